@@ -1,0 +1,64 @@
+# tilegrad_library(<folder> SOURCES ... LINK ... [FOREIGN ...]), tilegrad_test(...), tilegrad_bench(...):
+# one place for flags, so that a folder's CMakeLists.txt says only what it holds and what it needs.
+
+add_library(tilegrad_flags INTERFACE)
+target_compile_features(tilegrad_flags INTERFACE cxx_std_20)
+target_include_directories(tilegrad_flags INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
+# -ffp-contract=off: the reference means what it says, and gives the same bits under every compiler.
+target_compile_options(tilegrad_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -fno-math-errno -ffp-contract=off)
+if(TILEGRAD_WERROR)
+  target_compile_options(tilegrad_flags INTERFACE -Werror)
+endif()
+if(TILEGRAD_SANITIZE)
+  target_compile_options(tilegrad_flags INTERFACE
+    -fsanitize=${TILEGRAD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(tilegrad_flags INTERFACE -fsanitize=${TILEGRAD_SANITIZE})
+endif()
+
+# Highway: every kernel is compiled for each attainable target and EMU128, chosen at run time. Left out: targets between two
+# kept ones that would only cost compile time.
+add_library(tilegrad_simd INTERFACE)
+target_link_libraries(tilegrad_simd INTERFACE PkgConfig::LIBHWY)
+if(TILEGRAD_SIMD STREQUAL "scalar")
+  target_compile_definitions(tilegrad_simd INTERFACE HWY_COMPILE_ONLY_EMU128)
+else()
+  target_compile_definitions(tilegrad_simd INTERFACE
+    HWY_COMPILE_ALL_ATTAINABLE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
+endif()
+# Highway falls back from EMU128 to its one-lane target for GCC before 12.3; Debian 12 has 12.2. The tests hold EMU128 to the
+# reference with that very compiler, so the block is lifted: vectors of four lanes everywhere, one code path less.
+target_compile_definitions(tilegrad_simd INTERFACE HWY_BROKEN_EMU128=0)
+
+# tilegrad_library(base SOURCES a.cc b.cc LINK tilegrad::x FOREIGN fmt::fmt)
+function(tilegrad_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;FOREIGN" ${ARGN})
+  add_library(tilegrad_${name} STATIC ${ARG_SOURCES})
+  add_library(tilegrad::${name} ALIAS tilegrad_${name})
+  set_target_properties(tilegrad_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_link_libraries(tilegrad_${name} PUBLIC tilegrad_flags ${ARG_LINK} PRIVATE ${ARG_FOREIGN})
+endfunction()
+
+# tilegrad_test(raster_project project_test.cc LINK tilegrad::raster [LONG]): gtest binary <name>_test.
+# Suites or cases whose name contains "Long" run only in `./run test --long`; a test that has some says LONG.
+function(tilegrad_test name)
+  cmake_parse_arguments(ARG "LONG" "" "LINK" ${ARGN})
+  add_executable(${name}_test ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name}_test PRIVATE ${ARG_LINK} tilegrad_flags GTest::gtest GTest::gtest_main)
+  target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_compile_definitions(${name}_test PRIVATE TILEGRAD_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  add_test(NAME ${name} COMMAND ${name}_test --gtest_filter=-*Long* --gtest_brief=1)
+  set_tests_properties(${name} PROPERTIES LABELS short TIMEOUT 600)
+  if(ARG_LONG)
+    add_test(NAME ${name}_long COMMAND ${name}_test --gtest_filter=*Long* --gtest_brief=1)
+    set_tests_properties(${name}_long PROPERTIES LABELS long TIMEOUT 3000)
+  endif()
+endfunction()
+
+# tilegrad_bench(raster raster_bench.cc LINK tilegrad::render): Google Benchmark binary <name>_bench.
+function(tilegrad_bench name)
+  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
+  add_executable(${name}_bench ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name}_bench PRIVATE ${ARG_LINK} tilegrad_flags benchmark::benchmark benchmark::benchmark_main)
+endfunction()

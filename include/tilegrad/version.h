@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+// The version of the library, the single place where it is written in code (CMakeLists.txt holds
+// the same, a test compares).
+#pragma once
+#define TILEGRAD_VERSION_MAJOR 0
+#define TILEGRAD_VERSION_MINOR 1
+#define TILEGRAD_VERSION_PATCH 0
+#define TILEGRAD_VERSION "0.1.0"

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "base/error.h"
+
+namespace tilegrad {
+namespace {
+
+// Closes on scope exit; close(2) errors matter only when writing, where Close() is called and
+// checked.
+class FileHandle {
+ public:
+  FileHandle(const Path& path, int flags) : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {}
+  ~FileHandle() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  FileHandle(const FileHandle&) = delete;
+  FileHandle& operator=(const FileHandle&) = delete;
+  int fd() const { return fd_; }
+  bool Close() { return ::close(std::exchange(fd_, -1)) == 0; }
+
+ private:
+  int fd_;
+};
+
+Status SystemError(const Path& path, const char* doing) {
+  const int error = errno;
+  const auto code = error == ENOENT ? StatusCode::kNotFound : StatusCode::kIo;
+  return {code, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(error))};
+}
+
+bool WriteAll(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+std::span<const std::uint8_t> AsBytes(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+Status SyncFolder(const Path& folder) {
+  FileHandle handle(folder.empty() ? Path(".") : folder, O_RDONLY | O_DIRECTORY);
+  if (handle.fd() < 0 || ::fsync(handle.fd()) != 0)
+    return SystemError(folder, "cannot sync the folder");
+  return {};
+}
+
+Status WriteTemporary(const Path& temporary, std::span<const std::uint8_t> bytes) {
+  FileHandle file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+  if (file.fd() < 0) return SystemError(temporary, "cannot create");
+  if (!WriteAll(file.fd(), bytes)) return SystemError(temporary, "cannot write");
+  if (::fsync(file.fd()) != 0) return SystemError(temporary, "cannot sync");
+  if (!file.Close()) return SystemError(temporary, "cannot close");
+  return {};
+}
+
+template <class Container>
+Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
+  FileHandle file(path, O_RDONLY);
+  if (file.fd() < 0) return SystemError(path, "cannot open");
+  struct stat info = {};
+  if (::fstat(file.fd(), &info) != 0) return SystemError(path, "cannot stat");
+  if (!S_ISREG(info.st_mode)) return InvalidArgument("{}: not a regular file", path.string());
+  const auto size = static_cast<std::size_t>(info.st_size);
+  if (size > max_bytes) {
+    return ResourceExhausted("{}: {} bytes, more than the limit of {}", path.string(), size,
+                             max_bytes);
+  }
+  Container out(size, typename Container::value_type{});
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t n = ::read(file.fd(), out.data() + done, size - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return SystemError(path, "cannot read");
+    if (n == 0) return DataLoss("{}: ended after {} of {} bytes", path.string(), done, size);
+    done += static_cast<std::size_t>(n);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<Bytes> ReadFile(const Path& path, std::size_t max_bytes) {
+  return ReadWhole<Bytes>(path, max_bytes);
+}
+
+Result<std::string> ReadText(const Path& path, std::size_t max_bytes) {
+  return ReadWhole<std::string>(path, max_bytes);
+}
+
+Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes) {
+  if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
+  Path temporary = path;
+  temporary += fmt::format(".{}.tmp", ::getpid());
+  Status status = WriteTemporary(temporary, bytes);
+  if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
+    status = SystemError(path, "cannot rename the temporary file to this name");
+  }
+  if (!status.ok()) {
+    ::unlink(temporary.c_str());
+    return status;
+  }
+  return SyncFolder(path.parent_path());
+}
+
+Status WriteTextAtomic(const Path& path, std::string_view text) {
+  return WriteFileAtomic(path, AsBytes(text));
+}
+
+Status AppendText(const Path& path, std::string_view text, bool durable) {
+  FileHandle file(path, O_WRONLY | O_CREAT | O_APPEND);
+  if (file.fd() < 0) return SystemError(path, "cannot open");
+  if (!WriteAll(file.fd(), AsBytes(text))) return SystemError(path, "cannot append");
+  if (durable && ::fsync(file.fd()) != 0) return SystemError(path, "cannot sync");
+  if (!file.Close()) return SystemError(path, "cannot close");
+  return {};
+}
+
+Status MakeFolder(const Path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) return IoError("{}: cannot create the folder: {}", path.string(), error.message());
+  return {};
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Threads arrive as an argument: whoever computes is handed a Workers. This is the one home of
+// oneTBB.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "base/function_ref.h"
+
+namespace tilegrad {
+
+// A fixed number of workers. Copies nothing, has no global state; two Workers are independent.
+class Workers {
+ public:
+  explicit Workers(int count = 0);  // 0: one per core that this process may use
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  int count() const { return count_; }
+
+  // Calls task(index, worker) once for each index in [0, n) and returns when all are done; worker
+  // is in [0, count()) and no two calls with the same worker overlap, so it selects scratch memory.
+  // Which worker takes which index is not determined: results must depend on the index only, which
+  // is how the library keeps the same bits for any thread count. The task must not throw. Calls may
+  // nest.
+  void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
+
+  // The same over fixed ranges [begin, end) of at most `grain` indices; the split depends on n and
+  // grain only.
+  void ForRanges(
+      std::size_t n, std::size_t grain,
+      FunctionRef<void(std::size_t begin, std::size_t end, std::size_t worker)> task) const;
+
+ private:
+  struct Impl;
+  int count_;
+  std::unique_ptr<Impl> impl_;
+};
+
+// The cores this process may run on (its affinity mask), at least 1.
+int AvailableCores();
+
+}  // namespace tilegrad

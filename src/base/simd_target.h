@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which instruction set runs. Kernels are compiled for several Highway targets and the best one the
+// CPU has is taken at the first call; TILEGRAD_TARGET=AVX2 (say) in the environment forces one,
+// which makes results reproducible across machines.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+// Names ("AVX2", "SSE4", "EMU128", ...) of the targets that are compiled in and that this CPU can
+// run, best first.
+std::vector<std::string> RunnableTargets();
+// The name of the one that kernels use now.
+std::string ActiveTarget();
+// Uses only `name` from now on, or the best one again if `name` is empty. Not while kernels run.
+// Unknown or not runnable: an error that lists RunnableTargets().
+Status ForceTarget(const std::string& name);
+// ForceTarget(getenv("TILEGRAD_TARGET")) where that is set. Programs call it once at start.
+Status ForceTargetFromEnvironment();
+
+}  // namespace tilegrad

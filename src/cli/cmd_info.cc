@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad info: version, SIMD targets and why one was chosen, cores.
+#include <fmt/core.h>
+
+#include <cstdlib>
+
+#include "base/parallel.h"
+#include "base/simd_target.h"
+#include "cli/command.h"
+#include "tilegrad/version.h"
+
+namespace tilegrad::cli {
+namespace {
+
+Status PrintInfo() {
+  fmt::print("tilegrad {}\n", TILEGRAD_VERSION);
+  fmt::print("cores this process may use: {}\n", AvailableCores());
+  fmt::print("SIMD targets this CPU and build offer, best first:");
+  for (const auto& name : RunnableTargets()) fmt::print(" {}", name);
+  const bool forced = std::getenv("TILEGRAD_TARGET") != nullptr;
+  fmt::print(
+      "\nin use: {} ({})\n", ActiveTarget(),
+      forced ? "forced by TILEGRAD_TARGET" : "the best; set TILEGRAD_TARGET=NAME to force another");
+  return {};
+}
+
+}  // namespace
+
+void AddInfo(CLI::App& app, Action* action) {
+  auto* command = app.add_subcommand("info", "Show version, SIMD targets and cores");
+  command->callback([action] { *action = PrintInfo; });
+}
+
+}  // namespace tilegrad::cli

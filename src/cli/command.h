@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The commands of the program. Each lives in its own file cmd_<name>.cc, declares its options on a
+// CLI11 subcommand and, when chosen, returns a Status whose message the program prints; main.cc
+// alone maps it to an exit code.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad::cli {
+
+// What a chosen subcommand does once options are parsed.
+using Action = std::function<Status()>;
+
+// Adds a subcommand to `app`; when it is given on the command line, sets *action.
+void AddInfo(CLI::App& app, Action* action);
+
+}  // namespace tilegrad::cli

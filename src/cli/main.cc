@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program `tilegrad`. Exit codes: 0 done, 1 the work failed, 2 the command line or
+// configuration is wrong, 3 an input file is missing or broken, 130 stopped by a signal (state
+// saved).
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "base/simd_target.h"
+#include "cli/command.h"
+#include "tilegrad/version.h"
+
+namespace tilegrad::cli {
+namespace {
+
+int ExitCode(StatusCode code) {
+  switch (code) {
+    case StatusCode::kOk:
+      return 0;
+    case StatusCode::kInvalidArgument:
+      return 2;
+    case StatusCode::kNotFound:
+    case StatusCode::kDataLoss:
+      return 3;
+    case StatusCode::kCancelled:
+      return 130;
+    default:
+      return 1;
+  }
+}
+
+int Report(const Status& status) {
+  if (!status.ok()) fmt::print(stderr, "tilegrad: {}\n", status.message());
+  return ExitCode(status.code());
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
+               "tilegrad");
+  app.set_version_flag("--version", TILEGRAD_VERSION);
+  app.require_subcommand(1);
+  Action action;
+  AddInfo(app, &action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? 0 : 2;
+  }
+  if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
+  return Report(action());
+}
+
+}  // namespace
+}  // namespace tilegrad::cli
+
+int main(int argc, char** argv) {
+  try {
+    return tilegrad::cli::Run(argc, argv);
+  } catch (const std::exception&
+               error) {  // out of memory, or a library that throws: still a sentence and a code
+    fmt::print(stderr, "tilegrad: unexpected failure: {}\n", error.what());
+    return 1;
+  }
+}

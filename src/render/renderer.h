@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// The differentiable renderer: scenes in, images out; gradients of images in, gradients of scenes
+// out (paper, section 3).
+//
+// A batch of N scenes, each with its own mesh and camera, is rendered to N images of one size.
+// Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha of
+// background pixels is equation 6 over all faces, within `max_alpha_error`. The backward pass is
+// analytic and needs only the Frame: face ids and alpha.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "base/parallel.h"
+#include "scene/camera.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+enum class AttributeRate { kVertex, kCorner };
+enum class FaceCulling {
+  kNone,
+  kBack
+};  // kBack: clockwise faces are not drawn, but take part in alpha (spec 1.4)
+enum class Interpolation {
+  kPerspective,   // attributes are linear on the face in space: what a camera sees
+  kScreenLinear,  // linear on the screen: the paper's implementation
+};
+
+// Views over arrays of the caller, who keeps them alive and unchanged until Backward.
+template <class T>
+struct SceneViewT {
+  std::span<const T> positions;         // [V,3] world
+  std::span<const std::int32_t> faces;  // [F,3] indices in [0, V)
+  std::span<const T> attributes;        // [V,C] or [F,3,C] by `rate`; empty if channels == 0
+  int channels = 0;                     // C >= 0
+  AttributeRate rate = AttributeRate::kVertex;
+  CameraT<T> camera;
+};
+
+struct RenderOptions {
+  int width = 64, height = 64;  // pixels, 1..16384
+  double delta = 1.0 / 7000;    // equation 5: A = exp(-d^2 / delta), d in NDC (the image spans [-1,
+                                // 1] in each axis); > 0
+  double max_alpha_error =
+      1e-6;  // |alpha - equation 6 over all faces| <= this, in [0, 1]; 0 drops nothing
+  Interpolation interpolation = Interpolation::kPerspective;
+  FaceCulling culling = FaceCulling::kNone;
+};
+
+// Which images are wanted. What is not wanted is not computed and takes no memory.
+struct RenderRequest {
+  bool attributes = true;
+  bool alpha = true;
+  bool depth = false;
+  bool barycentrics = false;  // perspective-correct or screen-linear, as the options say
+};
+
+// The images of a batch, planar: N images, row 0 on top. Reused between calls of one size without
+// allocation.
+template <class T>
+struct FrameT {
+  int images = 0, channels = 0, height = 0, width = 0;
+  AlignedVector<std::int32_t>
+      face_ids;                 // [N,H,W] index into the scene's faces, -1 background; always there
+  AlignedVector<T> attributes;  // [N,C,H,W]; 0 at background pixels
+  AlignedVector<T> alpha;       // [N,H,W]; exactly 1 at foreground pixels
+  AlignedVector<T> depth;       // [N,H,W]; +infinity at background pixels
+  AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
+                                  // at background
+  double alpha_error_bound =
+      0;  // what culling really spent: no pixel is farther than this from equation 6
+};
+
+// dL/d(image); an empty span is zero. Shapes as in Frame.
+template <class T>
+struct FrameGradientsT {
+  std::span<const T> attributes;
+  std::span<const T> alpha;
+};
+
+// dL/d(scene), overwritten. An empty span (or false) is not computed.
+template <class T>
+struct SceneGradientsT {
+  std::span<T> positions;   // [V,3]
+  std::span<T> attributes;  // as SceneView::attributes
+  bool camera = false;      // fill d_camera
+  CameraT<T> d_camera;      // entry-wise: dL/d(rotation[i]), ..., as if all entries were free;
+                            // near_plane gets 0
+};
+
+using SceneView = SceneViewT<float>;
+using Frame = FrameT<float>;
+using FrameGradients = FrameGradientsT<float>;
+using SceneGradients = SceneGradientsT<float>;
+
+// Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
+// at a time per Renderer. Same bits for any worker count and any run. All scenes of a batch have
+// the same number of channels.
+class Renderer {
+ public:
+  explicit Renderer(const Workers& workers);  // keeps a reference
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+
+  // Errors: a span of the wrong size (names scene, array, expected and got), an index out of range,
+  // a non-finite input (names scene, array, index), options out of range. Then `frame` is left
+  // unspecified.
+  Status Render(std::span<const SceneView> scenes, const RenderOptions& options,
+                const RenderRequest& request, Frame* frame);
+
+  // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` needs alpha
+  // where d_frame has it.
+  Status Backward(std::span<const SceneView> scenes, const RenderOptions& options,
+                  const Frame& frame, const FrameGradients& d_frame,
+                  std::span<SceneGradients> d_scenes);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tilegrad

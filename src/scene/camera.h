@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one camera of the project. docs/conventions.md has a picture and a number for each rule
+// below.
+#pragma once
+
+namespace tilegrad {
+
+// Pinhole camera: world to camera, then camera to pixels.
+//
+//   p_cam = rotation * p_world + translation      (rows of `rotation`: the camera's x, y, z axes in
+//   world coordinates) x = cx + fx * p_cam.x / -p_cam.z              (pixels from the left edge of
+//   the image) y = cy - fy * p_cam.y / -p_cam.z              (pixels from the top edge of the
+//   image)
+//
+// Camera axes as OpenGL: x right, y up, the camera looks along -z, so visible points have p_cam.z <
+// 0 and depth = -p_cam.z. Pixel (column j, row i) has its centre at (j + 0.5, i + 0.5); row 0 is
+// the top.
+template <class T>
+struct CameraT {
+  T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
+  T translation[3] = {0, 0, 0};                 // world units
+  T fx = 64, fy = 64;                           // focal lengths, pixels
+  T cx = 32, cy = 32;                           // principal point, pixels
+  T near_plane = T(1e-2);                       // > 0, world units; what is nearer is clipped away
+};
+using Camera = CameraT<float>;
+
+// Degrees; `fov_y` is the full vertical field of view; the principal point is the image centre,
+// pixels are square.
+struct Lens {
+  double fov_y =
+      49.13434207744484;        // Blender's default, f = 35/16, of the paper's renders (spec: 1.1)
+  int width = 64, height = 64;  // pixels
+};
+
+// A camera at distance * (cos el cos az, sin el, cos el sin az) that looks at the origin with y up;
+// degrees. Elevations of exactly +-90 take the limit from below (up is then the horizontal
+// direction), so every finite input gives a rotation.
+Camera OrbitCamera(const Lens& lens, double azimuth, double elevation, double distance);
+
+// A camera at `eye` that looks at `target`. `up` need only be independent of the viewing direction;
+// if it is not, another axis is taken.
+Camera LookAtCamera(const Lens& lens, const float eye[3], const float target[3], const float up[3]);
+
+// Element-wise conversion, e.g. to double for the reference.
+template <class T, class U>
+CameraT<T> CameraCast(const CameraT<U>& c) {
+  CameraT<T> out;
+  for (int i = 0; i < 9; ++i) out.rotation[i] = static_cast<T>(c.rotation[i]);
+  for (int i = 0; i < 3; ++i) out.translation[i] = static_cast<T>(c.translation[i]);
+  out.fx = static_cast<T>(c.fx), out.fy = static_cast<T>(c.fy);
+  out.cx = static_cast<T>(c.cx), out.cy = static_cast<T>(c.cy);
+  out.near_plane = static_cast<T>(c.near_plane);
+  return out;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/image.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+struct Texture {
+  std::string name;  // file name or label, for messages
+  ImageU8 image;     // 3 or 4 channels; row 0 on top is v = 1
+};
+
+struct Material {
+  std::string name;
+  glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies the texture; alpha < 1 is glass
+  int base_color_texture = -1;                      // index into Mesh::textures, -1 for none
+};
+
+using Face = std::array<std::int32_t, 3>;
+
+// A triangle mesh that owns its arrays. V vertices, F faces. Counter-clockwise faces seen from
+// outside are front faces.
+struct Mesh {
+  std::vector<glm::vec3> positions;  // [V]
+  std::vector<Face> faces;           // [F], indices in [0, V)
+
+  // Per vertex; each is empty or has V entries.
+  std::vector<glm::vec3> normals;  // unit
+  std::vector<glm::vec4> colors;   // [0, 1]
+
+  // Per corner; each is empty or has 3F entries (corner k of face f is 3f + k), so seams need no
+  // doubled vertices.
+  std::vector<glm::vec2>
+      corner_uvs;  // u right, v up; (0,0) is the lower left corner of the texture
+  std::vector<glm::vec3> corner_normals;
+
+  std::vector<std::int32_t> face_materials;  // empty (all 0) or [F], indices into materials
+  std::vector<Material> materials;
+  std::vector<Texture> textures;
+};
+
+// OK, or an error that names the array and the index: sizes that do not match, an index out of
+// range, a non-finite number.
+Status Validate(const Mesh& mesh);
+
+struct Bounds {
+  glm::vec3 low, high;
+};
+// Over vertices that faces use. The mesh must be valid and have a face.
+Bounds MeshBounds(const Mesh& mesh);
+
+// Moves the centre of the bounding box to the origin and scales so that the largest half-extent is
+// `half_extent` (spec 5.1: 0.45). An error for an empty mesh or one without extent.
+Status NormalizeToBox(Mesh& mesh, float half_extent);
+
+}  // namespace tilegrad

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// A dataset on disk: rendered views of 3D models, split by model, and what evaluation needs.
+//
+//   <folder>/dataset.json              DatasetInfo: how it was made, camera rule, classes, credits
+//   <folder>/models.jsonl              one ModelInfo a line, in a fixed order; written when the
+//   dataset is complete <folder>/rejected.jsonl            models that could not be used: id,
+//   class, file, reason <folder>/models/<class>/<id>.npz   ModelData: images, occupancy, points,
+//   mesh <folder>/contact_sheet.png         to look at
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "scene/camera.h"
+#include "scene/mesh.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::train {
+
+// The same for every model: view i is OrbitCamera(lens, azimuth_step * i, elevation, distance)
+// (spec 5.1, 5.2).
+struct CameraRule {
+  Lens lens;                    // width = height = the image size
+  double azimuth_step = -15.0;  // degrees
+  double elevation = 27.0;      // degrees
+  double distance = 1.45;       // world units; the object's largest half-extent is `half_extent`
+  double half_extent = 0.45;
+  Camera View(int index) const;
+};
+
+struct DatasetInfo {
+  std::string source;   // "sweethome3d", "shapenet", "folder", "procedural", "nmr"
+  int image_size = 64;  // pixels, square
+  int views = 24;       // per model
+  CameraRule camera;
+  std::vector<std::string> classes;  // sorted; ModelInfo::class_index points here
+  std::vector<std::string> credits;  // one sentence a source
+};
+
+enum class Split { kTrain, kValidation, kTest };
+
+struct ModelInfo {
+  std::string id;    // unique in its class, safe as a file name
+  std::string name;  // for people
+  int class_index = 0;
+  Split split = Split::kTrain;
+  std::string license, creator;  // empty where unknown
+  int source_faces = 0;          // triangles before anything was done to it
+};
+
+inline constexpr int kOccupancyResolution = 32;  // voxels a side
+inline constexpr int kTruthPoints = 2500;        // spec section 6
+
+struct ModelData {
+  // [views][4][size][size], planar RGBA, row 0 on top. RGB is composited over black (premultiplied
+  // by the anti-aliased alpha).
+  std::vector<std::uint8_t> images;
+  // [32][32][32] as [x][y][z], 0 or 1: solid occupancy of the mesh scaled to fill the cube
+  // (train/metrics.h says the rule).
+  std::vector<std::uint8_t> occupancy;
+  std::vector<glm::vec3>
+      points;  // kTruthPoints area-weighted samples of the surface; largest half-extent 0.45
+  Mesh mesh;  // normalised truth, positions, faces and per-vertex colours; at most 5,000 faces, for
+              // reports
+};
+
+class Dataset {
+ public:
+  // Reads the two index files; errors name the file and line. Model files are read by Load.
+  static Result<Dataset> Open(const Path& folder);
+
+  const Path& folder() const { return folder_; }
+  const DatasetInfo& info() const { return info_; }
+  const std::vector<ModelInfo>& models() const { return models_; }
+  std::vector<int> Select(Split split) const;  // indices into models(), ascending
+
+  Result<ModelData> Load(int model) const;                        // everything
+  Result<std::vector<std::uint8_t>> LoadImages(int model) const;  // ModelData::images only
+  Path ModelPath(int model) const;
+
+ private:
+  Path folder_;
+  DatasetInfo info_;
+  std::vector<ModelInfo> models_;
+};
+
+}  // namespace tilegrad::train

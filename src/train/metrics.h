@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The paper's 3D metrics (section 5.1; spec section 6).
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "scene/mesh.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::train {
+
+// Solid occupancy of a mesh that is first scaled and moved so that its bounding box is centred in,
+// and its longest side fills, the cube [0, resolution]^3; voxel (i, j, k) has its centre at (i +
+// 0.5, j + 0.5, k + 0.5). A voxel is solid if the surface passes through it or if it cannot be
+// reached from outside (carving), so soups of open shells have a well-defined inside. Returns
+// [x][y][z] of 0 or 1. An error for an invalid mesh or one without extent.
+Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
+
+// |a and b| / |a or b|; 1 if both are empty. The sizes must agree.
+double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
+
+// `count` points distributed by area (deterministic in `seed`). An error if the surface has no
+// area.
+Result<std::vector<glm::vec3>> SampleSurface(const Mesh& mesh, int count, std::uint64_t seed);
+
+struct SurfaceScore {
+  double chamfer = 0;    // mean of the two mean nearest distances
+  double precision = 0;  // share of predicted points within the threshold of the truth
+  double recall = 0;
+  double f_score = 0;  // 2 P R / (P + R), 0 if both are 0
+};
+// Euclidean nearest neighbours; `threshold` in world units (the paper: 0.02 with the longest side
+// 0.9).
+SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<const glm::vec3> truth,
+                             double threshold);
+
+}  // namespace tilegrad::train

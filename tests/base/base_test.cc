@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <set>
+
+#include "base/aligned.h"
+#include "base/file.h"
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "base/simd_target.h"
+
+namespace tilegrad {
+namespace {
+
+TEST(Workers, CallsEachIndexOnceAndNeverTwoAtATimePerWorker) {
+  for (int count : {1, 2, 3, 7}) {
+    Workers workers(count);
+    std::vector<std::atomic<int>> calls(1000), busy(static_cast<std::size_t>(count));
+    workers.For(calls.size(), [&](std::size_t i, std::size_t w) {
+      ASSERT_LT(w, busy.size());
+      ASSERT_EQ(busy[w]++, 0);
+      ++calls[i];
+      --busy[w];
+    });
+    for (const auto& c : calls) EXPECT_EQ(c, 1);
+  }
+}
+
+TEST(Workers, NestedLoopsKeepWorkersApart) {
+  Workers workers(3);
+  std::vector<std::atomic<int>> busy(3);
+  std::atomic<int> total = 0;
+  workers.For(20, [&](std::size_t, std::size_t w) {
+    ASSERT_EQ(busy[w]++, 0);
+    workers.For(20, [&](std::size_t, std::size_t) { ++total; });
+    --busy[w];
+  });
+  EXPECT_EQ(total, 400);
+}
+
+TEST(Workers, RangesDependOnSizeAndGrainOnly) {
+  for (int count : {1, 5}) {
+    Workers workers(count);
+    std::vector<std::size_t> ends(4);
+    workers.ForRanges(10, 3, [&](std::size_t b, std::size_t e, std::size_t) { ends[b / 3] = e; });
+    EXPECT_EQ(ends, (std::vector<std::size_t>{3, 6, 9, 10}));
+  }
+}
+
+TEST(Rng, StreamsAreReproducibleAndResumable) {
+  Rng a(7, 3), b(7, 3), other(7, 4);
+  for (int i = 0; i < 10; ++i) a.Next();
+  b.set_counter(10);
+  EXPECT_EQ(a.Next(), b.Next());
+  EXPECT_NE(Rng(7, 3).Next(), other.Next());
+}
+
+TEST(Rng, MomentsOfUniformAndNormal) {
+  Rng rng(1);
+  double sum = 0, normal = 0, squares = 0;
+  const int n = 200000;
+  for (int i = 0; i < n; ++i) {
+    sum += rng.Uniform();
+    const double z = rng.Normal();
+    normal += z, squares += z * z;
+  }
+  // Five standard errors: 5 * sqrt(1/12/n), 5 / sqrt(n), 5 * sqrt(2/n).
+  EXPECT_NEAR(sum / n, 0.5, 5 * std::sqrt(1.0 / 12 / n));
+  EXPECT_NEAR(normal / n, 0, 5 / std::sqrt(n));
+  EXPECT_NEAR(squares / n, 1, 5 * std::sqrt(2.0 / n));
+}
+
+TEST(Rng, BelowCoversItsRange) {
+  Rng rng(2);
+  std::set<std::uint64_t> seen;
+  for (int i = 0; i < 200; ++i) seen.insert(rng.Below(6));
+  EXPECT_EQ(seen, (std::set<std::uint64_t>{0, 1, 2, 3, 4, 5}));
+}
+
+TEST(Arena, ReusesMemoryAfterReset) {
+  Arena arena;
+  for (int round = 0; round < 2; ++round) {
+    arena.Reset();
+    for (int i = 0; i < 10; ++i) {
+      auto span = arena.Allocate<float>(50000);
+      EXPECT_EQ(reinterpret_cast<std::uintptr_t>(span.data()) % kAlignment, 0u);
+    }
+  }
+  arena.Reset();
+  const std::size_t held = arena.capacity();
+  for (int i = 0; i < 10; ++i) (void)arena.Allocate<float>(50000);
+  EXPECT_EQ(arena.capacity(), held);
+}
+
+class FileTest : public testing::Test {
+ protected:
+  FileTest()
+      : folder_(Path(testing::TempDir()) / ("tilegrad_file_" + std::to_string(::getpid()))) {}
+  ~FileTest() override { std::filesystem::remove_all(folder_); }
+  Path folder_;
+};
+
+TEST_F(FileTest, WritesWholeAndReadsBack) {
+  const Path path = folder_ / "a" / "b.txt";
+  ASSERT_TRUE(WriteTextAtomic(path, "one").ok());
+  ASSERT_TRUE(WriteTextAtomic(path, "two").ok());
+  EXPECT_EQ(ReadText(path).value(), "two");
+  ASSERT_TRUE(AppendText(path, "!", true).ok());
+  EXPECT_EQ(ReadText(path).value(), "two!");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}),
+            1);  // no temporary left
+}
+
+TEST_F(FileTest, ErrorsNameThePath) {
+  const auto missing = ReadFile(folder_ / "none");
+  EXPECT_EQ(missing.status().code(), StatusCode::kNotFound);
+  EXPECT_NE(missing.status().message().find("none"), std::string::npos);
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "big", "12345").ok());
+  EXPECT_EQ(ReadFile(folder_ / "big", 4).status().code(), StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReadFile(folder_).status().code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(FileTest, FailedWriteLeavesTheOldFile) {
+  const Path path = folder_ / "f";
+  ASSERT_TRUE(WriteTextAtomic(path, "old").ok());
+  // The temporary cannot be renamed over a folder that is not empty.
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "d" / "x", "x").ok());
+  EXPECT_FALSE(WriteTextAtomic(folder_ / "d", "new").ok());
+  EXPECT_EQ(ReadText(folder_ / "d" / "x").value(), "x");
+  // /dev/full refuses every byte.
+  EXPECT_EQ(AppendText("/dev/full", "x", false).code(), StatusCode::kIo);
+}
+
+TEST(SimdTarget, ForcesEveryRunnableTargetAndRefusesOthers) {
+  const auto targets = RunnableTargets();
+  ASSERT_FALSE(targets.empty());
+  EXPECT_EQ(targets.back(), "EMU128");
+  for (const auto& name : targets) {
+    ASSERT_TRUE(ForceTarget(name).ok());
+    EXPECT_EQ(ActiveTarget(), name);
+    EXPECT_EQ(RunnableTargets(), targets);
+  }
+  EXPECT_EQ(ForceTarget("AVX9").code(), StatusCode::kInvalidArgument);
+  ASSERT_TRUE(ForceTarget("").ok());
+  EXPECT_EQ(ActiveTarget(), targets.front());
+}
+
+}  // namespace
+}  // namespace tilegrad
