@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// How long work reports on itself and is asked to stop, without the library printing or catching
+// signals.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace tilegrad {
+
+struct Progress {
+  std::string stage;        // "rendering", "training", ...
+  std::uint64_t done = 0;   // units finished
+  std::uint64_t total = 0;  // units of this stage; 0 where unknown
+  std::string note;         // rates and losses worth showing, or empty
+};
+
+// Called from one thread at a time, as often as the work likes; the receiver limits how often it
+// draws.
+using ProgressSink = std::function<void(const Progress&)>;
+
+// Set from a signal handler or another thread; long work looks at it between units, saves, and
+// returns StatusCode::kCancelled.
+using StopFlag = std::atomic<bool>;
+
+}  // namespace tilegrad

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/console.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+
+namespace tilegrad::cli {
+namespace {
+
+constexpr double kSilentSeconds = 2, kTerminalInterval = 0.2, kLogInterval = 10;
+
+StopFlag g_stop = false;  // a signal handler can reach nothing but a global
+
+extern "C" void HandleStop(int signal) {
+  g_stop = true;
+  std::signal(signal, SIG_DFL);
+}
+
+double Seconds(std::chrono::steady_clock::duration d) {
+  return std::chrono::duration<double>(d).count();
+}
+
+}  // namespace
+
+std::string FormatDuration(double seconds) {
+  const auto s = static_cast<long>(seconds + 0.5);
+  if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+  return fmt::format("{}:{:02}", s / 60, s % 60);
+}
+
+const StopFlag& StopOnSignals() {
+  std::signal(SIGINT, HandleStop);
+  std::signal(SIGTERM, HandleStop);
+  return g_stop;
+}
+
+ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+ProgressLine::~ProgressLine() { Finish(); }
+
+ProgressSink ProgressLine::Sink() {
+  return [this](const Progress& progress) { Show(progress); };
+}
+
+void ProgressLine::Show(const Progress& progress) {
+  const auto now = Clock::now();
+  if (progress.stage != last_.stage) {
+    Finish();
+    stage_start_ = last_draw_ = now;
+    first_done_ = progress.done;
+  }
+  last_ = progress;
+  const double elapsed = Seconds(now - stage_start_);
+  const double interval = terminal_ ? kTerminalInterval : kLogInterval;
+  if (elapsed < kSilentSeconds || (drawn_ && Seconds(now - last_draw_) < interval)) return;
+  Draw(progress, elapsed);
+  last_draw_ = now;
+}
+
+void ProgressLine::Draw(const Progress& p, double seconds) {
+  std::string line = p.stage;
+  if (p.total > 0) {
+    line += fmt::format("  {}/{}  {:.0f}%", p.done, p.total,
+                        100.0 * static_cast<double>(p.done) / static_cast<double>(p.total));
+    if (p.done > first_done_ && p.done < p.total) {
+      const double each = seconds / static_cast<double>(p.done - first_done_);
+      line +=
+          fmt::format("  {} left", FormatDuration(each * static_cast<double>(p.total - p.done)));
+    }
+  } else {
+    line += fmt::format("  {}", p.done);
+  }
+  if (!p.note.empty()) line += "  " + p.note;
+  fmt::print(stderr, "{}{}{}", terminal_ ? "\r" : "", line, terminal_ ? "\x1b[K" : "\n");
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+void ProgressLine::Finish() {
+  if (drawn_) {
+    Draw(last_, Seconds(Clock::now() - stage_start_));
+    if (terminal_) fmt::print(stderr, "\n");
+  }
+  drawn_ = false;
+  last_ = {};
+}
+
+}  // namespace tilegrad::cli
