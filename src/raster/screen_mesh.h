@@ -1,41 +1,88 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `project` hands on: a mesh on the screen of one camera, as structure of arrays.
+// What `project` hands on: a mesh on the screen of one camera, as structure of arrays; and the
+// gradient that comes back.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
+#include "base/aligned.h"
+
 namespace tilegrad::raster {
+
+// A vertex made by near clipping, on an edge of the source mesh: p = (1 - t) * a + t * b. a is the
+// visible end, b the hidden one.
+template <class T>
+struct ClipVertexT {
+  std::int32_t a, b;  // source vertices
+  T t;
+};
 
 // Views over scratch that belongs to the renderer; valid for one frame. V and F count the vertices
 // and faces *after* near clipping: clipping appends vertices and replaces a cut face by one or two,
-// which keep the identity of their source. Screen coordinates are pixels: x right from the left
-// edge, y down from the top edge.
+// which stand in its place in the order and keep the identity of their source. Screen coordinates
+// are pixels: x right from the left edge, y down from the top edge. Source vertices nearer than the
+// near plane have x = y = inverse_depth = 0 and belong to kFaceBehind faces only.
 template <class T>
 struct ScreenMeshT {
   std::span<const T> x, y;                   // [V] pixels
-  std::span<const T> depth;                  // [V] -p_cam.z, >= near plane
+  std::span<const T> depth;                  // [V] -p_cam.z; >= near plane where a face is drawn
   std::span<const T> inverse_depth;          // [V] 1 / depth
   std::span<const std::int32_t> v0, v1, v2;  // [F] vertex indices
-  std::span<const std::int32_t>
-      source_face;  // [F] the face of the caller's mesh; equals the index where nothing was clipped
-  // A clipped vertex lies on an edge of the source mesh: p = (1 - t) * a + t * b. For the others, a
-  // = b = own index and t = 0.
-  std::span<const std::int32_t> clip_a, clip_b;  // [V] source vertices
-  std::span<const T> clip_t;                     // [V]
-  // Per face: bits of FaceReject; 0 is drawn.
-  std::span<const std::uint8_t> reject;  // [F]
-  int width = 0, height = 0;             // pixels
+  // [F] the face of the caller's mesh, ascending; equals the index where nothing was clipped.
+  std::span<const std::int32_t> source_face;
+  // [V - source_vertices] where the appended vertices come from; empty if nothing was clipped.
+  std::span<const ClipVertexT<T>> clipped;
+  std::span<const std::uint8_t> reject;  // [F] bits of FaceReject; 0 is drawn
+  std::int32_t source_vertices = 0;
+  std::int32_t source_faces = 0;
+  int width = 0, height = 0;  // pixels
+
+  std::size_t vertices() const { return x.size(); }
+  std::size_t faces() const { return v0.size(); }
+  bool was_clipped() const { return !clipped.empty(); }
+  std::int32_t vertex(std::size_t face, int corner) const {
+    return corner == 0 ? v0[face] : corner == 1 ? v1[face] : v2[face];
+  }
 };
 using ScreenMesh = ScreenMeshT<float>;
 
 enum FaceReject : std::uint8_t {
   kFaceDrawn = 0,
-  kFaceBehind = 1,      // wholly nearer than the near plane
+  kFaceBehind = 1,      // wholly nearer than the near plane: no pixel, no soft mask
   kFaceDegenerate = 2,  // zero area on the screen: no pixel; still takes part in the soft mask,
                         // where it is a segment or point
   kFaceCulled =
       4,  // faces away and culling is on: no pixel; still takes part in the soft mask (spec 1.4)
+  kFaceOverflow = 8,  // a vertex projects to infinity: no pixel, no soft mask
 };
+inline constexpr std::uint8_t kFaceNotInSoftMask = kFaceBehind | kFaceOverflow;
+
+// Owns what a ScreenMesh looks at. Reused from frame to frame.
+template <class T>
+struct ScreenMeshBuffersT {
+  AlignedVector<T> x, y, depth, inverse_depth;
+  AlignedVector<std::int32_t> v0, v1, v2, source_face;
+  AlignedVector<ClipVertexT<T>> clipped;
+  AlignedVector<std::uint8_t> reject;
+  std::int32_t source_vertices = 0, source_faces = 0;
+  int width = 0, height = 0;
+
+  ScreenMeshT<T> View() const {
+    return {x,           y,       depth,  inverse_depth,   v0,           v1,    v2,
+            source_face, clipped, reject, source_vertices, source_faces, width, height};
+  }
+};
+using ScreenMeshBuffers = ScreenMeshBuffersT<float>;
+
+// dL/d(ScreenMesh); whoever produces a gradient adds to it.
+template <class T>
+struct ScreenGradientsT {
+  std::span<T> d_x, d_y;         // [V] per pixel
+  std::span<T> d_inverse_depth;  // [V]
+  std::span<T> d_clip_t;         // [V - source_vertices] through what was interpolated at the cut
+};
+using ScreenGradients = ScreenGradientsT<float>;
 
 }  // namespace tilegrad::raster

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rules of the rasterizer, decided once. docs/conventions.md says the same in prose.
+//
+// 1. Screen. x right, y down, pixels; pixel (column j, row i) is the square [j, j+1) x [i, i+1) and
+//    its centre is (j + 0.5, i + 0.5). Camera and projection: scene/camera.h.
+//
+//        0        1        2  x
+//      0 +--------+--------+--        NDC (what delta and the soft mask are measured in) spans
+//        |        |        |          [-1, 1] over the image in each axis with y up:
+//        |   *    |   *    |            x_ndc = 2 x / W - 1,   y_ndc = 1 - 2 y / H.
+//        | (0,0)  | (1,0)  |
+//      1 +--------+--------+--
+//      y
+//
+// 2. Winding. Counter-clockwise faces, seen, are front faces. y points down, so their doubled area
+//    (x1-x0)(y2-y0) - (x2-x0)(y1-y0) is negative. With culling off both windings are drawn; a
+//    culled face covers no pixel but takes part in the soft mask, as in DIB-R.
+//
+//           2                  front: 0 -> 1 -> 2 against the clock
+//          / \                 back:  with the clock
+//         /   \                                                                              .
+//        0-----1
+//
+// 3. Coverage is decided in integers. Vertices are rounded to the nearest 1/1024 pixel and the edge
+//    functions of the rounded triangle are evaluated without error, so two faces that share an edge
+//    (the same two vertices) cannot disagree about a pixel centre. A centre exactly on an edge
+//    belongs to the face whose left or top edge it is:
+//
+//        +--------+       E(p) = (b - a) x (p - a), a -> b an edge of the face, wound so that its
+//        |\       |       doubled area is positive (clockwise as seen); inside is E > 0, and E = 0
+//        | \  B   |       only on
+//        |  \     |         left edges (they go up: b.y < a.y) and
+//        | A *    |         top edges (horizontal, going right: b.y = a.y, b.x > a.x).
+//        |    \   |       The centre * lies on the diagonal: the diagonal is B's left edge and A's
+//        +-----\--+       right edge, so B has the pixel and A has not.
+//
+//    Hence a centre inside a closed fan of faces is covered exactly once, and there are neither
+//    cracks nor doubled pixels. Everything smooth (interpolation, the soft mask, gradients) uses
+//    the unrounded coordinates: it stays differentiable, and its weights may leave [0, 1] by what
+//    1/2048 pixel makes.
+//
+// 4. Depth. The nearest face wins; depth = -p_cam.z at the pixel centre, compared as 1/depth, which
+//    is linear on the screen. At equal 1/depth (coinciding faces) the face with the lower id in the
+//    caller's mesh wins.
+//
+// 5. Face ids are indices into the caller's faces, int32; -1 is background. A pixel is foreground
+//    (alpha = 1) if and only if it has a face id.
+//
+// 6. Near plane. Faces are cut at depth = near_plane and the part beyond is kept; the new vertices
+//    are computed from the two ends of the cut edge in the order visible end, hidden end, so that
+//    faces that share the edge get the same vertex. Pieces keep the id of their source face, and
+//    gradients flow through the cut.
+//
+//            visible   |near|   hidden          v = (1 - t) a + t b,
+//              a-------v- - - - -b              t = (near - depth_a) / (depth_b - depth_a)
+//
+// 7. Not drawn: faces wholly nearer than the near plane; faces of zero area after rounding
+//    (degenerate; in the soft mask they are segments or points); culled faces; faces with a vertex
+//    whose projection overflows (they take no part in the soft mask either). Off-screen faces cover
+//    nothing, but may reach into the image softly. Non-finite input is an error of Render.
+//
+// 8. Slivers. Interpolation divides by a face's height on the screen. A face thinner than 1/64
+//    pixel is interpolated flat: the mean of its corners, and no gradient of positions through
+//    attributes, since that gradient grows with 1/height without bound.
+#pragma once
+
+#include <cstdint>
+
+namespace tilegrad::raster {
+
+inline constexpr int kSubpixelBits = 10;  // coverage: 1/1024 pixel
+inline constexpr std::int64_t kSubpixels = std::int64_t{1} << kSubpixelBits;
+inline constexpr int kTileSize = 16;         // pixels; the unit of work
+inline constexpr int kMaxImageSize = 16384;  // pixels, each axis
+// Coordinates up to here give edge functions that step through a tile in 32 bits (see coverage.h);
+// every vertex on the largest image is inside.
+inline constexpr float kGuardBand = 16384.0f;  // pixels
+// Coordinates beyond are moved here, for coverage only: the exact edge functions need 128 bits.
+inline constexpr double kMaxSnap = 0x1p40;       // pixels
+inline constexpr double kFlatHeight = 1.0 / 64;  // pixels, rule 8
+
+}  // namespace tilegrad::raster
