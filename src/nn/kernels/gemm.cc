@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/kernels/gemm.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/kernels/gemm.cc"
+#include <hwy/foreach_target.h>  // must come before highway.h
+
+#include "nn/kernels/gemm-inl.h"
+
+#if HWY_ONCE
 #include "nn/kernels/gemm_ref.h"
 
 namespace tilegrad::nn {
+HWY_EXPORT(GemmTarget);
 
-void Gemm(const GemmProblem<float>& p, const KernelContext& context) {
-  context.workers.For(p.m, [&](std::size_t i, std::size_t) {
-    GemmProblem<float> row = p;
-    row.m = 1;
-    row.a += p.transpose_a ? i : i * p.lda;
-    row.c += i * p.ldc;
-    GemmRef(row);
-  });
+void Gemm(const GemmProblem<float>& problem, const KernelContext& context) {
+  if (problem.m == 0 || problem.n == 0) return;
+  if (problem.k == 0) return GemmRef(problem);  // nothing to multiply: only C and bias
+  HWY_DYNAMIC_DISPATCH(GemmTarget)(problem, context);
 }
 
 }  // namespace tilegrad::nn
+#endif

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a range is cut into nearly equal parts. The cut depends on the sizes alone.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+namespace tilegrad::nn {
+
+constexpr std::size_t DivideUp(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
+constexpr std::size_t RoundUp(std::size_t a, std::size_t b) { return DivideUp(a, b) * b; }
+
+// [0, total) as the fewest parts of at most `limit`, whose sizes differ by at most one: 64 rows in
+// panels of at most 6 are 9 x 6 + 2 x 5, so that no panel is left nearly empty.
+class Panels {
+ public:
+  Panels(std::size_t total, std::size_t limit)
+      : count_(DivideUp(total, limit)),
+        small_(count_ == 0 ? 0 : total / count_),
+        large_count_(count_ == 0 ? 0 : total % count_) {}
+
+  std::size_t count() const { return count_; }
+  std::size_t begin(std::size_t panel) const {
+    return panel * small_ + std::min(panel, large_count_);
+  }
+  std::size_t size(std::size_t panel) const { return small_ + (panel < large_count_ ? 1 : 0); }
+  std::size_t largest() const { return small_ + (large_count_ > 0 ? 1 : 0); }
+
+ private:
+  std::size_t count_, small_, large_count_;
+};
+
+}  // namespace tilegrad::nn
