@@ -16,21 +16,16 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
+#include "raster/attributes.h"
 #include "scene/camera.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
 
-enum class AttributeRate { kVertex, kCorner };
 enum class FaceCulling {
   kNone,
   kBack
 };  // kBack: clockwise faces are not drawn, but take part in alpha (spec 1.4)
-enum class Interpolation {
-  kPerspective,   // attributes are linear on the face in space: what a camera sees
-  kScreenLinear,  // linear on the screen: the paper's implementation
-};
-
 // Views over arrays of the caller, who keeps them alive and unchanged until Backward.
 template <class T>
 struct SceneViewT {

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Alpha of one background pixel over all faces (paper, equations 5 and 6), and its adjoint. Scalar
+// template: float, double, std::complex<double>.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "raster/scalar.h"
+#include "raster/screen_mesh.h"
+
+namespace tilegrad::raster {
+
+// From NDC distances to pixels: x_ndc = 2 x / W.
+template <class T>
+struct SoftScale {
+  T x, y;  // NDC per pixel
+  T inverse_delta;
+};
+
+// The point of a face's boundary that is nearest to a pixel centre: on edge k, fraction tau from
+// corner k to corner k+1; (rx, ry) leads from it to the pixel, in NDC.
+template <class T>
+struct NearestFeature {
+  int edge = 0;
+  T tau, rx, ry, squared_distance;
+};
+
+template <class T>
+NearestFeature<T> NearestOnEdge(const ScreenMeshT<T>& mesh, std::size_t face, int k, T px, T py,
+                                const SoftScale<T>& scale) {
+  const auto a = static_cast<std::size_t>(mesh.vertex(face, k));
+  const auto b = static_cast<std::size_t>(mesh.vertex(face, (k + 1) % 3));
+  const T ex = (mesh.x[b] - mesh.x[a]) * scale.x, ey = (mesh.y[b] - mesh.y[a]) * scale.y;
+  const T qx = (px - mesh.x[a]) * scale.x, qy = (py - mesh.y[a]) * scale.y;
+  const T length = ex * ex + ey * ey;
+  T tau = RealPart(length) > 0 ? (qx * ex + qy * ey) / length : T(0);
+  if (!(RealPart(tau) > 0)) tau = T(0);
+  if (RealPart(tau) > 1) tau = T(1);
+  const T rx = qx - tau * ex, ry = qy - tau * ey;
+  return {k, tau, rx, ry, rx * rx + ry * ry};
+}
+
+template <class T>
+NearestFeature<T> NearestOnFace(const ScreenMeshT<T>& mesh, std::size_t face, T px, T py,
+                                const SoftScale<T>& scale) {
+  NearestFeature<T> best = NearestOnEdge(mesh, face, 0, px, py, scale);
+  for (int k = 1; k < 3; ++k) {
+    const NearestFeature<T> other = NearestOnEdge(mesh, face, k, px, py, scale);
+    if (RealPart(other.squared_distance) < RealPart(best.squared_distance)) best = other;
+  }
+  return best;
+}
+
+// A = exp(-d^2 / delta), equation 5.
+template <class T>
+T FaceInfluence(const NearestFeature<T>& nearest, const SoftScale<T>& scale) {
+  using std::exp;
+  return exp(-nearest.squared_distance * scale.inverse_delta);
+}
+
+template <class T>
+T SoftAlphaRef(const ScreenMeshT<T>& mesh, T px, T py, const SoftScale<T>& scale) {
+  T outside = T(1);
+  for (std::size_t f = 0; f < mesh.faces(); ++f) {
+    if ((mesh.reject[f] & kFaceNotInSoftMask) != 0) continue;
+    outside *= T(1) - FaceInfluence(NearestOnFace(mesh, f, px, py, scale), scale);
+  }
+  return T(1) - outside;
+}
+
+// Adds to d_mesh.d_x, d_y. The product's derivative by prefix and suffix products, without
+// division.
+template <class T>
+void SoftAlphaRefBackward(const ScreenMeshT<T>& mesh, T px, T py, const SoftScale<T>& scale,
+                          T d_alpha, const ScreenGradientsT<T>& d_mesh) {
+  std::vector<std::size_t> faces;
+  std::vector<NearestFeature<T>> nearest;
+  std::vector<T> suffix(1, T(1));
+  for (std::size_t f = mesh.faces(); f-- > 0;) {
+    if ((mesh.reject[f] & kFaceNotInSoftMask) != 0) continue;
+    faces.push_back(f);
+    nearest.push_back(NearestOnFace(mesh, f, px, py, scale));
+    suffix.push_back(suffix.back() * (T(1) - FaceInfluence(nearest.back(), scale)));
+  }
+  T prefix = T(1);
+  for (std::size_t n = faces.size(); n-- > 0;) {
+    const NearestFeature<T>& at = nearest[n];
+    const T influence = FaceInfluence(at, scale);
+    // dA/d(d^2) = -A / delta; moving the near point by v changes d^2 by -2 r.v
+    const T push = d_alpha * prefix * suffix[n] * influence * scale.inverse_delta * T(2);
+    const T weight[2] = {T(1) - at.tau, at.tau};
+    for (int end = 0; end < 2; ++end) {
+      const auto v = static_cast<std::size_t>(mesh.vertex(faces[n], (at.edge + end) % 3));
+      d_mesh.d_x[v] += push * weight[end] * at.rx * scale.x;
+      d_mesh.d_y[v] += push * weight[end] * at.ry * scale.y;
+    }
+    prefix *= T(1) - influence;
+  }
+}
+
+}  // namespace tilegrad::raster

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/validate.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+#include "raster/conventions.h"
+
+namespace tilegrad {
+namespace {
+
+Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
+  if (got == expected) return {};
+  return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
+}
+
+Status CheckFinite(const char* array, std::span<const float> values) {
+  float sum = 0;  // of zeros, or of NaN where a value is not finite
+  for (const float v : values) sum += v - v;
+  if (sum == 0) return {};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
+  }
+  return {};
+}
+
+Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
+  if (faces.size() % 3 != 0) {
+    return InvalidArgument("faces must be [F,3], got {} indices", faces.size());
+  }
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (faces[i] < 0 || static_cast<std::size_t>(faces[i]) >= vertices) {
+      return InvalidArgument("faces[{}] is {}, outside of [0, {})", i, faces[i], vertices);
+    }
+  }
+  return {};
+}
+
+Status CheckCamera(const Camera& camera) {
+  TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
+  TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
+  const float numbers[5] = {camera.fx, camera.fy, camera.cx, camera.cy, camera.near_plane};
+  TILEGRAD_TRY(CheckFinite("camera.{fx, fy, cx, cy, near_plane}", numbers));
+  if (!(camera.near_plane > 0)) {
+    return InvalidArgument("camera.near_plane is {}, must be > 0", camera.near_plane);
+  }
+  return {};
+}
+
+Status CheckScene(const SceneView& scene) {
+  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
+  if (scene.positions.size() % 3 != 0) {
+    return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
+  }
+  if (scene.positions.size() > kMost || scene.faces.size() > kMost) {
+    return ResourceExhausted("{} numbers of positions and {} of faces, the limit is {} each",
+                             scene.positions.size(), scene.faces.size(), kMost);
+  }
+  const std::size_t vertices = scene.positions.size() / 3;
+  TILEGRAD_TRY(CheckFaces(scene.faces, vertices));
+  if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
+  const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
+  TILEGRAD_TRY(CheckSize("attributes", scene.attributes.size(),
+                         rows * static_cast<std::size_t>(scene.channels)));
+  TILEGRAD_TRY(CheckFinite("positions", scene.positions));
+  TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
+  return CheckCamera(scene.camera);
+}
+
+Status CheckGradients(const SceneView& scene, const SceneGradients& d_scene) {
+  if (!d_scene.positions.empty()) {
+    TILEGRAD_TRY(CheckSize("d_scene.positions", d_scene.positions.size(), scene.positions.size()));
+  }
+  if (!d_scene.attributes.empty()) {
+    TILEGRAD_TRY(
+        CheckSize("d_scene.attributes", d_scene.attributes.size(), scene.attributes.size()));
+  }
+  return {};
+}
+
+Status CheckImageSize(const char* axis, int pixels) {
+  if (pixels >= 1 && pixels <= raster::kMaxImageSize) return {};
+  return InvalidArgument("options.{} is {}, must be in 1..{} pixels", axis, pixels,
+                         raster::kMaxImageSize);
+}
+
+Status CheckFrame(std::size_t images, const RenderOptions& options, const Frame& frame,
+                  const FrameGradients& d_frame) {
+  const std::size_t pixels =
+      images * static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  TILEGRAD_TRY(CheckSize("frame.face_ids", frame.face_ids.size(), pixels));
+  if (!d_frame.alpha.empty()) {
+    TILEGRAD_TRY(CheckSize("d_frame.alpha", d_frame.alpha.size(), pixels));
+    TILEGRAD_TRY(CheckSize("frame.alpha", frame.alpha.size(), pixels));
+    TILEGRAD_TRY(CheckFinite("d_frame.alpha", d_frame.alpha));
+  }
+  return CheckFinite("d_frame.attributes", d_frame.attributes);
+}
+
+Status CheckFaceIds(const SceneView& scene, std::span<const std::int32_t> ids) {
+  const auto faces = static_cast<std::int32_t>(scene.faces.size() / 3);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids[i] < -1 || ids[i] >= faces) {
+      return InvalidArgument("frame.face_ids[{}] is {}, but the scene has {} faces", i, ids[i],
+                             faces);
+    }
+  }
+  return {};
+}
+
+std::string SceneName(std::size_t index) { return fmt::format("scene {}", index); }
+
+}  // namespace
+
+Status ValidateOptions(const RenderOptions& options) {
+  TILEGRAD_TRY(CheckImageSize("width", options.width));
+  TILEGRAD_TRY(CheckImageSize("height", options.height));
+  if (!(options.delta > 0) || !std::isfinite(options.delta)) {
+    return InvalidArgument("options.delta is {}, must be finite and > 0", options.delta);
+  }
+  if (!(options.max_alpha_error >= 0 && options.max_alpha_error <= 1)) {
+    return InvalidArgument("options.max_alpha_error is {}, must be in [0, 1]",
+                           options.max_alpha_error);
+  }
+  return {};
+}
+
+Status ValidateScenes(std::span<const SceneView> scenes) {
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (const Status status = CheckScene(scenes[n]); !status.ok()) {
+      return status.Within(SceneName(n));
+    }
+    if (scenes[n].channels != scenes[0].channels) {
+      return InvalidArgument("scene {} has {} channels, scene 0 has {}: a batch must agree", n,
+                             scenes[n].channels, scenes[0].channels);
+    }
+  }
+  return {};
+}
+
+Status ValidateBackward(std::span<const SceneView> scenes, const RenderOptions& options,
+                        const Frame& frame, const FrameGradients& d_frame,
+                        std::span<const SceneGradients> d_scenes) {
+  TILEGRAD_TRY(ValidateOptions(options));
+  TILEGRAD_TRY(ValidateScenes(scenes));
+  if (d_scenes.size() != scenes.size()) {
+    return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
+  }
+  TILEGRAD_TRY(CheckFrame(scenes.size(), options, frame, d_frame));
+  const std::size_t pixels =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  if (!scenes.empty() && !d_frame.attributes.empty()) {
+    TILEGRAD_TRY(CheckSize("d_frame.attributes", d_frame.attributes.size(),
+                           scenes.size() * pixels * static_cast<std::size_t>(scenes[0].channels)));
+  }
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    Status status = CheckGradients(scenes[n], d_scenes[n]);
+    if (status.ok()) {
+      status = CheckFaceIds(scenes[n], std::span(frame.face_ids).subspan(n * pixels, pixels));
+    }
+    if (!status.ok()) return status.Within(SceneName(n));
+  }
+  return {};
+}
+
+}  // namespace tilegrad
