@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/shapes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <map>
+#include <numbers>
+#include <utility>
+
+namespace tilegrad {
+namespace {
+
+// Twelve vertices (0, +-1, +-phi) and cyclic, and the twenty faces over them.
+const double kPhi = std::numbers::phi;
+const glm::dvec3 kIcosahedron[12] = {{-1, kPhi, 0}, {1, kPhi, 0}, {-1, -kPhi, 0}, {1, -kPhi, 0},
+                                     {0, -1, kPhi}, {0, 1, kPhi}, {0, -1, -kPhi}, {0, 1, -kPhi},
+                                     {kPhi, 0, -1}, {kPhi, 0, 1}, {-kPhi, 0, -1}, {-kPhi, 0, 1}};
+const Face kIcosahedronFaces[20] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                    {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                    {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                    {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+
+// Adds the midpoint of every edge once, on the unit sphere, and splits every face in four.
+class Subdivider {
+ public:
+  explicit Subdivider(std::vector<glm::dvec3>& points) : points_(points) {}
+
+  std::vector<Face> Split(const std::vector<Face>& faces) {
+    std::vector<Face> out;
+    out.reserve(faces.size() * 4);
+    for (const auto& [a, b, c] : faces) {
+      const std::int32_t ab = Middle(a, b), bc = Middle(b, c), ca = Middle(c, a);
+      out.insert(out.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
+    }
+    return out;
+  }
+
+ private:
+  std::int32_t Middle(std::int32_t a, std::int32_t b) {
+    const auto [it, added] =
+        middle_.try_emplace(std::minmax(a, b), static_cast<std::int32_t>(points_.size()));
+    if (added) points_.push_back(glm::normalize(points_[a] + points_[b]));
+    return it->second;
+  }
+  std::vector<glm::dvec3>& points_;
+  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middle_;
+};
+
+glm::vec3 OnCircle(float radius, float y, int i, int segments) {
+  const double angle = 2 * std::numbers::pi * i / segments;
+  return {radius * std::cos(angle), y,
+          -radius * std::sin(angle)};  // counter-clockwise seen from above
+}
+
+// Faces between two rings of `segments` vertices; `lower` and `upper` are the first indices.
+void BridgeRings(Mesh& mesh, std::int32_t lower, std::int32_t upper, int segments) {
+  for (int i = 0; i < segments; ++i) {
+    const int j = (i + 1) % segments;
+    mesh.faces.push_back({lower + i, lower + j, upper + j});
+    mesh.faces.push_back({lower + i, upper + j, upper + i});
+  }
+}
+
+// A fan from `apex` over a ring; `up` says on which side the outside is.
+void FanRing(Mesh& mesh, std::int32_t apex, std::int32_t ring, int segments, bool up) {
+  for (int i = 0; i < segments; ++i) {
+    const int j = (i + 1) % segments;
+    if (up)
+      mesh.faces.push_back({apex, ring + i, ring + j});
+    else
+      mesh.faces.push_back({apex, ring + j, ring + i});
+  }
+}
+
+template <class T>
+void AppendFilled(std::vector<T>& to, std::size_t to_size, const std::vector<T>& from,
+                  std::size_t from_size, T fill) {
+  if (to.empty() && from.empty()) return;
+  to.resize(to_size, fill);
+  to.insert(to.end(), from.begin(), from.end());
+  to.resize(to_size + from_size, fill);
+}
+
+std::vector<glm::vec3> FlatCornerNormals(const Mesh& mesh) {
+  std::vector<glm::vec3> out;
+  for (const auto& [a, b, c] : mesh.faces) {
+    const glm::vec3 n =
+        glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
+    const float length = glm::length(n);
+    out.insert(out.end(), 3, length > 0 ? n / length : glm::vec3(0, 0, 1));
+  }
+  return out;
+}
+
+void AppendMaterials(Mesh& mesh, const Mesh& other, std::size_t faces_before) {
+  const auto textures = static_cast<int>(mesh.textures.size());
+  if (mesh.materials.empty() && other.materials.empty()) return;
+  if (mesh.materials.empty()) mesh.materials.emplace_back();
+  const auto first = static_cast<std::int32_t>(mesh.materials.size());
+  mesh.face_materials.resize(faces_before, 0);
+  for (std::size_t f = 0; f < other.faces.size(); ++f) {
+    mesh.face_materials.push_back(first +
+                                  (other.face_materials.empty() ? 0 : other.face_materials[f]));
+  }
+  mesh.materials.insert(mesh.materials.end(), other.materials.begin(), other.materials.end());
+  if (other.materials.empty()) mesh.materials.emplace_back();
+  for (auto m = static_cast<std::size_t>(first); m < mesh.materials.size(); ++m) {
+    if (mesh.materials[m].base_color_texture >= 0) mesh.materials[m].base_color_texture += textures;
+  }
+  mesh.textures.insert(mesh.textures.end(), other.textures.begin(), other.textures.end());
+}
+
+}  // namespace
+
+Mesh Icosphere(int level, float radius) {
+  std::vector<glm::dvec3> points;
+  for (const glm::dvec3& p : kIcosahedron) points.push_back(glm::normalize(p));
+  std::vector<Face> faces(std::begin(kIcosahedronFaces), std::end(kIcosahedronFaces));
+  for (int i = 0; i < level; ++i) faces = Subdivider(points).Split(faces);
+  Mesh mesh;
+  for (const glm::dvec3& p : points) mesh.positions.emplace_back(p * static_cast<double>(radius));
+  mesh.faces = std::move(faces);
+  return mesh;
+}
+
+Mesh Box(glm::vec3 centre, glm::vec3 size) {
+  Mesh mesh;
+  for (int i = 0; i < 8; ++i) {
+    const glm::vec3 sign(i & 1 ? 0.5f : -0.5f, i & 2 ? 0.5f : -0.5f, i & 4 ? 0.5f : -0.5f);
+    mesh.positions.push_back(centre + sign * size);
+  }
+  mesh.faces = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return mesh;
+}
+
+Mesh Frustum(glm::vec3 centre, float radius_bottom, float radius_top, float height, int segments) {
+  Mesh mesh;
+  const float low = -0.5f * height, high = 0.5f * height;
+  for (int i = 0; i < segments; ++i)
+    mesh.positions.push_back(OnCircle(radius_bottom, low, i, segments));
+  const bool cone = radius_top <= 0;
+  if (!cone) {
+    for (int i = 0; i < segments; ++i)
+      mesh.positions.push_back(OnCircle(radius_top, high, i, segments));
+    BridgeRings(mesh, 0, segments, segments);
+  }
+  const auto bottom = static_cast<std::int32_t>(mesh.positions.size());
+  mesh.positions.emplace_back(0, low, 0);
+  mesh.positions.emplace_back(0, high, 0);
+  FanRing(mesh, bottom, 0, segments, false);
+  FanRing(mesh, bottom + 1, cone ? 0 : segments, segments, true);
+  for (glm::vec3& p : mesh.positions) p += centre;
+  return mesh;
+}
+
+Mesh Torus(float major, float minor, int major_segments, int minor_segments) {
+  Mesh mesh;
+  for (int i = 0; i < minor_segments; ++i) {
+    const double angle = 2 * std::numbers::pi * i / minor_segments;
+    const auto radius = static_cast<float>(major + minor * std::cos(angle));
+    const auto y = static_cast<float>(minor * std::sin(angle));
+    for (int j = 0; j < major_segments; ++j)
+      mesh.positions.push_back(OnCircle(radius, y, j, major_segments));
+  }
+  for (int i = 0; i < minor_segments; ++i) {
+    BridgeRings(mesh, i * major_segments, (i + 1) % minor_segments * major_segments,
+                major_segments);
+  }
+  return mesh;
+}
+
+Mesh UvSphere(float radius, int rings, int segments) {
+  Mesh mesh;
+  for (int i = 1; i < rings; ++i) {
+    const double angle = std::numbers::pi * i / rings;
+    const auto ring = static_cast<float>(radius * std::sin(angle));
+    const auto y = static_cast<float>(-radius * std::cos(angle));
+    for (int j = 0; j < segments; ++j) mesh.positions.push_back(OnCircle(ring, y, j, segments));
+  }
+  for (int i = 0; i + 2 < rings; ++i) BridgeRings(mesh, i * segments, (i + 1) * segments, segments);
+  const auto pole = static_cast<std::int32_t>(mesh.positions.size());
+  mesh.positions.emplace_back(0, -radius, 0);
+  mesh.positions.emplace_back(0, radius, 0);
+  FanRing(mesh, pole, 0, segments, false);
+  FanRing(mesh, pole + 1, (rings - 2) * segments, segments, true);
+  return mesh;
+}
+
+void SetColor(Mesh& mesh, glm::vec4 color) { mesh.colors.assign(mesh.positions.size(), color); }
+
+void Append(Mesh& mesh, const Mesh& other) {
+  const std::size_t v0 = mesh.positions.size(), v1 = other.positions.size();
+  const std::size_t f0 = mesh.faces.size(), f1 = other.faces.size();
+  if (v0 == 0 && f0 == 0) {
+    mesh = other;
+    return;
+  }
+  AppendFilled(mesh.colors, v0, other.colors, v1, glm::vec4(1));
+  AppendFilled(mesh.corner_uvs, 3 * f0, other.corner_uvs, 3 * f1, glm::vec2(0));
+  const bool vertex_normals = !mesh.normals.empty() || !other.normals.empty();
+  const bool corner_normals = !mesh.corner_normals.empty() || !other.corner_normals.empty();
+  if (vertex_normals) {
+    if (mesh.normals.empty()) mesh.normals = SmoothNormals(mesh);
+    const auto more = other.normals.empty() ? SmoothNormals(other) : other.normals;
+    mesh.normals.insert(mesh.normals.end(), more.begin(), more.end());
+  }
+  if (corner_normals) {
+    if (mesh.corner_normals.empty()) mesh.corner_normals = FlatCornerNormals(mesh);
+    const auto more =
+        other.corner_normals.empty() ? FlatCornerNormals(other) : other.corner_normals;
+    mesh.corner_normals.insert(mesh.corner_normals.end(), more.begin(), more.end());
+  }
+  AppendMaterials(mesh, other, f0);
+  const auto offset = static_cast<std::int32_t>(v0);
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& [a, b, c] : other.faces)
+    mesh.faces.push_back({a + offset, b + offset, c + offset});
+}
+
+void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 offset) {
+  const glm::mat3 m(linear[0], linear[1], linear[2]);
+  // The cofactor matrix: the inverse transpose up to a positive or negative factor, defined for
+  // singular m too.
+  glm::mat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+  const bool mirrored = glm::determinant(m) < 0;
+  const auto turn = [&](glm::vec3& n) {
+    const glm::vec3 turned = (mirrored ? -1.0f : 1.0f) * (cofactor * n);
+    const float length = glm::length(turned);
+    if (length > 0) n = turned / length;
+  };
+  for (glm::vec3& p : mesh.positions) p = m * p + offset;
+  for (glm::vec3& n : mesh.normals) turn(n);
+  for (glm::vec3& n : mesh.corner_normals) turn(n);
+  if (!mirrored) return;
+  // A mirror turns faces inside out: restore counter-clockwise order, corners' attributes with it.
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    std::swap(mesh.faces[f][1], mesh.faces[f][2]);
+    if (!mesh.corner_uvs.empty()) std::swap(mesh.corner_uvs[3 * f + 1], mesh.corner_uvs[3 * f + 2]);
+    if (!mesh.corner_normals.empty())
+      std::swap(mesh.corner_normals[3 * f + 1], mesh.corner_normals[3 * f + 2]);
+  }
+}
+
+std::vector<glm::vec3> SmoothNormals(const Mesh& mesh) {
+  std::vector<glm::vec3> sums(mesh.positions.size(), glm::vec3(0));
+  for (const auto& [a, b, c] : mesh.faces) {
+    const glm::vec3 n =
+        glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
+    sums[a] += n, sums[b] += n, sums[c] += n;
+  }
+  for (glm::vec3& n : sums) {
+    const float length = glm::length(n);
+    n = length > 0 ? n / length : glm::vec3(0, 0, 1);
+  }
+  return sums;
+}
+
+}  // namespace tilegrad

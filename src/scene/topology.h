@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who is next to whom: edges with their faces, vertices with their neighbours. What the
+// regularisers need.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scene/mesh.h"
+
+namespace tilegrad {
+
+struct Edge {
+  std::int32_t a, b;          // vertices, a < b
+  std::int32_t face0, face1;  // faces on it; face1 = -1 at a boundary
+};
+
+struct Topology {
+  std::vector<Edge>
+      edges;  // each undirected edge once, sorted by (a, b); all three sides of every face count
+  int nonmanifold_edges =
+      0;  // edges with more than two faces; only the first two, in face order, are kept in `edges`
+  int boundary_edges = 0;  // edges with one face
+  // Neighbours of vertex v: neighbors[offsets[v] .. offsets[v + 1]), ascending.
+  std::vector<std::int32_t> offsets;  // [V + 1]
+  std::vector<std::int32_t> neighbors;
+};
+
+// Indices must be in [0, vertices). Sides that join a vertex to itself are no edges.
+Topology BuildTopology(std::span<const Face> faces, std::size_t vertices);
+
+}  // namespace tilegrad

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "scene/camera.h"
+#include "scene/shapes.h"
+#include "scene/topology.h"
+
+namespace tilegrad {
+namespace {
+
+// Divergence theorem: sum of a . (b x c) / 6. Positive only if faces are counter-clockwise seen
+// from outside.
+double Volume(const Mesh& mesh) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.faces) {
+    sum += glm::dot(glm::dvec3(mesh.positions[a]),
+                    glm::cross(glm::dvec3(mesh.positions[b]), glm::dvec3(mesh.positions[c])));
+  }
+  return sum / 6;
+}
+
+void ExpectClosed(const Mesh& mesh, int euler) {
+  ASSERT_TRUE(Validate(mesh).ok());
+  const Topology t = BuildTopology(mesh.faces, mesh.positions.size());
+  EXPECT_EQ(t.boundary_edges, 0);
+  EXPECT_EQ(t.nonmanifold_edges, 0);
+  const auto count = [](const auto& v) { return static_cast<int>(v.size()); };
+  EXPECT_EQ(count(mesh.positions) - count(t.edges) + count(mesh.faces), euler);
+  EXPECT_GT(Volume(mesh), 0);
+}
+
+TEST(Shapes, AreClosedAndPointOutward) {
+  ExpectClosed(Icosphere(0, 1), 2);
+  ExpectClosed(Icosphere(3, 0.5f), 2);
+  ExpectClosed(Box({1, 2, 3}, {1, 2, 3}), 2);
+  ExpectClosed(Frustum({0, 0, 0}, 1, 0.5f, 2, 12), 2);
+  ExpectClosed(Frustum({0, 0, 0}, 1, 0, 2, 12), 2);
+  ExpectClosed(Torus(1, 0.25f, 24, 12), 0);
+  ExpectClosed(UvSphere(1, 8, 12), 2);
+  ExpectClosed(UvSphere(1, 2, 3), 2);
+}
+
+TEST(Shapes, IcosphereIsThePapersTemplate) {
+  const Mesh mesh = Icosphere(3, 0.5f);
+  EXPECT_EQ(mesh.positions.size(), 642u);
+  EXPECT_EQ(mesh.faces.size(), 1280u);
+  EXPECT_EQ(BuildTopology(mesh.faces, 642).edges.size(), 1920u);
+  EXPECT_NEAR(Volume(mesh), 0.519, 5e-4);  // spec 3.1, three digits
+  int zeros[3] = {};
+  for (const glm::vec3& p : mesh.positions) {
+    EXPECT_NEAR(glm::length(p), 0.5f, 1e-7);
+    for (int c = 0; c < 3; ++c) zeros[c] += p[c] == 0;
+  }
+  for (int z : zeros) EXPECT_EQ(z, 32);
+}
+
+TEST(Shapes, BoxVolumeIsExact) { EXPECT_NEAR(Volume(Box({5, 0, 0}, {1, 2, 3})), 6, 1e-6); }
+
+TEST(Shapes, AppendFillsWhatOneSideLacks) {
+  Mesh a = Box({0, 0, 0}, {1, 1, 1}), b = Icosphere(0, 1);
+  SetColor(b, {1, 0, 0, 1});
+  b.materials = {{.name = "red", .base_color_texture = 0}};
+  b.textures = {{.name = "t", .image = ImageU8(1, 1, 3)}};
+  b.corner_uvs.assign(3 * b.faces.size(), {0.5f, 0.5f});
+  b.normals = SmoothNormals(b);
+  Append(a, b);
+  Append(a, b);
+  ASSERT_TRUE(Validate(a).ok()) << Validate(a).message();
+  EXPECT_EQ(a.faces.size(), 12 + 40u);
+  EXPECT_EQ(a.colors.front(), glm::vec4(1));
+  EXPECT_EQ(a.colors.back(), glm::vec4(1, 0, 0, 1));
+  EXPECT_EQ(a.face_materials.front(), 0);
+  EXPECT_EQ(a.materials[a.face_materials.back()].name, "red");
+  EXPECT_EQ(a.materials[a.face_materials.back()].base_color_texture, 1);
+  EXPECT_EQ(a.faces.back()[0], b.faces.back()[0] + 8 + 12);
+}
+
+TEST(Shapes, MirrorKeepsFacesOutward) {
+  Mesh mesh = Icosphere(1, 1);
+  mesh.normals = SmoothNormals(mesh);
+  Transform(mesh, {glm::vec3(-2, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}, {1, 1, 1});
+  const Mesh moved = mesh;
+  Transform(mesh, {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}, {-1, -1, -1});
+  EXPECT_GT(Volume(mesh), 0);
+  const auto fresh = SmoothNormals(mesh);
+  for (std::size_t i = 0; i < fresh.size(); ++i)
+    EXPECT_GT(glm::dot(fresh[i], mesh.normals[i]), 0.9f);
+}
+
+TEST(Topology, NeighborsAreSymmetricAndAscending) {
+  const Mesh mesh = Icosphere(2, 1);
+  const Topology t = BuildTopology(mesh.faces, mesh.positions.size());
+  int five = 0;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const auto begin = t.neighbors.begin() + t.offsets[v],
+               end = t.neighbors.begin() + t.offsets[v + 1];
+    EXPECT_TRUE(std::is_sorted(begin, end));
+    five += end - begin == 5;
+    for (auto n = begin; n != end; ++n) {
+      EXPECT_TRUE(std::binary_search(t.neighbors.begin() + t.offsets[*n],
+                                     t.neighbors.begin() + t.offsets[*n + 1],
+                                     static_cast<std::int32_t>(v)));
+    }
+  }
+  EXPECT_EQ(five, 12);  // the icosahedron's own vertices
+}
+
+TEST(Topology, CountsBoundaryAndNonmanifoldEdges) {
+  const std::vector<Face> faces = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {5, 5, 6}};
+  const Topology t = BuildTopology(faces, 7);
+  EXPECT_EQ(t.nonmanifold_edges, 1);
+  EXPECT_EQ(t.boundary_edges, 6);
+  EXPECT_EQ(t.edges.front().face0, 0);
+  EXPECT_EQ(t.edges.front().face1, 1);
+}
+
+TEST(Mesh, ValidateNamesArrayAndIndex) {
+  Mesh mesh = Box({0, 0, 0}, {1, 1, 1});
+  mesh.faces[3][1] = 8;
+  EXPECT_NE(Validate(mesh).message().find("faces[3][1] is 8"), std::string::npos);
+  mesh.faces[3][1] = 0;
+  mesh.positions[2].y = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(Validate(mesh).message().find("positions[2][1] is nan"), std::string::npos);
+  mesh.positions[2].y = 0;
+  mesh.colors.resize(3);
+  EXPECT_NE(Validate(mesh).message().find("colors"), std::string::npos);
+}
+
+TEST(Mesh, NormalizeCentresAndScales) {
+  Mesh mesh = Box({100, -50, 3}, {2, 8, 4});
+  mesh.positions.emplace_back(1e6f, 0, 0);  // used by no face: does not count
+  ASSERT_TRUE(NormalizeToBox(mesh, 0.45f).ok());
+  const Bounds b = MeshBounds(mesh);
+  EXPECT_NEAR(b.high.y, 0.45f, 1e-6);
+  EXPECT_NEAR(b.low.x, -0.45f / 4, 1e-6);
+  Mesh point;
+  point.positions = {{1, 1, 1}};
+  point.faces = {{0, 0, 0}};
+  EXPECT_FALSE(NormalizeToBox(point, 1).ok());
+  Mesh empty;
+  EXPECT_FALSE(NormalizeToBox(empty, 1).ok());
+}
+
+TEST(Camera, RotationsAreOrthonormalAndLookAtTheOrigin) {
+  for (double elevation : {-90.0, -27.0, 0.0, 27.0, 90.0}) {
+    for (double azimuth : {0.0, 33.0, -180.0, 275.0}) {
+      const Camera c = OrbitCamera(Lens{}, azimuth, elevation, 1.45);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          double dot = 0;
+          for (int k = 0; k < 3; ++k)
+            dot += static_cast<double>(c.rotation[3 * i + k]) * c.rotation[3 * j + k];
+          EXPECT_NEAR(dot, i == j, 1e-6);
+        }
+      }
+      EXPECT_NEAR(c.translation[0], 0,
+                  1e-6);  // the origin projects to the middle, at the camera's distance
+      EXPECT_NEAR(c.translation[1], 0, 1e-6);
+      EXPECT_NEAR(c.translation[2], -1.45, 1e-6);
+    }
+  }
+}
+
+TEST(Camera, LookAtEqualsOrbit) {
+  const Camera orbit = OrbitCamera(Lens{}, 30, 20, 2);
+  float eye[3] = {};
+  for (int k = 0; k < 3; ++k) eye[k] = 2 * orbit.rotation[6 + k];
+  const float target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
+  const Camera look = LookAtCamera(Lens{}, eye, target, up);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(look.rotation[i], orbit.rotation[i], 1e-6);
+  EXPECT_NEAR(orbit.fx, 32 * 2.1875, 1e-4);  // f = 35/16 (spec 1.1)
+}
+
+}  // namespace
+}  // namespace tilegrad
