@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/image_file.h"
+
+#include <cstring>
+#include <memory>
+
+#include "base/error.h"
+
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_NO_STDIO
+#define STBI_MAX_DIMENSIONS 16384
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#pragma GCC diagnostic ignored "-Wsign-compare"
+#pragma GCC diagnostic ignored "-Wshadow"
+#include <stb_image.h>
+#include <stb_image_write.h>
+#pragma GCC diagnostic pop
+
+namespace tilegrad::io {
+
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
+  if (bytes.size() > std::size_t{1} << 30)
+    return ResourceExhausted("{}: an image file above 1 GiB", name);
+  const auto length = static_cast<int>(bytes.size());
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
+    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, GIF, PNM): {}", name,
+                    stbi_failure_reason());
+  }
+  if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide) {
+    return DataLoss("{}: the header says {} x {} pixels; at most {} a side are read", name, width,
+                    height, kMaxImageSide);
+  }
+  const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
+      stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
+  if (!pixels) {
+    return DataLoss("{}: the header says {} x {} pixels, but the data is truncated or corrupt: {}",
+                    name, width, height, stbi_failure_reason());
+  }
+  ImageU8 image(width, height, channels);
+  std::memcpy(image.pixels.data(), pixels.get(), image.pixels.size());
+  return image;
+}
+
+Result<ImageU8> LoadImage(const Path& path) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
+  return DecodeImage(bytes, path.string());
+}
+
+Result<Bytes> EncodePng(const ImageU8& image) {
+  if (image.empty() || image.channels < 1 || image.channels > 4) {
+    return InvalidArgument("a PNG needs 1 to 4 channels and a pixel, got {} x {} x {}", image.width,
+                           image.height, image.channels);
+  }
+  Bytes out;
+  const auto append = [](void* context, void* data, int size) {
+    const auto* begin = static_cast<const std::uint8_t*>(data);
+    static_cast<Bytes*>(context)->insert(static_cast<Bytes*>(context)->end(), begin, begin + size);
+  };
+  if (!stbi_write_png_to_func(append, &out, image.width, image.height, image.channels,
+                              image.pixels.data(), image.width * image.channels)) {
+    return InternalError("encoding a PNG of {} x {} failed", image.width, image.height);
+  }
+  return out;
+}
+
+Status SavePng(const Path& path, const ImageU8& image) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodePng(image));
+  return WriteFileAtomic(path, bytes);
+}
+
+}  // namespace tilegrad::io

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Image files by stb_image: PNG, JPEG, BMP, TGA, GIF, PNM in; PNG out.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "base/file.h"
+#include "scene/image.h"
+
+namespace tilegrad::io {
+
+inline constexpr int kMaxImageSide =
+    16384;  // pixels; a larger header is refused before any memory is taken
+
+// 1 to 4 channels as in the file (16-bit files are reduced to 8). `name` stands in error messages.
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
+Result<ImageU8> LoadImage(const Path& path);
+
+// 1 to 4 channels, 8 bits. SavePng appears whole or not at all.
+Result<Bytes> EncodePng(const ImageU8& image);
+Status SavePng(const Path& path, const ImageU8& image);
+
+}  // namespace tilegrad::io

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/npz.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+
+#include "io/archive.h"
+
+namespace tilegrad::io {
+namespace {
+
+struct TypeRow {
+  NpyType type;
+  const char* code;  // after the byte-order character
+  std::size_t size;
+  const char* name;
+};
+constexpr std::array<TypeRow, 11> kTypes = {{{NpyType::kBool, "b1", 1, "bool"},
+                                             {NpyType::kU8, "u1", 1, "uint8"},
+                                             {NpyType::kI8, "i1", 1, "int8"},
+                                             {NpyType::kU16, "u2", 2, "uint16"},
+                                             {NpyType::kI16, "i2", 2, "int16"},
+                                             {NpyType::kU32, "u4", 4, "uint32"},
+                                             {NpyType::kI32, "i4", 4, "int32"},
+                                             {NpyType::kU64, "u8", 8, "uint64"},
+                                             {NpyType::kI64, "i8", 8, "int64"},
+                                             {NpyType::kF32, "f4", 4, "float32"},
+                                             {NpyType::kF64, "f8", 8, "float64"}}};
+
+const TypeRow& Row(NpyType type) { return kTypes[static_cast<std::size_t>(type)]; }
+
+constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::size_t kMaxRank = 8;
+
+// What the Python dictionary in the header says.
+struct Header {
+  std::string descr;
+  bool fortran = false;
+  std::vector<std::size_t> shape;
+};
+
+// The text after 'key': in a dictionary literal; the writer's spacing is not relied upon.
+std::optional<std::string_view> ValueOf(std::string_view dictionary, std::string_view key) {
+  for (const char quote : {'\'', '"'}) {
+    const std::string quoted = quote + std::string(key) + quote;
+    const auto at = dictionary.find(quoted);
+    if (at == std::string_view::npos) continue;
+    auto rest = dictionary.substr(at + quoted.size());
+    rest.remove_prefix(std::min(rest.find_first_not_of(" :"), rest.size()));
+    return rest;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<std::size_t>> ParseShape(std::string_view text) {
+  if (text.empty() || text.front() != '(') return std::nullopt;
+  const auto end = text.find(')');
+  if (end == std::string_view::npos) return std::nullopt;
+  std::vector<std::size_t> shape;
+  const char* at = text.data() + 1;
+  const char* last = text.data() + end;
+  while (at < last) {
+    if (*at == ' ' || *at == ',') {
+      ++at;
+      continue;
+    }
+    std::size_t value = 0;
+    const auto [next, error] = std::from_chars(at, last, value);
+    if (error != std::errc() || shape.size() == kMaxRank) return std::nullopt;
+    shape.push_back(value);
+    at = next;
+  }
+  return shape;
+}
+
+std::optional<Header> ParseHeader(std::string_view text) {
+  const auto descr = ValueOf(text, "descr"), order = ValueOf(text, "fortran_order"),
+             shape = ValueOf(text, "shape");
+  if (!descr || !order || !shape || descr->empty()) return std::nullopt;
+  const auto close = descr->find(descr->front(), 1);
+  const auto dims = ParseShape(*shape);
+  if (close == std::string_view::npos || !dims) return std::nullopt;
+  return Header{std::string(descr->substr(1, close - 1)), order->starts_with("True"), *dims};
+}
+
+// Splits magic, version and header length off; returns the header text and where data begins.
+std::optional<std::pair<std::string_view, std::size_t>> SplitHeader(
+    std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (bytes.size() < 12 || !text.starts_with(kMagic)) return std::nullopt;
+  const int version = bytes[6];
+  if (version < 1 || version > 3) return std::nullopt;
+  const std::size_t fixed = version == 1 ? 10 : 12;
+  std::size_t length = bytes[8] | bytes[9] << 8;
+  if (version > 1)
+    length |= static_cast<std::size_t>(bytes[10]) << 16 | static_cast<std::size_t>(bytes[11]) << 24;
+  if (length > bytes.size() - fixed) return std::nullopt;
+  return std::pair(text.substr(fixed, length), fixed + length);
+}
+
+Result<NpyType> FindType(const std::string& descr, const std::string& name) {
+  if (descr.size() == 3) {
+    const bool single_byte = descr[2] == '1';
+    for (const TypeRow& row : kTypes) {
+      if (descr.substr(1) != row.code) continue;
+      if (descr[0] == '<' || descr[0] == '|' || (descr[0] == '>' && single_byte)) return row.type;
+      return DataLoss("{}: big-endian data ({}); save it again as little-endian", name, descr);
+    }
+  }
+  return DataLoss("{}: element type \"{}\" is not supported (bool, integers, float32, float64 are)",
+                  name, descr);
+}
+
+// Product of the shape times the element size, or nothing on overflow.
+std::optional<std::size_t> ByteCount(const std::vector<std::size_t>& shape, std::size_t element) {
+  std::size_t bytes = element;
+  for (std::size_t n : shape) {
+    if (__builtin_mul_overflow(bytes, n, &bytes)) return std::nullopt;
+  }
+  return bytes;
+}
+
+Bytes FortranToC(std::span<const std::uint8_t> data, const std::vector<std::size_t>& shape,
+                 std::size_t element) {
+  Bytes out(data.size());
+  std::vector<std::size_t> index(shape.size(), 0);
+  for (std::size_t to = 0; to < out.size(); to += element) {
+    std::size_t from = 0;
+    for (std::size_t k = shape.size(); k-- > 0;) from = from * shape[k] + index[k];
+    std::copy_n(data.data() + from * element, element, out.data() + to);
+    for (std::size_t k = shape.size(); k-- > 0 && ++index[k] == shape[k];) index[k] = 0;
+  }
+  return out;
+}
+
+std::string EntryName(const std::string& array) { return array + ".npy"; }
+
+}  // namespace
+
+std::size_t NpyTypeSize(NpyType type) { return Row(type).size; }
+const char* NpyTypeName(NpyType type) { return Row(type).name; }
+
+Result<NpyArray> DecodeNpy(std::span<const std::uint8_t> bytes, const std::string& name) {
+  const auto split = SplitHeader(bytes);
+  if (!split) return DataLoss("{}: not a .npy array (bad magic, version or header length)", name);
+  const auto header = ParseHeader(split->first);
+  if (!header) return DataLoss("{}: the .npy header cannot be read: {}", name, split->first);
+  TILEGRAD_ASSIGN(const NpyType type, FindType(header->descr, name));
+  const auto data = bytes.subspan(split->second);
+  const auto wanted = ByteCount(header->shape, NpyTypeSize(type));
+  if (!wanted || *wanted != data.size()) {
+    return DataLoss("{}: the header promises {} bytes of data, the file has {}", name,
+                    wanted ? std::to_string(*wanted) : "more than 2^64", data.size());
+  }
+  NpyArray array{type, header->shape, {}};
+  array.data = header->fortran && header->shape.size() > 1
+                   ? FortranToC(data, header->shape, NpyTypeSize(type))
+                   : Bytes(data.begin(), data.end());
+  return array;
+}
+
+Bytes EncodeNpy(const NpyArray& array) {
+  std::string shape;
+  for (std::size_t n : array.shape) shape += fmt::format("{},", n);
+  const char order = NpyTypeSize(array.type) == 1 ? '|' : '<';
+  std::string header = fmt::format("{{'descr': '{}{}', 'fortran_order': False, 'shape': ({}), }}",
+                                   order, Row(array.type).code, shape);
+  constexpr std::size_t kFixed = 10, kAlign = 64;  // data starts at a multiple of 64
+  header.resize((kFixed + header.size() + 1 + kAlign - 1) / kAlign * kAlign - kFixed - 1, ' ');
+  header += '\n';
+  Bytes out(kMagic.begin(), kMagic.end());
+  out.insert(out.end(), {1, 0, static_cast<std::uint8_t>(header.size()),
+                         static_cast<std::uint8_t>(header.size() >> 8)});
+  out.insert(out.end(), header.begin(), header.end());
+  out.insert(out.end(), array.data.begin(), array.data.end());
+  return out;
+}
+
+Result<NpyArray> LoadNpy(const Path& path) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
+  return DecodeNpy(bytes, path.string());
+}
+
+Result<NpzArrays> LoadNpz(const Path& path) {
+  TILEGRAD_ASSIGN(const auto names, ListZip(path));
+  TILEGRAD_ASSIGN(const auto zip, OpenZip(path));
+  NpzArrays arrays;
+  for (const std::string& name : names) {
+    if (!name.ends_with(".npy")) continue;
+    TILEGRAD_ASSIGN(const Bytes bytes, zip->Read(name));
+    TILEGRAD_ASSIGN(arrays[name.substr(0, name.size() - 4)], DecodeNpy(bytes, zip->Describe(name)));
+  }
+  return arrays;
+}
+
+Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
+  TILEGRAD_ASSIGN(const auto zip, OpenZip(path));
+  if (!zip->Exists(EntryName(name))) {
+    std::string there;
+    TILEGRAD_ASSIGN(const auto names, ListZip(path));
+    for (const auto& other : names) there += (there.empty() ? "" : ", ") + other;
+    return DataLoss("{}: no array \"{}\"; it has: {}", path.string(), name, there);
+  }
+  TILEGRAD_ASSIGN(const Bytes bytes, zip->Read(EntryName(name)));
+  return DecodeNpy(bytes, zip->Describe(EntryName(name)));
+}
+
+Status SaveNpz(const Path& path, const NpzArrays& arrays) {
+  std::vector<std::pair<std::string, Bytes>> entries;
+  for (const auto& [name, array] : arrays) entries.emplace_back(EntryName(name), EncodeNpy(array));
+  return WriteZip(path, entries);
+}
+
+}  // namespace tilegrad::io
