@@ -170,10 +170,10 @@ Bytes EncodeNpy(const NpyArray& array) {
   constexpr std::size_t kFixed = 10, kAlign = 64;  // data starts at a multiple of 64
   header.resize((kFixed + header.size() + 1 + kAlign - 1) / kAlign * kAlign - kFixed - 1, ' ');
   header += '\n';
-  Bytes out(kMagic.begin(), kMagic.end());
-  out.insert(out.end(), {1, 0, static_cast<std::uint8_t>(header.size()),
-                         static_cast<std::uint8_t>(header.size() >> 8)});
-  out.insert(out.end(), header.begin(), header.end());
+  std::string prefix(kMagic);
+  prefix += {1, 0, static_cast<char>(header.size()), static_cast<char>(header.size() >> 8)};
+  prefix += header;
+  Bytes out(prefix.begin(), prefix.end());
   out.insert(out.end(), array.data.begin(), array.data.end());
   return out;
 }
