@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/context.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace tilegrad::nn {
+namespace {
+
+template <class From>
+Tensor Converted(Tensor tensor, std::span<const From> values) {
+  assert(values.size() == tensor.elements());
+  WithFloatType(tensor.dtype(), [&]<class T>(T) {
+    std::transform(values.begin(), values.end(), tensor.data<T>(),
+                   [](From v) { return static_cast<T>(v); });
+  });
+  return tensor;
+}
+
+}  // namespace
+
+Context::Context(const Workers& workers, DType dtype)
+    : workers_(workers), dtype_(dtype), pool_(MemoryPool::Make()) {
+  assert(dtype == DType::kF32 || dtype == DType::kF64);
+}
+
+Tensor Context::Empty(const Shape& shape, DType dtype) const {
+  return {pool_->Allocate(static_cast<std::size_t>(shape.elements()) * BytesOf(dtype)), shape,
+          dtype};
+}
+
+Tensor Context::Full(const Shape& shape, double value) const {
+  Tensor tensor = Empty(shape);
+  WithFloatType(dtype_, [&]<class T>(T) {
+    std::fill_n(tensor.data<T>(), tensor.elements(), static_cast<T>(value));
+  });
+  return tensor;
+}
+
+Tensor Context::From(const Shape& shape, std::span<const float> values) const {
+  return Converted(Empty(shape), values);
+}
+
+Tensor Context::From(const Shape& shape, std::span<const double> values) const {
+  return Converted(Empty(shape), values);
+}
+
+Tensor Context::Indices(std::span<const std::int32_t> values) const {
+  Tensor tensor = Empty({static_cast<std::int64_t>(values.size())}, DType::kI32);
+  std::copy(values.begin(), values.end(), tensor.data<std::int32_t>());
+  return tensor;
+}
+
+Tensor Context::Copy(const Tensor& tensor) const {
+  Tensor copy = Empty(tensor.shape(), tensor.dtype());
+  std::memcpy(copy.raw(), tensor.raw(), tensor.bytes());
+  return copy;
+}
+
+void Context::Fail(Status status) {
+  if (status_.ok()) status_ = std::move(status);
+}
+
+Status Context::TakeStatus() { return std::exchange(status_, Status()); }
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every computation of this library is handed: workers, memory, the number type, and the place
+// where errors are noted. There are no globals; two contexts are independent.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "base/parallel.h"
+#include "nn/memory.h"
+#include "nn/tensor.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::nn {
+
+// Belongs to one thread at a time (operations themselves run on all workers).
+//
+// Errors: an operation whose operands do not fit notes the reason here and returns an invalid Var;
+// operations on invalid Vars return invalid Vars. So formulas stay formulas, and one look at
+// status() after a step, or before its result is used, sees the first thing that went wrong.
+class Context {
+ public:
+  // `workers` must outlive the context. `dtype` (kF32 or kF64) is that of the parameters which
+  // layers make, and of tensors made without naming one.
+  explicit Context(const Workers& workers, DType dtype = DType::kF32);
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+  const Workers& workers() const { return workers_; }
+  DType dtype() const { return dtype_; }
+
+  Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
+  Tensor Empty(const Shape& shape) const { return Empty(shape, dtype_); }
+  Tensor Full(const Shape& shape, double value) const;  // dtype()
+  Tensor Zeros(const Shape& shape) const { return Full(shape, 0.0); }
+  // Copies values.size() == shape.elements() numbers, converted to dtype().
+  Tensor From(const Shape& shape, std::span<const float> values) const;
+  Tensor From(const Shape& shape, std::span<const double> values) const;
+  Tensor Indices(std::span<const std::int32_t> values) const;  // [n] of kI32
+  Tensor Copy(const Tensor& tensor) const;                     // storage of its own
+
+  MemoryPool& memory() const { return *pool_; }
+
+  const Status& status() const { return status_; }
+  void Fail(Status status);  // the first error is kept
+  Status TakeStatus();       // returns the error, if any, and forgets it
+
+  bool recording() const { return recording_; }
+  void set_recording(bool on) { recording_ = on; }
+  std::uint64_t NextOrder() { return ++order_; }  // creation order of graph nodes
+
+ private:
+  const Workers& workers_;
+  DType dtype_;
+  std::shared_ptr<MemoryPool> pool_;
+  Status status_;
+  bool recording_ = true;
+  std::uint64_t order_ = 0;
+};
+
+// Sets whether operations record how to differentiate them, for a scope.
+class RecordingScope {
+ public:
+  RecordingScope(Context& context, bool on) : context_(context), before_(context.recording()) {
+    context_.set_recording(on);
+  }
+  ~RecordingScope() { context_.set_recording(before_); }
+  RecordingScope(const RecordingScope&) = delete;
+  RecordingScope& operator=(const RecordingScope&) = delete;
+
+ private:
+  Context& context_;
+  bool before_;
+};
+
+// Evaluation without memory for a way back: { NoGrad off(context); ... }
+class NoGrad : public RecordingScope {
+ public:
+  explicit NoGrad(Context& context) : RecordingScope(context, false) {}
+};
+
+}  // namespace tilegrad::nn

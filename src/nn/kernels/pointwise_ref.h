@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scalar truth that pointwise.h is held to. T: float, double or std::complex<double>; a complex
+// number is compared by its real part, which is what a complex step needs.
+#pragma once
+
+#include <cmath>
+#include <complex>
+
+#include "nn/kernels/pointwise.h"
+
+namespace tilegrad::nn {
+
+template <class T>
+double RealPart(const T& x) {
+  return static_cast<double>(std::real(x));
+}
+
+template <class T>
+T UnaryRef(UnaryOp op, T x, double p, double q) {
+  const double real = RealPart(x);
+  const T one(1), tp(static_cast<T>(p)), tq(static_cast<T>(q));
+  switch (op) {
+    case UnaryOp::kNeg: return -x;
+    case UnaryOp::kScale: return tp * x;
+    case UnaryOp::kAddScalar: return x + tp;
+    case UnaryOp::kExp: return std::exp(x);
+    case UnaryOp::kLog: return std::log(x);
+    case UnaryOp::kSqrt: return std::sqrt(x);
+    case UnaryOp::kSquare: return x * x;
+    case UnaryOp::kAbs: return real < 0 ? -x : x;
+    case UnaryOp::kSign: return real > 0 ? one : real < 0 ? -one : real == 0 ? T(0) : x;
+    case UnaryOp::kRelu: return real <= 0 ? T(0) : x;
+    case UnaryOp::kLeakyRelu: return real > 0 ? x : tp * x;
+    case UnaryOp::kTanh: return std::tanh(x);
+    case UnaryOp::kSigmoid: return one / (one + std::exp(-x));
+    case UnaryOp::kClamp: return real < p ? tp : real > q ? tq : x;
+    case UnaryOp::kInRange: return real >= p && real <= q ? one : T(0);
+  }
+  return x;
+}
+
+template <class T>
+T BinaryRef(BinaryOp op, T a, T b, double p) {
+  const double ra = RealPart(a), rb = RealPart(b);
+  switch (op) {
+    case BinaryOp::kAdd: return a + b;
+    case BinaryOp::kSub: return a - b;
+    case BinaryOp::kMul: return a * b;
+    case BinaryOp::kDiv: return a / b;
+    case BinaryOp::kMax: return ra >= rb || ra != ra ? a : b;  // NaN wins
+    case BinaryOp::kMin: return ra <= rb || ra != ra ? a : b;
+    case BinaryOp::kGreater: return T(ra > rb ? 1 : 0);
+    case BinaryOp::kGreaterEqual: return T(ra >= rb ? 1 : 0);
+    case BinaryOp::kReluGrad: return ra > 0 ? b : T(0);
+    case BinaryOp::kLeakyReluGrad: return ra > 0 ? b : static_cast<T>(p) * b;
+  }
+  return a;
+}
+
+// Where row `row` (all axes but the last) of each operand begins.
+struct RowOffsets {
+  std::size_t a = 0, b = 0;
+};
+
+template <class T>
+RowOffsets OffsetsOfRow(const BinaryProblem<T>& problem, std::size_t row) {
+  RowOffsets offsets;
+  for (int axis = BinaryProblem<T>::kRank - 2; axis >= 0; --axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const std::size_t index = row % problem.extents[i];
+    row /= problem.extents[i];
+    offsets.a += index * problem.strides_a[i];
+    offsets.b += index * problem.strides_b[i];
+  }
+  return offsets;
+}
+
+template <class T>
+void UnaryRangeRef(const UnaryProblem<T>& problem, std::size_t begin, std::size_t end) {
+  for (std::size_t i = begin; i < end; ++i) {
+    problem.y[i] = UnaryRef(problem.op, problem.x[i], problem.p, problem.q);
+  }
+}
+
+// Elements [begin, end) of each of the rows [first, last).
+struct RowRange {
+  std::size_t first, last;
+  std::size_t begin, end;
+};
+
+template <class T>
+void BinaryRangeRef(const BinaryProblem<T>& problem, const RowRange& range) {
+  const std::size_t length = problem.extents.back();
+  const std::size_t step_a = problem.strides_a.back(), step_b = problem.strides_b.back();
+  for (std::size_t row = range.first; row < range.last; ++row) {
+    const RowOffsets offsets = OffsetsOfRow(problem, row);
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      problem.y[row * length + i] = BinaryRef(problem.op, problem.a[offsets.a + i * step_a],
+                                              problem.b[offsets.b + i * step_b], problem.p);
+    }
+  }
+}
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layers with named parameters and buffers, and their composition.
+//
+//   Sequential net;
+//   net.Add<Conv2dLayer>("conv1", context, ConvShape{.in = 4, .out = 64, .kernel = 5}, rng);
+//   net.Add<BatchNorm>("bn1", context, 64, BatchNormOptions{.relu = true});
+//   Var y = net.Forward(x, Mode::kTrain);
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/rng.h"
+#include "nn/ops/batch_norm.h"
+#include "nn/ops/conv.h"
+#include "nn/tape.h"
+
+namespace tilegrad::nn {
+
+enum class Mode { kTrain, kEval };  // of batch norm: statistics of the batch, or the running ones
+
+struct NamedTensor {
+  std::string name;  // "encoder.conv1.weight"
+  Tensor value;      // shares the storage of the parameter or buffer
+};
+
+struct NamedVar {
+  std::string name;
+  Var value;
+};
+
+// Is shown every parameter (trained) and every buffer (saved, not trained) of a module.
+class ModuleVisitor {
+ public:
+  virtual ~ModuleVisitor() = default;
+  virtual void Parameter(const std::string& name, Var& value) = 0;
+  virtual void Buffer(const std::string& name, Tensor& value) = 0;
+};
+
+class Module {
+ public:
+  virtual ~Module() = default;
+  // Errors: as operations, see Context.
+  virtual Var Forward(const Var& x, Mode mode) = 0;
+  // Names begin with `prefix`, which is empty or ends in '.'. The order is fixed.
+  virtual void Visit(const std::string& prefix, ModuleVisitor& visitor) = 0;
+};
+
+std::vector<NamedVar> Parameters(Module& module);
+// Parameters and buffers: what a checkpoint holds.
+std::vector<NamedTensor> State(Module& module);
+std::int64_t CountParameters(Module& module);
+// Copies by name into the module's parameters and buffers, converting between F32 and F64. All of
+// them must be there with their shapes; else nothing is changed and the error names the first that
+// is not. Further names in `state` are ignored.
+Status LoadState(Module& module, const std::vector<NamedTensor>& state);
+
+struct LinearShape {
+  std::int64_t in = 0, out = 0;
+  bool bias = true;
+};
+
+class LinearLayer : public Module {
+ public:
+  LinearLayer(Context& context, const LinearShape& shape, Rng& rng);  // FillDefault
+  Var Forward(const Var& x, Mode mode) override;                      // [n, in] -> [n, out]
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Var weight;  // [out, in]
+  Var bias;    // [out]; invalid without
+};
+
+struct ConvShape {
+  std::int64_t in = 0, out = 0;
+  int kernel = 3;
+  ConvOptions options;
+  bool bias = true;
+};
+
+class Conv2dLayer : public Module {
+ public:
+  Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng);  // FillDefault
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Var weight;  // [out, in, kernel, kernel]
+  Var bias;    // [out]; invalid without
+
+ private:
+  ConvOptions options_;
+};
+
+// Of [n, c] and [n, c, h, w]. Running statistics as PyTorch: new = (1 - momentum) old + momentum
+// batch, with the unbiased variance.
+class BatchNorm : public Module {
+ public:
+  BatchNorm(Context& context, std::int64_t channels, const BatchNormOptions& options = {});
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  static constexpr double kMomentum = 0.1;
+  Var weight, bias;                      // gamma 1, beta 0 at the start
+  Tensor running_mean, running_variance;  // 0 and 1 at the start
+
+ private:
+  void Track(const BatchNormResult& batch, std::int64_t count);
+  BatchNormOptions options_;
+};
+
+class Activation : public Module {
+ public:
+  using Function = Var (*)(const Var&);
+  explicit Activation(Function function) : function_(function) {}  // e.g. &Relu
+  Var Forward(const Var& x, Mode) override { return function_(x); }
+  void Visit(const std::string&, ModuleVisitor&) override {}
+
+ private:
+  Function function_;
+};
+
+// [n, ...] -> [n, product of the rest].
+class Flatten : public Module {
+ public:
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string&, ModuleVisitor&) override {}
+};
+
+// One after the other.
+class Sequential : public Module {
+ public:
+  template <class M, class... A>
+  M& Add(const std::string& name, A&&... arguments) {
+    auto module = std::make_unique<M>(std::forward<A>(arguments)...);
+    M& reference = *module;
+    children_.emplace_back(name, std::move(module));
+    return reference;
+  }
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+ private:
+  std::vector<std::pair<std::string, std::unique_ptr<Module>>> children_;
+};
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/memory.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <mutex>
+#include <new>
+#include <utility>
+
+#include "base/aligned.h"
+
+namespace tilegrad::nn {
+
+struct Block {
+  std::byte* data = nullptr;
+  std::size_t bytes = 0;
+  std::size_t size_class = 0;
+  std::atomic<std::size_t> owners{0};
+  std::shared_ptr<MemoryPool> pool;  // set while the block is live: keeps the pool for its return
+};
+
+namespace {
+
+constexpr std::size_t kSteps = 8;  // classes to each doubling
+constexpr std::size_t kClasses = 64 * kSteps;
+constexpr std::size_t kSmallest = 1024;  // bytes; whatever is smaller shares one class
+
+struct SizeClass {
+  std::size_t index, bytes;
+};
+
+SizeClass ClassOf(std::size_t bytes) {
+  bytes = std::max(bytes, kSmallest);
+  const int log2 = std::bit_width(bytes) - 1;
+  const std::size_t step = (std::size_t{1} << log2) / kSteps;
+  const std::size_t rounded = (bytes + step - 1) / step * step;
+  return {static_cast<std::size_t>(log2) * kSteps + rounded / step - kSteps, rounded};
+}
+
+void Delete(Block* block) {
+  ::operator delete(block->data, std::align_val_t(kAlignment));
+  delete block;
+}
+
+}  // namespace
+
+struct MemoryPool::State {
+  mutable std::mutex mutex;
+  std::array<std::vector<Block*>, kClasses> free;
+  MemoryStats stats;
+};
+
+BlockRef::BlockRef(const BlockRef& other) : block_(other.block_) {
+  if (block_ != nullptr) block_->owners.fetch_add(1, std::memory_order_relaxed);
+}
+
+BlockRef::~BlockRef() {
+  if (block_ == nullptr || block_->owners.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+  const std::shared_ptr<MemoryPool> pool = std::move(block_->pool);
+  pool->Release(block_);
+}
+
+std::byte* BlockRef::data() const { return block_ == nullptr ? nullptr : block_->data; }
+
+bool BlockRef::unique() const {
+  return block_ != nullptr && block_->owners.load(std::memory_order_acquire) == 1;
+}
+
+MemoryPool::MemoryPool() : state_(std::make_unique<State>()) {}
+
+MemoryPool::~MemoryPool() { Trim(); }
+
+std::shared_ptr<MemoryPool> MemoryPool::Make() {
+  return std::shared_ptr<MemoryPool>(new MemoryPool());
+}
+
+BlockRef MemoryPool::Allocate(std::size_t bytes) {
+  const SizeClass wanted = ClassOf(bytes);
+  const std::lock_guard lock(state_->mutex);
+  auto& free = state_->free[wanted.index];
+  MemoryStats& stats = state_->stats;
+  ++stats.requests;
+  Block* block = nullptr;
+  if (free.empty()) {
+    ++stats.misses;
+    stats.held_bytes += wanted.bytes;
+    block = new Block;
+    block->data =
+        static_cast<std::byte*>(::operator new(wanted.bytes, std::align_val_t(kAlignment)));
+    block->bytes = wanted.bytes;
+    block->size_class = wanted.index;
+  } else {
+    block = free.back();
+    free.pop_back();
+  }
+  stats.live_bytes += block->bytes;
+  stats.peak_bytes = std::max(stats.peak_bytes, stats.live_bytes);
+  block->pool = shared_from_this();
+  block->owners.store(1, std::memory_order_relaxed);
+  return BlockRef(block);
+}
+
+void MemoryPool::Release(Block* block) {
+  const std::lock_guard lock(state_->mutex);
+  state_->stats.live_bytes -= block->bytes;
+  state_->free[block->size_class].push_back(block);
+}
+
+void MemoryPool::Trim() {
+  const std::lock_guard lock(state_->mutex);
+  for (auto& free : state_->free) {
+    for (Block* block : free) {
+      state_->stats.held_bytes -= block->bytes;
+      Delete(block);
+    }
+    free.clear();
+  }
+}
+
+void MemoryPool::ResetPeak() {
+  const std::lock_guard lock(state_->mutex);
+  state_->stats.peak_bytes = state_->stats.live_bytes;
+}
+
+MemoryStats MemoryPool::stats() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->stats;
+}
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Memory of tensors: reference-counted blocks that go back to a pool, so that a training step which
+// repeats the sizes of the one before takes nothing from the heap.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace tilegrad::nn {
+
+struct MemoryStats {
+  std::size_t live_bytes = 0;  // in blocks that some tensor holds now
+  std::size_t peak_bytes = 0;  // the largest live_bytes since the start or ResetPeak()
+  std::size_t held_bytes = 0;  // taken from the heap: live blocks and free ones
+  std::size_t misses = 0;      // requests that had to go to the heap
+  std::size_t requests = 0;
+};
+
+struct Block;
+
+// Shared ownership of one block; the last owner gives it back to its pool.
+class BlockRef {
+ public:
+  BlockRef() = default;
+  explicit BlockRef(Block* block) : block_(block) {}  // takes over one reference
+  BlockRef(const BlockRef& other);
+  BlockRef(BlockRef&& other) noexcept : block_(std::exchange(other.block_, nullptr)) {}
+  BlockRef& operator=(BlockRef other) noexcept {
+    std::swap(block_, other.block_);
+    return *this;
+  }
+  ~BlockRef();
+
+  std::byte* data() const;
+  bool unique() const;  // this is the only owner
+  explicit operator bool() const { return block_ != nullptr; }
+
+ private:
+  Block* block_ = nullptr;
+};
+
+// Free blocks are kept by size class (eight to each doubling, so at most 1/8 of a block is unused):
+// a fixed class for each size makes the second round of an equal sequence of requests free of
+// misses. Thread-safe. Blocks may outlive every other owner of the pool.
+class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
+ public:
+  static std::shared_ptr<MemoryPool> Make();
+  ~MemoryPool();
+  MemoryPool(const MemoryPool&) = delete;
+  MemoryPool& operator=(const MemoryPool&) = delete;
+
+  // Uninitialised, aligned to kAlignment, at least `bytes` long.
+  BlockRef Allocate(std::size_t bytes);
+  void Trim();  // gives the free blocks back to the heap
+  void ResetPeak();
+  MemoryStats stats() const;
+
+ private:
+  friend class BlockRef;
+  MemoryPool();
+  void Release(Block* block);
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// How NumPy-style broadcasting is laid out for a kernel.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "nn/tensor.h"
+
+namespace tilegrad::nn {
+
+// The shape that a and b are repeated to; false if they do not fit.
+bool BroadcastShape(const Shape& a, const Shape& b, Shape& result);
+
+// Axes merged where both operands allow it, so that loops are few and long. Unused leading axes have
+// extent 1; an axis along which an operand is repeated has stride 0.
+struct Broadcast {
+  using Extents = std::array<std::size_t, Shape::kMaxRank>;
+  Extents extents = {1, 1, 1, 1, 1};
+  std::array<Extents, 2> strides{};
+};
+Broadcast PlanBroadcast(const Shape& result, const Shape& a, const Shape& b);
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/ops/pointwise.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/error.h"
+#include "nn/kernels/pointwise.h"
+#include "nn/ops/broadcast.h"
+#include "nn/ops/reduce.h"
+
+namespace tilegrad::nn {
+namespace {
+
+struct UnaryParameters {
+  double p = 0, q = 0;
+};
+
+Tensor ComputeUnary(UnaryOp op, const Var& x, const UnaryParameters& parameters = {}) {
+  Tensor y = x.context().Empty(x.shape(), x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    Unary(UnaryProblem<T>{op, x.value().data<T>(), y.data<T>(), y.elements(), parameters.p,
+                          parameters.q},
+          x.context().workers());
+  });
+  return y;
+}
+
+// y = f(x), d_x = rule(adjoint): what every unary operation below is.
+Var UnaryVar(const OpInfo& info, UnaryOp op, const Var& x, const UnaryParameters& parameters,
+             Rule rule) {
+  if (!Usable(info.name, {&x})) return Invalid({&x});
+  return Record(info, ComputeUnary(op, x, parameters), {x}, std::move(rule));
+}
+
+// 1 where low <= x <= high.
+Var InRange(const Var& x, double low, double high) {
+  if (!Usable("in range", {&x})) return Invalid({&x});
+  return Constant(x.context(), ComputeUnary(UnaryOp::kInRange, x, {low, high}));
+}
+
+Var Sign(const Var& x) {
+  if (!Usable("sign", {&x})) return Invalid({&x});
+  return Constant(x.context(), ComputeUnary(UnaryOp::kSign, x));
+}
+
+struct BinaryCall {
+  BinaryOp op;
+  double p = 0;
+};
+
+template <class T>
+void FillProblem(const Broadcast& broadcast, BinaryProblem<T>& problem) {
+  problem.extents = broadcast.extents;
+  problem.strides_a = broadcast.strides[0];
+  problem.strides_b = broadcast.strides[1];
+}
+
+Tensor ComputeBinary(const BinaryCall& call, const Var& a, const Var& b, const Shape& shape) {
+  Tensor y = a.context().Empty(shape, a.dtype());
+  const Broadcast broadcast = PlanBroadcast(shape, a.shape(), b.shape());
+  WithFloatType(a.dtype(), [&]<class T>(T) {
+    BinaryProblem<T> problem;
+    problem.op = call.op;
+    problem.p = call.p;
+    FillProblem(broadcast, problem);
+    problem.a = a.value().data<T>();
+    problem.b = b.value().data<T>();
+    problem.y = y.data<T>();
+    Binary(problem, a.context().workers());
+  });
+  return y;
+}
+
+Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Var& b, Rule rule) {
+  if (!Usable(info.name, {&a, &b})) return Invalid({&a, &b});
+  Shape shape;
+  if (!BroadcastShape(a.shape(), b.shape(), shape)) {
+    return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
+                                   a.shape().ToString(), b.shape().ToString()));
+  }
+  return Record(info, ComputeBinary(call, a, b, shape), {a, b}, std::move(rule));
+}
+
+// No gradient flows out of a mask.
+Var Mask(const char* name, BinaryOp op, const Var& a, const Var& b) {
+  return BinaryVar({name}, {op}, Detach(a), Detach(b), nullptr);
+}
+
+}  // namespace
+
+Var Add(const Var& a, const Var& b) {
+  return BinaryVar({"add"}, {BinaryOp::kAdd}, a, b, [sa = a.shape(), sb = b.shape()](auto& adj) {
+    return std::vector<Var>{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
+                            adj.needs(1) ? SumTo(adj.dy(), sb) : Var()};
+  });
+}
+
+Var Sub(const Var& a, const Var& b) {
+  return BinaryVar({"sub"}, {BinaryOp::kSub}, a, b, [sa = a.shape(), sb = b.shape()](auto& adj) {
+    return std::vector<Var>{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
+                            adj.needs(1) ? Neg(SumTo(adj.dy(), sb)) : Var()};
+  });
+}
+
+Var Mul(const Var& a, const Var& b) {
+  return BinaryVar({"mul"}, {BinaryOp::kMul}, a, b, [a, b](const Adjoint& adj) {
+    return std::vector<Var>{adj.needs(0) ? SumTo(Mul(adj.dy(), b), a.shape()) : Var(),
+                            adj.needs(1) ? SumTo(Mul(adj.dy(), a), b.shape()) : Var()};
+  });
+}
+
+// d(a / b) = d_a / b - (a / b) d_b / b
+Var Div(const Var& a, const Var& b) {
+  const OpInfo info{"div", /*save_output=*/true};
+  return BinaryVar(info, {BinaryOp::kDiv}, a, b, [sa = a.shape(), b](const Adjoint& adj) {
+    const Var scaled = Div(adj.dy(), b);
+    return std::vector<Var>{adj.needs(0) ? SumTo(scaled, sa) : Var(),
+                            adj.needs(1) ? Neg(SumTo(Mul(scaled, adj.y()), b.shape())) : Var()};
+  });
+}
+
+Var Max(const Var& a, const Var& b) {
+  return BinaryVar({"max"}, {BinaryOp::kMax}, a, b, [a, b](const Adjoint& adj) {
+    return std::vector<Var>{SumTo(Mul(adj.dy(), GreaterEqual(a, b)), a.shape()),
+                            SumTo(Mul(adj.dy(), Greater(b, a)), b.shape())};
+  });
+}
+
+Var Min(const Var& a, const Var& b) {
+  return BinaryVar({"min"}, {BinaryOp::kMin}, a, b, [a, b](const Adjoint& adj) {
+    return std::vector<Var>{SumTo(Mul(adj.dy(), GreaterEqual(b, a)), a.shape()),
+                            SumTo(Mul(adj.dy(), Greater(a, b)), b.shape())};
+  });
+}
+
+Var Greater(const Var& a, const Var& b) { return Mask("greater", BinaryOp::kGreater, a, b); }
+
+Var GreaterEqual(const Var& a, const Var& b) {
+  return Mask("greater equal", BinaryOp::kGreaterEqual, a, b);
+}
+
+Var Neg(const Var& x) {
+  return UnaryVar({"neg"}, UnaryOp::kNeg, x, {},
+                  [](const Adjoint& adj) { return std::vector<Var>{Neg(adj.dy())}; });
+}
+
+Var Scale(const Var& x, double factor) {
+  return UnaryVar({"scale"}, UnaryOp::kScale, x, {factor}, [factor](const Adjoint& adj) {
+    return std::vector<Var>{Scale(adj.dy(), factor)};
+  });
+}
+
+Var AddScalar(const Var& x, double term) {
+  return UnaryVar({"add scalar"}, UnaryOp::kAddScalar, x, {term},
+                  [](const Adjoint& adj) { return std::vector<Var>{adj.dy()}; });
+}
+
+Var Exp(const Var& x) {
+  return UnaryVar({"exp", true}, UnaryOp::kExp, x, {},
+                  [](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), adj.y())}; });
+}
+
+Var Log(const Var& x) {
+  return UnaryVar({"log"}, UnaryOp::kLog, x, {},
+                  [x](const Adjoint& adj) { return std::vector<Var>{Div(adj.dy(), x)}; });
+}
+
+Var Sqrt(const Var& x) {
+  return UnaryVar({"sqrt", true}, UnaryOp::kSqrt, x, {}, [](const Adjoint& adj) {
+    return std::vector<Var>{Scale(Div(adj.dy(), adj.y()), 0.5)};
+  });
+}
+
+Var Square(const Var& x) {
+  return UnaryVar({"square"}, UnaryOp::kSquare, x, {}, [x](const Adjoint& adj) {
+    return std::vector<Var>{Scale(Mul(adj.dy(), x), 2.0)};
+  });
+}
+
+Var Abs(const Var& x) {
+  return UnaryVar({"abs"}, UnaryOp::kAbs, x, {},
+                  [x](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), Sign(x))}; });
+}
+
+namespace {
+
+// d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the second
+// derivative with respect to y is zero, and with respect to d_y it is the same operation.
+Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
+  return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
+    return std::vector<Var>{Var(), RectifierGrad(call, y, adj.dy())};
+  });
+}
+
+}  // namespace
+
+Var Relu(const Var& x) {
+  return UnaryVar({"relu", true}, UnaryOp::kRelu, x, {}, [](const Adjoint& adj) {
+    return std::vector<Var>{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.dy())};
+  });
+}
+
+Var LeakyRelu(const Var& x, double slope) {
+  return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, {slope},
+                  [slope](const Adjoint& adj) {
+                    const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
+                    return std::vector<Var>{RectifierGrad(call, adj.y(), adj.dy())};
+                  });
+}
+
+Var ReluGrad(const Var& y, const Var& dy) { return RectifierGrad({BinaryOp::kReluGrad}, y, dy); }
+
+Var Tanh(const Var& x) {  // 1 - y^2
+  return UnaryVar({"tanh", true}, UnaryOp::kTanh, x, {}, [](const Adjoint& adj) {
+    return std::vector<Var>{Sub(adj.dy(), Mul(adj.dy(), Square(adj.y())))};
+  });
+}
+
+Var Sigmoid(const Var& x) {  // y (1 - y)
+  return UnaryVar({"sigmoid", true}, UnaryOp::kSigmoid, x, {}, [](const Adjoint& adj) {
+    return std::vector<Var>{Mul(adj.dy(), Sub(adj.y(), Square(adj.y())))};
+  });
+}
+
+Var Clamp(const Var& x, double low, double high) {
+  return UnaryVar({"clamp"}, UnaryOp::kClamp, x, {low, high}, [x, low, high](const Adjoint& adj) {
+    return std::vector<Var>{Mul(adj.dy(), InRange(x, low, high))};
+  });
+}
+
+}  // namespace tilegrad::nn

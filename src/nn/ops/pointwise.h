@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Element by element. Binary operations broadcast as NumPy does: shapes are aligned at the last
+// axis, and an axis of extent 1 (or a missing one) is repeated.
+#pragma once
+
+#include "nn/tape.h"
+
+namespace tilegrad::nn {
+
+Var Add(const Var& a, const Var& b);
+Var Sub(const Var& a, const Var& b);
+Var Mul(const Var& a, const Var& b);
+Var Div(const Var& a, const Var& b);
+Var Max(const Var& a, const Var& b);  // where equal, the gradient goes to a
+Var Min(const Var& a, const Var& b);
+
+Var Neg(const Var& x);
+Var Scale(const Var& x, double factor);
+Var AddScalar(const Var& x, double term);
+Var Exp(const Var& x);
+Var Log(const Var& x);  // natural; NaN below 0, -inf at 0
+Var Sqrt(const Var& x);
+Var Square(const Var& x);
+Var Abs(const Var& x);                            // gradient 0 at 0
+Var Relu(const Var& x);                           // gradient 0 at 0
+Var LeakyRelu(const Var& x, double slope);        // x > 0 ? x : slope x; slope at 0; slope >= 0
+Var Tanh(const Var& x);
+Var Sigmoid(const Var& x);
+Var Clamp(const Var& x, double low, double high);  // gradient 1 within, bounds included; else 0
+
+inline Var operator+(const Var& a, const Var& b) { return Add(a, b); }
+inline Var operator-(const Var& a, const Var& b) { return Sub(a, b); }
+inline Var operator*(const Var& a, const Var& b) { return Mul(a, b); }
+inline Var operator/(const Var& a, const Var& b) { return Div(a, b); }
+inline Var operator-(const Var& x) { return Neg(x); }
+inline Var operator*(double s, const Var& x) { return Scale(x, s); }
+inline Var operator*(const Var& x, double s) { return Scale(x, s); }
+inline Var operator/(const Var& x, double s) { return Scale(x, 1.0 / s); }
+inline Var operator+(const Var& x, double s) { return AddScalar(x, s); }
+inline Var operator-(const Var& x, double s) { return AddScalar(x, -s); }
+inline Var operator+(double s, const Var& x) { return AddScalar(x, s); }
+inline Var operator-(double s, const Var& x) { return AddScalar(Neg(x), s); }
+
+// The adjoint of Relu from its output y: y > 0 ? dy : 0.
+Var ReluGrad(const Var& y, const Var& dy);
+
+// Masks, without gradient: 1 where the relation holds, else 0. Broadcast like the others.
+Var Greater(const Var& a, const Var& b);
+Var GreaterEqual(const Var& a, const Var& b);
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/ops/shape.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "base/error.h"
+#include "nn/kernels/copy.h"
+#include "nn/ops/broadcast.h"
+#include "nn/ops/reduce.h"
+
+namespace tilegrad::nn {
+namespace {
+
+// Row-major strides, right-aligned into a box of five axes.
+StridedBox::Axes StridesOf(const Shape& shape) {
+  StridedBox::Axes strides{};
+  std::size_t stride = 1;
+  for (int axis = shape.rank() - 1; axis >= 0; --axis) {
+    strides[static_cast<std::size_t>(StridedBox::kRank - shape.rank() + axis)] = stride;
+    stride *= static_cast<std::size_t>(shape[axis]);
+  }
+  return strides;
+}
+
+StridedBox::Axes ExtentsOf(const Shape& shape) {
+  StridedBox::Axes extents = {1, 1, 1, 1, 1};
+  for (int axis = 0; axis < shape.rank(); ++axis) {
+    extents[static_cast<std::size_t>(StridedBox::kRank - shape.rank() + axis)] =
+        static_cast<std::size_t>(shape[axis]);
+  }
+  return extents;
+}
+
+void Copy(const StridedBox& box, const Var& x, std::size_t from, Tensor& y, std::size_t to) {
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    CopyStrided(box, x.value().data<T>() + from, y.data<T>() + to, x.context().workers());
+  });
+}
+
+Tensor Zeros(const Var& like, const Shape& shape) {
+  Tensor zeros = like.context().Empty(shape, like.dtype());
+  std::fill_n(zeros.raw(), zeros.bytes(), std::byte{0});
+  return zeros;
+}
+
+bool HasAxis(const Shape& shape, int axis) { return axis >= 0 && axis < shape.rank(); }
+
+// [outer, extent of axis, inner]
+struct AxisView {
+  AxisView(const Shape& shape, int axis)
+      : outer(static_cast<std::size_t>(shape.Product(0, axis))),
+        extent(static_cast<std::size_t>(shape[axis])),
+        inner(static_cast<std::size_t>(shape.Product(axis + 1, shape.rank()))) {}
+  std::size_t outer, extent, inner;
+};
+
+// Copies `count` rows along an axis, from row `begin_x` of x to row `begin_y` of y.
+struct RowMove {
+  int axis;
+  std::size_t begin_x, begin_y, count;
+};
+void MoveRows(const RowMove& move, const Var& x, Tensor& y) {
+  const AxisView vx(x.shape(), move.axis), vy(y.shape(), move.axis);
+  StridedBox box;
+  box.extents = {1, 1, 1, vx.outer, move.count * vx.inner};
+  box.strides_from = {0, 0, 0, vx.extent * vx.inner, 1};
+  box.strides_to = {0, 0, 0, vy.extent * vy.inner, 1};
+  Copy(box, x, move.begin_x * vx.inner, y, move.begin_y * vy.inner);
+}
+
+Shape WithExtent(Shape shape, int axis, std::int64_t extent) {
+  shape[axis] = extent;
+  return shape;
+}
+
+}  // namespace
+
+Var Reshape(const Var& x, Shape shape) {
+  if (!Usable("reshape", {&x})) return Invalid({&x});
+  if (x.shape() == shape) return x;
+  const Shape asked = shape;
+  int open = -1;
+  for (int axis = 0; axis < shape.rank(); ++axis) {
+    if (shape[axis] == -1 && open < 0) open = axis;
+  }
+  if (open >= 0) {
+    shape[open] = 1;
+    const std::int64_t rest = std::max<std::int64_t>(1, shape.elements());
+    shape[open] = x.shape().elements() / rest;
+  }
+  if (shape.elements() != x.shape().elements()) {
+    return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
+  }
+  return Record({"reshape"}, x.value().Reshaped(shape), {x},
+                [before = x.shape()](const Adjoint& adj) {
+                  return std::vector<Var>{Reshape(adj.dy(), before)};
+                });
+}
+
+Var BroadcastTo(const Var& x, const Shape& shape) {
+  if (!Usable("broadcast", {&x}) || x.shape() == shape) return x;
+  Shape joined;
+  if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape)) {
+    return Fail(x,
+                InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
+  }
+  const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
+  Tensor y = x.context().Empty(shape, x.dtype());
+  Copy({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
+  return Record({"broadcast"}, std::move(y), {x}, [before = x.shape()](const Adjoint& adj) {
+    return std::vector<Var>{SumTo(adj.dy(), before)};
+  });
+}
+
+Var Permute(const Var& x, std::span<const int> axes) {
+  if (!Usable("permute", {&x})) return Invalid({&x});
+  const int rank = x.shape().rank();
+  std::array<int, Shape::kMaxRank> inverse;
+  inverse.fill(-1);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (HasAxis(x.shape(), axes[i])) inverse[static_cast<std::size_t>(axes[i])] = static_cast<int>(i);
+  }
+  const auto known = std::count_if(inverse.begin(), inverse.end(), [](int i) { return i >= 0; });
+  if (static_cast<int>(axes.size()) != rank || known != rank) {
+    return Fail(x, InvalidArgument("permute: shape {} needs each of its axes once",
+                                   x.shape().ToString()));
+  }
+  Shape shape;
+  for (int axis : axes) shape.Append(x.shape()[axis]);
+  StridedBox box{ExtentsOf(shape), {}, StridesOf(shape)};
+  const StridedBox::Axes strides = StridesOf(x.shape());
+  const auto pad = static_cast<std::size_t>(StridedBox::kRank - rank);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    box.strides_from[pad + i] = strides[pad + static_cast<std::size_t>(axes[i])];
+  }
+  Tensor y = x.context().Empty(shape, x.dtype());
+  Copy(box, x, 0, y, 0);
+  return Record({"permute"}, std::move(y), {x}, [inverse, rank](const Adjoint& adj) {
+    const std::span<const int> back(inverse.data(), static_cast<std::size_t>(rank));
+    return std::vector<Var>{Permute(adj.dy(), back)};
+  });
+}
+
+Var Permute(const Var& x, std::initializer_list<int> axes) {
+  return Permute(x, std::span<const int>(axes.begin(), axes.size()));
+}
+
+Var Transpose(const Var& x) { return Permute(x, {1, 0}); }
+
+Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
+  if (!Usable("slice", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis) || begin < 0 || begin > end || end > x.shape()[axis]) {
+    return Fail(x, InvalidArgument("slice: [{}, {}) of axis {} of {}", begin, end, axis,
+                                   x.shape().ToString()));
+  }
+  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, end - begin), x.dtype());
+  const auto first = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
+  MoveRows({axis, first, 0, count}, x, y);
+  const std::int64_t after = x.shape()[axis] - end;
+  return Record({"slice"}, std::move(y), {x}, [axis, begin, after](const Adjoint& adj) {
+    return std::vector<Var>{Pad(adj.dy(), axis, begin, after)};
+  });
+}
+
+Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
+  if (!Usable("pad", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis) || before < 0 || after < 0) {
+    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {}", before, after, axis,
+                                   x.shape().ToString()));
+  }
+  const std::int64_t extent = x.shape()[axis];
+  Tensor y = Zeros(x, WithExtent(x.shape(), axis, before + extent + after));
+  MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
+  return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
+    return std::vector<Var>{Slice(adj.dy(), axis, before, before + extent)};
+  });
+}
+
+namespace {
+
+// Two parts at a time would copy the front ones again and again; this places each part once.
+Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
+  Context& context = parts[0].context();
+  Tensor y = context.Empty(WithExtent(parts[0].shape(), axis, extent), parts[0].dtype());
+  std::vector<std::int64_t> ends = {0};
+  for (const Var& part : parts) {
+    const std::int64_t count = part.shape()[axis];
+    MoveRows({axis, 0, static_cast<std::size_t>(ends.back()), static_cast<std::size_t>(count)},
+             part, y);
+    ends.push_back(ends.back() + count);
+  }
+  const Rule rule = [axis, ends](const Adjoint& adj) {
+    std::vector<Var> d(ends.size() - 1);
+    for (std::size_t i = 0; i < d.size(); ++i) {
+      if (adj.needs(i)) d[i] = Slice(adj.dy(), axis, ends[i], ends[i + 1]);
+    }
+    return d;
+  };
+  return Record({"concat"}, std::move(y), parts, rule);
+}
+
+}  // namespace
+
+Var Concat(std::span<const Var> parts, int axis) {
+  if (parts.empty()) return {};
+  const Shape& first = parts[0].shape();
+  std::int64_t extent = 0;
+  for (const Var& part : parts) {
+    if (!Usable("concat", {&parts[0], &part})) return Invalid({&parts[0], &part});
+    if (!HasAxis(first, axis) || part.shape().rank() != first.rank() ||
+        !(WithExtent(part.shape(), axis, 0) == WithExtent(first, axis, 0))) {
+      return Fail(part, InvalidArgument("concat: {} and {} along axis {}", first.ToString(),
+                                        part.shape().ToString(), axis));
+    }
+    extent += part.shape()[axis];
+  }
+  return ConcatChecked(parts, axis, extent);
+}
+
+Var Concat(std::initializer_list<Var> parts, int axis) {
+  return Concat(std::span<const Var>(parts.begin(), parts.size()), axis);
+}
+
+namespace {
+
+// Why rows of `shape` along `axis` cannot be addressed by `indices` below `extent`, or OK.
+Status CheckIndices(const char* op, const Tensor& indices, std::int64_t extent) {
+  if (indices.empty() || indices.dtype() != DType::kI32 || indices.shape().rank() != 1) {
+    return InvalidArgument("{}: indices must be [n] of I32", op);
+  }
+  for (std::int32_t i : indices.span<std::int32_t>()) {
+    if (i < 0 || i >= extent) return InvalidArgument("{}: index {} of {}", op, i, extent);
+  }
+  return {};
+}
+
+IndexedRows RowsOf(const AxisView& view, const Tensor& indices) {
+  return {view.outer, view.extent, view.inner, indices.data<std::int32_t>(), indices.elements()};
+}
+
+}  // namespace
+
+Var Gather(const Var& x, int axis, const Tensor& indices) {
+  if (!Usable("gather", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis)) return Fail(x, InvalidArgument("gather: no axis {}", axis));
+  if (const Status s = CheckIndices("gather", indices, x.shape()[axis]); !s.ok()) return Fail(x, s);
+  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, indices.shape()[0]), x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    GatherRows(RowsOf(AxisView(x.shape(), axis), indices), x.value().data<T>(), y.data<T>(),
+               x.context().workers());
+  });
+  const std::int64_t extent = x.shape()[axis];
+  return Record({"gather"}, std::move(y), {x}, [axis, indices, extent](const Adjoint& adj) {
+    return std::vector<Var>{ScatterAdd(adj.dy(), axis, indices, extent)};
+  });
+}
+
+Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t extent) {
+  if (!Usable("scatter", {&x})) return Invalid({&x});
+  if (!HasAxis(x.shape(), axis)) return Fail(x, InvalidArgument("scatter: no axis {}", axis));
+  if (const Status s = CheckIndices("scatter", indices, extent); !s.ok()) return Fail(x, s);
+  if (indices.shape()[0] != x.shape()[axis]) {
+    return Fail(x, InvalidArgument("scatter: {} indices for axis {} of {}", indices.shape()[0],
+                                   axis, x.shape().ToString()));
+  }
+  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, extent), x.dtype());
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    ScatterRows(RowsOf(AxisView(y.shape(), axis), indices), x.value().data<T>(), y.data<T>(),
+                x.context().workers());
+  });
+  return Record({"scatter"}, std::move(y), {x}, [axis, indices](const Adjoint& adj) {
+    return std::vector<Var>{Gather(adj.dy(), axis, indices)};
+  });
+}
+
+}  // namespace tilegrad::nn

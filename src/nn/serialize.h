@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// safetensors files: the field's plain format for named tensors.
+// https://github.com/huggingface/safetensors#format: u64 header length (little endian), JSON
+// header, then the data that the header's offsets point into.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "nn/layers.h"
+
+namespace tilegrad::nn {
+
+struct TensorFile {
+  std::vector<NamedTensor> tensors;             // in file order
+  std::map<std::string, std::string> metadata;  // the header's "__metadata__"
+};
+
+// Of dtypes F32, F64, U8, I32 and I64. Every claim of the header (lengths, offsets, shapes) is held
+// against the file before memory is taken; a file that lies or is cut short gives kDataLoss, whose
+// message names the tensor.
+Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes);
+Result<TensorFile> ReadSafetensors(Context& context, const Path& path);
+
+// Names must be unique and not "__metadata__".
+Result<Bytes> EncodeSafetensors(const TensorFile& file);
+Status WriteSafetensors(const Path& path, const TensorFile& file);  // whole or not at all
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reverse-mode differentiation. A Var is a tensor that knows how it was computed; Grad walks that
+// graph backwards. The rule of each operation is written in the same operations on Vars, so the
+// gradient is itself a Var that can be differentiated again, to any order:
+//
+//   Var loss = Mean(Square(Linear(x, w, b) - y));
+//   auto [d_w, d_b] = ...Grad(loss, {w, b});
+//
+// Read first: Record in this file, then any file of ops/.
+#pragma once
+
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "nn/context.h"
+#include "nn/tensor.h"
+
+namespace tilegrad::nn {
+
+struct Node;
+
+// A value and its place in the graph. Cheap to copy; shares tensor and node.
+class Var {
+ public:
+  Var() = default;  // invalid, and of no context
+  Var(Context& context, Tensor value, std::shared_ptr<Node> node = nullptr, int slot = 0)
+      : context_(&context), value_(std::move(value)), node_(std::move(node)), slot_(slot) {}
+
+  bool valid() const { return !value_.empty(); }
+  Context& context() const { return *context_; }  // not of a default-made Var
+  const Tensor& value() const { return value_; }
+  Tensor& value() { return value_; }  // optimisers write here; not while a graph still needs it
+  const Shape& shape() const { return value_.shape(); }
+  DType dtype() const { return value_.dtype(); }
+  bool requires_grad() const { return node_ != nullptr; }
+  double item() const;  // the number of a one-element Var; NaN of an invalid one
+
+  const std::shared_ptr<Node>& node() const { return node_; }
+  int slot() const { return slot_; }  // which output of the node
+  bool has_context() const { return context_ != nullptr; }
+
+ private:
+  Context* context_ = nullptr;
+  Tensor value_;
+  std::shared_ptr<Node> node_;
+  int slot_ = 0;
+};
+
+Var Constant(Context& context, Tensor value);   // no gradient flows into it
+Var Constant(Context& context, double value);   // a scalar
+Var Parameter(Context& context, Tensor value);  // Grad may be asked for it
+Var Detach(const Var& x);                       // the value of x, cut off from its graph
+
+struct GradOptions {
+  bool create_graph = false;  // the gradients can be differentiated; the graph of `output` is kept
+  bool keep_graph = false;    // keep it although create_graph is off; else it is released on the way
+  Var d_output;               // adjoint of `output`, of its shape; default: 1 for one element
+};
+
+// d output / d inputs[i], of the shapes of `inputs`; zeros where output does not depend on it. On
+// errors (output has more than one element and no d_output, a graph that was released, an operand of
+// a first-order operation in a second derivative) the context notes it and every entry is invalid.
+std::vector<Var> Grad(const Var& output, std::span<const Var> inputs,
+                      const GradOptions& options = {});
+std::vector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
+                      const GradOptions& options = {});
+
+// An operation that is computed elsewhere (a renderer, a loss) and has a first derivative only.
+// `backward` receives one adjoint for each output (empty Tensor: zero) and returns one for each
+// input (empty Tensor: zero), of the input's shape and dtype.
+struct ExternalOp {
+  const char* name = "external";
+  std::vector<Var> inputs;
+  std::vector<Tensor> outputs;
+  std::function<std::vector<Tensor>(std::span<const Tensor> d_outputs)> backward;
+};
+std::vector<Var> External(Context& context, ExternalOp op);
+
+// ---- For those who write operations --------------------------------------------------------------
+
+// What a rule is given: the adjoints that arrived, and what is asked for.
+class Adjoint {
+ public:
+  Adjoint(const Var& y, std::span<const Var> d_outputs, const std::vector<bool>& needs)
+      : y_(y), d_outputs_(d_outputs), needs_(needs) {}
+  const Var& dy() const { return d_outputs_[0]; }
+  std::span<const Var> d_outputs() const { return d_outputs_; }
+  const Var& y() const { return y_; }  // the output, if the operation saved it
+  bool needs(std::size_t input) const { return needs_[input]; }
+
+ private:
+  const Var& y_;
+  std::span<const Var> d_outputs_;
+  const std::vector<bool>& needs_;
+};
+
+// Returns the adjoint of each input; an invalid Var where none flows or none is needed.
+using Rule = std::function<std::vector<Var>(const Adjoint&)>;
+
+struct OpInfo {
+  const char* name;          // for messages
+  bool save_output = false;  // the rule reads Adjoint::y()
+};
+
+// Makes the Var of an operation's result. The rule is kept only where a gradient can be asked for.
+Var Record(const OpInfo& info, Tensor value, std::span<const Var> inputs, Rule rule);
+Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, Rule rule);
+
+// The invalid Var of the operands' context, after noting `status` there.
+Var Fail(const Var& operand, Status status);
+// True where all are valid, of one float dtype; else the context of `operands` knows why.
+bool Usable(const char* op, std::initializer_list<const Var*> operands);
+// The invalid result that follows from an invalid operand.
+Var Invalid(std::initializer_list<const Var*> operands);
+
+}  // namespace tilegrad::nn

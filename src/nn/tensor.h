@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tensors: contiguous, row-major, of rank 0 to 5. Copying a Tensor shares its storage.
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "nn/memory.h"
+
+namespace tilegrad::nn {
+
+// Operations compute in kF32 (SIMD) and kF64 (the scalar references); kI32 holds indices, the
+// others are for files only.
+enum class DType : std::uint8_t { kF32, kF64, kU8, kI32, kI64 };
+
+std::size_t BytesOf(DType dtype);
+const char* NameOf(DType dtype);  // as safetensors spells it: "F32", ...
+
+template <class T>
+inline constexpr DType kDTypeOf = DType::kU8;
+template <>
+inline constexpr DType kDTypeOf<float> = DType::kF32;
+template <>
+inline constexpr DType kDTypeOf<double> = DType::kF64;
+template <>
+inline constexpr DType kDTypeOf<std::int32_t> = DType::kI32;
+template <>
+inline constexpr DType kDTypeOf<std::int64_t> = DType::kI64;
+
+// Extents, outermost first. Rank 0 is a scalar: one element.
+class Shape {
+ public:
+  static constexpr int kMaxRank = 5;
+
+  Shape() = default;
+  Shape(std::initializer_list<std::int64_t> extents) {  // NOLINT: {2, 3} is a shape
+    for (std::int64_t e : extents) Append(e);
+  }
+
+  int rank() const { return rank_; }
+  std::int64_t operator[](int axis) const { return extents_[static_cast<std::size_t>(axis)]; }
+  std::int64_t& operator[](int axis) { return extents_[static_cast<std::size_t>(axis)]; }
+  void Append(std::int64_t extent) {
+    assert(rank_ < kMaxRank && extent >= -1);
+    extents_[static_cast<std::size_t>(rank_++)] = extent;
+  }
+  std::int64_t elements() const;
+  // Product of the extents of axes [begin, end).
+  std::int64_t Product(int begin, int end) const;
+  std::string ToString() const;  // "[64, 3, 32, 32]"
+  bool operator==(const Shape& other) const;
+
+ private:
+  std::array<std::int64_t, kMaxRank> extents_{};
+  int rank_ = 0;
+};
+
+class Tensor {
+ public:
+  Tensor() = default;  // holds nothing
+  Tensor(BlockRef block, const Shape& shape, DType dtype)
+      : block_(std::move(block)), shape_(shape), dtype_(dtype) {}
+
+  bool empty() const { return !block_; }  // no storage; a [0, 3] tensor has one
+  const Shape& shape() const { return shape_; }
+  DType dtype() const { return dtype_; }
+  std::size_t elements() const { return static_cast<std::size_t>(shape_.elements()); }
+  std::size_t bytes() const { return elements() * BytesOf(dtype_); }
+  bool unique() const { return block_.unique(); }  // nobody else sees the storage
+
+  template <class T>
+  T* data() {
+    assert(dtype_ == kDTypeOf<T>);
+    return reinterpret_cast<T*>(block_.data());
+  }
+  template <class T>
+  const T* data() const {
+    assert(dtype_ == kDTypeOf<T>);
+    return reinterpret_cast<const T*>(block_.data());
+  }
+  template <class T>
+  std::span<T> span() {
+    return {data<T>(), elements()};
+  }
+  template <class T>
+  std::span<const T> span() const {
+    return {data<T>(), elements()};
+  }
+  std::byte* raw() { return block_.data(); }
+  const std::byte* raw() const { return block_.data(); }
+
+  // The same storage seen with another shape of as many elements.
+  Tensor Reshaped(const Shape& shape) const {
+    assert(shape.elements() == shape_.elements());
+    return {block_, shape, dtype_};
+  }
+
+ private:
+  BlockRef block_;
+  Shape shape_;
+  DType dtype_ = DType::kF32;
+};
+
+// Calls f(T{}) with T = float or double as the dtype says. The dtype must be one of the two.
+template <class F>
+decltype(auto) WithFloatType(DType dtype, F&& f) {
+  assert(dtype == DType::kF32 || dtype == DType::kF64);
+  return dtype == DType::kF64 ? f(double{}) : f(float{});
+}
+
+}  // namespace tilegrad::nn
