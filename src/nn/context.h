@@ -8,6 +8,7 @@
 #include <span>
 
 #include "base/parallel.h"
+#include "nn/kernels/kernel_context.h"
 #include "nn/memory.h"
 #include "nn/tensor.h"
 #include "tilegrad/status.h"
@@ -28,6 +29,7 @@ class Context {
   Context& operator=(const Context&) = delete;
 
   const Workers& workers() const { return workers_; }
+  KernelContext kernels() { return {workers_, scratch_}; }
   DType dtype() const { return dtype_; }
 
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
@@ -54,6 +56,7 @@ class Context {
   const Workers& workers_;
   DType dtype_;
   std::shared_ptr<MemoryPool> pool_;
+  KernelScratch scratch_;
   Status status_;
   bool recording_ = true;
   std::uint64_t order_ = 0;

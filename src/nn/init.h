@@ -9,7 +9,7 @@
 namespace tilegrad::nn {
 
 void FillConstant(Tensor& tensor, double value);
-void FillNormal(Tensor& tensor, Rng& rng, double deviation);        // N(0, deviation^2)
+void FillNormal(Tensor& tensor, Rng& rng, double deviation);          // N(0, deviation^2)
 void FillUniform(Tensor& tensor, Rng& rng, double low, double high);  // [low, high)
 
 // Inputs that one output of a weight [out, in] or [out, in, kh, kw] sums over.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/rng.h"
+#include "nn/named_tensors.h"
 #include "nn/ops/batch_norm.h"
 #include "nn/ops/conv.h"
 #include "nn/tape.h"
@@ -20,11 +21,6 @@
 namespace tilegrad::nn {
 
 enum class Mode { kTrain, kEval };  // of batch norm: statistics of the batch, or the running ones
-
-struct NamedTensor {
-  std::string name;  // "encoder.conv1.weight"
-  Tensor value;      // shares the storage of the parameter or buffer
-};
 
 struct NamedVar {
   std::string name;
@@ -52,9 +48,7 @@ std::vector<NamedVar> Parameters(Module& module);
 // Parameters and buffers: what a checkpoint holds.
 std::vector<NamedTensor> State(Module& module);
 std::int64_t CountParameters(Module& module);
-// Copies by name into the module's parameters and buffers, converting between F32 and F64. All of
-// them must be there with their shapes; else nothing is changed and the error names the first that
-// is not. Further names in `state` are ignored.
+// CopyByName into parameters and buffers.
 Status LoadState(Module& module, const std::vector<NamedTensor>& state);
 
 struct LinearShape {
@@ -101,7 +95,7 @@ class BatchNorm : public Module {
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
   static constexpr double kMomentum = 0.1;
-  Var weight, bias;                      // gamma 1, beta 0 at the start
+  Var weight, bias;                       // gamma 1, beta 0 at the start
   Tensor running_mean, running_variance;  // 0 and 1 at the start
 
  private:

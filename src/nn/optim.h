@@ -11,6 +11,8 @@
 
 namespace tilegrad::nn {
 
+struct AdamCoefficients;  // of kernels/adam.h
+
 struct AdamOptions {
   double learning_rate = 1e-3;
   double beta1 = 0.9;
@@ -32,8 +34,8 @@ class Adam {
   std::int64_t steps() const { return steps_; }
   AdamOptions& options() { return options_; }  // schedules set learning_rate here
 
-  // "adam.m.<name>", "adam.v.<name>" and "adam.steps" ([1] of kI64). Loading restores the same bits;
-  // errors as LoadState of layers.h.
+  // "adam.m.<name>", "adam.v.<name>" and "adam.steps" ([1] of kI64). Loading restores the same
+  // bits; errors as CopyByName.
   std::vector<NamedTensor> State() const;
   Status LoadState(const std::vector<NamedTensor>& state);
 
@@ -42,6 +44,7 @@ class Adam {
     NamedVar parameter;
     Tensor m, v;
   };
+  void Update(Slot& slot, const Tensor& gradient, const AdamCoefficients& coefficients);
   Context& context_;
   std::vector<Slot> slots_;
   AdamOptions options_;

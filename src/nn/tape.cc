@@ -39,8 +39,8 @@ std::shared_ptr<Node> MakeNode(Context& context, const OpInfo& info, std::span<c
 }
 
 bool WantsNode(const Context& context, std::span<const Var> inputs) {
-  return context.recording() && std::any_of(inputs.begin(), inputs.end(),
-                                            [](const Var& v) { return v.requires_grad(); });
+  return context.recording() &&
+         std::any_of(inputs.begin(), inputs.end(), [](const Var& v) { return v.requires_grad(); });
 }
 
 // One walk backwards over the graph of `output`.
@@ -293,8 +293,7 @@ std::vector<Var> ExternalBackward(const ExternalOp& op, Context& context,
                                  d_inputs[i].shape().ToString(), op.inputs[i].shape().ToString()));
       return {};
     }
-    result.push_back(d_inputs[i].empty() ? Var()
-                                         : Record({op.name}, d_inputs[i], parents, refuse));
+    result.push_back(d_inputs[i].empty() ? Var() : Record({op.name}, d_inputs[i], parents, refuse));
   }
   return result;
 }

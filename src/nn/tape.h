@@ -56,13 +56,14 @@ Var Detach(const Var& x);                       // the value of x, cut off from 
 
 struct GradOptions {
   bool create_graph = false;  // the gradients can be differentiated; the graph of `output` is kept
-  bool keep_graph = false;    // keep it although create_graph is off; else it is released on the way
-  Var d_output;               // adjoint of `output`, of its shape; default: 1 for one element
+  bool keep_graph = false;  // keep it although create_graph is off; else it is released on the way
+  Var d_output;             // adjoint of `output`, of its shape; default: 1 for one element
 };
 
 // d output / d inputs[i], of the shapes of `inputs`; zeros where output does not depend on it. On
-// errors (output has more than one element and no d_output, a graph that was released, an operand of
-// a first-order operation in a second derivative) the context notes it and every entry is invalid.
+// errors (output has more than one element and no d_output, a graph that was released, an operand
+// of a first-order operation in a second derivative) the context notes it and every entry is
+// invalid.
 std::vector<Var> Grad(const Var& output, std::span<const Var> inputs,
                       const GradOptions& options = {});
 std::vector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
@@ -79,7 +80,8 @@ struct ExternalOp {
 };
 std::vector<Var> External(Context& context, ExternalOp op);
 
-// ---- For those who write operations --------------------------------------------------------------
+// ---- For those who write operations
+// --------------------------------------------------------------
 
 // What a rule is given: the adjoints that arrived, and what is asked for.
 class Adjoint {

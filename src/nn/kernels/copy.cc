@@ -70,9 +70,9 @@ void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& worke
   });
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                   \
-  template void CopyStrided(const StridedBox&, const T*, T*, const Workers&);     \
-  template void GatherRows(const IndexedRows&, const T*, T*, const Workers&);     \
+#define TILEGRAD_INSTANTIATE(T)                                               \
+  template void CopyStrided(const StridedBox&, const T*, T*, const Workers&); \
+  template void GatherRows(const IndexedRows&, const T*, T*, const Workers&); \
   template void ScatterRows(const IndexedRows&, const T*, T*, const Workers&)
 TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves of elements: strided copies, gather and scatter. Nothing is computed but the sums of scatter,
-// so there is no vector body: rows go through memcpy.
+// Moves of elements: strided copies, gather and scatter. Nothing is computed but the sums of
+// scatter, so there is no vector body: rows go through memcpy.
 #pragma once
 
 #include <array>

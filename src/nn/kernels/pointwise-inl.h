@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of pointwise.h. Assumes nothing of length or alignment: a tail goes through a buffer of
-// one vector, so an element's bits do not depend on its position.
+// Vector body of pointwise.h. Assumes nothing of length or alignment: a tail goes through a buffer
+// of one vector, so an element's bits do not depend on its position.
 #if defined(TILEGRAD_NN_POINTWISE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_POINTWISE_INL_H_
 #undef TILEGRAD_NN_POINTWISE_INL_H_
@@ -45,29 +45,41 @@ HWY_INLINE VF SafeTanh(DF d, VF x) {
 // kOp is a constant of each loop: the switch costs nothing.
 template <UnaryOp kOp>
 HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
-    const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-    switch (kOp) {
-      case UnaryOp::kNeg: return hn::Neg(x);
-      case UnaryOp::kScale: return hn::Mul(p, x);
-      case UnaryOp::kAddScalar: return hn::Add(x, p);
-      case UnaryOp::kExp: return SafeExp(d, x);
-      case UnaryOp::kLog: return SafeLog(d, x);
-      case UnaryOp::kSqrt: return hn::Sqrt(x);
-      case UnaryOp::kSquare: return hn::Mul(x, x);
-      case UnaryOp::kAbs: return hn::Abs(x);
-      case UnaryOp::kSign:
-        return hn::IfThenElse(hn::Or(hn::Eq(x, zero), hn::IsNaN(x)), x, hn::CopySign(one, x));
-      case UnaryOp::kRelu: return hn::IfThenElse(hn::Le(x, zero), zero, x);
-      case UnaryOp::kLeakyRelu: return hn::IfThenElse(hn::Gt(x, zero), x, hn::Mul(p, x));
-      case UnaryOp::kTanh: return SafeTanh(d, x);
-      case UnaryOp::kSigmoid: return hn::Div(one, hn::Add(one, SafeExp(d, hn::Neg(x))));
-      case UnaryOp::kClamp:
-        return hn::IfThenElse(hn::Lt(x, p), p, hn::IfThenElse(hn::Gt(x, q), q, x));
-      case UnaryOp::kInRange:
-        return hn::IfThenElseZero(hn::And(hn::Ge(x, p), hn::Le(x, q)), one);
-    }
-    return x;
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  switch (kOp) {
+    case UnaryOp::kNeg:
+      return hn::Neg(x);
+    case UnaryOp::kScale:
+      return hn::Mul(p, x);
+    case UnaryOp::kAddScalar:
+      return hn::Add(x, p);
+    case UnaryOp::kExp:
+      return SafeExp(d, x);
+    case UnaryOp::kLog:
+      return SafeLog(d, x);
+    case UnaryOp::kSqrt:
+      return hn::Sqrt(x);
+    case UnaryOp::kSquare:
+      return hn::Mul(x, x);
+    case UnaryOp::kAbs:
+      return hn::Abs(x);
+    case UnaryOp::kSign:
+      return hn::IfThenElse(hn::Or(hn::Eq(x, zero), hn::IsNaN(x)), x, hn::CopySign(one, x));
+    case UnaryOp::kRelu:
+      return hn::IfThenElse(hn::Le(x, zero), zero, x);
+    case UnaryOp::kLeakyRelu:
+      return hn::IfThenElse(hn::Gt(x, zero), x, hn::Mul(p, x));
+    case UnaryOp::kTanh:
+      return SafeTanh(d, x);
+    case UnaryOp::kSigmoid:
+      return hn::Div(one, hn::Add(one, SafeExp(d, hn::Neg(x))));
+    case UnaryOp::kClamp:
+      return hn::IfThenElse(hn::Lt(x, p), p, hn::IfThenElse(hn::Gt(x, q), q, x));
+    case UnaryOp::kInRange:
+      return hn::IfThenElseZero(hn::And(hn::Ge(x, p), hn::Le(x, q)), one);
   }
+  return x;
+}
 
 template <UnaryOp kOp>
 void UnaryLoop(const UnaryProblem<float>& problem, std::size_t begin, std::size_t end) {
@@ -112,16 +124,26 @@ template <BinaryOp kOp>
 HWY_INLINE VF ApplyBinary(DF d, VF a, VF b, VF p) {
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   switch (kOp) {
-    case BinaryOp::kAdd: return hn::Add(a, b);
-    case BinaryOp::kSub: return hn::Sub(a, b);
-    case BinaryOp::kMul: return hn::Mul(a, b);
-    case BinaryOp::kDiv: return hn::Div(a, b);
-    case BinaryOp::kMax: return hn::IfThenElse(hn::Or(hn::Ge(a, b), hn::IsNaN(a)), a, b);
-    case BinaryOp::kMin: return hn::IfThenElse(hn::Or(hn::Le(a, b), hn::IsNaN(a)), a, b);
-    case BinaryOp::kGreater: return hn::IfThenElseZero(hn::Gt(a, b), one);
-    case BinaryOp::kGreaterEqual: return hn::IfThenElseZero(hn::Ge(a, b), one);
-    case BinaryOp::kReluGrad: return hn::IfThenElseZero(hn::Gt(a, zero), b);
-    case BinaryOp::kLeakyReluGrad: return hn::IfThenElse(hn::Gt(a, zero), b, hn::Mul(p, b));
+    case BinaryOp::kAdd:
+      return hn::Add(a, b);
+    case BinaryOp::kSub:
+      return hn::Sub(a, b);
+    case BinaryOp::kMul:
+      return hn::Mul(a, b);
+    case BinaryOp::kDiv:
+      return hn::Div(a, b);
+    case BinaryOp::kMax:
+      return hn::IfThenElse(hn::Or(hn::Ge(a, b), hn::IsNaN(a)), a, b);
+    case BinaryOp::kMin:
+      return hn::IfThenElse(hn::Or(hn::Le(a, b), hn::IsNaN(a)), a, b);
+    case BinaryOp::kGreater:
+      return hn::IfThenElseZero(hn::Gt(a, b), one);
+    case BinaryOp::kGreaterEqual:
+      return hn::IfThenElseZero(hn::Ge(a, b), one);
+    case BinaryOp::kReluGrad:
+      return hn::IfThenElseZero(hn::Gt(a, zero), b);
+    case BinaryOp::kLeakyReluGrad:
+      return hn::IfThenElse(hn::Gt(a, zero), b, hn::Mul(p, b));
   }
   return a;
 }

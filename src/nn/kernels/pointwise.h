@@ -50,8 +50,8 @@ struct UnaryProblem {
   double p = 0, q = 0;
 };
 
-// y[i0,..,i4] = f(a[sum i strides_a], b[sum i strides_b]); y is dense. The last axis has strides 0 or
-// 1; axes that are not used have extent 1.
+// y[i0,..,i4] = f(a[sum i strides_a], b[sum i strides_b]); y is dense. The last axis has strides 0
+// or 1; axes that are not used have extent 1.
 template <class T>
 struct BinaryProblem {
   static constexpr int kRank = 5;

@@ -20,21 +20,36 @@ T UnaryRef(UnaryOp op, T x, double p, double q) {
   const double real = RealPart(x);
   const T one(1), tp(static_cast<T>(p)), tq(static_cast<T>(q));
   switch (op) {
-    case UnaryOp::kNeg: return -x;
-    case UnaryOp::kScale: return tp * x;
-    case UnaryOp::kAddScalar: return x + tp;
-    case UnaryOp::kExp: return std::exp(x);
-    case UnaryOp::kLog: return std::log(x);
-    case UnaryOp::kSqrt: return std::sqrt(x);
-    case UnaryOp::kSquare: return x * x;
-    case UnaryOp::kAbs: return real < 0 ? -x : x;
-    case UnaryOp::kSign: return real > 0 ? one : real < 0 ? -one : real == 0 ? T(0) : x;
-    case UnaryOp::kRelu: return real <= 0 ? T(0) : x;
-    case UnaryOp::kLeakyRelu: return real > 0 ? x : tp * x;
-    case UnaryOp::kTanh: return std::tanh(x);
-    case UnaryOp::kSigmoid: return one / (one + std::exp(-x));
-    case UnaryOp::kClamp: return real < p ? tp : real > q ? tq : x;
-    case UnaryOp::kInRange: return real >= p && real <= q ? one : T(0);
+    case UnaryOp::kNeg:
+      return -x;
+    case UnaryOp::kScale:
+      return tp * x;
+    case UnaryOp::kAddScalar:
+      return x + tp;
+    case UnaryOp::kExp:
+      return std::exp(x);
+    case UnaryOp::kLog:
+      return std::log(x);
+    case UnaryOp::kSqrt:
+      return std::sqrt(x);
+    case UnaryOp::kSquare:
+      return x * x;
+    case UnaryOp::kAbs:
+      return real < 0 ? -x : x;
+    case UnaryOp::kSign:
+      return real > 0 ? one : real < 0 ? -one : real == 0 ? T(0) : x;
+    case UnaryOp::kRelu:
+      return real <= 0 ? T(0) : x;
+    case UnaryOp::kLeakyRelu:
+      return real > 0 ? x : tp * x;
+    case UnaryOp::kTanh:
+      return std::tanh(x);
+    case UnaryOp::kSigmoid:
+      return one / (one + std::exp(-x));
+    case UnaryOp::kClamp:
+      return real < p ? tp : real > q ? tq : x;
+    case UnaryOp::kInRange:
+      return real >= p && real <= q ? one : T(0);
   }
   return x;
 }
@@ -43,16 +58,26 @@ template <class T>
 T BinaryRef(BinaryOp op, T a, T b, double p) {
   const double ra = RealPart(a), rb = RealPart(b);
   switch (op) {
-    case BinaryOp::kAdd: return a + b;
-    case BinaryOp::kSub: return a - b;
-    case BinaryOp::kMul: return a * b;
-    case BinaryOp::kDiv: return a / b;
-    case BinaryOp::kMax: return ra >= rb || ra != ra ? a : b;  // NaN wins
-    case BinaryOp::kMin: return ra <= rb || ra != ra ? a : b;
-    case BinaryOp::kGreater: return T(ra > rb ? 1 : 0);
-    case BinaryOp::kGreaterEqual: return T(ra >= rb ? 1 : 0);
-    case BinaryOp::kReluGrad: return ra > 0 ? b : T(0);
-    case BinaryOp::kLeakyReluGrad: return ra > 0 ? b : static_cast<T>(p) * b;
+    case BinaryOp::kAdd:
+      return a + b;
+    case BinaryOp::kSub:
+      return a - b;
+    case BinaryOp::kMul:
+      return a * b;
+    case BinaryOp::kDiv:
+      return a / b;
+    case BinaryOp::kMax:
+      return ra >= rb || ra != ra ? a : b;  // NaN wins
+    case BinaryOp::kMin:
+      return ra <= rb || ra != ra ? a : b;
+    case BinaryOp::kGreater:
+      return T(ra > rb ? 1 : 0);
+    case BinaryOp::kGreaterEqual:
+      return T(ra >= rb ? 1 : 0);
+    case BinaryOp::kReluGrad:
+      return ra > 0 ? b : T(0);
+    case BinaryOp::kLeakyReluGrad:
+      return ra > 0 ? b : static_cast<T>(p) * b;
   }
   return a;
 }

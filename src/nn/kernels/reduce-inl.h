@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of reduce.h. Where the last axis is reduced, lanes run along it; where it is kept, each
-// lane sums an output of its own.
+// Vector body of reduce.h. Where the last axis is reduced, lanes run along it; where it is kept,
+// each lane sums an output of its own.
 #if defined(TILEGRAD_NN_REDUCE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_REDUCE_INL_H_
 #undef TILEGRAD_NN_REDUCE_INL_H_
@@ -19,7 +19,11 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 // Four independent sums hide the latency of the addition (4 cycles, 2 a cycle on AVX2 machines).
 struct RowSum {
   DF d;
-  VF s0 = hn::Zero(d), s1 = hn::Zero(d), s2 = hn::Zero(d), s3 = hn::Zero(d);
+  VF s0, s1, s2, s3;
+
+  // Written out: a default member initialiser would not be compiled for the target.
+  HWY_INLINE explicit RowSum(DF tag)
+      : s0(hn::Zero(tag)), s1(hn::Zero(tag)), s2(hn::Zero(tag)), s3(hn::Zero(tag)) {}
 
   HWY_INLINE void AddRow(const float* x, std::size_t n) {
     const std::size_t lanes = hn::Lanes(d);
@@ -41,7 +45,7 @@ void SumAlongRows(const ReduceLayout& l, const float* x, float* y, std::size_t b
                   std::size_t end) {
   for (std::size_t o = begin; o < end; ++o) {
     const ReduceAddress address = AddressOf(l, o);
-    RowSum sum;
+    RowSum sum{DF()};
     for (std::size_t a = 0; a < l.reduced[0]; ++a) {
       for (std::size_t b = 0; b < l.reduced[1]; ++b) {
         sum.AddRow(x + address.base + a * address.steps[0] + b * address.steps[1], l.reduced[2]);

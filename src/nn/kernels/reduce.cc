@@ -17,9 +17,9 @@ HWY_EXPORT(SumColumns);
 
 namespace {
 
-constexpr std::size_t kGrain = 16384;        // elements read by a task, about
-constexpr std::size_t kColumnBlock = 256;    // outputs of one task where columns are summed
-constexpr std::size_t kMaxPartials = 4096;   // of one long sum, merged in order
+constexpr std::size_t kGrain = 16384;       // elements read by a task, about
+constexpr std::size_t kColumnBlock = 256;   // outputs of one task where columns are summed
+constexpr std::size_t kMaxPartials = 4096;  // of one long sum, merged in order
 
 std::size_t OutputsPerTask(const ReduceLayout& l) {
   return std::max<std::size_t>(1, kGrain / std::max<std::size_t>(1, l.inputs_each()));

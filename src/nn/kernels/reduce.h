@@ -11,8 +11,8 @@
 
 namespace tilegrad::nn {
 
-// x seen as [k0, r0, k1, r1, k2, r2] (row-major): kept and reduced axes in turn, extent 1 where there
-// is none. y is [k0, k1, k2].
+// x seen as [k0, r0, k1, r1, k2, r2] (row-major): kept and reduced axes in turn, extent 1 where
+// there is none. y is [k0, k1, k2].
 struct ReduceLayout {
   std::array<std::size_t, 3> kept = {1, 1, 1};
   std::array<std::size_t, 3> reduced = {1, 1, 1};

@@ -15,8 +15,8 @@ struct ReduceAddress {
 inline ReduceAddress AddressOf(const ReduceLayout& l, std::size_t o) {
   const std::size_t i2 = o % l.kept[2], rest = o / l.kept[2];
   const std::size_t i1 = rest % l.kept[1], i0 = rest / l.kept[1];
-  const std::size_t step1 = l.kept[2] * l.reduced[2];              // along r1
-  const std::size_t step0 = l.kept[1] * l.reduced[1] * step1;      // along r0
+  const std::size_t step1 = l.kept[2] * l.reduced[2];          // along r1
+  const std::size_t step0 = l.kept[1] * l.reduced[1] * step1;  // along r0
   return {i0 * l.reduced[0] * step0 + i1 * l.reduced[1] * step1 + i2 * l.reduced[2],
           {step0, step1}};
 }

@@ -17,8 +17,8 @@ struct BatchNormResult {
   Tensor variance;  // [c], biased: divided by the count
 };
 
-// x [n, c] or [n, c, h, w]; gamma, beta [c]; statistics over all axes but c, which must hold at least
-// two elements. y = gamma (x - mean) / sqrt(variance + epsilon) + beta.
+// x [n, c] or [n, c, h, w]; gamma, beta [c]; statistics over all axes but c, which must hold at
+// least two elements. y = gamma (x - mean) / sqrt(variance + epsilon) + beta.
 BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
                                const BatchNormOptions& options = {});
 
@@ -26,7 +26,7 @@ BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
 struct BatchStatistics {
   Tensor mean, variance;  // [c]
 };
-Var BatchNormEval(const Var& x, const Var& gamma, const Var& beta, const BatchStatistics& statistics,
-                  const BatchNormOptions& options = {});
+Var BatchNormEval(const Var& x, const Var& gamma, const Var& beta,
+                  const BatchStatistics& statistics, const BatchNormOptions& options = {});
 
 }  // namespace tilegrad::nn

@@ -12,8 +12,8 @@ namespace tilegrad::nn {
 // The shape that a and b are repeated to; false if they do not fit.
 bool BroadcastShape(const Shape& a, const Shape& b, Shape& result);
 
-// Axes merged where both operands allow it, so that loops are few and long. Unused leading axes have
-// extent 1; an axis along which an operand is repeated has stride 0.
+// Axes merged where both operands allow it, so that loops are few and long. Unused leading axes
+// have extent 1; an axis along which an operand is repeated has stride 0.
 struct Broadcast {
   using Extents = std::array<std::size_t, Shape::kMaxRank>;
   Extents extents = {1, 1, 1, 1, 1};

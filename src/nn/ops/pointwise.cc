@@ -185,8 +185,8 @@ Var Abs(const Var& x) {
 
 namespace {
 
-// d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the second
-// derivative with respect to y is zero, and with respect to d_y it is the same operation.
+// d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the
+// second derivative with respect to y is zero, and with respect to d_y it is the same operation.
 Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
   return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
     return std::vector<Var>{Var(), RectifierGrad(call, y, adj.dy())};

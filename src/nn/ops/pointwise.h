@@ -21,9 +21,9 @@ Var Exp(const Var& x);
 Var Log(const Var& x);  // natural; NaN below 0, -inf at 0
 Var Sqrt(const Var& x);
 Var Square(const Var& x);
-Var Abs(const Var& x);                            // gradient 0 at 0
-Var Relu(const Var& x);                           // gradient 0 at 0
-Var LeakyRelu(const Var& x, double slope);        // x > 0 ? x : slope x; slope at 0; slope >= 0
+Var Abs(const Var& x);                      // gradient 0 at 0
+Var Relu(const Var& x);                     // gradient 0 at 0
+Var LeakyRelu(const Var& x, double slope);  // x > 0 ? x : slope x; slope at 0; slope >= 0
 Var Tanh(const Var& x);
 Var Sigmoid(const Var& x);
 Var Clamp(const Var& x, double low, double high);  // gradient 1 within, bounds included; else 0

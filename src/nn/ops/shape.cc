@@ -103,8 +103,7 @@ Var BroadcastTo(const Var& x, const Shape& shape) {
   if (!Usable("broadcast", {&x}) || x.shape() == shape) return x;
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape)) {
-    return Fail(x,
-                InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
+    return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
   }
   const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
   Tensor y = x.context().Empty(shape, x.dtype());
@@ -120,12 +119,13 @@ Var Permute(const Var& x, std::span<const int> axes) {
   std::array<int, Shape::kMaxRank> inverse;
   inverse.fill(-1);
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (HasAxis(x.shape(), axes[i])) inverse[static_cast<std::size_t>(axes[i])] = static_cast<int>(i);
+    if (HasAxis(x.shape(), axes[i]))
+      inverse[static_cast<std::size_t>(axes[i])] = static_cast<int>(i);
   }
   const auto known = std::count_if(inverse.begin(), inverse.end(), [](int i) { return i >= 0; });
   if (static_cast<int>(axes.size()) != rank || known != rank) {
-    return Fail(x, InvalidArgument("permute: shape {} needs each of its axes once",
-                                   x.shape().ToString()));
+    return Fail(
+        x, InvalidArgument("permute: shape {} needs each of its axes once", x.shape().ToString()));
   }
   Shape shape;
   for (int axis : axes) shape.Append(x.shape()[axis]);

@@ -26,8 +26,8 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after);
 Var Concat(std::span<const Var> parts, int axis);
 Var Concat(std::initializer_list<Var> parts, int axis);
 
-// y[.., i, ..] = x[.., indices[i], ..] along `axis`; indices: [n] of kI32 within the extent, else an
-// error. Adjoint: ScatterAdd.
+// y[.., i, ..] = x[.., indices[i], ..] along `axis`; indices: [n] of kI32 within the extent, else
+// an error. Adjoint: ScatterAdd.
 Var Gather(const Var& x, int axis, const Tensor& indices);
 // y of extent `extent` along `axis`: y[.., indices[i], ..] += x[.., i, ..], in the order of i.
 Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t extent);

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/serialize.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+
+static_assert(std::endian::native == std::endian::little, "safetensors data is little endian");
+
+namespace tilegrad::nn {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kLengthBytes = 8;
+constexpr std::size_t kMaxHeader = 100u << 20;  // the format's own limit
+constexpr const char* kMetadata = "__metadata__";
+
+std::optional<DType> DTypeNamed(const std::string& name) {
+  for (DType dtype : {DType::kF32, DType::kF64, DType::kU8, DType::kI32, DType::kI64}) {
+    if (name == NameOf(dtype)) return dtype;
+  }
+  return std::nullopt;
+}
+
+// A tensor's entry in the header, checked against the size of the data.
+struct Entry {
+  DType dtype = DType::kF32;
+  Shape shape;
+  std::size_t begin = 0;  // in the data
+};
+
+Status BadEntry(const std::string& name, const char* why) {
+  return DataLoss("safetensors: tensor \"{}\": {}", name, why);
+}
+
+bool IsCount(const Json& value) { return value.is_number_unsigned(); }
+
+Result<Shape> ParseShape(const std::string& name, const Json& extents, std::size_t max_elements) {
+  if (extents.size() > static_cast<std::size_t>(Shape::kMaxRank)) {
+    return BadEntry(name, "more than five axes");
+  }
+  Shape shape;
+  std::size_t elements = 1;
+  for (const Json& extent : extents) {
+    if (!IsCount(extent)) return BadEntry(name, "an extent is not a count");
+    const auto e = extent.get<std::uint64_t>();
+    if (e > max_elements || (e != 0 && elements > max_elements / e)) {
+      return BadEntry(name, "its shape is larger than the file");
+    }
+    elements *= e;
+    shape.Append(static_cast<std::int64_t>(e));
+  }
+  return shape;
+}
+
+Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t data_bytes) {
+  const bool complete = json.is_object() && json.contains("dtype") && json["dtype"].is_string() &&
+                        json.contains("shape") && json["shape"].is_array() &&
+                        json.contains("data_offsets") && json["data_offsets"].is_array();
+  if (!complete) return BadEntry(name, "dtype, shape or data_offsets is missing");
+  const Json& offsets = json["data_offsets"];
+  if (offsets.size() != 2 || !IsCount(offsets[0]) || !IsCount(offsets[1])) {
+    return BadEntry(name, "data_offsets are not two counts");
+  }
+  const std::optional<DType> dtype = DTypeNamed(json["dtype"].get<std::string>());
+  if (!dtype) return BadEntry(name, "its dtype is none of F32, F64, U8, I32, I64");
+  const auto begin = offsets[0].get<std::uint64_t>(), end = offsets[1].get<std::uint64_t>();
+  if (begin > end || end > data_bytes) return BadEntry(name, "its data lies beyond the file's end");
+  Entry entry{*dtype, {}, static_cast<std::size_t>(begin)};
+  TILEGRAD_ASSIGN(entry.shape, ParseShape(name, json["shape"], data_bytes));
+  const auto elements = static_cast<std::uint64_t>(entry.shape.elements());
+  if (elements * BytesOf(*dtype) != end - begin) {
+    return BadEntry(name, "its shape and its data differ in size");
+  }
+  return entry;
+}
+
+Result<Json> ParseHeader(std::span<const std::uint8_t> bytes) {
+  std::uint64_t length = 0;
+  if (bytes.size() < kLengthBytes)
+    return DataLoss("safetensors: {} bytes are no file", bytes.size());
+  std::memcpy(&length, bytes.data(), kLengthBytes);
+  if (length > kMaxHeader || length > bytes.size() - kLengthBytes) {
+    return DataLoss(
+        "safetensors: a header of {} bytes in a file of {}: cut short, or not such a file", length,
+        bytes.size());
+  }
+  const auto* begin = bytes.data() + kLengthBytes;
+  Json header = Json::parse(begin, begin + length, nullptr, /*allow_exceptions=*/false);
+  if (!header.is_object()) return DataLoss("safetensors: the header is not a JSON object");
+  return header;
+}
+
+Status ParseMetadata(const Json& json, std::map<std::string, std::string>& metadata) {
+  if (!json.is_object()) return DataLoss("safetensors: __metadata__ is not an object");
+  for (const auto& [key, value] : json.items()) {
+    if (!value.is_string())
+      return DataLoss("safetensors: __metadata__ \"{}\" is not a string", key);
+    metadata[key] = value.get<std::string>();
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes) {
+  TILEGRAD_ASSIGN(const Json header, ParseHeader(bytes));
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data(), kLengthBytes);
+  const auto data = bytes.subspan(kLengthBytes + static_cast<std::size_t>(length));
+  TensorFile file;
+  for (const auto& [name, json] : header.items()) {
+    if (name == kMetadata) {
+      TILEGRAD_TRY(ParseMetadata(json, file.metadata));
+      continue;
+    }
+    TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
+    Tensor tensor = context.Empty(entry.shape, entry.dtype);
+    if (tensor.bytes() != 0) std::memcpy(tensor.raw(), data.data() + entry.begin, tensor.bytes());
+    file.tensors.push_back({name, std::move(tensor)});
+  }
+  return file;
+}
+
+Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
+  auto file = DecodeSafetensors(context, bytes);
+  if (!file.ok()) return file.status().Within(path.string());
+  return file;
+}
+
+Result<Bytes> EncodeSafetensors(const TensorFile& file) {
+  Json header = Json::object();
+  if (!file.metadata.empty()) header[kMetadata] = file.metadata;
+  std::size_t end = 0;
+  for (const NamedTensor& t : file.tensors) {
+    if (t.value.empty() || t.name == kMetadata || header.contains(t.name)) {
+      return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
+    }
+    Json extents = Json::array();
+    for (int axis = 0; axis < t.value.shape().rank(); ++axis) {
+      extents.push_back(static_cast<std::uint64_t>(t.value.shape()[axis]));
+    }
+    const std::size_t begin = std::exchange(end, end + t.value.bytes());
+    header[t.name] = {{"dtype", NameOf(t.value.dtype())},
+                      {"shape", std::move(extents)},
+                      {"data_offsets", {begin, end}}};
+  }
+  std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
+  Bytes bytes(kLengthBytes + text.size() + end);
+  const std::uint64_t length = text.size();
+  std::memcpy(bytes.data(), &length, kLengthBytes);
+  std::memcpy(bytes.data() + kLengthBytes, text.data(), text.size());
+  std::uint8_t* to = bytes.data() + kLengthBytes + text.size();
+  for (const NamedTensor& t : file.tensors) {
+    if (t.value.bytes() != 0) std::memcpy(to, t.value.raw(), t.value.bytes());
+    to += t.value.bytes();
+  }
+  return bytes;
+}
+
+Status WriteSafetensors(const Path& path, const TensorFile& file) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeSafetensors(file));
+  return WriteFileAtomic(path, bytes);
+}
+
+}  // namespace tilegrad::nn
