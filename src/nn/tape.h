@@ -57,7 +57,7 @@ Var Detach(const Var& x);                       // the value of x, cut off from 
 struct GradOptions {
   bool create_graph = false;  // the gradients can be differentiated; the graph of `output` is kept
   bool keep_graph = false;  // keep it although create_graph is off; else it is released on the way
-  Var d_output;             // adjoint of `output`, of its shape; default: 1 for one element
+  Var d_output = {};        // adjoint of `output`, of its shape; default: 1 for one element
 };
 
 // d output / d inputs[i], of the shapes of `inputs`; zeros where output does not depend on it. On
@@ -74,9 +74,9 @@ std::vector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
 // input (empty Tensor: zero), of the input's shape and dtype.
 struct ExternalOp {
   const char* name = "external";
-  std::vector<Var> inputs;
-  std::vector<Tensor> outputs;
-  std::function<std::vector<Tensor>(std::span<const Tensor> d_outputs)> backward;
+  std::vector<Var> inputs = {};
+  std::vector<Tensor> outputs = {};
+  std::function<std::vector<Tensor>(std::span<const Tensor> d_outputs)> backward = {};
 };
 std::vector<Var> External(Context& context, ExternalOp op);
 
