@@ -15,7 +15,6 @@
 
 #include <array>
 #include <cstddef>
-#include <type_traits>
 #include <utility>
 
 #include "nn/kernels/panels.h"
@@ -40,6 +39,7 @@ constexpr std::size_t kTileRows = 6;
 // The row factor from a packed panel [k][R].
 template <std::size_t R>
 struct PackedRows {
+  static constexpr std::size_t kRows = R;
   const float* next;
   HWY_INLINE Vec At(std::size_t row) const { return hn::Set(Tag(), next[row]); }
   HWY_INLINE void Advance() { next += R; }
@@ -49,6 +49,7 @@ struct PackedRows {
 // float.
 template <std::size_t R>
 struct PlainRows {
+  static constexpr std::size_t kRows = R;
   std::array<const float*, R> data;
   std::size_t k = 0;
   HWY_INLINE Vec At(std::size_t row) const { return hn::Set(Tag(), data[row][k]); }
@@ -70,40 +71,6 @@ struct IndirectColumns {
   HWY_INLINE void Advance() { ++offset; }
 };
 
-template <std::size_t... I, class F>
-HWY_INLINE void UnrollOver(std::index_sequence<I...>, const F& f) {
-  (f(std::integral_constant<std::size_t, I>()), ...);
-}
-
-// The sums of a tile of R rows. Loops over rows are unrolled by hand: arrays of vectors stay in
-// registers only if every index is a constant before the optimiser looks.
-template <std::size_t R>
-struct Tile {
-  Vec sum[R][kTileVectors];
-
-  template <class F>
-  static HWY_INLINE void ForEachRow(const F& f) {
-    UnrollOver(std::make_index_sequence<R>(), f);
-  }
-  HWY_INLINE void Clear() {
-    ForEachRow([&](auto r) HWY_ATTR { sum[r][0] = sum[r][1] = hn::Zero(Tag()); });
-  }
-  // sum += rows columns^T over `steps` steps of k; both factors move on.
-  template <class Rows, class Columns>
-  HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
-    for (std::size_t k = 0; k < steps; ++k) {
-      const Vec b0 = columns.At(0), b1 = columns.At(1);
-      ForEachRow([&](auto r) HWY_ATTR {
-        const Vec a = rows.At(r);
-        sum[r][0] = hn::MulAdd(a, b0, sum[r][0]);
-        sum[r][1] = hn::MulAdd(a, b1, sum[r][1]);
-      });
-      rows.Advance();
-      columns.Advance();
-    }
-  }
-};
-
 // Where a tile goes: row r, vector v to c[r * ldc + offset[v]], of which count[v] lanes exist.
 struct TileTarget {
   float* c;
@@ -115,60 +82,79 @@ struct TileTarget {
   bool accumulate = false;
 };
 
-// The `count` first lanes of p, the others 0, without touching memory behind them.
-HWY_INLINE Vec LoadFirst(const float* p, std::size_t count) {
-  if (count == kLanes) return hn::LoadU(Tag(), p);
-  HWY_ALIGN float lanes[kLanes] = {};
-  for (std::size_t i = 0; i < count; ++i) lanes[i] = p[i];
-  return hn::Load(Tag(), lanes);
+HWY_INLINE Vec WithBiasAndOld(Vec sum, const TileTarget& t, std::size_t row, const float* bias,
+                              const float* c) {
+  if (t.row_bias != nullptr) sum = hn::Add(sum, hn::Set(Tag(), t.row_bias[row]));
+  if (t.column_bias != nullptr) sum = hn::Add(sum, hn::LoadU(Tag(), bias));
+  return t.accumulate ? hn::Add(hn::LoadU(Tag(), c), sum) : sum;
 }
 
-HWY_INLINE void StoreFirst(Vec v, float* p, std::size_t count) {
-  if (count == kLanes) return hn::StoreU(v, Tag(), p);
-  HWY_ALIGN float lanes[kLanes];
-  hn::Store(v, Tag(), lanes);
-  for (std::size_t i = 0; i < count; ++i) p[i] = lanes[i];
+// Through a copy, without touching memory behind the lanes that exist.
+inline HWY_NOINLINE void StorePartialVector(Vec sum, const TileTarget& t, std::size_t row,
+                                            std::size_t v) {
+  HWY_ALIGN float bias[kLanes] = {}, c[kLanes] = {};
+  float* out = t.c + row * t.ldc + t.offset[v];
+  for (std::size_t i = 0; i < t.count[v]; ++i) {
+    if (t.column_bias != nullptr) bias[i] = t.column_bias[t.offset[v] + i];
+    if (t.accumulate) c[i] = out[i];
+  }
+  hn::Store(WithBiasAndOld(sum, t, row, bias, c), Tag(), c);
+  for (std::size_t i = 0; i < t.count[v]; ++i) out[i] = c[i];
 }
 
 HWY_INLINE void StoreVector(Vec sum, const TileTarget& t, std::size_t row, std::size_t v) {
+  if (HWY_UNLIKELY(t.count[v] != kLanes)) return StorePartialVector(sum, t, row, v);
   float* c = t.c + row * t.ldc + t.offset[v];
-  if (t.row_bias != nullptr) sum = hn::Add(sum, hn::Set(Tag(), t.row_bias[row]));
-  if (t.column_bias != nullptr) {
-    sum = hn::Add(sum, LoadFirst(t.column_bias + t.offset[v], t.count[v]));
+  hn::StoreU(WithBiasAndOld(sum, t, row, t.column_bias + t.offset[v], c), Tag(), c);
+}
+
+// The sums of a tile of R rows. Loops over rows are fold expressions over always-inlined members:
+// arrays of vectors stay in registers only if every index is a constant before the optimiser looks.
+template <std::size_t R, class Row = std::make_index_sequence<R>>
+struct Tile;
+
+template <std::size_t R, std::size_t... row>
+struct Tile<R, std::index_sequence<row...>> {
+  Vec sum[R][kTileVectors];
+
+  HWY_INLINE void Clear() { ((sum[row][0] = sum[row][1] = hn::Zero(Tag())), ...); }
+  // sum += rows columns^T over `steps` steps of k.
+  template <class Rows, class Columns>
+  HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
+    for (std::size_t k = 0; k < steps; ++k) {
+      const Vec b0 = columns.At(0), b1 = columns.At(1);
+      (AddProduct<row>(rows.At(row), b0, b1), ...);
+      rows.Advance();
+      columns.Advance();
+    }
   }
-  if (t.accumulate) sum = hn::Add(LoadFirst(c, t.count[v]), sum);
-  StoreFirst(sum, c, t.count[v]);
+  template <std::size_t r>
+  HWY_INLINE void AddProduct(Vec a, Vec b0, Vec b1) {
+    sum[r][0] = hn::MulAdd(a, b0, sum[r][0]);
+    sum[r][1] = hn::MulAdd(a, b1, sum[r][1]);
+  }
+  HWY_INLINE void Store(const TileTarget& target) const {
+    ((StoreVector(sum[row][0], target, row, 0), StoreVector(sum[row][1], target, row, 1)), ...);
+  }
+};
+
+template <class Rows, class Columns>
+HWY_INLINE void RunTile(Rows rows, Columns columns, std::size_t steps, const TileTarget& target) {
+  Tile<Rows::kRows> tile;
+  tile.Clear();
+  tile.Multiply(rows, columns, steps);
+  tile.Store(target);
 }
 
-template <std::size_t R>
-HWY_INLINE void StoreTile(const Tile<R>& tile, const TileTarget& target) {
-  Tile<R>::ForEachRow([&](auto r) HWY_ATTR {
-    StoreVector(tile.sum[r][0], target, r, 0);
-    StoreVector(tile.sum[r][1], target, r, 1);
-  });
-}
-
-// f(integral_constant<rows>) for a run-time count of rows in [1, kTileRows].
-template <std::size_t R = kTileRows, class F>
-HWY_INLINE void WithRows(std::size_t rows, const F& f) {
+// One tile from packed rows [k][rows], rows in [1, kTileRows], and any column factor.
+template <class Columns, std::size_t R = kTileRows>
+HWY_INLINE void PackedRowsTile(const float* packed, std::size_t rows, Columns columns,
+                               std::size_t steps, const TileTarget& target) {
   if (rows == R) {
-    f(std::integral_constant<std::size_t, R>());
+    RunTile(PackedRows<R>{packed}, columns, steps, target);
   } else if constexpr (R > 1) {
-    WithRows<R - 1>(rows, f);
+    PackedRowsTile<Columns, R - 1>(packed, rows, columns, steps, target);
   }
-}
-
-// One tile from packed rows [k][rows] and any column factor.
-template <class Columns>
-HWY_NOINLINE void PackedRowsTile(const float* packed, std::size_t rows, Columns columns,
-                                 std::size_t steps, const TileTarget& target) {
-  WithRows(rows, [&](auto r) HWY_ATTR {
-    Tile<r> tile;
-    PackedRows<r> factor{packed};
-    tile.Clear();
-    tile.Multiply(factor, columns, steps);
-    StoreTile(tile, target);
-  });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The yardstick of the NN benchmarks: what one core reaches at best, measured beside each kernel,
+// and the medians of runs that take turns.
+#pragma once
+
+#include <time.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace tilegrad::nn {
+
+// Runs independent fused multiply-adds (multiply and add where the target has none) from registers
+// for about a millisecond; returns their floating-point operations, 2 each.
+double RunFmaPeak();
+
+// CPU time of this thread in seconds: others on the machine disturb it less than wall time.
+inline double ThreadSeconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+inline double WallSeconds() {
+  timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// Samples of one contender's rate; the median is robust to a busy machine.
+class Samples {
+ public:
+  void Add(double value) { values_.push_back(value); }
+  double Median() const {
+    if (values_.empty()) return 0;
+    std::vector<double> sorted = values_;
+    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+    return sorted[sorted.size() / 2];
+  }
+
+ private:
+  std::vector<double> values_;
+};
+
+// FLOP/s of `run`, which does `flop` operations, by `clock`.
+template <class Clock, class F>
+double Rate(const Clock& clock, double flop, const F& run) {
+  const double start = clock();
+  run();
+  return flop / (clock() - start);
+}
+
+inline double PeakRate() {
+  const double start = ThreadSeconds();
+  const double flop = RunFmaPeak();
+  return flop / (ThreadSeconds() - start);
+}
+
+}  // namespace tilegrad::nn
