@@ -119,7 +119,7 @@ void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context)
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
   const std::size_t b_size = RoundUp(plan.packed_b_size(), kAlignment);
   float* packed_a =
-      context.scratch.Take(a_size + b_size * static_cast<std::size_t>(context.workers.count()));
+      context.scratch.Floats(a_size + b_size * static_cast<std::size_t>(context.workers.count()));
   for (std::size_t k0 = 0; k0 < problem.k; k0 += plan.super_depth) {
     const std::size_t k1 = std::min(problem.k, k0 + plan.super_depth);
     context.workers.For(plan.rows.count(), [&](std::size_t panel, std::size_t) {

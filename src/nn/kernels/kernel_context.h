@@ -14,18 +14,24 @@ namespace tilegrad::nn {
 // the same calls allocates nothing. One kernel at a time may use it.
 class KernelScratch {
  public:
-  // At least `count` floats with unspecified contents, aligned to kAlignment, until the next call.
-  float* Take(std::size_t count) {
-    if (buffer_.size() < count) {
-      buffer_ = {};  // frees before it allocates: the old contents are not kept
-      buffer_.resize(count);
-    }
-    return buffer_.data();
+  // At least `count` numbers with unspecified contents, aligned to kAlignment, until the next call.
+  float* Floats(std::size_t count) { return Grown(floats_, count); }
+  std::size_t* Indices(std::size_t count) { return Grown(indices_, count); }
+  std::size_t bytes() const {
+    return floats_.size() * sizeof(float) + indices_.size() * sizeof(std::size_t);
   }
-  std::size_t bytes() const { return buffer_.size() * sizeof(float); }
 
  private:
-  AlignedVector<float> buffer_;
+  template <class T>
+  static T* Grown(AlignedVector<T>& buffer, std::size_t count) {
+    if (buffer.size() < count) {
+      buffer = {};  // frees before it allocates: the old contents are not kept
+      buffer.resize(count);
+    }
+    return buffer.data();
+  }
+  AlignedVector<float> floats_;
+  AlignedVector<std::size_t> indices_;
 };
 
 struct KernelContext {

@@ -66,7 +66,7 @@ struct PackedColumns {
 // The column factor of step k at base[vector] + *offset.
 struct IndirectColumns {
   std::array<const float*, kTileVectors> base;
-  const std::ptrdiff_t* offset;
+  const std::size_t* offset;
   HWY_INLINE Vec At(std::size_t vector) const { return hn::LoadU(Tag(), base[vector] + *offset); }
   HWY_INLINE void Advance() { ++offset; }
 };

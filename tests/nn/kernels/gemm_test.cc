@@ -159,10 +159,10 @@ TEST(Gemm, RepeatedCallsKeepTheirScratch) {
   const Workers workers(2);
   KernelScratch scratch;
   Gemm(o.Problem(g), {workers, scratch});
-  const float* memory = scratch.Take(1);
+  const float* memory = scratch.Floats(1);
   const std::size_t bytes = scratch.bytes();
   for (int i = 0; i < 3; ++i) Gemm(o.Problem(g), {workers, scratch});
-  EXPECT_EQ(scratch.Take(1), memory);
+  EXPECT_EQ(scratch.Floats(1), memory);
   EXPECT_EQ(scratch.bytes(), bytes);
 }
 

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// Padded copies of image channels in which a convolution needs no bounds and no stride: source
+// pixels are dealt out to step x step planes by their position modulo the step, so that the pixels
+// under one tap of the kernel lie side by side. A block of channels and image rows at a time is
+// copied, never a whole im2col matrix.
+
+#if defined(TILEGRAD_NN_KERNELS_CONV2D_PLANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_NN_KERNELS_CONV2D_PLANES_INL_H_
+#undef TILEGRAD_NN_KERNELS_CONV2D_PLANES_INL_H_
+#else
+#define TILEGRAD_NN_KERNELS_CONV2D_PLANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "nn/kernels/micro_kernel-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::nn::HWY_NAMESPACE {
+
+// Plane (a, b) holds at (y, x) the source pixel (y step + origin_row + a,
+// x step + origin_column + b), or 0
+// outside the image.
+struct PlaneGrid {
+  std::size_t height, width;  // of the source
+  std::size_t step;
+  std::ptrdiff_t origin_row, origin_column;
+  std::size_t planes_down, planes_across;  // that are needed of step x step
+  std::size_t rows, columns;               // of one plane
+
+  std::size_t plane_size() const { return rows * columns; }
+  std::size_t channel_size() const { return planes_down * planes_across * plane_size(); }
+};
+
+// out[x] = the pixel x step + first of a source row of g.width pixels.
+inline void CopyPlaneRow(const PlaneGrid& g, const float* row, std::ptrdiff_t first, float* out) {
+  const auto step = static_cast<std::ptrdiff_t>(g.step);
+  const auto columns = static_cast<std::ptrdiff_t>(g.columns);
+  const auto inside = [&](std::ptrdiff_t limit) {  // how many x lie before source pixel `limit`
+    return std::clamp<std::ptrdiff_t>((limit - first + step - 1) / step, 0, columns);
+  };
+  const std::ptrdiff_t begin = first >= 0 ? 0 : inside(0);
+  const std::ptrdiff_t width = static_cast<std::ptrdiff_t>(g.width);
+  const std::ptrdiff_t end = first >= width ? begin : std::max(begin, inside(width));
+  std::fill(out, out + begin, 0.0f);
+  if (step == 1) {
+    std::copy(row + (first + begin), row + (first + end), out + begin);
+  } else {
+    for (std::ptrdiff_t x = begin; x < end; ++x) out[x] = row[x * step + first];
+  }
+  std::fill(out + end, out + columns, 0.0f);
+}
+
+// Row y of every plane of one channel; `channel` points to its source.
+inline void CopyPlanesRow(const PlaneGrid& g, const float* channel, std::ptrdiff_t first_row,
+                          float* out) {
+  for (std::size_t a = 0; a < g.planes_down; ++a) {
+    const std::ptrdiff_t row = first_row + static_cast<std::ptrdiff_t>(a);
+    const bool outside = row < 0 || row >= static_cast<std::ptrdiff_t>(g.height);
+    for (std::size_t b = 0; b < g.planes_across; ++b, out += g.plane_size()) {
+      if (outside) {
+        std::fill_n(out, g.columns, 0.0f);
+      } else {
+        CopyPlaneRow(g, channel + static_cast<std::size_t>(row) * g.width,
+                     g.origin_column + static_cast<std::ptrdiff_t>(b), out);
+      }
+    }
+  }
+}
+
+// All planes of `channels` consecutive channels, the first plane row being `first_row` of the
+// planes of a whole image. out: channels x channel_size().
+inline void CopyPlanes(const PlaneGrid& g, const float* source, std::size_t channels,
+                       std::size_t first_row, float* out) {
+  for (std::size_t c = 0; c < channels; ++c) {
+    for (std::size_t y = 0; y < g.rows; ++y) {
+      CopyPlanesRow(g, source + c * g.height * g.width,
+                    static_cast<std::ptrdiff_t>((first_row + y) * g.step) + g.origin_row,
+                    out + c * g.channel_size() + y * g.columns);
+    }
+  }
+}
+
+// How a batch of grids of rows x columns is cut into pieces of about `pixels`: bands of rows of one
+// image, or groups of whole images.
+struct BatchCut {
+  BatchCut(std::size_t batch_size, std::size_t grid_rows, std::size_t columns, std::size_t pixels)
+      : batch(batch_size),
+        rows(grid_rows),
+        images(
+            std::clamp<std::size_t>(pixels / (rows * columns), 1, std::max<std::size_t>(batch, 1))),
+        bands(rows, std::max<std::size_t>(1, pixels / columns)) {}
+
+  std::size_t groups() const { return DivideUp(batch, images); }
+  std::size_t pieces() const { return groups() * bands.count(); }
+
+  std::size_t batch, rows;
+  std::size_t images;  // in one piece, 1 if there are several bands
+  Panels bands;        // of rows
+};
+
+// One piece: images [image, image_end), grid rows [row, row + rows).
+struct BatchPiece {
+  BatchPiece(const BatchCut& cut, std::size_t index)
+      : image(index / cut.bands.count() * cut.images),
+        image_end(std::min(cut.batch, image + cut.images)),
+        row(cut.bands.begin(index % cut.bands.count())),
+        rows(cut.bands.size(index % cut.bands.count())) {}
+  std::size_t image, image_end, row, rows;
+};
+
+}  // namespace tilegrad::nn::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
