@@ -14,9 +14,9 @@
 #include "raster/interpolate_ref.h"
 #include "raster/near_clip.h"
 #include "raster/project_ref.h"
+#include "raster/soft_mask_ref.h"
 #include "raster/visibility_ref.h"
 #include "render/renderer.h"
-#include "render/soft_alpha_ref.h"
 
 namespace tilegrad {
 
@@ -27,6 +27,7 @@ struct PreparedScene {
   raster::ScreenMeshT<T> mesh;
   AlignedVector<T> clipped_attributes;  // empty where nothing was clipped
   raster::AttributeViewT<const T> attributes;
+  std::vector<std::int32_t> soft_faces;  // that take part in alpha
   raster::SoftScale<T> scale;
 };
 
@@ -46,6 +47,10 @@ void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, Prepar
   out->mesh = out->buffers.View();
   out->attributes = AttributesOf(scene);
   out->scale = {T(2.0 / options.width), T(2.0 / options.height), T(1.0 / options.delta)};
+  for (std::size_t f = 0; f < out->mesh.faces(); ++f) {
+    if ((out->mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
+    out->soft_faces.push_back(static_cast<std::int32_t>(f));
+  }
   if (!out->mesh.was_clipped()) return;
   out->clipped_attributes.resize(raster::AttributeRows(out->mesh, scene.rate) *
                                  static_cast<std::size_t>(scene.channels));
@@ -95,8 +100,9 @@ void ShadePixelRef(const SceneViewT<T>& scene, const PreparedScene<T>& prepared,
   const T px = T(column) + T(0.5), py = T(row) + T(0.5);
   const bool background = face == raster::kNoFace;
   if (!frame->alpha.empty()) {
-    frame->alpha[pixel] =
-        background ? raster::SoftAlphaRef(prepared.mesh, px, py, prepared.scale) : T(1);
+    frame->alpha[pixel] = background ? raster::SoftAlphaRef<T>(prepared.mesh, prepared.soft_faces,
+                                                               px, py, prepared.scale)
+                                     : T(1);
   }
   std::vector<T> values(static_cast<std::size_t>(frame->channels), T(0));
   T source[3] = {T(0), T(0), T(0)};
@@ -191,8 +197,13 @@ void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions
   const T px = T(column) + T(0.5), py = T(row) + T(0.5);
   if (face == raster::kNoFace) {
     if (d_frame.alpha.empty()) return;
-    raster::SoftAlphaRefBackward(prepared.mesh, px, py, prepared.scale, d_frame.alpha[pixel],
-                                 d->screen);
+    raster::SoftAlphaRefBackward<T>(
+        prepared.mesh, prepared.soft_faces, px, py, prepared.scale, d_frame.alpha[pixel],
+        [&](std::size_t n, int corner, T d_x, T d_y) {
+          const auto f = static_cast<std::size_t>(prepared.soft_faces[n]);
+          const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
+          d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
+        });
     return;
   }
   if (d_frame.attributes.empty()) return;

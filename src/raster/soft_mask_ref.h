@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "raster/scalar.h"
@@ -60,41 +62,41 @@ T FaceInfluence(const NearestFeature<T>& nearest, const SoftScale<T>& scale) {
   return exp(-nearest.squared_distance * scale.inverse_delta);
 }
 
+// Alpha over the listed faces.
 template <class T>
-T SoftAlphaRef(const ScreenMeshT<T>& mesh, T px, T py, const SoftScale<T>& scale) {
+T SoftAlphaRef(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces, T px, T py,
+               const SoftScale<T>& scale) {
   T outside = T(1);
-  for (std::size_t f = 0; f < mesh.faces(); ++f) {
-    if ((mesh.reject[f] & kFaceNotInSoftMask) != 0) continue;
-    outside *= T(1) - FaceInfluence(NearestOnFace(mesh, f, px, py, scale), scale);
+  for (const std::int32_t f : faces) {
+    const auto nearest = NearestOnFace(mesh, static_cast<std::size_t>(f), px, py, scale);
+    outside *= T(1) - FaceInfluence(nearest, scale);
   }
   return T(1) - outside;
 }
 
-// Adds to d_mesh.d_x, d_y. The product's derivative by prefix and suffix products, without
-// division.
-template <class T>
-void SoftAlphaRefBackward(const ScreenMeshT<T>& mesh, T px, T py, const SoftScale<T>& scale,
-                          T d_alpha, const ScreenGradientsT<T>& d_mesh) {
-  std::vector<std::size_t> faces;
+// Calls add(n, corner, d_x, d_y) for the two corners of faces[n] that its nearest point lies
+// between. The product's derivative by prefix and suffix products, without division.
+template <class T, class Add>
+void SoftAlphaRefBackward(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces, T px,
+                          T py, const SoftScale<T>& scale, T d_alpha, const Add& add) {
   std::vector<NearestFeature<T>> nearest;
-  std::vector<T> suffix(1, T(1));
-  for (std::size_t f = mesh.faces(); f-- > 0;) {
-    if ((mesh.reject[f] & kFaceNotInSoftMask) != 0) continue;
-    faces.push_back(f);
-    nearest.push_back(NearestOnFace(mesh, f, px, py, scale));
-    suffix.push_back(suffix.back() * (T(1) - FaceInfluence(nearest.back(), scale)));
+  std::vector<T> suffix(faces.size() + 1, T(1));
+  for (const std::int32_t f : faces) {
+    nearest.push_back(NearestOnFace(mesh, static_cast<std::size_t>(f), px, py, scale));
+  }
+  for (std::size_t n = faces.size(); n-- > 0;) {
+    suffix[n] = suffix[n + 1] * (T(1) - FaceInfluence(nearest[n], scale));
   }
   T prefix = T(1);
-  for (std::size_t n = faces.size(); n-- > 0;) {
+  for (std::size_t n = 0; n < faces.size(); ++n) {
     const NearestFeature<T>& at = nearest[n];
     const T influence = FaceInfluence(at, scale);
     // dA/d(d^2) = -A / delta; moving the near point by v changes d^2 by -2 r.v
-    const T push = d_alpha * prefix * suffix[n] * influence * scale.inverse_delta * T(2);
+    const T push = d_alpha * prefix * suffix[n + 1] * influence * scale.inverse_delta * T(2);
     const T weight[2] = {T(1) - at.tau, at.tau};
     for (int end = 0; end < 2; ++end) {
-      const auto v = static_cast<std::size_t>(mesh.vertex(faces[n], (at.edge + end) % 3));
-      d_mesh.d_x[v] += push * weight[end] * at.rx * scale.x;
-      d_mesh.d_y[v] += push * weight[end] * at.ry * scale.y;
+      add(n, (at.edge + end) % 3, push * weight[end] * at.rx * scale.x,
+          push * weight[end] * at.ry * scale.y);
     }
     prefix *= T(1) - influence;
   }
