@@ -223,4 +223,18 @@ void ClipAttributesBackward(const ScreenMeshT<T>& mesh, std::span<const std::int
       });
 }
 
+// Weights of the source face's corners: a cut face mixes them.
+template <class T>
+void SourceWeights(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
+                   std::size_t face, const T w[3], T out[3]) {
+  for (int k = 0; k < 3; ++k) out[k] = mesh.was_clipped() ? T(0) : w[k];
+  if (!mesh.was_clipped()) return;
+  const std::size_t first = 3 * static_cast<std::size_t>(mesh.source_face[face]);
+  for (int k = 0; k < 3; ++k) {
+    const auto rows = CornerRows(mesh, faces, face, k);
+    out[rows.a - first] += (T(1) - rows.t) * w[k];
+    out[rows.b - first] += rows.t * w[k];
+  }
+}
+
 }  // namespace tilegrad::raster

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "raster/near_clip.h"
 #include "raster/scalar.h"
@@ -91,28 +90,30 @@ CameraT<T> ZeroCamera() {
   return zero;
 }
 
-// Adds to d_positions [V,3] and *d_camera.
+// Adds to d_positions [V,3] (may be empty) and *d_camera. d_points: V zeros, scratch.
 template <class T>
 void ProjectRefBackward(const FaceSource<T>& source, const ScreenMeshT<T>& mesh,
-                        const ScreenGradientsT<T>& d_mesh, std::span<T> d_positions,
-                        CameraT<T>* d_camera) {
+                        const ScreenGradientsT<T>& d_mesh, std::span<CameraPoint<T>> d_points,
+                        std::span<T> d_positions, CameraT<T>* d_camera) {
   const CameraT<T>& camera = *source.camera;
   const auto n = static_cast<std::size_t>(mesh.source_vertices);
-  std::vector<CameraPoint<T>> points(n), d_points(n, {T(0), T(0), T(0)});
+  const auto point = [&](std::size_t v) { return ToCamera(camera, &source.positions[3 * v]); };
   for (std::size_t v = 0; v < n; ++v) {
-    points[v] = ToCamera(camera, &source.positions[3 * v]);
-    if (!IsVisibleDepth(points[v].depth, camera)) continue;
-    PerspectiveBackward(points[v], d_mesh.d_x[v], d_mesh.d_y[v], d_mesh.d_inverse_depth[v], camera,
+    const CameraPoint<T> p = point(v);
+    if (!IsVisibleDepth(p.depth, camera)) continue;
+    PerspectiveBackward(p, d_mesh.d_x[v], d_mesh.d_y[v], d_mesh.d_inverse_depth[v], camera,
                         &d_points[v], d_camera);
   }
   for (std::size_t i = 0; i < mesh.clipped.size(); ++i) {
     const ClipVertexT<T>& clip = mesh.clipped[i];
     const auto a = static_cast<std::size_t>(clip.a), b = static_cast<std::size_t>(clip.b);
-    ClipVertexBackward(points[a], points[b], clip.t, d_mesh.d_x[n + i], d_mesh.d_y[n + i],
+    ClipVertexBackward(point(a), point(b), clip.t, d_mesh.d_x[n + i], d_mesh.d_y[n + i],
                        d_mesh.d_clip_t[i], camera, &d_points[a], &d_points[b], d_camera);
   }
   for (std::size_t v = 0; v < n; ++v) {
-    ToCameraBackward(camera, &source.positions[3 * v], d_points[v], &d_positions[3 * v], d_camera);
+    T unwanted[3] = {T(0), T(0), T(0)};
+    ToCameraBackward(camera, &source.positions[3 * v], d_points[v],
+                     d_positions.empty() ? unwanted : &d_positions[3 * v], d_camera);
   }
 }
 

@@ -1,38 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
-#include <algorithm>
+#include <cstddef>
+#include <vector>
 
-#include "render/renderer_ref.h"
+#include "render/frame_layout.h"
+#include "render/prepare.h"
+#include "render/tile_backward.h"
+#include "render/tile_forward.h"
 #include "render/validate.h"
 
 namespace tilegrad {
 
 struct Renderer::Impl {
-  const Workers& workers;
-  explicit Impl(const Workers& w) : workers(w) {}
+  explicit Impl(const Workers& w)
+      : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {}
+
+  // Projects and bins every scene of the batch.
+  void Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
+               const PrepareRequest& request) {
+    if (images.size() < scenes.size()) images.resize(scenes.size());
+    workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
+      PrepareImage(scenes[n], options, request, &images[n]);
+    });
+  }
+
+  // Calls run(task, worker) for all tiles of all images together.
+  template <class Run>
+  void ForTiles(std::size_t count, const RenderOptions& options, const Run& run) {
+    const raster::TileGrid grid(options.width, options.height);
+    workers->For(count * grid.tiles(), [&](std::size_t index, std::size_t worker) {
+      const std::size_t tile = index % grid.tiles();
+      run(TileTask{index / grid.tiles(), tile, grid.rect(tile)}, worker);
+    });
+  }
+
+  void Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
+             SceneGradients* d_scene);
+
+  const Workers* workers;
+  std::vector<ImageScratch> images;
+  std::vector<WorkerScratch> worker_scratch;
+  std::vector<TileGradients> tile_gradients;  // [image][tile]
 };
+
+void Renderer::Impl::Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
+                           SceneGradients* d_scene) {
+  ImageScratch& image = images[n];
+  ClearImageGradients(scene, *d_scene, &image);
+  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
+  const std::span<float> d_attributes =
+      image.mesh.was_clipped() ? std::span<float>(image.d_attributes) : d_scene->attributes;
+  MergeTileGradients(image, std::span(tile_gradients).subspan(n * tiles, tiles), worker_scratch,
+                     d_attributes, {image.d_x, image.d_y, image.d_inverse_depth, image.d_clip_t});
+  FinishImageGradients(scene, options, &image, d_scene);
+}
 
 Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
-
-namespace {
-
-template <class Vector>
-void CopyImage(const Vector& image, std::size_t n, Vector* batch) {
-  std::copy(image.begin(), image.end(),
-            batch->begin() + static_cast<std::ptrdiff_t>(n * image.size()));
-}
-
-template <class T>
-std::span<T> ImageOf(std::span<T> batch, std::size_t n, std::size_t images) {
-  const std::size_t size = batch.size() / images;
-  return batch.subspan(n * size, size);
-}
-
-}  // namespace
 
 Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
                         const RenderRequest& request, Frame* frame) {
@@ -40,14 +67,11 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateScenes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  impl_->workers.For(scenes.size(), [&](std::size_t n, std::size_t) {
-    Frame image;
-    RenderRef(scenes[n], options, request, &image);
-    CopyImage(image.face_ids, n, &frame->face_ids);
-    CopyImage(image.attributes, n, &frame->attributes);
-    CopyImage(image.alpha, n, &frame->alpha);
-    CopyImage(image.depth, n, &frame->depth);
-    CopyImage(image.barycentrics, n, &frame->barycentrics);
+  if (request.alpha) frame->alpha_error_bound = options.max_alpha_error;
+  impl_->Prepare(scenes, options, {true, request.alpha});
+  impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
+    RenderTile(scenes[task.image], options, impl_->images[task.image], task,
+               &impl_->worker_scratch[worker], frame);
   });
   return {};
 }
@@ -56,13 +80,20 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           const Frame& frame, const FrameGradients& d_frame,
                           std::span<SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
-  const std::size_t images = scenes.size();
-  impl_->workers.For(images, [&](std::size_t n, std::size_t) {
-    const FrameGradients d_image{ImageOf(d_frame.attributes, n, images),
-                                 ImageOf(d_frame.alpha, n, images)};
-    RenderRefBackward<float>(scenes[n], options,
-                             ImageOf(std::span<const std::int32_t>(frame.face_ids), n, images),
-                             d_image, {0, options.height}, &d_scenes[n]);
+  impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty()});
+  for (WorkerScratch& worker : impl_->worker_scratch) worker.ClearGradients();
+  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
+  impl_->tile_gradients.resize(scenes.size() * tiles);
+  impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
+    const SceneGradients& wanted = d_scenes[task.image];
+    const BackwardRequest request{!wanted.positions.empty() || wanted.camera,
+                                  !wanted.attributes.empty()};
+    impl_->tile_gradients[task.image * tiles + task.tile] =
+        RenderTileBackward(options, impl_->images[task.image], task, frame, d_frame, request,
+                           worker, &impl_->worker_scratch[worker]);
+  });
+  impl_->workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
+    impl_->Merge(scenes[n], options, n, &d_scenes[n]);
   });
   return {};
 }

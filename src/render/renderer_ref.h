@@ -16,6 +16,7 @@
 #include "raster/project_ref.h"
 #include "raster/soft_mask_ref.h"
 #include "raster/visibility_ref.h"
+#include "render/frame_layout.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -32,16 +33,6 @@ struct PreparedScene {
 };
 
 template <class T>
-raster::FaceSource<T> FaceSourceOf(const SceneViewT<T>& scene, const RenderOptions& options) {
-  return {scene.positions, scene.faces, &scene.camera, options.culling == FaceCulling::kBack};
-}
-
-template <class T>
-raster::AttributeViewT<const T> AttributesOf(const SceneViewT<T>& scene) {
-  return {scene.attributes, scene.channels, scene.rate};
-}
-
-template <class T>
 void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, PreparedScene<T>* out) {
   raster::ProjectRef(FaceSourceOf(scene, options), options.width, options.height, &out->buffers);
   out->mesh = out->buffers.View();
@@ -56,36 +47,6 @@ void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, Prepar
                                  static_cast<std::size_t>(scene.channels));
   raster::ClipAttributes<T>(out->mesh, scene.faces, out->attributes, out->clipped_attributes);
   out->attributes.values = out->clipped_attributes;
-}
-
-template <class T>
-void SizeFrame(int images, int channels, const RenderOptions& options, const RenderRequest& request,
-               FrameT<T>* frame) {
-  frame->images = images, frame->channels = request.attributes ? channels : 0;
-  frame->height = options.height, frame->width = options.width;
-  const std::size_t pixels = static_cast<std::size_t>(images) *
-                             static_cast<std::size_t>(options.height) *
-                             static_cast<std::size_t>(options.width);
-  frame->face_ids.resize(pixels);
-  frame->attributes.resize(pixels * static_cast<std::size_t>(frame->channels));
-  frame->alpha.resize(request.alpha ? pixels : 0);
-  frame->depth.resize(request.depth ? pixels : 0);
-  frame->barycentrics.resize(request.barycentrics ? 2 * pixels : 0);
-  frame->alpha_error_bound = 0;
-}
-
-// Weights of the source face's corners: a cut face mixes them.
-template <class T>
-void SourceWeights(const raster::ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
-                   std::size_t face, const T w[3], T out[3]) {
-  for (int k = 0; k < 3; ++k) out[k] = mesh.was_clipped() ? T(0) : w[k];
-  if (!mesh.was_clipped()) return;
-  const std::size_t first = 3 * static_cast<std::size_t>(mesh.source_face[face]);
-  for (int k = 0; k < 3; ++k) {
-    const auto rows = raster::CornerRows(mesh, faces, face, k);
-    out[rows.a - first] += (T(1) - rows.t) * w[k];
-    out[rows.b - first] += rows.t * w[k];
-  }
 }
 
 // One pixel of the smooth images, given its face of the prepared mesh. `frame` holds one image.
@@ -112,7 +73,7 @@ void ShadePixelRef(const SceneViewT<T>& scene, const PreparedScene<T>& prepared,
     const auto weights = raster::PixelWeightsRef(
         prepared.mesh, raster::MakeFacePlane(prepared.mesh, f), f, options.interpolation, px, py);
     raster::InterpolateRef<T>(prepared.mesh, prepared.attributes, f, weights, values);
-    SourceWeights(prepared.mesh, scene.faces, f, weights.w, source);
+    raster::SourceWeights<T>(prepared.mesh, scene.faces, f, weights.w, source);
     depth = T(1) / raster::MakeDepthPlane(prepared.mesh, f).At(px, py);
   }
   for (std::size_t c = 0; c < values.size(); ++c) frame->attributes[c * plane + pixel] = values[c];
@@ -232,8 +193,9 @@ void PrepareRefBackward(const SceneViewT<T>& scene, const RenderOptions& options
   }
   std::vector<T> d_positions(scene.positions.size(), T(0));
   CameraT<T> d_camera = raster::ZeroCamera<T>();
-  raster::ProjectRefBackward<T>(FaceSourceOf(scene, options), prepared.mesh, d.screen, d_positions,
-                                &d_camera);
+  std::vector<raster::CameraPoint<T>> d_points(scene.positions.size() / 3, {T(0), T(0), T(0)});
+  raster::ProjectRefBackward<T>(FaceSourceOf(scene, options), prepared.mesh, d.screen, d_points,
+                                d_positions, &d_camera);
   if (d_scene->camera) d_scene->d_camera = d_camera;
   if (d_scene->positions.empty()) return;
   std::copy(d_positions.begin(), d_positions.end(), d_scene->positions.begin());

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/interpolate.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "raster/interpolate.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "raster/interpolate-inl.h"
+
+#if HWY_ONCE
+namespace tilegrad::raster {
+namespace {
+
+HWY_EXPORT(SetUpPlanes);
+HWY_EXPORT(Interpolate);
+HWY_EXPORT(InterpolateBackward);
+
+}  // namespace
+
+void TilePlanes::Resize(int channels, bool barycentrics) {
+  channels_ = channels, outputs_ = channels + (barycentrics ? 2 : 0);
+  const auto arrays = static_cast<std::size_t>(channels) + 1;
+  data_.resize(kTilePixels * static_cast<std::size_t>(3 * (4 + outputs_) + 3));
+  rows_.resize(kTilePixels * 3);
+  h_.resize(kTilePixels * arrays);
+  moments_.resize(kTilePixels * 3 * arrays);
+}
+
+void SetUpTilePlanes(const InterpolateInput& input, const TileFaces& faces, TilePlanes* planes) {
+  planes->Resize(input.attributes.channels, input.barycentrics);
+  HWY_DYNAMIC_DISPATCH(SetUpPlanes)(input, faces, planes);
+}
+
+void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
+                     TilePlanes* planes, const PlanarView<float>& out,
+                     const PlanarView<float>& barycentrics) {
+  HWY_DYNAMIC_DISPATCH(Interpolate)(input, faces, rect, planes, out, barycentrics);
+}
+
+void InterpolateTileBackward(const InterpolateInput& input, const TileFaces& faces,
+                             const TileRect& rect, const PlanarView<const float>& d_out,
+                             TilePlanes* planes, std::size_t stride, float* d_faces) {
+  HWY_DYNAMIC_DISPATCH(InterpolateBackward)(input, faces, rect, d_out, planes, stride, d_faces);
+}
+
+}  // namespace tilegrad::raster
+#endif

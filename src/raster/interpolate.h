@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Attributes over the pixels of a tile, and the adjoint (paper, equations 1 to 4).
+//
+// Over a face, b_k is linear in the pixel position, so with m_k = 1/depth_k (or 1: screen-linear)
+//
+//     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k          (Q = 1:
+//     screen-linear)
+//
+// where N_c and Q are planes: three numbers per face and channel. With h_c = dL/dI_c / Q and
+// s = sum_c h_c I_c, the adjoint of a face needs only sums of h_c and s over its pixels, weighted
+// by 1, x and y (their moments): with S_k(f) = sum over pixels of b_k f, a combination of those,
+//
+//     d_a_kc = m_k S_k(h_c)                  d_m_k = sum_c a_kc S_k(h_c) - S_k(s)
+//     d_v_k  = -(sum_c grad N_c S_k(h_c) - grad Q S_k(s))        (weights are dragged along)
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/aligned.h"
+#include "raster/attributes.h"
+#include "raster/tile_faces.h"
+
+namespace tilegrad::raster {
+
+struct InterpolateInput {
+  const ScreenMesh* mesh;
+  AttributeViewT<const float> attributes;  // in the layout of the mesh
+  Interpolation mode;
+  bool barycentrics;  // two more planes: the weights of corners 1 and 2
+};
+
+// Per slot of a tile, as structure of arrays with kTilePixels entries each: planes in terms of the
+// position relative to the slot's origin. Scratch of one worker.
+class TilePlanes {
+ public:
+  void Resize(int channels, bool barycentrics);
+
+  int channels() const { return channels_; }
+  int outputs() const { return outputs_; }  // channels, and 2 where barycentrics are wanted
+  // Three consecutive arrays: value at the origin, d/dx, d/dy.
+  float* weight(int k) { return data_.data() + kTilePixels * 3 * k; }
+  float* q() { return weight(3); }
+  float* numerator(int output) { return weight(4 + output); }
+  float* m(int k) { return data_.data() + kTilePixels * (3 * (4 + outputs_) + k); }
+  std::int32_t* row(int k) { return rows_.data() + kTilePixels * k; }  // first value of corner k
+  // Scratch of the backward pass: h_c and s per pixel; moments [slot][3][channels + 1].
+  float* h(int channel) { return h_.data() + kTilePixels * channel; }
+  float* moments() { return moments_.data(); }
+
+ private:
+  int channels_ = 0, outputs_ = 0;
+  AlignedVector<float> data_, h_, moments_;
+  AlignedVector<std::int32_t> rows_;
+};
+
+// A planar image, seen from the tile's top left pixel. T may be const.
+template <class T>
+struct PlanarView {
+  T* data;
+  std::ptrdiff_t plane, row;  // steps
+};
+
+// Fills `planes` for the faces of a tile.
+void SetUpTilePlanes(const InterpolateInput& input, const TileFaces& faces, TilePlanes* planes);
+
+// Writes the pixels of `rect`: outputs [0, channels) to `out`, the two barycentrics to
+// `barycentrics`; 0 at background pixels.
+void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
+                     TilePlanes* planes, const PlanarView<float>& out,
+                     const PlanarView<float>& barycentrics);
+
+// Arrays of `stride` numbers per slot, one after the other: d_x[3], d_y[3], d_inverse_depth[3] of
+// the corners, then d_attribute [3][C].
+inline std::size_t FaceGradientArrays(int channels) {
+  return 9 + 3 * static_cast<std::size_t>(channels);
+}
+
+// The adjoint: overwrites FaceGradientArrays(channels) * stride numbers; stride is a multiple of
+// kTileSize and >= count.
+void InterpolateTileBackward(const InterpolateInput& input, const TileFaces& faces,
+                             const TileRect& rect, const PlanarView<const float>& d_out,
+                             TilePlanes* planes, std::size_t stride, float* d_faces);
+
+}  // namespace tilegrad::raster

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/project.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "raster/project.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "raster/project-inl.h"
+
+#if HWY_ONCE
+#include <algorithm>
+
+#include "raster/project_ref.h"
+
+namespace tilegrad::raster {
+namespace {
+
+HWY_EXPORT(ProjectVertices);
+HWY_EXPORT(ProjectVerticesBackward);
+
+// AssembleFaces where every vertex is visible and finite, without its tests.
+void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out) {
+  const std::size_t n = source.faces.size() / 3;
+  for (auto* array : {&out->v0, &out->v1, &out->v2, &out->source_face}) array->resize(n);
+  out->reject.resize(n);
+  out->clipped.clear();
+  for (std::size_t f = 0; f < n; ++f) {
+    out->v0[f] = source.faces[3 * f];
+    out->v1[f] = source.faces[3 * f + 1];
+    out->v2[f] = source.faces[3 * f + 2];
+    out->source_face[f] = static_cast<std::int32_t>(f);
+  }
+  const ScreenMesh mesh = out->View();
+  for (std::size_t f = 0; f < n; ++f) {
+    out->reject[f] = ShapeReject(SnapFace(mesh, f), source.cull_back);
+  }
+}
+
+bool AllVisible(const ScreenMesh& mesh) {
+  if (mesh.was_clipped()) return false;
+  return std::all_of(mesh.inverse_depth.begin(), mesh.inverse_depth.end(),
+                     [](float inverse) { return inverse > 0; });
+}
+
+}  // namespace
+
+void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out) {
+  const std::size_t n = source.positions.size() / 3;
+  for (auto* array : {&out->x, &out->y, &out->depth, &out->inverse_depth}) array->resize(n);
+  out->source_vertices = static_cast<std::int32_t>(n);
+  out->source_faces = static_cast<std::int32_t>(source.faces.size() / 3);
+  out->width = width, out->height = height;
+  if (HWY_DYNAMIC_DISPATCH(ProjectVertices)(source, out)) {
+    AssembleWholeFaces(source, out);
+  } else {
+    AssembleFaces(source, out);
+  }
+}
+
+void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,
+                     const ScreenGradients& d_mesh, AlignedVector<CameraPoint<float>>* scratch,
+                     const ProjectGradients& out) {
+  if (AllVisible(mesh)) {
+    HWY_DYNAMIC_DISPATCH(ProjectVerticesBackward)(source, d_mesh, out);
+    return;
+  }
+  CameraT<float> d_camera = ZeroCamera<float>();
+  scratch->assign(static_cast<std::size_t>(mesh.source_vertices), {0, 0, 0});
+  std::fill(out.d_positions.begin(), out.d_positions.end(), 0.0f);
+  ProjectRefBackward<float>(source, mesh, d_mesh, *scratch, out.d_positions, &d_camera);
+  if (out.d_camera != nullptr) *out.d_camera = d_camera;
+}
+
+}  // namespace tilegrad::raster
+#endif

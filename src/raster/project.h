@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// World to screen (scene/camera.h), with near clipping, and its adjoint.
+#pragma once
+
+#include <span>
+
+#include "base/aligned.h"
+#include "raster/near_clip.h"
+#include "raster/screen_mesh.h"
+
+namespace tilegrad::raster {
+
+// Fills `out` with the screen mesh of a validated, finite source. Deterministic; allocates only to
+// grow `out`. Not thread-safe for one `out`.
+void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out);
+
+// What the adjoint of Project is asked for, and scratch.
+struct ProjectGradients {
+  std::span<float> d_positions;        // [V,3] overwritten; empty: not wanted
+  CameraT<float>* d_camera = nullptr;  // overwritten; null: not wanted
+};
+
+// Adjoint of Project: from d_mesh to the source. `scratch` grows to V points where faces were cut.
+void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,
+                     const ScreenGradients& d_mesh, AlignedVector<CameraPoint<float>>* scratch,
+                     const ProjectGradients& out);
+
+}  // namespace tilegrad::raster

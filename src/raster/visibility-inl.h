@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of visibility.h. Lanes are the pixels of a row. A face walks only the columns and
+// rows of its own box, so small faces take one vector per row and large ones whole rows; a face
+// that covers the whole tile raises the depth floor below which later faces are rejected unseen.
+#if defined(TILEGRAD_RASTER_VISIBILITY_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_VISIBILITY_INL_H_
+#undef TILEGRAD_RASTER_VISIBILITY_INL_H_
+#else
+#define TILEGRAD_RASTER_VISIBILITY_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+
+#include "raster/tile_face_setup.h"
+#include "raster/visibility.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using VisibilityTag = HWY_CAPPED(float, kTileSize);
+using VisibilityIntTag = hn::RebindToSigned<VisibilityTag>;
+
+// One vector of columns, from `column` on, of every row of the face's box.
+// Mul and Add are kept apart (no fused MulAdd): the same bits on every instruction set.
+HWY_INLINE void DrawColumns(const TileFaceSetup& face, int column, const TileRect& rect,
+                            VisibilityTile* out) {
+  const VisibilityTag d;
+  const VisibilityIntTag di;
+  const auto columns = hn::Iota(di, column);
+  hn::Vec<VisibilityIntTag> edge[3], step[3];
+  for (int k = 0; k < 3; ++k) {
+    const auto start = hn::Set(di, face.edge[k] + face.step_y[k] * face.row_begin);
+    edge[k] = hn::Add(start, hn::Mul(hn::Set(di, face.step_x[k]), columns));
+    step[k] = hn::Set(di, face.step_y[k]);
+  }
+  const auto& plane = face.depth;
+  const auto px = hn::Add(hn::Iota(d, static_cast<float>(rect.x0 + column)), hn::Set(d, 0.5f));
+  const auto dx = hn::Mul(hn::Set(d, plane.gx), hn::Sub(px, hn::Set(d, plane.x0)));
+  const auto low = hn::Set(d, plane.low), high = hn::Set(d, plane.high);
+  const auto base = hn::Set(d, plane.base);
+  const auto id = hn::Set(di, face.face);
+  for (int i = face.row_begin; i < face.row_end; ++i) {
+    const auto inside = hn::Gt(hn::Or(hn::Or(edge[0], edge[1]), edge[2]), hn::Set(di, -1));
+    for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], step[k]);
+    const float py = static_cast<float>(rect.y0 + i) + 0.5f;
+    const auto dy = hn::Set(d, plane.gy * (py - plane.y0));
+    const auto z = hn::Min(hn::Max(hn::Add(base, hn::Add(dx, dy)), low), high);
+    float* nearest = out->inverse_depth + i * kTileSize + column;
+    std::int32_t* ids = out->face + i * kTileSize + column;
+    const auto old = hn::LoadU(d, nearest);
+    const auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
+    hn::StoreU(hn::IfThenElse(seen, z, old), d, nearest);
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(di, seen), id, hn::LoadU(di, ids)), di, ids);
+  }
+}
+
+void DrawFaces(const ScreenMesh& mesh, std::span<const std::int32_t> faces, const TileRect& rect,
+               VisibilityTile* out) {
+  const VisibilityTag d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  float floor = 0;  // every pixel of the tile is at least this near
+  for (const std::int32_t f : faces) {
+    TileFaceSetup face;
+    if (!SetUpTileFace(mesh, f, rect, &face) || face.depth.high <= floor) continue;
+    if (!face.guarded) {
+      DrawUnguarded(mesh, face, rect, out);
+      continue;
+    }
+    if (face.CoversTile()) floor = HWY_MAX(floor, face.depth.low);
+    int column = HWY_MIN(face.column_begin, kTileSize - lanes);
+    for (; column < face.column_end; column += lanes) {
+      DrawColumns(face, HWY_MIN(column, kTileSize - lanes), rect, out);
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::raster
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/visibility.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "raster/visibility.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "raster/visibility-inl.h"
+
+#if HWY_ONCE
+#include <algorithm>
+
+#include "raster/fragments.h"
+
+namespace tilegrad::raster {
+namespace {
+
+HWY_EXPORT(DrawFaces);
+
+// Pixels of [origin, end) whose centre lies in [low, high] (subpixels), counted from origin.
+void CentreRange(std::int64_t low, std::int64_t high, int origin, int end, int* first, int* last) {
+  constexpr std::int64_t kHalf = kSubpixels / 2;
+  const std::int64_t from = (low - kHalf + kSubpixels - 1) >> kSubpixelBits;
+  const std::int64_t to = ((high - kHalf) >> kSubpixelBits) + 1;
+  *first = static_cast<int>(std::clamp<std::int64_t>(from, origin, end) - origin);
+  *last = static_cast<int>(std::clamp<std::int64_t>(to, origin, end) - origin);
+}
+
+void SetUpEdges(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out) {
+  constexpr std::int64_t kFar = std::int64_t{1} << 30;  // 15 steps in x and y stay below 2^30
+  for (int k = 0; k < 3; ++k) {
+    const int n = k == 2 ? 0 : k + 1;
+    const std::int64_t exact =
+        shape.EdgeAt<std::int64_t>(k, CentreSubpixel(rect.x0), CentreSubpixel(rect.y0));
+    out->edge[k] = static_cast<std::int32_t>(std::clamp(exact >> kSubpixelBits, -kFar, kFar));
+    out->step_x[k] = static_cast<std::int32_t>(shape.y[k] - shape.y[n]);
+    out->step_y[k] = static_cast<std::int32_t>(shape.x[n] - shape.x[k]);
+  }
+}
+
+}  // namespace
+
+bool SetUpTileFace(const ScreenMesh& mesh, std::int32_t face, const TileRect& rect,
+                   TileFaceSetup* out) {
+  const auto f = static_cast<std::size_t>(face);
+  const SnappedFace shape = SnapFaceClockwise(mesh, f);
+  const auto [left, right] = std::minmax({shape.x[0], shape.x[1], shape.x[2]});
+  const auto [top, bottom] = std::minmax({shape.y[0], shape.y[1], shape.y[2]});
+  CentreRange(left, right, rect.x0, rect.x1, &out->column_begin, &out->column_end);
+  CentreRange(top, bottom, rect.y0, rect.y1, &out->row_begin, &out->row_end);
+  if (out->column_begin >= out->column_end || out->row_begin >= out->row_end) return false;
+  out->face = face;
+  out->guarded = shape.guarded();
+  out->depth = MakeDepthPlane(mesh, f);
+  if (out->guarded) SetUpEdges(shape, rect, out);
+  return true;
+}
+
+void DrawUnguarded(const ScreenMesh& mesh, const TileFaceSetup& face, const TileRect& rect,
+                   VisibilityTile* out) {
+  const SnappedFace shape = SnapFaceClockwise(mesh, static_cast<std::size_t>(face.face));
+  for (int i = face.row_begin; i < face.row_end; ++i) {
+    for (int j = face.column_begin; j < face.column_end; ++j) {
+      const int column = rect.x0 + j, row = rect.y0 + i, pixel = i * kTileSize + j;
+      if (!Covers(shape, column, row)) continue;
+      const float z =
+          face.depth.At(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
+      if (!(z > out->inverse_depth[pixel])) continue;
+      out->inverse_depth[pixel] = z, out->face[pixel] = face.face;
+    }
+  }
+}
+
+void ComputeVisibility(const ScreenMesh& mesh, std::span<const std::int32_t> faces,
+                       const TileRect& rect, VisibilityTile* out) {
+  std::fill(out->face, out->face + kTilePixels, kNoFace);
+  std::fill(out->inverse_depth, out->inverse_depth + kTilePixels, 0.0f);
+  if (!faces.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, faces, rect, out);
+  // Vectors reach beyond the image where the tile is narrower; what they saw there is nothing.
+  for (int i = 0; i < kTileSize && rect.x1 - rect.x0 < kTileSize; ++i) {
+    const int from = i * kTileSize + rect.x1 - rect.x0, to = (i + 1) * kTileSize;
+    std::fill(out->face + from, out->face + to, kNoFace);
+    std::fill(out->inverse_depth + from, out->inverse_depth + to, 0.0f);
+  }
+}
+
+}  // namespace tilegrad::raster
+#endif

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which face is seen in each pixel of a tile (conventions.h, rules 3 and 4). Discrete: no gradient.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "raster/bin.h"
+#include "raster/screen_mesh.h"
+#include "raster/tile_faces.h"
+
+namespace tilegrad::raster {
+
+// Pixel arrays of one tile.
+struct VisibilityTile {
+  alignas(128) std::int32_t face[kTilePixels];    // index into the ScreenMesh, kNoFace: background
+  alignas(128) float inverse_depth[kTilePixels];  // 1/depth; 0 at background
+};
+
+// `faces`: drawn faces that may cover the tile, ascending. The result does not depend on the
+// instruction set: the same bits as VisibilityRef<float> everywhere.
+void ComputeVisibility(const ScreenMesh& mesh, std::span<const std::int32_t> faces,
+                       const TileRect& rect, VisibilityTile* out);
+
+}  // namespace tilegrad::raster

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scratch of a Renderer: what is kept per image of the batch and per worker. Everything grows to
+// its largest use and stays.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "base/aligned.h"
+#include "raster/attributes.h"
+#include "raster/bin.h"
+#include "raster/interpolate.h"
+#include "raster/near_clip.h"
+#include "raster/screen_mesh.h"
+#include "raster/soft_mask_ref.h"
+#include "raster/tile_faces.h"
+#include "raster/visibility.h"
+#include "render/renderer.h"
+
+namespace tilegrad {
+
+// A scene on the screen, ready for its tiles.
+struct ImageScratch {
+  raster::ScreenMeshBuffers buffers;
+  raster::ScreenMesh mesh;
+  AlignedVector<float> clipped_attributes;
+  raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
+  raster::TileListBuffers drawn_buffers, soft_buffers;
+  raster::TileLists drawn, soft;
+
+  // Backward: gradients in the layout of `mesh`.
+  AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t, d_attributes;
+  AlignedVector<raster::CameraPoint<float>> points;
+};
+
+// Gradients of one tile's faces: `count` faces, and arrays of `stride` numbers, in a worker's
+// lists.
+struct FaceGradientBlock {
+  std::size_t face_begin = 0, value_begin = 0;
+  std::size_t count = 0, stride = 0;
+};
+struct TileGradients {
+  std::size_t worker = 0;
+  FaceGradientBlock interpolated;  // arrays as InterpolateTileBackward writes them
+  FaceGradientBlock soft;          // d_x[3], d_y[3]
+};
+
+struct WorkerScratch {
+  raster::VisibilityTile visibility;
+  raster::TileFaces faces;
+  raster::TilePlanes planes;
+  // Lists that the TileGradients of this worker's tiles point into.
+  AlignedVector<std::int32_t> gradient_faces;
+  AlignedVector<float> gradient_values;
+
+  void ClearGradients() { gradient_faces.clear(), gradient_values.clear(); }
+};
+
+// One tile of one image of the batch.
+struct TileTask {
+  std::size_t image, tile;
+  raster::TileRect rect;
+};
+
+struct SoftMaskSettings {
+  raster::SoftScale<float> scale;
+};
+
+}  // namespace tilegrad
