@@ -1,23 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/kernels/adam.h"
 
-#include <vector>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/kernels/adam.cc"
+#include <hwy/foreach_target.h>
+//
+#include "nn/kernels/adam-inl.h"
 
-#include "nn/kernels/adam_ref.h"
+#if HWY_ONCE
+#include <algorithm>
+#include <array>
 
 namespace tilegrad::nn {
+
+HWY_EXPORT(AdamRange);
+HWY_EXPORT(SquaresRange);
+
 namespace {
 
-constexpr std::size_t kGrain = 65536;  // elements to a task
+constexpr std::size_t kGrain = 65536;       // elements to a task
+constexpr std::size_t kMaxPartials = 4096;  // of one sum
 
-template <class T>
-double Sum(const T* x, std::size_t n, const Workers& workers) {
-  std::vector<double> partial((n + kGrain - 1) / kGrain);
-  workers.ForRanges(n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
-    partial[begin / kGrain] = SumOfSquaresRef(x + begin, end - begin);
+template <class T, class RangeSum>
+double SumByRanges(const T* x, std::size_t n, const Workers& workers, const RangeSum& range_sum) {
+  const std::size_t stretch = std::max(kGrain, (n + kMaxPartials - 1) / kMaxPartials);
+  std::array<double, kMaxPartials> partial;
+  workers.ForRanges(n, stretch, [&](std::size_t begin, std::size_t end, std::size_t) {
+    partial[begin / stretch] = range_sum(x + begin, end - begin);
   });
   double sum = 0;
-  for (double p : partial) sum += p;
+  for (std::size_t i = 0; i * stretch < n; ++i) sum += partial[i];
   return sum;
 }
 
@@ -25,7 +37,7 @@ double Sum(const T* x, std::size_t n, const Workers& workers) {
 
 void AdamStep(const AdamProblem<float>& problem, const Workers& workers) {
   workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
-    AdamStepRef(problem, begin, end);
+    HWY_DYNAMIC_DISPATCH(AdamRange)(problem, begin, end);
   });
 }
 
@@ -36,11 +48,14 @@ void AdamStep(const AdamProblem<double>& problem, const Workers& workers) {
 }
 
 double SumOfSquares(const float* x, std::size_t n, const Workers& workers) {
-  return Sum(x, n, workers);
+  return SumByRanges(x, n, workers, [](const float* from, std::size_t count) {
+    return HWY_DYNAMIC_DISPATCH(SquaresRange)(from, count);
+  });
 }
 
 double SumOfSquares(const double* x, std::size_t n, const Workers& workers) {
-  return Sum(x, n, workers);
+  return SumByRanges(x, n, workers, SumOfSquaresRef<double>);
 }
 
 }  // namespace tilegrad::nn
+#endif  // HWY_ONCE

@@ -1,13 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/kernels/batch_norm.h"
 
-#include "nn/kernels/batch_norm_ref.h"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/kernels/batch_norm.cc"
+#include <hwy/foreach_target.h>
+//
+#include "nn/kernels/batch_norm-inl.h"
+
+#if HWY_ONCE
 
 namespace tilegrad::nn {
 
+HWY_EXPORT(BatchNormForwardRange);
+HWY_EXPORT(BatchNormBackwardRange);
+
+namespace {
+
+// Channels to a task: with pixels, one is work enough.
+std::size_t Grain(const BatchNormShape& shape) { return shape.pixels == 1 ? 64 : 1; }
+
+}  // namespace
+
 void BatchNormForward(const BatchNormForwardProblem<float>& problem, const Workers& workers) {
-  workers.For(problem.shape.channels,
-              [&](std::size_t c, std::size_t) { BatchNormForwardRef(problem, c); });
+  workers.ForRanges(problem.shape.channels, Grain(problem.shape),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      HWY_DYNAMIC_DISPATCH(BatchNormForwardRange)(problem, begin, end);
+                    });
 }
 
 void BatchNormForward(const BatchNormForwardProblem<double>& problem, const Workers& workers) {
@@ -16,8 +34,10 @@ void BatchNormForward(const BatchNormForwardProblem<double>& problem, const Work
 }
 
 void BatchNormBackward(const BatchNormBackwardProblem<float>& problem, const Workers& workers) {
-  workers.For(problem.shape.channels,
-              [&](std::size_t c, std::size_t) { BatchNormBackwardRef(problem, c); });
+  workers.ForRanges(problem.shape.channels, Grain(problem.shape),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      HWY_DYNAMIC_DISPATCH(BatchNormBackwardRange)(problem, begin, end);
+                    });
 }
 
 void BatchNormBackward(const BatchNormBackwardProblem<double>& problem, const Workers& workers) {
@@ -26,3 +46,4 @@ void BatchNormBackward(const BatchNormBackwardProblem<double>& problem, const Wo
 }
 
 }  // namespace tilegrad::nn
+#endif  // HWY_ONCE

@@ -16,30 +16,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// Four independent sums hide the latency of the addition (4 cycles, 2 a cycle on AVX2 machines).
-struct RowSum {
-  DF d;
-  VF s0, s1, s2, s3;
-
-  // Written out: a default member initialiser would not be compiled for the target.
-  HWY_INLINE explicit RowSum(DF tag)
-      : s0(hn::Zero(tag)), s1(hn::Zero(tag)), s2(hn::Zero(tag)), s3(hn::Zero(tag)) {}
-
-  HWY_INLINE void AddRow(const float* x, std::size_t n) {
-    const std::size_t lanes = hn::Lanes(d);
-    std::size_t i = 0;
-    for (; i + 4 * lanes <= n; i += 4 * lanes) {
-      s0 = hn::Add(s0, hn::LoadU(d, x + i));
-      s1 = hn::Add(s1, hn::LoadU(d, x + i + lanes));
-      s2 = hn::Add(s2, hn::LoadU(d, x + i + 2 * lanes));
-      s3 = hn::Add(s3, hn::LoadU(d, x + i + 3 * lanes));
-    }
-    for (; i + lanes <= n; i += lanes) s0 = hn::Add(s0, hn::LoadU(d, x + i));
-    if (i < n) s1 = hn::Add(s1, LoadTail(d, x + i, n - i));
-  }
-  HWY_INLINE float Total() const { return SumLanes(d, hn::Add(hn::Add(s0, s1), hn::Add(s2, s3))); }
-};
-
 // Outputs [begin, end); the last axis is reduced.
 void SumAlongRows(const ReduceLayout& l, const float* x, float* y, std::size_t begin,
                   std::size_t end) {
@@ -67,14 +43,10 @@ void SumColumns(const ReduceLayout& l, const float* x, float* y, std::size_t beg
     for (std::size_t a = 0; a < l.reduced[0]; ++a) {
       for (std::size_t b = 0; b < l.reduced[1]; ++b) {
         const float* from = x + address.base + a * address.steps[0] + b * address.steps[1];
-        sum = hn::Add(sum, count == lanes ? hn::LoadU(d, from) : LoadTail(d, from, count));
+        sum = hn::Add(sum, LoadSome(d, from, count));
       }
     }
-    if (count == lanes) {
-      hn::StoreU(sum, d, y + o);
-    } else {
-      StoreTail(sum, d, y + o, count);
-    }
+    StoreSome(sum, d, y + o, count);
   }
 }
 
