@@ -2,10 +2,11 @@
 // A dataset on disk: rendered views of 3D models, split by model, and what evaluation needs.
 //
 //   <folder>/dataset.json              DatasetInfo: how it was made, camera rule, classes, credits
-//   <folder>/models.jsonl              one ModelInfo a line, in a fixed order; written when the
-//   dataset is complete <folder>/rejected.jsonl            models that could not be used: id,
-//   class, file, reason <folder>/models/<class>/<id>.npz   ModelData: images, occupancy, points,
-//   mesh <folder>/contact_sheet.png         to look at
+//   <folder>/models.jsonl              one ModelInfo a line, in a fixed order; appears when all is
+//                                      complete
+//   <folder>/rejected.jsonl            models that could not be used: id, class, file, reason
+//   <folder>/models/<class>/<id>.npz   ModelData: images, occupancy, points, mesh
+//   <folder>/contact_sheet.png         to look at
 #pragma once
 
 #include <cstdint>
@@ -37,6 +38,7 @@ struct DatasetInfo {
   CameraRule camera;
   std::vector<std::string> classes;  // sorted; ModelInfo::class_index points here
   std::vector<std::string> credits;  // one sentence a source
+  std::string recipe;                // 16 hex digits over all that shapes the model files
 };
 
 enum class Split { kTrain, kValidation, kTest };
@@ -48,10 +50,13 @@ struct ModelInfo {
   Split split = Split::kTrain;
   std::string license, creator;  // empty where unknown
   int source_faces = 0;          // triangles before anything was done to it
+  std::uint64_t geometry =
+      0;  // equal for copies of one mesh in other colours; 0 if there is no mesh
 };
 
 inline constexpr int kOccupancyResolution = 32;  // voxels a side
 inline constexpr int kTruthPoints = 2500;        // spec section 6
+inline constexpr int kTruthFaces = 5000;
 
 struct ModelData {
   // [views][4][size][size], planar RGBA, row 0 on top. RGB is composited over black (premultiplied
@@ -60,15 +65,18 @@ struct ModelData {
   // [32][32][32] as [x][y][z], 0 or 1: solid occupancy of the mesh scaled to fill the cube
   // (train/metrics.h says the rule).
   std::vector<std::uint8_t> occupancy;
-  std::vector<glm::vec3>
-      points;  // kTruthPoints area-weighted samples of the surface; largest half-extent 0.45
-  Mesh mesh;  // normalised truth, positions, faces and per-vertex colours; at most 5,000 faces, for
-              // reports
+  // kTruthPoints area-weighted samples of the surface; largest half-extent 0.45. Empty where the
+  // source has no meshes ("nmr").
+  std::vector<glm::vec3> points;
+  // Normalised truth for reports: positions, faces and per-vertex colours; at most kTruthFaces
+  // faces. Empty where the source has no meshes.
+  Mesh mesh;
 };
 
 class Dataset {
  public:
-  // Reads the two index files; errors name the file and line. Model files are read by Load.
+  // Reads the two index files; errors name the file and the line or key. Model files are read by
+  // Load. A folder whose making was interrupted has no models.jsonl yet, and the error says so.
   static Result<Dataset> Open(const Path& folder);
 
   const Path& folder() const { return folder_; }
@@ -76,6 +84,8 @@ class Dataset {
   const std::vector<ModelInfo>& models() const { return models_; }
   std::vector<int> Select(Split split) const;  // indices into models(), ascending
 
+  // Errors name the file and the array: missing, of another shape than dataset.json promises, not
+  // finite.
   Result<ModelData> Load(int model) const;                        // everything
   Result<std::vector<std::uint8_t>> LoadImages(int model) const;  // ModelData::images only
   Path ModelPath(int model) const;

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/dataset.h"
+
+#include "base/error.h"
+#include "train/data/dataset_files.h"
+
+namespace tilegrad::train {
+
+Camera CameraRule::View(int index) const {
+  return OrbitCamera(lens, azimuth_step * index, elevation, distance);
+}
+
+Result<Dataset> Dataset::Open(const Path& folder) {
+  Dataset dataset;
+  dataset.folder_ = folder;
+  TILEGRAD_ASSIGN(dataset.info_, ReadDatasetInfo(folder));
+  std::error_code error;
+  if (!std::filesystem::exists(ModelsPath(folder), error)) {
+    return NotFound(
+        "{}: the dataset is not complete; run the same `tilegrad dataset` command again to finish "
+        "it",
+        folder.string());
+  }
+  TILEGRAD_ASSIGN(dataset.models_, ReadModels(folder, dataset.info_));
+  return dataset;
+}
+
+std::vector<int> Dataset::Select(Split split) const {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < models_.size(); ++i) {
+    if (models_[i].split == split) out.push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
+Path Dataset::ModelPath(int model) const {
+  const ModelInfo& m = models_[static_cast<std::size_t>(model)];
+  return ModelFilePath(folder_, info_.classes[static_cast<std::size_t>(m.class_index)], m.id);
+}
+
+Result<ModelData> Dataset::Load(int model) const { return LoadModelFile(ModelPath(model), info_); }
+
+Result<std::vector<std::uint8_t>> Dataset::LoadImages(int model) const {
+  return LoadModelImages(ModelPath(model), info_);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files of a dataset (dataset.h says which there are): writing them, and reading them back with
+// every size checked.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "train/data/dataset.h"
+
+namespace tilegrad::train {
+
+// A model that could not be used, and why.
+struct RejectedModel {
+  std::string id, class_name;
+  std::string file;  // where it came from
+  std::string reason;
+};
+
+// What a model file says about itself besides its data.
+struct ModelStamp {
+  std::string recipe;          // of the dataset that it was made for, DatasetInfo::recipe
+  std::uint64_t geometry = 0;  // as ModelInfo::geometry
+  int source_faces = 0;        // as ModelInfo::source_faces
+};
+
+const char* SplitName(Split split);  // "train", "validation", "test"
+
+Path DatasetInfoPath(const Path& folder);
+Path ModelsPath(const Path& folder);
+Path RejectedPath(const Path& folder);
+Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id);
+
+Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info);
+Result<DatasetInfo> ReadDatasetInfo(const Path& folder);
+Status WriteModels(const Path& folder, const DatasetInfo& info,
+                   const std::vector<ModelInfo>& models);
+Result<std::vector<ModelInfo>> ReadModels(const Path& folder, const DatasetInfo& info);
+Status WriteRejected(const Path& folder, const std::vector<RejectedModel>& rejected);
+
+// Compressed; the same data gives the same bytes.
+Status SaveModelFile(const Path& path, const DatasetInfo& info, const ModelData& data,
+                     const ModelStamp& stamp);
+Result<ModelData> LoadModelFile(const Path& path, const DatasetInfo& info);
+Result<std::vector<std::uint8_t>> LoadModelImages(const Path& path, const DatasetInfo& info);
+// Reads the whole file, so that a broken one is found; an error if it is, or if it belongs to
+// another recipe.
+Result<ModelStamp> VerifyModelFile(const Path& path, const DatasetInfo& info);
+
+}  // namespace tilegrad::train
