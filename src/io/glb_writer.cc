@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/glb_writer.h"
+
+#include <cstring>
+#include <glm/common.hpp>
+#include <nlohmann/json.hpp>
+#include <unordered_map>
+
+#include "base/error.h"
+#include "io/image_file.h"
+
+namespace tilegrad::io {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFloat = 5126, kUnsignedInt = 5125, kArrayBuffer = 34962, kElementBuffer = 34963;
+
+// The binary chunk and the JSON that describes it.
+struct GlbBuilder {
+  Bytes binary;
+  Json json = {{"asset", {{"version", "2.0"}, {"generator", "tilegrad"}}}};
+
+  int AddView(const void* data, std::size_t bytes, int target) {
+    while (binary.size() % 4 != 0) binary.push_back(0);
+    Json view = {{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", bytes}};
+    if (target != 0) view["target"] = target;
+    const auto* begin = static_cast<const std::uint8_t*>(data);
+    binary.insert(binary.end(), begin, begin + bytes);
+    json["bufferViews"].push_back(std::move(view));
+    return static_cast<int>(json["bufferViews"].size()) - 1;
+  }
+
+  template <class Vec>
+  int AddVectors(const std::vector<Vec>& values) {
+    const int view = AddView(values.data(), values.size() * sizeof(Vec), kArrayBuffer);
+    json["accessors"].push_back({{"bufferView", view},
+                                 {"componentType", kFloat},
+                                 {"count", values.size()},
+                                 {"type", fmt::format("VEC{}", Vec::length())}});
+    return static_cast<int>(json["accessors"].size()) - 1;
+  }
+
+  int AddIndices(const std::vector<std::uint32_t>& values) {
+    const int view = AddView(values.data(), values.size() * sizeof(std::uint32_t), kElementBuffer);
+    json["accessors"].push_back({{"bufferView", view},
+                                 {"componentType", kUnsignedInt},
+                                 {"count", values.size()},
+                                 {"type", "SCALAR"}});
+    return static_cast<int>(json["accessors"].size()) - 1;
+  }
+};
+
+// The vertices of one primitive: corners with equal attributes share one.
+struct Primitive {
+  std::vector<glm::vec3> positions, normals;
+  std::vector<glm::vec4> colors;
+  std::vector<glm::vec2> uvs;
+  std::vector<std::uint32_t> indices;
+};
+
+class PrimitiveBuilder {
+ public:
+  explicit PrimitiveBuilder(const Mesh& mesh) : mesh_(mesh) {}
+
+  void AddCorner(std::size_t face, int k) {
+    const std::size_t corner = 3 * face + static_cast<std::size_t>(k);
+    const std::int32_t vertex = mesh_.faces[face][static_cast<std::size_t>(k)];
+    std::string key(reinterpret_cast<const char*>(&vertex), sizeof(vertex));
+    if (!mesh_.corner_uvs.empty())
+      key.append(reinterpret_cast<const char*>(&mesh_.corner_uvs[corner]), sizeof(glm::vec2));
+    if (!mesh_.corner_normals.empty())
+      key.append(reinterpret_cast<const char*>(&mesh_.corner_normals[corner]), sizeof(glm::vec3));
+    const auto [it, added] =
+        seen_.try_emplace(std::move(key), static_cast<std::uint32_t>(out_.positions.size()));
+    if (added) AddVertex(corner, vertex);
+    out_.indices.push_back(it->second);
+  }
+  Primitive Take() { return std::move(out_); }
+
+ private:
+  void AddVertex(std::size_t corner, std::int32_t vertex) {
+    out_.positions.push_back(mesh_.positions[vertex]);
+    if (!mesh_.colors.empty()) out_.colors.push_back(mesh_.colors[vertex]);
+    if (!mesh_.corner_normals.empty())
+      out_.normals.push_back(mesh_.corner_normals[corner]);
+    else if (!mesh_.normals.empty())
+      out_.normals.push_back(mesh_.normals[vertex]);
+    if (!mesh_.corner_uvs.empty())
+      out_.uvs.emplace_back(mesh_.corner_uvs[corner].x, 1.0f - mesh_.corner_uvs[corner].y);
+  }
+  const Mesh& mesh_;
+  Primitive out_;
+  std::unordered_map<std::string, std::uint32_t> seen_;
+};
+
+std::vector<Primitive> SplitByMaterial(const Mesh& mesh) {
+  const std::size_t count = std::max<std::size_t>(mesh.materials.size(), 1);
+  std::vector<PrimitiveBuilder> builders(count, PrimitiveBuilder(mesh));
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const std::size_t m =
+        mesh.face_materials.empty() ? 0 : static_cast<std::size_t>(mesh.face_materials[f]);
+    for (int k = 0; k < 3; ++k) builders[m].AddCorner(f, k);
+  }
+  std::vector<Primitive> out;
+  for (auto& builder : builders) out.push_back(builder.Take());
+  return out;
+}
+
+Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
+  Json attributes;
+  attributes["POSITION"] = glb.AddVectors(p.positions);
+  glm::vec3 low = p.positions[0], high = low;
+  for (const glm::vec3& q : p.positions) low = glm::min(low, q), high = glm::max(high, q);
+  Json& accessor = glb.json["accessors"].back();
+  accessor["min"] = {low.x, low.y, low.z};
+  accessor["max"] = {high.x, high.y, high.z};
+  if (!p.normals.empty()) attributes["NORMAL"] = glb.AddVectors(p.normals);
+  if (!p.colors.empty()) attributes["COLOR_0"] = glb.AddVectors(p.colors);
+  if (!p.uvs.empty()) attributes["TEXCOORD_0"] = glb.AddVectors(p.uvs);
+  return {{"attributes", attributes}, {"indices", glb.AddIndices(p.indices)}};
+}
+
+Json MaterialJson(const Material& m) {
+  Json pbr = {{"baseColorFactor", {m.base_color.r, m.base_color.g, m.base_color.b, m.base_color.a}},
+              {"metallicFactor", 0.0},
+              {"roughnessFactor", 1.0}};
+  if (m.base_color_texture >= 0) pbr["baseColorTexture"] = {{"index", m.base_color_texture}};
+  Json out = {{"name", m.name}, {"pbrMetallicRoughness", pbr}, {"doubleSided", true}};
+  if (m.base_color.a < 1) out["alphaMode"] = "BLEND";
+  return out;
+}
+
+Status AddTextures(GlbBuilder& glb, const Mesh& mesh) {
+  for (const Texture& texture : mesh.textures) {
+    auto png = EncodePng(texture.image);
+    if (!png.ok()) return png.status().Within("texture " + texture.name);
+    const int view = glb.AddView(png->data(), png->size(), 0);
+    glb.json["images"].push_back(
+        {{"bufferView", view}, {"mimeType", "image/png"}, {"name", texture.name}});
+    glb.json["textures"].push_back({{"source", glb.json["images"].size() - 1}});
+  }
+  return {};
+}
+
+void AppendChunk(Bytes& out, const char type[5], const std::uint8_t* data, std::size_t size,
+                 std::uint8_t padding) {
+  const auto padded = static_cast<std::uint32_t>((size + 3) / 4 * 4);
+  const auto* length = reinterpret_cast<const std::uint8_t*>(&padded);
+  out.insert(out.end(), length, length + 4);
+  out.insert(out.end(), type, type + 4);
+  out.insert(out.end(), data, data + size);
+  out.resize(out.size() + padded - size, padding);
+}
+
+Result<Bytes> Assemble(GlbBuilder& glb) {
+  glb.json["buffers"] = Json::array({{{"byteLength", glb.binary.size()}}});
+  // Names come from files and may not be UTF-8: replace what is not.
+  const std::string text = glb.json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::size_t total =
+      12 + 8 + (text.size() + 3) / 4 * 4 + 8 + (glb.binary.size() + 3) / 4 * 4;
+  if (total > 0xFFFFFFFFu)
+    return ResourceExhausted("a GLB file holds at most 4 GiB, this mesh needs {}", total);
+  Bytes out = {'g', 'l', 'T', 'F', 2, 0, 0, 0};
+  out.reserve(total);
+  const auto total32 = static_cast<std::uint32_t>(total);
+  const auto* length = reinterpret_cast<const std::uint8_t*>(&total32);
+  out.insert(out.end(), length, length + 4);
+  AppendChunk(out, "JSON", reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), ' ');
+  AppendChunk(out, "BIN\0", glb.binary.data(), glb.binary.size(), 0);
+  return out;
+}
+
+}  // namespace
+
+Result<Bytes> EncodeGlb(const Mesh& mesh) {
+  TILEGRAD_TRY(Validate(mesh));
+  if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
+  // Without a material viewers take glTF's default, which is metal: vertex colours would look
+  // black.
+  const Material plain{.name = "plain", .base_color = glm::vec4(1)};
+  const std::vector<Material> materials =
+      mesh.materials.empty() ? std::vector{plain} : mesh.materials;
+  GlbBuilder glb;
+  glb.json["scene"] = 0;
+  glb.json["scenes"] = Json::array({{{"nodes", {0}}}});
+  glb.json["nodes"] = Json::array({{{"mesh", 0}}});
+  Json primitives = Json::array();
+  const std::vector<Primitive> parts = SplitByMaterial(mesh);
+  for (std::size_t m = 0; m < parts.size(); ++m) {
+    if (parts[m].indices.empty()) continue;
+    Json primitive = AddPrimitive(glb, parts[m]);
+    primitive["material"] = m;
+    primitives.push_back(std::move(primitive));
+  }
+  glb.json["meshes"] = Json::array({{{"primitives", primitives}}});
+  for (const Material& material : mesh.materials)
+    glb.json["materials"].push_back(MaterialJson(material));
+  TILEGRAD_TRY(AddTextures(glb, mesh));
+  return Assemble(glb);
+}
+
+Status SaveGlb(const Path& path, const Mesh& mesh) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh));
+  return WriteFileAtomic(path, bytes);
+}
+
+}  // namespace tilegrad::io

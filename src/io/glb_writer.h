@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes out, as binary glTF 2.0, which every viewer opens.
+#pragma once
+
+#include "base/file.h"
+#include "scene/mesh.h"
+
+namespace tilegrad::io {
+
+// One primitive a material that is used. Positions, faces, normals, vertex colours, uv, base
+// colours and textures (as PNG inside) are kept; per-corner attributes split vertices where they
+// must. An error if the mesh is not valid or has no face.
+Result<Bytes> EncodeGlb(const Mesh& mesh);
+Status SaveGlb(const Path& path, const Mesh& mesh);  // whole or not at all
+
+}  // namespace tilegrad::io

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mesh files: glTF and GLB by tinygltf; OBJ with MTL, AC3D, PLY, STL, OFF, Collada, FBX, 3DS, ...
+// by Assimp.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/archive.h"
+#include "scene/mesh.h"
+
+namespace tilegrad::io {
+
+struct LoadedMesh {
+  Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
+              // transforms applied
+  std::vector<std::string> warnings;  // what was missing or left out and what stands in for it
+};
+
+// The format follows the file name's ending. Errors name the file and, where the format has places,
+// the place in it. A missing texture is a warning; the material's colour stands in. Lines and
+// points are left out with a warning.
+Result<LoadedMesh> LoadMesh(const Path& path);
+Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name);
+
+// Whether the ending (any case) is one that LoadMesh reads.
+bool IsMeshFileName(const std::string& name);
+
+}  // namespace tilegrad::io

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to io: what mesh_file.cc dispatches to, and what the readers share.
+#pragma once
+
+#include <string>
+
+#include "io/mesh_file.h"
+
+namespace tilegrad::io {
+
+// Both leave validation to mesh_file.cc.
+Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
+Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name);
+
+// OBJ only: every index of every face against the counts of v, vt and vn. Assimp drops or misreads
+// what is out of range.
+Status CheckObjIndices(std::string_view text, const std::string& name);
+
+// Finds an image that a mesh file mentions: as written beside the mesh, then by its base name
+// there, which helps absolute paths of another computer. Adds it to out.mesh.textures and returns
+// its index, or adds a warning and returns -1.
+int AddTexture(const FileSource& source, const std::string& mesh_name,
+               const std::string& image_name, LoadedMesh& out);
+
+// The same for an image that is already in memory.
+int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
+
+// Adds a part whose only material is `material`, which refers to textures that are already in
+// out.mesh.
+void AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out);
+
+}  // namespace tilegrad::io

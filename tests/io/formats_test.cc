@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images, npy and npz, zip archives, Java properties: round trips and broken files.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "io/archive.h"
+#include "io/image_file.h"
+#include "io/npz.h"
+#include "io/sh3f.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+class FormatsTest : public TempFolderTest {};
+
+ImageU8 Gradient(int width, int height, int channels) {
+  ImageU8 image(width, height, channels);
+  std::iota(image.pixels.begin(), image.pixels.end(), std::uint8_t{0});
+  return image;
+}
+
+TEST_F(FormatsTest, PngRoundTripForEveryChannelCount) {
+  for (int channels = 1; channels <= 4; ++channels) {
+    const ImageU8 image = Gradient(7, 5, channels);
+    ASSERT_TRUE(SavePng(folder_ / "a.png", image).ok());
+    const auto back = LoadImage(folder_ / "a.png");
+    ASSERT_TRUE(back.ok()) << back.status().message();
+    EXPECT_EQ(back->channels, channels);
+    EXPECT_EQ(back->pixels, image.pixels);
+  }
+  EXPECT_FALSE(EncodePng(ImageU8{}).ok());
+}
+
+TEST_F(FormatsTest, PngWithALyingHeader) {
+  Bytes png = EncodePng(Gradient(8, 8, 3)).value();
+  png[16] = 0x7f;  // width: over two thousand million pixels
+  ExpectMessage(LoadImage(Write("lie.png", png)).status(), "lie.png");
+  Bytes larger = EncodePng(Gradient(8, 8, 3)).value();
+  larger[19] = 200;  // width 200: the data is too short (stb does not compare the checksum)
+  ExpectMessage(LoadImage(Write("larger.png", larger)).status(), "larger.png");
+}
+
+TEST_F(FormatsTest, TruncatedImagesAreErrors) {
+  const Bytes png = EncodePng(Gradient(64, 64, 4)).value();
+  for (std::size_t length = 0; length + 20 < png.size(); length += 13) {
+    ExpectMessage(
+        LoadImage(
+            Write("cut.png", Bytes(png.begin(), png.begin() + static_cast<std::ptrdiff_t>(length))))
+            .status(),
+        "cut.png");
+  }
+  ExpectMessage(LoadImage(Write("text.png", "not an image")).status(), "text.png",
+                "not an image that can be read");
+}
+
+TEST_F(FormatsTest, NpzRoundTrip) {
+  const std::vector<float> f = {1.5f, -2, 3};
+  const std::vector<std::uint8_t> u(24, 7);
+  const std::vector<std::int64_t> empty;
+  ASSERT_TRUE(SaveNpz(folder_ / "a.npz", {{"f", MakeNpy<float>({3}, f)},
+                                          {"u", MakeNpy<std::uint8_t>({2, 3, 4}, u)},
+                                          {"e", MakeNpy<std::int64_t>({0, 5}, empty)}})
+                  .ok());
+  const auto back = LoadNpz(folder_ / "a.npz");
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ(back->at("f").As<float>().value(), f);
+  EXPECT_EQ(back->at("u").shape, (std::vector<std::size_t>{2, 3, 4}));
+  EXPECT_EQ(back->at("e").count(), 0u);
+  ExpectMessage(back->at("f").As<double>().status(), "float64", "float32");
+  ExpectMessage(LoadNpzArray(folder_ / "a.npz", "x").status(), "a.npz", "\"x\"", "f.npy");
+  const Bytes first = ReadFile(folder_ / "a.npz").value();
+  ASSERT_TRUE(SaveNpz(folder_ / "b.npz", *back).ok());
+  EXPECT_EQ(ReadFile(folder_ / "b.npz").value(), first);
+}
+
+Bytes NpyWithHeader(const std::string& dictionary, std::size_t data) {
+  std::string header = dictionary;
+  header.resize(118 - 1, ' ');
+  std::string text = "\x93NUMPY";
+  text += {1, 0, 118, 0};
+  text += header + "\n" + std::string(data, '\1');
+  return {text.begin(), text.end()};
+}
+
+TEST_F(FormatsTest, NpyAsNumpyWritesIt) {
+  const auto array = DecodeNpy(
+      NpyWithHeader("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", 24), "a.npy");
+  ASSERT_TRUE(array.ok()) << array.status().message();
+  EXPECT_EQ(array->shape, (std::vector<std::size_t>{2, 3}));
+  const auto scalar = DecodeNpy(
+      NpyWithHeader("{'descr': '|u1', 'fortran_order': False, 'shape': (), }", 1), "s.npy");
+  ASSERT_TRUE(scalar.ok());
+  EXPECT_EQ(scalar->count(), 1u);
+  EXPECT_EQ(DecodeNpy(NpyWithHeader("{'descr': '|b1', 'fortran_order': False, 'shape': (4,), }", 4),
+                      "b.npy")
+                ->As<std::uint8_t>()
+                .value()
+                .size(),
+            4u);
+}
+
+TEST_F(FormatsTest, FortranOrderIsConverted) {
+  Bytes bytes = NpyWithHeader("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3), }", 6);
+  const std::size_t begin = bytes.size() - 6;
+  for (std::uint8_t i = 0; i < 6; ++i) bytes[begin + i] = i;  // columns (0,1), (2,3), (4,5)
+  EXPECT_EQ(DecodeNpy(bytes, "f").value().data, (Bytes{0, 2, 4, 1, 3, 5}));
+}
+
+TEST_F(FormatsTest, BrokenNpyHeadersAreErrors) {
+  const auto error = [](const std::string& dictionary, std::size_t data) {
+    return DecodeNpy(NpyWithHeader(dictionary, data), "bad.npy").status();
+  };
+  ExpectMessage(
+      error("{'descr': '<f4', 'fortran_order': False, 'shape': (1000000000, 1000000000), }", 8),
+      "bad.npy", "promises");
+  ExpectMessage(
+      error("{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999,), }", 8),
+      "bad.npy");
+  ExpectMessage(error("{'descr': '<f4', 'fortran_order': False, 'shape': (4000000000, 4000000000, "
+                      "4000000000), }",
+                      8),
+                "2^64");
+  ExpectMessage(error("{'descr': '>f4', 'fortran_order': False, 'shape': (2,), }", 8),
+                "big-endian");
+  ExpectMessage(error("{'descr': '|O', 'fortran_order': False, 'shape': (2,), }", 16), "|O");
+  ExpectMessage(error("nonsense", 8), "header");
+  ExpectMessage(DecodeNpy(Bytes(5, 0), "short.npy").status(), "short.npy");
+}
+
+TEST_F(FormatsTest, TruncatedZipsAreErrors) {
+  ASSERT_TRUE(WriteZip(folder_ / "a.zip", {{"x", Bytes(1000, 5)}, {"y", Bytes(10, 1)}}).ok());
+  const Bytes whole = ReadFile(folder_ / "a.zip").value();
+  for (std::size_t length = 0; length < whole.size(); length += 7) {
+    const auto zip = OpenZip(Write(
+        "cut.zip", Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length))));
+    ExpectMessage(zip.status(), "cut.zip");
+  }
+}
+
+TEST_F(FormatsTest, CorruptZipEntryIsAnError) {
+  Bytes noise(4096);
+  for (std::size_t i = 0; i < noise.size(); ++i)
+    noise[i] = static_cast<std::uint8_t>(i * i * 31 >> 3);
+  ASSERT_TRUE(WriteZip(folder_ / "a.zip", {{"x", noise}}).ok());
+  Bytes bytes = ReadFile(folder_ / "a.zip").value();
+  bytes[200] ^= 0xff;
+  const auto zip = OpenZip(Write("bad.zip", bytes));
+  ASSERT_TRUE(zip.ok()) << zip.status().message();
+  ExpectMessage((*zip)->Read("x").status(), "bad.zip");
+}
+
+TEST_F(FormatsTest, NamesNeverLeaveTheSource) {
+  EXPECT_FALSE(NormalizeName("../secret").has_value());
+  EXPECT_FALSE(NormalizeName("/etc/passwd").has_value());
+  EXPECT_FALSE(NormalizeName("a/../../b").has_value());
+  EXPECT_EQ(NormalizeName("a\\b\\..\\c").value(), "a/c");
+  EXPECT_EQ(OpenFolder(folder_)->Read("../x").status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(FormatsTest, PropertiesOfJava) {
+  const std::string text =
+      "# comment\n! too\nkey#1 = value one\nlong=first \\\n   "
+      "second\nuni=\\u00e9\\n\xe9\nempty=\ncolon:x=y\n";
+  const auto p = ParseProperties(Bytes(text.begin(), text.end()));
+  ASSERT_EQ(p.size(), 5u);
+  EXPECT_EQ(p[0], (std::pair<std::string, std::string>("key#1", "value one")));
+  EXPECT_EQ(p[1].second, "first second");
+  EXPECT_EQ(p[2].second, "\xc3\xa9\n\xc3\xa9");
+  EXPECT_EQ(p[3].second, "");
+  EXPECT_EQ(p[4], (std::pair<std::string, std::string>("colon", "x=y")));
+}
+
+TEST_F(FormatsTest, FurnitureCatalog) {
+  const std::string text =
+      "license=CC0\nid#1=a\nname#1=Chair\nmodel#1=/a/a.obj\nwidth#1=50\ndepth#1=40\nheight#1=90\n"
+      "modelRotation#1=0 0 1 -1 0 0 0 -1 0\nid#2=b\nname#2=No model\n";
+  ASSERT_TRUE(WriteZip(folder_ / "a.sh3f",
+                       {{"PluginFurnitureCatalog.properties", Bytes(text.begin(), text.end())}})
+                  .ok());
+  const auto catalog = ReadFurnitureCatalog(**OpenZip(folder_ / "a.sh3f"));
+  ASSERT_TRUE(catalog.ok()) << catalog.status().message();
+  ASSERT_EQ(catalog->entries.size(), 1u);
+  EXPECT_EQ(catalog->entries[0].model, "a/a.obj");
+  EXPECT_EQ(catalog->entries[0].size_cm, glm::vec3(50, 90, 40));
+  Mesh mesh;
+  mesh.positions = {{1, 2, 3}};
+  ApplyRotation(mesh, *catalog->entries[0].rotation);
+  EXPECT_EQ(mesh.positions[0], glm::vec3(3, -1, -2));
+}
+
+}  // namespace
+}  // namespace tilegrad::io

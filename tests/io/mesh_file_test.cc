@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <glm/geometric.hpp>
+
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "io/sh3f.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+class MeshFileTest : public TempFolderTest {
+ protected:
+  Status LoadStatus(const Path& path) { return LoadMesh(path).status(); }
+};
+
+const std::string kTriangleObj =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+
+// A cube with every kind of data the writer knows.
+Mesh RichMesh() {
+  Mesh mesh = Box({0, 0, 0}, {1, 2, 3});
+  SetColor(mesh, {0.25f, 0.5f, 0.75f, 1});
+  for (std::size_t c = 0; c < 3 * mesh.faces.size(); ++c)
+    mesh.corner_uvs.emplace_back(0.25f * float(c % 3), 0.1f * float(c % 7));
+  mesh.materials = {{.name = "red", .base_color = {1, 0, 0, 1}},
+                    {.name = "image", .base_color = glm::vec4(1), .base_color_texture = 0}};
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) mesh.face_materials.push_back(f % 2);
+  ImageU8 image(4, 2, 3);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = static_cast<std::uint8_t>(10 * i);
+  mesh.textures = {{"checker", image}};
+  return mesh;
+}
+
+// Position, uv and colour of every corner, in face order grouped by material: what a viewer would
+// draw.
+std::vector<std::vector<float>> Corners(const Mesh& mesh) {
+  std::vector<std::vector<float>> out;
+  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      if (mesh.face_materials[f] != static_cast<int>(m)) continue;
+      for (int k = 0; k < 3; ++k) {
+        const std::int32_t v = mesh.faces[f][static_cast<std::size_t>(k)];
+        const glm::vec3 p = mesh.positions[v];
+        const glm::vec2 uv = mesh.corner_uvs[3 * f + static_cast<std::size_t>(k)];
+        const glm::vec4 c = mesh.colors[v];
+        out.push_back({p.x, p.y, p.z, uv.x, uv.y, c.r, c.g, c.b, c.a});
+      }
+    }
+  }
+  return out;
+}
+
+TEST_F(MeshFileTest, GlbRoundTripKeepsWhatIsDrawn) {
+  const Mesh mesh = RichMesh();
+  ASSERT_TRUE(SaveGlb(folder_ / "a.glb", mesh).ok());
+  const auto loaded = LoadMesh(folder_ / "a.glb");
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_TRUE(loaded->warnings.empty());
+  const auto want = Corners(mesh), got = Corners(loaded->mesh);
+  ASSERT_EQ(got.size(), want.size());
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    for (std::size_t c = 0; c < want[i].size(); ++c)
+      EXPECT_NEAR(got[i][c], want[i][c], 1e-6);  // 1 - (1 - v) rounds
+  }
+  EXPECT_EQ(loaded->mesh.materials[0].base_color, glm::vec4(1, 0, 0, 1));
+  ASSERT_EQ(loaded->mesh.textures.size(), 1u);
+  EXPECT_EQ(loaded->mesh.textures[0].image.pixels, mesh.textures[0].image.pixels);
+}
+
+TEST_F(MeshFileTest, EncodingIsDeterministic) {
+  EXPECT_EQ(EncodeGlb(RichMesh()).value(), EncodeGlb(RichMesh()).value());
+  EXPECT_FALSE(EncodeGlb(Mesh{}).ok());
+}
+
+TEST_F(MeshFileTest, ObjWithSeveralMaterialsAndAwkwardNames) {
+  ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 200)).ok());
+  Write("a.mtl",
+        "newmtl wood\nKd 0 0 0\nmap_Kd my wood.png\nnewmtl glass\nKd 0.1 0.2 0.3\nd 0.4\n"
+        "newmtl far\nKd 0.5 0.5 0.5\nmap_Kd C:\\models\\my wood.png\nnewmtl gone\nKd 0.9 0.1 "
+        "0.1\nmap_Kd nowhere.jpg\n");
+  Write("a.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl "
+        "wood\nf 1/1 2/2 3/3 4/4\n"
+        "usemtl glass\nf 1 2 3\nusemtl far\nf -4/1 -3/2 -2/3\nusemtl gone\nf 1 3 4\n");
+  const auto loaded = LoadMesh(folder_ / "a.obj");
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const Mesh& mesh = loaded->mesh;
+  EXPECT_EQ(mesh.faces.size(), 5u);  // the quad is two
+  const auto material = [&](const std::string& name) {
+    for (const Material& m : mesh.materials) {
+      if (m.name == name) return m;
+    }
+    ADD_FAILURE() << "no material " << name;
+    return Material{};
+  };
+  EXPECT_GE(material("wood").base_color_texture, 0);
+  EXPECT_EQ(material("wood").base_color, glm::vec4(1));
+  EXPECT_NEAR(material("glass").base_color.a, 0.4f, 1e-6);
+  EXPECT_GE(material("far").base_color_texture, 0);
+  EXPECT_EQ(material("gone").base_color_texture, -1);
+  EXPECT_NEAR(material("gone").base_color.r, 0.9f, 1e-6);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("nowhere.jpg"), std::string::npos);
+}
+
+TEST_F(MeshFileTest, Ac3dAndPlyAndStl) {
+  Write("a.ac",
+        "AC3Db\nMATERIAL \"m\" rgb 1 0 0 amb 0.2 0.2 0.2 emis 0 0 0 spec 0.5 0.5 0.5 shi 10 trans "
+        "0\nOBJECT world\nkids 1\n"
+        "OBJECT poly\nname \"t\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x00\nmat "
+        "0\nrefs 3\n0 0 0\n1 1 0\n2 0 1\nkids 0\n");
+  const auto ac = LoadMesh(folder_ / "a.ac");
+  ASSERT_TRUE(ac.ok()) << ac.status().message();
+  EXPECT_EQ(ac->mesh.faces.size(), 1u);
+  EXPECT_EQ(ac->mesh.materials[ac->mesh.face_materials[0]].base_color.r, 1);
+  Write("a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty uchar red\n"
+        "property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int "
+        "vertex_indices\nend_header\n"
+        "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n");
+  const auto ply = LoadMesh(folder_ / "a.ply");
+  ASSERT_TRUE(ply.ok()) << ply.status().message();
+  EXPECT_NEAR(ply->mesh.colors.at(1).g, 1, 1e-6);
+  Write("a.stl",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+        "0\nendloop\nendfacet\nendsolid a\n");
+  EXPECT_TRUE(LoadMesh(folder_ / "a.stl").ok());
+}
+
+// --- broken files: an error that names the file, never a crash ---
+
+TEST_F(MeshFileTest, TruncatedGlbAtEveryLength) {
+  const Bytes whole = EncodeGlb(RichMesh()).value();
+  for (std::size_t length = 0; length < whole.size(); length += length < 64 ? 1 : 37) {
+    const Path path =
+        Write("cut.glb", Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)));
+    ExpectMessage(LoadStatus(path), "cut.glb");
+  }
+}
+
+TEST_F(MeshFileTest, GlbWithAFlippedByteNeverCrashes) {
+  const Bytes whole = EncodeGlb(RichMesh()).value();
+  for (std::size_t i = 0; i < whole.size(); i += 3) {
+    Bytes broken = whole;
+    broken[i] ^= static_cast<std::uint8_t>(1 + i % 255);
+    const auto loaded = LoadMesh(Write("flip.glb", broken));
+    EXPECT_TRUE(!loaded.ok() || Validate(loaded->mesh).ok());
+  }
+}
+
+std::string GltfWith(const std::string& accessors, const std::string& primitive) {
+  // 36 bytes of zeros as data.
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[)" +
+         primitive +
+         R"(]}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)" +
+         std::string(48, 'A') +
+         R"("}],"bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[)" + accessors + "]}";
+}
+
+TEST_F(MeshFileTest, GltfAccessorBeyondItsBuffer) {
+  const auto path = Write(
+      "far.gltf", GltfWith(R"({"bufferView":0,"componentType":5126,"count":1000000,"type":"VEC3"})",
+                           R"({"attributes":{"POSITION":0}})"));
+  ExpectMessage(LoadStatus(path), "far.gltf", "mesh 0 primitive 0", "beyond its buffer");
+}
+
+TEST_F(MeshFileTest, GltfIndexOutOfRange) {
+  const auto path = Write(
+      "index.gltf",
+      GltfWith(R"({"bufferView":0,"componentType":5126,"count":1,"type":"VEC3"},)"
+               R"({"bufferView":0,"byteOffset":0,"componentType":5125,"count":3,"type":"SCALAR"},)"
+               R"({"bufferView":0,"componentType":5126,"count":0,"type":"VEC3"})",
+               R"({"attributes":{"POSITION":2},"indices":1})"));
+  ExpectMessage(LoadStatus(path), "index.gltf", "index 0 is 0, but there are 0 vertices");
+}
+
+TEST_F(MeshFileTest, GltfWithoutPositionsAndWithCycles) {
+  ExpectMessage(LoadStatus(Write("none.gltf", GltfWith("", R"({"attributes":{}})"))), "none.gltf",
+                "POSITION");
+  ExpectMessage(
+      LoadStatus(Write(
+          "cycle.gltf",
+          R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})")),
+      "cycle.gltf", "nested");
+  ExpectMessage(LoadStatus(Write("json.gltf", "{\"asset\":")), "json.gltf");
+  ExpectMessage(LoadStatus(Write("list.gltf", "[1,2,3]")), "list.gltf");
+}
+
+TEST_F(MeshFileTest, ObjIndexOutOfRangeNamesTheLine) {
+  ExpectMessage(LoadStatus(Write("r.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")), "r.obj",
+                "line 4", "vertex 9");
+  ExpectMessage(LoadStatus(Write("n.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -9\n")), "n.obj",
+                "line 4", "-9");
+  ExpectMessage(LoadStatus(Write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/5 2/5 3/5\n")), "line 4",
+                "texture coordinate 5");
+  ExpectMessage(LoadStatus(Write("z.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n")), "line 4",
+                "vertex 0");
+  ExpectMessage(LoadStatus(Write("g.obj", "v 0 0 0\nf a b c\n")), "line 2", "\"a\"");
+}
+
+TEST_F(MeshFileTest, NonFiniteEmptyAndUnknown) {
+  ExpectMessage(LoadStatus(Write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), "nan.obj");
+  ExpectMessage(LoadStatus(Write("big.obj", "v 1e39 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), "big.obj");
+  ExpectMessage(LoadStatus(Write("empty.obj", "")), "empty.obj");
+  ExpectMessage(LoadStatus(Write("points.obj", "v 0 0 0\nv 1 0 0\n")), "points.obj");
+  ExpectMessage(LoadStatus(Write("garbage.ply", std::string(200, '\xff'))), "garbage.ply");
+  ExpectMessage(LoadStatus(Write("a.txt", "hello")), "a.txt", "ending");
+  ExpectMessage(LoadStatus(folder_ / "missing.obj"), "missing.obj");
+}
+
+TEST_F(MeshFileTest, ReadsFromAZipIgnoringCase) {
+  const auto bytes = [](const std::string& text) { return Bytes(text.begin(), text.end()); };
+  ASSERT_TRUE(WriteZip(folder_ / "a.zip",
+                       {{"Chair/Chair.OBJ", bytes("mtllib CHAIR.mtl\nusemtl m\n" + kTriangleObj)},
+                        {"Chair/chair.mtl", bytes("newmtl m\nKd 0 1 0\n")}})
+                  .ok());
+  const auto zip = OpenZip(folder_ / "a.zip");
+  ASSERT_TRUE(zip.ok());
+  const auto loaded = LoadMesh(**zip, "chair/chair.obj");
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.materials[loaded->mesh.face_materials[0]].base_color.g, 1);
+}
+
+TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
+  const Path folder = "/usr/share/sweethome3d/furniture";
+  if (!std::filesystem::exists(folder))
+    GTEST_SKIP() << "Debian's sweethome3d-furniture is not installed";
+  int models = 0, textured = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".sh3f") continue;
+    const auto zip = OpenZip(entry.path());
+    ASSERT_TRUE(zip.ok()) << zip.status().message();
+    const auto catalog = ReadFurnitureCatalog(**zip);
+    ASSERT_TRUE(catalog.ok()) << catalog.status().message();
+    for (const FurnitureEntry& item : catalog->entries) {
+      const auto loaded = LoadMesh(**zip, item.model);
+      EXPECT_TRUE(loaded.ok()) << loaded.status().message();
+      ++models;
+      textured += loaded.ok() && !loaded->mesh.textures.empty();
+    }
+  }
+  EXPECT_EQ(models, 820);
+  EXPECT_GT(textured, 350);
+}
+
+}  // namespace
+}  // namespace tilegrad::io
