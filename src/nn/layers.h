@@ -69,7 +69,7 @@ class LinearLayer : public Module {
 struct ConvShape {
   std::int64_t in = 0, out = 0;
   int kernel = 3;
-  ConvOptions options;
+  ConvOptions options = {};
   bool bias = true;
 };
 

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layers, initialisers, Adam, and a whole training step: same bits for any number of workers, no
+// memory from the heap after the first steps.
+#include "nn/layers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "nn/nn.h"
+
+namespace tilegrad::nn {
+namespace {
+
+std::vector<double> Values(const Tensor& t) {
+  const auto span = t.span<double>();
+  return {span.begin(), span.end()};
+}
+
+TEST(Layers, NamesAndCounts) {
+  const Workers workers(1);
+  Context context(workers);
+  Rng rng(1);
+  Sequential net;
+  auto& encoder = net.Add<Sequential>("encoder");
+  encoder.Add<Conv2dLayer>("conv1", context, ConvShape{.in = 4, .out = 6, .kernel = 5}, rng);
+  encoder.Add<BatchNorm>("bn1", context, 6);
+  net.Add<Flatten>("flatten");
+  net.Add<LinearLayer>("fc", context, LinearShape{.in = 6, .out = 2, .bias = false}, rng);
+  std::vector<std::string> names;
+  for (const NamedTensor& t : State(net)) names.push_back(t.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"encoder.conv1.weight", "encoder.conv1.bias",
+                                             "encoder.bn1.weight", "encoder.bn1.bias",
+                                             "encoder.bn1.running_mean", "encoder.bn1.running_var",
+                                             "fc.weight"}));
+  EXPECT_EQ(Parameters(net).size(), 5u);
+  EXPECT_EQ(CountParameters(net), 4 * 6 * 25 + 6 + 12 + 12);
+}
+
+TEST(Layers, DefaultInitialisation) {
+  const Workers workers(1);
+  Context context(workers);
+  Rng rng(3);
+  const Conv2dLayer conv(context, {.in = 4, .out = 64, .kernel = 5}, rng);
+  double largest = 0, squares = 0;
+  for (float w : conv.weight.value().span<float>()) {
+    largest = std::max(largest, static_cast<double>(std::abs(w)));
+    squares += static_cast<double>(w) * static_cast<double>(w);
+  }
+  // Uniform in +-1/sqrt(100): variance 0.01 / 3. 6400 draws: the mean of squares has a standard
+  // deviation of 0.01 / 3 sqrt(0.8 / 6400) = 1.1 %; six of them are allowed.
+  EXPECT_LE(largest, 0.1);
+  EXPECT_GT(largest, 0.099);
+  EXPECT_NEAR(squares / 6400, 0.01 / 3, 0.067 * 0.01 / 3);
+}
+
+TEST(Layers, RunningStatistics) {
+  const Workers workers(1);
+  Context context(workers, DType::kF64);
+  BatchNorm norm(context, 1);
+  const Var x = Constant(context, context.From({4, 1}, std::vector<double>{1, 2, 3, 6}));
+  norm.Forward(x, Mode::kTrain);
+  EXPECT_DOUBLE_EQ(Values(norm.running_mean)[0], 0.1 * 3);
+  EXPECT_DOUBLE_EQ(Values(norm.running_variance)[0], 0.9 + 0.1 * 14.0 / 3);  // unbiased
+  const Var y = norm.Forward(x, Mode::kEval);
+  EXPECT_NEAR(Values(y.value())[3], (6 - 0.3) / std::sqrt(0.9 + 1.4 / 3 + 1e-5), 1e-12);
+  EXPECT_DOUBLE_EQ(Values(norm.running_mean)[0], 0.1 * 3);  // eval tracks nothing
+}
+
+TEST(Adam, HandComputedSteps) {
+  const Workers workers(1);
+  Context context(workers, DType::kF64);
+  Var p = Parameter(context, context.Full({1}, 1.0));
+  Adam adam(context, {{"p", p}}, {.learning_rate = 0.1});
+  const auto gradient = [&](double g) {
+    return std::vector<Var>{Constant(context, context.Full({1}, g))};
+  };
+  // Step 1: m / (1 - beta1) = g, v / (1 - beta2) = g^2: p moves by the learning rate.
+  ASSERT_TRUE(adam.Step(gradient(4.0)).ok());
+  EXPECT_NEAR(Values(p.value())[0], 1.0 - 0.1 * 4.0 / (4.0 + 1e-8), 1e-15);
+  // Step 2 with g = -2 (as -1, scaled by 2): m = 0.9 0.4 - 0.1 2 = 0.16, v = 0.999 0.016 + 0.001 4.
+  ASSERT_TRUE(adam.Step(gradient(-1.0), 2.0).ok());
+  const double m = 0.16 / 0.19, v = (0.999 * 0.016 + 0.004) / (1 - 0.999 * 0.999);
+  EXPECT_NEAR(Values(p.value())[0], 0.9 - 0.1 * m / (std::sqrt(v) + 1e-8), 1e-9);
+  EXPECT_EQ(adam.steps(), 2);
+}
+
+TEST(Adam, RefusesWhatDoesNotFit) {
+  const Workers workers(1);
+  Context context(workers);
+  Var p = Parameter(context, context.Full({2}, 1.0));
+  Adam adam(context, {{"net.p", p}}, {});
+  const std::vector<Var> wrong = {Constant(context, context.Full({3}, 1.0))};
+  const Status status = adam.Step(wrong);
+  EXPECT_NE(status.message().find("net.p"), std::string::npos);
+  EXPECT_FALSE(adam.Step({}).ok());
+  EXPECT_EQ(p.value().data<float>()[0], 1.0f);
+  EXPECT_EQ(adam.steps(), 0);
+}
+
+TEST(Adam, ClippingByNorm) {
+  const Workers workers(2);
+  Context context(workers);
+  const std::vector<Var> g = {Constant(context, context.Full({4}, 1.5)),
+                              Constant(context, context.Full({1}, 4.0))};
+  EXPECT_DOUBLE_EQ(GlobalNorm(context, g), 5.0);
+  EXPECT_DOUBLE_EQ(ClipFactor(5.0, 1.0), 0.2);
+  EXPECT_DOUBLE_EQ(ClipFactor(0.5, 1.0), 1.0);
+}
+
+// A small encoder and head in the manner of the paper's section 5.1.
+struct Trainer {
+  explicit Trainer(const Workers& workers)
+      : context(workers), adam(context, Build(), {.learning_rate = 1e-3}) {}
+
+  std::vector<NamedVar> Build() {
+    Rng rng(11);
+    const ConvOptions half{.stride = 2, .padding = 2};
+    net.Add<Conv2dLayer>("conv1", context,
+                         ConvShape{.in = 4, .out = 9, .kernel = 5, .options = half}, rng);
+    net.Add<BatchNorm>("bn1", context, 9, BatchNormOptions{.relu = true});
+    net.Add<Conv2dLayer>("conv2", context,
+                         ConvShape{.in = 9, .out = 17, .kernel = 5, .options = half}, rng);
+    net.Add<BatchNorm>("bn2", context, 17, BatchNormOptions{.relu = true});
+    net.Add<Flatten>("flatten");
+    net.Add<LinearLayer>("fc1", context, LinearShape{.in = 17 * 16, .out = 50}, rng);
+    net.Add<BatchNorm>("bn3", context, 50, BatchNormOptions{.relu = true});
+    net.Add<LinearLayer>("fc2", context, LinearShape{.in = 50, .out = 30}, rng);
+    return Parameters(net);
+  }
+
+  double Step(std::uint64_t step) {
+    Rng rng(12, step);
+    Tensor image = context.Empty({6, 4, 16, 16});
+    FillUniform(image, rng, 0, 1);
+    Var y = Reshape(net.Forward(Constant(context, image), Mode::kTrain), {6, 10, 3});
+    const Var low = ReduceMin(y, {1}, Keep::kYes), high = ReduceMax(y, {1}, Keep::kYes);
+    y = y / (high - low + 0.1);
+    const Var loss = Mean(Square(y - 0.3)) + 0.1 * Mean(Abs(Tanh(y)));
+    const auto gradients = Grad(loss, adam.parameters());
+    EXPECT_TRUE(adam.Step(gradients, ClipFactor(GlobalNorm(context, gradients), 1.0)).ok());
+    return loss.item();
+  }
+
+  std::vector<float> Weights() {
+    std::vector<float> all;
+    for (const NamedTensor& t : State(net)) {
+      const auto span = t.value.span<float>();
+      all.insert(all.end(), span.begin(), span.end());
+    }
+    return all;
+  }
+
+  Context context;
+  Sequential net;
+  Adam adam;
+};
+
+TEST(Training, SameBitsForAnyNumberOfWorkers) {
+  std::vector<float> want;
+  for (int count : {1, 2, 7}) {
+    const Workers workers(count);
+    Trainer trainer(workers);
+    for (std::uint64_t step = 0; step < 4; ++step) trainer.Step(step);
+    const auto got = trainer.Weights();
+    if (want.empty()) want = got;
+    ASSERT_EQ(got.size(), want.size());
+    EXPECT_EQ(std::memcmp(got.data(), want.data(), got.size() * sizeof(float)), 0) << count;
+  }
+}
+
+TEST(Training, LossFallsAndMemoryIsReused) {
+  const Workers workers(2);
+  Trainer trainer(workers);
+  const double before = trainer.Step(0);
+  trainer.Step(1);
+  const MemoryStats warm = trainer.context.memory().stats();
+  double after = 0;
+  for (std::uint64_t step = 2; step < 40; ++step) after = trainer.Step(step);
+  const MemoryStats end = trainer.context.memory().stats();
+  EXPECT_LT(after, 0.8 * before);
+  EXPECT_EQ(end.misses, warm.misses);
+  EXPECT_EQ(end.peak_bytes, warm.peak_bytes);
+  EXPECT_GT(end.requests, warm.requests + 1000);
+}
+
+TEST(Training, SavedAndRestoredIsBitEqual) {
+  const Workers workers(2);
+  Trainer a(workers), b(workers);
+  for (std::uint64_t step = 0; step < 3; ++step) a.Step(step);
+  TensorFile file{State(a.net), {{"step", "3"}}};
+  const auto moments = a.adam.State();
+  file.tensors.insert(file.tensors.end(), moments.begin(), moments.end());
+  const Bytes bytes = EncodeSafetensors(file).value();
+  const TensorFile back = DecodeSafetensors(b.context, bytes).value();
+  ASSERT_TRUE(LoadState(b.net, back.tensors).ok());
+  ASSERT_TRUE(b.adam.LoadState(back.tensors).ok());
+  EXPECT_EQ(b.adam.steps(), 3);
+  for (std::uint64_t step = 3; step < 5; ++step) EXPECT_EQ(a.Step(step), b.Step(step));
+  EXPECT_EQ(a.Weights(), b.Weights());
+}
+
+TEST(Training, LoadingChecksBeforeItChanges) {
+  const Workers workers(1);
+  Trainer a(workers), b(workers);
+  a.Step(0);
+  const auto before = b.Weights();
+  auto state = State(a.net);
+  state.pop_back();
+  EXPECT_NE(LoadState(b.net, state).message().find("fc2.bias"), std::string::npos);
+  state = State(a.net);
+  state[0].value = state[1].value;
+  EXPECT_NE(LoadState(b.net, state).message().find("conv1.weight"), std::string::npos);
+  EXPECT_EQ(b.Weights(), before);
+}
+
+}  // namespace
+}  // namespace tilegrad::nn

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// safetensors against bytes written by hand, and against files that lie.
+#include "nn/serialize.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+namespace tilegrad::nn {
+namespace {
+
+class Safetensors : public ::testing::Test {
+ protected:
+  Status Decode(const Bytes& bytes) { return DecodeSafetensors(context_, bytes).status(); }
+  // A file of this header and `data_bytes` zeros.
+  static Bytes File(const std::string& header, std::size_t data_bytes) {
+    Bytes bytes(8 + header.size() + data_bytes);
+    const std::uint64_t length = header.size();
+    std::memcpy(bytes.data(), &length, 8);
+    std::memcpy(bytes.data() + 8, header.data(), header.size());
+    return bytes;
+  }
+
+  Workers workers_{1};
+  Context context_{workers_};
+};
+
+// {"b":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}} padded to 56 bytes, then 1.0f and -2.5f:
+// written out by hand from the format's description.
+const std::uint8_t kByHand[] = {
+    0x38, 0,    0,    0,    0,    0,    0,    0,                             // header: 56 bytes
+    0x7b, 0x22, 0x62, 0x22, 0x3a, 0x7b, 0x22, 0x64, 0x74, 0x79, 0x70, 0x65,  // {"b":{"dtype
+    0x22, 0x3a, 0x22, 0x46, 0x33, 0x32, 0x22, 0x2c, 0x22, 0x73, 0x68, 0x61,  // ":"F32","sha
+    0x70, 0x65, 0x22, 0x3a, 0x5b, 0x32, 0x5d, 0x2c, 0x22, 0x64, 0x61, 0x74,  // pe":[2],"dat
+    0x61, 0x5f, 0x6f, 0x66, 0x66, 0x73, 0x65, 0x74, 0x73, 0x22, 0x3a, 0x5b,  // a_offsets":[
+    0x30, 0x2c, 0x38, 0x5d, 0x7d, 0x7d, 0x20, 0x20,  // 0,8]}} and two spaces
+    0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x20, 0xc0};
+
+TEST_F(Safetensors, ReadsAFileWrittenByHand) {
+  const auto file = DecodeSafetensors(context_, kByHand);
+  ASSERT_TRUE(file.ok()) << file.status().message();
+  ASSERT_EQ(file->tensors.size(), 1u);
+  EXPECT_EQ(file->tensors[0].name, "b");
+  EXPECT_EQ(file->tensors[0].value.shape(), (Shape{2}));
+  EXPECT_EQ(file->tensors[0].value.data<float>()[0], 1.0f);
+  EXPECT_EQ(file->tensors[0].value.data<float>()[1], -2.5f);
+}
+
+TEST_F(Safetensors, WritesThoseBytes) {
+  const std::vector<float> values = {1.0f, -2.5f};
+  const auto bytes = EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}});
+  EXPECT_EQ(bytes.value(), Bytes(std::begin(kByHand), std::end(kByHand)));
+}
+
+TEST_F(Safetensors, RoundTripOfAllTypes) {
+  TensorFile file;
+  file.metadata = {{"step", "12"}, {"note", "a \"quoted\" one"}};
+  for (DType dtype : {DType::kF32, DType::kF64, DType::kU8, DType::kI32, DType::kI64}) {
+    for (const Shape& shape : {Shape{}, Shape{3}, Shape{2, 0, 3}, Shape{1, 2, 3, 2, 1}}) {
+      Tensor t = context_.Empty(shape, dtype);
+      for (std::size_t i = 0; i < t.bytes(); ++i) t.raw()[i] = static_cast<std::byte>(i * 37);
+      file.tensors.push_back({NameOf(dtype) + shape.ToString(), t});
+    }
+  }
+  const auto back = DecodeSafetensors(context_, EncodeSafetensors(file).value());
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ(back->metadata, file.metadata);
+  ASSERT_EQ(back->tensors.size(), file.tensors.size());
+  for (std::size_t i = 0; i < file.tensors.size(); ++i) {
+    const Tensor& want = file.tensors[i].value;
+    const Tensor& got = back->tensors[i].value;
+    EXPECT_EQ(back->tensors[i].name, file.tensors[i].name);
+    EXPECT_EQ(got.dtype(), want.dtype());
+    ASSERT_EQ(got.shape(), want.shape());
+    EXPECT_EQ(std::memcmp(got.raw(), want.raw(), want.bytes()), 0);
+  }
+}
+
+TEST_F(Safetensors, EveryCutIsNoticed) {
+  const Bytes whole(std::begin(kByHand), std::end(kByHand));
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    EXPECT_EQ(Decode(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n))).code(),
+              StatusCode::kDataLoss)
+        << n;
+  }
+}
+
+TEST_F(Safetensors, HeadersThatLie) {
+  const struct {
+    const char* header;
+    const char* message;
+  } cases[] = {
+      {"[]", "not a JSON object"},
+      {"{\"a\":", "not a JSON object"},
+      {R"({"a":3})", "\"a\": dtype, shape or data_offsets is missing"},
+      {R"({"a":{"dtype":"F8","shape":[2],"data_offsets":[0,8]}})", "none of F32"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,800]}})", "beyond the file's end"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[8,0]}})", "beyond the file's end"},
+      {R"({"a":{"dtype":"F32","shape":[3],"data_offsets":[0,8]}})", "differ in size"},
+      {R"({"a":{"dtype":"F32","shape":[-2],"data_offsets":[0,8]}})", "not a count"},
+      {R"({"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,8]}})", "larger"},
+      {R"({"a":{"dtype":"F32","shape":[1,1,1,1,1,2],"data_offsets":[0,8]}})", "five axes"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8.5]}})", "two counts"},
+      {R"({"__metadata__":{"a":1}})", "not a string"},
+  };
+  for (const auto& c : cases) {
+    const Status status = Decode(File(c.header, 8));
+    EXPECT_EQ(status.code(), StatusCode::kDataLoss) << c.header;
+    EXPECT_NE(status.message().find(c.message), std::string::npos) << status.message();
+  }
+  Bytes huge = File("{}", 0);
+  huge[7] = 0xff;  // a header of 2^63 bytes
+  EXPECT_EQ(Decode(huge).code(), StatusCode::kDataLoss);
+}
+
+TEST_F(Safetensors, Files) {
+  const Path path = std::filesystem::temp_directory_path() / "tilegrad_safetensors_test" / "a.st";
+  const TensorFile file{{{"x", context_.Full({2, 2}, 7.0)}}, {{"k", "v"}}};
+  ASSERT_TRUE(WriteSafetensors(path, file).ok());
+  const auto back = ReadSafetensors(context_, path);
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->tensors[0].value.data<float>()[3], 7.0f);
+  ASSERT_TRUE(WriteTextAtomic(path, "not that").ok());
+  EXPECT_NE(ReadSafetensors(context_, path).status().message().find(path.string()),
+            std::string::npos);
+  std::filesystem::remove_all(path.parent_path());
+  EXPECT_EQ(ReadSafetensors(context_, path).status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(Safetensors, NamesMustBeUnique) {
+  const Tensor t = context_.Full({1}, 0);
+  EXPECT_FALSE(EncodeSafetensors({{{"a", t}, {"a", t}}, {}}).ok());
+  EXPECT_FALSE(EncodeSafetensors({{{"__metadata__", t}}, {}}).ok());
+}
+
+}  // namespace
+}  // namespace tilegrad::nn

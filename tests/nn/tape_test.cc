@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tape itself: what is released when, errors, external operations.
+#include "nn/tape.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "nn/nn.h"
+
+namespace tilegrad::nn {
+namespace {
+
+class Tape : public ::testing::Test {
+ protected:
+  Var Vector(std::vector<double> values) {
+    const auto n = static_cast<std::int64_t>(values.size());
+    return Parameter(context_, context_.From({n}, values));
+  }
+  std::string Message() { return context_.TakeStatus().message(); }
+
+  Workers workers_{1};
+  Context context_{workers_, DType::kF64};
+};
+
+TEST_F(Tape, UsesAddUp) {
+  const Var x = Vector({3});
+  const Var y = x * x + x;                    // 2 x + 1
+  EXPECT_EQ(Grad(y * x, {x})[0].item(), 33);  // d(x^3 + x^2) = 3 x^2 + 2 x
+}
+
+TEST_F(Tape, AnyOrder) {
+  const Var x = Vector({0.5});
+  Var y = Exp(2.0 * x);
+  for (int order = 1; order <= 5; ++order) {
+    y = Grad(y, {x}, {.create_graph = true})[0];
+    EXPECT_NEAR(y.item(), std::pow(2, order) * std::exp(1.0), 1e-12) << order;
+  }
+}
+
+TEST_F(Tape, WhatOutputDoesNotDependOnHasGradientZero) {
+  const Var x = Vector({1, 2}), other = Vector({1, 2, 3});
+  const auto d = Grad(Sum(x), {other, x});
+  EXPECT_EQ(d[0].shape(), (Shape{3}));
+  EXPECT_EQ(d[0].value().data<double>()[2], 0);
+  EXPECT_EQ(d[1].value().data<double>()[1], 1);
+}
+
+TEST_F(Tape, IntermediateGradients) {
+  const Var x = Vector({2});
+  const Var h = Square(x);
+  const auto d = Grad(Square(h), {h, x});
+  EXPECT_EQ(d[0].item(), 8);
+  EXPECT_EQ(d[1].item(), 32);
+}
+
+TEST_F(Tape, GivenAdjoint) {
+  const Var x = Vector({1, 2});
+  const Var d = Constant(context_, context_.From({2}, std::vector<double>{10, 100}));
+  const auto g = Grad(Square(x), {x}, {.d_output = d});
+  EXPECT_EQ(g[0].value().data<double>()[0], 20);
+  EXPECT_EQ(g[0].value().data<double>()[1], 400);
+}
+
+TEST_F(Tape, ErrorsAreNotedAndSpread) {
+  const Var a = Vector({1, 2}), b = Vector({1, 2, 3});
+  const Var y = Exp(Add(a, b));
+  EXPECT_FALSE(y.valid());
+  EXPECT_TRUE(std::isnan(Sum(y).item()));
+  EXPECT_FALSE(Grad(Sum(y), {a})[0].valid());
+  EXPECT_EQ(Message(), "add: shapes [2] and [3] do not broadcast");
+  EXPECT_TRUE(context_.status().ok());
+
+  EXPECT_FALSE(Grad(a, {a})[0].valid());
+  EXPECT_NE(Message().find("give d_output"), std::string::npos);
+  EXPECT_FALSE(Matmul(a, b).valid());
+  EXPECT_NE(Message().find("matmul: [2] by [3]"), std::string::npos);
+  EXPECT_FALSE(Reshape(a, {3}).valid());
+  EXPECT_NE(Message().find("reshape"), std::string::npos);
+  EXPECT_FALSE(Gather(b, 0, context_.Indices(std::vector<std::int32_t>{0, 3})).valid());
+  EXPECT_NE(Message().find("index 3 of 3"), std::string::npos);
+  EXPECT_FALSE(Sum(a, {1}).valid());
+  EXPECT_NE(Message().find("axis 1"), std::string::npos);
+  EXPECT_FALSE(Conv2d(a, b, Var(), {}).valid());
+  EXPECT_NE(Message().find("conv2d"), std::string::npos);
+}
+
+TEST_F(Tape, ReleasedGraphIsAnError) {
+  const Var x = Vector({2});
+  const Var y = Square(x);
+  EXPECT_EQ(Grad(y, {x}, {.keep_graph = true})[0].item(), 4);
+  EXPECT_EQ(Grad(y, {x})[0].item(), 4);
+  EXPECT_FALSE(Grad(y, {x})[0].valid());
+  EXPECT_NE(Message().find("was released"), std::string::npos);
+}
+
+TEST_F(Tape, NoGradRecordsNothing) {
+  const Var x = Vector({2});
+  {
+    const NoGrad off(context_);
+    EXPECT_FALSE(Square(x).requires_grad());
+  }
+  EXPECT_TRUE(Square(x).requires_grad());
+  EXPECT_FALSE(Square(Detach(x)).requires_grad());
+}
+
+// A chain of n operations holds n values while it is recorded; on the way back each is let go as
+// soon as its rule has run, so the peak is the chain and a few adjoints, not twice the chain.
+TEST_F(Tape, ValuesAreReleasedOnTheWayBack) {
+  const std::int64_t n = 1 << 16;
+  const std::size_t bytes = static_cast<std::size_t>(n) * sizeof(double);
+  const Var x = Parameter(context_, context_.Full({n}, 0.1));
+  Var y = x;
+  for (int i = 0; i < 20; ++i) y = Exp(Scale(y, 0.5));
+  const Var loss = Sum(y);
+  y = Var();
+  // Exp keeps its output for its rule; Scale keeps nothing.
+  EXPECT_LE(context_.memory().stats().live_bytes, 22 * bytes);
+  context_.memory().ResetPeak();
+  Grad(loss, {x});
+  EXPECT_LE(context_.memory().stats().peak_bytes, 25 * bytes);
+  EXPECT_LE(context_.memory().stats().live_bytes, 2 * bytes);
+}
+
+// (u, v) -> (u v, u + v), whose adjoint is written by hand.
+std::vector<Var> ProductAndSum(Context& context, const Var& u, const Var& v) {
+  const auto value = [](const Var& x) { return x.item(); };
+  const auto scalar = [&context](double x) { return context.Full({}, x); };
+  ExternalOp op;
+  op.name = "product and sum";
+  op.inputs = {u, v};
+  op.outputs = {scalar(value(u) * value(v)), scalar(value(u) + value(v))};
+  op.backward = [=](std::span<const Tensor> d) {
+    const auto at = [](const Tensor& t) { return t.empty() ? 0.0 : *t.data<double>(); };
+    return std::vector<Tensor>{scalar(at(d[0]) * value(v) + at(d[1])),
+                               scalar(at(d[0]) * value(u) + at(d[1]))};
+  };
+  return External(context, std::move(op));
+}
+
+TEST_F(Tape, ExternalOperations) {
+  const Var u = Parameter(context_, context_.Full({}, 3)),
+            v = Parameter(context_, context_.Full({}, 5));
+  auto out = ProductAndSum(context_, u, v);
+  auto d = Grad(Square(out[0]) + out[1], {u, v});  // 2 u v v + 1, 2 u v u + 1
+  EXPECT_EQ(d[0].item(), 151);
+  EXPECT_EQ(d[1].item(), 91);
+  out = ProductAndSum(context_, u, v);
+  EXPECT_EQ(Grad(out[1], {u})[0].item(), 1);  // the other output has no adjoint
+}
+
+TEST_F(Tape, ExternalOperationsRefuseASecondDerivative) {
+  const Var u = Parameter(context_, context_.Full({}, 3)),
+            v = Parameter(context_, context_.Full({}, 5));
+  const auto out = ProductAndSum(context_, u, v);
+  const auto d = Grad(out[0], {u}, {.create_graph = true});
+  EXPECT_EQ(d[0].item(), 5);
+  EXPECT_FALSE(Grad(Square(d[0]), {v})[0].valid());
+  EXPECT_EQ(Message(), "product and sum has a first derivative only");
+}
+
+TEST(Memory, BlocksAreReused) {
+  const Workers workers(1);
+  const Context context(workers);
+  const void* first = nullptr;
+  {
+    const Tensor a = context.Empty({1000, 100});
+    first = a.raw();
+    const Tensor b = a;  // shared
+    EXPECT_FALSE(a.unique());
+  }
+  EXPECT_EQ(context.memory().stats().live_bytes, 0u);
+  const Tensor again = context.Empty({99999});  // of the same size class
+  EXPECT_EQ(again.raw(), first);
+  EXPECT_EQ(context.memory().stats().misses, 1u);
+  EXPECT_EQ(context.memory().stats().requests, 2u);
+}
+
+TEST(Memory, TensorsMayOutliveTheirContext) {
+  Tensor survivor;
+  {
+    const Workers workers(1);
+    const Context context(workers);
+    survivor = context.Full({3}, 2.0);
+  }
+  EXPECT_EQ(survivor.data<float>()[2], 2.0f);
+}
+
+}  // namespace
+}  // namespace tilegrad::nn
