@@ -84,7 +84,7 @@ void BM_Conv2dTwoWorkers(benchmark::State& state) {
 }
 
 void Shapes(benchmark::internal::Benchmark* b) {
-  b->ArgNames({"pass", "n", "c", "o", "h", "k", "s"})->Unit(benchmark::kMillisecond)->MinTime(1.0);
+  b->ArgNames({"pass", "n", "c", "o", "h", "k", "s"})->Unit(benchmark::kMillisecond)->MinTime(0.5);
   for (std::int64_t pass : {kForward, kInputGrad, kWeightGrad}) {
     b->Args({pass, 64, 4, 64, 64, 5, 2});
     b->Args({pass, 64, 64, 128, 32, 5, 2});

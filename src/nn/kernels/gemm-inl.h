@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matrix product, blocked after Goto and van de Geijn: Anatomy of high-performance matrix
 // multiplication, ACM TOMS 34(3), 2008. A is packed once for all; every work item packs the slice
-// of B that it needs and keeps a panel of it in L1 while panels of A stream past from L2.
+// of B that it needs and keeps a panel of it in L1 while panels of A stream past from L2. With few
+// rows of A (a training batch) waiting for B would cost as much as multiplying: the next block of B
+// is asked for between the tiles of the present one.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_INL_H_
@@ -26,6 +28,8 @@ constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel 
 constexpr std::size_t kItemRows = 256;     // kItemRows x kDepth of packed A take half of L2
 constexpr std::size_t kItemColumns = 128;  // of C in one work item
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
+
+constexpr std::size_t kLineFloats = 16;  // in a cache line
 
 struct GemmPlan {
   explicit GemmPlan(const GemmProblem<float>& problem)
@@ -64,12 +68,46 @@ struct ColumnBlock {
   std::size_t k, steps;
 };
 
+// Whole panels of a B that is not transposed, row by row: memory is read in long runs.
+inline void PackWholePanels(const GemmProblem<float>& p, const ColumnBlock& block,
+                            std::size_t panels, float* packed) {
+  for (std::size_t k = 0; k < block.steps; ++k) {
+    const float* row = p.b + (block.k + k) * p.ldb + block.begin;
+    float* out = packed + k * kTileColumns;
+    for (std::size_t panel = 0; panel < panels; ++panel) {
+      CopyStrip(row + panel * kTileColumns, 0, kTileColumns, 1,
+                out + panel * kTileColumns * block.steps, 0);
+    }
+  }
+}
+
 inline void PackColumns(const GemmProblem<float>& p, const ColumnBlock& block, float* packed) {
-  for (std::size_t j = block.begin; j < block.end; j += kTileColumns) {
+  std::size_t j = block.begin;
+  if (!p.transpose_b) {
+    const std::size_t whole = (block.end - block.begin) / kTileColumns;
+    PackWholePanels(p, block, whole, packed);
+    j += whole * kTileColumns;
+  }
+  for (; j < block.end; j += kTileColumns) {
     const std::size_t columns = std::min(kTileColumns, block.end - j);
     float* panel = packed + (j - block.begin) * block.steps;
     if (columns < kTileColumns) std::fill_n(panel, kTileColumns * block.steps, 0.0f);
     PackStrip({p.b, p.ldb, !p.transpose_b}, j, columns, block.k, block.steps, panel, kTileColumns);
+  }
+}
+
+// Asks for share `part` of `parts` of the memory that PackColumns(block) will read.
+inline void PrefetchColumns(const GemmProblem<float>& p, const ColumnBlock& block, std::size_t part,
+                            std::size_t parts) {
+  const std::size_t columns = block.end - block.begin;
+  const std::size_t count = p.transpose_b ? columns : block.steps;
+  const std::size_t length = p.transpose_b ? block.steps : columns;
+  const float* data =
+      p.transpose_b ? p.b + block.begin * p.ldb + block.k : p.b + block.k * p.ldb + block.begin;
+  for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+    for (std::size_t j = 0; j < length; j += kLineFloats) {
+      __builtin_prefetch(data + i * p.ldb + j, 0, 2);  // read, into L2
+    }
   }
 }
 
@@ -85,13 +123,19 @@ inline TileTarget TargetOf(const GemmProblem<float>& p, std::size_t row, std::si
   return t;
 }
 
-// The tiles of row panels [panel_begin, panel_end) and the columns of `block`.
+// The tiles of row panels [panel_begin, panel_end) and the columns of `block`. Meanwhile `next` is
+// fetched.
 inline void MultiplyBlock(const GemmPlan& plan, std::size_t panel_begin, std::size_t panel_end,
-                          const ColumnBlock& block, const float* packed_a, const float* packed_b) {
+                          const ColumnBlock& block, const ColumnBlock& next, const float* packed_a,
+                          const float* packed_b) {
+  const std::size_t panels = panel_end - panel_begin;
+  const std::size_t tiles = panels * DivideUp(block.end - block.begin, kTileColumns);
+  std::size_t tile = 0;
   for (std::size_t j = block.begin; j < block.end; j += kTileColumns) {
     const PackedColumns columns{packed_b + (j - block.begin) * block.steps};
-    for (std::size_t panel = panel_begin; panel < panel_end; ++panel) {
+    for (std::size_t panel = panel_begin; panel < panel_end; ++panel, ++tile) {
       const std::size_t row = plan.rows.begin(panel);
+      PrefetchColumns(plan.p, next, tile, tiles);
       PackedRowsTile(packed_a + row * block.steps, plan.rows.size(panel), columns, block.steps,
                      TargetOf(plan.p, row, j, block.k == 0));
     }
@@ -108,8 +152,10 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t k0,
       std::min(plan.p.n, begin + plan.column_blocks.size(columns) * kTileColumns);
   for (std::size_t k = k0; k < k1; k += kDepth) {
     const ColumnBlock block{begin, end, k, std::min(kDepth, k1 - k)};
+    const std::size_t next_k = std::min(k1, k + kDepth);
+    const ColumnBlock next{begin, end, next_k, std::min(kDepth, k1 - next_k)};
     PackColumns(plan.p, block, packed_b);
-    MultiplyBlock(plan, panel, panel + plan.row_blocks.size(rows), block,
+    MultiplyBlock(plan, panel, panel + plan.row_blocks.size(rows), block, next,
                   packed_a + plan.p.m * (k - k0), packed_b);
   }
 }
