@@ -35,38 +35,45 @@ struct PlaneGrid {
   std::size_t channel_size() const { return planes_down * planes_across * plane_size(); }
 };
 
-// out[x] = the pixel x step + first of a source row of g.width pixels.
-inline void CopyPlaneRow(const PlaneGrid& g, const float* row, std::ptrdiff_t first, float* out) {
-  const auto step = static_cast<std::ptrdiff_t>(g.step);
-  const auto columns = static_cast<std::ptrdiff_t>(g.columns);
-  const auto inside = [&](std::ptrdiff_t limit) {  // how many x lie before source pixel `limit`
-    return std::clamp<std::ptrdiff_t>((limit - first + step - 1) / step, 0, columns);
-  };
-  const std::ptrdiff_t begin = first >= 0 ? 0 : inside(0);
-  const std::ptrdiff_t width = static_cast<std::ptrdiff_t>(g.width);
-  const std::ptrdiff_t end = first >= width ? begin : std::max(begin, inside(width));
-  std::fill(out, out + begin, 0.0f);
-  if (step == 1) {
-    std::copy(row + (first + begin), row + (first + end), out + begin);
-  } else {
-    for (std::ptrdiff_t x = begin; x < end; ++x) out[x] = row[x * step + first];
+// A row of plane column b: entries [begin, end) are the source pixels x step + first, the others 0.
+struct PlaneRowSpan {
+  PlaneRowSpan(const PlaneGrid& g, std::size_t b)
+      : first(g.origin_column + static_cast<std::ptrdiff_t>(b)),
+        begin(Before(g, 0)),
+        end(std::max(begin, Before(g, static_cast<std::ptrdiff_t>(g.width)))) {}
+  std::ptrdiff_t first, begin, end;
+
+ private:
+  // How many entries of a row lie before source pixel `limit`.
+  std::ptrdiff_t Before(const PlaneGrid& g, std::ptrdiff_t limit) const {
+    if (first >= limit) return 0;
+    const auto step = static_cast<std::ptrdiff_t>(g.step);
+    return std::min((limit - first + step - 1) / step, static_cast<std::ptrdiff_t>(g.columns));
   }
-  std::fill(out + end, out + columns, 0.0f);
+};
+
+// One row of one plane from a source row.
+inline void CopyPlaneRow(const PlaneGrid& g, const PlaneRowSpan& span, const float* row,
+                         float* out) {
+  const auto step = static_cast<std::ptrdiff_t>(g.step);
+  std::fill(out, out + span.begin, 0.0f);
+  if (step == 1) {
+    std::copy(row + (span.first + span.begin), row + (span.first + span.end), out + span.begin);
+  } else {
+    for (std::ptrdiff_t x = span.begin; x < span.end; ++x) out[x] = row[x * step + span.first];
+  }
+  std::fill(out + span.end, out + g.columns, 0.0f);
 }
 
-// Row y of every plane of one channel; `channel` points to its source.
-inline void CopyPlanesRow(const PlaneGrid& g, const float* channel, std::ptrdiff_t first_row,
-                          float* out) {
-  for (std::size_t a = 0; a < g.planes_down; ++a) {
-    const std::ptrdiff_t row = first_row + static_cast<std::ptrdiff_t>(a);
-    const bool outside = row < 0 || row >= static_cast<std::ptrdiff_t>(g.height);
-    for (std::size_t b = 0; b < g.planes_across; ++b, out += g.plane_size()) {
-      if (outside) {
-        std::fill_n(out, g.columns, 0.0f);
-      } else {
-        CopyPlaneRow(g, channel + static_cast<std::size_t>(row) * g.width,
-                     g.origin_column + static_cast<std::ptrdiff_t>(b), out);
-      }
+// One plane of one channel, its row 0 being source row `first_row`.
+inline void CopyPlane(const PlaneGrid& g, const PlaneRowSpan& span, const float* channel,
+                      std::ptrdiff_t first_row, float* out) {
+  for (std::size_t y = 0; y < g.rows; ++y, out += g.columns) {
+    const std::ptrdiff_t row = first_row + static_cast<std::ptrdiff_t>(y * g.step);
+    if (row < 0 || row >= static_cast<std::ptrdiff_t>(g.height)) {
+      std::fill_n(out, g.columns, 0.0f);
+    } else {
+      CopyPlaneRow(g, span, channel + static_cast<std::size_t>(row) * g.width, out);
     }
   }
 }
@@ -75,11 +82,14 @@ inline void CopyPlanesRow(const PlaneGrid& g, const float* channel, std::ptrdiff
 // planes of a whole image. out: channels x channel_size().
 inline void CopyPlanes(const PlaneGrid& g, const float* source, std::size_t channels,
                        std::size_t first_row, float* out) {
-  for (std::size_t c = 0; c < channels; ++c) {
-    for (std::size_t y = 0; y < g.rows; ++y) {
-      CopyPlanesRow(g, source + c * g.height * g.width,
-                    static_cast<std::ptrdiff_t>((first_row + y) * g.step) + g.origin_row,
-                    out + c * g.channel_size() + y * g.columns);
+  const std::ptrdiff_t top = static_cast<std::ptrdiff_t>(first_row * g.step) + g.origin_row;
+  for (std::size_t b = 0; b < g.planes_across; ++b) {
+    const PlaneRowSpan span(g, b);
+    for (std::size_t c = 0; c < channels; ++c) {
+      for (std::size_t a = 0; a < g.planes_down; ++a) {
+        CopyPlane(g, span, source + c * g.height * g.width, top + static_cast<std::ptrdiff_t>(a),
+                  out + c * g.channel_size() + (a * g.planes_across + b) * g.plane_size());
+      }
     }
   }
 }

@@ -57,6 +57,7 @@ struct WeightGradPlan {
   BatchCut cut;
   Panels shares;  // of the pieces of the batch
   PlaneGrid planes;
+  const std::size_t* offsets = nullptr;  // of each (channel of a block, tap) in the planes
 };
 
 struct WeightGradItem {
@@ -102,13 +103,7 @@ HWY_INLINE void WeightGradTile(const WeightGradPass& pass, std::size_t row, Pack
                                float* c) {
   const WeightGradPlan& plan = pass.plan;
   PlainRows<R> rows;
-  for (std::size_t r = 0; r < R; ++r) {
-    const std::size_t channel = (row + r) / plan.s.kernel_area();
-    const std::size_t tap = (row + r) % plan.s.kernel_area();
-    rows.data[r] =
-        pass.planes + channel * plan.planes.channel_size() +
-        InputPlaneOffset(plan.planes, tap / plan.s.kernel_width, tap % plan.s.kernel_width);
-  }
+  for (std::size_t r = 0; r < R; ++r) rows.data[r] = pass.planes + plan.offsets[row + r];
   Tile<R> tile;
   tile.Clear();
   for (std::size_t n = 0; n < pass.piece.image_end - pass.piece.image; ++n) {
@@ -183,9 +178,22 @@ inline void FinishWeightGrad(const WeightGradPlan& plan, std::size_t index, floa
                  row_size);
 }
 
+inline void FillWeightGradOffsets(const WeightGradPlan& plan, std::size_t* offsets) {
+  for (std::size_t c = 0; c < plan.blocks.largest(); ++c) {
+    for (std::size_t tap = 0; tap < plan.s.kernel_area(); ++tap) {
+      *offsets++ =
+          c * plan.planes.channel_size() +
+          InputPlaneOffset(plan.planes, tap / plan.s.kernel_width, tap % plan.s.kernel_width);
+    }
+  }
+}
+
 void Conv2dWeightGradTarget(const Conv2dShape& s, const float* x, const float* d_y, float* d_weight,
                             const KernelContext& context) {
-  const WeightGradPlan plan(s, x, d_y);
+  WeightGradPlan plan(s, x, d_y);
+  std::size_t* offsets = context.scratch.Indices(plan.blocks.largest() * s.kernel_area());
+  FillWeightGradOffsets(plan, offsets);
+  plan.offsets = offsets;
   const std::size_t sums_size = RoundUp(plan.item_count() * plan.sums_size(), kAlignment);
   float* sums = context.scratch.Floats(
       sums_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
