@@ -40,9 +40,20 @@ void SumOne(const float* x, std::size_t n, float* y, const Workers& workers) {
   *y = static_cast<float>(sum);
 }
 
+// The same reduction with its innermost axes in the last places, so that rows are as long as they
+// can be.
+ReduceLayout ShiftedInward(ReduceLayout l) {
+  for (int place = 0; place < 2 && l.kept[2] == 1 && l.reduced[2] == 1; ++place) {
+    l.kept = {1, l.kept[0], l.kept[1]};
+    l.reduced = {1, l.reduced[0], l.reduced[1]};
+  }
+  return l;
+}
+
 }  // namespace
 
-void ReduceSum(const ReduceLayout& l, const float* x, float* y, const Workers& workers) {
+void ReduceSum(const ReduceLayout& layout, const float* x, float* y, const Workers& workers) {
+  const ReduceLayout l = ShiftedInward(layout);
   if (l.outputs() == 1 && l.reduced[0] == 1 && l.reduced[1] == 1) {
     return SumOne(x, l.reduced[2], y, workers);
   }
