@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/bench_scenes.h"
+
+#include <array>
+#include <cmath>
+
+#include "base/rng.h"
+#include "scene/shapes.h"
+
+namespace tilegrad::bench {
+namespace {
+
+// Rotation of a random unit quaternion, row-major.
+std::array<double, 9> RandomRotation(Rng* rng) {
+  double q[4], norm = 0;
+  for (double& v : q) v = rng->Normal(), norm += v * v;
+  for (double& v : q) v /= std::sqrt(norm);
+  const auto [w, x, y, z] = q;
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+}
+
+std::vector<float> RotatedPositions(const Mesh& mesh, Rng* rng) {
+  const auto r = RandomRotation(rng);
+  std::vector<float> out;
+  for (const glm::vec3& p : mesh.positions) {
+    for (int row = 0; row < 3; ++row) {
+      const double* axis = &r[static_cast<std::size_t>(3 * row)];
+      out.push_back(static_cast<float>(axis[0] * p.x + axis[1] * p.y + axis[2] * p.z));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+BenchBatch::BenchBatch(const SceneSpec& spec) {
+  const Mesh sphere = Icosphere(spec.level, 0.5f);
+  Rng rng(1234);
+  options.width = options.height = spec.size;
+  options.interpolation = Interpolation::kScreenLinear;  // as the peers
+  for (const Face& face : sphere.faces) faces.insert(faces.end(), face.begin(), face.end());
+  for (std::size_t i = 0; i < 3 * sphere.positions.size(); ++i) {
+    colors.push_back(static_cast<float>(rng.Uniform()));
+  }
+  const Camera camera = OrbitCamera({30.0, spec.size, spec.size}, 90, 0, 2.732);
+  for (int n = 0; n < spec.images; ++n) {
+    positions.push_back(RotatedPositions(sphere, &rng));
+    d_positions.emplace_back(positions.back().size());
+    d_colors.emplace_back(colors.size());
+  }
+  for (std::size_t n = 0; n < positions.size(); ++n) {
+    scenes.push_back({positions[n], faces, colors, 3, AttributeRate::kVertex, camera});
+    d_scenes.push_back({d_positions[n], d_colors[n], false, {}});
+  }
+  const std::size_t pixels = static_cast<std::size_t>(spec.images) *
+                             static_cast<std::size_t>(spec.size) *
+                             static_cast<std::size_t>(spec.size);
+  d_attributes.resize(3 * pixels), d_alpha.resize(pixels);
+  for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
+  for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
+}
+
+}  // namespace tilegrad::bench

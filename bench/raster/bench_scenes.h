@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scenes that renderers are compared on: random rotations of an icosphere of radius 0.5, seen
+// with a field of view of 30 degrees from 2.732 away, random upstream gradients.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "render/renderer.h"
+
+namespace tilegrad::bench {
+
+struct SceneSpec {
+  const char* name;
+  int images, size, level;  // icosphere level: 20 * 4^level faces
+};
+inline constexpr SceneSpec kScenes[] = {
+    {"S1", 64, 64, 3}, {"S2", 8, 256, 3}, {"S3", 4, 256, 5}, {"Training", 128, 64, 3}};
+
+// A batch with everything that a forward and backward pass reads and writes.
+struct BenchBatch {
+  explicit BenchBatch(const SceneSpec& spec);
+
+  RenderOptions options;
+  std::vector<std::int32_t> faces;
+  std::vector<float> colors;
+  std::vector<std::vector<float>> positions;  // per image
+  std::vector<SceneView> scenes;
+  std::vector<float> d_attributes, d_alpha;
+  std::vector<std::vector<float>> d_positions, d_colors;
+  std::vector<SceneGradients> d_scenes;
+};
+
+}  // namespace tilegrad::bench
