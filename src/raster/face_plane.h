@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <utility>
 
 #include "raster/conventions.h"
 #include "raster/scalar.h"
@@ -37,15 +38,28 @@ bool IsSliver(T x1, T y1, T x2, T y2, T area) {
   return !(area * area > T(kFlatHeight * kFlatHeight) * longest);  // height = |area| / longest edge
 }
 
+// The corners of a face on the screen; z = 1/depth.
 template <class T>
-FacePlane<T> MakeFacePlane(const ScreenMeshT<T>& mesh, std::size_t face) {
-  const auto a = static_cast<std::size_t>(mesh.v0[face]);
-  const auto b = static_cast<std::size_t>(mesh.v1[face]);
-  const auto c = static_cast<std::size_t>(mesh.v2[face]);
-  const T x1 = mesh.x[b] - mesh.x[a], y1 = mesh.y[b] - mesh.y[a];
-  const T x2 = mesh.x[c] - mesh.x[a], y2 = mesh.y[c] - mesh.y[a];
+struct ScreenCorners {
+  T x[3], y[3], z[3];
+};
+
+template <class T>
+ScreenCorners<T> CornersOf(const ScreenMeshT<T>& mesh, std::size_t face) {
+  ScreenCorners<T> out;
+  for (int k = 0; k < 3; ++k) {
+    const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
+    out.x[k] = mesh.x[v], out.y[k] = mesh.y[v], out.z[k] = mesh.inverse_depth[v];
+  }
+  return out;
+}
+
+template <class T>
+FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
+  const T x1 = c.x[1] - c.x[0], y1 = c.y[1] - c.y[0];
+  const T x2 = c.x[2] - c.x[0], y2 = c.y[2] - c.y[0];
   const T area = x1 * y2 - x2 * y1;
-  FacePlane<T> plane{mesh.x[a], mesh.y[a], {T(1), T(0), T(0)}, {}, {}};
+  FacePlane<T> plane{c.x[0], c.y[0], {T(1), T(0), T(0)}, {}, {}};
   if (IsSliver(RealPart(x1), RealPart(y1), RealPart(x2), RealPart(y2), RealPart(area))) {
     for (T& weight : plane.base) weight = T(1) / T(3);
     return plane;
@@ -55,6 +69,11 @@ FacePlane<T> MakeFacePlane(const ScreenMeshT<T>& mesh, std::size_t face) {
   plane.gx[2] = -y1 * inverse, plane.gy[2] = x1 * inverse;
   plane.gx[0] = -(plane.gx[1] + plane.gx[2]), plane.gy[0] = -(plane.gy[1] + plane.gy[2]);
   return plane;
+}
+
+template <class T>
+FacePlane<T> MakeFacePlane(const ScreenMeshT<T>& mesh, std::size_t face) {
+  return MakeFacePlane(CornersOf(mesh, face));
 }
 
 // 1/depth over a face; linear on the screen, kept between the values of the corners, which rounding
@@ -72,15 +91,26 @@ struct DepthPlane {
 };
 
 template <class T>
+void SwapUnlessOrdered(ScreenCorners<T>* c, int i, int j) {
+  const auto before = [](const T& p, const T& q) { return RealPart(p) < RealPart(q); };
+  const bool same_x = !before(c->x[i], c->x[j]) && !before(c->x[j], c->x[i]);
+  if (same_x ? !before(c->y[j], c->y[i]) : before(c->x[i], c->x[j])) return;
+  std::swap(c->x[i], c->x[j]), std::swap(c->y[i], c->y[j]), std::swap(c->z[i], c->z[j]);
+}
+
+// The same bits for coinciding faces whatever corner they start at and however they are wound (both
+// sides of a double-sided face), so that the tie rule decides between them and not rounding.
+template <class T>
 DepthPlane<T> MakeDepthPlane(const ScreenMeshT<T>& mesh, std::size_t face) {
-  const FacePlane<T> weights = MakeFacePlane(mesh, face);
-  DepthPlane<T> plane{weights.x0, weights.y0, T(0), T(0), T(0), T(0), T(0)};
+  ScreenCorners<T> c = CornersOf(mesh, face);
+  SwapUnlessOrdered(&c, 0, 1), SwapUnlessOrdered(&c, 1, 2), SwapUnlessOrdered(&c, 0, 1);
+  const FacePlane<T> weights = MakeFacePlane(c);
+  DepthPlane<T> plane{weights.x0, weights.y0, T(0), T(0), T(0), c.z[0], c.z[0]};
   for (int k = 0; k < 3; ++k) {
-    const T z = mesh.inverse_depth[static_cast<std::size_t>(mesh.vertex(face, k))];
-    plane.base += weights.base[k] * z;
-    plane.gx += weights.gx[k] * z, plane.gy += weights.gy[k] * z;
-    if (k == 0 || RealPart(z) < RealPart(plane.low)) plane.low = z;
-    if (k == 0 || RealPart(z) > RealPart(plane.high)) plane.high = z;
+    plane.base += weights.base[k] * c.z[k];
+    plane.gx += weights.gx[k] * c.z[k], plane.gy += weights.gy[k] * c.z[k];
+    if (RealPart(c.z[k]) < RealPart(plane.low)) plane.low = c.z[k];
+    if (RealPart(c.z[k]) > RealPart(plane.high)) plane.high = c.z[k];
   }
   return plane;
 }

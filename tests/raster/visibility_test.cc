@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rules of conventions.h: fill rule, depth order, ties; on every instruction set.
+#include "raster/visibility.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/rng.h"
+#include "base/simd_target.h"
+#include "raster/bin.h"
+#include "raster/coverage.h"
+#include "raster/fragments.h"
+#include "raster/visibility_ref.h"
+
+namespace tilegrad::raster {
+namespace {
+
+// A mesh that is on the screen already.
+struct Flat {
+  int width, height;
+  ScreenMeshBuffers buffers;
+
+  Flat(int w, int h) : width(w), height(h) {}
+  std::int32_t Vertex(double px, double py, double depth = 1) {
+    buffers.x.push_back(static_cast<float>(px));
+    buffers.y.push_back(static_cast<float>(py));
+    buffers.depth.push_back(static_cast<float>(depth));
+    buffers.inverse_depth.push_back(static_cast<float>(1 / depth));
+    return static_cast<std::int32_t>(buffers.x.size()) - 1;
+  }
+  void AddFace(std::int32_t a, std::int32_t b, std::int32_t c) {
+    const auto f = static_cast<std::int32_t>(buffers.v0.size());
+    buffers.v0.push_back(a), buffers.v1.push_back(b), buffers.v2.push_back(c);
+    buffers.source_face.push_back(f);
+    buffers.reject.push_back(kFaceDrawn);
+  }
+  ScreenMesh Finish() {
+    buffers.width = width, buffers.height = height;
+    buffers.source_vertices = static_cast<std::int32_t>(buffers.x.size());
+    buffers.source_faces = static_cast<std::int32_t>(buffers.v0.size());
+    for (std::size_t f = 0; f < buffers.v0.size(); ++f) {
+      buffers.reject[f] = ShapeReject(SnapFace(buffers.View(), f), false);
+    }
+    return buffers.View();
+  }
+};
+
+// Faces of a whole image, by tiles.
+std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
+  const TileGrid grid(mesh.width, mesh.height);
+  TileListBuffers buffers;
+  const TileLists bins = BinDrawnFaces(mesh, grid, &buffers);
+  std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
+  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+    VisibilityTile tile;
+    const TileRect rect = grid.rect(t);
+    ComputeVisibility(mesh, bins[t], rect, &tile);
+    for (int i = rect.y0; i < rect.y1; ++i) {
+      for (int j = rect.x0; j < rect.x1; ++j) {
+        out[static_cast<std::size_t>(i) * mesh.width + j] =
+            tile.face[(i - rect.y0) * kTileSize + j - rect.x0];
+      }
+    }
+  }
+  return out;
+}
+
+std::vector<std::int32_t> VisibleRef(const ScreenMesh& mesh) {
+  std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height);
+  VisibilityRef<float>(mesh, 0, mesh.height, out);
+  return out;
+}
+
+class VisibilityOnEveryTarget : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override { ASSERT_TRUE(ForceTarget(GetParam()).ok()); }
+  void TearDown() override { ASSERT_TRUE(ForceTarget("").ok()); }
+};
+
+// A rectangle of n x n jittered quads, each cut along a random diagonal with random winding; every
+// vertex coordinate is a multiple of `grid` pixels, so many centres lie exactly on edges and
+// corners.
+Flat JitteredRectangle(int n, double cell, double grid, Rng* rng) {
+  Flat flat(static_cast<int>(n * cell) + 3, static_cast<int>(n * cell) + 2);
+  const auto snap = [&](double v) { return std::round(v / grid) * grid; };
+  for (int r = 0; r <= n; ++r) {
+    for (int c = 0; c <= n; ++c) {
+      const bool border = r == 0 || c == 0 || r == n || c == n;
+      const double amount = border ? 0 : 0.3 * cell;
+      flat.Vertex(snap(1 + c * cell + rng->Uniform(-amount, amount)),
+                  snap(1 + r * cell + rng->Uniform(-amount, amount)));
+    }
+  }
+  for (int r = 0; r < n; ++r) {
+    for (int c = 0; c < n; ++c) {
+      std::int32_t q[4] = {r * (n + 1) + c, r * (n + 1) + c + 1, (r + 1) * (n + 1) + c + 1,
+                           (r + 1) * (n + 1) + c};
+      const auto turn = static_cast<std::size_t>(rng->Below(2));
+      flat.AddFace(q[turn], q[turn + 1], q[turn + 2]);
+      if (rng->Below(2) == 0) std::swap(q[turn], q[turn + 2]);
+      flat.AddFace(q[turn], q[turn + 2], q[(turn + 3) % 4]);
+    }
+  }
+  return flat;
+}
+
+TEST_P(VisibilityOnEveryTarget, EveryPixelOfATriangulatedRectangleIsCoveredExactlyOnce) {
+  Rng rng(5, 1);
+  for (const double grid : {0.5, 0.25, 1.0 / 1024, 1e-7}) {
+    for (int round = 0; round < 8; ++round) {
+      Flat flat = JitteredRectangle(6 + round, 2.0 + round, grid, &rng);
+      const ScreenMesh mesh = flat.Finish();
+      std::vector<int> count(static_cast<std::size_t>(mesh.width) * mesh.height, 0);
+      for (std::size_t f = 0; f < mesh.faces(); ++f) {
+        if (mesh.reject[f] != kFaceDrawn) continue;
+        const auto shape = SnapFaceClockwise(mesh, f);
+        for (std::size_t p = 0; p < count.size(); ++p) {
+          count[p] +=
+              Covers(shape, static_cast<int>(p) % mesh.width, static_cast<int>(p) / mesh.width);
+        }
+      }
+      const auto seen = Visible(mesh);
+      const double end = 1 + (6 + round) * (2.0 + round);
+      for (std::size_t p = 0; p < count.size(); ++p) {
+        const double x = static_cast<int>(p) % mesh.width + 0.5;
+        const double y = static_cast<int>(p) / mesh.width + 0.5;
+        const bool inside = x >= 1 && x < end && y >= 1 && y < end;
+        EXPECT_EQ(count[p], inside ? 1 : 0) << "pixel " << x << ", " << y << " grid " << grid;
+        EXPECT_EQ(seen[p] >= 0, inside) << "pixel " << x << ", " << y << " grid " << grid;
+      }
+    }
+  }
+}
+
+// Triangles of every size, some far off-screen, many overlapping.
+Flat RandomTriangles(int count, double spread, Rng* rng) {
+  Flat flat(45, 39);
+  for (int f = 0; f < count; ++f) {
+    const double cx = rng->Uniform(-5, 50), cy = rng->Uniform(-5, 45);
+    const double size = spread * std::pow(10, rng->Uniform(-2, 0));
+    std::int32_t v[3];
+    for (auto& index : v) {
+      index = flat.Vertex(cx + rng->Uniform(-size, size), cy + rng->Uniform(-size, size),
+                          rng->Uniform(1, 3));
+    }
+    flat.AddFace(v[0], v[1], v[2]);
+  }
+  return flat;
+}
+
+TEST_P(VisibilityOnEveryTarget, EqualsTheReferenceBitForBit) {
+  Rng rng(6, 2);
+  // 1e6 leaves the guard band: edges in 128 bits.
+  for (const double spread : {2.0, 30.0, 1000.0, 1e6}) {
+    for (int round = 0; round < 4; ++round) {
+      Flat flat = RandomTriangles(60, spread, &rng);
+      const ScreenMesh mesh = flat.Finish();
+      EXPECT_EQ(Visible(mesh), VisibleRef(mesh)) << "spread " << spread;
+    }
+  }
+}
+
+TEST_P(VisibilityOnEveryTarget, CoincidingFacesShowTheLowerId) {
+  Rng rng(7, 3);
+  Flat flat = RandomTriangles(20, 30, &rng);
+  const auto n = static_cast<std::size_t>(20);
+  for (std::size_t f = 0; f < n; ++f) {  // the same again, the other way round
+    flat.AddFace(flat.buffers.v0[f], flat.buffers.v2[f], flat.buffers.v1[f]);
+  }
+  for (const std::int32_t id : Visible(flat.Finish())) EXPECT_LT(id, 20);
+}
+
+TEST_P(VisibilityOnEveryTarget, NearestWinsWhateverTheOrder) {
+  for (const bool near_first : {true, false}) {
+    Flat flat(40, 40);
+    for (const double depth : {near_first ? 1.0 : 2.0, near_first ? 2.0 : 1.0}) {
+      const auto a = flat.Vertex(-100, -100, depth), b = flat.Vertex(200, -100, depth),
+                 c = flat.Vertex(-100, 200, depth);
+      flat.AddFace(a, b, c);
+    }
+    for (const std::int32_t id : Visible(flat.Finish())) EXPECT_EQ(id, near_first ? 0 : 1);
+  }
+}
+
+TEST_P(VisibilityOnEveryTarget, CentreOnTheDiagonalBelongsToTheFaceWhoseLeftEdgeItIs) {
+  // Figure of rule 3: A below the diagonal, B above, of the square [0, 2) x [0, 2).
+  Flat flat(2, 2);
+  const auto tl = flat.Vertex(0, 0), tr = flat.Vertex(2, 0), br = flat.Vertex(2, 2),
+             bl = flat.Vertex(0, 2);
+  flat.AddFace(tl, bl, br);  // A
+  flat.AddFace(tl, br, tr);  // B
+  EXPECT_EQ(Visible(flat.Finish()), (std::vector<std::int32_t>{1, 1, 0, 1}));
+}
+
+TEST_P(VisibilityOnEveryTarget, DegenerateFacesCoverNothing) {
+  Flat flat(8, 8);
+  const auto a = flat.Vertex(1, 1), b = flat.Vertex(7, 7), c = flat.Vertex(4, 4);
+  flat.AddFace(a, b, c);
+  flat.AddFace(a, a, b);
+  flat.AddFace(a, a, a);
+  const ScreenMesh mesh = flat.Finish();
+  for (std::size_t f = 0; f < 3; ++f) EXPECT_EQ(mesh.reject[f], kFaceDegenerate);
+  for (const std::int32_t id : Visible(mesh)) EXPECT_EQ(id, kNoFace);
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, VisibilityOnEveryTarget, testing::ValuesIn(RunnableTargets()),
+                         [](const auto& param) { return param.param; });
+
+TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
+  Rng rng(8, 4);
+  Flat flat = RandomTriangles(200, 40, &rng);
+  const ScreenMesh mesh = flat.Finish();
+  const TileGrid grid(mesh.width, mesh.height);
+  TileListBuffers buffers;
+  const TileLists bins = BinDrawnFaces(mesh, grid, &buffers);
+  std::size_t listed = 0;
+  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+    EXPECT_TRUE(std::is_sorted(bins[t].begin(), bins[t].end()));
+    listed += bins[t].size();
+    const TileRect rect = grid.rect(t);
+    for (std::size_t f = 0; f < mesh.faces(); ++f) {
+      if (mesh.reject[f] != kFaceDrawn) continue;
+      bool covers = false;
+      const auto shape = SnapFaceClockwise(mesh, f);
+      for (int i = rect.y0; i < rect.y1; ++i) {
+        for (int j = rect.x0; j < rect.x1; ++j) covers |= Covers(shape, j, i);
+      }
+      if (!covers) continue;
+      EXPECT_TRUE(std::binary_search(bins[t].begin(), bins[t].end(), static_cast<int>(f)));
+    }
+  }
+  EXPECT_LT(listed, mesh.faces() * grid.tiles() / 2);  // it does reject
+}
+
+TEST(Bin, SoftListsHoldEveryFaceWithinTheMarginAndNotMuchMore) {
+  Rng rng(9, 4);
+  Flat flat = RandomTriangles(100, 10, &rng);
+  const ScreenMesh mesh = flat.Finish();
+  const TileGrid grid(mesh.width, mesh.height);
+  TileListBuffers buffers;
+  const float inf = std::numeric_limits<float>::infinity();
+  const TileLists all = BinSoftFaces(mesh, grid, inf, inf, &buffers);
+  for (std::size_t t = 0; t < grid.tiles(); ++t) EXPECT_EQ(all[t].size(), mesh.faces());
+
+  const float margin = 2.5f;
+  const TileLists near = BinSoftFaces(mesh, grid, margin, margin, &buffers);
+  const auto outside = [&](float low, float high, int from, int to) {
+    return high + margin < static_cast<float>(from) + 0.5f ||
+           low - margin > static_cast<float>(to) - 0.5f;
+  };
+  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+    const TileRect rect = grid.rect(t);
+    for (std::size_t f = 0; f < mesh.faces(); ++f) {
+      const auto v = 3 * f;  // RandomTriangles shares no vertices
+      const auto [left, right] = std::minmax({mesh.x[v], mesh.x[v + 1], mesh.x[v + 2]});
+      const auto [top, bottom] = std::minmax({mesh.y[v], mesh.y[v + 1], mesh.y[v + 2]});
+      const bool expected =
+          !outside(left, right, rect.x0, rect.x1) && !outside(top, bottom, rect.y0, rect.y1);
+      EXPECT_EQ(std::binary_search(near[t].begin(), near[t].end(), static_cast<int>(f)), expected)
+          << "face " << f << " tile " << t;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::raster
