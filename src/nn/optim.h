@@ -51,7 +51,8 @@ class Adam {
   std::int64_t steps_ = 0;
 };
 
-// Square root of the sum of all squares, summed in double and in a fixed order.
+// Square root of the sum of all squares, summed in double and in a fixed order. Not finite where a
+// gradient is not: look before you step.
 double GlobalNorm(Context& context, std::span<const Var> gradients);
 // The factor that brings a norm above `max_norm` down to it: min(1, max_norm / norm).
 double ClipFactor(double norm, double max_norm);

@@ -79,6 +79,12 @@ TEST_F(Tape, ErrorsAreNotedAndSpread) {
   EXPECT_NE(Message().find("reshape"), std::string::npos);
   EXPECT_FALSE(Gather(b, 0, context_.Indices(std::vector<std::int32_t>{0, 3})).valid());
   EXPECT_NE(Message().find("index 3 of 3"), std::string::npos);
+  EXPECT_FALSE(LeakyRelu(a, -0.1).valid());
+  EXPECT_NE(Message().find("slope -0.1"), std::string::npos);
+  EXPECT_FALSE(Clamp(a, 1, 0).valid());
+  EXPECT_NE(Message().find("[1, 0] is empty"), std::string::npos);
+  EXPECT_FALSE(Mean(Slice(a, 0, 1, 1)).valid());
+  EXPECT_NE(Message().find("nothing to average"), std::string::npos);
   EXPECT_FALSE(Sum(a, {1}).valid());
   EXPECT_NE(Message().find("axis 1"), std::string::npos);
   EXPECT_FALSE(Conv2d(a, b, Var(), {}).valid());

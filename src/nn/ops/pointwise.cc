@@ -202,6 +202,8 @@ Var Relu(const Var& x) {
 }
 
 Var LeakyRelu(const Var& x, double slope) {
+  if (!Usable("leaky relu", {&x})) return Invalid({&x});
+  if (!(slope >= 0)) return Fail(x, InvalidArgument("leaky relu: slope {} is negative", slope));
   return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, {slope},
                   [slope](const Adjoint& adj) {
                     const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
@@ -224,6 +226,8 @@ Var Sigmoid(const Var& x) {  // y (1 - y)
 }
 
 Var Clamp(const Var& x, double low, double high) {
+  if (!Usable("clamp", {&x})) return Invalid({&x});
+  if (!(low <= high)) return Fail(x, InvalidArgument("clamp: [{}, {}] is empty", low, high));
   return UnaryVar({"clamp"}, UnaryOp::kClamp, x, {low, high}, [x, low, high](const Adjoint& adj) {
     return std::vector<Var>{Mul(adj.dy(), InRange(x, low, high))};
   });

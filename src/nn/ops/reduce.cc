@@ -70,8 +70,9 @@ Var SumOver(const Var& x, const AxisSet& axes, Keep keep) {
   return Record({"sum"}, std::move(y), {x}, rule);
 }
 
-std::int64_t Reduced(const Shape& shape, const AxisSet& axes) {
-  return static_cast<std::int64_t>(Plan(shape, axes).layout.inputs_each());
+Var MeanOf(const Var& x, const Var& sum, std::size_t count) {
+  if (count > 0) return Scale(sum, 1.0 / static_cast<double>(count));
+  return Fail(x, InvalidArgument("mean: shape {} has nothing to average", x.shape().ToString()));
 }
 
 struct ExtremumCall {
@@ -133,12 +134,12 @@ Var Mean(const Var& x, std::initializer_list<int> axes, Keep keep) {
   AxisSet set{};
   const Status status = ParseAxes("mean", x.shape(), axes, set);
   if (!status.ok()) return Fail(x, status);
-  return Scale(sum, 1.0 / static_cast<double>(Reduced(x.shape(), set)));
+  return MeanOf(x, sum, Plan(x.shape(), set).layout.inputs_each());
 }
 
 Var Mean(const Var& x) {
   const Var sum = Sum(x);
-  return sum.valid() ? Scale(sum, 1.0 / static_cast<double>(x.shape().elements())) : sum;
+  return sum.valid() ? MeanOf(x, sum, x.value().elements()) : sum;
 }
 
 Var ReduceMax(const Var& x, std::initializer_list<int> axes, Keep keep) {
