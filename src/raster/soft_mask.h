@@ -18,13 +18,14 @@
 #include "base/aligned.h"
 #include "raster/bin.h"
 #include "raster/screen_mesh.h"
+#include "raster/soft_mask_setup.h"
 
 namespace tilegrad::raster {
 
 struct SoftMaskOptions {
   int width = 0, height = 0;      // pixels, of the image
   double delta = 1.0 / 7000;      // equation 5; > 0
-  double max_alpha_error = 1e-6;  // E in [0, 1]; 0 drops a face only where its A is 0 in float
+  double max_alpha_error = 1e-6;  // E in [0, 1]; 0 drops a face only where A < 2^-125
   std::size_t faces = 0;          // of the mesh that take part: not kFaceNotInSoftMask
 };
 
@@ -57,10 +58,9 @@ double BinnedError(const SoftMaskPlan& plan, std::size_t listed);
 
 // Memory of one worker. Grows to the longest list seen, then nothing is allocated.
 struct SoftMaskScratch {
-  AlignedVector<double> edges;          // edge lines of the tile's candidates
-  AlignedVector<float> block;           // those of a block, as the vector code reads them
-  AlignedVector<std::int32_t> members;  // of a block: positions in the list
-  AlignedVector<float> products;        // of a block: product before each face, per pixel
+  AlignedVector<SoftFace> faces;         // the tile's candidates
+  AlignedVector<SoftBlockFace> members;  // those that a block keeps
+  AlignedVector<float> products;         // [members][kBlockPixels] product before each member
 };
 
 // Writes alpha of the tile's pixels: 1 where face_ids >= 0. Returns what was spent: no pixel is

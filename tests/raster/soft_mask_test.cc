@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// The soft mask on every target against all faces in double, within E + the rounding that
+// docs/numerics.md derives; gradients likewise, and by complex step.
+#include "raster/soft_mask.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <complex>
+#include <limits>
+#include <string>
+
+#include "base/simd_target.h"
+#include "raster/soft_mask_test_util.h"
+
+namespace tilegrad::raster {
+namespace {
+
+using test::RandomScene;
+using test::RunSoftMask;
+using test::SoftResult;
+using test::SoftScene;
+using test::SoftTruth;
+
+void CheckAlpha(const SoftScene& scene, const SoftTruth& truth, const SoftResult& result) {
+  const double e = scene.options.max_alpha_error;
+  // exp(-87) per face is what E = 0 means ("Budget").
+  EXPECT_LE(result.spent, e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(scene.options.faces));
+  for (std::size_t i = 0; i < scene.pixels(); ++i) {
+    if (scene.face_ids[i] >= 0) {
+      EXPECT_EQ(result.alpha[i], 1.0f);
+      continue;
+    }
+    const double error = std::abs(static_cast<double>(result.alpha[i]) - truth.Alpha(i));
+    EXPECT_LE(error, result.spent + truth.Rounding(i)) << "pixel " << i << " E " << e;
+  }
+}
+
+// Error of the gradient of corner k and of the corners that coincide with it: which of them is the
+// nearest is a matter of rounding, their sum is not.
+std::array<double, 2> MergedError(const SoftScene& scene, std::size_t face, std::size_t corner,
+                                  const std::vector<double>& exact,
+                                  const std::vector<float>& actual) {
+  std::array<double, 2> error{};
+  const std::size_t vertex = 3 * face + corner;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t other = 3 * face + k;
+    if (scene.mesh.x[other] != scene.mesh.x[vertex]) continue;
+    if (scene.mesh.y[other] != scene.mesh.y[vertex]) continue;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      error[axis] += static_cast<double>(actual[2 * other + axis]) - exact[2 * other + axis];
+    }
+  }
+  return error;
+}
+
+void CheckGradient(const SoftScene& scene, const SoftTruth& truth,
+                   const std::vector<float>& d_alpha, const SoftResult& result) {
+  std::vector<double> exact, tolerance;
+  truth.Gradient(d_alpha, &exact, &tolerance);
+  for (std::size_t f = 0; f < scene.options.faces; ++f) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto error = MergedError(scene, f, k, exact, result.d_corners);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        EXPECT_LE(std::abs(error[axis]), 3 * tolerance[6 * f + axis])
+            << "face " << f << " corner " << k << " axis " << axis << " E "
+            << scene.options.max_alpha_error << " delta " << scene.options.delta;
+      }
+    }
+  }
+}
+
+// Pixels at which the nearest feature is a matter of rounding have no gradient to compare.
+std::vector<float> ComparableGradient(const SoftScene& scene, const SoftTruth& truth) {
+  std::vector<float> d_alpha = scene.d_alpha;
+  for (std::size_t i = 0; i < d_alpha.size(); ++i) {
+    if (truth.Ambiguous(i)) d_alpha[i] = 0;
+  }
+  return d_alpha;
+}
+
+void CheckScenes(std::uint64_t first, std::uint64_t count, std::size_t most_faces) {
+  SoftMaskScratch scratch;
+  std::size_t compared = 0;
+  for (std::uint64_t seed = first; seed < first + count; ++seed) {
+    SCOPED_TRACE("scene " + std::to_string(seed));
+    const SoftScene scene = RandomScene(seed, most_faces);
+    const SoftTruth truth(scene);
+    const auto d_alpha = ComparableGradient(scene, truth);
+    for (const std::string& target : RunnableTargets()) {
+      SCOPED_TRACE(target);
+      ASSERT_TRUE(ForceTarget(target).ok());
+      const SoftResult result = RunSoftMask(scene, d_alpha, &scratch);
+      CheckAlpha(scene, truth, result);
+      CheckGradient(scene, truth, d_alpha, result);
+      compared += scene.pixels();
+    }
+    if (::testing::Test::HasFailure()) break;
+  }
+  ASSERT_TRUE(ForceTarget("").ok());
+  EXPECT_GT(compared, 0u);
+}
+
+TEST(SoftMask, FewFacesOnEveryTarget) { CheckScenes(0, 1800, 12); }
+TEST(SoftMask, ManyFacesOnEveryTarget) { CheckScenes(100000, 200, 150); }
+TEST(SoftMaskLong, TwentyThousandScenes) {
+  CheckScenes(200000, 18000, 12);
+  CheckScenes(300000, 2000, 300);
+}
+
+// The order of the faces may move alpha within the budget only, and not at all by bits run to run.
+TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
+  SoftMaskScratch scratch, fresh;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    SoftScene scene = RandomScene(seed, 60);
+    const SoftTruth truth(scene);
+    const SoftResult a = RunSoftMask(scene, scene.d_alpha, &scratch);
+    const SoftResult again = RunSoftMask(scene, scene.d_alpha, &fresh);
+    EXPECT_EQ(a.alpha, again.alpha);
+    EXPECT_EQ(a.d_corners, again.d_corners);
+    for (auto* index : {&scene.mesh.v0, &scene.mesh.v1, &scene.mesh.v2}) {
+      std::reverse(index->begin(), index->end());
+    }
+    const SoftResult b = RunSoftMask(scene, scene.d_alpha, &scratch);
+    for (std::size_t i = 0; i < scene.pixels(); ++i) {
+      EXPECT_NEAR(static_cast<double>(a.alpha[i]), static_cast<double>(b.alpha[i]),
+                  a.spent + b.spent + 2 * truth.Rounding(i));
+    }
+  }
+}
+
+// Thousands of faces, each too weak to change 1 - A in float, together are not.
+TEST(SoftMask, FaintFacesAddUp) {
+  SoftScene scene;
+  scene.Resize(4, 4);
+  scene.options.delta = 0.1, scene.options.max_alpha_error = 0;
+  // z = d^2 / delta = 17.5, A = 2.5e-8 < 2^-25
+  const auto x = static_cast<float>(0.5 + 2 * std::sqrt(1.75));
+  for (int f = 0; f < 20000; ++f) scene.AddFace({x, x, x}, {0.5f, 0.5f, 0.5f});
+  SoftMaskScratch scratch;
+  const SoftTruth truth(scene);
+  ASSERT_GT(truth.Alpha(0), 4e-4);
+  EXPECT_NEAR(static_cast<double>(RunSoftMask(scene, scene.d_alpha, &scratch).alpha[0]),
+              truth.Alpha(0), truth.Rounding(0));
+}
+
+TEST(SoftMask, PixelOnTheBoundaryIsOpaqueAndStill) {
+  SoftScene scene;
+  scene.Resize(8, 8);
+  scene.AddFace({1.5f, 6.5f, 1.5f}, {1.5f, 1.5f, 6.5f});
+  scene.d_alpha.assign(64, 0.0f);
+  for (const std::size_t on : {9u, 11u, 14u, 49u}) scene.d_alpha[on] = 1;
+  SoftMaskScratch scratch;
+  const SoftResult result = RunSoftMask(scene, scene.d_alpha, &scratch);
+  EXPECT_EQ(result.alpha[9], 1.0f);
+  EXPECT_EQ(result.alpha[11], 1.0f);
+  for (const float d : result.d_corners) EXPECT_EQ(d, 0.0f);
+}
+
+// A saturated pixel: 1 - A is 0 in float for one face, and the other must not lose or gain.
+TEST(SoftMask, GradientNearAnEdgeIsNotLost) {
+  SoftScene scene;
+  scene.Resize(4, 4);
+  scene.options.delta = 1, scene.options.max_alpha_error = 0;
+  scene.AddFace({-3, 9, 3}, {0.4999f, 0.4999f, -9});
+  SoftMaskScratch scratch;
+  std::vector<float> d_alpha(16, 0.0f);
+  d_alpha[1] = 1;
+  const SoftResult result = RunSoftMask(scene, d_alpha, &scratch);
+  ASSERT_EQ(result.alpha[1], 1.0f);
+  std::vector<double> exact, tolerance;
+  SoftTruth(scene).Gradient(d_alpha, &exact, &tolerance);
+  for (const std::size_t n : {1u, 3u}) {
+    EXPECT_NE(exact[n], 0);
+    EXPECT_NEAR(static_cast<double>(result.d_corners[n]) / exact[n], 1, 0.01);
+  }
+}
+
+TEST(SoftMask, FiniteAtExtremes) {
+  SoftMaskScratch scratch;
+  const float coordinates[] = {0.0f, -0.0f, 1e-40f, 1e-20f, 2.5f, 1e6f, -1e12f, 1e30f, -3e38f};
+  Rng rng(5);
+  for (int n = 0; n < 3000; ++n) {
+    SoftScene scene;
+    scene.Resize(9, 5);
+    scene.options.delta = std::pow(10.0, rng.Uniform(-300, 300));
+    scene.options.max_alpha_error = rng.Below(2) == 0 ? 0 : rng.Uniform();
+    for (int f = 0; f < 3; ++f) {
+      float x[3], y[3];
+      for (float& c : x) c = coordinates[rng.Below(9)];
+      for (float& c : y) c = coordinates[rng.Below(9)];
+      scene.AddFace(x, y);
+    }
+    const SoftResult result = RunSoftMask(scene, std::vector<float>(45, 1.0f), &scratch);
+    for (const float a : result.alpha) EXPECT_TRUE(a >= 0 && a <= 1) << a;
+    for (const float d : result.d_corners) EXPECT_FALSE(std::isnan(d));
+    EXPECT_TRUE(result.spent >= 0 && result.spent <= 1);
+  }
+}
+
+TEST(SoftMask, NoFacesAndNoBackground) {
+  SoftScene scene;
+  scene.Resize(3, 3);
+  SoftMaskScratch scratch;
+  for (const float a : RunSoftMask(scene, scene.d_alpha, &scratch).alpha) EXPECT_EQ(a, 0.0f);
+  scene.face_ids.assign(9, 4);
+  const SoftResult covered = RunSoftMask(scene, scene.d_alpha, &scratch);
+  for (const float a : covered.alpha) EXPECT_EQ(a, 1.0f);
+  EXPECT_EQ(covered.spent, 0);
+}
+
+// The reference's gradient, which the others are held to.
+TEST(SoftMaskRef, GradientIsThatOfAComplexStep) {
+  using Complex = std::complex<double>;
+  const std::vector<std::int32_t> faces{0, 1}, v0{0, 1}, v1{1, 2}, v2{2, 3};
+  const std::vector<std::uint8_t> reject{0, 0};
+  const SoftScale<double> scale{0.2, 0.3, 4.0};
+  const SoftScale<Complex> complex_scale{0.2, 0.3, 4.0};
+  Rng rng(11);
+  for (int scene = 0; scene < 200; ++scene) {
+    std::vector<double> x, y, d_x(4, 0.0), d_y(4, 0.0);
+    for (int v = 0; v < 4; ++v) x.push_back(rng.Uniform(0, 10)), y.push_back(rng.Uniform(0, 10));
+    const auto mesh = [&](auto& mx, auto& my, auto out) {
+      out.x = mx, out.y = my, out.v0 = v0, out.v1 = v1, out.v2 = v2, out.reject = reject;
+      return out;
+    };
+    const auto real = mesh(x, y, ScreenMeshT<double>{});
+    SoftAlphaRefBackward<double>(real, faces, 4.5, 5.5, scale, 1.0,
+                                 [&](std::size_t n, int corner, double dx, double dy) {
+                                   const auto v = static_cast<std::size_t>(real.vertex(n, corner));
+                                   d_x[v] += dx, d_y[v] += dy;
+                                 });
+    for (std::size_t v = 0; v < 8; ++v) {
+      std::vector<Complex> cx(x.begin(), x.end()), cy(y.begin(), y.end());
+      (v < 4 ? cx[v] : cy[v - 4]) += Complex(0, 1e-100);
+      const Complex alpha = SoftAlphaRef<Complex>(mesh(cx, cy, ScreenMeshT<Complex>{}), faces,
+                                                  Complex(4.5), Complex(5.5), complex_scale);
+      EXPECT_NEAR(v < 4 ? d_x[v] : d_y[v - 4], alpha.imag() * 1e100, 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::raster

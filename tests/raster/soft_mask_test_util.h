@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+// Random scenes for the soft mask, its truth in double, and the rounding that docs/numerics.md
+// allows.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "base/rng.h"
+#include "raster/soft_mask.h"
+#include "raster/soft_mask_ref.h"
+
+namespace tilegrad::raster::test {
+
+struct SoftScene {
+  ScreenMeshBuffers mesh;
+  std::vector<std::int32_t> face_ids;
+  std::vector<float> d_alpha;
+  SoftMaskOptions options;
+
+  std::size_t pixels() const { return face_ids.size(); }
+  void AddFace(const float (&x)[3], const float (&y)[3]) {
+    for (int k = 0; k < 3; ++k) {
+      auto& index = k == 0 ? mesh.v0 : k == 1 ? mesh.v1 : mesh.v2;
+      index.push_back(static_cast<std::int32_t>(mesh.x.size()));
+      mesh.x.push_back(x[k]), mesh.y.push_back(y[k]);
+    }
+    mesh.source_face.push_back(static_cast<std::int32_t>(mesh.reject.size()));
+    mesh.reject.push_back(kFaceDrawn);
+    options.faces = mesh.reject.size();
+  }
+  void Resize(int width, int height) {
+    mesh.width = options.width = width, mesh.height = options.height = height;
+    face_ids.assign(static_cast<std::size_t>(width * height), -1);
+    d_alpha.assign(face_ids.size(), 0.0f);
+  }
+};
+
+// The kinds of faces that kernels get wrong.
+enum class FaceKind { kSmall, kLarge, kSliver, kPoint, kSegment, kOnCentres, kFarAway, kCount };
+
+inline void RandomFace(FaceKind kind, Rng* rng, SoftScene* scene) {
+  const double w = scene->options.width, h = scene->options.height;
+  const double reach = kind == FaceKind::kLarge ? 2 * w : kind == FaceKind::kFarAway ? 1e5 : 2;
+  const double cx = rng->Uniform(-2, w + 2), cy = rng->Uniform(-2, h + 2);
+  float x[3], y[3];
+  for (int k = 0; k < 3; ++k) {
+    x[k] = static_cast<float>(cx + rng->Uniform(-reach, reach));
+    y[k] = static_cast<float>(cy + rng->Uniform(-reach, reach));
+    if (kind == FaceKind::kOnCentres)
+      x[k] = std::floor(x[k]) + 0.5f, y[k] = std::floor(y[k]) + 0.5f;
+  }
+  if (kind == FaceKind::kSliver) x[2] = x[1] + 1e-5f, y[2] = y[1] - 1e-5f;
+  if (kind == FaceKind::kSegment || kind == FaceKind::kPoint) x[2] = x[1], y[2] = y[1];
+  if (kind == FaceKind::kPoint) x[1] = x[2] = x[0], y[1] = y[2] = y[0];
+  scene->AddFace(x, y);
+}
+
+inline SoftScene RandomScene(std::uint64_t seed, std::size_t most_faces) {
+  Rng rng(seed, 77);
+  SoftScene scene;
+  scene.Resize(1 + static_cast<int>(rng.Below(20)), 1 + static_cast<int>(rng.Below(20)));
+  const double errors[] = {0, 1e-6, 1e-4, 1e-2};
+  scene.options.max_alpha_error = errors[rng.Below(4)];
+  scene.options.delta = std::pow(10.0, rng.Uniform(-6, 0));
+  const std::size_t faces = rng.Below(most_faces + 1);
+  const bool mixed = rng.Below(2) == 0;
+  auto kind = static_cast<FaceKind>(rng.Below(static_cast<std::uint64_t>(FaceKind::kCount)));
+  for (std::size_t f = 0; f < faces; ++f) {
+    RandomFace(kind, &rng, &scene);
+    if (mixed)
+      kind = static_cast<FaceKind>(rng.Below(static_cast<std::uint64_t>(FaceKind::kCount)));
+  }
+  for (std::size_t i = 0; i < scene.pixels(); ++i) {
+    scene.face_ids[i] = faces > 0 && rng.Below(5) == 0 ? 0 : -1;
+    scene.d_alpha[i] = static_cast<float>(rng.Uniform(-1, 1));
+  }
+  return scene;
+}
+
+// The scene's mesh in double, and everything per (pixel, face) that bounds need.
+class SoftTruth {
+ public:
+  explicit SoftTruth(const SoftScene& scene) : scene_(scene), faces_(scene.options.faces) {
+    x_.assign(scene.mesh.x.begin(), scene.mesh.x.end());
+    y_.assign(scene.mesh.y.begin(), scene.mesh.y.end());
+    mesh_.x = x_, mesh_.y = y_;
+    mesh_.v0 = scene.mesh.v0, mesh_.v1 = scene.mesh.v1, mesh_.v2 = scene.mesh.v2;
+    mesh_.reject = scene.mesh.reject;
+    std::iota(faces_.begin(), faces_.end(), 0);
+    const SoftMaskOptions& o = scene.options;
+    scale_ = {2.0 / o.width, 2.0 / o.height, 1 / o.delta};
+    const double unit = 1 / std::sqrt(o.delta);
+    radius_ = 3.5 * std::hypot(scale_.x * unit, scale_.y * unit);
+    largest_unit_ = std::max(scale_.x, scale_.y) * unit;
+  }
+  double X(std::size_t i) const {
+    return static_cast<double>(i % static_cast<std::size_t>(scene_.options.width)) + 0.5;
+  }
+  double Y(std::size_t i) const {
+    return static_cast<double>(i / static_cast<std::size_t>(scene_.options.width)) + 0.5;
+  }
+  double Alpha(std::size_t i) const {
+    return SoftAlphaRef<double>(mesh_, faces_, X(i), Y(i), scale_);
+  }
+  double Z(std::size_t i, std::size_t face) const {
+    return NearestOnFace(mesh_, face, X(i), Y(i), scale_).squared_distance * scale_.inverse_delta;
+  }
+  // Error of a computed z ("Rounding": Delta z).
+  double ErrorOfZ(double z) const {
+    const double cross = 6 * kU * radius_;
+    return kU * (8 * z + 17 * radius_ * std::sqrt(z)) + 2 * cross * cross;
+  }
+  // Error of a computed A.
+  double ErrorOfA(double z) const {
+    const double error = ErrorOfZ(z);
+    const bool both_end = z - error > 87;  // and so the computed one is 0
+    return both_end ? std::exp(-z) : std::exp(-z) * std::expm1(error + 3 * kU);
+  }
+  // Rounding of alpha at pixel i: the running bound of docs/numerics.md.
+  double Rounding(std::size_t i) const {
+    const auto zs = AllZ(i);
+    const auto others = ProductsOfOthers(zs);
+    double sum = 20 * kU * Alpha(i);
+    for (std::size_t f = 0; f < zs.size(); ++f) {
+      sum += others[f] * ErrorOfA(zs[f]);
+    }
+    return sum + 1e-16 * static_cast<double>(zs.size());
+  }
+  // Two features of a face are equally near within rounding and move differently with its corners:
+  // its gradient is not defined.
+  bool Ambiguous(std::size_t i) const {
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+      const auto best = NearestOnFace(mesh_, f, X(i), Y(i), scale_);
+      for (int k = 0; k < 3; ++k) {
+        const auto other = NearestOnEdge(mesh_, f, k, X(i), Y(i), scale_);
+        const double gap = (other.squared_distance - best.squared_distance) * scale_.inverse_delta;
+        if (gap > 4 * ErrorOfZ(best.squared_distance * scale_.inverse_delta)) continue;
+        const auto a = WeightsOf(f, best), b = WeightsOf(f, other);
+        for (std::size_t c = 0; c < 3; ++c) {
+          if (std::abs(a[c] - b[c]) > 1e-9) return true;
+        }
+      }
+    }
+    return false;
+  }
+  // d_corners [faces][3][2] for d_alpha, and how far a float kernel may be from it.
+  void Gradient(const std::vector<float>& d_alpha, std::vector<double>* d_corners,
+                std::vector<double>* tolerance) const {
+    d_corners->assign(6 * faces_.size(), 0), tolerance->assign(6 * faces_.size(), 0);
+    for (std::size_t i = 0; i < scene_.pixels(); ++i) {
+      if (scene_.face_ids[i] >= 0 || d_alpha[i] == 0) continue;
+      const auto d = static_cast<double>(d_alpha[i]);
+      SoftAlphaRefBackward<double>(mesh_, faces_, X(i), Y(i), scale_, d,
+                                   [&](std::size_t n, int corner, double dx, double dy) {
+                                     double* at = d_corners->data() + 6 * n + 2 * corner;
+                                     at[0] += dx, at[1] += dy;
+                                   });
+      AddTolerance(i, std::abs(d), tolerance);
+    }
+  }
+
+ private:
+  static constexpr double kU = 0x1p-24;
+
+  std::vector<double> AllZ(std::size_t i) const {
+    std::vector<double> zs;
+    for (std::size_t f = 0; f < faces_.size(); ++f) zs.push_back(Z(i, f));
+    return zs;
+  }
+  // How the nearest point moves with the corners; coinciding corners share their weight.
+  std::array<double, 3> WeightsOf(std::size_t f, const NearestFeature<double>& at) const {
+    const double weight[2] = {1 - at.tau, at.tau};
+    std::array<double, 3> out{};
+    for (int k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(mesh_.vertex(f, k));
+      for (int end = 0; end < 2; ++end) {
+        const auto w = static_cast<std::size_t>(mesh_.vertex(f, (at.edge + end) % 3));
+        if (x_[v] == x_[w] && y_[v] == y_[w]) out[static_cast<std::size_t>(k)] += weight[end];
+      }
+    }
+    return out;
+  }
+  static std::vector<double> ProductsOfOthers(const std::vector<double>& zs) {
+    std::vector<double> out(zs.size(), 1.0);
+    double product = 1;
+    for (std::size_t f = 0; f < zs.size(); ++f) out[f] *= product, product *= -std::expm1(-zs[f]);
+    product = 1;
+    for (std::size_t f = zs.size(); f-- > 0;) out[f] *= product, product *= -std::expm1(-zs[f]);
+    return out;
+  }
+  double ShortestEdge(std::size_t f) const {
+    double shortest = 1e300;
+    for (int k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(mesh_.vertex(f, k));
+      const auto b = static_cast<std::size_t>(mesh_.vertex(f, (k + 1) % 3));
+      const double length = std::hypot((x_[a] - x_[b]) * scale_.x, (y_[a] - y_[b]) * scale_.y) /
+                            std::sqrt(scene_.options.delta);
+      if (length > 0) shortest = std::min(shortest, length);
+    }
+    return shortest;
+  }
+  // "Gradients": what culling and rounding may do to each corner of each face.
+  void AddTolerance(std::size_t i, double d_alpha, std::vector<double>* tolerance) const {
+    const auto zs = AllZ(i);
+    const auto others = ProductsOfOthers(zs);
+    const double dropped = scene_.options.max_alpha_error + 1e-30;
+    double d_product = dropped;
+    for (const double z : zs) d_product += 4 * kU + ErrorOfA(z);
+    for (std::size_t f = 0; f < zs.size(); ++f) {
+      const double d = std::sqrt(zs[f]), a = std::exp(-zs[f]);
+      const double d_r = kU * (5 * d + 9 * radius_);
+      const double d_weight = std::min(1.0, kU * (8 * d + 12 * radius_) / ShortestEdge(f) + 4 * kU);
+      const double error =
+          others[f] * (d * ErrorOfA(zs[f]) + a * (80 * kU * d + d_r + d * d_weight)) +
+          a * d * d_product + dropped * (1 + d);
+      for (std::size_t k = 0; k < 6; ++k) {
+        (*tolerance)[6 * f + k] += 2 * largest_unit_ * d_alpha * error;
+      }
+    }
+  }
+
+  const SoftScene& scene_;
+  std::vector<double> x_, y_;
+  ScreenMeshT<double> mesh_;
+  std::vector<std::int32_t> faces_;
+  SoftScale<double> scale_{};
+  double radius_ = 0, largest_unit_ = 0;
+};
+
+// The kernel over all tiles, merged in tile order.
+struct SoftResult {
+  std::vector<float> alpha;
+  double spent = 0;
+  std::vector<float> d_corners;  // [faces][3][2]
+};
+
+inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& d_alpha,
+                              SoftMaskScratch* scratch) {
+  const ScreenMesh mesh = scene.mesh.View();
+  const SoftMaskPlan plan = PlanSoftMask(scene.options);
+  const TileGrid grid(scene.options.width, scene.options.height);
+  TileListBuffers buffers;
+  const TileLists lists = BinSoftFaces(mesh, grid, plan.margin_x, plan.margin_y, &buffers);
+  SoftResult out;
+  out.alpha.assign(scene.pixels(), -1.0f), out.d_corners.assign(6 * mesh.faces(), 0.0f);
+  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+    const SoftMaskTile tile{grid.rect(t), lists[t], BinnedError(plan, lists[t].size()),
+                            scene.face_ids};
+    out.spent = std::max(out.spent, SoftMaskForward(mesh, plan, tile, out.alpha, scratch));
+    std::vector<float> d_tile(6 * lists[t].size(), -1.0f);
+    SoftMaskBackward(mesh, plan, tile, d_alpha, d_tile, scratch);
+    for (std::size_t n = 0; n < d_tile.size(); ++n) {
+      out.d_corners[6 * static_cast<std::size_t>(lists[t][n / 6]) + n % 6] += d_tile[n];
+    }
+  }
+  return out;
+}
+
+}  // namespace tilegrad::raster::test
