@@ -184,10 +184,10 @@ inline void MemberGradient(const SoftBlock& block, const SoftBlockGradient& g, s
     const V weighted = hn::Mul(hn::Mul(two, decay.exp), hn::Load(d, g.d_alpha + pixel));
     AddToCorners(d, n, hn::Mul(weighted, hn::Mul(before, after)), &sums);
   }
-  float* corners = g.d_corners + 6 * static_cast<std::size_t>(block.members[m].position);
-  for (int k = 0; k < 3; ++k) {
-    corners[2 * k] += hn::GetLane(hn::SumOfLanes(d, sums.x[k]));
-    corners[2 * k + 1] += hn::GetLane(hn::SumOfLanes(d, sums.y[k]));
+  float* corners = g.d_corners + block.members[m].position;
+  for (std::size_t k = 0; k < 3; ++k) {
+    corners[k * g.stride] += hn::GetLane(hn::SumOfLanes(d, sums.x[k]));
+    corners[(3 + k) * g.stride] += hn::GetLane(hn::SumOfLanes(d, sums.y[k]));
   }
 }
 

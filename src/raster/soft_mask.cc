@@ -114,12 +114,12 @@ void SoftMaskBackward(const ScreenMesh& mesh, const SoftMaskPlan& plan, const So
     block.stop = plan.stop_error * plan.stop_error;
     scratch->products.resize(std::max(scratch->products.size(), block.count * kBlockPixels));
     g.products = scratch->products.data(), g.d_corners = d_corners.data();
+    g.stride = tile.faces.size();
     HWY_DYNAMIC_DISPATCH(SoftMaskBlockBackwardTarget)(block, g);
   });
-  for (std::size_t i = 0; i < d_corners.size(); i += 2) {
-    d_corners[i] *= static_cast<float>(plan.unit_x);
-    d_corners[i + 1] *= static_cast<float>(plan.unit_y);
-  }
+  const std::size_t half = d_corners.size() / 2;
+  for (float& d : d_corners.first(half)) d *= static_cast<float>(plan.unit_x);
+  for (float& d : d_corners.last(half)) d *= static_cast<float>(plan.unit_y);
 }
 
 }  // namespace tilegrad::raster

@@ -69,8 +69,9 @@ struct SoftMaskScratch {
 double SoftMaskForward(const ScreenMesh& mesh, const SoftMaskPlan& plan, const SoftMaskTile& tile,
                        std::span<float> alpha, SoftMaskScratch* scratch);
 
-// dL/d(corners) of the tile's candidates: d_corners[6 * n + 2 * k], [.. + 1] <- d_x, d_y (per
-// pixel) of corner k of tile.faces[n]; overwritten. The caller merges tiles in a fixed order.
+// dL/d(corners) of the tile's candidates, per pixel: with F = tile.faces.size(),
+// d_corners[k * F + n] <- d_x and d_corners[(3 + k) * F + n] <- d_y of corner k of tile.faces[n].
+// Overwritten; the caller merges tiles in a fixed order.
 // d_alpha as alpha; foreground pixels have no gradient. The nearest feature of each face is held
 // fixed (envelope theorem); on the boundary itself, where A has a kink-free maximum, it is 0.
 void SoftMaskBackward(const ScreenMesh& mesh, const SoftMaskPlan& plan, const SoftMaskTile& tile,

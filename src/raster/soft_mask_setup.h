@@ -66,7 +66,8 @@ struct SoftBlockAlpha {
 struct SoftBlockGradient {
   alignas(64) float d_alpha[kBlockPixels];  // 0 for pixels that have none
   float* products;                          // [count][kBlockPixels]
-  float* d_corners;                         // [tile's list][3][2], added to, per kernel unit
+  float* d_corners;                         // [6][stride] d_x[3], d_y[3]; added to, per kernel unit
+  std::size_t stride;                       // the length of the tile's list
 };
 
 }  // namespace tilegrad::raster

@@ -255,8 +255,10 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
     out.spent = std::max(out.spent, SoftMaskForward(mesh, plan, tile, out.alpha, scratch));
     std::vector<float> d_tile(6 * lists[t].size(), -1.0f);
     SoftMaskBackward(mesh, plan, tile, d_alpha, d_tile, scratch);
-    for (std::size_t n = 0; n < d_tile.size(); ++n) {
-      out.d_corners[6 * static_cast<std::size_t>(lists[t][n / 6]) + n % 6] += d_tile[n];
+    for (std::size_t n = 0; n < lists[t].size(); ++n) {
+      float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(lists[t][n]);
+      for (std::size_t a = 0; a < 6; ++a)
+        to[2 * (a % 3) + a / 3] += d_tile[a * lists[t].size() + n];
     }
   }
   return out;
