@@ -48,9 +48,21 @@ struct TileGrid {
   }
 };
 
+// Tiles [column_begin, column_end) x [row_begin, row_end) of a face.
+struct TileRange {
+  std::int16_t column_begin, column_end, row_begin, row_end;
+};
+
+// How far a face reaches, in pixels, and the bits of FaceReject that keep it out of the lists.
+struct BinMargin {
+  float x, y;
+  std::uint8_t reject;
+};
+
 // Owns the memory of a TileLists; reused from frame to frame.
 struct TileListBuffers {
   AlignedVector<std::int32_t> begin, faces, cursor;
+  AlignedVector<TileRange> ranges;
   TileLists View() const { return {begin, faces}; }
 };
 

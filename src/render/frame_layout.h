@@ -7,7 +7,6 @@
 
 #include "raster/attributes.h"
 #include "raster/near_clip.h"
-#include "render/image_scratch.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -36,11 +35,6 @@ void SizeFrame(int images, int channels, const RenderOptions& options, const Ren
   frame->depth.resize(request.depth ? pixels : 0);
   frame->barycentrics.resize(request.barycentrics ? 2 * pixels : 0);
   frame->alpha_error_bound = 0;
-}
-
-inline SoftMaskSettings SoftSettings(const RenderOptions& options) {
-  return {{2.0f / static_cast<float>(options.width), 2.0f / static_cast<float>(options.height),
-           static_cast<float>(1.0 / options.delta)}};
 }
 
 }  // namespace tilegrad

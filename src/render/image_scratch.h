@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "base/aligned.h"
 #include "raster/attributes.h"
@@ -12,7 +13,7 @@
 #include "raster/interpolate.h"
 #include "raster/near_clip.h"
 #include "raster/screen_mesh.h"
-#include "raster/soft_mask_ref.h"
+#include "raster/soft_mask.h"
 #include "raster/tile_faces.h"
 #include "raster/visibility.h"
 #include "render/renderer.h"
@@ -27,6 +28,7 @@ struct ImageScratch {
   raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
   raster::TileListBuffers drawn_buffers, soft_buffers;
   raster::TileLists drawn, soft;
+  raster::SoftMaskPlan soft_plan;
 
   // Backward: gradients in the layout of `mesh`.
   AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t, d_attributes;
@@ -37,18 +39,20 @@ struct ImageScratch {
 // lists.
 struct FaceGradientBlock {
   std::size_t face_begin = 0, value_begin = 0;
-  std::size_t count = 0, stride = 0;
+  std::size_t count = 0;
+  std::size_t stride = 0;  // of their arrays
 };
 struct TileGradients {
   std::size_t worker = 0;
-  FaceGradientBlock interpolated;  // arrays as InterpolateTileBackward writes them
-  FaceGradientBlock soft;          // d_x[3], d_y[3]
+  FaceGradientBlock interpolated;  // as InterpolateTileBackward writes them
+  FaceGradientBlock soft;          // as SoftMaskBackward writes them
 };
 
 struct WorkerScratch {
   raster::VisibilityTile visibility;
   raster::TileFaces faces;
   raster::TilePlanes planes;
+  raster::SoftMaskScratch soft;
   // Lists that the TileGradients of this worker's tiles point into.
   AlignedVector<std::int32_t> gradient_faces;
   AlignedVector<float> gradient_values;
@@ -62,8 +66,11 @@ struct TileTask {
   raster::TileRect rect;
 };
 
-struct SoftMaskSettings {
-  raster::SoftScale<float> scale;
-};
+// The tile's share of the soft mask; face_ids [H,W] of its image.
+inline raster::SoftMaskTile SoftTileOf(const ImageScratch& image, const TileTask& task,
+                                       std::span<const std::int32_t> face_ids) {
+  const auto near = image.soft[task.tile];
+  return {task.rect, near, raster::BinnedError(image.soft_plan, near.size()), face_ids};
+}
 
 }  // namespace tilegrad

@@ -2,22 +2,12 @@
 #include "render/prepare.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "raster/project.h"
 #include "render/frame_layout.h"
 
 namespace tilegrad {
 namespace {
-
-// Faces farther than this from a pixel change its alpha by less than max_alpha_error altogether: F
-// of them, each at most exp(-d^2/delta). In NDC.
-float SoftMargin(const RenderOptions& options, std::size_t faces) {
-  if (options.max_alpha_error == 0) return std::numeric_limits<float>::infinity();
-  const double ratio = std::max(1.0, static_cast<double>(faces) / options.max_alpha_error);
-  return static_cast<float>(std::sqrt(options.delta * std::log(ratio)));
-}
 
 void PrepareAttributes(const SceneView& scene, ImageScratch* image) {
   image->attributes = AttributesOf(scene);
@@ -41,10 +31,11 @@ void PrepareImage(const SceneView& scene, const RenderOptions& options,
     image->drawn = raster::BinDrawnFaces(image->mesh, grid, &image->drawn_buffers);
   }
   if (request.soft_bins) {
-    const float margin = SoftMargin(options, image->mesh.faces());
-    image->soft = raster::BinSoftFaces(
-        image->mesh, grid, margin * 0.5f * static_cast<float>(options.width),
-        margin * 0.5f * static_cast<float>(options.height), &image->soft_buffers);
+    image->soft_plan =
+        raster::PlanSoftMask({options.width, options.height, options.delta, options.max_alpha_error,
+                              raster::CountSoftFaces(image->mesh)});
+    image->soft = raster::BinSoftFaces(image->mesh, grid, image->soft_plan.margin_x,
+                                       image->soft_plan.margin_y, &image->soft_buffers);
   }
 }
 

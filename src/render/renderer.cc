@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -42,6 +43,7 @@ struct Renderer::Impl {
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
   std::vector<TileGradients> tile_gradients;  // [image][tile]
+  std::vector<double> tile_errors;            // of alpha, [image][tile]
 };
 
 void Renderer::Impl::Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
@@ -67,12 +69,17 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateScenes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  if (request.alpha) frame->alpha_error_bound = options.max_alpha_error;
+  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
+  impl_->tile_errors.assign(scenes.size() * tiles, 0.0);
   impl_->Prepare(scenes, options, {true, request.alpha});
   impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
-    RenderTile(scenes[task.image], options, impl_->images[task.image], task,
-               &impl_->worker_scratch[worker], frame);
+    impl_->tile_errors[task.image * tiles + task.tile] =
+        RenderTile(scenes[task.image], options, impl_->images[task.image], task,
+                   &impl_->worker_scratch[worker], frame);
   });
+  for (const double error : impl_->tile_errors) {
+    frame->alpha_error_bound = std::max(frame->alpha_error_bound, error);
+  }
   return {};
 }
 

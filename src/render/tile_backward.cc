@@ -60,33 +60,21 @@ FaceGradientBlock InterpolatedBlock(const RenderOptions& options, const ImageScr
   return block;
 }
 
-FaceGradientBlock SoftBlock(const RenderOptions& options, const ImageScratch& image,
-                            const TileTask& task, const Frame& frame,
+FaceGradientBlock SoftBlock(const ImageScratch& image, const TileTask& task, const Frame& frame,
                             std::span<const float> d_alpha, WorkerScratch* worker) {
-  const auto near = image.soft[task.tile];
-  const FaceGradientBlock block = AppendBlock(near, near.size(), 6, worker);
-  float* d_faces = worker->gradient_values.data() + block.value_begin;
-  std::fill(d_faces, d_faces + 6 * block.stride, 0.0f);
-  const std::size_t plane =
-      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  for (int i = task.rect.y0; i < task.rect.y1; ++i) {
-    for (int j = task.rect.x0; j < task.rect.x1; ++j) {
-      const std::size_t at = task.image * plane + static_cast<std::size_t>(i * options.width + j);
-      if (frame.face_ids[at] != raster::kNoFace || frame.alpha[at] == 0) continue;
-      raster::SoftAlphaRefBackward<float>(image.mesh, near, static_cast<float>(j) + 0.5f,
-                                          static_cast<float>(i) + 0.5f, SoftSettings(options).scale,
-                                          d_alpha[at],
-                                          [&](std::size_t n, int corner, float d_x, float d_y) {
-                                            const auto k = static_cast<std::size_t>(corner);
-                                            d_faces[k * block.stride + n] += d_x;
-                                            d_faces[(3 + k) * block.stride + n] += d_y;
-                                          });
-    }
-  }
+  const std::size_t pixels =
+      static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  const auto part = [&](auto batch) { return batch.subspan(task.image * pixels, pixels); };
+  const auto tile = SoftTileOf(image, task, part(std::span<const std::int32_t>(frame.face_ids)));
+  const FaceGradientBlock block = AppendBlock(tile.faces, tile.faces.size(), 6, worker);
+  raster::SoftMaskBackward(
+      image.mesh, image.soft_plan, tile, part(d_alpha),
+      std::span(worker->gradient_values).subspan(block.value_begin, 6 * block.stride),
+      &worker->soft);
   return block;
 }
 
-// Adds the arrays [first, first + 3) of a block to a per-vertex gradient.
+// Adds three arrays, one per corner, to a per-vertex gradient.
 void AddCorners(const raster::ScreenMesh& mesh, std::span<const std::int32_t> faces,
                 const float* values, std::size_t stride, std::span<float> d_vertex) {
   for (std::size_t n = 0; n < faces.size(); ++n) {
@@ -112,6 +100,26 @@ void AddAttributes(const ImageScratch& image, std::span<const std::int32_t> face
   }
 }
 
+void MergeInterpolated(const ImageScratch& image, const FaceGradientBlock& block,
+                       const WorkerScratch& worker, std::span<float> d_attributes,
+                       const raster::ScreenGradients& d_mesh) {
+  const auto faces = std::span(worker.gradient_faces).subspan(block.face_begin, block.count);
+  const float* values = worker.gradient_values.data() + block.value_begin;
+  AddCorners(image.mesh, faces, values, block.stride, d_mesh.d_x);
+  AddCorners(image.mesh, faces, values + 3 * block.stride, block.stride, d_mesh.d_y);
+  AddCorners(image.mesh, faces, values + 6 * block.stride, block.stride, d_mesh.d_inverse_depth);
+  if (d_attributes.empty()) return;
+  AddAttributes(image, faces, values + 9 * block.stride, block.stride, d_attributes);
+}
+
+void MergeSoft(const raster::ScreenMesh& mesh, const FaceGradientBlock& block,
+               const WorkerScratch& worker, const raster::ScreenGradients& d_mesh) {
+  const auto faces = std::span(worker.gradient_faces).subspan(block.face_begin, block.count);
+  const float* values = worker.gradient_values.data() + block.value_begin;
+  AddCorners(mesh, faces, values, block.stride, d_mesh.d_x);
+  AddCorners(mesh, faces, values + 3 * block.stride, block.stride, d_mesh.d_y);
+}
+
 }  // namespace
 
 TileGradients RenderTileBackward(const RenderOptions& options, const ImageScratch& image,
@@ -128,7 +136,7 @@ TileGradients RenderTileBackward(const RenderOptions& options, const ImageScratc
     out.interpolated = InterpolatedBlock(options, image, task, d_frame.attributes, worker);
   }
   if (!d_frame.alpha.empty() && request.geometry && !image.soft[task.tile].empty()) {
-    out.soft = SoftBlock(options, image, task, frame, d_frame.alpha, worker);
+    out.soft = SoftBlock(image, task, frame, d_frame.alpha, worker);
   }
   return out;
 }
@@ -138,18 +146,8 @@ void MergeTileGradients(const ImageScratch& image, std::span<const TileGradients
                         const raster::ScreenGradients& d_mesh) {
   for (const TileGradients& tile : tiles) {
     const WorkerScratch& worker = workers[tile.worker];
-    for (const FaceGradientBlock* block : {&tile.interpolated, &tile.soft}) {
-      if (block->count == 0) continue;
-      const auto faces = std::span(worker.gradient_faces).subspan(block->face_begin, block->count);
-      const float* values = worker.gradient_values.data() + block->value_begin;
-      AddCorners(image.mesh, faces, values, block->stride, d_mesh.d_x);
-      AddCorners(image.mesh, faces, values + 3 * block->stride, block->stride, d_mesh.d_y);
-      if (block == &tile.soft) continue;
-      AddCorners(image.mesh, faces, values + 6 * block->stride, block->stride,
-                 d_mesh.d_inverse_depth);
-      if (d_attributes.empty()) continue;
-      AddAttributes(image, faces, values + 9 * block->stride, block->stride, d_attributes);
-    }
+    MergeInterpolated(image, tile.interpolated, worker, d_attributes, d_mesh);
+    MergeSoft(image.mesh, tile.soft, worker, d_mesh);
   }
 }
 

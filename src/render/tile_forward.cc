@@ -51,18 +51,6 @@ void MixCutWeights(const SceneView& scene, const raster::ScreenMesh& mesh,
   });
 }
 
-void WriteAlpha(const ImageScratch& image, const SoftMaskSettings& soft, const TileTask& task,
-                const std::int32_t* faces, float* alpha) {
-  const auto near = image.soft[task.tile];
-  ForEachPixel(task.rect, image.mesh.width, [&](std::size_t from, std::size_t to) {
-    const float px = static_cast<float>(to % static_cast<std::size_t>(image.mesh.width)) + 0.5f;
-    const float py = static_cast<float>(to / static_cast<std::size_t>(image.mesh.width)) + 0.5f;
-    alpha[to] = faces[from] != raster::kNoFace
-                    ? 1.0f
-                    : raster::SoftAlphaRef<float>(image.mesh, near, px, py, soft.scale);
-  });
-}
-
 // The images of one scene within a batch.
 struct ImageOfFrame {
   std::size_t pixels, channels, n;
@@ -96,8 +84,8 @@ void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
 
 }  // namespace
 
-void RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                const TileTask& task, WorkerScratch* worker, Frame* frame) {
+double RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
+                  const TileTask& task, WorkerScratch* worker, Frame* frame) {
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
@@ -110,9 +98,12 @@ void RenderTile(const SceneView& scene, const RenderOptions& options, const Imag
   if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
     InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
   }
-  if (float* alpha = part.plane(frame->alpha, 1)) {
-    WriteAlpha(image, SoftSettings(options), task, seen.face, alpha);
-  }
+  float* alpha = part.plane(frame->alpha, 1);
+  if (alpha == nullptr) return 0;
+  return raster::SoftMaskForward(
+      image.mesh, image.soft_plan,
+      SoftTileOf(image, task, {part.plane(frame->face_ids, 1), part.pixels}), {alpha, part.pixels},
+      &worker->soft);
 }
 
 }  // namespace tilegrad

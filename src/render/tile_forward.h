@@ -7,8 +7,8 @@
 
 namespace tilegrad {
 
-// Writes the tile's pixels into every image that `frame` has.
-void RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                const TileTask& task, WorkerScratch* worker, Frame* frame);
+// Writes the tile's pixels into every image that `frame` has. Returns the error that alpha spent.
+double RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
+                  const TileTask& task, WorkerScratch* worker, Frame* frame);
 
 }  // namespace tilegrad

@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: Apache-2.0
+// What renderer.h promises besides numbers: errors, same bits, no allocation, only what is asked
+// for.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <new>
+
+#include "render/renderer.h"
+#include "render/test_scenes.h"
+
+// Counts heap allocations of the whole program.
+static std::atomic<long> g_allocations{0};
+
+void* CountedAllocate(std::size_t size, std::size_t alignment) {
+  ++g_allocations;
+  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (p == nullptr) std::abort();
+  return p;
+}
+void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return CountedAllocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace tilegrad {
+namespace {
+
+using test::TestScene;
+
+constexpr int kWidth = 40, kHeight = 36;
+
+RenderOptions Options() {
+  RenderOptions options;
+  options.width = kWidth, options.height = kHeight, options.delta = 1e-3;
+  return options;
+}
+
+// A batch with its gradients: a sphere, soups, one of them cut by the near plane.
+struct Batch {
+  std::vector<TestScene<float>> scenes;
+  std::vector<SceneView> views;
+  std::vector<float> d_attributes, d_alpha;
+  std::vector<std::vector<float>> positions, attributes;
+  std::vector<SceneGradients> d_scenes;
+
+  Batch() {
+    Rng rng(21, 1);
+    scenes = {test::BumpySphere(10, 12, kWidth, kHeight, &rng),
+              test::TriangleSoup(40, 0.3, kWidth, kHeight, &rng),
+              test::SoupAroundCamera(20, kWidth, kHeight, &rng)};
+    for (const auto& scene : scenes) {
+      views.push_back(scene.View());
+      positions.emplace_back(scene.positions.size());
+      attributes.emplace_back(scene.attributes.size());
+    }
+    for (std::size_t n = 0; n < scenes.size(); ++n) {
+      d_scenes.push_back({positions[n], attributes[n], true, {}});
+    }
+    d_alpha.resize(scenes.size() * kWidth * kHeight), d_attributes.resize(3 * d_alpha.size());
+    for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
+    for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
+  }
+};
+
+// Everything a forward and a backward pass put out, as bytes.
+std::string Bytes(Renderer* renderer, Batch* batch, std::size_t first, std::size_t count) {
+  Frame frame;
+  const auto views = std::span(batch->views).subspan(first, count);
+  const auto d_scenes = std::span(batch->d_scenes).subspan(first, count);
+  const auto part = [&](const std::vector<float>& values) {
+    const std::size_t one = values.size() / batch->views.size();
+    return std::span<const float>(values).subspan(first * one, count * one);
+  };
+  EXPECT_TRUE(renderer->Render(views, Options(), {true, true, true, true}, &frame).ok());
+  EXPECT_TRUE(renderer
+                  ->Backward(views, Options(), frame,
+                             {part(batch->d_attributes), part(batch->d_alpha)}, d_scenes)
+                  .ok());
+  std::string out;
+  const auto add = [&](const auto& values) {
+    out.append(reinterpret_cast<const char*>(std::data(values)),
+               std::size(values) * sizeof(*std::data(values)));
+  };
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto image = [&](const auto& values) {
+      add(std::span(values).subspan(n * values.size() / count, values.size() / count));
+    };
+    image(frame.face_ids), image(frame.attributes), image(frame.alpha);
+    image(frame.depth), image(frame.barycentrics);
+    add(d_scenes[n].positions), add(d_scenes[n].attributes);
+    add(d_scenes[n].d_camera.rotation), add(d_scenes[n].d_camera.translation);
+    const CameraT<float>& d_camera = d_scenes[n].d_camera;
+    add(std::vector<float>{d_camera.fx, d_camera.fy, d_camera.cx, d_camera.cy});
+  }
+  return out;
+}
+
+TEST(RendererBits, SameForAnyWorkerCountAndAnyRun) {
+  Batch batch;
+  std::string first;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    Renderer renderer(workers);
+    for (int run = 0; run < 3; ++run) {
+      const std::string bytes = Bytes(&renderer, &batch, 0, 3);
+      if (first.empty()) first = bytes;
+      EXPECT_TRUE(bytes == first) << count << " workers, run " << run;
+    }
+  }
+}
+
+TEST(RendererBits, SameBatchedAndOneByOne) {
+  Batch batch;
+  const Workers workers(2);
+  Renderer renderer(workers);
+  const std::string together = Bytes(&renderer, &batch, 0, 3);
+  std::string single;
+  for (std::size_t n = 0; n < 3; ++n) single += Bytes(&renderer, &batch, n, 1);
+  EXPECT_TRUE(together == single);
+}
+
+TEST(RendererMemory, SteadyStateAllocatesNothing) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const auto step = [&] {
+    ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &frame).ok());
+    ASSERT_TRUE(renderer
+                    .Backward(batch.views, Options(), frame, {batch.d_attributes, batch.d_alpha},
+                              batch.d_scenes)
+                    .ok());
+  };
+  const long before_first = g_allocations;
+  step();
+  EXPECT_GT(g_allocations, before_first);  // the counter counts
+  const long before = g_allocations;
+  for (int i = 0; i < 3; ++i) step();
+  EXPECT_EQ(g_allocations - before, 0);
+}
+
+TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const std::size_t pixels = batch.d_alpha.size();
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, false, false}, &frame).ok());
+  EXPECT_EQ(frame.face_ids.size(), pixels);
+  EXPECT_TRUE(frame.attributes.empty() && frame.alpha.empty() && frame.depth.empty() &&
+              frame.barycentrics.empty());
+  EXPECT_EQ(frame.channels, 0);
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &frame).ok());
+  EXPECT_EQ(frame.attributes.size(), 3 * pixels);
+  EXPECT_EQ(frame.alpha.size(), pixels);
+  EXPECT_EQ(frame.depth.size(), pixels);
+  EXPECT_EQ(frame.barycentrics.size(), 2 * pixels);
+}
+
+TEST(RendererRequest, ImagesDoNotDependOnWhatElseIsWanted) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame all, one;
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &all).ok());
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, false, false, false}, &one).ok());
+  EXPECT_EQ(one.attributes, all.attributes);
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, true, false, false}, &one).ok());
+  EXPECT_EQ(one.alpha, all.alpha);
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, true, true}, &one).ok());
+  EXPECT_EQ(one.depth, all.depth);
+  EXPECT_EQ(one.barycentrics, all.barycentrics);
+}
+
+TEST(RendererRequest, GradientsThatAreNotWantedAreLeftAlone) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
+  const FrameGradients d_frame{batch.d_attributes, batch.d_alpha};
+  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
+  const auto positions = batch.positions;
+  const auto attributes = batch.attributes;
+  for (auto& d : batch.d_scenes) d = {{}, d.attributes, false, {}}, d.d_camera.fx = 123;
+  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
+  EXPECT_EQ(batch.attributes, attributes);
+  EXPECT_EQ(batch.d_scenes[0].d_camera.fx, 123);
+  for (std::size_t n = 0; n < 3; ++n) batch.d_scenes[n] = {batch.positions[n], {}, false, {}};
+  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
+  EXPECT_EQ(batch.positions, positions);
+}
+
+TEST(RendererRequest, AnEmptyImageGradientIsZero) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
+  for (auto& d : batch.positions) std::fill(d.begin(), d.end(), 5.0f);
+  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, {}, batch.d_scenes).ok());
+  for (const auto& array : {batch.positions, batch.attributes}) {
+    for (const auto& d : array) {
+      for (const float x : d) EXPECT_EQ(x, 0);
+    }
+  }
+}
+
+// What Render says about a scene that `spoil` has touched.
+template <class Spoil>
+std::string ErrorOf(const Spoil& spoil) {
+  Batch batch;
+  RenderOptions options = Options();
+  spoil(&batch, &options);
+  std::vector<SceneView> views;
+  for (const auto& scene : batch.scenes) views.push_back(scene.View());
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const Status status = renderer.Render(views, options, {}, &frame);
+  return status.ok() ? "ok" : status.message();
+}
+
+TEST(RendererErrors, NameSceneArrayAndIndex) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions*) {}), "ok");
+  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[1].positions[7] = nan; }),
+            "scene 1: positions[7] is nan");
+  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[2].attributes[4] = inf; }),
+            "scene 2: attributes[4] is inf");
+  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[0].camera.rotation[3] = nan; }),
+            "scene 0: camera.rotation[3] is nan");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[0].camera.near_plane = 0; }),
+            "scene 0: camera.near_plane is 0, must be > 0");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = 120; }),
+            "scene 1: faces[5] is 120, outside of [0, 120)");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = -1; }),
+            "scene 1: faces[5] is -1, outside of [0, 120)");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces.pop_back(); }),
+            "scene 1: faces must be [F,3], got 119 indices");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].positions.pop_back(); }),
+            "scene 1: positions must be [V,3], got 359 numbers");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].attributes.pop_back(); }),
+            "scene 1: attributes has 359 numbers, expected 360");
+  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) {
+              b->scenes[2].channels = 0, b->scenes[2].attributes.clear();
+            }),
+            "scene 2 has 0 channels, scene 0 has 3: a batch must agree");
+  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->width = 0; }),
+            "options.width is 0, must be in 1..16384 pixels");
+  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->delta = 0; }),
+            "options.delta is 0, must be finite and > 0");
+  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->max_alpha_error = 2; }),
+            "options.max_alpha_error is 2, must be in [0, 1]");
+}
+
+TEST(RendererErrors, BackwardChecksTheFrame) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
+  const auto error = [&](const FrameGradients& d_frame) {
+    return renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).message();
+  };
+  EXPECT_EQ(error({std::span(batch.d_attributes).first(3), {}}),
+            "d_frame.attributes has 3 numbers, expected 12960");
+  batch.d_alpha[9] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(error({{}, batch.d_alpha}), "d_frame.alpha[9] is nan");
+  batch.d_alpha[9] = 0;
+  frame.face_ids[kWidth * kHeight + 2] = 40;
+  EXPECT_EQ(error({{}, batch.d_alpha}),
+            "scene 1: frame.face_ids[2] is 40, but the scene has 40 faces");
+  frame.face_ids.pop_back();
+  EXPECT_EQ(error({{}, batch.d_alpha}), "frame.face_ids has 4319 numbers, expected 4320");
+}
+
+TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({}, Options(), {}, &frame).ok());
+  EXPECT_TRUE(frame.face_ids.empty());
+  const SceneView empty[] = {SceneView{}};
+  ASSERT_TRUE(renderer.Render(empty, Options(), {true, true, true, true}, &frame).ok());
+  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
+  for (const float alpha : frame.alpha) EXPECT_EQ(alpha, 0);
+  for (const float depth : frame.depth) EXPECT_TRUE(std::isinf(depth));
+  SceneGradients d[] = {{{}, {}, true, {}}};
+  const std::vector<float> d_alpha(frame.alpha.size(), 1.0f);
+  ASSERT_TRUE(renderer.Backward(empty, Options(), frame, {{}, d_alpha}, d).ok());
+  EXPECT_EQ(d[0].d_camera.fx, 0);
+}
+
+TEST(RendererEdgeCases, BehindOffScreenAndDegenerateFacesAreFiniteBackground) {
+  TestScene<float> scene;
+  scene.channels = 1;
+  scene.positions = {0,    0, 5,  1,    0,    5,  0,    1, 5,    // behind
+                     99,   0, -1, 99,   1,    -1, 98,   0, -1,   // beside
+                     0,    0, -2, 0.5f, 0.5f, -2, 1,    1, -2,   // a line
+                     0.2f, 0, -2, 0.2f, 0,    -2, 0.2f, 0, -2};  // a point
+  for (int v = 0; v < 12; ++v) scene.faces.push_back(v);
+  scene.attributes.assign(12, 1.0f);
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const SceneView views[] = {scene.View()};
+  ASSERT_TRUE(renderer.Render(views, Options(), {true, true, true, true}, &frame).ok());
+  float most = 0;
+  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
+  for (const float alpha : frame.alpha) most = std::max(most, alpha);
+  EXPECT_GT(most, 0.1f);  // lines and points are in the soft mask
+  std::vector<float> d_positions(scene.positions.size()), d_alpha(frame.alpha.size(), 1.0f);
+  SceneGradients d[] = {{d_positions, {}, true, {}}};
+  ASSERT_TRUE(renderer.Backward(views, Options(), frame, {{}, d_alpha}, d).ok());
+  for (std::size_t i = 0; i < d_positions.size(); ++i) {
+    EXPECT_TRUE(std::isfinite(d_positions[i])) << i;
+    if (i < 18) {
+      EXPECT_EQ(d_positions[i], 0) << i;
+    }
+  }
+}
+
+TEST(RendererEdgeCases, CulledFacesAreBackgroundWithAlpha) {
+  TestScene<float> scene;
+  scene.channels = 0;
+  scene.positions = {-0.1f, -0.1f, -2, 0, 0.1f, -2, 0.1f, -0.1f, -2};  // clockwise
+  scene.faces = {0, 1, 2};
+  RenderOptions options = Options();
+  options.culling = FaceCulling::kBack;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const SceneView views[] = {scene.View()};
+  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
+  float most = 0;
+  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
+  for (const float alpha : frame.alpha) most = std::max(most, alpha);
+  EXPECT_GT(most, 0.1f);
+  options.culling = FaceCulling::kNone;
+  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
+  EXPECT_GT(std::count(frame.face_ids.begin(), frame.face_ids.end(), 0), 0);
+}
+
+}  // namespace
+}  // namespace tilegrad
