@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/memory.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -39,8 +41,26 @@ SizeClass ClassOf(std::size_t bytes) {
   return {static_cast<std::size_t>(log2) * kSteps + rounded / step - kSteps, rounded};
 }
 
+// Large blocks ask for huge pages: fewer page faults at the start, fewer TLB misses in every pass
+// over weights and activations.
+constexpr std::size_t kHugePage = std::size_t{2} << 20;
+
+std::align_val_t AlignmentOf(std::size_t bytes) {
+  return std::align_val_t(bytes >= 2 * kHugePage ? kHugePage : kAlignment);
+}
+
+Block* New(const SizeClass& size) {
+  auto* block = new Block;
+  block->data = static_cast<std::byte*>(::operator new(size.bytes, AlignmentOf(size.bytes)));
+  block->bytes = size.bytes;
+  block->size_class = size.index;
+  // Advice only: where the system does not follow it, nothing changes but speed.
+  if (size.bytes >= 2 * kHugePage) madvise(block->data, size.bytes, MADV_HUGEPAGE);
+  return block;
+}
+
 void Delete(Block* block) {
-  ::operator delete(block->data, std::align_val_t(kAlignment));
+  ::operator delete(block->data, AlignmentOf(block->bytes));
   delete block;
 }
 
@@ -86,11 +106,7 @@ BlockRef MemoryPool::Allocate(std::size_t bytes) {
   if (free.empty()) {
     ++stats.misses;
     stats.held_bytes += wanted.bytes;
-    block = new Block;
-    block->data =
-        static_cast<std::byte*>(::operator new(wanted.bytes, std::align_val_t(kAlignment)));
-    block->bytes = wanted.bytes;
-    block->size_class = wanted.index;
+    block = New(wanted);
   } else {
     block = free.back();
     free.pop_back();

@@ -18,8 +18,8 @@ Var Neg(const Var& x);
 Var Scale(const Var& x, double factor);
 Var AddScalar(const Var& x, double term);
 Var Exp(const Var& x);
-Var Log(const Var& x);  // natural; NaN below 0, -inf at 0
-Var Sqrt(const Var& x);
+Var Log(const Var& x);   // natural; NaN below 0, -inf at 0
+Var Sqrt(const Var& x);  // gradient infinite at 0: add an epsilon before
 Var Square(const Var& x);
 Var Abs(const Var& x);                      // gradient 0 at 0
 Var Relu(const Var& x);                     // gradient 0 at 0
