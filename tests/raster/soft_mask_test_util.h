@@ -218,7 +218,7 @@ class SoftTruth {
       const double d_weight = std::min(1.0, kU * (8 * d + 12 * radius_) / ShortestEdge(f) + 4 * kU);
       const double error =
           others[f] * (d * ErrorOfA(zs[f]) + a * (80 * kU * d + d_r + d * d_weight)) +
-          a * d * d_product + dropped * (1 + d);
+          a * (d + d_r) * d_product + dropped * (1 + d);
       for (std::size_t k = 0; k < 6; ++k) {
         (*tolerance)[6 * f + k] += 2 * largest_unit_ * d_alpha * error;
       }
