@@ -29,14 +29,18 @@ void ForBlocks(const TileRect& tile, const Task& task) {
   }
 }
 
+std::size_t PixelIndex(const SoftMaskPlan& plan, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
+         static_cast<std::size_t>(x);
+}
+
 // Calls task(index into the image, index into the block) for each background pixel of the block.
 template <class Task>
 void ForBackground(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& block,
                    const Task& task) {
   for (int y = block.y0; y < block.y1; ++y) {
     for (int x = block.x0; x < block.x1; ++x) {
-      const std::size_t image = static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
-                                static_cast<std::size_t>(x);
+      const std::size_t image = PixelIndex(plan, x, y);
       if (tile.face_ids[image] >= 0) continue;
       task(image, static_cast<std::size_t>(y - block.y0) * kBlockSize +
                       static_cast<std::size_t>(x - block.x0));
@@ -44,13 +48,26 @@ void ForBackground(const SoftMaskPlan& plan, const SoftMaskTile& tile, const Til
   }
 }
 
+// The smallest rectangle with all background pixels of `rect`; x1 <= x0 if there is none.
+TileRect BackgroundBox(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& rect) {
+  TileRect box{rect.x1, rect.y1, rect.x0, rect.y0};
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    for (int x = rect.x0; x < rect.x1; ++x) {
+      if (tile.face_ids[PixelIndex(plan, x, y)] >= 0) continue;
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), y + 1};
+    }
+  }
+  return box;
+}
+
+// `rect` is the block, `box` its background.
 double ForwardBlock(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& rect,
-                    std::span<float> alpha, SoftMaskScratch* scratch) {
+                    const TileRect& box, std::span<float> alpha, SoftMaskScratch* scratch) {
   SoftBlockAlpha out;
   std::fill_n(out.alpha, kBlockPixels, 1.0);
   ForBackground(plan, tile, rect, [&](std::size_t, std::size_t b) { out.alpha[b] = 0; });
   SoftBlock block;
-  const double culled = GatherBlock(plan, tile, rect, scratch, &block);
+  const double culled = GatherBlock(plan, tile, {rect, box}, scratch, &block);
   block.stop = StopProduct(plan);
   HWY_DYNAMIC_DISPATCH(SoftMaskBlockTarget)(block, &out);
   double spent = 0;
@@ -60,12 +77,6 @@ double ForwardBlock(const SoftMaskPlan& plan, const SoftMaskTile& tile, const Ti
     spent = std::max(spent, tile.unlisted + culled + (rest > kUnseenProduct ? rest : 0));
   });
   return spent;
-}
-
-bool AnyBackground(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& rect) {
-  bool any = false;
-  ForBackground(plan, tile, rect, [&](std::size_t, std::size_t) { any = true; });
-  return any;
 }
 
 // True if a pixel of the block has a gradient to hand on.
@@ -88,12 +99,14 @@ double SoftMaskForward(const ScreenMesh& mesh, const SoftMaskPlan& plan, const S
     const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width);
     std::fill(alpha.data() + row + tile.rect.x0, alpha.data() + row + tile.rect.x1, 1.0f);
   }
-  if (!AnyBackground(plan, tile, tile.rect)) return 0;
-  SetUpFaces(mesh, plan, tile, &scratch->faces);
+  const TileRect background = BackgroundBox(plan, tile, tile.rect);
+  if (background.x1 <= background.x0) return 0;
+  SetUpFaces(mesh, plan, tile, background, &scratch->faces);
   double spent = 0;
   ForBlocks(tile.rect, [&](const TileRect& rect) {
-    if (!AnyBackground(plan, tile, rect)) return;
-    spent = std::max(spent, ForwardBlock(plan, tile, rect, alpha, scratch));
+    const TileRect box = BackgroundBox(plan, tile, rect);
+    if (box.x1 <= box.x0) return;
+    spent = std::max(spent, ForwardBlock(plan, tile, rect, box, alpha, scratch));
   });
   return std::min(spent, 1.0);
 }
@@ -106,10 +119,13 @@ void SoftMaskBackward(const ScreenMesh& mesh, const SoftMaskPlan& plan, const So
   ForBlocks(tile.rect, [&](const TileRect& rect) {
     SoftBlockGradient g;
     if (!CollectGradient(plan, tile, rect, d_alpha, &g)) return;
-    if (!set_up) SetUpFaces(mesh, plan, tile, &scratch->faces);
+    if (!set_up) {
+      SetUpFaces(mesh, plan, tile, BackgroundBox(plan, tile, tile.rect), &scratch->faces);
+    }
     set_up = true;
+    const TileRect box = BackgroundBox(plan, tile, rect);
     SoftBlock block;
-    GatherBlock(plan, tile, rect, scratch, &block);
+    GatherBlock(plan, tile, {rect, box}, scratch, &block);
     // The square: a face's gradient may be as large as the root of the product (docs/numerics.md).
     block.stop = plan.stop_error * plan.stop_error;
     scratch->products.resize(std::max(scratch->products.size(), block.count * kBlockPixels));

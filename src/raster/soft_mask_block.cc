@@ -30,15 +30,18 @@ struct Point {
 SoftEdge MakeEdge(const Point& a, const Point& b) {
   const double ex = b.x - a.x, ey = b.y - a.y;
   const double length = std::sqrt(ex * ex + ey * ey);
-  const double tx = length > 0 ? ex / length : 1, ty = length > 0 ? ey / length : 0;
-  return {tx, ty, ty * a.x - tx * a.y, -(tx * a.x + ty * a.y), length};
+  const double inverse = length > 0 ? 1 / length : 0;
+  const double tx = length > 0 ? ex * inverse : 1, ty = ey * inverse;
+  return {tx, ty, ty * a.x - tx * a.y, -(tx * a.x + ty * a.y), length, inverse};
 }
 
-SoftFace MakeFace(const Point (&c)[3]) {
-  const auto [left, right] = std::minmax({c[0].x, c[1].x, c[2].x});
-  const auto [top, bottom] = std::minmax({c[0].y, c[1].y, c[2].y});
-  return {
-      left, top, right, bottom, {MakeEdge(c[0], c[1]), MakeEdge(c[1], c[2]), MakeEdge(c[2], c[0])}};
+void SetBox(const Point (&c)[3], SoftFace* face) {
+  face->left = std::min({c[0].x, c[1].x, c[2].x}), face->right = std::max({c[0].x, c[1].x, c[2].x});
+  face->top = std::min({c[0].y, c[1].y, c[2].y}), face->bottom = std::max({c[0].y, c[1].y, c[2].y});
+}
+
+void SetEdges(const Point (&c)[3], SoftFace* face) {
+  for (int k = 0; k < 3; ++k) face->edge[k] = MakeEdge(c[k], c[k == 2 ? 0 : k + 1]);
 }
 
 // Finite, and its square is at most infinite.
@@ -51,37 +54,47 @@ SoftBlockEdge ShiftEdge(const SoftEdge& e, const Point& p) {
           ToFloat(e.side - e.ty * p.x + e.tx * p.y),
           ToFloat(along),
           ToFloat(along - e.length),
-          e.length > 0 ? ToFloat(1 / e.length) : 0.0f};
+          ToFloat(e.inverse_length)};
 }
 
-// A block's pixel centres: a box around `centre`.
+// Pixel centres in a box around `centre`, and z from which on a face is far from them.
 struct Box {
   Point centre, half;
-  double radius() const { return std::hypot(half.x, half.y); }
+  double z, reach;  // reach: sqrt(z) + the radius of the box, squared
 };
 
-Box BoxOf(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& rect) {
-  const double dx = rect.x0 + 0.5 * kBlockSize - 0.5 * (tile.rect.x0 + tile.rect.x1);
-  const double dy = rect.y0 + 0.5 * kBlockSize - 0.5 * (tile.rect.y0 + tile.rect.y1);
-  constexpr double kHalf = 0.5 * (kBlockSize - 1);
-  return {{dx * plan.unit_x, dy * plan.unit_y}, {kHalf * plan.unit_x, kHalf * plan.unit_y}};
+// The centre of the tile is the origin.
+Point ToUnits(const SoftMaskPlan& plan, const SoftMaskTile& tile, double x, double y) {
+  return {(x - 0.5 * (tile.rect.x0 + tile.rect.x1)) * plan.unit_x,
+          (y - 0.5 * (tile.rect.y0 + tile.rect.y1)) * plan.unit_y};
+}
+
+Box BoxOf(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& pixels, double z) {
+  const Point half{0.5 * (pixels.x1 - pixels.x0 - 1) * plan.unit_x,
+                   0.5 * (pixels.y1 - pixels.y0 - 1) * plan.unit_y};
+  const double reach = std::sqrt(z) + std::hypot(half.x, half.y);
+  return {ToUnits(plan, tile, 0.5 * (pixels.x0 + pixels.x1), 0.5 * (pixels.y0 + pixels.y1)), half,
+          z, reach * reach};
 }
 
 double Gap(double low, double high, double centre, double half) {
   return std::max({low - centre - half, centre - half - high, 0.0});
 }
 
-// Every point of the block is farther than sqrt(z) from the face's boundary.
-bool IsFar(const SoftFace& face, const Box& box, double z) {
+// Every point of the box is farther than sqrt(z) from the face's box.
+bool IsBoxFar(const SoftFace& face, const Box& box) {
   const double gx = Gap(face.left, face.right, box.centre.x, box.half.x);
   const double gy = Gap(face.top, face.bottom, box.centre.y, box.half.y);
-  if (gx * gx + gy * gy > z) return true;
+  return gx * gx + gy * gy > box.z;
+}
+
+// The same for the face's boundary.
+bool IsBoundaryFar(const SoftFace& face, const Box& box) {
   double nearest = SquaredDistance(face.edge[0], box.centre.x, box.centre.y);
   for (int k = 1; k < 3; ++k) {
     nearest = std::min(nearest, SquaredDistance(face.edge[k], box.centre.x, box.centre.y));
   }
-  const double reach = std::sqrt(z) + box.radius();
-  return nearest > reach * reach;
+  return nearest > box.reach;
 }
 
 }  // namespace
@@ -114,39 +127,43 @@ double BinnedError(const SoftMaskPlan& plan, std::size_t listed) {
 double StopProduct(const SoftMaskPlan& plan) { return std::max(plan.stop_error, kUnseenProduct); }
 
 void SetUpFaces(const ScreenMesh& mesh, const SoftMaskPlan& plan, const SoftMaskTile& tile,
-                AlignedVector<SoftFace>* faces) {
-  const double cx = 0.5 * (tile.rect.x0 + tile.rect.x1), cy = 0.5 * (tile.rect.y0 + tile.rect.y1);
+                const TileRect& background, AlignedVector<SoftFace>* faces) {
+  const Box box = BoxOf(plan, tile, background, DropZ(tile.faces.size(), plan.cull_error));
   faces->resize(tile.faces.size());
   for (std::size_t n = 0; n < tile.faces.size(); ++n) {
+    SoftFace& face = (*faces)[n];
     Point corner[3];
     for (int k = 0; k < 3; ++k) {
       const auto v =
           static_cast<std::size_t>(mesh.vertex(static_cast<std::size_t>(tile.faces[n]), k));
-      corner[k] = {(static_cast<double>(mesh.x[v]) - cx) * plan.unit_x,
-                   (static_cast<double>(mesh.y[v]) - cy) * plan.unit_y};
+      corner[k] =
+          ToUnits(plan, tile, static_cast<double>(mesh.x[v]), static_cast<double>(mesh.y[v]));
     }
-    (*faces)[n] = MakeFace(corner);
+    SetBox(corner, &face);
+    face.far = IsBoxFar(face, box);
+    if (!face.far) SetEdges(corner, &face);
   }
 }
 
-double GatherBlock(const SoftMaskPlan& plan, const SoftMaskTile& tile, const TileRect& rect,
+double GatherBlock(const SoftMaskPlan& plan, const SoftMaskTile& tile, const BlockPixels& pixels,
                    SoftMaskScratch* scratch, SoftBlock* block) {
-  const Box box = BoxOf(plan, tile, rect);
   const std::size_t listed = scratch->faces.size();
   const double z = DropZ(listed, plan.cull_error);
+  const Box box = BoxOf(plan, tile, pixels.background, z);
+  constexpr double kMiddle = 0.5 * (kBlockSize - 1);
+  const Point origin =
+      ToUnits(plan, tile, pixels.rect.x0 + kMiddle + 0.5, pixels.rect.y0 + kMiddle + 0.5);
   scratch->members.clear();
   for (std::size_t n = 0; n < listed; ++n) {
     const SoftFace& face = scratch->faces[n];
-    if (IsFar(face, box, z)) continue;
-    scratch->members.push_back(
-        {{ShiftEdge(face.edge[0], box.centre), ShiftEdge(face.edge[1], box.centre),
-          ShiftEdge(face.edge[2], box.centre)},
-         static_cast<std::int32_t>(n)});
+    if (face.far || IsBoxFar(face, box) || IsBoundaryFar(face, box)) continue;
+    scratch->members.push_back({{ShiftEdge(face.edge[0], origin), ShiftEdge(face.edge[1], origin),
+                                 ShiftEdge(face.edge[2], origin)},
+                                static_cast<std::int32_t>(n)});
   }
   for (int i = 0; i < kBlockSize; ++i) {
-    const double offset = i - 0.5 * (kBlockSize - 1);
-    block->x[i] = static_cast<float>(offset * plan.unit_x);
-    block->y[i] = static_cast<float>(offset * plan.unit_y);
+    block->x[i] = static_cast<float>((i - kMiddle) * plan.unit_x);
+    block->y[i] = static_cast<float>((i - kMiddle) * plan.unit_y);
   }
   block->members = scratch->members.data(), block->count = scratch->members.size();
   return static_cast<double>(listed - block->count) * std::exp(-z);

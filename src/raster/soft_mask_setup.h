@@ -21,11 +21,13 @@ inline constexpr std::size_t kMergeEvery = 16;
 // lies at `side` along n and at `along` along t from the first corner.
 struct SoftEdge {
   double tx, ty, side, along, length;
+  double inverse_length;  // 0 for an edge of no length
 };
 
 struct SoftFace {
   double left, top, right, bottom;  // box
   SoftEdge edge[3];                 // edge k: corner k to corner k + 1
+  bool far;                         // from all pixels of the tile that are computed
 };
 
 // Squared distance of (x, y) to an edge, the point given relative to the edge's origin.
