@@ -137,6 +137,7 @@ HWY_INLINE void SetUpLanes(const InterpolateInput& input, const TileFaces& faces
     hn::Store(row[k], di, planes->row(k) + s);
   }
   StorePlane(q, planes->q() + s);
+  hn::Store(hn::Min(hn::Min(m[0], m[1]), m[2]), d, planes->least_q() + s);
   for (int c = 0; c < planes->channels(); ++c) {
     Plane n = ZeroPlane();
     for (int k = 0; k < 3; ++k) {
@@ -181,7 +182,9 @@ HWY_INLINE PixelLanes LocatePixels(const InterpolateInput& input, const TileFace
   out.y = hn::Sub(py, hn::GatherIndex(d, faces.origin_y, out.slot));
   out.inverse_q = hn::Set(d, 1.0f);
   if (input.mode == Interpolation::kPerspective) {
-    out.inverse_q = hn::Div(hn::Set(d, 1.0f), EvaluatePlane(planes->q(), out.slot, out.x, out.y));
+    const auto q = hn::Max(EvaluatePlane(planes->q(), out.slot, out.x, out.y),
+                           hn::GatherIndex(d, planes->least_q(), out.slot));
+    out.inverse_q = hn::Div(hn::Set(d, 1.0f), q);
   }
   return out;
 }

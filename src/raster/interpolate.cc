@@ -21,7 +21,7 @@ HWY_EXPORT(InterpolateBackward);
 void TilePlanes::Resize(int channels, bool barycentrics) {
   channels_ = channels, outputs_ = channels + (barycentrics ? 2 : 0);
   const auto arrays = static_cast<std::size_t>(channels) + 1;
-  data_.resize(kTilePixels * static_cast<std::size_t>(3 * (4 + outputs_) + 3));
+  data_.resize(kTilePixels * static_cast<std::size_t>(3 * (4 + outputs_) + 4));
   rows_.resize(kTilePixels * 3);
   h_.resize(kTilePixels * arrays);
   moments_.resize(kTilePixels * 3 * arrays);

@@ -6,6 +6,9 @@
 //     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k          (Q = 1:
 //     screen-linear)
 //
+// (Q is kept at or above the smallest m_k: rounding in coverage lets a pixel centre lie a hair
+// outside of its face, where a plane that varies much may cross zero)
+//
 // where N_c and Q are planes: three numbers per face and channel. With h_c = dL/dI_c / Q and
 // s = sum_c h_c I_c, the adjoint of a face needs only sums of h_c and s over its pixels, weighted
 // by 1, x and y (their moments): with S_k(f) = sum over pixels of b_k f, a combination of those,
@@ -44,6 +47,7 @@ class TilePlanes {
   float* q() { return weight(3); }
   float* numerator(int output) { return weight(4 + output); }
   float* m(int k) { return data_.data() + kTilePixels * (3 * (4 + outputs_) + k); }
+  float* least_q() { return m(3); }
   std::int32_t* row(int k) { return rows_.data() + kTilePixels * k; }  // first value of corner k
   // Scratch of the backward pass: h_c and s per pixel; moments [slot][3][channels + 1].
   float* h(int channel) { return h_.data() + kTilePixels * channel; }

@@ -8,6 +8,7 @@
 
 #include "raster/attributes.h"
 #include "raster/face_plane.h"
+#include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {
@@ -24,13 +25,16 @@ PixelWeights<T> PixelWeightsRef(const ScreenMeshT<T>& mesh, const FacePlane<T>& 
                                 std::size_t face, Interpolation mode, const T& px, const T& py) {
   PixelWeights<T> out;
   const auto b = plane.Weights(px, py);
+  const ScreenCorners<T> corners = CornersOf(mesh, face);
+  T least = corners.z[0];
   out.q = T(0);
   for (int k = 0; k < 3; ++k) {
     out.b[k] = b[static_cast<std::size_t>(k)];
-    const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
-    out.w[k] = mode == Interpolation::kPerspective ? out.b[k] * mesh.inverse_depth[v] : out.b[k];
+    out.w[k] = mode == Interpolation::kPerspective ? out.b[k] * corners.z[k] : out.b[k];
     out.q += out.w[k];
+    if (RealPart(corners.z[k]) < RealPart(least)) least = corners.z[k];
   }
+  if (RealPart(out.q) < RealPart(least)) out.q = least;  // see interpolate.h
   if (mode == Interpolation::kScreenLinear) out.q = T(1);
   for (T& w : out.w) w /= out.q;
   return out;

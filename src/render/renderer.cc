@@ -102,7 +102,7 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
   impl_->workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
     impl_->Merge(scenes[n], options, n, &d_scenes[n]);
   });
-  return {};
+  return ValidateResult(d_scenes);
 }
 
 }  // namespace tilegrad

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/validate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -40,11 +41,15 @@ Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
   return {};
 }
 
-Status CheckCamera(const Camera& camera) {
+Status CheckCameraNumbers(const Camera& camera) {
   TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
   TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
   const float numbers[5] = {camera.fx, camera.fy, camera.cx, camera.cy, camera.near_plane};
-  TILEGRAD_TRY(CheckFinite("camera.{fx, fy, cx, cy, near_plane}", numbers));
+  return CheckFinite("camera.{fx, fy, cx, cy, near_plane}", numbers);
+}
+
+Status CheckCamera(const Camera& camera) {
+  TILEGRAD_TRY(CheckCameraNumbers(camera));
   if (!(camera.near_plane > 0)) {
     return InvalidArgument("camera.near_plane is {}, must be > 0", camera.near_plane);
   }
@@ -56,9 +61,10 @@ Status CheckScene(const SceneView& scene) {
   if (scene.positions.size() % 3 != 0) {
     return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
   }
-  if (scene.positions.size() > kMost || scene.faces.size() > kMost) {
-    return ResourceExhausted("{} numbers of positions and {} of faces, the limit is {} each",
-                             scene.positions.size(), scene.faces.size(), kMost);
+  if (std::max({scene.positions.size(), scene.faces.size(), scene.attributes.size()}) > kMost) {
+    return ResourceExhausted(
+        "{} numbers of positions, {} of faces, {} of attributes: the limit is {} each",
+        scene.positions.size(), scene.faces.size(), scene.attributes.size(), kMost);
   }
   const std::size_t vertices = scene.positions.size() / 3;
   TILEGRAD_TRY(CheckFaces(scene.faces, vertices));
@@ -163,6 +169,16 @@ Status ValidateBackward(std::span<const SceneView> scenes, const RenderOptions& 
       status = CheckFaceIds(scenes[n], std::span(frame.face_ids).subspan(n * pixels, pixels));
     }
     if (!status.ok()) return status.Within(SceneName(n));
+  }
+  return {};
+}
+
+Status ValidateResult(std::span<const SceneGradients> d_scenes) {
+  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
+    Status status = CheckFinite("d_scene.positions", d_scenes[n].positions);
+    if (status.ok()) status = CheckFinite("d_scene.attributes", d_scenes[n].attributes);
+    if (status.ok() && d_scenes[n].camera) status = CheckCameraNumbers(d_scenes[n].d_camera);
+    if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
   }
   return {};
 }

@@ -15,5 +15,7 @@ Status ValidateScenes(std::span<const SceneView> scenes);
 Status ValidateBackward(std::span<const SceneView> scenes, const RenderOptions& options,
                         const Frame& frame, const FrameGradients& d_frame,
                         std::span<const SceneGradients> d_scenes);
+// Gradients that overflow float are an error, not an Inf that spreads.
+Status ValidateResult(std::span<const SceneGradients> d_scenes);
 
 }  // namespace tilegrad

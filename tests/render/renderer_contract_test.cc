@@ -285,6 +285,20 @@ TEST(RendererErrors, BackwardChecksTheFrame) {
   EXPECT_EQ(error({{}, batch.d_alpha}), "frame.face_ids has 4319 numbers, expected 4320");
 }
 
+TEST(RendererErrors, AnOverflowingGradientIsNotReturnedSilently) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
+  for (float& d : batch.d_attributes) d = std::numeric_limits<float>::max();
+  const Status status =
+      renderer.Backward(batch.views, Options(), frame, {batch.d_attributes, {}}, batch.d_scenes);
+  EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message().find("the gradient overflows: d_scene."), std::string::npos)
+      << status.message();
+}
+
 TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
   const Workers workers(1);
   Renderer renderer(workers);

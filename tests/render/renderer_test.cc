@@ -25,7 +25,6 @@ struct Case {
   int width, height;
   Interpolation mode;
   double delta;
-  // Whole tests run on scenes whose faces are not slivers: errors scale with 1 / height.
 };
 
 TestScene<float> CornerSoup(int w, int h, Rng* r) {
@@ -82,13 +81,24 @@ class OnTarget : public testing::TestWithParam<Case> {
 
 class AgainstReference : public OnTarget {};
 
-// Screen coordinates carry about 4 rounding errors of float relative to the image size W, i.e.
-// 4 eps W pixels; over a face of height h that moves a weight by 4 eps W / h, and faces thinner
-// than kFlatHeight are flat. So no weight errs by more than 4 eps W / kFlatHeight, and typical
-// faces (h > 1 pixel) by 64 times less.
+// Screen coordinates are sums and products of a handful of floats of the size of the image, W: they
+// err by about 4 eps W pixels. Over a face of height h pixels that moves a weight by 4 eps W / h.
+// This is for h = 1/4; what is thinner (down to kFlatHeight, below which faces are flat) may err
+// more, and tests say how many pixels may. 1e-5 is for the few operations on weights of up to 64
+// (the distance of the corners of a tile's face from its first pixel).
 double WeightTolerance(const RenderOptions& options) {
   return 16 * kEps * std::max(options.width, options.height) + 1e-5;
 }
+
+// Attributes are in [0, 1] and mix three weights.
+double ImageTolerance(const RenderOptions& options) { return 4 * WeightTolerance(options); }
+
+// Relative to the largest entry: the position gradient has one weight and one 1/height more.
+double GradientTolerance(const RenderOptions& options) { return 8 * WeightTolerance(options); }
+
+// Distances err by 4 eps W pixels = 8 eps in NDC, so A = exp(-z), z = d^2 / delta, errs by at most
+// max(2 sqrt(z) exp(-z)) 8 eps / sqrt(delta) = 0.86 * 8 eps * 84 = 7e-5 for delta >= 1/7000.
+constexpr double kAlphaTolerance = 1e-4;
 
 TEST_P(AgainstReference, ForwardImages) {
   const RenderOptions options = OptionsOf(GetParam());
@@ -107,13 +117,13 @@ TEST_P(AgainstReference, ForwardImages) {
                                {0, options.height}, &truth);
     // A pixel on a sliver may be off by much more than others: those are counted.
     std::size_t far_off = 0;
-    const double tolerance = 4 * WeightTolerance(options);
+    const double tolerance = ImageTolerance(options);
     for (std::size_t i = 0; i < truth.attributes.size(); ++i) {
       far_off += !(std::abs(frame.attributes[i] - truth.attributes[i]) <= tolerance);
     }
     EXPECT_LE(far_off, truth.attributes.size() / 200) << target;
     for (std::size_t i = 0; i < truth.alpha.size(); ++i) {
-      EXPECT_NEAR(frame.alpha[i], truth.alpha[i], 1e-4) << target << " pixel " << i;
+      EXPECT_NEAR(frame.alpha[i], truth.alpha[i], kAlphaTolerance) << target << " pixel " << i;
     }
     for (std::size_t i = 0; i < truth.depth.size(); ++i) {
       if (std::isinf(truth.depth[i])) {
@@ -130,11 +140,11 @@ TEST_P(AgainstReference, ForwardImages) {
   }
 }
 
-TEST_P(AgainstReference, FaceIdsEqualTheFloatReferenceBitForBit) {
+// Bit for bit against the reference in float: tests/raster/visibility_test.cc. Here in double.
+TEST_P(AgainstReference, FaceIds) {
   const RenderOptions options = OptionsOf(GetParam());
   Rng rng(12, 3);
   const auto scene = GetParam().make(options.width, options.height, &rng);
-  std::vector<std::int32_t> first;
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     const Workers workers(1);
@@ -143,7 +153,8 @@ TEST_P(AgainstReference, FaceIdsEqualTheFloatReferenceBitForBit) {
     const SceneView views[] = {scene.View()};
     ASSERT_TRUE(renderer.Render(views, options, {false, false, false, false}, &frame).ok());
     // The double reference rounds vertices to subpixels from better coordinates: a pixel may differ
-    // where a coordinate sits at the boundary of rounding and a centre within 1/1024 pixel.
+    // where a coordinate sits at the boundary of rounding and a centre within 1/1024 pixel. With
+    // edges of about 1/4 of the pixels' number in length, 1/1024 of those centres are that near.
     const auto truth =
         FaceIdsRef(test::SceneCast<double>(scene).View(), options, {0, options.height});
     std::size_t different = 0;
@@ -184,7 +195,7 @@ TEST_P(AgainstReference, Gradients) {
         EXPECT_NEAR(got[i], expected[i], bound * scale + 1e-6) << target << " " << what << " " << i;
       }
     };
-    const double bound = 8 * WeightTolerance(options);
+    const double bound = GradientTolerance(options);
     check("positions", positions, t_positions, bound);
     check("attributes", attributes, t_attributes, bound);
     check("rotation", d[0].d_camera.rotation, t.d_camera.rotation, bound);
