@@ -16,5 +16,6 @@ using Action = std::function<Status()>;
 
 // Adds a subcommand to `app`; when it is given on the command line, sets *action.
 void AddInfo(CLI::App& app, Action* action);
+void AddTrain(CLI::App& app, Action* action);
 
 }  // namespace tilegrad::cli

@@ -42,6 +42,7 @@ int Run(int argc, char** argv) {
   app.require_subcommand(1);
   Action action;
   AddInfo(app, &action);
+  AddTrain(app, &action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad train: a run from a configuration and a dataset.
+#include <fmt/core.h>
+
+#include "base/parallel.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "train/trainer.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct TrainOptions {
+  std::string config, data, out;
+  std::vector<std::string> overrides;
+  bool resume = false;
+  double max_minutes = 0;
+  int workers = 0;
+};
+
+void PrintOutcome(const train::TrainOutcome& outcome, const TrainOptions& options) {
+  for (const auto& warning : outcome.warnings)
+    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  if (outcome.first_step == outcome.last_step) {
+    fmt::print("{}: the run is complete at step {}; nothing to do\n", options.out,
+               outcome.last_step);
+    return;
+  }
+  fmt::print("{}: {} at step {}, {} of training\n", options.out,
+             outcome.finished ? "finished" : "stopped", outcome.last_step,
+             FormatDuration(outcome.seconds));
+  if (!outcome.finished) fmt::print("go on with the same command and --resume\n");
+}
+
+Status RunTraining(const TrainOptions& options) {
+  train::TrainJob job;
+  TILEGRAD_ASSIGN(job.config, train::ReadConfig(options.config));
+  TILEGRAD_TRY(train::ApplyOverrides(options.overrides, &job.config));
+  job.data = options.data;
+  job.run = options.out;
+  job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
+  job.max_minutes = options.max_minutes;
+  const Workers workers(options.workers);
+  ProgressLine line;
+  auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
+  line.Finish();
+  if (!outcome.ok()) return outcome.status();
+  PrintOutcome(*outcome, options);
+  return {};
+}
+
+}  // namespace
+
+void AddTrain(CLI::App& app, Action* action) {
+  auto options = std::make_shared<TrainOptions>();
+  auto* command = app.add_subcommand(
+      "train", "Train a single-image 3D predictor on a dataset, 2D supervision only");
+  command
+      ->add_option("--config", options->config,
+                   "TOML file, e.g. configs/quick.toml or configs/paper.toml")
+      ->required();
+  command->add_option("--data", options->data, "dataset folder (see: tilegrad dataset)")
+      ->required();
+  command->add_option("--out", options->out, "run folder: checkpoints, curves, samples")
+      ->required();
+  command->add_option("--set", options->overrides,
+                      "override a key: --set schedule.steps=100 (repeatable)");
+  command->add_flag("--resume", options->resume,
+                    "go on with the run in --out (start it if there is none)");
+  command
+      ->add_option("--max-minutes", options->max_minutes,
+                   "save and stop after this many minutes; 0: no limit")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--workers", options->workers,
+                   "threads; 0: one per core. The result does not depend on it")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  command->callback([options, action] { *action = [options] { return RunTraining(*options); }; });
+}
+
+}  // namespace tilegrad::cli

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/checkpoint.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr const char* kFormat = "tilegrad-checkpoint-1";
+constexpr std::string_view kPrefix = "step_", kSuffix = ".safetensors";
+
+Path Folder(const Path& run) { return run / "checkpoints"; }
+
+template <class T>
+std::optional<T> Number(const std::map<std::string, std::string>& metadata,
+                        const std::string& key) {
+  const auto it = metadata.find(key);
+  if (it == metadata.end()) return std::nullopt;
+  T value{};
+  const char* end = it->second.data() + it->second.size();
+  const auto [at, error] = std::from_chars(it->second.data(), end, value);
+  return error == std::errc() && at == end ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
+                      std::vector<nn::NamedTensor> tensors) {
+  nn::TensorFile file{std::move(tensors),
+                      {{"format", kFormat},
+                       {"step", std::to_string(info.step)},
+                       {"image_size", std::to_string(info.image_size)},
+                       {"seconds", fmt::format("{}", info.seconds)},
+                       {"config", info.config}}};
+  return nn::WriteSafetensors(Folder(run) / fmt::format("{}{:08}{}", kPrefix, info.step, kSuffix),
+                              file);
+}
+
+Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& path) {
+  TILEGRAD_ASSIGN(nn::TensorFile file, nn::ReadSafetensors(context, path));
+  const auto& m = file.metadata;
+  const auto step = Number<std::int64_t>(m, "step"),
+             image_size = Number<std::int64_t>(m, "image_size");
+  const auto seconds = Number<double>(m, "seconds");
+  if (m.count("format") == 0 || m.at("format") != kFormat || !step || !image_size || !seconds ||
+      m.count("config") == 0) {
+    return DataLoss(
+        "{}: a safetensors file, but not a checkpoint of tilegrad (its metadata lacks format, "
+        "step, image_size, seconds "
+        "or config)",
+        path.string());
+  }
+  return Checkpoint{{*step, *image_size, m.at("config"), *seconds}, std::move(file.tensors)};
+}
+
+std::vector<Path> ListCheckpoints(const Path& run) {
+  std::vector<Path> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(Folder(run), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(kPrefix) && name.ends_with(kSuffix)) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());  // step numbers have leading zeros
+  return files;
+}
+
+Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
+  std::vector<Path> files = ListCheckpoints(run);
+  if (files.empty()) return NotFound("{}: no checkpoint in it", Folder(run).string());
+  FoundCheckpoint found;
+  Status first_failure;
+  for (auto file = files.rbegin(); file != files.rend(); ++file) {
+    auto checkpoint = LoadCheckpoint(context, *file);
+    if (checkpoint.ok()) {
+      found.checkpoint = std::move(checkpoint).value();
+      found.file = *file;
+      return found;
+    }
+    found.warnings.push_back(checkpoint.status().message());
+    if (first_failure.ok()) first_failure = checkpoint.status();
+  }
+  return first_failure;
+}
+
+void PruneCheckpoints(const Path& run, std::int64_t keep) {
+  std::error_code error;
+  const std::vector<Path> files = ListCheckpoints(run);
+  const auto kept = std::min(files.size(), static_cast<std::size_t>(keep));
+  for (std::size_t i = 0; i + kept < files.size(); ++i) std::filesystem::remove(files[i], error);
+  for (const auto& entry : std::filesystem::directory_iterator(Folder(run), error)) {
+    if (entry.path().extension() == ".tmp") std::filesystem::remove(entry.path(), error);
+  }
+}
+
+}  // namespace tilegrad::train

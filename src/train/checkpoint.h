@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Checkpoints of a run: <run>/checkpoints/step_00001500.safetensors with every weight, batch-norm
+// statistic and Adam moment, and the step. Data order and views follow from (seed, step), so this
+// is all that a run's future depends on.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "nn/serialize.h"
+
+namespace tilegrad::train {
+
+struct CheckpointInfo {
+  std::int64_t step = 0;        // steps done
+  std::int64_t image_size = 0;  // pixels
+  std::string config;           // TOML of the run
+  double seconds = 0;           // trained so far
+};
+
+struct Checkpoint {
+  CheckpointInfo info;
+  std::vector<nn::NamedTensor> tensors;
+};
+
+// Whole or not at all.
+Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
+                      std::vector<nn::NamedTensor> tensors);
+// Errors name the file: cut short, not a checkpoint of this program, ...
+Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& file);
+
+struct FoundCheckpoint {
+  Checkpoint checkpoint;
+  Path file;
+  std::vector<std::string> warnings;  // newer files that could not be read
+};
+// The newest one that is whole. NotFound if there is none, DataLoss naming the first reason if
+// there are only broken ones.
+Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
+
+// All checkpoint files of a run, oldest first.
+std::vector<Path> ListCheckpoints(const Path& run);
+// Removes all but the newest `keep`, and temporary files that a killed run left.
+void PruneCheckpoints(const Path& run, std::int64_t keep);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/batches.h"
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/rng.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Streams of the run's seed; the network's weights have theirs in models/.
+constexpr std::uint64_t kOrderStream = 0x6f72646572, kViewStream = 0x76696577;
+
+}  // namespace
+
+Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
+                                  const Workers& workers, const ProgressSink& progress,
+                                  const StopFlag& stop) {
+  ImageStore store;
+  store.models = static_cast<int>(models.size());
+  store.views = dataset.info().views;
+  store.size = dataset.info().image_size;
+  for (int v = 0; v < store.views; ++v) store.cameras.push_back(dataset.info().camera.View(v));
+  const std::size_t per_model = store.ImageBytes() * static_cast<std::size_t>(store.views);
+  store.bytes.resize(per_model * models.size());
+  std::mutex mutex;
+  std::uint64_t done = 0;
+  std::vector<Status> failures(models.size());
+  workers.For(models.size(), [&](std::size_t i, std::size_t) {
+    if (stop) return;
+    auto images = dataset.LoadImages(models[i]);
+    if (images.ok())
+      std::copy(images->begin(), images->end(),
+                store.bytes.begin() + static_cast<std::ptrdiff_t>(i * per_model));
+    failures[i] = images.status();
+    const std::scoped_lock lock(mutex);
+    progress({"loading images", ++done, models.size(), ""});
+  });
+  if (stop) return Cancelled("stopped while loading the dataset");
+  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  return store;
+}
+
+const std::vector<int>& BatchOrder::Permutation(std::int64_t epoch) {
+  if (epoch != cached_epoch_) {
+    permutation_.resize(static_cast<std::size_t>(models_));
+    std::iota(permutation_.begin(), permutation_.end(), 0);
+    Rng rng(seed_ ^ kOrderStream, static_cast<std::uint64_t>(epoch));
+    for (std::size_t i = permutation_.size(); i > 1; --i)
+      std::swap(permutation_[i - 1], permutation_[rng.Below(i)]);
+    cached_epoch_ = epoch;
+  }
+  return permutation_;
+}
+
+std::vector<Sample> BatchOrder::Batch(std::int64_t step, int size, int views) {
+  std::vector<Sample> batch;
+  for (int i = 0; i < size; ++i) {
+    const std::int64_t position = step * size + i;
+    Sample sample{Permutation(position / models_)[static_cast<std::size_t>(position % models_)],
+                  {}};
+    // The first `views` of a random permutation of all views.
+    std::vector<int> all(static_cast<std::size_t>(views_));
+    std::iota(all.begin(), all.end(), 0);
+    Rng rng(seed_ ^ kViewStream, static_cast<std::uint64_t>(position));
+    for (int v = 0; v < views; ++v) {
+      std::swap(
+          all[static_cast<std::size_t>(v)],
+          all[static_cast<std::size_t>(v) + rng.Below(static_cast<std::uint64_t>(views_ - v))]);
+      sample.views.push_back(all[static_cast<std::size_t>(v)]);
+    }
+    batch.push_back(std::move(sample));
+  }
+  return batch;
+}
+
+}  // namespace tilegrad::train

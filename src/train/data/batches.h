@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Training batches. What step s sees is a pure function of (seed, s): nothing of the data order has
+// to be saved, and a resumed run goes on as if it had never stopped.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "scene/camera.h"
+#include "train/data/dataset.h"
+
+namespace tilegrad::train {
+
+// The images of some models in memory: [models][views][4][size][size] bytes.
+struct ImageStore {
+  std::vector<std::uint8_t> bytes;
+  std::vector<Camera> cameras;  // by view, the same for all models
+  int models = 0, views = 0, size = 0;
+
+  std::size_t ImageBytes() const {
+    return 4 * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  }
+  std::span<const std::uint8_t> Image(int model, int view) const {
+    return {bytes.data() + (static_cast<std::size_t>(model) * static_cast<std::size_t>(views) +
+                            static_cast<std::size_t>(view)) *
+                               ImageBytes(),
+            ImageBytes()};
+  }
+};
+
+// Loads the images of these models, in order; errors name the file. Stops between models when
+// `stop` is set.
+Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>& models,
+                                  const Workers& workers, const ProgressSink& progress,
+                                  const StopFlag& stop);
+
+// One object of a batch: the view that the network sees comes first, then the other views, all
+// distinct.
+struct Sample {
+  int model = 0;
+  std::vector<int> views;
+};
+
+// Every epoch shows each model once in a new order; the last batch of an epoch runs into the next.
+class BatchOrder {
+ public:
+  BatchOrder(int models, int views, std::uint64_t seed)
+      : models_(models), views_(views), seed_(seed) {}
+  // `views` is at most the number of views there are.
+  std::vector<Sample> Batch(std::int64_t step, int size, int views);
+
+ private:
+  const std::vector<int>& Permutation(std::int64_t epoch);
+  int models_, views_;
+  std::uint64_t seed_;
+  std::int64_t cached_epoch_ = -1;
+  std::vector<int> permutation_;
+};
+
+}  // namespace tilegrad::train

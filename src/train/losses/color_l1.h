@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Equation 13: the L1 loss of colours. As the official code: the sum over the channels of the mean
+// over pixels and images of |I - I'|, that is three times a plain mean for RGB (spec 4).
+#pragma once
+
+#include <cmath>
+
+#include "nn/tape.h"
+#include "train/losses/image_batch.h"
+
+namespace tilegrad::train {
+
+// Sum of |a - b| of one image, in double and in order.
+template <class T>
+double AbsoluteDifference(std::span<const T> a, std::span<const T> b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += std::abs(static_cast<double>(b[i]) - static_cast<double>(a[i]));
+  return sum;
+}
+
+// The subgradient `scale` * sign(predicted - truth), 0 where they are equal.
+template <class T>
+void AbsoluteDifferenceBackward(std::span<const T> truth, std::span<const T> predicted,
+                                double scale, std::span<T> d_predicted) {
+  const T s = static_cast<T>(scale);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    d_predicted[i] = predicted[i] > truth[i] ? s : predicted[i] < truth[i] ? -s : T(0);
+  }
+}
+
+// image and truth: [N, channels, H, W] of one dtype. A scalar.
+nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a loss that is written by hand joins the tape.
+#pragma once
+
+#include <cmath>
+
+#include "nn/tape.h"
+
+namespace tilegrad::train {
+
+// `value` as a scalar Var whose gradient with respect to `input` is `gradient`, computed beforehand
+// with the value.
+inline nn::Var ScalarLoss(const char* name, const nn::Var& input, double value,
+                          nn::Tensor gradient) {
+  nn::Context& context = input.context();
+  nn::Tensor output = context.Empty({}, input.dtype());
+  nn::WithFloatType(input.dtype(), [&]<class T>(T) { *output.data<T>() = static_cast<T>(value); });
+  auto backward = [gradient](std::span<const nn::Tensor> d_outputs) mutable {
+    nn::WithFloatType(gradient.dtype(), [&]<class T>(T) {
+      const T factor = d_outputs[0].empty() ? T(0) : *d_outputs[0].data<T>();
+      if (factor != T(1)) {
+        for (T& g : gradient.span<T>()) g *= factor;
+      }
+    });
+    return std::vector<nn::Tensor>{gradient};
+  };
+  return nn::External(
+      context,
+      {.name = name, .inputs = {input}, .outputs = {output}, .backward = std::move(backward)})[0];
+}
+
+}  // namespace tilegrad::train

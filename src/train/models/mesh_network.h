@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The network of section 5.1 (spec 3.1): one RGBA image in, a deformed and coloured sphere out.
+#pragma once
+
+#include <memory>
+
+#include "nn/layers.h"
+#include "scene/mesh.h"
+#include "train/config.h"
+
+namespace tilegrad::train {
+
+inline constexpr std::int64_t kPaperParameters =
+    34'115'916;                                        // at 64 x 64 with NetworkConfig's defaults
+inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, as the truth
+
+// What the network says of a batch of B images.
+struct PredictedMeshes {
+  nn::Var movement;  // [B, V, 3] offsets from the template, before normalisation: what the
+                     // Laplacian sees
+  nn::Var
+      positions;   // [B, V, 3] template + movement, bounding box centred, largest half-extent 0.45
+  nn::Var colors;  // [B, V, 3] linear, not clamped
+};
+
+class MeshNetwork {
+ public:
+  // `image_size` in pixels, a multiple of 8. The seed decides every weight.
+  MeshNetwork(nn::Context& context, const NetworkConfig& config, int image_size,
+              std::uint64_t seed);
+
+  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black.
+  PredictedMeshes Forward(const nn::Var& images, nn::Mode mode);
+
+  nn::Module& module() { return all_; }
+  const Mesh& template_mesh() const { return template_; }
+
+ private:
+  nn::Context& context_;
+  Mesh template_;
+  nn::Tensor template_positions_;  // [V, 3]
+  // The three parts, shown to visitors as one module.
+  struct Parts : nn::Module {
+    nn::Sequential encoder, shape, color;
+    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return encoder.Forward(x, mode); }
+    void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+  } all_;
+};
+
+// positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per
+// mesh of [B, V, 3]. The gradient flows through the extremes (spec 3.1, trap 17). A mesh without
+// extent stays finite.
+nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent);
+
+}  // namespace tilegrad::train

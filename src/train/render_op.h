@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The renderer as an operation on the tape: predicted meshes in, images out, gradients back.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "nn/tape.h"
+#include "render/renderer.h"
+
+namespace tilegrad::train {
+
+struct RenderJob {
+  std::span<const std::int32_t> faces;  // [F,3], shared by all meshes; must outlive the tape
+  std::vector<Camera>
+      cameras;  // [B * views]: mesh b is rendered by cameras [b * views, (b + 1) * views)
+  int views = 1;
+  RenderOptions options;
+};
+
+struct RenderedImages {
+  nn::Var colors;  // [B * views, 3, H, W], 0 at background pixels
+  nn::Var alpha;   // [B * views, H, W]
+};
+
+// positions and colors: [B, V, 3]. f32 renders with `renderer`, f64 with the scalar reference (for
+// proofs). Errors of the renderer reach the context's status. One call of `renderer` at a time,
+// backward included.
+RenderedImages RenderMeshes(Renderer& renderer, const nn::Var& positions, const nn::Var& colors,
+                            RenderJob job);
+
+}  // namespace tilegrad::train

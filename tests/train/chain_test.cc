@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// The network of section 5.1, and the gradient of the whole chain: loss <- renderer <-
+// normalisation <- network weights.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "nn/nn.h"
+#include "train/step.h"
+
+namespace tilegrad::train {
+namespace {
+
+TEST(MeshNetwork, HasThePapersParameters) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  MeshNetwork network(context, NetworkConfig{}, 64, 1);
+  EXPECT_EQ(nn::CountParameters(network.module()), kPaperParameters);
+  EXPECT_EQ(network.template_mesh().positions.size(), 642u);
+}
+
+TEST(MeshNetwork, PredictionsFillTheirBox) {
+  const Workers workers(1);
+  nn::Context context(workers, nn::DType::kF64);
+  const nn::Var x = nn::Constant(
+      context, context.From({1, 3, 3}, std::span<const double>({0.0, 0, 0, 4, 1, 0, 2, 1, 1})));
+  const nn::Var y = NormalizeMeshes(x, 0.45);
+  const std::vector<double> want = {-0.45,   -0.1125, -0.1125, 0.45,  0.1125,
+                                    -0.1125, 0,       0.1125,  0.1125};
+  for (std::size_t i = 0; i < want.size(); ++i)
+    EXPECT_NEAR(y.value().data<double>()[i], want[i], 1e-9);
+  const nn::Var point = nn::Parameter(context, context.Full({1, 4, 3}, 2.0));
+  const nn::Var collapsed = NormalizeMeshes(point, 0.45);
+  for (const double v : nn::Grad(nn::Sum(collapsed), {point})[0].value().span<double>())
+    EXPECT_TRUE(std::isfinite(v));
+}
+
+// Two objects, two views of 16 x 16, a small network: everything of a real step.
+struct SmallProblem {
+  TrainConfig config;
+  ImageStore store;
+  std::vector<Sample> samples = {{0, {0, 1}}, {1, {2, 0}}, {0, {2, 1}}};
+
+  SmallProblem() {
+    config.network = {.channels = 2,
+                      .code = 6,
+                      .hidden1 = 5,
+                      .hidden2 = 7,
+                      .template_level = 1,
+                      .fc_deviation = 0,
+                      .color_bias = 0.4};
+    config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
+    config.schedule.batch = 3;
+    store.models = 2, store.views = 3, store.size = 16;
+    CameraRule rule;
+    rule.lens.width = rule.lens.height = store.size;
+    Rng rng(5);
+    store.bytes.resize(store.ImageBytes() * 6);
+    for (int v = 0; v < 3; ++v)
+      store.cameras.push_back(OrbitCamera(rule.lens, 40.0 * v, 20, rule.distance));
+    // Truth: discs with noise inside.
+    for (std::size_t image = 0; image < 6; ++image) {
+      for (int i = 0; i < 256; ++i) {
+        const double x = i % 16 - 7.5, y = i / 16 - 7.5;
+        const bool inside = x * x + y * y < 20 + 6.0 * static_cast<double>(image);
+        for (std::size_t c = 0; c < 4; ++c) {
+          store.bytes[image * store.ImageBytes() + c * 256 + static_cast<std::size_t>(i)] =
+              static_cast<std::uint8_t>(!inside  ? 0
+                                        : c == 3 ? 255
+                                                 : 60 + rng.Below(150));
+        }
+      }
+    }
+  }
+};
+
+// Central differences in float64 on weights of every layer. The chain is piecewise smooth (ReLU,
+// visibility, L1, the box): h = 1e-6 keeps crossings of a kink improbable, truncation is O(h^2) =
+// 1e-12 and rounding 1e-16 / h = 1e-10 relative to a loss near 1; gradients of single weights are
+// 1e-4 and more, so 1e-5 relative (plus 1e-8 absolute) is what can be asked. One entry in fifty may
+// sit on a kink.
+TEST(Chain, Float64GradientsAgreeWithDifferences) {
+  const SmallProblem p;
+  const Workers workers(1);
+  nn::Context context(workers, nn::DType::kF64);
+  TrainStep step(context, p.config, p.store.size);
+  const BatchTensors batch = GatherBatch(context, p.store, p.samples);
+  LossValues values;
+  std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
+  const std::vector<nn::Var> gradients =
+      nn::Grad(step.Loss(batch, 0, &values), step.adam().parameters());
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  EXPECT_LT(values.iou, 0.95);  // the scene is not empty: silhouettes overlap
+  Rng rng(9);
+  int checked = 0, off = 0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    nn::Tensor& weight = parameters[i].value.value();
+    for (int k = 0; k < 3; ++k, ++checked) {
+      const std::size_t at = rng.Below(weight.elements());
+      const double h = 1e-6, before = weight.data<double>()[at];
+      LossValues up, down;
+      weight.data<double>()[at] = before + h;
+      step.Loss(batch, 0, &up);
+      weight.data<double>()[at] = before - h;
+      step.Loss(batch, 0, &down);
+      weight.data<double>()[at] = before;
+      const double want = (up.total - down.total) / (2 * h),
+                   got = gradients[i].value().data<double>()[at];
+      if (std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8) continue;
+      ++off;
+      EXPECT_NEAR(got, want, 0.05 * std::abs(want) + 1e-3)
+          << parameters[i].name << "[" << at << "]";
+    }
+  }
+  EXPECT_LE(off, checked / 50) << "of " << checked;
+}
+
+// The path that trains (float32, SIMD, tiled renderer) against float64: a relative error of the
+// whole gradient of each tensor. Float rounding 6e-8 grows by the sums' condition and batch norm's
+// division; 1e-3 of the tensor's norm is asked.
+TEST(Chain, TheTrainingPathAgreesWithFloat64) {
+  const SmallProblem p;
+  const Workers workers(2);
+  nn::Context wide(workers, nn::DType::kF64), narrow(workers);
+  TrainStep reference(wide, p.config, p.store.size), fast(narrow, p.config, p.store.size);
+  ASSERT_TRUE(nn::LoadState(reference.network().module(), nn::State(fast.network().module())).ok());
+  LossValues want, got;
+  const auto d_want = nn::Grad(reference.Loss(GatherBatch(wide, p.store, p.samples), 0, &want),
+                               reference.adam().parameters());
+  const auto d_got = nn::Grad(fast.Loss(GatherBatch(narrow, p.store, p.samples), 0, &got),
+                              fast.adam().parameters());
+  EXPECT_NEAR(got.total, want.total, 1e-5);
+  EXPECT_NEAR(got.iou, want.iou, 1e-5);
+  EXPECT_NEAR(got.color, want.color, 1e-5);
+  double total = 0;
+  for (const nn::Var& d : d_want) {
+    for (const double g : d.value().span<double>()) total += g * g;
+  }
+  for (std::size_t i = 0; i < d_want.size(); ++i) {
+    double difference = 0, norm = 0;
+    for (std::size_t k = 0; k < d_want[i].value().elements(); ++k) {
+      const double w = d_want[i].value().data<double>()[k], g = d_got[i].value().data<float>()[k];
+      difference += (w - g) * (w - g);
+      norm += w * w;
+    }
+    // Biases before batch norm have gradient 0 but for rounding: their floor is a share of the
+    // whole.
+    EXPECT_LE(std::sqrt(difference), 1e-3 * std::sqrt(norm) + 1e-6 * std::sqrt(total)) << i;
+  }
+}
+
+TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
+  const SmallProblem p;
+  std::vector<std::vector<float>> finals;
+  double first = 0, last = 0;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    nn::Context context(workers);
+    TrainConfig config = p.config;
+    config.optimizer.learning_rate = 3e-3;
+    TrainStep step(context, config, p.store.size);
+    for (std::int64_t s = 0; s < 60; ++s) {
+      const auto values = step.Run(GatherBatch(context, p.store, p.samples), s);
+      ASSERT_TRUE(values.ok()) << values.status().message();
+      (s == 0 ? first : last) = values->total;
+    }
+    std::vector<float> weights;
+    for (const nn::NamedTensor& t : nn::State(step.network().module())) {
+      const auto span = t.value.span<float>();
+      weights.insert(weights.end(), span.begin(), span.end());
+    }
+    finals.push_back(std::move(weights));
+  }
+  EXPECT_EQ(finals[0], finals[1]);
+  EXPECT_EQ(finals[0], finals[2]);
+  EXPECT_LT(last, 0.7 * first);  // three pictures can be learned by heart
+}
+
+TEST(Schedules, LearningRateAndSharpness) {
+  TrainConfig c;
+  c.schedule.steps = 100;
+  c.optimizer = {.learning_rate = 1, .final_factor = 0.1, .warmup = 10};
+  EXPECT_NEAR(LearningRateAt(c, 0), 0.1, 1e-9);
+  EXPECT_NEAR(LearningRateAt(c, 50), 0.55, 1e-12);
+  EXPECT_NEAR(LearningRateAt(c, 100), 0.1, 1e-12);
+  c.render.sharpness_start = 100, c.render.sharpness = 10000;
+  EXPECT_NEAR(SharpnessAt(c, 0), 100, 1e-9);
+  EXPECT_NEAR(SharpnessAt(c, 25), 1000, 1e-9);
+  EXPECT_NEAR(SharpnessAt(c, 80), 10000, 1e-8);
+}
+
+}  // namespace
+}  // namespace tilegrad::train

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradients of the losses against central differences in float64, f32 against f64, and independent
+// numbers where they are at hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "base/rng.h"
+#include "nn/nn.h"
+#include "scene/shapes.h"
+#include "support/shared_data.h"
+#include "train/losses/color_l1.h"
+#include "train/losses/iou.h"
+#include "train/losses/laplacian.h"
+#include "train/losses/smoothness.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Loss = std::function<nn::Var(const nn::Var&)>;
+
+std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
+  Rng rng(seed);
+  std::vector<double> out(n);
+  for (double& x : out) x = rng.Uniform(low, high);
+  return out;
+}
+
+class Losses : public testing::Test {
+ protected:
+  Losses() : workers_(2), context_(workers_, nn::DType::kF64) {}
+
+  double Value(const Loss& loss, const nn::Shape& shape, const std::vector<double>& x) {
+    return loss(nn::Constant(context_, context_.From(shape, std::span<const double>(x)))).item();
+  }
+  // Central differences with h = 1e-6: the truncation is h^2 f'''/6 ~ 1e-12, the rounding eps f / h
+  // ~ 2e-10 for f ~ 1; 1e-7 relative to the largest entry leaves room for sums of thousands.
+  void ExpectGradient(const Loss& loss, const nn::Shape& shape, std::vector<double> x) {
+    const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(x)));
+    const nn::Tensor gradient = nn::Grad(3.0 * loss(input), {input})[0].value();
+    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
+    double largest = 0;
+    for (const double g : gradient.span<double>()) largest = std::max(largest, std::abs(g));
+    ASSERT_GT(largest, 0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double h = 1e-6, at = x[i];
+      x[i] = at + h;
+      const double up = Value(loss, shape, x);
+      x[i] = at - h;
+      const double down = Value(loss, shape, x);
+      x[i] = at;
+      EXPECT_NEAR(gradient.data<double>()[i], 3 * (up - down) / (2 * h), 1e-7 * (1 + largest)) << i;
+    }
+  }
+
+  Workers workers_;
+  nn::Context context_;
+};
+
+TEST_F(Losses, IouGradient) {
+  const nn::Shape shape = {3, 5, 4};
+  const auto truth = context_.From(shape, std::span<const double>(Uniform(60, 0, 1, 1)));
+  ExpectGradient([&](const nn::Var& a) { return IouLoss(a, truth); }, shape, Uniform(60, 0, 1, 2));
+}
+
+TEST_F(Losses, IouKnownValues) {
+  const nn::Shape shape = {2, 4};
+  const auto truth = context_.From(shape, std::span<const double>({1.0, 1, 0, 0, 0, 0, 0, 0}));
+  const auto value = [&](std::vector<double> a) {
+    return Value([&](const nn::Var& x) { return IouLoss(x, truth); }, shape, a);
+  };
+  EXPECT_NEAR(value({1, 1, 0, 0, 0, 0, 0, 0}), 0.5,
+              1e-9);  // perfect; and empty against empty counts as loss 1
+  EXPECT_NEAR(value({0, 1, 1, 0, 1, 0, 0, 0}), 0.5 * (2.0 / 3 + 1), 1e-9);
+}
+
+TEST_F(Losses, ColorGradientAwayFromKinks) {
+  const nn::Shape shape = {2, 3, 3, 2};
+  const auto truth = context_.From(shape, std::span<const double>(Uniform(36, 0, 0.4, 3)));
+  ExpectGradient([&](const nn::Var& a) { return ColorL1Loss(a, truth); }, shape,
+                 Uniform(36, 0.5, 1, 4));
+}
+
+TEST_F(Losses, ColorIsThreeTimesThePlainMean) {
+  const nn::Shape shape = {1, 3, 1, 2};
+  const auto truth = context_.Zeros(shape);
+  EXPECT_NEAR(
+      Value([&](const nn::Var& a) { return ColorL1Loss(a, truth); }, shape, {1, 1, 1, 1, 1, 1}), 3,
+      1e-12);
+}
+
+TEST_F(Losses, LaplacianGradient) {
+  const Mesh mesh = Icosphere(1, 1);
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
+  ExpectGradient([&](const nn::Var& m) { return LaplacianLoss(m, topology); }, {2, vertices, 3},
+                 Uniform(6 * mesh.positions.size(), -1, 1, 5));
+  // A translation has no relative movement.
+  EXPECT_NEAR(Value([&](const nn::Var& m) { return LaplacianLoss(m, topology); }, {1, vertices, 3},
+                    std::vector<double>(3 * mesh.positions.size(), 0.7)),
+              0, 1e-25);
+}
+
+TEST_F(Losses, SmoothnessGradient) {
+  const Mesh mesh = Icosphere(1, 1);
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  std::vector<double> x;
+  for (int copy = 0; copy < 2; ++copy) {
+    for (const glm::vec3& p : mesh.positions) x.insert(x.end(), {p.x, p.y, p.z});
+  }
+  const auto noise = Uniform(x.size(), -0.2, 0.2, 6);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] += noise[i];
+  ExpectGradient([&](const nn::Var& p) { return SmoothnessLoss(p, mesh.faces, topology); },
+                 {2, static_cast<std::int64_t>(mesh.positions.size()), 3}, x);
+}
+
+TEST_F(Losses, SmoothnessIsFiniteForCollapsedFaces) {
+  const Mesh mesh = Icosphere(0, 1);
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  const nn::Var p = nn::Parameter(context_, context_.Zeros({1, 12, 3}));
+  const nn::Var loss = SmoothnessLoss(p, mesh.faces, topology);
+  EXPECT_EQ(loss.item(), 0);
+  for (const double g : nn::Grad(loss, {p})[0].value().span<double>()) EXPECT_EQ(g, 0);
+}
+
+TEST_F(Losses, ShapesThatDoNotFitAreErrors) {
+  const nn::Var a = nn::Constant(context_, context_.Zeros({2, 4}));
+  EXPECT_FALSE(IouLoss(a, context_.Zeros({2, 5})).valid());
+  EXPECT_FALSE(context_.TakeStatus().ok());
+}
+
+// Numbers of other implementations (the README of the vectors says whose): f64 against f64, so sums
+// of a hundred terms agree to 1e-9.
+class LossVectors : public Losses {
+ protected:
+  void SetUp() override {
+    const auto path = SharedFile("vectors/09_mesh_and_mask_losses.json");
+    if (!path) GTEST_SKIP() << "vectors/09_mesh_and_mask_losses.json is not here";
+    json_ = nlohmann::json::parse(ReadText(*path).value());
+    faces_ = json_["faces"].get<std::vector<Face>>();
+  }
+  std::vector<double> Numbers(const std::string& key) const {
+    std::vector<double> out;
+    Collect(json_[key], out);
+    return out;
+  }
+  static void Collect(const nlohmann::json& node, std::vector<double>& out) {
+    if (node.is_number()) out.push_back(node.get<double>());
+    for (const auto& child : node) {
+      if (!node.is_number()) Collect(child, out);
+    }
+  }
+  void ExpectMatches(const Loss& loss, const nn::Shape& shape, const std::string& input,
+                     const std::string& value, const std::string& gradient) {
+    const nn::Var x =
+        nn::Parameter(context_, context_.From(shape, std::span<const double>(Numbers(input))));
+    const nn::Var result = loss(x);
+    EXPECT_NEAR(result.item(), json_[value].get<double>(), 1e-9);
+    const nn::Var d_x = nn::Grad(result, {x})[0];
+    const auto want = Numbers(gradient);
+    for (std::size_t i = 0; i < want.size(); ++i)
+      EXPECT_NEAR(d_x.value().data<double>()[i], want[i], 1e-9);
+  }
+  nlohmann::json json_;
+  std::vector<Face> faces_;
+};
+
+TEST_F(LossVectors, Iou) {
+  const auto truth = context_.From({2, 4, 4}, std::span<const double>(Numbers("mask_rhs")));
+  ExpectMatches([&](const nn::Var& a) { return IouLoss(a, truth); }, {2, 4, 4}, "mask_lhs",
+                "kaolin_mask_iou_loss", "kaolin_mask_iou_grad_lhs");
+}
+
+TEST_F(LossVectors, Laplacian) {
+  const Topology topology = BuildTopology(faces_, 12);
+  ExpectMatches([&](const nn::Var& m) { return LaplacianLoss(m, topology); }, {2, 12, 3},
+                "movement", "dibr_laplacian_loss", "dibr_laplacian_grad_movement");
+}
+
+TEST_F(LossVectors, Smoothness) {
+  const Topology topology = BuildTopology(faces_, 12);
+  ExpectMatches([&](const nn::Var& p) { return SmoothnessLoss(p, faces_, topology); }, {2, 12, 3},
+                "vertices", "dibr_flatten_loss", "dibr_flatten_grad_vertices");
+}
+
+}  // namespace
+}  // namespace tilegrad::train

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// Configuration, checkpoints, logs, TensorBoard records, data order.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "train/checkpoint.h"
+#include "train/config.h"
+#include "train/data/batches.h"
+#include "train/run_log.h"
+#include "train/tensorboard.h"
+
+namespace tilegrad::train {
+namespace {
+
+class RunTest : public TempFolderTest {
+ protected:
+  RunTest() : workers_(1), context_(workers_) {}
+  Workers workers_;
+  nn::Context context_;
+};
+
+TEST_F(RunTest, ConfigRoundTrip) {
+  TrainConfig config;
+  config.name = "odd \"name\"";
+  config.optimizer.learning_rate = 3.3e-5;
+  config.network.channels = 7;
+  const auto back = ParseConfig(WriteConfig(config), "c");
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ(WriteConfig(*back), WriteConfig(config));
+  EXPECT_EQ(back->name, config.name);
+  EXPECT_EQ(back->optimizer.learning_rate, 3.3e-5);
+}
+
+TEST_F(RunTest, ConfigsOfTheProjectAreValid) {
+  for (const char* name : {"quick", "paper"}) {
+    const auto config =
+        ReadConfig(Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(name) + ".toml"));
+    ASSERT_TRUE(config.ok()) << config.status().message();
+    EXPECT_EQ(config->name, name);
+  }
+}
+
+TEST_F(RunTest, ConfigErrorsNameFileLineAndKey) {
+  const auto error = [&](const std::string& name, const std::string& text) {
+    return ReadConfig(Write(name, text)).status();
+  };
+  ExpectMessage(error("a.toml", "name = \"x\"\n[network]\nchanels = 3\n"), "a.toml", "line 3",
+                "network.chanels", "network.channels");
+  ExpectMessage(error("b.toml", "[schedule]\nbatch = 1\n"), "line 2", "schedule.batch is 1", "[2,");
+  ExpectMessage(error("c.toml", "[schedule]\nbatch = \"many\"\n"), "line 2", "whole number");
+  ExpectMessage(error("d.toml", "[schedule\n"), "d.toml", "line");
+  ExpectMessage(error("e.toml", "[optimizer]\nlearning_rate = nan\n"), "learning_rate");
+  ExpectMessage(ReadConfig(folder_ / "none.toml").status(), "none.toml");
+}
+
+TEST_F(RunTest, Overrides) {
+  TrainConfig config;
+  EXPECT_TRUE(ApplyOverrides({"schedule.steps=5", "name=me", "loss.color=0.5"}, &config).ok());
+  EXPECT_EQ(config.schedule.steps, 5);
+  EXPECT_EQ(config.name, "me");
+  ExpectMessage(ApplyOverrides({"schedule.step=5"}, &config), "schedule.steps");
+  ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
+  ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
+}
+
+std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {
+  return {{"w", context.Full({3, 2}, value)}};
+}
+
+TEST_F(RunTest, NewestWholeCheckpointIsTaken) {
+  EXPECT_EQ(LoadNewestCheckpoint(context_, folder_).status().code(), StatusCode::kNotFound);
+  for (const std::int64_t step : {10, 20, 30}) {
+    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "name = \"x\"", 1.5},
+                               SomeTensors(context_, static_cast<double>(step)))
+                    .ok());
+  }
+  const auto files = ListCheckpoints(folder_);
+  ASSERT_EQ(files.size(), 3u);
+  // The newest is cut in half, as a crash of the machine could leave it.
+  const Bytes whole = ReadFile(files[2]).value();
+  ASSERT_TRUE(WriteFileAtomic(files[2], std::span(whole).first(whole.size() / 2)).ok());
+  const auto found = LoadNewestCheckpoint(context_, folder_);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_EQ(found->checkpoint.info.step, 20);
+  EXPECT_EQ(found->checkpoint.info.seconds, 1.5);
+  EXPECT_EQ(std::as_const(found->checkpoint.tensors[0].value).data<float>()[0], 20);
+  ASSERT_EQ(found->warnings.size(), 1u);
+  EXPECT_NE(found->warnings[0].find("step_00000030"), std::string::npos);
+}
+
+TEST_F(RunTest, OnlyBrokenCheckpointsAreAnError) {
+  Write("checkpoints/step_00000010.safetensors", "garbage");
+  ExpectMessage(LoadNewestCheckpoint(context_, folder_).status(), "step_00000010");
+  ASSERT_TRUE(
+      nn::WriteSafetensors(folder_ / "other.safetensors", {SomeTensors(context_, 1), {}}).ok());
+  ExpectMessage(LoadCheckpoint(context_, folder_ / "other.safetensors").status(),
+                "not a checkpoint");
+}
+
+TEST_F(RunTest, PruneKeepsTheNewest) {
+  for (const std::int64_t step : {1, 2, 3, 4}) {
+    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, SomeTensors(context_, 0)).ok());
+  }
+  Write("checkpoints/step_00000009.safetensors.123.tmp", "left by a killed run");
+  PruneCheckpoints(folder_, 2);
+  const auto files = ListCheckpoints(folder_);
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_EQ(files[0].filename(), "step_00000003.safetensors");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "checkpoints"), {}), 2);
+}
+
+TEST_F(RunTest, LogForgetsWhatCameAfterTheCheckpoint) {
+  {
+    auto log = RunLog::Open(folder_, 0);
+    ASSERT_TRUE(log.ok());
+    for (const std::int64_t step : {10, 20, 30}) {
+      ASSERT_TRUE(log->Append({step, {{"loss", 1.0 / static_cast<double>(step)}}}).ok());
+    }
+  }
+  ASSERT_TRUE(AppendText(folder_ / "metrics.jsonl", "{\"step\": 4", false).ok());  // cut by a crash
+  auto log = RunLog::Open(folder_, 20);
+  ASSERT_TRUE(log.ok()) << log.status().message();
+  ASSERT_TRUE(log->Append({21, {{"loss", 7}}}).ok());
+  const auto entries = ReadLog(folder_);
+  ASSERT_TRUE(entries.ok());
+  ASSERT_EQ(entries->size(), 3u);
+  EXPECT_EQ(entries->at(1).step, 20);
+  EXPECT_EQ(entries->at(1).values[0].second, 1.0 / 20);  // numbers survive exactly
+  EXPECT_EQ(entries->at(2).step, 21);
+  Write("metrics.jsonl", "{\"step\":1}\nnonsense\n");
+  ExpectMessage(ReadLog(folder_).status(), "metrics.jsonl", "line 2");
+}
+
+TEST(Tensorboard, CrcAndFraming) {
+  EXPECT_EQ(Crc32c("123456789"), 0xE3069283u);  // the check value of CRC-32C
+  const std::string record = TensorboardScalarsRecord(1.0, 5, {{"loss", 0.5}});
+  // u64 length, crc, event, crc. Event: 09 wall_time, 10 step, 2a summary {0a value {0a tag, 15
+  // float}}.
+  const std::string event = record.substr(12, record.size() - 16);
+  EXPECT_EQ(static_cast<std::uint8_t>(record[0]), event.size());
+  const unsigned char want[] = {0x09, 0,  0,    0, 0,   0,   0,   0xf0, 0x3f, 0x10, 5, 0x2a, 13,
+                                0x0a, 11, 0x0a, 4, 'l', 'o', 's', 's',  0x15, 0,    0, 0,    0x3f};
+  EXPECT_EQ(event, std::string(reinterpret_cast<const char*>(want), sizeof(want)));
+}
+
+TEST(BatchOrder, EveryEpochShowsEachModelOnceAndViewsAreDistinct) {
+  BatchOrder order(10, 6, 3), again(10, 6, 3);
+  std::multiset<int> seen;
+  for (std::int64_t step = 0; step < 5; ++step) {
+    for (const Sample& s : order.Batch(step, 4, 3)) {
+      seen.insert(s.model);
+      EXPECT_EQ(std::set<int>(s.views.begin(), s.views.end()).size(), 3u);
+    }
+  }
+  for (int m = 0; m < 10; ++m) EXPECT_EQ(seen.count(m), 2u);
+  // A pure function of the step: asking for step 4 alone gives the same.
+  EXPECT_EQ(again.Batch(4, 4, 3)[2].views, order.Batch(4, 4, 3)[2].views);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
