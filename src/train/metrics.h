@@ -20,7 +20,7 @@ namespace tilegrad::train {
 // [x][y][z] of 0 or 1. An error for an invalid mesh or one without extent.
 Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
 
-// |a and b| / |a or b|; 1 if both are empty. The sizes must agree.
+// |a and b| / |a or b| over voxels that are not 0; 1 if both are empty. The sizes must agree.
 double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
 
 // `count` points distributed by area (deterministic in `seed`). An error if the surface has no
@@ -34,7 +34,7 @@ struct SurfaceScore {
   double f_score = 0;  // 2 P R / (P + R), 0 if both are 0
 };
 // Euclidean nearest neighbours; `threshold` in world units (the paper: 0.02 with the longest side
-// 0.9).
+// 0.9). All zero if one of the two has no points. Coordinates must be finite.
 SurfaceScore CompareSurfaces(std::span<const glm::vec3> predicted, std::span<const glm::vec3> truth,
                              double threshold);
 
