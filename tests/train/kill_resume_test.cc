@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program is killed with SIGKILL at random moments and resumed: the weights, moments and
 // curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,8 +14,8 @@
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
+#include "tiny_run.h"
 #include "train/checkpoint.h"
-#include "train/data/dataset_files.h"
 #include "train/run_log.h"
 
 namespace tilegrad::train {
@@ -23,61 +24,10 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kConfig = R"(name = "tiny"
-[network]
-channels = 4
-code = 16
-hidden1 = 16
-hidden2 = 16
-template_level = 1
-fc_deviation = 0.0
-[render]
-sharpness = 500
-sharpness_start = 100
-[schedule]
-batch = 8
-views = 2
-log_every = 1
-sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
-
-// Images of noise: what they show does not matter here.
-Status WriteNoiseDataset(const Path& folder) {
-  constexpr int kModels = 12, kSize = 32, kViews = 4;
-  DatasetInfo info;
-  info.source = "nmr";
-  info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
-  info.views = kViews;
-  info.classes = {"noise"};
-  info.recipe = "0000000000000000";
-  ModelData data;
-  data.images.resize(std::size_t{kViews} * 4 * kSize * kSize);
-  data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
-                        kOccupancyResolution);
-  std::vector<ModelInfo> models;
-  Rng rng(3);
-  for (int m = 0; m < kModels; ++m) {
-    ModelInfo model;
-    model.id = model.name = "m" + std::to_string(m);
-    model.split = m < 10 ? Split::kTrain : Split::kTest;
-    for (std::uint8_t& byte : data.images) byte = static_cast<std::uint8_t>(rng.Below(256));
-    const Path file = ModelFilePath(folder, "noise", model.id);
-    std::filesystem::create_directories(file.parent_path());
-    if (Status status = SaveModelFile(file, info, data, {info.recipe, 0, 0}); !status.ok()) {
-      return status;
-    }
-    models.push_back(model);
-  }
-  if (Status status = WriteDatasetInfo(folder, info); !status.ok()) return status;
-  return WriteModels(folder, info, models);
-}
-
 class KillResume : public TempFolderTest {
  protected:
   KillResume() : workers_(1), context_(workers_) {
-    Write("tiny.toml", std::string(kConfig));
+    Write("tiny.toml", std::string(kTinyConfig));
     std::filesystem::create_directories(folder_ / "data");
     const Status written = WriteNoiseDataset(folder_ / "data");
     EXPECT_TRUE(written.ok()) << written.message();
@@ -99,7 +49,8 @@ class KillResume : public TempFolderTest {
     const std::string log = (folder_ / (run + ".txt")).string();
     const pid_t child = ::fork();
     if (child != 0) return child;
-    if (std::freopen(log.c_str(), "a", stdout) == nullptr || ::dup2(1, 2) < 0) ::_exit(126);
+    const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
+    if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(126);
     ::execv(arguments[0], arguments.data());
     ::_exit(127);
   }
@@ -176,6 +127,7 @@ class KillResume : public TempFolderTest {
   void CheckKills(int kills) {
     const double seconds = Finish("whole", 2);
     EXPECT_GT(KillAtRandom("killed", kills, seconds), 0);
+    EXPECT_FALSE(ListCheckpoints(folder_ / "killed").empty());  // some came after the first steps
     Finish("killed", 1);
     ExpectSameBits("whole", "killed");
     ExpectSameCurves("whole", "killed");
@@ -183,13 +135,13 @@ class KillResume : public TempFolderTest {
 
   Workers workers_;
   nn::Context context_;
-  int steps_ = 40;
+  int steps_ = 200;
 };
 
 TEST_F(KillResume, ThreeKills) { CheckKills(3); }
 
 TEST_F(KillResume, LongTenKills) {
-  steps_ = 300;
+  steps_ = 1000;
   CheckKills(10);
 }
 

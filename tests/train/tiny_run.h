@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// A dataset and a configuration for tests of whole training runs: images of noise (what they show
+// does not matter there) and a network of a few thousand weights.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/rng.h"
+#include "train/data/dataset_files.h"
+
+namespace tilegrad::train {
+
+inline constexpr const char* kTinyConfig = R"(name = "tiny"
+[network]
+channels = 4
+code = 16
+hidden1 = 16
+hidden2 = 16
+template_level = 1
+fc_deviation = 0.0
+[render]
+sharpness = 500
+sharpness_start = 100
+[schedule]
+batch = 8
+views = 2
+log_every = 1
+sample_every = 10
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
+inline Status WriteNoiseDataset(const Path& folder) {
+  constexpr int kModels = 12, kSize = 32, kViews = 4;
+  DatasetInfo info;
+  info.source = "nmr";
+  info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
+  info.views = kViews;
+  info.classes = {"noise"};
+  info.recipe = "0000000000000000";
+  ModelData data;
+  data.images.resize(std::size_t{kViews} * 4 * kSize * kSize);
+  data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
+                        kOccupancyResolution);
+  std::vector<ModelInfo> models;
+  Rng rng(3);
+  for (int m = 0; m < kModels; ++m) {
+    ModelInfo model;
+    model.id = model.name = "m" + std::to_string(m);
+    model.split = m < 10 ? Split::kTrain : Split::kTest;
+    for (std::uint8_t& byte : data.images) byte = static_cast<std::uint8_t>(rng.Below(256));
+    const Path file = ModelFilePath(folder, "noise", model.id);
+    std::filesystem::create_directories(file.parent_path());
+    if (Status status = SaveModelFile(file, info, data, {info.recipe, 0, 0}); !status.ok()) {
+      return status;
+    }
+    models.push_back(model);
+  }
+  if (Status status = WriteDatasetInfo(folder, info); !status.ok()) return status;
+  return WriteModels(folder, info, models);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Train() itself: resuming to the same bits, what it refuses, and what it survives.
+#include "train/trainer.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "tiny_run.h"
+#include "train/checkpoint.h"
+#include "train/run_log.h"
+
+namespace tilegrad::train {
+namespace {
+
+// While it lives no file can grow beyond `bytes`: writes fail as on a full disk.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit now = {bytes, before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &now), 0);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_;
+};
+
+class TrainerTest : public TempFolderTest {
+ protected:
+  TrainerTest() : workers_(1), context_(workers_) {
+    const Status written = WriteNoiseDataset(folder_ / "data");
+    EXPECT_TRUE(written.ok()) << written.message();
+    auto config = ParseConfig(kTinyConfig, "tiny");
+    EXPECT_TRUE(config.ok()) << config.status().message();
+    job_ = {.config = std::move(config).value(), .data = folder_ / "data", .run = folder_ / "run"};
+    job_.config.schedule.steps = 12;
+  }
+
+  Result<TrainOutcome> Run(const ProgressSink& progress, int workers = 1) {
+    const Workers count(workers);
+    return Train(job_, count, progress, stop_);
+  }
+  Result<TrainOutcome> Run() { return Run(kSilent); }
+  // Stops by the flag once `step` steps are done.
+  void StopAfter(std::uint64_t step) {
+    const auto outcome = Run([&](const Progress& p) {
+      if (std::string_view(p.stage) == "training" && p.done >= step) stop_ = true;
+    });
+    stop_ = false;
+    ASSERT_EQ(outcome.status().code(), StatusCode::kCancelled) << outcome.status().message();
+    ExpectMessage(outcome.status(), "--resume");
+  }
+  // Starts anew in `name`, undisturbed.
+  void RunWhole(const std::string& name, int workers) {
+    const Path before = std::exchange(job_.run, folder_ / name);
+    const auto outcome = Run(kSilent, workers);
+    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    EXPECT_TRUE(outcome->finished);
+    job_.run = before;
+  }
+  void ExpectFinishes() {
+    job_.existing = ExistingRun::kContinue;
+    const auto outcome = Run();
+    ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+    EXPECT_TRUE(outcome->finished);
+  }
+  void ExpectSameBits(const std::string& a, const std::string& b) {
+    const auto left = LoadNewestCheckpoint(context_, folder_ / a);
+    const auto right = LoadNewestCheckpoint(context_, folder_ / b);
+    ASSERT_TRUE(left.ok() && right.ok());
+    EXPECT_EQ(left->checkpoint.info.step, right->checkpoint.info.step);
+    const auto &x = left->checkpoint.tensors, &y = right->checkpoint.tensors;
+    ASSERT_EQ(x.size(), y.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      ASSERT_EQ(x[i].value.bytes(), y[i].value.bytes());
+      EXPECT_EQ(std::memcmp(x[i].value.raw(), y[i].value.raw(), x[i].value.bytes()), 0)
+          << x[i].name;
+    }
+  }
+
+  static void CutInHalf(const Path& file) {
+    std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  }
+
+  static inline const ProgressSink kSilent = [](const Progress&) {};
+  Workers workers_;
+  nn::Context context_;
+  StopFlag stop_{false};
+  TrainJob job_;
+};
+
+TEST_F(TrainerTest, WorkersDoNotChangeTheResult) {
+  RunWhole("one", 1);
+  RunWhole("two", 2);
+  RunWhole("seven", 7);
+  ExpectSameBits("one", "two");
+  ExpectSameBits("one", "seven");
+}
+
+TEST_F(TrainerTest, StoppedAndResumedIsTheSame) {
+  RunWhole("whole", 1);
+  StopAfter(4);  // between two checkpoints of the schedule
+  EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 4);
+  ExpectFinishes();
+  ExpectSameBits("whole", "run");
+}
+
+TEST_F(TrainerTest, RefusesAnExistingRun) {
+  StopAfter(2);
+  ExpectMessage(Run().status(), "run", "--resume", "--out");
+}
+
+TEST_F(TrainerTest, RefusesAnotherConfiguration) {
+  StopAfter(2);
+  job_.existing = ExistingRun::kContinue;
+  job_.config.optimizer.learning_rate *= 2;
+  ExpectMessage(Run().status(), "learning_rate", "another configuration");
+  EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 2);
+}
+
+TEST_F(TrainerTest, HalfACheckpointFallsBackToTheOneBefore) {
+  RunWhole("whole", 1);
+  StopAfter(8);
+  CutInHalf(ListCheckpoints(job_.run).back());
+  job_.existing = ExistingRun::kContinue;
+  const auto outcome = Run();
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_EQ(outcome->first_step, 6);
+  ASSERT_EQ(outcome->warnings.size(), 1u);
+  EXPECT_NE(outcome->warnings[0].find("step_00000008"), std::string::npos);
+  ExpectSameBits("whole", "run");
+}
+
+TEST_F(TrainerTest, OnlyBrokenCheckpointsAreAnErrorAndStay) {
+  StopAfter(8);
+  const auto files = ListCheckpoints(job_.run);
+  for (const Path& file : files) CutInHalf(file);
+  job_.existing = ExistingRun::kContinue;
+  ExpectMessage(Run().status(), "step_00000008");
+  EXPECT_EQ(ListCheckpoints(job_.run), files);
+}
+
+TEST_F(TrainerTest, FullDiskLosesNothingThatWasSaved) {
+  RunWhole("whole", 1);
+  StopAfter(6);
+  job_.existing = ExistingRun::kContinue;
+  {
+    // Room for the small files, not for a checkpoint.
+    const auto checkpoint = std::filesystem::file_size(ListCheckpoints(job_.run).back());
+    const FullDisk full(checkpoint / 2);
+    const auto outcome = Run();
+    ASSERT_EQ(outcome.status().code(), StatusCode::kIo) << outcome.status().message();
+    ExpectMessage(outcome.status(), "checkpoints");
+  }
+  EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 6);
+  ExpectFinishes();
+  ExpectSameBits("whole", "run");
+  EXPECT_EQ(ReadLog(job_.run)->size(), 12u);
+}
+
+TEST_F(TrainerTest, BadDatasetsAreNamed) {
+  job_.data = folder_ / "nothing";
+  ExpectMessage(Run().status(), "nothing");
+  job_.data = folder_ / "data";
+  job_.config.schedule.views = 5;
+  ExpectMessage(Run().status(), "schedule.views", "4 views");
+  job_.config.schedule.views = 2;
+  CutInHalf(ModelFilePath(job_.data, "noise", "m3"));
+  ExpectMessage(Run().status(), "m3.npz");
+}
+
+}  // namespace
+}  // namespace tilegrad::train
