@@ -189,8 +189,7 @@ struct NodeWalk {
     if (it == converted.end()) {
       it = converted.emplace(part.mMaterialIndex, materials.Get(part.mMaterialIndex, out)).first;
     }
-    AppendWithMaterial(std::move(mesh), it->second, out);
-    return {};
+    return AppendWithMaterial(std::move(mesh), it->second, out).Within(place);
   }
 };
 

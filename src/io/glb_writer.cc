@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "io/srgb.h"
 
 namespace tilegrad::io {
 namespace {
@@ -81,7 +82,7 @@ class PrimitiveBuilder {
  private:
   void AddVertex(std::size_t corner, std::int32_t vertex) {
     out_.positions.push_back(mesh_.positions[vertex]);
-    if (!mesh_.colors.empty()) out_.colors.push_back(mesh_.colors[vertex]);
+    if (!mesh_.colors.empty()) out_.colors.push_back(SrgbToLinear(mesh_.colors[vertex]));
     if (!mesh_.corner_normals.empty())
       out_.normals.push_back(mesh_.corner_normals[corner]);
     else if (!mesh_.normals.empty())
@@ -122,7 +123,8 @@ Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
 }
 
 Json MaterialJson(const Material& m) {
-  Json pbr = {{"baseColorFactor", {m.base_color.r, m.base_color.g, m.base_color.b, m.base_color.a}},
+  const glm::vec4 factor = SrgbToLinear(m.base_color);
+  Json pbr = {{"baseColorFactor", {factor.r, factor.g, factor.b, factor.a}},
               {"metallicFactor", 0.0},
               {"roughnessFactor", 1.0}};
   if (m.base_color_texture >= 0) pbr["baseColorTexture"] = {{"index", m.base_color_texture}};
@@ -194,7 +196,7 @@ Result<Bytes> EncodeGlb(const Mesh& mesh) {
     primitives.push_back(std::move(primitive));
   }
   glb.json["meshes"] = Json::array({{{"primitives", primitives}}});
-  for (const Material& material : mesh.materials)
+  for (const Material& material : materials)
     glb.json["materials"].push_back(MaterialJson(material));
   TILEGRAD_TRY(AddTextures(glb, mesh));
   return Assemble(glb);

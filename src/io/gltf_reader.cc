@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <charconv>
 #include <cstring>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -6,26 +7,17 @@
 #include <optional>
 
 #include "base/error.h"
+#include "io/gltf_model.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
+#include "io/srgb.h"
 #include "scene/shapes.h"
-
-// Compiled in here: the layout of its classes depends on macros, and Debian's shared library was
-// built with others.
-#define TINYGLTF_IMPLEMENTATION
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#define TINYGLTF_NO_EXTERNAL_IMAGE
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wshadow"
-#pragma GCC diagnostic ignored "-Wpedantic"
-#include <tiny_gltf.h>
-#pragma GCC diagnostic pop
 
 namespace tilegrad::io {
 namespace {
 
-constexpr int kMaxNodeDepth = 256;  // deeper is a cycle or an attack
+constexpr int kMaxNodeDepth = 256;   // the walk is recursive
+constexpr int kMaxJsonNesting = 64;  // so is tinygltf's reading of "extras"
 
 // Side files of a glTF are names relative to it.
 struct SideFiles {
@@ -51,110 +43,13 @@ bool SideWrite(std::string*, const std::string&, const std::vector<unsigned char
   return false;
 }
 
-// Keeps the encoded bytes; images are decoded when a material asks for one.
+// Keeps the encoded bytes of data URIs; images are decoded when a material asks for one. An image
+// in a buffer view comes with a place that tinygltf has not checked: it is left alone until then.
 bool KeepEncoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int,
                  const unsigned char* bytes, int size, void*) {
-  image->image.assign(bytes, bytes + size);
+  if (image->bufferView < 0) image->image.assign(bytes, bytes + size);
   return true;
 }
-
-// The elements of an accessor, converted to float; every read is checked against the buffer before.
-class Accessor {
- public:
-  static Result<Accessor> Open(const tinygltf::Model& model, int index, int components,
-                               const std::string& what) {
-    if (index < 0 || index >= static_cast<int>(model.accessors.size()))
-      return DataLoss("{}: accessor {} does not exist", what, index);
-    const tinygltf::Accessor& a = model.accessors[index];
-    if (a.sparse.isSparse)
-      return DataLoss("{}: sparse accessors are not supported; save the file without them", what);
-    const int got = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(a.type));
-    if (components > 0 && got != components)
-      return DataLoss("{}: expected {} numbers an element, got {}", what, components, got);
-    if (a.bufferView < 0 || a.bufferView >= static_cast<int>(model.bufferViews.size())) {
-      return DataLoss("{}: accessor {} has no buffer view", what, index);
-    }
-    const tinygltf::BufferView& view = model.bufferViews[a.bufferView];
-    if (view.buffer < 0 || view.buffer >= static_cast<int>(model.buffers.size()))
-      return DataLoss("{}: buffer {} does not exist", what, view.buffer);
-    const auto& buffer = model.buffers[view.buffer].data;
-    const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType));
-    const int stride = a.ByteStride(view);
-    if (size <= 0 || got <= 0 || stride <= 0)
-      return DataLoss("{}: component type {} is not valid", what, a.componentType);
-    const std::size_t element = static_cast<std::size_t>(size) * got,
-                      begin = a.byteOffset + view.byteOffset;
-    std::size_t span = 0, end = 0;
-    if (a.count > 0 &&
-        (__builtin_mul_overflow(a.count - 1, static_cast<std::size_t>(stride), &span) ||
-         __builtin_add_overflow(span, begin + element, &end) || end > buffer.size())) {
-      return DataLoss("{}: accessor {} reaches beyond its buffer of {} bytes", what, index,
-                      buffer.size());
-    }
-    return Accessor{buffer.data() + begin, a.count,     stride, size, got,
-                    a.componentType,       a.normalized};
-  }
-
-  std::size_t count() const { return count_; }
-  int components() const { return components_; }
-
-  float Float(std::size_t element, int component) const {
-    const unsigned char* at =
-        data_ + element * stride_ + static_cast<std::size_t>(component) * size_;
-    switch (type_) {
-      case TINYGLTF_COMPONENT_TYPE_FLOAT:
-        return Read<float>(at);
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-        return Scaled(*at, 255);
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        return Scaled(Read<std::uint16_t>(at), 65535);
-      case TINYGLTF_COMPONENT_TYPE_BYTE:
-        return std::max(-1.0f, Scaled(Read<std::int8_t>(at), 127));
-      case TINYGLTF_COMPONENT_TYPE_SHORT:
-        return std::max(-1.0f, Scaled(Read<std::int16_t>(at), 32767));
-      default:
-        return static_cast<float>(Integer(element));
-    }
-  }
-
-  std::uint64_t Integer(std::size_t element) const {
-    const unsigned char* at = data_ + element * stride_;
-    switch (type_) {
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-        return *at;
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        return Read<std::uint16_t>(at);
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-        return Read<std::uint32_t>(at);
-      default:
-        return ~std::uint64_t{0};  // not an index type: out of range for every mesh
-    }
-  }
-
- private:
-  Accessor(const unsigned char* data, std::size_t count, int stride, int size, int components,
-           int type, bool normalized)
-      : data_(data),
-        count_(count),
-        stride_(static_cast<std::size_t>(stride)),
-        size_(static_cast<std::size_t>(size)),
-        components_(components),
-        type_(type),
-        normalized_(normalized) {}
-
-  template <class T>
-  static T Read(const unsigned char* at) {
-    T value;
-    std::memcpy(&value, at, sizeof(T));
-    return value;
-  }
-  float Scaled(float value, float largest) const { return normalized_ ? value / largest : value; }
-
-  const unsigned char* data_;
-  std::size_t count_, stride_, size_;
-  int components_, type_;
-  bool normalized_;
-};
 
 struct GltfWalk {
   const tinygltf::Model& model;
@@ -162,6 +57,7 @@ struct GltfWalk {
   std::string name, place;
   LoadedMesh out;
   std::vector<std::optional<int>> textures;  // by glTF image
+  std::vector<bool> visited;                 // by node
 
   Result<std::vector<std::uint32_t>> Indices(const tinygltf::Primitive& p, std::size_t vertices,
                                              const std::string& what);
@@ -169,16 +65,34 @@ struct GltfWalk {
   Status AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m, const std::string& what);
   Material ConvertMaterial(int index);
   int ImageTexture(int texture);
+  int AddImage(const tinygltf::Image& image, int index);
   Status Visit(int node, const glm::mat4& parent, int depth);
 };
 
-int AttributeIndex(const tinygltf::Primitive& p, const char* key) {
+// "my%20wood.png" -> "my wood.png"
+std::string DecodePercent(const std::string& uri) {
+  std::string out;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    int code = 0;
+    const char* begin = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::from_chars(begin, begin + 2, code, 16).ptr == begin + 2) {
+      out += static_cast<char>(code);
+      i += 2;
+    } else {
+      out += uri[i];
+    }
+  }
+  return out;
+}
+
+int AttributeIndex(const tinygltf::Primitive& p, const std::string& key) {
   const auto it = p.attributes.find(key);
   return it == p.attributes.end() ? -1 : it->second;
 }
 
 // Lists, strips and fans of triangles become lists.
-Result<std::vector<Face>> Triangles(int mode, const std::vector<std::uint32_t>& indices) {
+std::vector<Face> Triangles(int mode, const std::vector<std::uint32_t>& indices) {
   std::vector<Face> faces;
   const auto at = [&](std::size_t i) { return static_cast<std::int32_t>(indices[i]); };
   const std::size_t n = indices.size();
@@ -201,50 +115,78 @@ Result<std::vector<std::uint32_t>> GltfWalk::Indices(const tinygltf::Primitive& 
     for (std::size_t i = 0; i < vertices; ++i) indices.push_back(static_cast<std::uint32_t>(i));
     return indices;
   }
-  TILEGRAD_ASSIGN(const Accessor accessor, Accessor::Open(model, p.indices, 1, what + ": indices"));
+  TILEGRAD_ASSIGN(const GltfAccessor accessor,
+                  GltfAccessor::OpenIndices(model, p.indices, what + ": indices"));
   for (std::size_t i = 0; i < accessor.count(); ++i) {
-    const std::uint64_t index = accessor.Integer(i);
+    const std::uint32_t index = accessor.Index(i);
     if (index >= vertices)
       return DataLoss("{}: index {} is {}, but there are {} vertices", what, i, index, vertices);
-    indices.push_back(static_cast<std::uint32_t>(index));
+    indices.push_back(index);
   }
   return indices;
 }
 
+// An attribute that the primitive may lack: then nothing.
+template <class Vec>
+Result<std::vector<Vec>> ReadAttribute(const tinygltf::Model& model, const tinygltf::Primitive& p,
+                                       const std::string& key, const std::string& what) {
+  std::vector<Vec> out;
+  const int index = AttributeIndex(p, key);
+  if (index < 0) return out;
+  TILEGRAD_ASSIGN(const GltfAccessor from,
+                  GltfAccessor::OpenAttribute(model, index, Vec::length(), what + ": " + key));
+  out.resize(from.count());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (int c = 0; c < Vec::length(); ++c) out[i][c] = from.Float(i, c);
+  }
+  return out;
+}
+
+// COLOR_0 has three or four components; alpha is 1 where there is none.
+Result<std::vector<glm::vec4>> ReadColors(const tinygltf::Model& model,
+                                          const tinygltf::Primitive& p, const std::string& what) {
+  std::vector<glm::vec4> out;
+  const int index = AttributeIndex(p, "COLOR_0");
+  if (index < 0) return out;
+  TILEGRAD_ASSIGN(const GltfAccessor from,
+                  GltfAccessor::OpenAttribute(model, index, 0, what + ": COLOR_0"));
+  if (from.components() < 3 || from.components() > 4)
+    return DataLoss("{}: COLOR_0 has {} numbers an element, not 3 or 4", what, from.components());
+  for (std::size_t i = 0; i < from.count(); ++i) {
+    out.push_back(LinearToSrgb({from.Float(i, 0), from.Float(i, 1), from.Float(i, 2),
+                                from.components() > 3 ? from.Float(i, 3) : 1.0f}));
+  }
+  return out;
+}
+
+// The uv set that the material's texture names.
+std::string UvKey(const tinygltf::Model& model, int material) {
+  const bool known = material >= 0 && material < static_cast<int>(model.materials.size());
+  const int set =
+      known ? model.materials[material].pbrMetallicRoughness.baseColorTexture.texCoord : 0;
+  return fmt::format("TEXCOORD_{}", set);
+}
+
 Result<Mesh> GltfWalk::Convert(const tinygltf::Primitive& p, const std::string& what) {
   Mesh mesh;
-  TILEGRAD_ASSIGN(const Accessor positions,
-                  Accessor::Open(model, AttributeIndex(p, "POSITION"), 3, what + ": POSITION"));
-  const std::size_t count = positions.count();
-  for (std::size_t i = 0; i < count; ++i)
-    mesh.positions.emplace_back(positions.Float(i, 0), positions.Float(i, 1),
-                                positions.Float(i, 2));
+  const std::string uv_key = UvKey(model, p.material);
+  if (AttributeIndex(p, "POSITION") < 0) return DataLoss("{}: no POSITION attribute", what);
+  TILEGRAD_ASSIGN(mesh.positions, ReadAttribute<glm::vec3>(model, p, "POSITION", what));
+  TILEGRAD_ASSIGN(mesh.normals, ReadAttribute<glm::vec3>(model, p, "NORMAL", what));
+  TILEGRAD_ASSIGN(mesh.colors, ReadColors(model, p, what));
+  TILEGRAD_ASSIGN(const auto uvs, ReadAttribute<glm::vec2>(model, p, uv_key, what));
+  const std::size_t count = mesh.positions.size();
+  for (const auto& [key, got] :
+       {std::pair("NORMAL", mesh.normals.size()), std::pair("COLOR_0", mesh.colors.size()),
+        std::pair(uv_key.c_str(), uvs.size())}) {
+    if (AttributeIndex(p, key) >= 0 && got != count)
+      return DataLoss("{}: {} has {} elements for {} vertices", what, key, got, count);
+  }
   TILEGRAD_ASSIGN(const auto indices, Indices(p, count, what));
-  TILEGRAD_ASSIGN(mesh.faces, Triangles(p.mode, indices));
-  if (const int a = AttributeIndex(p, "NORMAL"); a >= 0) {
-    TILEGRAD_ASSIGN(const Accessor normals, Accessor::Open(model, a, 3, what + ": NORMAL"));
-    if (normals.count() != count)
-      return DataLoss("{}: {} normals for {} vertices", what, normals.count(), count);
-    for (std::size_t i = 0; i < count; ++i)
-      mesh.normals.emplace_back(normals.Float(i, 0), normals.Float(i, 1), normals.Float(i, 2));
-  }
-  if (const int a = AttributeIndex(p, "COLOR_0"); a >= 0) {
-    TILEGRAD_ASSIGN(const Accessor colors, Accessor::Open(model, a, 0, what + ": COLOR_0"));
-    if (colors.count() != count || colors.components() < 3)
-      return DataLoss("{}: COLOR_0 does not fit {} vertices", what, count);
-    for (std::size_t i = 0; i < count; ++i) {
-      mesh.colors.emplace_back(colors.Float(i, 0), colors.Float(i, 1), colors.Float(i, 2),
-                               colors.components() > 3 ? colors.Float(i, 3) : 1.0f);
-    }
-  }
-  if (const int a = AttributeIndex(p, "TEXCOORD_0"); a >= 0) {
-    TILEGRAD_ASSIGN(const Accessor uvs, Accessor::Open(model, a, 2, what + ": TEXCOORD_0"));
-    if (uvs.count() != count)
-      return DataLoss("{}: {} uv for {} vertices", what, uvs.count(), count);
-    for (const Face& face : mesh.faces) {  // glTF's v points down
-      for (const std::int32_t v : face)
-        mesh.corner_uvs.emplace_back(uvs.Float(v, 0), 1.0f - uvs.Float(v, 1));
-    }
+  mesh.faces = Triangles(p.mode, indices);
+  if (uvs.empty()) return mesh;
+  for (const Face& face : mesh.faces) {  // glTF's v points down
+    for (const std::int32_t v : face) mesh.corner_uvs.emplace_back(uvs[v].x, 1.0f - uvs[v].y);
   }
   return mesh;
 }
@@ -253,15 +195,18 @@ int GltfWalk::ImageTexture(int texture) {
   if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return -1;
   const int image = model.textures[texture].source;
   if (image < 0 || image >= static_cast<int>(model.images.size())) return -1;
-  if (!textures[image]) {
-    const tinygltf::Image& from = model.images[image];
-    const std::string label = !from.uri.empty()    ? from.uri
-                              : !from.name.empty() ? from.name
-                                                   : fmt::format("image {}", image);
-    textures[image] = from.image.empty() ? AddTexture(source, name, label, out)
-                                         : AddTexture(DecodeImage(from.image, label), label, out);
-  }
+  if (!textures[image]) textures[image] = AddImage(model.images[image], image);
   return *textures[image];
+}
+
+int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
+  std::string label = image.name.empty() ? fmt::format("image {}", index) : image.name;
+  if (image.bufferView >= 0) {
+    const auto bytes = GltfViewBytes(model, image.bufferView, label);
+    return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
+  }
+  if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
+  return AddTexture(source, name, DecodePercent(image.uri), out);
 }
 
 Material GltfWalk::ConvertMaterial(int index) {
@@ -273,8 +218,13 @@ Material GltfWalk::ConvertMaterial(int index) {
   const auto& factor = from.pbrMetallicRoughness.baseColorFactor;
   for (std::size_t c = 0; c < 4 && c < factor.size(); ++c)
     material.base_color[static_cast<int>(c)] = static_cast<float>(factor[c]);
+  material.base_color = LinearToSrgb(material.base_color);
   if (from.alphaMode.empty() || from.alphaMode == "OPAQUE") material.base_color.a = 1;
-  material.base_color_texture = ImageTexture(from.pbrMetallicRoughness.baseColorTexture.index);
+  const tinygltf::TextureInfo& texture = from.pbrMetallicRoughness.baseColorTexture;
+  material.base_color_texture = ImageTexture(texture.index);
+  if (texture.extensions.count("KHR_texture_transform") > 0)
+    out.warnings.push_back(
+        fmt::format("material \"{}\": KHR_texture_transform is not applied", from.name));
   return material;
 }
 
@@ -290,8 +240,8 @@ Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m,
   if (mesh.faces.empty()) return {};
   if (m != glm::mat4(1))
     Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
-  AppendWithMaterial(mesh, ConvertMaterial(p.material), out);
-  return {};
+  const Status added = AppendWithMaterial(std::move(mesh), ConvertMaterial(p.material), out);
+  return added.Within(what);
 }
 
 glm::mat4 LocalMatrix(const tinygltf::Node& node) {
@@ -310,9 +260,14 @@ glm::mat4 LocalMatrix(const tinygltf::Node& node) {
 
 Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
   if (depth > kMaxNodeDepth)
-    return DataLoss("{}: nodes are nested more than {} deep (a cycle?)", place, kMaxNodeDepth);
+    return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
   if (index < 0 || index >= static_cast<int>(model.nodes.size()))
     return DataLoss("{}: node {} does not exist", place, index);
+  // Nodes form trees: a second visit is a cycle, or shared children, whose number of paths may grow
+  // without bound.
+  if (visited[index])
+    return DataLoss("{}: node {} is reached twice; nodes must form a tree", place, index);
+  visited[index] = true;
   const tinygltf::Node& node = model.nodes[index];
   const glm::mat4 m = parent * LocalMatrix(node);
   if (node.mesh >= 0) {
@@ -366,6 +321,48 @@ Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
   return DataLoss("{}: not valid glTF: {}", place, error.empty() ? "no reason given" : error);
 }
 
+// The JSON text: the whole of a .gltf, the first chunk of a GLB whose length tinygltf checks.
+std::string_view JsonPart(const Bytes& bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  constexpr std::size_t kGlbHeader = 20;
+  if (!text.starts_with("glTF") || text.size() < kGlbHeader) return text;
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + 12, sizeof(length));
+  return text.substr(kGlbHeader, length);
+}
+
+Status CheckNesting(std::string_view json, const std::string& place) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (quoted && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (!quoted && (c == '{' || c == '[')) {
+      if (++depth > kMaxJsonNesting) {
+        return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, i,
+                        kMaxJsonNesting);
+      }
+    } else if (!quoted && (c == '}' || c == ']')) {
+      --depth;
+    }
+  }
+  return {};
+}
+
+// Extensions without which there is no geometry are errors, others that the file requires warnings.
+Status CheckExtensions(const tinygltf::Model& model, const std::string& place, LoadedMesh& out) {
+  for (const std::string& name : model.extensionsRequired) {
+    if (name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression")
+      return DataLoss("{}: {} is not supported; save the file without compression", place, name);
+    if (name != "KHR_mesh_quantization")
+      out.warnings.push_back(fmt::format("the extension {} is not read", name));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
@@ -374,14 +371,21 @@ Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
   if (bytes.size() > 0xFFFFFFFFu) return ResourceExhausted("{}: a glTF file above 4 GiB", place);
   const auto slash = name.find_last_of('/');
   SideFiles side{source, slash == std::string::npos ? "" : name.substr(0, slash)};
+  TILEGRAD_TRY(CheckNesting(JsonPart(bytes), place));
   tinygltf::Model model;
   try {
     TILEGRAD_TRY(Parse(bytes, side, place, &model));
   } catch (const std::exception& error) {  // the JSON library throws on some type errors
     return DataLoss("{}: not valid glTF: {}", place, error.what());
   }
-  GltfWalk walk{model, source, name,
-                place, {},     std::vector<std::optional<int>>(model.images.size())};
+  GltfWalk walk{model,
+                source,
+                name,
+                place,
+                {},
+                std::vector<std::optional<int>>(model.images.size()),
+                std::vector<bool>(model.nodes.size())};
+  TILEGRAD_TRY(CheckExtensions(model, place, walk.out));
   for (const int root : RootNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::mat4(1), 0));
   return std::move(walk.out);
 }

@@ -13,6 +13,10 @@
 namespace tilegrad::io {
 namespace {
 
+// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
+// many corners still have 32-bit indices.
+constexpr std::size_t kMaxElements = std::size_t{1} << 26;
+
 constexpr std::array<std::string_view, 2> kGltfEndings = {".gltf", ".glb"};
 constexpr std::array<std::string_view, 13> kAssimpEndings = {
     ".obj", ".ac",  ".ply", ".stl",  ".off", ".dae", ".fbx",
@@ -80,7 +84,11 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
   return -1;
 }
 
-void AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
+  if (out.mesh.positions.size() + part.positions.size() > kMaxElements ||
+      out.mesh.faces.size() + part.faces.size() > kMaxElements) {
+    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxElements);
+  }
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
   if (out.mesh.faces.empty()) {
@@ -90,6 +98,7 @@ void AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
     Append(out.mesh, part);
   }
   out.mesh.materials.back() = material;
+  return {};
 }
 
 bool IsMeshFileName(const std::string& name) {

@@ -26,7 +26,7 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
 
 // Adds a part whose only material is `material`, which refers to textures that are already in
-// out.mesh.
-void AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out);
+// out.mesh. An error if the whole becomes too large: a small file can place one part many times.
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out);
 
 }  // namespace tilegrad::io

@@ -19,6 +19,7 @@ struct Texture {
   ImageU8 image;     // 3 or 4 channels; row 0 on top is v = 1
 };
 
+// Colours are sRGB-encoded, like the pixels of images.
 struct Material {
   std::string name;
   glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies the texture; alpha < 1 is glass

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <string>
 
 #include "base/file.h"
@@ -23,13 +24,14 @@ class TempFolderTest : public testing::Test {
   }
   ~TempFolderTest() override { std::filesystem::remove_all(folder_); }
 
+  // Without fsync, which would be most of the time of a test with many broken files.
   Path Write(const std::string& name, const std::string& text) const {
-    EXPECT_TRUE(WriteTextAtomic(folder_ / name, text).ok());
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    EXPECT_EQ(std::filesystem::file_size(folder_ / name), text.size());
     return folder_ / name;
   }
   Path Write(const std::string& name, const Bytes& bytes) const {
-    EXPECT_TRUE(WriteFileAtomic(folder_ / name, bytes).ok());
-    return folder_ / name;
+    return Write(name, std::string(bytes.begin(), bytes.end()));
   }
 
   Path folder_;

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+// glTF and GLB that are broken or hostile: an error that names the file and the place. tinygltf
+// hands on most numbers as they stand in the file, so each kind of number is wrong once here.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+using Json = nlohmann::json;
+
+// A triangle with three indices: 36 bytes of positions, then 12 of indices, in one data URI.
+Json Triangle() {
+  Json json = Json::parse(R"({
+    "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "buffers": [{"byteLength": 48}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                  {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"}]})");
+  // Positions (0,0,0) (1,0,0) (0,1,0), indices 0 1 2.
+  json["buffers"][0]["uri"] =
+      "data:application/octet-stream;base64,"
+      "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAEAAAACAAAA";
+  return json;
+}
+
+class BrokenGltfTest : public TempFolderTest {
+ protected:
+  Status Load(const Json& json) { return LoadText(json.dump()); }
+  Status LoadText(const std::string& text) { return LoadMesh(Write("bad.gltf", text)).status(); }
+  Status LoadGlb(const Bytes& bytes) { return LoadMesh(Write("bad.glb", bytes)).status(); }
+};
+
+TEST_F(BrokenGltfTest, TheWholeOneLoads) {
+  const auto loaded = LoadMesh(Write("good.gltf", Triangle().dump()));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}}));
+  EXPECT_EQ(loaded->mesh.positions[1], glm::vec3(1, 0, 0));
+}
+
+TEST_F(BrokenGltfTest, AccessorBeyondItsView) {
+  Json json = Triangle();
+  json["accessors"][0]["count"] = 4;
+  ExpectMessage(Load(json), "bad.gltf", "mesh 0 primitive 0", "POSITION", "4 elements");
+  json["accessors"][0]["count"] = 1'000'000'000'000;
+  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer view");
+  json = Triangle();
+  json["accessors"][0]["byteOffset"] = 4;
+  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer view");
+}
+
+// 2^64 - 12 plus an element of 12 bytes is 0: sums of offsets must not wrap.
+TEST_F(BrokenGltfTest, OffsetsThatWrapAround) {
+  Json json = Triangle();
+  json["accessors"][0]["byteOffset"] = std::uint64_t(-12);
+  json["accessors"][0]["count"] = 1;
+  ExpectMessage(Load(json), "bad.gltf");
+  json = Triangle();
+  json["bufferViews"][0]["byteOffset"] = std::uint64_t(-12);
+  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer");
+  json["bufferViews"][0]["byteOffset"] = 20;
+  ExpectMessage(Load(json), "bad.gltf", "beyond its buffer");
+}
+
+TEST_F(BrokenGltfTest, ReferencesToNowhere) {
+  const std::vector<std::pair<const char*, Json>> edits = {
+      {"/meshes/0/primitives/0/attributes/POSITION", 7},
+      {"/meshes/0/primitives/0/attributes/POSITION", -1},
+      {"/meshes/0/primitives/0/indices", 9},
+      {"/accessors/0/bufferView", 5},
+      {"/accessors/1/bufferView", -3},
+      {"/bufferViews/0/buffer", 2},
+      {"/bufferViews/1/buffer", -2},
+      {"/nodes/0/mesh", 3},
+      {"/nodes/0/children", {4}},
+      {"/scenes/0/nodes", {11}},
+      {"/buffers/0/uri", "missing.bin"},
+      {"/buffers/0/byteLength", 4000000000u}};
+  for (const auto& [place, value] : edits) {
+    Json json = Triangle();
+    json[Json::json_pointer(place)] = value;
+    SCOPED_TRACE(place);
+    ExpectMessage(Load(json), "bad.gltf");
+  }
+}
+
+TEST_F(BrokenGltfTest, IndexOutOfRange) {
+  Json json = Triangle();
+  json["accessors"][0]["count"] = 2;
+  ExpectMessage(Load(json), "bad.gltf", "index 2 is 2, but there are 2 vertices");
+}
+
+TEST_F(BrokenGltfTest, ComponentTypesThatAreNotAllowed) {
+  Json json = Triangle();
+  json["accessors"][1]["componentType"] = 5126;
+  ExpectMessage(Load(json), "bad.gltf", "indices must be unsigned");
+  json = Triangle();
+  json["accessors"][0]["componentType"] = 5125;
+  ExpectMessage(Load(json), "bad.gltf", "not allowed in an attribute");
+  json = Triangle();
+  json["accessors"][0]["type"] = "VEC2";
+  ExpectMessage(Load(json), "bad.gltf", "expected 3 numbers");
+  json = Triangle();
+  json["bufferViews"][0]["byteStride"] = 13;
+  ExpectMessage(Load(json), "bad.gltf");
+}
+
+TEST_F(BrokenGltfTest, AttributesOfDifferentLengths) {
+  Json json = Triangle();
+  json["accessors"].push_back(
+      {{"bufferView", 0}, {"componentType", 5126}, {"count", 2}, {"type", "VEC3"}});
+  for (const char* key : {"NORMAL", "COLOR_0"}) {
+    json["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", 0}, {key, 2}};
+    ExpectMessage(Load(json), "bad.gltf", key, "2 elements for 3 vertices");
+  }
+}
+
+TEST_F(BrokenGltfTest, NonFinitePosition) {
+  Json json = Triangle();
+  // The first number is a quiet NaN.
+  json["buffers"][0]["uri"] =
+      "data:application/octet-stream;base64,"
+      "AADAfwAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAEAAAACAAAA";
+  ExpectMessage(Load(json), "bad.gltf", "positions[0][0] is nan");
+  json = Triangle();
+  json["nodes"][0]["scale"] = {1e39, 1, 1};
+  ExpectMessage(Load(json), "bad.gltf");
+}
+
+TEST_F(BrokenGltfTest, NodesThatAreNoTree) {
+  Json json = Triangle();
+  json["nodes"] = {{{"children", {0}}}};
+  ExpectMessage(Load(json), "bad.gltf", "node 0 is reached twice");
+  // Every node twice in the one above it: 2^60 paths.
+  json["nodes"] = Json::array();
+  for (int i = 1; i <= 60; ++i) json["nodes"].push_back({{"children", {i, i}}});
+  json["nodes"].push_back({{"mesh", 0}});
+  ExpectMessage(Load(json), "bad.gltf", "reached twice");
+  json["nodes"] = Json::array();
+  for (int i = 1; i <= 100000; ++i) json["nodes"].push_back({{"children", {i}}});
+  json["nodes"].push_back({{"mesh", 0}});
+  ExpectMessage(Load(json), "bad.gltf", "deep");
+}
+
+TEST_F(BrokenGltfTest, JsonThatIsBrokenOrTooDeep) {
+  const std::string good = Triangle().dump();
+  for (std::size_t length = 0; length < good.size(); length += 11)
+    ExpectMessage(LoadText(good.substr(0, length)), "bad.gltf");
+  ExpectMessage(LoadText("[1,2,3]"), "bad.gltf");
+  ExpectMessage(LoadText("{\"asset\":\"\xff\xfe\"}"), "bad.gltf");
+  // In "extras", where everything is allowed.
+  const int deep = 1'000'000;
+  ExpectMessage(LoadText(R"({"asset":{"version":"2.0"},"extras":)" + std::string(deep, '[') +
+                         std::string(deep, ']') + "}"),
+                "bad.gltf", "nested more than");
+  // Brackets in a string are no nesting.
+  Json json = Triangle();
+  json["asset"]["copyright"] = std::string(1000, '[') + "\"";
+  EXPECT_TRUE(Load(json).ok()) << Load(json).message();
+}
+
+TEST_F(BrokenGltfTest, CompressedGeometrySaysWhatToDo) {
+  Json json = Triangle();
+  json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+  ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
+}
+
+// An image whose place in the buffer is wrong costs the texture, not the mesh.
+TEST_F(BrokenGltfTest, ImagesBeyondTheirBufferAreWarnings) {
+  Json json = Triangle();
+  json["meshes"][0]["primitives"][0]["material"] = 0;
+  json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  json["textures"] = {{{"source", 0}}};
+  json["images"] = {{{"bufferView", 2}, {"mimeType", "image/png"}, {"name", "photo"}}};
+  for (const long length : {1000000000L, 3000000000L, 40L}) {
+    json["bufferViews"][2] = {{"buffer", 0}, {"byteOffset", 40}, {"byteLength", length}};
+    const auto loaded = LoadMesh(Write("image.gltf", json.dump()));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    ASSERT_EQ(loaded->warnings.size(), 1u);
+    EXPECT_NE(loaded->warnings[0].find("photo"), std::string::npos) << loaded->warnings[0];
+    EXPECT_NE(loaded->warnings[0].find("beyond its buffer"), std::string::npos);
+  }
+}
+
+TEST_F(BrokenGltfTest, ImageBesideTheFileWithAPercentEncodedName) {
+  ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 99)).ok());
+  Json json = Triangle();
+  json["meshes"][0]["primitives"][0]["material"] = 0;
+  json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  json["textures"] = {{{"source", 0}}};
+  json["images"] = {{{"uri", "my%20wood.png"}}};
+  const auto loaded = LoadMesh(Write("side.gltf", json.dump()));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_EQ(loaded->mesh.textures.size(), 1u) << loaded->warnings.at(0);
+  EXPECT_EQ(loaded->mesh.textures[0].image.pixels[0], 99);
+}
+
+Mesh TexturedBox() {
+  Mesh mesh = Box({0, 0, 0}, {1, 2, 3});
+  SetColor(mesh, {0.25f, 0.5f, 0.75f, 1});
+  mesh.corner_uvs.assign(3 * mesh.faces.size(), {0.25f, 0.5f});
+  mesh.materials = {{.name = "image", .base_color = glm::vec4(1), .base_color_texture = 0}};
+  mesh.textures = {{"grey", ImageU8(4, 4, 3, 128)}};
+  return mesh;
+}
+
+TEST_F(BrokenGltfTest, GlbCutAtEveryLength) {
+  const Bytes whole = EncodeGlb(TexturedBox()).value();
+  for (std::size_t length = 0; length < whole.size(); length += length < 64 ? 1 : 61)
+    ExpectMessage(LoadGlb(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(length))), "bad.glb");
+}
+
+TEST_F(BrokenGltfTest, GlbWithLyingLengths) {
+  const Bytes whole = EncodeGlb(TexturedBox()).value();
+  std::uint32_t json_length = 0;
+  std::memcpy(&json_length, &whole[12], 4);
+  // Length of the file, of the JSON chunk, of the binary chunk.
+  for (const std::size_t at : {std::size_t{8}, std::size_t{12}, std::size_t{20} + json_length}) {
+    for (const std::uint32_t lie : {0u, 1u, 0x7fffffffu, 0xfffffff0u, 0xffffffffu}) {
+      Bytes broken = whole;
+      std::memcpy(&broken[at], &lie, 4);
+      SCOPED_TRACE(testing::Message() << "at " << at << ": " << lie);
+      ExpectMessage(LoadGlb(broken), "bad.glb");
+    }
+  }
+}
+
+TEST_F(BrokenGltfTest, GlbWithAFlippedByteNeverCrashes) {
+  const Bytes whole = EncodeGlb(TexturedBox()).value();
+  for (std::size_t i = 0; i < whole.size(); i += 3) {
+    Bytes broken = whole;
+    broken[i] ^= static_cast<std::uint8_t>(1 + i % 255);
+    const auto loaded = LoadMesh(Write("flip.glb", broken));
+    EXPECT_TRUE(!loaded.ok() || Validate(loaded->mesh).ok());
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::io
