@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <limits>
+#include <vector>
+
+#include "base/rng.h"
+#include "shade/texture_ref.h"
+
+namespace tilegrad::shade {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr int kWidth = 5, kHeight = 4, kChannels = 3;
+constexpr double kStep = 1e-30;  // complex step: no cancellation, so the derivative is exact
+
+template <class T>
+TextureViewT<T> View(const std::vector<T>& texels, Wrap wrap) {
+  return {texels, kWidth, kHeight, kChannels, wrap};
+}
+
+std::vector<double> RandomTexels() {
+  Rng rng(7);
+  std::vector<double> out(kWidth * kHeight * kChannels);
+  for (double& t : out) t = rng.Uniform();
+  return out;
+}
+
+template <class T>
+std::vector<T> Sample(const TextureViewT<T>& texture, T u, T v) {
+  std::vector<T> color(static_cast<std::size_t>(texture.channels));
+  SampleBilinearRef<T>(texture, u, v, color);
+  return color;
+}
+
+TEST(Texture, CentreOfATexelIsTheTexel) {
+  const auto texels = RandomTexels();
+  for (int i = 0; i < kHeight; ++i) {
+    for (int j = 0; j < kWidth; ++j) {
+      const auto color =
+          Sample(View(texels, Wrap::kRepeat), (j + 0.5) / kWidth, 1.0 - (i + 0.5) / kHeight);
+      // u * W is within two roundings of j + 0.5, times the largest difference of texels (1).
+      for (int c = 0; c < kChannels; ++c) {
+        EXPECT_NEAR(color[static_cast<std::size_t>(c)],
+                    texels[static_cast<std::size_t>((i * kWidth + j) * kChannels + c)], 4e-15);
+      }
+    }
+  }
+}
+
+TEST(Texture, RepeatTilesThePlaneAndClampHoldsTheBorder) {
+  const auto texels = RandomTexels();
+  const auto repeat = View(texels, Wrap::kRepeat), clamp = View(texels, Wrap::kClamp);
+  const auto inside = Sample(repeat, 0.3, 0.6), outside = Sample(repeat, 3.3, -1.4);
+  const auto edge = Sample(clamp, 0.0, 1.0), far = Sample(clamp, -9.0, 4.0);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    EXPECT_NEAR(inside[c], outside[c], 1e-14);  // 3.3 * 5 loses 2 bits more than 0.3 * 5
+    EXPECT_EQ(edge[c], texels[c]);
+    EXPECT_EQ(far[c], texels[c]);
+  }
+}
+
+TEST(Texture, EndlessCoordinatesReadATexelNotTheMemoryBeside) {
+  const auto texels = RandomTexels();
+  for (double u : {1e300, -1e300, std::numeric_limits<double>::infinity(),
+                   std::numeric_limits<double>::quiet_NaN()}) {
+    for (Wrap wrap : {Wrap::kRepeat, Wrap::kClamp}) {
+      for (double c : Sample(View(texels, wrap), u, 0.5)) {
+        EXPECT_GE(c, 0.0);
+        EXPECT_LE(c, 1.0);
+      }
+    }
+  }
+}
+
+struct Pulled {
+  std::vector<double> uv = {0, 0}, texels = std::vector<double>(kWidth * kHeight * kChannels);
+};
+
+Pulled Adjoint(const std::vector<double>& texels, Wrap wrap, double u, double v,
+               const std::vector<double>& d_color) {
+  Pulled out;
+  SampleBilinearAdjointRef<double>(View(texels, wrap), u, v, d_color, out.uv, out.texels);
+  return out;
+}
+
+double ComplexLoss(const std::vector<Complex>& texels, Wrap wrap, Complex u, Complex v,
+                   const std::vector<double>& d_color) {
+  const auto color = Sample(View(texels, wrap), u, v);
+  Complex loss = 0;
+  for (std::size_t c = 0; c < color.size(); ++c) loss += color[c] * d_color[c];
+  return loss.imag() / kStep;
+}
+
+TEST(Texture, AdjointIsTheComplexStepDerivative) {
+  const auto texels = RandomTexels();
+  const std::vector<Complex> complex_texels(texels.begin(), texels.end());
+  const std::vector<double> d_color = {0.7, -1.3, 0.4};
+  const Complex step(0, kStep);
+  // A dozen roundings of terms below W * |d_color| * |texel difference| ~ 10.
+  constexpr double kTolerance = 1e-13;
+  Rng rng(3);
+  for (int n = 0; n < 50; ++n) {
+    const Wrap wrap = n % 2 ? Wrap::kRepeat : Wrap::kClamp;
+    const double u = rng.Uniform(-0.6, 1.6), v = rng.Uniform(-0.6, 1.6);
+    const Pulled pulled = Adjoint(texels, wrap, u, v, d_color);
+    EXPECT_NEAR(pulled.uv[0], ComplexLoss(complex_texels, wrap, u + step, v, d_color), kTolerance);
+    EXPECT_NEAR(pulled.uv[1], ComplexLoss(complex_texels, wrap, u, v + step, d_color), kTolerance);
+    const std::size_t k = rng.Below(texels.size());
+    auto moved = complex_texels;
+    moved[k] += step;
+    EXPECT_NEAR(pulled.texels[k], ComplexLoss(moved, wrap, u, v, d_color), kTolerance);
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::shade
