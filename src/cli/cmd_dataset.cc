@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad dataset: renders models into a dataset that training reads.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "train/data/build.h"
+
+namespace tilegrad::cli {
+namespace {
+
+using train::ModelSource;
+
+struct DatasetOptions {
+  std::string source = "sweethome3d", input, out, split_list;
+  int workers = 0;
+  bool fixed_size = false;  // --size or --views was given
+  train::BuildOptions build;
+};
+
+constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
+
+Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetOptions& options) {
+  const train::BuildOptions& build = options.build;
+  if (options.source == "procedural") {
+    return train::ProceduralSource(build.per_class > 0 ? build.per_class : kProceduralModels,
+                                   build.split.seed);
+  }
+  if (options.source == "sweethome3d") {
+    return train::SweetHome3dSource(options.input.empty() ? train::kSweetHome3dFolder
+                                                          : options.input);
+  }
+  if (options.input.empty()) {
+    return InvalidArgument("--source {} needs --input FOLDER", options.source);
+  }
+  if (options.source == "folder") return train::FolderSource(options.input);
+  if (options.source == "shapenet") {
+    return train::ShapeNetSource(options.input, options.split_list);
+  }
+  if (options.fixed_size) {
+    return InvalidArgument("--source nmr holds images of 64 pixels in 24 views: leave out --size "
+                           "and --views");
+  }
+  return train::NmrSource(options.input);
+}
+
+void PrintTable(const train::BuildSummary& summary) {
+  fmt::print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", "class", "train", "valid.", "test", "rejected");
+  for (std::size_t c = 0; c < summary.info.classes.size(); ++c) {
+    int counts[3] = {}, rejected = 0;
+    for (const auto& model : summary.models) {
+      if (model.class_index == static_cast<int>(c)) ++counts[static_cast<int>(model.split)];
+    }
+    for (const auto& model : summary.rejected) {
+      rejected += model.class_name == summary.info.classes[c];
+    }
+    fmt::print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", summary.info.classes[c], counts[0], counts[1],
+               counts[2], rejected);
+  }
+}
+
+// Reasons mostly begin with the file: what is the same in several is what follows it.
+void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
+  if (summary.rejected.empty()) return;
+  std::map<std::string, int> reasons;
+  for (const auto& model : summary.rejected) {
+    const auto colon = model.reason.rfind(": ");
+    ++reasons[colon == std::string::npos ? model.reason : model.reason.substr(colon + 2)];
+  }
+  fmt::print("{} models could not be used ({} lists them):\n", summary.rejected.size(),
+             (folder / "rejected.jsonl").string());
+  for (const auto& [reason, count] : reasons) fmt::print("  {:>5}  {}\n", count, reason);
+}
+
+Status Make(const DatasetOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const Path folder = options.out.empty() ? Path("datasets") / options.source : Path(options.out);
+  TILEGRAD_ASSIGN(const auto source, OpenSource(options));
+  const Workers workers(options.workers);
+  ProgressLine line;
+  TILEGRAD_ASSIGN(const train::BuildSummary summary,
+                  train::BuildDataset(*source, options.build, folder, workers, line.Sink(),
+                                      StopOnSignals()));
+  line.Finish();
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  PrintTable(summary);
+  PrintRejected(summary, folder);
+  fmt::print("{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
+             "earlier), {:.1f} s\n",
+             summary.models.size(), summary.info.views, summary.info.image_size,
+             summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
+             summary.reused, seconds.count());
+  for (const auto& credit : summary.info.credits) fmt::print("{}\n", credit);
+  fmt::print("look at {}\n", (folder / "contact_sheet.png").string());
+  return {};
+}
+
+}  // namespace
+
+void AddDataset(CLI::App& app, Action* action) {
+  auto options = std::make_shared<DatasetOptions>();
+  auto* command = app.add_subcommand(
+      "dataset",
+      "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
+      "Stopped with Ctrl-C, the same command goes on where it was.");
+  command
+      ->add_option("--source", options->source,
+                   "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
+                   "shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL.glb, "
+                   ".obj, ...), procedural (built in), nmr (.npz renders of N3MR and SoftRas)")
+      ->check(CLI::IsMember({"sweethome3d", "shapenet", "folder", "procedural", "nmr"}))
+      ->capture_default_str();
+  command->add_option("--input", options->input,
+                      "folder of the models; sweethome3d has a default, procedural needs none");
+  command->add_option("--out", options->out, "folder to fill [datasets/SOURCE]");
+  train::BuildOptions& build = options->build;
+  auto* size =
+      command->add_option("--size", build.image_size, "pixels a side")->capture_default_str();
+  auto* views =
+      command->add_option("--views", build.views, "views of a model")->capture_default_str();
+  command->add_option("--per-class", build.per_class,
+                      "at most N models of a class; 0 is all, or 100 if procedural")
+      ->capture_default_str();
+  command->add_option("--limit", build.limit, "at most N models in all; 0 is all")
+      ->capture_default_str();
+  command->add_option("--seed", build.split.seed,
+                      "of the choice of models, the split and procedural shapes")
+      ->capture_default_str();
+  command->add_option("--test-share", build.split.test_share, "of each class's models")
+      ->capture_default_str();
+  command->add_option("--validation-share", build.split.validation_share,
+                      "of each class's models")
+      ->capture_default_str();
+  command->add_option("--split-list", options->split_list,
+                      "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
+  command->add_option("--workers", options->workers, "threads; 0 is one a core")
+      ->capture_default_str();
+  command->callback([options, action, size, views] {
+    options->fixed_size = size->count() + views->count() > 0;
+    *action = [options] { return Make(*options); };
+  });
+}
+
+}  // namespace tilegrad::cli

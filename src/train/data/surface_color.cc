@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/surface_color.h"
+
+#include <algorithm>
+#include <array>
+
+#include "shade/texture_ref.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Half the size by the mean of 2 x 2 texels; an odd last row or column is left out.
+ImageU8 Halve(const ImageU8& image) {
+  const int w = std::max(1, image.width / 2), h = std::max(1, image.height / 2);
+  ImageU8 out(w, h, image.channels);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const int x1 = std::min(2 * x + 1, image.width - 1),
+                y1 = std::min(2 * y + 1, image.height - 1);
+      for (int c = 0; c < image.channels; ++c) {
+        const int sum = image.at(2 * x, 2 * y)[c] + image.at(x1, 2 * y)[c] +
+                        image.at(2 * x, y1)[c] + image.at(x1, y1)[c];
+        out.at(x, y)[c] = static_cast<std::uint8_t>((sum + 2) / 4);
+      }
+    }
+  }
+  return out;
+}
+
+template <class T>
+void Keep(std::vector<T>* values, const std::vector<char>& keep_face, std::size_t per_face) {
+  if (values->empty()) return;
+  std::size_t to = 0;
+  for (std::size_t f = 0; f < keep_face.size(); ++f) {
+    if (!keep_face[f]) continue;
+    for (std::size_t k = 0; k < per_face; ++k) (*values)[to++] = (*values)[f * per_face + k];
+  }
+  values->resize(to);
+}
+
+}  // namespace
+
+SurfaceColor::SurfaceColor(const Mesh& mesh) : mesh_(mesh) {
+  for (const Texture& texture : mesh.textures) textures_.push_back(Prepare(texture.image));
+}
+
+SurfaceColor::Texels SurfaceColor::Prepare(const ImageU8& image) {
+  if (image.empty()) return {};
+  if (std::max(image.width, image.height) > kMaxTextureSide) return Prepare(Halve(image));
+  Texels out{image.width, image.height, {}};
+  const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
+  out.rgb.reserve(3 * texels);
+  for (std::size_t i = 0; i < texels; ++i) {
+    const auto* p = image.pixels.data() + i * static_cast<std::size_t>(image.channels);
+    for (int c = 0; c < 3; ++c) {
+      out.rgb.push_back(static_cast<float>(p[image.channels >= 3 ? c : 0]) / 255);
+    }
+  }
+  return out;
+}
+
+glm::vec3 SurfaceColor::At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_color) const {
+  if (mesh_.materials.empty()) return vertex_color;
+  const Material& material = mesh_.materials[this->material(face)];
+  const glm::vec3 color = glm::vec3(material.base_color) * vertex_color;
+  if (material.base_color_texture < 0 || mesh_.corner_uvs.empty()) return color;
+  const Texels& texels = textures_[static_cast<std::size_t>(material.base_color_texture)];
+  if (texels.rgb.empty()) return color;
+  std::array<float, 3> texel;
+  shade::SampleBilinearRef<float>(
+      {texels.rgb, texels.width, texels.height, 3, shade::Wrap::kRepeat}, uv.x, uv.y, texel);
+  return color * glm::vec3(texel[0], texel[1], texel[2]);
+}
+
+glm::vec3 SurfaceColor::AtCorner(std::size_t face, int k) const {
+  const auto vertex = static_cast<std::size_t>(mesh_.faces[face][static_cast<std::size_t>(k)]);
+  const std::size_t corner = 3 * face + static_cast<std::size_t>(k);
+  const glm::vec2 uv = mesh_.corner_uvs.empty() ? glm::vec2(0) : mesh_.corner_uvs[corner];
+  return At(face, uv, mesh_.colors.empty() ? glm::vec3(1) : glm::vec3(mesh_.colors[vertex]));
+}
+
+void RemoveGlass(Mesh* mesh) {
+  if (mesh->materials.empty()) return;
+  std::vector<char> keep(mesh->faces.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) {
+    const auto m =
+        mesh->face_materials.empty() ? 0 : static_cast<std::size_t>(mesh->face_materials[f]);
+    keep[f] = mesh->materials[m].base_color.a >= kGlassAlpha;
+  }
+  if (std::find(keep.begin(), keep.end(), 1) == keep.end()) return;
+  Keep(&mesh->faces, keep, 1);
+  Keep(&mesh->face_materials, keep, 1);
+  Keep(&mesh->corner_uvs, keep, 3);
+  Keep(&mesh->corner_normals, keep, 3);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace tilegrad::train {
+
+// The text of data/sweethome3d_classes.tsv (data/README.md says its columns).
+std::string_view SweetHome3dList();
+
+}  // namespace tilegrad::train
