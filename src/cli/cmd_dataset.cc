@@ -44,8 +44,9 @@ Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetOptions& options) {
     return train::ShapeNetSource(options.input, options.split_list);
   }
   if (options.fixed_size) {
-    return InvalidArgument("--source nmr holds images of 64 pixels in 24 views: leave out --size "
-                           "and --views");
+    return InvalidArgument(
+        "--source nmr holds images of 64 pixels in 24 views: leave out --size "
+        "and --views");
   }
   return train::NmrSource(options.input);
 }
@@ -84,18 +85,18 @@ Status Make(const DatasetOptions& options) {
   TILEGRAD_ASSIGN(const auto source, OpenSource(options));
   const Workers workers(options.workers);
   ProgressLine line;
-  TILEGRAD_ASSIGN(const train::BuildSummary summary,
-                  train::BuildDataset(*source, options.build, folder, workers, line.Sink(),
-                                      StopOnSignals()));
+  TILEGRAD_ASSIGN(
+      const train::BuildSummary summary,
+      train::BuildDataset(*source, options.build, folder, workers, line.Sink(), StopOnSignals()));
   line.Finish();
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   PrintTable(summary);
   PrintRejected(summary, folder);
-  fmt::print("{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
-             "earlier), {:.1f} s\n",
-             summary.models.size(), summary.info.views, summary.info.image_size,
-             summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
-             summary.reused, seconds.count());
+  fmt::print(
+      "{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
+      "earlier), {:.1f} s\n",
+      summary.models.size(), summary.info.views, summary.info.image_size, summary.info.image_size,
+      static_cast<double>(summary.bytes) / 1e6, folder.string(), summary.reused, seconds.count());
   for (const auto& credit : summary.info.credits) fmt::print("{}\n", credit);
   fmt::print("look at {}\n", (folder / "contact_sheet.png").string());
   return {};
@@ -105,10 +106,10 @@ Status Make(const DatasetOptions& options) {
 
 void AddDataset(CLI::App& app, Action* action) {
   auto options = std::make_shared<DatasetOptions>();
-  auto* command = app.add_subcommand(
-      "dataset",
-      "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
-      "Stopped with Ctrl-C, the same command goes on where it was.");
+  auto* command =
+      app.add_subcommand("dataset",
+                         "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
+                         "Stopped with Ctrl-C, the same command goes on where it was.");
   command
       ->add_option("--source", options->source,
                    "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
@@ -124,18 +125,19 @@ void AddDataset(CLI::App& app, Action* action) {
       command->add_option("--size", build.image_size, "pixels a side")->capture_default_str();
   auto* views =
       command->add_option("--views", build.views, "views of a model")->capture_default_str();
-  command->add_option("--per-class", build.per_class,
-                      "at most N models of a class; 0 is all, or 100 if procedural")
+  command
+      ->add_option("--per-class", build.per_class,
+                   "at most N models of a class; 0 is all, or 100 if procedural")
       ->capture_default_str();
   command->add_option("--limit", build.limit, "at most N models in all; 0 is all")
       ->capture_default_str();
-  command->add_option("--seed", build.split.seed,
-                      "of the choice of models, the split and procedural shapes")
+  command
+      ->add_option("--seed", build.split.seed,
+                   "of the choice of models, the split and procedural shapes")
       ->capture_default_str();
   command->add_option("--test-share", build.split.test_share, "of each class's models")
       ->capture_default_str();
-  command->add_option("--validation-share", build.split.validation_share,
-                      "of each class's models")
+  command->add_option("--validation-share", build.split.validation_share, "of each class's models")
       ->capture_default_str();
   command->add_option("--split-list", options->split_list,
                       "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");

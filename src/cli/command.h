@@ -15,6 +15,7 @@ namespace tilegrad::cli {
 using Action = std::function<Status()>;
 
 // Adds a subcommand to `app`; when it is given on the command line, sets *action.
+void AddDataset(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
 void AddTrain(CLI::App& app, Action* action);
 

@@ -41,6 +41,7 @@ int Run(int argc, char** argv) {
   app.set_version_flag("--version", TILEGRAD_VERSION);
   app.require_subcommand(1);
   Action action;
+  AddDataset(app, &action);
   AddInfo(app, &action);
   AddTrain(app, &action);
   try {

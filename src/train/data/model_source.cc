@@ -42,8 +42,8 @@ std::string SafeFileName(const std::string& text) {
     const auto u = static_cast<unsigned char>(c);
     if (u > 127 || (!std::isalnum(u) && c != '.' && c != '-' && c != '_')) c = '_';
   }
-  if (out.empty() || out[0] == '.') out.insert(0, "_");
-  return out;
+  const bool hidden = out.empty() || out[0] == '.';
+  return hidden ? "_" + out : out;
 }
 
 void SortEntries(std::vector<SourceEntry>* entries) {

@@ -70,8 +70,13 @@ Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
     for (const Path& file : files) {
       if (!io::IsMeshFileName(file.filename().string())) continue;
       const std::string stem = file.stem().string();
-      entries.push_back({SafeFileName(class_folder.filename().string()), SafeFileName(stem), stem,
-                         "", "", file.string(), {}});
+      entries.push_back({SafeFileName(class_folder.filename().string()),
+                         SafeFileName(stem),
+                         stem,
+                         "",
+                         "",
+                         file.string(),
+                         {}});
     }
   }
   if (entries.empty()) {
@@ -84,7 +89,9 @@ Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
 
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Path& split_list) {
   SplitList list;
-  if (!split_list.empty()) TILEGRAD_ASSIGN(list, ReadSplitList(split_list));
+  if (!split_list.empty()) {
+    TILEGRAD_ASSIGN(list, ReadSplitList(split_list));
+  }
   std::vector<SourceEntry> entries;
   TILEGRAD_ASSIGN(const auto synsets, ListFolder(folder));
   for (const Path& synset : synsets) {
@@ -98,8 +105,8 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Pa
       std::optional<Split> split;
       if (listed != list.end()) split = listed->second;
       const Path file = model / "models" / "model_normalized.obj";
-      entries.push_back(
-          {class_name, SafeFileName(name), name, "ShapeNet terms of use", "", file.string(), split});
+      entries.push_back({class_name, SafeFileName(name), name, "ShapeNet terms of use", "",
+                         file.string(), split});
     }
   }
   if (entries.empty()) {

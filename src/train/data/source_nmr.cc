@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images and voxels of N3MR and SoftRas as they are published (spec 5.2), in our frame.
 //
-// Their frame is left-handed: image v is seen from (d cos e sin a, d sin e, -d cos e cos a) with a =
-// -15 v degrees, e = 30, d = 2.732. With x = -z', z = -x' (primes: theirs) that is our orbit at
-// azimuth +15 v. Their evaluation compares the file's grid g with a prediction's grid p'[x'][y'][z']
-// by g[i][j][k] = p'[j][i][31 - k], so ours is p[x][y][z] = g[y][31 - z][x].
+// Their frame is left-handed: image v is seen from (d cos e sin a, d sin e, -d cos e cos a) with a
+// = -15 v degrees, e = 30, d = 2.732. With x = -z', z = -x' (primes: theirs) that is our orbit at
+// azimuth +15 v. Their evaluation compares the file's grid g with a prediction's grid
+// p'[x'][y'][z'] by g[i][j][k] = p'[j][i][31 - k], so ours is p[x][y][z] = g[y][31 - z][x].
 #include <map>
 #include <memory>
 #include <mutex>

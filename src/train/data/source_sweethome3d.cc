@@ -95,8 +95,13 @@ class SweetHome3d : public ModelSource {
     const std::string stem = Path(row.model).stem().string();
     const std::string file = fmt::format("{}.sh3f: {}", row.library, row.model);
     models_[file] = {row.library, row.model};
-    entries_.push_back({row.class_name, SafeFileName(row.library + "-" + stem), row.name,
-                        row.license, row.creator, file, {}});
+    entries_.push_back({row.class_name,
+                        SafeFileName(row.library + "-" + stem),
+                        row.name,
+                        row.license,
+                        row.creator,
+                        file,
+                        {}});
     return {};
   }
 
