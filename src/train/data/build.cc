@@ -117,14 +117,14 @@ class Builder {
     // The list stands for a complete set, which this no longer is.
     std::error_code error;
     std::filesystem::remove(ModelsPath(folder_), error);
-    std::vector<ViewRenderer> renderers(static_cast<std::size_t>(workers_.count()));
+    std::vector<LitRenderer> renderers(static_cast<std::size_t>(workers_.count()));
     TILEGRAD_TRY(ForEachModel("rendering", [&](std::size_t i, std::size_t worker) {
       if (!outcomes_[i].stamp) Make(i, renderers[worker]);
     }));
     return write_failure_;
   }
 
-  void Make(std::size_t i, ViewRenderer& renderer) {
+  void Make(std::size_t i, LitRenderer& renderer) {
     auto made = Load(i, renderer);
     if (!made.ok()) {
       outcomes_[i].failure = made.status();
@@ -141,7 +141,7 @@ class Builder {
     failed_ = true;
   }
 
-  Result<MadeModel> Load(std::size_t i, ViewRenderer& renderer) const {
+  Result<MadeModel> Load(std::size_t i, LitRenderer& renderer) const {
     TILEGRAD_ASSIGN(SourceModel model, source_.Load(chosen_[i]));
     return MakeModel(entry(i), std::move(model), info_, renderer);
   }

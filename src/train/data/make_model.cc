@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "train/data/glass.h"
 #include "train/data/split.h"
-#include "train/data/surface_color.h"
 #include "train/data/truth_mesh.h"
 #include "train/metrics.h"
 
@@ -16,14 +16,16 @@ namespace {
 constexpr int kRulesVersion = 1;
 
 Result<MadeModel> FromMesh(const SourceEntry& entry, Mesh mesh, const DatasetInfo& info,
-                           ViewRenderer& renderer) {
+                           LitRenderer& renderer) {
   TILEGRAD_TRY(Validate(mesh));
   MadeModel made;
   made.stamp.source_faces = static_cast<int>(mesh.faces.size());
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(info.camera.half_extent)));
   made.stamp.geometry = GeometryFingerprint(mesh);
-  TILEGRAD_ASSIGN(made.data.images, renderer.Render(mesh, info.camera, info.views));
+  std::vector<Camera> cameras;
+  for (int i = 0; i < info.views; ++i) cameras.push_back(info.camera.View(i));
+  TILEGRAD_ASSIGN(made.data.images, renderer.Render(mesh, cameras, info.image_size));
   TILEGRAD_ASSIGN(made.data.occupancy, Voxelize(mesh, kOccupancyResolution));
   const std::uint64_t seed = HashText(entry.class_name + "/" + entry.id, 0);
   TILEGRAD_ASSIGN(made.data.points, SampleSurface(mesh, kTruthPoints, seed));
@@ -47,7 +49,7 @@ Status CheckVisible(const ModelData& data, int size) {
 }  // namespace
 
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
-                            ViewRenderer& renderer) {
+                            LitRenderer& renderer) {
   MadeModel made;
   if (auto* data = std::get_if<ModelData>(&model)) {
     made.data = std::move(*data);

@@ -4,9 +4,9 @@
 
 #include <string>
 
+#include "render/lit_renderer.h"
 #include "train/data/dataset_files.h"
 #include "train/data/model_source.h"
-#include "train/data/render_views.h"
 
 namespace tilegrad::train {
 
@@ -15,11 +15,11 @@ struct MadeModel {
   ModelStamp stamp;
 };
 
-// Glass goes (surface_color.h), the rest is centred and scaled to the rule's half-extent, rendered,
+// Glass goes (glass.h), the rest is centred and scaled to the rule's half-extent, rendered,
 // voxelised, sampled (seeded by class and id) and reduced for reports. A pure function of the
 // model, the entry and `info`.
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
-                            ViewRenderer& renderer);
+                            LitRenderer& renderer);
 
 // 16 hex digits that change whenever model files would: `info`'s sizes and camera, the source's
 // name, and a version of the rules.

@@ -8,19 +8,25 @@
 #include <unordered_map>
 
 #include "base/rng.h"
-#include "train/data/surface_color.h"
+#include "render/lit_renderer.h"
 
 namespace tilegrad::train {
 namespace {
+
+using Colors = std::vector<glm::vec3>;  // [3F], of corners
 
 struct Sum {
   glm::vec3 position = glm::vec3(0), color = glm::vec3(0);
   float count = 0;
 };
 
+std::uint64_t MaterialOf(const Mesh& mesh, std::size_t face) {
+  return mesh.face_materials.empty() ? 0 : static_cast<std::uint64_t>(mesh.face_materials[face]);
+}
+
 // Joins the corners that `key_of(face, k)` gives the same key.
 template <class KeyOf>
-Mesh JoinCorners(const Mesh& mesh, const SurfaceColor& surface, KeyOf key_of) {
+Mesh JoinCorners(const Mesh& mesh, const Colors& colors, KeyOf key_of) {
   Mesh out;
   std::vector<Sum> sums;
   std::unordered_map<std::uint64_t, std::int32_t> index;
@@ -34,7 +40,7 @@ Mesh JoinCorners(const Mesh& mesh, const SurfaceColor& surface, KeyOf key_of) {
       Sum& sum = sums[static_cast<std::size_t>(at->second)];
       const auto corner = static_cast<std::size_t>(k);
       sum.position += mesh.positions[static_cast<std::size_t>(mesh.faces[f][corner])];
-      sum.color += surface.AtCorner(f, k);
+      sum.color += colors[3 * f + corner];
       sum.count += 1;
       face[corner] = at->second;
     }
@@ -81,30 +87,30 @@ std::uint64_t Cell(glm::vec3 p, const Bounds& bounds, float cell) {
   return key;
 }
 
-Mesh Cluster(const Mesh& mesh, const SurfaceColor& surface, const Bounds& bounds, int cells) {
+Mesh Cluster(const Mesh& mesh, const Colors& colors, const Bounds& bounds, int cells) {
   const glm::vec3 size = bounds.high - bounds.low;
   const float cell = std::max({size.x, size.y, size.z}) / static_cast<float>(cells);
-  return JoinCorners(mesh, surface, [&](std::size_t f, int k) {
+  return JoinCorners(mesh, colors, [&](std::size_t f, int k) {
     const auto v = static_cast<std::size_t>(mesh.faces[f][static_cast<std::size_t>(k)]);
-    return Cell(mesh.positions[v], bounds, cell) << 24 | surface.material(f);
+    return Cell(mesh.positions[v], bounds, cell) << 24 | MaterialOf(mesh, f);
   });
 }
 
 }  // namespace
 
 Mesh MakeTruthMesh(const Mesh& mesh, std::size_t max_faces) {
-  const SurfaceColor surface(mesh);
+  const Colors colors = CornerColors(mesh);
   Mesh out;
   if (mesh.faces.size() <= max_faces) {
-    out = JoinCorners(mesh, surface, [&](std::size_t f, int k) {
+    out = JoinCorners(mesh, colors, [&](std::size_t f, int k) {
       return static_cast<std::uint64_t>(mesh.faces[f][static_cast<std::size_t>(k)]) << 24 |
-             surface.material(f);
+             MaterialOf(mesh, f);
     });
   } else {
     const Bounds bounds = MeshBounds(mesh);
     int cells = 160;
     do {
-      out = Cluster(mesh, surface, bounds, cells);
+      out = Cluster(mesh, colors, bounds, cells);
       cells = std::max(1, cells * 4 / 5);
     } while (out.faces.size() > max_faces);
   }

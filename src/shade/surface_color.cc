@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/data/surface_color.h"
+#include "shade/surface_color.h"
 
 #include <algorithm>
 #include <array>
 
 #include "shade/texture_ref.h"
 
-namespace tilegrad::train {
+namespace tilegrad::shade {
 namespace {
 
 // Half the size by the mean of 2 x 2 texels; an odd last row or column is left out.
@@ -25,17 +25,6 @@ ImageU8 Halve(const ImageU8& image) {
     }
   }
   return out;
-}
-
-template <class T>
-void Keep(std::vector<T>* values, const std::vector<char>& keep_face, std::size_t per_face) {
-  if (values->empty()) return;
-  std::size_t to = 0;
-  for (std::size_t f = 0; f < keep_face.size(); ++f) {
-    if (!keep_face[f]) continue;
-    for (std::size_t k = 0; k < per_face; ++k) (*values)[to++] = (*values)[f * per_face + k];
-  }
-  values->resize(to);
 }
 
 }  // namespace
@@ -67,8 +56,8 @@ glm::vec3 SurfaceColor::At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_colo
   const Texels& texels = textures_[static_cast<std::size_t>(material.base_color_texture)];
   if (texels.rgb.empty()) return color;
   std::array<float, 3> texel;
-  shade::SampleBilinearRef<float>(
-      {texels.rgb, texels.width, texels.height, 3, shade::Wrap::kRepeat}, uv.x, uv.y, texel);
+  SampleBilinearRef<float>({texels.rgb, texels.width, texels.height, 3, Wrap::kRepeat}, uv.x, uv.y,
+                           texel);
   return color * glm::vec3(texel[0], texel[1], texel[2]);
 }
 
@@ -79,19 +68,4 @@ glm::vec3 SurfaceColor::AtCorner(std::size_t face, int k) const {
   return At(face, uv, mesh_.colors.empty() ? glm::vec3(1) : glm::vec3(mesh_.colors[vertex]));
 }
 
-void RemoveGlass(Mesh* mesh) {
-  if (mesh->materials.empty()) return;
-  std::vector<char> keep(mesh->faces.size());
-  for (std::size_t f = 0; f < keep.size(); ++f) {
-    const auto m =
-        mesh->face_materials.empty() ? 0 : static_cast<std::size_t>(mesh->face_materials[f]);
-    keep[f] = mesh->materials[m].base_color.a >= kGlassAlpha;
-  }
-  if (std::find(keep.begin(), keep.end(), 1) == keep.end()) return;
-  Keep(&mesh->faces, keep, 1);
-  Keep(&mesh->face_materials, keep, 1);
-  Keep(&mesh->corner_uvs, keep, 3);
-  Keep(&mesh->corner_normals, keep, 3);
-}
-
-}  // namespace tilegrad::train
+}  // namespace tilegrad::shade

@@ -6,10 +6,9 @@
 
 #include "scene/mesh.h"
 
-namespace tilegrad::train {
+namespace tilegrad::shade {
 
 inline constexpr int kMaxTextureSide = 512;  // texels; larger textures are halved until they fit
-inline constexpr float kGlassAlpha = 0.2f;   // materials with less are not drawn
 
 // Keeps a reference to the mesh.
 class SurfaceColor {
@@ -36,8 +35,4 @@ class SurfaceColor {
   std::vector<Texels> textures_;
 };
 
-// Removes faces of materials whose alpha is below kGlassAlpha, unless nothing would be left: what
-// is behind glass is what people see. Everything else counts as opaque.
-void RemoveGlass(Mesh* mesh);
-
-}  // namespace tilegrad::train
+}  // namespace tilegrad::shade

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "scene/mesh.h"
+
+namespace tilegrad::train {
+
+inline constexpr float kGlassAlpha = 0.2f;  // materials with less are glass
+
+// Removes faces of glass, unless nothing would be left: what is behind it is what people see.
+// Everything else counts as opaque.
+void RemoveGlass(Mesh* mesh);
+
+}  // namespace tilegrad::train
