@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad eval: how good a run is on models that it never saw, beside two baselines.
+#include <fmt/core.h>
+
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "train/evaluate.h"
+#include "train/models/predictor.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct EvalOptions {
+  std::string run, data;
+  int views_per_model = 24;
+  bool training_models = false;
+  int workers = 0;
+};
+
+Status RunEvaluation(const EvalOptions& options) {
+  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
+  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
+  TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(data));
+  const Workers workers(options.workers);
+  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(run, workers));
+  train::EvaluationJob job;
+  job.dataset = &dataset;
+  job.split = options.training_models ? train::Split::kTrain : train::Split::kTest;
+  job.predict = [&](std::span<const std::uint8_t> images) { return predictor.Predict(images); };
+  job.template_mesh = predictor.template_mesh();
+  job.views_per_model = options.views_per_model;
+  job.predictor = predictor.description();
+  ProgressLine line;
+  auto evaluation = train::Evaluate(job, workers, line.Sink(), StopOnSignals());
+  line.Finish();
+  if (!evaluation.ok()) return evaluation.status();
+  fmt::print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
+  if (options.training_models) return {};  // a look at overfitting: the files keep the held-out figures
+  TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation, dataset));
+  fmt::print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
+  return {};
+}
+
+}  // namespace
+
+void AddEval(CLI::App& app, Action* action) {
+  auto options = std::make_shared<EvalOptions>();
+  auto* command = app.add_subcommand("eval", "3D IoU and F-score of a run on held-out models, beside two baselines");
+  command->add_option("--run", options->run, "run folder [the newest below runs/]");
+  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+  command->add_option("--views-per-model", options->views_per_model, "images of each model that are predicted from")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--training-models", options->training_models, "score the training models instead and write nothing");
+  command->add_option("--workers", options->workers, "threads; 0: one per core")->capture_default_str()->check(CLI::Range(0, 1024));
+  command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
+}
+
+}  // namespace tilegrad::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/run_folder.h"
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "base/error.h"
+
+namespace tilegrad::cli {
+
+Result<Path> ChooseRun(const std::string& given) {
+  if (!given.empty()) return Path(given);
+  std::optional<std::filesystem::directory_entry> newest;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("runs", error)) {
+    if (!std::filesystem::exists(entry.path() / "run.json", error)) continue;
+    if (!newest || entry.last_write_time(error) > newest->last_write_time(error)) newest = entry;
+  }
+  if (!newest) return NotFound("no run below runs/; name one with --run, or train one (tilegrad train --help)");
+  return newest->path();
+}
+
+Result<Path> ChooseDataset(const std::string& given, const Path& run) {
+  if (!given.empty()) return Path(given);
+  const Path file = run / "run.json";
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || !json.contains("dataset") || !json["dataset"].is_string()) {
+    return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
+  }
+  return Path(json["dataset"].get<std::string>());
+}
+
+}  // namespace tilegrad::cli
