@@ -22,14 +22,18 @@ Result<int> ChooseModel(const train::Dataset& dataset, const ViewOptions& option
   if (options.model.empty()) {
     const auto split = options.split == "train" ? train::Split::kTrain : train::Split::kTest;
     const auto models = dataset.Select(split);
-    if (models.empty()) return NotFound("{}: no models in the {} split", options.data, options.split);
+    if (models.empty())
+      return NotFound("{}: no models in the {} split", options.data, options.split);
     return models[models.size() / 2];
   }
   for (std::size_t m = 0; m < dataset.models().size(); ++m) {
     const auto& info = dataset.models()[m];
-    if (dataset.info().classes[static_cast<std::size_t>(info.class_index)] + "/" + info.id == options.model) return static_cast<int>(m);
+    if (dataset.info().classes[static_cast<std::size_t>(info.class_index)] + "/" + info.id ==
+        options.model)
+      return static_cast<int>(m);
   }
-  return NotFound("{}: no model \"{}\" (they are named CLASS/ID, as the files below models/)", options.data, options.model);
+  return NotFound("{}: no model \"{}\" (they are named CLASS/ID, as the files below models/)",
+                  options.data, options.model);
 }
 
 // Planar RGB over black to interleaved RGBA with straight alpha.
@@ -39,7 +43,8 @@ ImageU8 Straighten(std::span<const std::uint8_t> planar, int size) {
   for (std::size_t p = 0; p < plane; ++p) {
     const int alpha = planar[3 * plane + p];
     for (std::size_t c = 0; c < 3; ++c) {
-      out.pixels[4 * p + c] = static_cast<std::uint8_t>(alpha == 0 ? 0 : std::min(255, (planar[c * plane + p] * 255 + alpha / 2) / alpha));
+      out.pixels[4 * p + c] = static_cast<std::uint8_t>(
+          alpha == 0 ? 0 : std::min(255, (planar[c * plane + p] * 255 + alpha / 2) / alpha));
     }
     out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
   }
@@ -48,15 +53,19 @@ ImageU8 Straighten(std::span<const std::uint8_t> planar, int size) {
 
 Status WriteView(const ViewOptions& options) {
   TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(options.data));
-  if (options.view >= dataset.info().views) return InvalidArgument("--view {}: the dataset has views 0 to {}", options.view, dataset.info().views - 1);
+  if (options.view >= dataset.info().views)
+    return InvalidArgument("--view {}: the dataset has views 0 to {}", options.view,
+                           dataset.info().views - 1);
   TILEGRAD_ASSIGN(const int model, ChooseModel(dataset, options));
   TILEGRAD_ASSIGN(const auto images, dataset.LoadImages(model));
   const int size = dataset.info().image_size;
   const std::size_t bytes = 4 * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
-  const auto image = std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
+  const auto image =
+      std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
   TILEGRAD_TRY(io::SavePng(options.out, Straighten(image, size)));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
-  fmt::print("{}: {} ({}), view {}\n", options.out, info.name, dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
+  fmt::print("{}: {} ({}), view {}\n", options.out, info.name,
+             dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
   return {};
 }
 
@@ -66,9 +75,14 @@ void AddDatasetView(CLI::App& app, Action* action) {
   auto options = std::make_shared<ViewOptions>();
   auto* command = app.add_subcommand("dataset-view", "Save one image of a dataset as an RGBA PNG");
   command->add_option("--data", options->data, "dataset folder")->required();
-  command->add_option("--model", options->model, "CLASS/ID, as the files below models/ [one of --split]");
-  command->add_option("--split", options->split, "train or test")->capture_default_str()->check(CLI::IsMember({"train", "test"}));
-  command->add_option("--view", options->view, "which view")->capture_default_str()->check(CLI::NonNegativeNumber);
+  command->add_option("--model", options->model,
+                      "CLASS/ID, as the files below models/ [one of --split]");
+  command->add_option("--split", options->split, "train or test")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"train", "test"}));
+  command->add_option("--view", options->view, "which view")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--out", options->out, "PNG file")->capture_default_str();
   command->callback([options, action] { *action = [options] { return WriteView(*options); }; });
 }

@@ -36,7 +36,8 @@ Status RunEvaluation(const EvalOptions& options) {
   line.Finish();
   if (!evaluation.ok()) return evaluation.status();
   fmt::print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
-  if (options.training_models) return {};  // a look at overfitting: the files keep the held-out figures
+  if (options.training_models)
+    return {};  // a look at overfitting: the files keep the held-out figures
   TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation, dataset));
   fmt::print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
   return {};
@@ -46,14 +47,20 @@ Status RunEvaluation(const EvalOptions& options) {
 
 void AddEval(CLI::App& app, Action* action) {
   auto options = std::make_shared<EvalOptions>();
-  auto* command = app.add_subcommand("eval", "3D IoU and F-score of a run on held-out models, beside two baselines");
+  auto* command = app.add_subcommand(
+      "eval", "3D IoU and F-score of a run on held-out models, beside two baselines");
   command->add_option("--run", options->run, "run folder [the newest below runs/]");
   command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
-  command->add_option("--views-per-model", options->views_per_model, "images of each model that are predicted from")
+  command
+      ->add_option("--views-per-model", options->views_per_model,
+                   "images of each model that are predicted from")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  command->add_flag("--training-models", options->training_models, "score the training models instead and write nothing");
-  command->add_option("--workers", options->workers, "threads; 0: one per core")->capture_default_str()->check(CLI::Range(0, 1024));
+  command->add_flag("--training-models", options->training_models,
+                    "score the training models instead and write nothing");
+  command->add_option("--workers", options->workers, "threads; 0: one per core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 

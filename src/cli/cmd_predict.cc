@@ -35,19 +35,23 @@ Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers)
   const train::CameraRule rule;
   std::vector<Camera> cameras;
   for (int i = 0; i < kTurntableViews; ++i) {
-    cameras.push_back(OrbitCamera(rule.lens, -360.0 * i / kTurntableViews, rule.elevation, rule.distance));
+    cameras.push_back(
+        OrbitCamera(rule.lens, -360.0 * i / kTurntableViews, rule.elevation, rule.distance));
   }
-  TILEGRAD_ASSIGN(const auto views, train::DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers));
+  TILEGRAD_ASSIGN(const auto views,
+                  train::DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers));
   return io::SavePng(file, train::TileImages(views, kTurntableColumns));
 }
 
-Status PredictOne(const train::Predictor& predictor, const PredictOptions& options, const std::string& file, const Workers& workers) {
+Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
+                  const std::string& file, const Workers& workers) {
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   TILEGRAD_ASSIGN(const auto input, train::PrepareCutout(cutout, predictor.image_size(), framing));
   TILEGRAD_ASSIGN(const auto meshes, predictor.Predict(input));
   const std::string stem = Path(file).stem().string();
-  const Path glb = Path(options.out) / (stem + ".glb"), turntable = Path(options.out) / (stem + "_turntable.png");
+  const Path glb = Path(options.out) / (stem + ".glb"),
+             turntable = Path(options.out) / (stem + "_turntable.png");
   TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
   fmt::print("{} -> {}, {}\n", file, glb.string(), turntable.string());
@@ -55,7 +59,8 @@ Status PredictOne(const train::Predictor& predictor, const PredictOptions& optio
 }
 
 Status RunPrediction(const PredictOptions& options) {
-  if (!options.mask.empty() && options.images.size() > 1) return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
+  if (!options.mask.empty() && options.images.size() > 1)
+    return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const Workers workers(options.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(run, workers));
@@ -74,13 +79,20 @@ Status RunPrediction(const PredictOptions& options) {
 
 void AddPredict(CLI::App& app, Action* action) {
   auto options = std::make_shared<PredictOptions>();
-  auto* command = app.add_subcommand("predict", "Predict a coloured 3D mesh from one image of an object that is cut out");
-  command->add_option("images", options->images, "RGBA cut-outs (PNG), or an RGB image with --mask")->required();
-  command->add_option("--run", options->run, "run folder or one checkpoint [the newest below runs/]");
-  command->add_option("--out", options->out, "folder for NAME.glb and NAME_turntable.png")->capture_default_str();
+  auto* command = app.add_subcommand(
+      "predict", "Predict a coloured 3D mesh from one image of an object that is cut out");
+  command->add_option("images", options->images, "RGBA cut-outs (PNG), or an RGB image with --mask")
+      ->required();
+  command->add_option("--run", options->run,
+                      "run folder or one checkpoint [the newest below runs/]");
+  command->add_option("--out", options->out, "folder for NAME.glb and NAME_turntable.png")
+      ->capture_default_str();
   command->add_option("--mask", options->mask, "grey image of the same size: white is the object");
-  command->add_flag("--keep-framing", options->keep_framing, "only resize: the image is framed like a training image already");
-  command->add_option("--workers", options->workers, "threads; 0: one per core")->capture_default_str()->check(CLI::Range(0, 1024));
+  command->add_flag("--keep-framing", options->keep_framing,
+                    "only resize: the image is framed like a training image already");
+  command->add_option("--workers", options->workers, "threads; 0: one per core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   command->callback([options, action] { *action = [options] { return RunPrediction(*options); }; });
 }
 

@@ -16,7 +16,9 @@ Result<Path> ChooseRun(const std::string& given) {
     if (!std::filesystem::exists(entry.path() / "run.json", error)) continue;
     if (!newest || entry.last_write_time(error) > newest->last_write_time(error)) newest = entry;
   }
-  if (!newest) return NotFound("no run below runs/; name one with --run, or train one (tilegrad train --help)");
+  if (!newest)
+    return NotFound(
+        "no run below runs/; name one with --run, or train one (tilegrad train --help)");
   return newest->path();
 }
 

@@ -8,7 +8,8 @@
 
 namespace tilegrad::cli {
 
-// `given`, or if that is empty the folder below runs/ that was changed last; an error if there is none.
+// `given`, or if that is empty the folder below runs/ that was changed last; an error if there is
+// none.
 Result<Path> ChooseRun(const std::string& given);
 // `given`, or if that is empty the dataset that the run's run.json names.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);

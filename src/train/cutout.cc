@@ -23,26 +23,32 @@ Result<Window> FitWindow(const ImageU8& rgba) {
     for (int x = 0; x < rgba.width; ++x) {
       if (rgba.at(x, y)[3] < kOpaque) continue;
       ++opaque;
-      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y),
+      bottom = std::max(bottom, y);
     }
   }
   if (opaque == 0) return InvalidArgument("the mask is empty: no pixel is opaque");
   if (opaque == rgba.pixels.size() / 4) {
-    return InvalidArgument("every pixel is opaque, so the object is not cut out; give an image with a transparent background, or a "
-                           "mask with --mask");
+    return InvalidArgument(
+        "every pixel is opaque, so the object is not cut out; give an image with a transparent "
+        "background, or a "
+        "mask with --mask");
   }
   const double side = std::max(right - left + 1, bottom - top + 1) / kTrainingFill;
   return Window{0.5 * (left + right + 1) - 0.5 * side, 0.5 * (top + bottom + 1) - 0.5 * side, side};
 }
 
-// The mean over [x0, x1) x [y0, y1) of (r a, g a, b a, a), transparent beyond the edges; by exact area.
+// The mean over [x0, x1) x [y0, y1) of (r a, g a, b a, a), transparent beyond the edges; by exact
+// area.
 struct Sum {
   double value[4] = {};
 };
 Sum AverageArea(const ImageU8& rgba, double x0, double y0, double side) {
   Sum sum;
-  const int first_y = std::max(0, static_cast<int>(std::floor(y0))), last_y = std::min(rgba.height - 1, static_cast<int>(std::ceil(y0 + side)) - 1);
-  const int first_x = std::max(0, static_cast<int>(std::floor(x0))), last_x = std::min(rgba.width - 1, static_cast<int>(std::ceil(x0 + side)) - 1);
+  const int first_y = std::max(0, static_cast<int>(std::floor(y0))),
+            last_y = std::min(rgba.height - 1, static_cast<int>(std::ceil(y0 + side)) - 1);
+  const int first_x = std::max(0, static_cast<int>(std::floor(x0))),
+            last_x = std::min(rgba.width - 1, static_cast<int>(std::ceil(x0 + side)) - 1);
   for (int y = first_y; y <= last_y; ++y) {
     const double height = std::min(y + 1.0, y0 + side) - std::max<double>(y, y0);
     for (int x = first_x; x <= last_x; ++x) {
@@ -60,7 +66,9 @@ Sum AverageArea(const ImageU8& rgba, double x0, double y0, double side) {
 }  // namespace
 
 Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, Framing framing) {
-  if (rgba.channels != 4) return InvalidArgument("the image has no alpha channel; give a cut-out with transparency, or a mask with --mask");
+  if (rgba.channels != 4)
+    return InvalidArgument(
+        "the image has no alpha channel; give a cut-out with transparency, or a mask with --mask");
   TILEGRAD_ASSIGN(Window window, FitWindow(rgba));
   if (framing == Framing::kKeep) {
     const double side = std::max(rgba.width, rgba.height);
@@ -73,7 +81,8 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, F
     for (int x = 0; x < size; ++x) {
       const Sum mean = AverageArea(rgba, window.x0 + x * cell, window.y0 + y * cell, cell);
       for (std::size_t c = 0; c < 4; ++c) {
-        out[c * plane + static_cast<std::size_t>(y * size + x)] = static_cast<std::uint8_t>(std::min(255.0, mean.value[c] + 0.5));
+        out[c * plane + static_cast<std::size_t>(y * size + x)] =
+            static_cast<std::uint8_t>(std::min(255.0, mean.value[c] + 0.5));
       }
     }
   }
@@ -82,7 +91,8 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, F
 
 Result<ImageU8> WithMask(const ImageU8& rgb, const ImageU8& mask) {
   if (rgb.width != mask.width || rgb.height != mask.height) {
-    return InvalidArgument("the mask is {} x {} pixels, the image {} x {}; they must be equal", mask.width, mask.height, rgb.width, rgb.height);
+    return InvalidArgument("the mask is {} x {} pixels, the image {} x {}; they must be equal",
+                           mask.width, mask.height, rgb.width, rgb.height);
   }
   ImageU8 out(rgb.width, rgb.height, 4);
   for (int y = 0; y < rgb.height; ++y) {

@@ -16,20 +16,25 @@ Camera Scaled(Camera camera, float factor) {
   return camera;
 }
 
-std::uint8_t ToByte(float unit) { return static_cast<std::uint8_t>(255 * std::clamp(unit, 0.0f, 1.0f) + 0.5f); }
+std::uint8_t ToByte(float unit) {
+  return static_cast<std::uint8_t>(255 * std::clamp(unit, 0.0f, 1.0f) + 0.5f);
+}
 
 // The mean over kSamples^2 samples of image n of the frame; samples without a face show the paper.
 ImageU8 Resolve(const Frame& frame, std::size_t n, int size) {
   ImageU8 out(size, size, 3);
-  const auto wide = static_cast<std::size_t>(frame.width), plane = wide * static_cast<std::size_t>(frame.height);
+  const auto wide = static_cast<std::size_t>(frame.width),
+             plane = wide * static_cast<std::size_t>(frame.height);
   const float* rgb = frame.attributes.data() + 3 * plane * n;
   const std::int32_t* ids = frame.face_ids.data() + plane * n;
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       float sum[3] = {};
       for (int s = 0; s < kSamples * kSamples; ++s) {
-        const std::size_t p = static_cast<std::size_t>(y * kSamples + s / kSamples) * wide + static_cast<std::size_t>(x * kSamples + s % kSamples);
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += ids[p] < 0 ? kPaper : std::clamp(rgb[c * plane + p], 0.0f, 1.0f);
+        const std::size_t p = static_cast<std::size_t>(y * kSamples + s / kSamples) * wide +
+                              static_cast<std::size_t>(x * kSamples + s % kSamples);
+        for (std::size_t c = 0; c < 3; ++c)
+          sum[c] += ids[p] < 0 ? kPaper : std::clamp(rgb[c * plane + p], 0.0f, 1.0f);
       }
       for (int c = 0; c < 3; ++c) out.at(x, y)[c] = ToByte(sum[c] / (kSamples * kSamples));
     }
@@ -47,16 +52,19 @@ std::vector<float> Colors(const Mesh& mesh) {
 
 }  // namespace
 
-Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& request, const Workers& workers) {
+Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& request,
+                                      const Workers& workers) {
   TILEGRAD_TRY(Validate(mesh));
   const std::vector<float> colors = Colors(mesh);
-  SceneView scene{.channels = 3};
+  SceneView scene;
+  scene.channels = 3;
   scene.attributes = colors;
   if (!mesh.positions.empty()) scene.positions = {&mesh.positions[0].x, 3 * mesh.positions.size()};
   if (!mesh.faces.empty()) scene.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};
   std::vector<SceneView> scenes;
   for (const Camera& camera : request.cameras) {
-    scene.camera = Scaled(camera, static_cast<float>(request.size * kSamples) / static_cast<float>(request.camera_size));
+    scene.camera = Scaled(camera, static_cast<float>(request.size * kSamples) /
+                                      static_cast<float>(request.camera_size));
     scenes.push_back(scene);
   }
   RenderOptions options;
@@ -74,20 +82,23 @@ ImageU8 CompositeOverPaper(std::span<const std::uint8_t> planar, int size) {
   const std::size_t plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   for (std::size_t p = 0; p < plane; ++p) {
     const float through = kPaper * (1 - static_cast<float>(planar[3 * plane + p]) / 255);
-    for (std::size_t c = 0; c < 3; ++c) out.pixels[3 * p + c] = ToByte(static_cast<float>(planar[c * plane + p]) / 255 + through);
+    for (std::size_t c = 0; c < 3; ++c)
+      out.pixels[3 * p + c] = ToByte(static_cast<float>(planar[c * plane + p]) / 255 + through);
   }
   return out;
 }
 
 ImageU8 TileImages(std::span<const ImageU8> images, int columns) {
   if (images.empty()) return {};
-  const int count = static_cast<int>(images.size()), across = std::min(columns, count), down = (count + columns - 1) / columns;
+  const int count = static_cast<int>(images.size()), across = std::min(columns, count),
+            down = (count + columns - 1) / columns;
   const int width = images[0].width, height = images[0].height;
   ImageU8 out(across * (width + kGap) - kGap, down * (height + kGap) - kGap, 3, 255);
   for (int i = 0; i < count; ++i) {
     const ImageU8& from = images[static_cast<std::size_t>(i)];
     for (int y = 0; y < height; ++y) {
-      std::copy_n(from.at(0, y), 3 * width, out.at(i % columns * (width + kGap), i / columns * (height + kGap) + y));
+      std::copy_n(from.at(0, y), 3 * width,
+                  out.at(i % columns * (width + kGap), i / columns * (height + kGap) + y));
     }
   }
   return out;
