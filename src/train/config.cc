@@ -40,6 +40,8 @@ std::vector<Field> Fields(TrainConfig& c) {
       {"network.template_radius", &c.network.template_radius, 1e-3, 10, "world units"},
       {"network.fc_deviation", &c.network.fc_deviation, 0, 10,
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
+      {"network.output_deviation", &c.network.output_deviation, 0, 10,
+       "the decoders' last weights start as N(0, this^2)"},
       {"network.color_bias", &c.network.color_bias, -1, 2, "what vertex colours start at"},
       {"loss.iou", &c.loss.iou, 0, kHuge, "weight of equation 12"},
       {"loss.color", &c.loss.color, 0, kHuge, "weight of equation 13"},

@@ -22,6 +22,8 @@ struct NetworkConfig {
   std::int64_t hidden2 = 2048;
   std::int64_t template_level = 3;  // subdivisions of the icosahedron: 3 gives 642 vertices
   double template_radius = 0.175;   // world units
+  double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
+                                    // prediction is nearly the template
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
                                     // fan-in, as convolutions
   double color_bias = 0.0;          // what vertex colours start at

@@ -9,15 +9,19 @@
 namespace tilegrad::train {
 namespace {
 
+Frame& FrameOf(MeshRenderer& renderer, float) { return renderer.frame; }
+FrameT<double>& FrameOf(MeshRenderer& renderer, double) { return renderer.frame64; }
+
 // One rendering of a batch and what its way back needs. Lives in the tape's closure.
 template <class T>
 class BatchRender {
  public:
-  BatchRender(Renderer& renderer, RenderJob job, nn::Tensor positions, nn::Tensor colors)
+  BatchRender(MeshRenderer& renderer, RenderJob job, nn::Tensor positions, nn::Tensor colors)
       : renderer_(renderer),
         job_(std::move(job)),
         positions_(std::move(positions)),
-        colors_(std::move(colors)) {
+        colors_(std::move(colors)),
+        frame_(FrameOf(renderer, T{})) {
     const auto size = static_cast<std::size_t>(positions_.shape()[1] * 3);
     for (std::size_t n = 0; n < job_.cameras.size(); ++n) {
       const std::size_t mesh = n / static_cast<std::size_t>(job_.views);
@@ -31,9 +35,8 @@ class BatchRender {
 
   Status Forward();
   Status Backward(const FrameGradientsT<T>& d_frame, std::span<SceneGradientsT<T>> d_scenes);
-  // Gradients of the views of one mesh are summed in view order.
-  Status Gradients(std::span<const nn::Tensor> d_outputs, nn::Tensor& d_positions,
-                   nn::Tensor& d_colors);
+  Status Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs,
+                   std::span<nn::Tensor> d_inputs);
 
   const FrameT<T>& frame() const { return frame_; }
 
@@ -41,27 +44,28 @@ class BatchRender {
   std::span<const T> Positions() const { return std::as_const(positions_).template span<T>(); }
   std::span<const T> Colors() const { return std::as_const(colors_).template span<T>(); }
 
-  Renderer& renderer_;
+  MeshRenderer& renderer_;
   RenderJob job_;
   nn::Tensor positions_, colors_;
   std::vector<SceneViewT<T>> scenes_;
-  FrameT<T> frame_;
+  FrameT<T>& frame_;
 };
 
 template <>
 Status BatchRender<float>::Forward() {
-  return renderer_.Render(scenes_, job_.options, RenderRequest{}, &frame_);
+  return renderer_.renderer.Render(scenes_, job_.options, RenderRequest{}, &frame_);
 }
 
 template <>
 Status BatchRender<float>::Backward(const FrameGradients& d_frame,
                                     std::span<SceneGradients> d_scenes) {
-  return renderer_.Backward(scenes_, job_.options, frame_, d_frame, d_scenes);
+  return renderer_.renderer.Backward(scenes_, job_.options, frame_, d_frame, d_scenes);
 }
 
 // The reference renders one scene at a time; its frames are laid side by side.
 template <>
 Status BatchRender<double>::Forward() {
+  frame_ = {};
   for (const auto& scene : scenes_) {
     FrameT<double> one;
     RenderRef(scene, job_.options, RenderRequest{}, &one);
@@ -88,38 +92,41 @@ Status BatchRender<double>::Backward(const FrameGradientsT<double>& d_frame,
   return {};
 }
 
+// [meshes * views][size] to [meshes][size]: the views of one mesh are summed in view order.
 template <class T>
-void AddViews(const std::vector<AlignedVector<T>>& per_scene, int views, std::span<T> out) {
-  const std::size_t size = per_scene[0].size();
-  for (std::size_t n = 0; n < per_scene.size(); ++n) {
-    T* to = &out[n / static_cast<std::size_t>(views) * size];
-    const bool first = n % static_cast<std::size_t>(views) == 0;
-    for (std::size_t i = 0; i < size; ++i) to[i] = (first ? T(0) : to[i]) + per_scene[n][i];
+void AddViews(std::span<const T> per_scene, std::size_t views, std::size_t size, std::span<T> out) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const T* from = &per_scene[i / size * views * size + i % size];
+    T sum = 0;
+    for (std::size_t v = 0; v < views; ++v) sum += from[v * size];
+    out[i] = sum;
   }
 }
 
 template <class T>
-Status BatchRender<T>::Gradients(std::span<const nn::Tensor> d_outputs, nn::Tensor& d_positions,
-                                 nn::Tensor& d_colors) {
+Status BatchRender<T>::Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs,
+                                 std::span<nn::Tensor> d_inputs) {
+  const nn::Shape all = {static_cast<std::int64_t>(scenes_.size()), positions_.shape()[1], 3};
+  nn::Tensor positions = context.Empty(all, nn::kDTypeOf<T>),
+             colors = context.Empty(all, nn::kDTypeOf<T>);
   const auto size = static_cast<std::size_t>(positions_.shape()[1] * 3);
-  std::vector<AlignedVector<T>> positions(scenes_.size(), AlignedVector<T>(size)),
-      colors = positions;
   std::vector<SceneGradientsT<T>> d_scenes(scenes_.size());
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    d_scenes[n].positions = positions[n];
-    d_scenes[n].attributes = colors[n];
+    d_scenes[n].positions = positions.span<T>().subspan(n * size, size);
+    d_scenes[n].attributes = colors.span<T>().subspan(n * size, size);
   }
   FrameGradientsT<T> d_frame;
   if (!d_outputs[0].empty()) d_frame.attributes = d_outputs[0].template span<T>();
   if (!d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
   TILEGRAD_TRY(Backward(d_frame, d_scenes));
-  AddViews(positions, job_.views, d_positions.template span<T>());
-  AddViews(colors, job_.views, d_colors.template span<T>());
+  const auto views = static_cast<std::size_t>(job_.views);
+  AddViews<T>(positions.span<T>(), views, size, d_inputs[0].span<T>());
+  AddViews<T>(colors.span<T>(), views, size, d_inputs[1].span<T>());
   return {};
 }
 
 template <class T>
-RenderedImages Render(Renderer& renderer, const nn::Var& positions, const nn::Var& colors,
+RenderedImages Render(MeshRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
                       RenderJob job) {
   nn::Context& context = positions.context();
   const auto images = static_cast<std::int64_t>(job.cameras.size());
@@ -134,7 +141,7 @@ RenderedImages Render(Renderer& renderer, const nn::Var& positions, const nn::Va
                    shape = positions.shape()](std::span<const nn::Tensor> d_outputs) {
     std::vector<nn::Tensor> d_inputs = {context.Empty(shape, nn::kDTypeOf<T>),
                                         context.Empty(shape, nn::kDTypeOf<T>)};
-    if (Status status = batch->Gradients(d_outputs, d_inputs[0], d_inputs[1]); !status.ok())
+    if (Status status = batch->Gradients(context, d_outputs, d_inputs); !status.ok())
       context.Fail(std::move(status));
     return d_inputs;
   };
@@ -151,7 +158,7 @@ RenderedImages Render(Renderer& renderer, const nn::Var& positions, const nn::Va
 
 }  // namespace
 
-RenderedImages RenderMeshes(Renderer& renderer, const nn::Var& positions, const nn::Var& colors,
+RenderedImages RenderMeshes(MeshRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
                             RenderJob job) {
   if (!positions.valid() || !colors.valid()) return {positions, colors};
   return nn::WithFloatType(positions.dtype(), [&]<class T>(T) {

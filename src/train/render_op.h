@@ -23,10 +23,20 @@ struct RenderedImages {
   nn::Var alpha;   // [B * views, H, W]
 };
 
+// A renderer with its images, reused from step to step so that a steady state takes nothing large
+// from the heap. Holds the state of one rendering at a time: its way back is taken, or given up,
+// before the next RenderMeshes.
+struct MeshRenderer {
+  explicit MeshRenderer(const Workers& workers) : renderer(workers) {}
+  Renderer renderer;
+  Frame frame;
+  FrameT<double> frame64;
+};
+
 // positions and colors: [B, V, 3]. f32 renders with `renderer`, f64 with the scalar reference (for
 // proofs). Errors of the renderer reach the context's status. One call of `renderer` at a time,
 // backward included.
-RenderedImages RenderMeshes(Renderer& renderer, const nn::Var& positions, const nn::Var& colors,
+RenderedImages RenderMeshes(MeshRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
                             RenderJob job);
 
 }  // namespace tilegrad::train

@@ -6,11 +6,11 @@
 #include <memory>
 
 #include "nn/optim.h"
-#include "render/renderer.h"
 #include "scene/topology.h"
 #include "train/config.h"
 #include "train/data/batches.h"
 #include "train/models/mesh_network.h"
+#include "train/render_op.h"
 
 namespace tilegrad::train {
 
@@ -45,7 +45,7 @@ class TrainStep {
 
   MeshNetwork& network() { return network_; }
   nn::Adam& adam() { return adam_; }
-  Renderer& renderer() { return renderer_; }
+  MeshRenderer& renderer() { return renderer_; }
   RenderOptions OptionsAt(std::int64_t step) const;
   std::span<const std::int32_t> faces() const;
 
@@ -56,7 +56,7 @@ class TrainStep {
   MeshNetwork network_;
   nn::Adam adam_;
   Topology topology_;
-  Renderer renderer_;
+  MeshRenderer renderer_;
 };
 
 }  // namespace tilegrad::train

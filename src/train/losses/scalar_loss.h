@@ -2,8 +2,6 @@
 // How a loss that is written by hand joins the tape.
 #pragma once
 
-#include <cmath>
-
 #include "nn/tape.h"
 
 namespace tilegrad::train {
@@ -15,14 +13,15 @@ inline nn::Var ScalarLoss(const char* name, const nn::Var& input, double value,
   nn::Context& context = input.context();
   nn::Tensor output = context.Empty({}, input.dtype());
   nn::WithFloatType(input.dtype(), [&]<class T>(T) { *output.data<T>() = static_cast<T>(value); });
-  auto backward = [gradient](std::span<const nn::Tensor> d_outputs) mutable {
-    nn::WithFloatType(gradient.dtype(), [&]<class T>(T) {
-      const T factor = d_outputs[0].empty() ? T(0) : *d_outputs[0].data<T>();
-      if (factor != T(1)) {
-        for (T& g : gradient.span<T>()) g *= factor;
-      }
+  auto backward = [gradient, &context](std::span<const nn::Tensor> d_outputs) {
+    if (d_outputs[0].empty()) return std::vector<nn::Tensor>(1);
+    return nn::WithFloatType(gradient.dtype(), [&]<class T>(T) {
+      const T factor = *d_outputs[0].data<T>();
+      if (factor == T(1)) return std::vector<nn::Tensor>{gradient};
+      nn::Tensor scaled = context.Empty(gradient.shape(), gradient.dtype());
+      for (std::size_t i = 0; i < scaled.elements(); ++i) scaled.data<T>()[i] = factor * gradient.data<T>()[i];
+      return std::vector<nn::Tensor>{scaled};
     });
-    return std::vector<nn::Tensor>{gradient};
   };
   return nn::External(
       context,

@@ -49,7 +49,9 @@ void BuildEncoder(Builder& b, nn::Sequential& net, int image_size) {
 nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t vertices) {
   b.FcRelu(net, "1", b.config.code, b.config.hidden1);
   b.FcRelu(net, "2", b.config.hidden1, b.config.hidden2);
-  return b.Fc(net, "3", b.config.hidden2, 3 * vertices);
+  auto& output = b.Fc(net, "3", b.config.hidden2, 3 * vertices);
+  nn::FillNormal(output.weight.value(), b.rng, b.config.output_deviation);
+  return output;
 }
 
 }  // namespace
