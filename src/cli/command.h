@@ -16,7 +16,10 @@ using Action = std::function<Status()>;
 
 // Adds a subcommand to `app`; when it is given on the command line, sets *action.
 void AddDataset(CLI::App& app, Action* action);
+void AddDatasetView(CLI::App& app, Action* action);
+void AddEval(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
+void AddPredict(CLI::App& app, Action* action);
 void AddTrain(CLI::App& app, Action* action);
 
 }  // namespace tilegrad::cli

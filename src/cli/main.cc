@@ -42,8 +42,11 @@ int Run(int argc, char** argv) {
   app.require_subcommand(1);
   Action action;
   AddDataset(app, &action);
-  AddInfo(app, &action);
   AddTrain(app, &action);
+  AddEval(app, &action);
+  AddPredict(app, &action);
+  AddDatasetView(app, &action);
+  AddInfo(app, &action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
