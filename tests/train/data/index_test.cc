@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Broken datasets: every error names the file and the place.
+#include <gtest/gtest.h>
+
+#include "io/npz.h"
+#include "train/data/build.h"
+#include "train/data/temp_folder.h"
+
+namespace tilegrad::train {
+namespace {
+
+class IndexTest : public FolderTest {
+ protected:
+  void SetUp() override {
+    FolderTest::SetUp();
+    BuildOptions options;
+    options.image_size = 8;
+    options.views = 1;
+    const StopFlag stop = false;
+    ASSERT_TRUE(BuildDataset(*ProceduralSource(1, 0), options, root_, Workers(1), {}, stop).ok());
+  }
+
+  // Replaces the first `from` in a file of the dataset.
+  void Edit(const char* file, const std::string& from, const std::string& to) {
+    std::string text = ReadText(root_ / file).value();
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    ASSERT_TRUE(WriteTextAtomic(root_ / file, text.replace(at, from.size(), to)).ok());
+  }
+  void ExpectOpenError(const std::vector<std::string>& words) {
+    const auto dataset = Dataset::Open(root_);
+    ASSERT_FALSE(dataset.ok());
+    for (const auto& word : words) {
+      EXPECT_NE(dataset.status().message().find(word), std::string::npos)
+          << "\"" << word << "\" is not in: " << dataset.status().message();
+    }
+  }
+};
+
+TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(root_).ok()); }
+
+TEST_F(IndexTest, MissingFolder) {
+  const auto dataset = Dataset::Open(root_ / "no");
+  EXPECT_EQ(dataset.status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(IndexTest, BrokenInfoNamesTheLine) {
+  Edit("dataset.json", "\"views\":", "\"views\"");
+  ExpectOpenError({"dataset.json", "line 5"});
+}
+
+TEST_F(IndexTest, InfoKeysOfAnotherTypeOrRange) {
+  Edit("dataset.json", "\"views\": 1", "\"views\": \"one\"");
+  ExpectOpenError({"dataset.json", "\"views\"", "whole number"});
+  Edit("dataset.json", "\"views\": \"one\"", "\"views\": 18446744073709551615");
+  ExpectOpenError({"dataset.json", "\"views\"", "[1, 4096]"});
+}
+
+TEST_F(IndexTest, AnotherFormat) {
+  Edit("dataset.json", "tilegrad-dataset-1", "tilegrad-dataset-9");
+  ExpectOpenError({"dataset.json", "tilegrad-dataset-9"});
+}
+
+TEST_F(IndexTest, MissingCamera) {
+  Edit("dataset.json", "\"camera\"", "\"Camera\"");
+  ExpectOpenError({"dataset.json", "\"camera\""});
+}
+
+TEST_F(IndexTest, ModelLinesNameTheirNumber) {
+  Edit("models.jsonl", "\"class\":\"lamp\"", "\"class\":\"ship\"");
+  ExpectOpenError({"models.jsonl", "line 3", "ship"});
+  Edit("models.jsonl", "{\"id\":\"chair-00000\"", "{\"id\":\"../../etc\"");
+  ExpectOpenError({"models.jsonl", "line 2", "\"id\""});
+  Edit("models.jsonl", "{\"id\":\"car-00000\",", "{\"id\":\"car-00000\"");
+  ExpectOpenError({"models.jsonl", "line 1", "JSON"});
+}
+
+TEST_F(IndexTest, ALineCutByACrash) {
+  std::string text = ReadText(root_ / "models.jsonl").value();
+  text.resize(text.size() - 20);
+  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", text).ok());
+  ExpectOpenError({"models.jsonl", "line 5"});
+}
+
+TEST_F(IndexTest, TheSameIdTwice) {
+  const std::string text = ReadText(root_ / "models.jsonl").value();
+  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", text + text).ok());
+  ExpectOpenError({"models.jsonl", "line 6", "twice"});
+}
+
+TEST_F(IndexTest, NoModels) {
+  ASSERT_TRUE(WriteTextAtomic(root_ / "models.jsonl", "").ok());
+  ExpectOpenError({"models.jsonl", "no models"});
+}
+
+TEST_F(IndexTest, ModelFilesThatAreNotWhatTheyShould) {
+  const auto dataset = Dataset::Open(root_);
+  ASSERT_TRUE(dataset.ok());
+  const Path file = dataset->ModelPath(0);
+  const auto arrays = io::LoadNpz(file).value();
+  const auto expect_error = [&](io::NpzArrays changed, const std::string& name) {
+    ASSERT_TRUE(io::SaveNpz(file, changed).ok());
+    const auto data = dataset->Load(0);
+    ASSERT_FALSE(data.ok());
+    EXPECT_NE(data.status().message().find(file.string()), std::string::npos);
+    EXPECT_NE(data.status().message().find(name), std::string::npos) << data.status().message();
+  };
+  auto changed = arrays;
+  changed.erase("occupancy");
+  expect_error(changed, "occupancy");
+  changed = arrays;
+  changed["images"].shape = {2, 4, 8, 4};
+  expect_error(changed, "images");
+  changed = arrays;
+  const std::vector<float> nan(9, std::nanf(""));
+  changed["points"] = io::MakeNpy<float>({3, 3}, nan);
+  expect_error(changed, "points");
+  changed = arrays;
+  const std::vector<std::int32_t> beyond = {0, 1, 1 << 30};
+  changed["mesh_faces"] = io::MakeNpy<std::int32_t>({1, 3}, beyond);
+  expect_error(changed, "faces");
+  ASSERT_TRUE(WriteTextAtomic(file, "not a zip").ok());
+  EXPECT_FALSE(dataset->Load(0).ok());
+  EXPECT_FALSE(dataset->LoadImages(0).ok());
+}
+
+}  // namespace
+}  // namespace tilegrad::train
