@@ -45,6 +45,7 @@ int Run(int argc, char** argv) {
   AddTrain(app, &action);
   AddEval(app, &action);
   AddPredict(app, &action);
+  AddReport(app, &action);
   AddDatasetView(app, &action);
   AddInfo(app, &action);
   try {

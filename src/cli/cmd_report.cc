@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad report: one page about a run.
+#include <fmt/core.h>
+
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "train/report/report.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct ReportOptions {
+  std::string run, data, out;
+  int models = 8;
+  int workers = 0;
+};
+
+Status RunReport(const ReportOptions& options) {
+  train::ReportJob job;
+  TILEGRAD_ASSIGN(job.run, ChooseRun(options.run));
+  TILEGRAD_ASSIGN(job.data, ChooseDataset(options.data, job.run));
+  job.out = options.out.empty() ? job.run / "report.html" : Path(options.out);
+  job.models = options.models;
+  const Workers workers(options.workers);
+  ProgressLine line;
+  const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
+  line.Finish();
+  if (!summary.ok()) return summary.status();
+  fmt::print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
+             static_cast<double>(summary->bytes) / 1e6);
+  if (!summary->evaluated)
+    fmt::print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
+  return {};
+}
+
+}  // namespace
+
+void AddReport(CLI::App& app, Action* action) {
+  auto options = std::make_shared<ReportOptions>();
+  auto* command = app.add_subcommand(
+      "report", "One page about a run: scores, curves, pictures, meshes to turn in the browser");
+  command->add_option("--run", options->run, "run folder [the newest below runs/]");
+  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+  command->add_option("--models", options->models, "held-out models to show")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 200));
+  command->add_option("--out", options->out, "the page [RUN/report.html]");
+  command->add_option("--workers", options->workers, "threads; 0: one per core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  command->callback([options, action] { *action = [options] { return RunReport(*options); }; });
+}
+
+}  // namespace tilegrad::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/report/html.h"
+
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "io/image_file.h"
+
+namespace tilegrad::train {
+namespace {
+
+std::string ReplaceAll(std::string_view text, char from, std::string_view to) {
+  std::string out;
+  for (const char c : text) {
+    if (c == from)
+      out += to;
+    else
+      out += c;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string EscapeHtml(std::string_view text) {
+  std::string out = ReplaceAll(text, '&', "&amp;");
+  out = ReplaceAll(out, '<', "&lt;");
+  out = ReplaceAll(out, '>', "&gt;");
+  out = ReplaceAll(out, '"', "&quot;");
+  return ReplaceAll(out, '\'', "&#39;");
+}
+
+std::string Base64(std::span<const std::uint8_t> bytes) {
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - at);
+    std::uint32_t group = 0;
+    for (std::size_t i = 0; i < 3; ++i) group = group << 8 | (i < count ? bytes[at + i] : 0u);
+    for (std::size_t i = 0; i < 4; ++i)
+      out += i <= count ? kDigits[group >> (18 - 6 * i) & 63] : '=';
+  }
+  return out;
+}
+
+std::string ScriptJson(const nlohmann::ordered_json& json) {
+  return ReplaceAll(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
+                    '<', "\\u003c");
+}
+
+Result<std::string> PngAddress(const ImageU8& image) {
+  TILEGRAD_ASSIGN(const Bytes png, io::EncodePng(image));
+  return "data:image/png;base64," + Base64(png);
+}
+
+Result<std::string> FillTemplate(std::string_view text,
+                                 const std::map<std::string, std::string>& values) {
+  std::string out;
+  for (std::size_t at = 0;;) {
+    const std::size_t open = text.find("{{", at);
+    out += text.substr(at, open - at);
+    if (open == std::string_view::npos) return out;
+    const std::size_t close = text.find("}}", open);
+    const std::string name(text.substr(open + 2, close - open - 2));
+    const auto value = values.find(name);
+    if (close == std::string_view::npos || value == values.end())
+      return InternalError("the page's template has no value for \"{}\"", name);
+    out += value->second;
+    at = close + 2;
+  }
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Text that is safe to put into a page.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "scene/image.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::train {
+
+// For text and for attribute values in double quotes.
+std::string EscapeHtml(std::string_view text);
+
+std::string Base64(std::span<const std::uint8_t> bytes);
+
+// JSON for a <script> element: every '<' is written as \u003c, so nothing in it can end the
+// element. Bytes that are no UTF-8 become replacement characters.
+std::string ScriptJson(const nlohmann::ordered_json& json);
+
+// A PNG as data: address.
+Result<std::string> PngAddress(const ImageU8& image);
+
+// Puts values["x"] where `text` has {{x}}; values are not searched again. kInternal names a
+// placeholder without a value.
+Result<std::string> FillTemplate(std::string_view text,
+                                 const std::map<std::string, std::string>& values);
+
+}  // namespace tilegrad::train

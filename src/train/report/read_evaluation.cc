@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// eval.json back into an Evaluation.
+#include <limits>
+
+#include "train/data/json_fields.h"
+#include "train/report/run_facts.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Json = nlohmann::json;
+
+Result<const Json*> Array(const Json& json, const char* key, const std::string& place) {
+  if (json.is_object() && json.contains(key) && json[key].is_array()) return &json[key];
+  return DataLoss("{}: \"{}\" must be an array", place, key);
+}
+
+Result<Score> ReadScore(const Json& json, const std::string& place) {
+  Score score;
+  JsonFields fields(json, place);
+  fields.Read("iou", &score.iou);
+  if (json.is_object() && json.contains("f_score") && !json["f_score"].is_null())
+    fields.Read("f_score", &score.f_score.emplace());
+  if (!fields.status().ok()) return fields.status();
+  return score;
+}
+
+Result<EvaluationRow> ReadRow(const Json& json, std::size_t classes, const std::string& place) {
+  EvaluationRow row;
+  JsonFields fields(json, place);
+  fields.Read("method", &row.method);
+  if (!fields.status().ok()) return fields.status();
+  TILEGRAD_ASSIGN(const Json* scores, Array(json, "classes", place));
+  if (scores->size() != classes)
+    return DataLoss("{}: {} scores for {} classes", place, scores->size(), classes);
+  for (const Json& item : *scores) {
+    TILEGRAD_ASSIGN(const Score score, ReadScore(item, place));
+    row.classes.push_back(score);
+  }
+  TILEGRAD_ASSIGN(row.mean, ReadScore(json.value("mean", Json()), place + ": \"mean\""));
+  return row;
+}
+
+Status ReadRows(const Json& json, const std::string& place, Evaluation* out) {
+  TILEGRAD_ASSIGN(const Json* rows, Array(json, "rows", place));
+  for (const Json& item : *rows) {
+    TILEGRAD_ASSIGN(EvaluationRow row,
+                    ReadRow(item, out->classes.size(), place + ": an entry of \"rows\""));
+    out->rows.push_back(std::move(row));
+  }
+  if (out->rows.empty()) return DataLoss("{}: \"rows\" is empty", place);
+  return {};
+}
+
+Status ReadClassModels(const Json& json, const std::string& place, Evaluation* out) {
+  TILEGRAD_ASSIGN(const Json* counts, Array(json, "class_models", place));
+  for (const Json& count : *counts) {
+    if (!count.is_number_integer())
+      return DataLoss("{}: \"class_models\" must hold numbers", place);
+    out->class_models.push_back(count);
+  }
+  if (out->class_models.size() == out->classes.size()) return {};
+  return DataLoss("{}: \"class_models\" and \"classes\" differ in length", place);
+}
+
+int FindModel(const Dataset& dataset, const std::string& class_name, const std::string& id) {
+  const auto& models = dataset.models();
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const auto& name = dataset.info().classes[static_cast<std::size_t>(models[i].class_index)];
+    if (models[i].id == id && name == class_name) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+Status ReadModelScores(const Json& json, const std::string& place, const Dataset& dataset,
+                       Evaluation* out) {
+  TILEGRAD_ASSIGN(const Json* models, Array(json, "models", place));
+  for (const Json& item : *models) {
+    const std::string entry = place + ": an entry of \"models\"";
+    TILEGRAD_ASSIGN(const Score score, ReadScore(item, entry));
+    std::string class_name, id;
+    JsonFields fields(item, entry);
+    fields.Read("class", &class_name);
+    fields.Read("id", &id);
+    if (!fields.status().ok()) return fields.status();
+    if (const int model = FindModel(dataset, class_name, id); model >= 0)
+      out->models.push_back({model, score});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::optional<Evaluation>> ReadEvaluation(const Path& run, const Dataset& dataset) {
+  const Path file = run / "eval.json";
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return std::optional<Evaluation>();
+  const std::string place = file.string();
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  TILEGRAD_ASSIGN(const Json json, ParseJson(text, place));
+  Evaluation out;
+  JsonFields fields(json, place);
+  const int most = std::numeric_limits<int>::max();
+  fields.Read("predictor", &out.predictor);
+  fields.Read("split", &out.split);
+  fields.Read("views_per_model", 1, most, &out.views_per_model);
+  fields.Read("shape_threshold", &out.shape_threshold);
+  fields.Read("unusable_predictions", 0, most, &out.unusable_predictions);
+  fields.Read("classes", &out.classes);
+  if (!fields.status().ok()) return fields.status();
+  TILEGRAD_TRY(ReadClassModels(json, place, &out));
+  TILEGRAD_TRY(ReadRows(json, place, &out));
+  TILEGRAD_TRY(ReadModelScores(json, place, dataset, &out));
+  return std::optional(std::move(out));
+}
+
+}  // namespace tilegrad::train

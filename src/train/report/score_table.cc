@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// The evaluation as a table: a row a class, the methods side by side for each measure.
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "train/report/html.h"
+#include "train/report/sections.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Values = std::vector<std::optional<double>>;
+
+// Percent with one digit: what is printed is what is compared.
+std::optional<double> Shown(std::optional<double> share) {
+  return share ? std::optional(std::round(1000 * *share) / 10) : std::nullopt;
+}
+
+// One cell a method; every value that equals the best is marked.
+std::string CellsHtml(const Values& values) {
+  std::optional<double> best;
+  for (const auto& value : values) best = std::max(best, Shown(value));
+  std::string out;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const char* group = i == 0 ? " first" : "";
+    const auto shown = Shown(values[i]);
+    if (!shown)
+      out += fmt::format("<td class=\"number{}\">–</td>", group);
+    else if (shown == best)
+      out += fmt::format("<td class=\"number best{}\"><strong>{:.1f}</strong></td>", group, *shown);
+    else
+      out += fmt::format("<td class=\"number{}\">{:.1f}</td>", group, *shown);
+  }
+  return out;
+}
+
+// `pick` gives the score of a method's row.
+template <class Pick>
+std::string LineHtml(const Evaluation& evaluation, const std::string& heading, Pick pick) {
+  Values iou, f_score;
+  for (const auto& row : evaluation.rows) {
+    iou.emplace_back(pick(row).iou);
+    f_score.push_back(pick(row).f_score);
+  }
+  return fmt::format("<tr><th scope=\"row\">{}</th>{}{}</tr>\n", heading, CellsHtml(iou),
+                     CellsHtml(f_score));
+}
+
+std::string HeadHtml(const Evaluation& evaluation) {
+  std::string methods;
+  for (int group = 0; group < 2; ++group) {
+    for (std::size_t i = 0; i < evaluation.rows.size(); ++i) {
+      methods += fmt::format("<th scope=\"col\" class=\"number{}\">{}</th>", i == 0 ? " first" : "",
+                             EscapeHtml(evaluation.rows[i].method));
+    }
+  }
+  return fmt::format(
+      "<thead><tr><th rowspan=\"2\" scope=\"col\">class (models)</th>"
+      "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">3D IoU at 32³, %</th>"
+      "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">F-score at {1}, %</th></tr>\n"
+      "<tr>{2}</tr></thead>\n",
+      evaluation.rows.size(), kFScoreThreshold, methods);
+}
+
+std::string NotesHtml(const ReportFacts& facts) {
+  const Evaluation& evaluation = *facts.evaluation;
+  std::string out = fmt::format(
+      "{} split, {} view{} of each model; the mean is over classes; the best of each measure is "
+      "bold. The best single shape holds the voxels that at least {:.0f} % of the training models "
+      "have, the share that scores best on the training models.",
+      EscapeHtml(evaluation.split), evaluation.views_per_model,
+      evaluation.views_per_model == 1 ? "" : "s", 100 * evaluation.shape_threshold);
+  out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
+  if (evaluation.unusable_predictions > 0) {
+    out += fmt::format(" {} predictions without extent or area score 0.",
+                       evaluation.unusable_predictions);
+  }
+  if (evaluation.predictor != facts.predictor) {
+    out += fmt::format(" The scores are of: {}; the pictures and meshes of this page are of: {}.",
+                       EscapeHtml(evaluation.predictor), EscapeHtml(facts.predictor));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string ScoresHtml(const ReportFacts& facts) {
+  if (!facts.evaluation) {
+    return fmt::format(
+        "<p>There is no evaluation yet: <code>tilegrad eval --run {}</code>, then make this report "
+        "again.</p>",
+        EscapeHtml(facts.run.folder.string()));
+  }
+  const Evaluation& evaluation = *facts.evaluation;
+  std::string lines;
+  for (std::size_t c = 0; c < evaluation.classes.size(); ++c) {
+    const std::string heading =
+        fmt::format("{} <span class=\"count\">({})</span>", EscapeHtml(evaluation.classes[c]),
+                    evaluation.class_models[c]);
+    lines += LineHtml(evaluation, heading, [c](const auto& row) { return row.classes[c]; });
+  }
+  const std::string mean = LineHtml(evaluation, "mean", [](const auto& row) { return row.mean; });
+  return fmt::format(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Scores\"><table "
+      "class=\"scores\">\n{}<tbody>\n{}</tbody>\n<tfoot>\n{}</tfoot>\n</table></div>\n"
+      "<p class=\"note\">{}</p>",
+      HeadHtml(evaluation), lines, mean, NotesHtml(facts));
+}
+
+}  // namespace tilegrad::train

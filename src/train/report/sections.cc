@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/report/sections.h"
+
+#include <algorithm>
+#include <map>
+
+#include "base/error.h"
+#include "train/report/html.h"
+
+namespace tilegrad::train {
+namespace {
+
+// 3214902 as "3,214,902".
+std::string WithCommas(std::int64_t number) {
+  std::string digits = std::to_string(number);
+  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3)
+    digits.insert(static_cast<std::size_t>(at), ",");
+  return digits;
+}
+
+std::string SourceName(const std::string& source) {
+  static const std::map<std::string, std::string> names = {
+      {"sweethome3d", "of the Sweet Home 3D furniture library"},
+      {"shapenet", "of ShapeNet"},
+      {"nmr", "of ShapeNet, as rendered for N3MR"},
+      {"folder", "of a folder of one's own"},
+      {"procedural", "made by the built-in generator"}};
+  const auto at = names.find(source);
+  return at == names.end() ? "of " + EscapeHtml(source) : at->second;
+}
+
+std::string Comparison(const Evaluation& evaluation) {
+  const auto& rows = evaluation.rows;
+  const double own = rows.back().mean.iou;
+  const auto beaten = static_cast<std::size_t>(std::count_if(
+      rows.begin(), rows.end() - 1, [&](const auto& row) { return row.mean.iou < own; }));
+  std::string baselines;
+  for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
+    baselines += fmt::format("{}the {} has {:.1f} %", i > 0 ? ", " : "", EscapeHtml(rows[i].method),
+                             100 * rows[i].mean.iou);
+  }
+  if (baselines.empty()) return ".";
+  const char* verdict = beaten + 1 == rows.size() ? "above every baseline"
+                        : beaten > 0              ? "above one baseline but not all"
+                                                  : "not above the baselines";
+  return fmt::format(", {}: {}.", verdict, baselines);
+}
+
+std::string EvaluationSentence(const ReportFacts& facts) {
+  if (!facts.evaluation) return "There is no evaluation of it yet.";
+  const Evaluation& evaluation = *facts.evaluation;
+  int models = 0;
+  for (const int n : evaluation.class_models) models += n;
+  return fmt::format("On {} models of the {} split it reaches a mean 3D IoU of <b>{:.1f} %</b>{}",
+                     WithCommas(models), EscapeHtml(evaluation.split),
+                     100 * evaluation.rows.back().mean.iou, Comparison(evaluation));
+}
+
+// A word as a shell reads it back.
+std::string Quoted(const std::string& word) {
+  constexpr std::string_view kSafe =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
+  if (!word.empty() && word.find_first_not_of(kSafe) == std::string::npos) return word;
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+}  // namespace
+
+std::string SummaryHtml(const ReportFacts& facts) {
+  const RunFacts& run = facts.run;
+  const std::int64_t step = run.log.empty() ? 0 : run.log.back().step;
+  const std::string progress =
+      step >= run.config.schedule.steps
+          ? WithCommas(step)
+          : fmt::format("{} of {}", WithCommas(step), WithCommas(run.config.schedule.steps));
+  const std::size_t classes = facts.dataset->info().classes.size();
+  return fmt::format(
+      "A network of {} parameters learned for {} steps to predict shape and colour of an object "
+      "from one image. It saw only rendered views of {} models in {} class{} {}, no 3D data. {}",
+      WithCommas(run.parameters), progress, WithCommas(run.training_models), classes,
+      classes == 1 ? "" : "es", SourceName(run.dataset_source), EvaluationSentence(facts));
+}
+
+std::string ComparisonHtml(const ReportFacts& facts) {
+  if (!facts.evaluation) return "";
+  std::string out = "<dl class=\"bars\" aria-label=\"Mean 3D IoU of each method\">\n";
+  for (const auto& row : facts.evaluation->rows) {
+    const bool own = &row == &facts.evaluation->rows.back();
+    out += fmt::format(
+        "<div{}><dt>{}</dt><dd><span class=\"bar\" style=\"width:{:.1f}%\"></span>"
+        "<span class=\"value\">{:.1f} %</span></dd></div>\n",
+        own ? " class=\"own\"" : "", EscapeHtml(row.method),
+        80 * std::clamp(row.mean.iou, 0.0, 1.0), 100 * row.mean.iou);
+  }
+  return out +
+         "</dl>\n<p class=\"note\">Mean 3D IoU over classes, held-out models, 32³ voxels.</p>";
+}
+
+std::string CommandsHtml(const ReportFacts& facts) {
+  const std::string run = Quoted(facts.run.folder.string()), data = Quoted(facts.data);
+  const std::string config = Quoted((facts.run.folder / "config.toml").string());
+  return EscapeHtml(
+      fmt::format("tilegrad train --config {} --data {} --out runs/again\n"
+                  "tilegrad eval --run runs/again\n"
+                  "tilegrad report --run runs/again\n"
+                  "\n"
+                  "tilegrad report --run {} --data {}   # this page",
+                  config, data, run, data));
+}
+
+std::string MachineHtml(const ReportFacts& facts) {
+  std::string out;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    out += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", EscapeHtml(name),
+                       EscapeHtml(value));
+  };
+  add("predictor", facts.predictor);
+  add("dataset", facts.data + " (" + facts.run.dataset_source + ")");
+  for (const auto& [name, value] : facts.run.machine) add(name, value);
+  return out;
+}
+
+std::string CreditsHtml(const ReportFacts& facts) {
+  std::string out = "<ul>\n";
+  for (const auto& credit : facts.dataset->info().credits)
+    out += "<li>" + EscapeHtml(credit) + "</li>\n";
+  for (const auto& shown : facts.models) {
+    const ModelInfo& info = facts.dataset->models()[static_cast<std::size_t>(shown.model)];
+    out += fmt::format("<li><b>{}</b>, by {}, licence: {}</li>\n",
+                       EscapeHtml(info.name.empty() ? info.id : info.name),
+                       info.creator.empty() ? "an unnamed creator" : EscapeHtml(info.creator),
+                       info.license.empty() ? "not stated" : EscapeHtml(info.license));
+  }
+  return out + "</ul>";
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of the page as HTML; all text from files is escaped.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "train/report/run_facts.h"
+#include "train/report/shown_models.h"
+
+namespace tilegrad::train {
+
+// Everything that a report tells about, gathered from the run and its dataset.
+struct ReportFacts {
+  RunFacts run;
+  const Dataset* dataset = nullptr;
+  std::string data;       // the dataset's folder, as it was given
+  std::string predictor;  // Predictor::description
+  std::optional<Evaluation> evaluation;
+  std::vector<ShownModel> models;
+};
+
+std::string SummaryHtml(const ReportFacts& facts);  // what was trained on what, and how good it is
+std::string ComparisonHtml(const ReportFacts& facts);      // mean IoU of each method as bars
+Result<std::string> ModelsHtml(const ReportFacts& facts);  // a row of pictures a model
+std::string ScoresHtml(const ReportFacts& facts);          // the table, or that there is none yet
+std::string CommandsHtml(const ReportFacts& facts);        // how to make all this again
+std::string MachineHtml(const ReportFacts& facts);
+std::string CreditsHtml(const ReportFacts& facts);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// The report of a tiny run: it needs nothing from outside, its data parses, text of files cannot
+// break out of its place, and what is missing or broken is said by name.
+#include "train/report/report.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "support/temp_folder.h"
+#include "tiny_run.h"
+#include "train/report/html.h"
+#include "train/report/page_data.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr const char* kEvil = "</script><b onclick=\"x\">&'";
+
+int Count(const std::string& text, const std::string& part) {
+  int count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
+}
+
+// What stands between the first `begin` and the next `end`.
+std::string Between(const std::string& text, const std::string& begin, const std::string& end) {
+  const std::size_t from = text.find(begin);
+  if (from == std::string::npos) return "";
+  return text.substr(from + begin.size(), text.find(end, from) - from - begin.size());
+}
+
+class ReportTest : public TempFolderTest {
+ protected:
+  ReportTest() : workers_(1) {
+    const Path data = folder_ / "data";
+    EXPECT_TRUE(WriteNoiseDataset(data).ok());
+    Dataset dataset = Dataset::Open(data).value();
+    std::vector<ModelInfo> models = dataset.models();
+    models.back().name = models.back().creator = models.back().license = kEvil;
+    DatasetInfo info = dataset.info();
+    info.credits = {kEvil};
+    EXPECT_TRUE(WriteDatasetInfo(data, info).ok());
+    EXPECT_TRUE(WriteModels(data, info, models).ok());
+    TrainJob job;
+    job.config = ParseConfig(kTinyConfig, "tiny").value();
+    job.config.name = kEvil;
+    job.config.schedule.steps = 3;
+    job.data = data;
+    job.run = job_.run = folder_ / "run";
+    const auto trained = Train(
+        job, workers_, [](const Progress&) {}, stop_);
+    EXPECT_TRUE(trained.ok()) << trained.status().message();
+    job_.data = data;
+    job_.out = folder_ / "page.html";
+  }
+
+  Result<ReportSummary> Make() {
+    return WriteReport(
+        job_, workers_, [](const Progress&) {}, stop_);
+  }
+  std::string Page() {
+    const auto summary = Make();
+    EXPECT_TRUE(summary.ok()) << summary.status().message();
+    return summary.ok() ? ReadText(job_.out).value() : "";
+  }
+  void Evaluate(double own) {
+    const Dataset dataset = Dataset::Open(job_.data).value();
+    Evaluation e;
+    e.predictor = "elder network";
+    e.split = "test";
+    e.views_per_model = 4;
+    e.classes = {"noise"};
+    e.class_models = {2};
+    const auto row = [](const char* method, double iou) {
+      return EvaluationRow{method, {{iou, std::nullopt}}, {iou, std::nullopt}};
+    };
+    e.rows = {row("undeformed template", 0.25), row(kEvil, 0.5), row("tilegrad", own)};
+    e.models = {{dataset.Select(Split::kTest)[0], {0.123, 0.456}}};
+    ASSERT_TRUE(WriteEvaluation(job_.run, e, dataset).ok());
+  }
+
+  Workers workers_;
+  StopFlag stop_ = false;
+  ReportJob job_;
+};
+
+TEST_F(ReportTest, NeedsNothingFromOutside) {
+  std::string page = Page();
+  const std::string xmlns = "http://www.w3.org/2000/svg";  // a name, not an address to load
+  ASSERT_EQ(Count(page, xmlns), 1);
+  page.erase(page.find(xmlns), xmlns.size());
+  EXPECT_EQ(Count(page, "http:"), 0);
+  EXPECT_EQ(Count(page, "https:"), 0);
+  EXPECT_EQ(Count(page, "//cdn"), 0);
+  EXPECT_EQ(Count(page, "{{"), 0);
+  EXPECT_EQ(Count(page, "<img src=\"data:image/png;base64,"), 2 * 2 * kShownViews);
+}
+
+TEST_F(ReportTest, DataParsesAndHoldsCurvesAndMeshes) {
+  const std::string text =
+      Between(Page(), "<script type=\"application/json\" id=\"data\">", "</script>");
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  ASSERT_TRUE(json.is_object());
+  EXPECT_EQ(json["curves"]["step"], (nlohmann::json{1, 2, 3}));
+  EXPECT_EQ(json["curves"]["iou"].size(), 3u);
+  ASSERT_EQ(json["models"].size(), 2u);
+  EXPECT_EQ(json["models"][1]["name"], kEvil);
+  EXPECT_EQ(json["models"][0]["prediction"]["index_bytes"], 2);
+  EXPECT_TRUE(json["models"][0]["truth"].is_null());  // this dataset has no meshes
+}
+
+TEST_F(ReportTest, TextOfFilesStaysText) {
+  Evaluate(0.6);
+  const std::string page = Page();
+  EXPECT_EQ(Count(page, "<b onclick"), 0);
+  EXPECT_EQ(Count(page, "</script>"), 2);  // the page's own
+  // Name of the run in title and heading; name, creator and licence of the model in the credits.
+  EXPECT_GE(Count(page, "&lt;/script&gt;&lt;b onclick=&quot;x&quot;&gt;&amp;&#39;"), 6);
+}
+
+TEST_F(ReportTest, SaysThatThereIsNoEvaluationYet) {
+  const std::string page = Page();
+  EXPECT_EQ(Count(page, "There is no evaluation"), 2);  // in the summary and in place of the table
+  EXPECT_EQ(Count(page, "<table class=\"scores\">"), 0);
+  EXPECT_FALSE(Make()->evaluated);
+}
+
+TEST_F(ReportTest, MarksTheBestAndComparesWithBaselines) {
+  Evaluate(0.6);
+  std::string page = Page();
+  EXPECT_EQ(Count(page, "<strong>60.0</strong>"), 2);  // of the class and of the mean
+  EXPECT_EQ(Count(page, "<strong>50.0</strong>"), 0);
+  EXPECT_EQ(Count(page, "above every baseline"), 1);
+  EXPECT_EQ(Count(page, "3D IoU 12.3 %<br>F-score 45.6 %"), 1);
+  EXPECT_EQ(Count(page, "The scores are of: elder network"), 1);
+  Evaluate(0.4);
+  EXPECT_EQ(Count(Page(), "above one baseline but not all"), 1);
+  Evaluate(0.1);
+  page = Page();
+  EXPECT_EQ(Count(page, "not above the baselines"), 1);
+  EXPECT_EQ(Count(page, "<strong>50.0</strong>"), 2);
+}
+
+TEST_F(ReportTest, SameRunSameBytes) {
+  const std::string first = Page();
+  const Workers three(3);
+  ASSERT_TRUE(WriteReport(
+                  job_, three, [](const Progress&) {}, stop_)
+                  .ok());
+  EXPECT_EQ(ReadText(job_.out).value(), first);
+}
+
+TEST_F(ReportTest, ErrorsNameTheFileAndKeepThePage) {
+  Write("page.html", std::string("old"));
+  const auto broken = [&](const std::string& name, const std::string& text) {
+    const Path file = folder_ / name;
+    const Bytes before = std::filesystem::exists(file) ? ReadFile(file).value() : Bytes();
+    Write(name, text);
+    const Status status = Make().status();
+    if (before.empty())
+      std::filesystem::remove(file);
+    else
+      Write(name, before);
+    return status;
+  };
+  ExpectMessage(broken("run/run.json", "{}"), "run.json", "dataset");
+  ExpectMessage(broken("run/run.json", "{"), "run.json", "line 1");
+  ExpectMessage(broken("run/config.toml", "nmae = 1\n"), "config.toml", "nmae");
+  ExpectMessage(broken("run/metrics.jsonl", "x\n"), "metrics.jsonl", "line 1");
+  ExpectMessage(broken("run/eval.json", "[]"), "eval.json");
+  ExpectMessage(broken("data/models.jsonl", "x\n"), "models.jsonl", "line 1");
+  EXPECT_EQ(ReadText(job_.out).value(), "old");
+  std::filesystem::remove_all(job_.run / "checkpoints");
+  ExpectMessage(Make().status(), "run", "checkpoint");
+}
+
+TEST_F(ReportTest, BrokenEvaluationsAreRefused) {
+  Evaluate(0.6);
+  const auto good = nlohmann::json::parse(ReadText(job_.run / "eval.json").value());
+  const auto with = [&](const char* key, nlohmann::json value) {
+    auto json = good;
+    json[key] = std::move(value);
+    Write("run/eval.json", json.dump());
+    return Make().status();
+  };
+  ExpectMessage(with("rows", nlohmann::json::array()), "eval.json", "rows");
+  ExpectMessage(with("rows", {1}), "eval.json", "rows");
+  ExpectMessage(with("classes", {"a", "b"}), "eval.json", "class");
+  ExpectMessage(with("class_models", {"many"}), "eval.json", "class_models");
+  ExpectMessage(with("models", {{{"iou", 1}}}), "eval.json", "models");
+}
+
+TEST_F(ReportTest, StopWritesNothing) {
+  stop_ = true;
+  EXPECT_EQ(Make().status().code(), StatusCode::kCancelled);
+  EXPECT_FALSE(std::filesystem::exists(job_.out));
+}
+
+TEST(ReportHtml, Base64) {  // RFC 4648, section 10
+  const auto encode = [](const std::string& text) {
+    return Base64(Bytes(text.begin(), text.end()));
+  };
+  EXPECT_EQ(encode(""), "");
+  EXPECT_EQ(encode("f"), "Zg==");
+  EXPECT_EQ(encode("fo"), "Zm8=");
+  EXPECT_EQ(encode("foo"), "Zm9v");
+  EXPECT_EQ(encode("foobar"), "Zm9vYmFy");
+}
+
+TEST(ReportHtml, TemplateFillsOnce) {
+  EXPECT_EQ(FillTemplate("a{{x}}b{{y}}", {{"x", "{{y}}"}, {"y", "2"}}).value(), "a{{y}}b2");
+  ExpectMessage(FillTemplate("{{z}}", {}).status(), "\"z\"");
+}
+
+TEST(ReportData, MeshKeepsSixteenBits) {
+  Mesh mesh;
+  mesh.positions = {{-1, 0, 2}, {1, 0, 4}, {0, 0, 3}};
+  mesh.faces = {{0, 1, 2}};
+  const auto json = MeshJson(mesh);
+  EXPECT_EQ(json["low"], (nlohmann::ordered_json{-1.0, 0.0, 2.0}));
+  EXPECT_EQ(json["high"], (nlohmann::ordered_json{1.0, 0.0, 4.0}));
+  // Steps 0 0 0, 65535 0 65535, 32768 0 32768 (half rounds up), little-endian; y has no extent.
+  const Bytes steps = {0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 255, 255, 0, 128, 0, 0, 0, 128};
+  EXPECT_EQ(json["positions"], Base64(steps));
+  EXPECT_EQ(json["colors"], Base64(Bytes(9, 255)));
+  EXPECT_EQ(json["faces"], Base64(Bytes{0, 0, 1, 0, 2, 0}));
+  EXPECT_TRUE(MeshJson(Mesh()).is_null());
+}
+
+TEST(ReportData, ThinKeepsMeansAndTheLastStep) {
+  std::vector<LogEntry> log;
+  for (int i = 1; i <= 10; ++i) log.push_back({i, {{"loss", 1.0 * i}}});
+  const auto thin = Thin(log, 5);
+  ASSERT_EQ(thin.size(), 5u);
+  EXPECT_EQ(thin[0].values[0].second, 1.5);
+  EXPECT_EQ(thin[4].step, 10);
+  EXPECT_EQ(Thin(log, 10).size(), 10u);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
