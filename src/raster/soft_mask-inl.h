@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The soft mask on blocks of 8x8 pixels: lanes over pixels, faces in the loop.
+// The soft mask on blocks of 8x8 pixels: lanes over the pixels of a cell, faces in the loop.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_INL_H_
@@ -21,7 +21,7 @@ namespace tilegrad::raster::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace simd = tilegrad::HWY_NAMESPACE;
 
-using D = hn::CappedTag<float, kBlockSize>;
+using D = hn::CappedTag<float, kCellPixels>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
@@ -51,66 +51,107 @@ HWY_INLINE V NearestZ(D d, const SoftBlockFace& f, V x, V y) {
 struct Pixels {
   V x, y;
 };
-HWY_INLINE Pixels PixelsAt(D d, const SoftBlock& block, int pixel) {
-  return {hn::Load(d, block.x + pixel % kBlockSize), hn::Set(d, block.y[pixel / kBlockSize])};
+HWY_INLINE Pixels PixelsAt(D d, const SoftBlock& block, std::size_t pixel) {
+  return {hn::Load(d, block.x + pixel), hn::Load(d, block.y + pixel)};
 }
 
-// 1 - product over members [begin, end) for the pixels of two rows, from `first` on, merged into
-// alpha. a <- a + (1 - a) A keeps small alphas precise, which 1 - product would not.
-inline void AccumulateRowPair(const SoftBlock& block, std::size_t begin, std::size_t end, int first,
-                              double* alpha) {
-  const D d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  const V one = hn::Set(d, 1.0f);
-  alignas(64) float part[2 * kBlockSize];
-  for (int pixel = 0; pixel < 2 * kBlockSize; pixel += 2 * lanes) {
-    const Pixels p = PixelsAt(d, block, first + pixel);
-    const Pixels q = PixelsAt(d, block, first + pixel + lanes);
-    V a = hn::Zero(d), b = a;
-    for (std::size_t m = begin; m < end; ++m) {
-      const SoftBlockFace& face = block.members[m];
-      a = hn::MulAdd(hn::Sub(one, a), simd::DecayOf(d, NearestZ(d, face, p.x, p.y)).exp, a);
-      b = hn::MulAdd(hn::Sub(one, b), simd::DecayOf(d, NearestZ(d, face, q.x, q.y)).exp, b);
-    }
-    hn::Store(a, d, part + pixel);
-    hn::Store(b, d, part + pixel + lanes);
+// Bit s: cell s may not drop the face.
+HWY_INLINE std::uint32_t CellsNear(D d, const SoftBlock& block, const SoftBlockFace& face) {
+  static_assert(kCells == kCellPixels);
+  const std::size_t lanes = hn::Lanes(d);
+  std::uint32_t near = 0;
+  for (std::size_t s = 0; s < kCells; s += lanes) {
+    const V z = NearestZ(d, face, hn::Load(d, block.cell_x + s), hn::Load(d, block.cell_y + s));
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Le(z, hn::Set(d, block.cell_reach)), bytes);
+    near |= static_cast<std::uint32_t>(bytes[0]) << s;
   }
-  for (int i = 0; i < 2 * kBlockSize; ++i)
+  return near;
+}
+
+// Calls visit(s) for every cell of `cells`.
+template <class Visit>
+HWY_INLINE void ForCells(std::uint32_t cells, const Visit& visit) {
+  for (; cells != 0; cells &= cells - 1) {
+    visit(static_cast<std::size_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(cells)));
+  }
+}
+
+// a <- a + (1 - a) A for the pixels of cell s: keeps small alphas precise, which 1 - product would
+// not.
+HWY_INLINE void Accumulate(D d, const SoftBlock& block, const SoftBlockFace& face, std::size_t s,
+                           float* alpha) {
+  for (std::size_t i = s * kCellPixels; i < (s + 1) * kCellPixels; i += hn::Lanes(d)) {
+    const Pixels p = PixelsAt(d, block, i);
+    const V a = hn::Load(d, alpha + i);
+    const V decay = simd::DecayOf(d, NearestZ(d, face, p.x, p.y)).exp;
+    hn::Store(hn::MulAdd(hn::Sub(hn::Set(d, 1.0f), a), decay, a), d, alpha + i);
+  }
+}
+
+// Merges a cell of `part` into `alpha` and zeroes it. Returns the least alpha.
+inline double MergeCell(std::size_t s, float* part, double* alpha) {
+  double lowest = 1;
+  for (std::size_t i = s * kCellPixels; i < (s + 1) * kCellPixels; ++i) {
     alpha[i] += (1 - alpha[i]) * static_cast<double>(part[i]);
+    part[i] = 0;
+    lowest = std::min(lowest, alpha[i]);
+  }
+  return lowest;
 }
 
 inline void SoftMaskBlockTarget(const SoftBlock& block, SoftBlockAlpha* out) {
-  std::fill_n(out->stopped, kBlockSize / 2, false);
+  const D d;
+  alignas(64) float part[kBlockPixels] = {};
+  std::fill_n(out->looked, kCells, 0u);
+  out->stopped = 0;
   for (std::size_t begin = 0; begin < block.count; begin += kMergeEvery) {
     const std::size_t end = std::min(begin + kMergeEvery, block.count);
-    for (int pair = 0; pair < kBlockSize / 2; ++pair) {
-      double* alpha = out->alpha + pair * 2 * kBlockSize;
-      const double lowest = *std::min_element(alpha, alpha + 2 * kBlockSize);
-      out->stopped[pair] = out->stopped[pair] || 1 - lowest <= block.stop;
-      if (out->stopped[pair]) continue;
-      AccumulateRowPair(block, begin, end, pair * 2 * kBlockSize, alpha);
+    std::uint32_t touched = 0;
+    for (std::size_t m = begin; m < end; ++m) {
+      const SoftBlockFace& face = block.members[m];
+      const std::uint32_t cells = CellsNear(d, block, face) & block.cells & ~out->stopped;
+      touched |= cells;
+      ForCells(cells, [&](std::size_t s) HWY_ATTR {
+        Accumulate(d, block, face, s, part);
+        ++out->looked[s];
+      });
     }
+    ForCells(touched, [&](std::size_t s) HWY_ATTR {
+      const double lowest = MergeCell(s, part, out->alpha);
+      if (end < block.count && 1 - lowest <= block.stop) out->stopped |= 1u << s;
+    });
+    if (out->stopped == block.cells) break;
   }
 }
 
-// Fills products and returns how many members matter: behind them, every product is <= stop.
+// Fills products and the cells of members, and returns how many members matter: behind them, every
+// product is <= stop.
 inline std::size_t ForwardProducts(const SoftBlock& block, const SoftBlockGradient& g,
                                    float* product) {
   const D d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
   for (int i = 0; i < kBlockPixels; ++i) product[i] = g.d_alpha[i] == 0 ? 0.0f : 1.0f;
+  std::uint32_t live = block.cells;
   for (std::size_t m = 0; m < block.count; ++m) {
-    if (m % kMergeEvery == 0 &&
-        static_cast<double>(*std::max_element(product, product + kBlockPixels)) <= block.stop) {
-      return m;
+    if (m > 0 && m % kMergeEvery == 0) {
+      ForCells(live, [&](std::size_t s) HWY_ATTR {
+        const float* cell = product + s * kCellPixels;
+        const float largest = *std::max_element(cell, cell + kCellPixels);
+        if (static_cast<double>(largest) <= block.stop) live &= ~(1u << s);
+      });
+      if (live == 0) return m;
     }
-    for (int pixel = 0; pixel < kBlockPixels; pixel += lanes) {
-      const Pixels p = PixelsAt(d, block, pixel);
-      const V before = hn::Load(d, product + pixel);
-      hn::Store(before, d, g.products + m * kBlockPixels + pixel);
-      const V outside = simd::DecayOf(d, NearestZ(d, block.members[m], p.x, p.y)).one_minus;
-      hn::Store(hn::Mul(before, outside), d, product + pixel);
-    }
+    SoftBlockFace& face = block.members[m];
+    face.cells = CellsNear(d, block, face) & live;
+    ForCells(face.cells, [&](std::size_t s) HWY_ATTR {
+      for (std::size_t i = s * kCellPixels; i < (s + 1) * kCellPixels; i += hn::Lanes(d)) {
+        const Pixels p = PixelsAt(d, block, i);
+        const V before = hn::Load(d, product + i);
+        hn::Store(before, d, g.products + m * kBlockPixels + i);
+        const V outside = simd::DecayOf(d, NearestZ(d, face, p.x, p.y)).one_minus;
+        hn::Store(hn::Mul(before, outside), d, product + i);
+      }
+    });
   }
   return block.count;
 }
@@ -172,19 +213,22 @@ HWY_INLINE void AddToCorners(D d, const Nearest& n, V push, CornerSums* sums) {
 inline void MemberGradient(const SoftBlock& block, const SoftBlockGradient& g, std::size_t m,
                            float* behind) {
   const D d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const SoftBlockFace& face = block.members[m];
+  if (face.cells == 0) return;
   const V zero = hn::Zero(d), two = hn::Set(d, 2.0f);
   CornerSums sums{{zero, zero, zero}, {zero, zero, zero}};
-  for (int pixel = 0; pixel < kBlockPixels; pixel += lanes) {
-    const Nearest n = NearestOf(d, block.members[m], PixelsAt(d, block, pixel));
-    const simd::Decay<V> decay = simd::DecayOf(d, n.z);
-    const V before = hn::Load(d, g.products + m * kBlockPixels + pixel);
-    const V after = hn::Load(d, behind + pixel);
-    hn::Store(hn::Mul(after, decay.one_minus), d, behind + pixel);
-    const V weighted = hn::Mul(hn::Mul(two, decay.exp), hn::Load(d, g.d_alpha + pixel));
-    AddToCorners(d, n, hn::Mul(weighted, hn::Mul(before, after)), &sums);
-  }
-  float* corners = g.d_corners + block.members[m].position;
+  ForCells(face.cells, [&](std::size_t s) HWY_ATTR {
+    for (std::size_t i = s * kCellPixels; i < (s + 1) * kCellPixels; i += hn::Lanes(d)) {
+      const Nearest n = NearestOf(d, face, PixelsAt(d, block, i));
+      const simd::Decay<V> decay = simd::DecayOf(d, n.z);
+      const V before = hn::Load(d, g.products + m * kBlockPixels + i);
+      const V after = hn::Load(d, behind + i);
+      hn::Store(hn::Mul(after, decay.one_minus), d, behind + i);
+      const V weighted = hn::Mul(hn::Mul(two, decay.exp), hn::Load(d, g.d_alpha + i));
+      AddToCorners(d, n, hn::Mul(weighted, hn::Mul(before, after)), &sums);
+    }
+  });
+  float* corners = g.d_corners + face.position;
   for (std::size_t k = 0; k < 3; ++k) {
     corners[k * g.stride] += hn::GetLane(hn::SumOfLanes(d, sums.x[k]));
     corners[(3 + k) * g.stride] += hn::GetLane(hn::SumOfLanes(d, sums.y[k]));

@@ -58,8 +58,8 @@ double BinnedError(const SoftMaskPlan& plan, std::size_t listed);
 
 // Memory of one worker. Grows to the longest list seen, then nothing is allocated.
 struct SoftMaskScratch {
-  AlignedVector<SoftFace> faces;         // the tile's candidates
-  AlignedVector<SoftBlockFace> members;  // those that a block keeps
+  SoftFaces faces;                       // those of the tile's candidates that are not far
+  AlignedVector<SoftBlockFace> members;  // those that a block keeps; never shrinks
   AlignedVector<float> products;         // [members][kBlockPixels] product before each member
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The part of the soft mask that decides which faces a block of pixels looks at. Scalar.
+// The scalar part of the soft mask's culling: what a tile, a block and a cell may drop.
 #pragma once
 
 #include "raster/soft_mask.h"
@@ -12,19 +12,26 @@ inline constexpr double kUnseenProduct = 0x1p-26;
 // The product at which a pixel may stop.
 double StopProduct(const SoftMaskPlan& plan);
 
-// The tile's candidates, seen from its centre. `background`: the pixels that are computed are
-// inside; faces too far from it are marked `far` and have no edges.
-void SetUpFaces(const ScreenMesh& mesh, const SoftMaskPlan& plan, const SoftMaskTile& tile,
-                const TileRect& background, AlignedVector<SoftFace>* faces);
-
-// A block: the pixels its offsets count from, and those of them that are computed.
-struct BlockPixels {
-  TileRect rect, background;
+// From pixels to kernel units, counted from the centre of a tile.
+struct SoftFrame {
+  double x, y;            // the centre, pixels
+  double unit_x, unit_y;  // kernel units per pixel
 };
+SoftFrame FrameOf(const SoftMaskPlan& plan, const TileRect& tile);
 
-// Fills scratch->members and `block` (all but `stop`) with the candidates that matter to the
-// block's background. Returns a bound on the sum of A over the others, at any of these pixels.
-double GatherBlock(const SoftMaskPlan& plan, const SoftMaskTile& tile, const BlockPixels& pixels,
-                   SoftMaskScratch* scratch, SoftBlock* block);
+struct SoftPoint {
+  double x, y;
+};
+SoftPoint ToUnits(const SoftFrame& frame, double x, double y);
+
+// z from which on `n` faces have A <= share / n each, and together no more than `share`.
+double DropZ(std::size_t n, double share);
+
+// What is far from the centres of `pixels`, if `z` is what they may drop.
+SoftBox BoxOf(const SoftFrame& frame, const TileRect& pixels, double z);
+
+// Sets what all blocks of a tile have in common: where pixels and cells lie, and what a cell may
+// drop.
+void SetUpBlock(const SoftFrame& frame, double z, SoftBlock* block);
 
 }  // namespace tilegrad::raster
