@@ -13,7 +13,7 @@ namespace tilegrad::cli {
 namespace {
 
 struct ViewOptions {
-  std::string data, model, split = "test", out = "view.png";
+  std::string data, model, class_name, split = "test", out = "view.png";
   int view = 0;
 };
 
@@ -77,6 +77,7 @@ void AddDatasetView(CLI::App& app, Action* action) {
   command->add_option("--data", options->data, "dataset folder")->required();
   command->add_option("--model", options->model,
                       "CLASS/ID, as the files below models/ [one of --split]");
+  command->add_option("--class", options->class_name, "choose among the models of this class");
   command->add_option("--split", options->split, "train or test")
       ->capture_default_str()
       ->check(CLI::IsMember({"train", "test"}));

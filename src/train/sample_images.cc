@@ -51,13 +51,18 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
   Sheet sheet{ImageU8(columns * cell - kGap, rows * cell - kGap, 3, 255), store.size};
   const std::size_t plane =
       static_cast<std::size_t>(store.size) * static_cast<std::size_t>(store.size);
+  // Soft alpha is a signal for training; people see what is covered.
+  std::vector<float> covered(images.alpha.value().elements());
+  std::transform(images.alpha.value().data<float>(),
+                 images.alpha.value().data<float>() + covered.size(), covered.begin(),
+                 [](float alpha) { return alpha == 1 ? 1.0f : 0.0f; });
   for (int row = 0; row < rows; ++row) {
     for (int v = 0; v < views; ++v) {
       const std::size_t n = static_cast<std::size_t>(row * views + v);
       const float* truth = batch.truth_colors.data<float>() + 3 * plane * n;
       const float* predicted = images.colors.value().data<float>() + 3 * plane * n;
       sheet.Draw(2 * v, row, truth, batch.truth_alpha.data<float>() + plane * n);
-      sheet.Draw(2 * v + 1, row, predicted, images.alpha.value().data<float>() + plane * n);
+      sheet.Draw(2 * v + 1, row, predicted, covered.data() + plane * n);
     }
   }
   return sheet.image;

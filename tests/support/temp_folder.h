@@ -26,6 +26,7 @@ class TempFolderTest : public testing::Test {
 
   // Without fsync, which would be most of the time of a test with many broken files.
   Path Write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((folder_ / name).parent_path());
     std::ofstream(folder_ / name, std::ios::binary) << text;
     EXPECT_EQ(std::filesystem::file_size(folder_ / name), text.size());
     return folder_ / name;
