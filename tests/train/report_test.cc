@@ -134,7 +134,7 @@ TEST_F(ReportTest, MarksTheBestAndComparesWithBaselines) {
   EXPECT_EQ(Count(page, "<strong>60.0</strong>"), 2);  // of the class and of the mean
   EXPECT_EQ(Count(page, "<strong>50.0</strong>"), 0);
   EXPECT_EQ(Count(page, "above every baseline"), 1);
-  EXPECT_EQ(Count(page, "3D IoU 12.3 %<br>F-score 45.6 %"), 1);
+  EXPECT_EQ(Count(page, "<span>3D IoU 12.3 %</span> <span>F-score 45.6 %</span>"), 1);
   EXPECT_EQ(Count(page, "The scores are of: elder network"), 1);
   Evaluate(0.4);
   EXPECT_EQ(Count(Page(), "above one baseline but not all"), 1);

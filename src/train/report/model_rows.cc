@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures of the shown models, in pairs of truth and prediction.
-#include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "train/report/html.h"
@@ -28,9 +28,9 @@ std::string ModelScoreHtml(const ReportFacts& facts, int model) {
   if (!facts.evaluation) return "";
   for (const ModelScore& entry : facts.evaluation->models) {
     if (entry.model != model) continue;
-    std::string text = fmt::format("3D IoU {:.1f} %", 100 * entry.score.iou);
+    std::string text = fmt::format("<span>3D IoU {:.1f} %</span>", 100 * entry.score.iou);
     if (entry.score.f_score)
-      text += fmt::format("<br>F-score {:.1f} %", 100 * *entry.score.f_score);
+      text += fmt::format(" <span>F-score {:.1f} %</span>", 100 * *entry.score.f_score);
     return "<p class=\"score\">" + text + "</p>";
   }
   return "";
@@ -39,9 +39,8 @@ std::string ModelScoreHtml(const ReportFacts& facts, int model) {
 Result<std::string> PicturesHtml(const ShownModel& shown, const std::string& name, double step) {
   std::string out;
   for (std::size_t v = 0; v < shown.truth_views.size(); ++v) {
-    const std::string turned =
-        fmt::format("turned {:.0f}°", std::abs(step) * static_cast<double>(v));
-    const std::string view = v == 0 ? "the input's view" : turned;
+    const std::string turned = fmt::format("+{:.0f}°", std::abs(step) * static_cast<double>(v));
+    const std::string view = v == 0 ? "the input's view" : "view turned by " + turned;
     TILEGRAD_ASSIGN(const std::string truth,
                     FigureHtml({shown.truth_views[v], v == 0 ? "input" : "truth, " + turned,
                                 v == 0 ? name + ": the image that the network sees"

@@ -249,7 +249,7 @@ function showModel([prediction, truth], index) {
   byId('viewer-truth-caption').textContent = model.truth ? 'truth' : 'the dataset has no mesh of this model';
   byId('viewer-input').src = inputOf(index);
   byId('viewer-input').alt = `${model.name}: the image that the network sees`;
-  byId('viewer-name').textContent = `${model.name} · ${model.class}`;
+  byId('viewer-name').textContent = `${model.name} (${model.class})`;
 }
 
 // ---- Curves: small charts that share one cursor.
@@ -271,7 +271,7 @@ function svg(name, attributes, parent, text) {
 // Round numbers over [0, high], about `count` of them.
 function ticks(high, count) {
   const rough = (high || 1) / count, power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough);
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= 0.7 * rough);
   return Array.from({length: Math.floor(high / step + 1e-9) + 1}, (_, i) => +(i * step).toPrecision(12));
 }
 
