@@ -15,6 +15,7 @@
 
 #include "raster/tile_face_setup.h"
 #include "raster/visibility.h"
+#include "raster/visibility_setup-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster {
@@ -58,23 +59,35 @@ HWY_INLINE void DrawColumns(const TileFaceSetup& face, int column, const TileRec
   }
 }
 
+// `floor`: every pixel of the tile is at least this near.
+HWY_INLINE void DrawFace(const ScreenMesh& mesh, const TileFaceSetup& face, const TileRect& rect,
+                         float* floor, VisibilityTile* out) {
+  const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
+  if (face.depth.high <= *floor) return;
+  if (!face.guarded) {
+    DrawUnguarded(mesh, face, rect, out);
+    return;
+  }
+  if (face.CoversTile()) *floor = HWY_MAX(*floor, face.depth.low);
+  int column = HWY_MIN(face.column_begin, kTileSize - lanes);
+  for (; column < face.column_end; column += lanes) {
+    DrawColumns(face, HWY_MIN(column, kTileSize - lanes), rect, out);
+  }
+}
+
 void DrawFaces(const ScreenMesh& mesh, std::span<const std::int32_t> faces, const TileRect& rect,
                VisibilityTile* out) {
-  const VisibilityTag d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  float floor = 0;  // every pixel of the tile is at least this near
-  for (const std::int32_t f : faces) {
-    TileFaceSetup face;
-    if (!SetUpTileFace(mesh, f, rect, &face) || face.depth.high <= floor) continue;
-    if (!face.guarded) {
-      DrawUnguarded(mesh, face, rect, out);
-      continue;
+  float floor = 0;
+  TileFaceBatch batch;
+  TileFaceSetup face;
+  while (!faces.empty()) {
+    const std::size_t count = SetUpBatch(mesh, faces, rect, &batch);
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool inside = batch.small[i] != 0 ? FromBatch(batch, i, &face)
+                                              : SetUpTileFace(mesh, batch.face[i], rect, &face);
+      if (inside) DrawFace(mesh, face, rect, &floor, out);
     }
-    if (face.CoversTile()) floor = HWY_MAX(floor, face.depth.low);
-    int column = HWY_MIN(face.column_begin, kTileSize - lanes);
-    for (; column < face.column_end; column += lanes) {
-      DrawColumns(face, HWY_MIN(column, kTileSize - lanes), rect, out);
-    }
+    faces = faces.subspan(count);
   }
 }
 
