@@ -52,17 +52,26 @@ HWY_INLINE GatherMask IsBoxNear(GatherTag d, const GatherVec (&side)[4], const S
 HWY_INLINE void LoadCorners(GatherTag d, const ScreenMesh& mesh, const SoftFrame& frame,
                             std::span<const std::int32_t> faces, std::size_t n,
                             GatherVec (&corner)[6]) {
-  HWY_ALIGN double c[6][kGatherMost];
-  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const auto f = static_cast<std::size_t>(faces[HWY_MIN(n + i, faces.size() - 1)]);
-    for (int k = 0; k < 3; ++k) {
-      const auto v = static_cast<std::size_t>(mesh.vertex(f, k));
-      c[k][i] = static_cast<double>(mesh.x[v]), c[3 + k][i] = static_cast<double>(mesh.y[v]);
-    }
+  const GatherFloatTag df;
+  const hn::RebindToSigned<GatherFloatTag> di;
+  const std::size_t lanes = hn::Lanes(di);
+  HWY_ALIGN std::int32_t last[kGatherMost];
+  const std::int32_t* listed = faces.data() + n;
+  if (n + lanes > faces.size()) {
+    for (std::size_t i = 0; i < lanes; ++i) last[i] = faces[HWY_MIN(n + i, faces.size() - 1)];
+    listed = last;
   }
-  for (int k = 0; k < 6; ++k) {
-    const double origin = k < 3 ? frame.x : frame.y, unit = k < 3 ? frame.unit_x : frame.unit_y;
-    corner[k] = hn::Mul(hn::Sub(hn::Load(d, c[k]), hn::Set(d, origin)), hn::Set(d, unit));
+  const auto face = hn::LoadU(di, listed);
+  const auto units = [&](const float* at, hn::Vec<decltype(di)> v, double origin, double unit)
+                         HWY_ATTR {
+                           const auto pixels = hn::PromoteTo(d, hn::GatherIndex(df, at, v));
+                           return hn::Mul(hn::Sub(pixels, hn::Set(d, origin)), hn::Set(d, unit));
+                         };
+  const std::int32_t* const vertices[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
+  for (int k = 0; k < 3; ++k) {
+    const auto v = hn::GatherIndex(di, vertices[k], face);
+    corner[k] = units(mesh.x.data(), v, frame.x, frame.unit_x);
+    corner[3 + k] = units(mesh.y.data(), v, frame.y, frame.unit_y);
   }
 }
 

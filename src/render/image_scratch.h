@@ -20,6 +20,18 @@
 
 namespace tilegrad {
 
+// What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
+// the forward pass of the same scenes.
+struct PreparedFrom {
+  bool valid = false, drawn_bins = false, soft_bins = false;
+  AlignedVector<float> positions;
+  AlignedVector<std::int32_t> faces;
+  CameraT<float> camera;
+  int width = 0, height = 0;
+  double delta = 0, max_alpha_error = 0;
+  FaceCulling culling = FaceCulling::kNone;
+};
+
 // A scene on the screen, ready for its tiles.
 struct ImageScratch {
   raster::ScreenMeshBuffers buffers;
@@ -29,6 +41,7 @@ struct ImageScratch {
   raster::TileListBuffers drawn_buffers, soft_buffers;
   raster::TileLists drawn, soft;
   raster::SoftMaskPlan soft_plan;
+  PreparedFrom prepared;
 
   // Backward: gradients in the layout of `mesh`.
   AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t, d_attributes;

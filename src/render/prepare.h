@@ -10,6 +10,7 @@ namespace tilegrad {
 struct PrepareRequest {
   bool drawn_bins = true;  // visibility will run
   bool soft_bins = true;   // alpha or its gradient will run
+  bool reuse = false;      // what was prepared last, if it was for the same scene and options
 };
 
 void PrepareImage(const SceneView& scene, const RenderOptions& options,

@@ -71,7 +71,7 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
   const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
   impl_->tile_errors.assign(scenes.size() * tiles, 0.0);
-  impl_->Prepare(scenes, options, {true, request.alpha});
+  impl_->Prepare(scenes, options, {true, request.alpha, false});
   impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
     impl_->tile_errors[task.image * tiles + task.tile] =
         RenderTile(scenes[task.image], options, impl_->images[task.image], task,
@@ -87,7 +87,7 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           const Frame& frame, const FrameGradients& d_frame,
                           std::span<SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
-  impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty()});
+  impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true});
   for (WorkerScratch& worker : impl_->worker_scratch) worker.ClearGradients();
   const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
   impl_->tile_gradients.resize(scenes.size() * tiles);

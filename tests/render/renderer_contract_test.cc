@@ -128,6 +128,36 @@ TEST(RendererBits, SameBatchedAndOneByOne) {
   EXPECT_TRUE(together == single);
 }
 
+// Backward may reuse what Render prepared, but only for the same scenes and options.
+TEST(RendererBits, BackwardDoesNotDependOnWhatWasRenderedLast) {
+  Batch batch;
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame, other;
+  const auto backward = [&] {
+    return renderer.Backward(batch.views, Options(), frame, {batch.d_attributes, batch.d_alpha},
+                             batch.d_scenes);
+  };
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
+  ASSERT_TRUE(backward().ok());
+  const auto expected = batch.positions;
+  const auto check_after = [&](const RenderOptions& options, const char* what) {
+    ASSERT_TRUE(renderer.Render(batch.views, options, {}, &other).ok());
+    batch = Batch();  // the scenes as they were, at other addresses
+    ASSERT_TRUE(backward().ok());
+    EXPECT_EQ(batch.positions, expected) << what;
+  };
+  batch.scenes[0].positions[4] += 0.05f;
+  check_after(Options(), "a vertex moved");
+  std::swap(batch.scenes[1].faces[0], batch.scenes[1].faces[1]);
+  check_after(Options(), "a face turned");
+  batch.views[2].camera.fx += 3;
+  check_after(Options(), "another camera");
+  RenderOptions wide = Options();
+  wide.delta = 0.1;
+  check_after(wide, "another kernel");
+}
+
 TEST(RendererMemory, SteadyStateAllocatesNothing) {
   Batch batch;
   const Workers workers(1);
