@@ -177,6 +177,11 @@ struct NodeWalk {
   }
 
   Status AddPart(const aiMesh& part, const aiMatrix4x4& m) {
+    if ((part.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
+      out.warnings.push_back(
+          fmt::format("part \"{}\": points or lines left out", part.mName.C_Str()));
+      return {};
+    }
     TILEGRAD_ASSIGN(Mesh mesh, ConvertPart(part, place));
     if (mesh.faces.empty()) return {};
     if (!m.IsIdentity()) {
@@ -193,13 +198,24 @@ struct NodeWalk {
   }
 };
 
+// Says what a part really holds. Some importers claim polygons where there are lines only, upon
+// which triangulation aborts the program.
+void CorrectPrimitiveTypes(const aiScene& scene) {
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    aiMesh& part = *scene.mMeshes[m];
+    part.mPrimitiveTypes = 0;
+    for (unsigned f = 0; f < part.mNumFaces; ++f)
+      part.mPrimitiveTypes |= AI_PRIMITIVE_TYPE_FOR_N_INDICES(part.mFaces[f].mNumIndices);
+  }
+}
+
 Result<LoadedMesh> Import(const FileSource& source, const std::string& name) {
   const std::string place = source.Describe(name);
   Assimp::Importer importer;
   importer.SetIOHandler(new SourceSystem(source));  // the importer owns it
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
-                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const aiScene* scene = importer.ReadFile(name, aiProcess_Triangulate | aiProcess_SortByPType);
+  if (importer.ReadFile(name, 0) != nullptr) CorrectPrimitiveTypes(*importer.GetScene());
+  const aiScene* scene =
+      importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     return DataLoss("{}: {}", place, importer.GetErrorString());
   }
@@ -211,17 +227,20 @@ Result<LoadedMesh> Import(const FileSource& source, const std::string& name) {
 }  // namespace
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
-  TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
   const std::string place = source.Describe(name);
-  if (Path(name).extension() == ".obj" || Path(name).extension() == ".OBJ") {
-    TILEGRAD_TRY(
-        CheckObjIndices({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, place));
-  }
+  if (!source.Exists(name)) return NotFound("{}: no such file", place);
   try {
     return Import(source, name);
   } catch (const std::exception& error) {  // Assimp's importers throw on some broken files
     return DataLoss("{}: {}", place, error.what());
   }
+}
+
+Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
+  TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
+  TILEGRAD_TRY(
+      CheckObj({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, source.Describe(name)));
+  return ReadByAssimp(source, name);
 }
 
 }  // namespace tilegrad::io

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "base/error.h"
 #include "io/image_file.h"
@@ -17,10 +19,19 @@ namespace {
 // many corners still have 32-bit indices.
 constexpr std::size_t kMaxElements = std::size_t{1} << 26;
 
-constexpr std::array<std::string_view, 2> kGltfEndings = {".gltf", ".glb"};
-constexpr std::array<std::string_view, 13> kAssimpEndings = {
-    ".obj", ".ac",  ".ply", ".stl",  ".off", ".dae", ".fbx",
-    ".3ds", ".lwo", ".x",   ".ms3d", ".3mf", ".ase"};
+struct Format {
+  std::string_view ending;
+  Result<LoadedMesh> (*read)(const FileSource& source, const std::string& name);
+};
+// Of the formats that Assimp knows, those whose importers stood up to mutated files.
+constexpr std::array<Format, 8> kFormats = {{{".glb", ReadGltf},
+                                             {".gltf", ReadGltf},
+                                             {".obj", ReadObj},
+                                             {".ply", ReadPly},
+                                             {".off", ReadOff},
+                                             {".ac", ReadByAssimp},
+                                             {".stl", ReadByAssimp},
+                                             {".3ds", ReadByAssimp}}};
 
 std::string Ending(const std::string& name) {
   std::string ending = Path(name).extension().string();
@@ -29,9 +40,11 @@ std::string Ending(const std::string& name) {
   return ending;
 }
 
-template <class List>
-bool Contains(const List& list, const std::string& ending) {
-  return std::find(list.begin(), list.end(), ending) != list.end();
+const Format* FindFormat(const std::string& name) {
+  const std::string ending = Ending(name);
+  const auto* found = std::find_if(kFormats.begin(), kFormats.end(),
+                                   [&](const Format& f) { return f.ending == ending; });
+  return found == kFormats.end() ? nullptr : found;
 }
 
 std::string Folder(const std::string& name) {
@@ -52,6 +65,28 @@ ImageU8 ToColor(ImageU8 image) {
     if (alpha) to[3] = from[1];
   }
   return out;
+}
+
+void ClampColors(Mesh& mesh) {
+  const auto clamp = [](glm::vec4& color) { color = glm::clamp(color, 0.0f, 1.0f); };
+  std::for_each(mesh.colors.begin(), mesh.colors.end(), clamp);
+  for (Material& material : mesh.materials) clamp(material.base_color);
+}
+
+glm::vec3 UnitOr(glm::vec3 normal, glm::vec3 fallback) {
+  const glm::dvec3 n(normal);  // its square must not overflow
+  const double length = glm::length(n);
+  return length > 0 ? glm::vec3(n / length) : fallback;
+}
+
+// Files hold normals of any length, zero included.
+void MakeNormalsUnit(Mesh& mesh) {
+  if (mesh.normals.empty() && mesh.corner_normals.empty()) return;
+  const auto smooth = SmoothNormals(mesh);
+  for (std::size_t v = 0; v < mesh.normals.size(); ++v)
+    mesh.normals[v] = UnitOr(mesh.normals[v], smooth[v]);
+  for (std::size_t c = 0; c < mesh.corner_normals.size(); ++c)
+    mesh.corner_normals[c] = UnitOr(mesh.corner_normals[c], smooth[mesh.faces[c / 3][c % 3]]);
 }
 
 }  // namespace
@@ -101,32 +136,43 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
   return {};
 }
 
-bool IsMeshFileName(const std::string& name) {
-  const std::string ending = Ending(name);
-  return Contains(kGltfEndings, ending) || Contains(kAssimpEndings, ending);
+void AddPolygon(std::span<const std::int32_t> corners, Mesh& mesh) {
+  for (std::size_t k = 2; k < corners.size(); ++k)
+    mesh.faces.push_back({corners[0], corners[k - 1], corners[k]});
 }
 
+bool IsMeshFileName(const std::string& name) { return FindFormat(name) != nullptr; }
+
 Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
-  const std::string ending = Ending(name), place = source.Describe(name);
-  const bool gltf = Contains(kGltfEndings, ending);
-  if (!gltf && !Contains(kAssimpEndings, ending)) {
+  const std::string place = source.Describe(name);
+  const Format* format = FindFormat(name);
+  if (format == nullptr) {
     return InvalidArgument(
-        "{}: the ending \"{}\" is none of a mesh format that is read (glb, gltf, obj, ac, ply, "
-        "stl, off, "
-        "dae, fbx, 3ds, ...)",
-        place, ending);
+        "{}: the ending \"{}\" is none of a mesh format that is read (glb, gltf, obj, ply, off, "
+        "ac, "
+        "stl, 3ds)",
+        place, Ending(name));
   }
-  auto loaded = gltf ? ReadGltf(source, name) : ReadByAssimp(source, name);
+  auto loaded = format->read(source, name);
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
+  ClampColors(loaded->mesh);
+  MakeNormalsUnit(loaded->mesh);
   return loaded;
 }
 
 Result<LoadedMesh> LoadMesh(const Path& path) {
-  const Path folder = path.has_parent_path() ? path.parent_path() : Path(".");
-  return LoadMesh(*OpenFolder(folder), path.filename().string());
+  // The source begins one folder above the mesh's: textures often lie in "../images".
+  Path folder = path.parent_path();
+  const Path last = folder.filename();
+  if (last.empty() || last == "." || last == "..") {
+    std::error_code error;
+    folder = std::filesystem::absolute(path, error).lexically_normal().parent_path();
+  }
+  const Path above = folder.has_parent_path() ? folder.parent_path() : Path(".");
+  return LoadMesh(*OpenFolder(above), (folder.filename() / path.filename()).string());
 }
 
 }  // namespace tilegrad::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mesh files: glTF and GLB by tinygltf; OBJ with MTL, AC3D, PLY, STL, OFF, Collada, FBX, 3DS, ...
-// by Assimp.
+// Mesh files: glTF and GLB (tinygltf), OBJ with MTL, AC3D, STL and 3DS (Assimp), PLY and
+// OFF.
 #pragma once
 
 #include <string>
@@ -13,13 +13,14 @@ namespace tilegrad::io {
 
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
-              // transforms applied
+              // transforms applied, polygons split, normals unit, colours in [0, 1]
   std::vector<std::string> warnings;  // what was missing or left out and what stands in for it
 };
 
 // The format follows the file name's ending. Errors name the file and, where the format has places,
 // the place in it. A missing texture is a warning; the material's colour stands in. Lines and
-// points are left out with a warning.
+// points are left out with a warning. Side files (MTL, images) are looked for in the mesh's folder
+// and in the folders beside it.
 Result<LoadedMesh> LoadMesh(const Path& path);
 Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name);
 

@@ -2,19 +2,27 @@
 // Internal to io: what mesh_file.cc dispatches to, and what the readers share.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "io/mesh_file.h"
 
 namespace tilegrad::io {
 
-// Both leave validation to mesh_file.cc.
+// All leave validation to mesh_file.cc.
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
+Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name);
+Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
+Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name);
 
-// OBJ only: every index of every face against the counts of v, vt and vn. Assimp drops or misreads
-// what is out of range.
-Status CheckObjIndices(std::string_view text, const std::string& name);
+// A fan over the corners; fewer than three add nothing.
+void AddPolygon(std::span<const std::int32_t> corners, Mesh& mesh);
+
+// OBJ only, before Assimp, which drops or misreads what is wrong: the numbers of every vertex, and
+// every index of every face, line and point against the counts of v, vt and vn.
+Status CheckObj(std::string_view text, const std::string& name);
 
 // Finds an image that a mesh file mentions: as written beside the mesh, then by its base name
 // there, which helps absolute paths of another computer. Adds it to out.mesh.textures and returns

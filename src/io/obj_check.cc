@@ -1,88 +1,117 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <charconv>
-#include <cstdint>
-#include <vector>
+#include <array>
 
 #include "base/error.h"
 #include "io/mesh_readers.h"
+#include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
 
-struct Counts {
-  std::int64_t of[3] = {0, 0, 0};  // v, vt, vn
+constexpr std::array<const char*, 3> kKindNames = {"vertex", "texture coordinate", "normal"};
+
+// Positive indices may point forward in the file, so the largest of each kind waits for the end.
+struct Largest {
+  std::int64_t index = 0;
+  std::size_t line = 0;
 };
 
-struct Reference {
-  std::size_t line;
-  int kind;            // 0 v, 1 vt, 2 vn
-  std::int64_t index;  // 1-based, resolved if it was relative
-  std::int64_t written;
-};
+class ObjCheck {
+ public:
+  explicit ObjCheck(const std::string& name) : name_(name) {}
 
-constexpr const char* kKindNames[3] = {"vertex", "texture coordinate", "normal"};
-
-std::string_view NextToken(std::string_view& rest) {
-  const auto begin = rest.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return rest = {};
-  const auto end = std::min(rest.find_first_of(" \t\r", begin), rest.size());
-  const auto token = rest.substr(begin, end - begin);
-  rest.remove_prefix(end);
-  return token;
-}
-
-// One corner "v/vt/vn", any of the last two left out. False if it is not of that form.
-bool ParseCorner(std::string_view token, std::size_t line, const Counts& counts,
-                 std::vector<Reference>& out) {
-  for (int kind = 0; kind < 3; ++kind) {
-    const auto slash = std::min(token.find('/'), token.size());
-    const auto part = token.substr(0, slash);
-    if (part.empty() && kind == 0) return false;
-    if (!part.empty()) {
-      std::int64_t value = 0;
-      const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-      if (error != std::errc() || end != part.data() + part.size()) return false;
-      out.push_back({line, kind, value < 0 ? counts.of[kind] + 1 + value : value, value});
-    }
-    if (slash == token.size()) return true;
-    token.remove_prefix(slash + 1);
+  Status Line(std::string_view line, std::size_t number) {
+    number_ = number;
+    const auto keyword = NextToken(line);
+    if (keyword == "v") return Vertex(line);
+    if (keyword == "vt") ++count_[1];
+    if (keyword == "vn") ++count_[2];
+    if (keyword == "f" || keyword == "l" || keyword == "p") return Corners(line);
+    return {};
   }
-  return false;
-}
 
-int KindOf(std::string_view keyword) {
-  return keyword == "v" ? 0 : keyword == "vt" ? 1 : keyword == "vn" ? 2 : -1;
-}
+  Status Finish() const {
+    for (std::size_t kind = 0; kind < 3; ++kind) {
+      const Largest& largest = largest_[kind];
+      if (largest.index > count_[kind]) return OutOfRange(kind, largest.index, largest.line);
+    }
+    return {};
+  }
+
+ private:
+  Status Vertex(std::string_view line) {
+    ++count_[0];
+    for (int c = 0; c < 3; ++c) {
+      const auto token = NextToken(line);
+      float value = 0;
+      if (!ParseNumber(token, value)) {
+        return DataLoss("{}: line {}: a vertex needs three finite numbers, got \"{}\"", name_,
+                        number_, token);
+      }
+    }
+    return {};
+  }
+
+  Status Corners(std::string_view line) {
+    for (auto token = NextToken(line); !token.empty() && token[0] != '#'; token = NextToken(line))
+      TILEGRAD_TRY(Corner(token));
+    return {};
+  }
+
+  // "v/vt/vn", any of the last two left out.
+  Status Corner(const std::string_view whole) {
+    std::string_view token = whole;
+    for (std::size_t kind = 0; kind < 3; ++kind) {
+      const auto slash = token.find('/');
+      const auto part = token.substr(0, slash);
+      if (!part.empty() || kind == 0) {
+        std::int64_t index = 0;
+        if (!ParseNumber(part, index)) break;
+        TILEGRAD_TRY(Index(kind, index));
+      }
+      if (slash == std::string_view::npos) return {};
+      token.remove_prefix(slash + 1);
+    }
+    return DataLoss("{}: line {}: \"{}\" is not a corner of a face (v, v/vt, v//vn or v/vt/vn)",
+                    name_, number_, whole);
+  }
+
+  Status Index(std::size_t kind, std::int64_t index) {
+    if (index == 0 || index < -count_[kind]) return OutOfRange(kind, index, number_);
+    if (index > largest_[kind].index) largest_[kind] = {index, number_};
+    return {};
+  }
+
+  Status OutOfRange(std::size_t kind, std::int64_t index, std::size_t line) const {
+    return DataLoss("{}: line {}: a face uses {} {}, but the file has {}", name_, line,
+                    kKindNames[kind], index, count_[kind]);
+  }
+
+  const std::string& name_;
+  std::size_t number_ = 0;
+  std::array<std::int64_t, 3> count_ = {0, 0, 0};  // v, vt, vn so far
+  std::array<Largest, 3> largest_;
+};
 
 }  // namespace
 
-Status CheckObjIndices(std::string_view text, const std::string& name) {
-  Counts counts;
-  std::vector<Reference> references;
-  std::size_t line_number = 0;
-  while (!text.empty()) {
-    ++line_number;
-    const auto end = std::min(text.find('\n'), text.size());
-    std::string_view line = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    const auto keyword = NextToken(line);
-    if (const int kind = KindOf(keyword); kind >= 0) ++counts.of[kind];
-    if (keyword != "f") continue;
-    for (auto token = NextToken(line); !token.empty() && token[0] != '#' && token != "\\";
-         token = NextToken(line)) {
-      if (!ParseCorner(token, line_number, counts, references)) {
-        return DataLoss("{}: line {}: \"{}\" is not a corner of a face (v, v/vt, v//vn or v/vt/vn)",
-                        name, line_number, token);
-      }
+Status CheckObj(std::string_view text, const std::string& name) {
+  ObjCheck check(name);
+  Lines lines(text);
+  std::string joined;  // a trailing backslash continues the line
+  for (std::string_view line; lines.Next(line);) {
+    if (line.ends_with('\\')) {
+      joined.append(line.substr(0, line.size() - 1)) += ' ';
+      continue;
     }
-  }
-  for (const auto& [line, kind, index, written] : references) {
-    if (index < 1 || index > counts.of[kind]) {
-      return DataLoss("{}: line {}: a face uses {} {}, but the file has {}", name, line,
-                      kKindNames[kind], written, counts.of[kind]);
+    if (!joined.empty()) {
+      joined += line;
+      line = joined;
     }
+    TILEGRAD_TRY(check.Line(line, lines.Number()));
+    joined.clear();
   }
-  return {};
+  return check.Finish();
 }
 
 }  // namespace tilegrad::io

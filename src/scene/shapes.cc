@@ -83,14 +83,21 @@ void AppendFilled(std::vector<T>& to, std::size_t to_size, const std::vector<T>&
   to.resize(to_size + from_size, fill);
 }
 
+// Twice the area, along the normal; in double, where no float coordinates overflow or underflow.
+glm::dvec3 FaceNormal(const Mesh& mesh, const Face& face) {
+  const glm::dvec3 a(mesh.positions[face[0]]);
+  return glm::cross(glm::dvec3(mesh.positions[face[1]]) - a,
+                    glm::dvec3(mesh.positions[face[2]]) - a);
+}
+
+glm::vec3 UnitOrZ(const glm::dvec3& n) {
+  const double length = glm::length(n);
+  return length > 0 ? glm::vec3(n / length) : glm::vec3(0, 0, 1);
+}
+
 std::vector<glm::vec3> FlatCornerNormals(const Mesh& mesh) {
   std::vector<glm::vec3> out;
-  for (const auto& [a, b, c] : mesh.faces) {
-    const glm::vec3 n =
-        glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
-    const float length = glm::length(n);
-    out.insert(out.end(), 3, length > 0 ? n / length : glm::vec3(0, 0, 1));
-  }
+  for (const Face& face : mesh.faces) out.insert(out.end(), 3, UnitOrZ(FaceNormal(mesh, face)));
   return out;
 }
 
@@ -221,17 +228,17 @@ void Append(Mesh& mesh, const Mesh& other) {
 }
 
 void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 offset) {
-  const glm::mat3 m(linear[0], linear[1], linear[2]);
+  const glm::dmat3 m(linear[0], linear[1], linear[2]);
   // The cofactor matrix: the inverse transpose up to a positive or negative factor, defined for
   // singular m too.
-  glm::mat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+  const glm::dmat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
   const bool mirrored = glm::determinant(m) < 0;
   const auto turn = [&](glm::vec3& n) {
-    const glm::vec3 turned = (mirrored ? -1.0f : 1.0f) * (cofactor * n);
-    const float length = glm::length(turned);
-    if (length > 0) n = turned / length;
+    const glm::dvec3 turned = (mirrored ? -1.0 : 1.0) * (cofactor * glm::dvec3(n));
+    const double length = glm::length(turned);
+    if (length > 0) n = glm::vec3(turned / length);
   };
-  for (glm::vec3& p : mesh.positions) p = m * p + offset;
+  for (glm::vec3& p : mesh.positions) p = glm::vec3(m * glm::dvec3(p) + glm::dvec3(offset));
   for (glm::vec3& n : mesh.normals) turn(n);
   for (glm::vec3& n : mesh.corner_normals) turn(n);
   if (!mirrored) return;
@@ -245,17 +252,14 @@ void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 off
 }
 
 std::vector<glm::vec3> SmoothNormals(const Mesh& mesh) {
-  std::vector<glm::vec3> sums(mesh.positions.size(), glm::vec3(0));
-  for (const auto& [a, b, c] : mesh.faces) {
-    const glm::vec3 n =
-        glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
-    sums[a] += n, sums[b] += n, sums[c] += n;
+  std::vector<glm::dvec3> sums(mesh.positions.size(), glm::dvec3(0));
+  for (const Face& face : mesh.faces) {
+    for (const std::int32_t v : face) sums[v] += FaceNormal(mesh, face);
   }
-  for (glm::vec3& n : sums) {
-    const float length = glm::length(n);
-    n = length > 0 ? n / length : glm::vec3(0, 0, 1);
-  }
-  return sums;
+  std::vector<glm::vec3> out;
+  out.reserve(sums.size());
+  for (const glm::dvec3& n : sums) out.push_back(UnitOrZ(n));
+  return out;
 }
 
 }  // namespace tilegrad

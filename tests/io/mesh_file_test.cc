@@ -172,6 +172,53 @@ TEST_F(MeshFileTest, ObjIndexOutOfRangeNamesTheLine) {
   ExpectMessage(LoadStatus(Write("g.obj", "v 0 0 0\nf a b c\n")), "line 2", "\"a\"");
 }
 
+TEST_F(MeshFileTest, BrokenObjLines) {
+  ExpectMessage(LoadStatus(Write("short.obj", "v 0 0\nf 1 1 1\n")), "short.obj", "line 1",
+                "three finite numbers");
+  ExpectMessage(LoadStatus(Write("word.obj", "v 0 0 0\nv 1 zero 0\n")), "line 2", "\"zero\"");
+  // The index is in the continuation of line 4.
+  ExpectMessage(LoadStatus(Write("next.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 \\\n 9\n")),
+                "line 5", "vertex 9");
+  ExpectMessage(LoadStatus(Write("line.obj", kTriangleObj + "l 1 77\n")), "line 8", "vertex 77");
+  ExpectMessage(LoadStatus(Write("huge.obj", "v 0 0 0\nf 1 1 99999999999999999999\n")), "line 2");
+  ExpectMessage(LoadStatus(Write("upper.OBJ", "v 0 0 0\nf 1 2 3\n")), "upper.OBJ", "line 2");
+  EXPECT_TRUE(LoadStatus(Write("plus.obj", "v +0 0 0\nv 1e0 0 0\nv 0 1.5 0 \r\nf 3 2 1\r\n")).ok());
+}
+
+TEST_F(MeshFileTest, LinesAreLeftOutWithAWarning) {
+  const auto loaded = LoadMesh(Write("l.obj", kTriangleObj + "o wire\nl 1 2\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces.size(), 1u);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("lines"), std::string::npos);
+}
+
+// ShapeNet's layout: the images lie in a folder beside the model's.
+TEST_F(MeshFileTest, TexturesOneFolderUp) {
+  std::filesystem::create_directories(folder_ / "models");
+  ASSERT_TRUE(SavePng(folder_ / "images" / "t.png", ImageU8(2, 2, 3, 5)).ok());
+  Write("models/m.mtl", "newmtl m\nKd 1 1 1\nmap_Kd ../images/t.png\n");
+  const auto loaded = LoadMesh(Write("models/m.obj", "mtllib m.mtl\nusemtl m\n" + kTriangleObj));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_TRUE(loaded->warnings.empty()) << loaded->warnings[0];
+  EXPECT_EQ(loaded->mesh.textures.size(), 1u);
+}
+
+TEST_F(MeshFileTest, NormalsBecomeUnitAndColorsAreClamped) {
+  Write("a.mtl", "newmtl m\nKd 7 0.5 -1\n");
+  const auto loaded = LoadMesh(
+      Write("a.obj",
+            "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 3 4\nvn 0 0 0\nvn 1e30 0 0\nusemtl "
+            "m\nf 1//1 2//2 3//3\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const Mesh& mesh = loaded->mesh;
+  ASSERT_EQ(mesh.corner_normals.size(), 3u);
+  EXPECT_EQ(mesh.corner_normals[0], glm::vec3(0, 0.6f, 0.8f));
+  EXPECT_EQ(mesh.corner_normals[1], glm::vec3(0, 0, 1));  // the face's own
+  EXPECT_EQ(mesh.corner_normals[2], glm::vec3(1, 0, 0));
+  EXPECT_EQ(mesh.materials[mesh.face_materials[0]].base_color, glm::vec4(1, 0.5f, 0, 1));
+}
+
 TEST_F(MeshFileTest, NonFiniteEmptyAndUnknown) {
   ExpectMessage(LoadStatus(Write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), "nan.obj");
   ExpectMessage(LoadStatus(Write("big.obj", "v 1e39 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), "big.obj");

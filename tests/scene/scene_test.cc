@@ -91,6 +91,19 @@ TEST(Shapes, MirrorKeepsFacesOutward) {
     EXPECT_GT(glm::dot(fresh[i], mesh.normals[i]), 0.9f);
 }
 
+// Squares and cubes of such coordinates leave the range of float.
+TEST(Shapes, NormalsOfHugeAndTinyMeshesAreUnit) {
+  for (const float radius : {1e-30f, 1.0f, 1e30f}) {
+    Mesh mesh = Icosphere(1, radius);
+    mesh.normals = SmoothNormals(mesh);
+    Transform(mesh, {glm::vec3(1e-25f, 0, 0), glm::vec3(0, 1e-25f, 0), glm::vec3(0, 0, 1e-25f)},
+              {0, 0, 0});
+    const Mesh unit = Icosphere(1, 1);
+    for (std::size_t i = 0; i < mesh.normals.size(); ++i)
+      EXPECT_NEAR(glm::dot(mesh.normals[i], unit.positions[i]), 1, 1e-2);
+  }
+}
+
 TEST(Topology, NeighborsAreSymmetricAndAscending) {
   const Mesh mesh = Icosphere(2, 1);
   const Topology t = BuildTopology(mesh.faces, mesh.positions.size());

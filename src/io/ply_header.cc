@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/ply_header.h"
+
+#include <array>
+
+#include "base/error.h"
+#include "io/text_scan.h"
+
+namespace tilegrad::io {
+namespace {
+
+constexpr std::size_t kMaxProperties = 256;
+
+struct TypeName {
+  std::string_view name, sized_name;
+  PlyType type;
+  std::size_t size;
+};
+constexpr std::array<TypeName, 8> kTypes = {{{"char", "int8", PlyType::kI8, 1},
+                                             {"uchar", "uint8", PlyType::kU8, 1},
+                                             {"short", "int16", PlyType::kI16, 2},
+                                             {"ushort", "uint16", PlyType::kU16, 2},
+                                             {"int", "int32", PlyType::kI32, 4},
+                                             {"uint", "uint32", PlyType::kU32, 4},
+                                             {"float", "float32", PlyType::kF32, 4},
+                                             {"double", "float64", PlyType::kF64, 8}}};
+
+bool ParseType(std::string_view token, PlyType& type) {
+  for (const TypeName& row : kTypes) {
+    if (token != row.name && token != row.sized_name) continue;
+    type = row.type;
+    return true;
+  }
+  return false;
+}
+
+bool ParseFormat(std::string_view rest, PlyHeader& header) {
+  const auto token = NextToken(rest);
+  using Encoding = PlyHeader::Encoding;
+  header.encoding = token == "binary_little_endian" ? Encoding::kLittleEndian
+                    : token == "binary_big_endian"  ? Encoding::kBigEndian
+                                                    : Encoding::kText;
+  return header.encoding != Encoding::kText || token == "ascii";
+}
+
+bool ParseElement(std::string_view rest, PlyHeader& header) {
+  PlyElement element;
+  element.name = NextToken(rest);
+  if (!ParseNumber(NextToken(rest), element.count)) return false;
+  header.elements.push_back(std::move(element));
+  return true;
+}
+
+bool ParseProperty(std::string_view rest, PlyHeader& header) {
+  if (header.elements.empty()) return false;
+  auto& properties = header.elements.back().properties;
+  PlyProperty property;
+  auto token = NextToken(rest);
+  if (token == "list") {
+    PlyType count_type;
+    if (!ParseType(NextToken(rest), count_type)) return false;
+    if (count_type == PlyType::kF32 || count_type == PlyType::kF64) return false;
+    property.count_type = count_type;
+    token = NextToken(rest);
+  }
+  if (!ParseType(token, property.type) || properties.size() == kMaxProperties) return false;
+  property.name = NextToken(rest);
+  properties.push_back(std::move(property));
+  return true;
+}
+
+void ParseComment(std::string_view rest, PlyHeader& header) {
+  if (NextToken(rest) != "TextureFile") return;
+  const auto begin = rest.find_first_not_of(" \t");
+  if (begin != std::string_view::npos) header.texture = rest.substr(begin);
+}
+
+bool ParseLine(std::string_view line, PlyHeader& header) {
+  const auto keyword = NextToken(line);
+  if (keyword == "format") return ParseFormat(line, header);
+  if (keyword == "element") return ParseElement(line, header);
+  if (keyword == "property") return ParseProperty(line, header);
+  if (keyword == "comment") ParseComment(line, header);
+  return keyword == "comment" || keyword == "obj_info";
+}
+
+// The fewest bytes of a row: a list may be empty, a number in text is a digit and a space.
+std::size_t LeastRowSize(const PlyElement& element, PlyHeader::Encoding encoding) {
+  std::size_t size = 0;
+  for (const PlyProperty& p : element.properties) {
+    size += encoding == PlyHeader::Encoding::kText ? 2 : PlyTypeSize(p.count_type.value_or(p.type));
+  }
+  return size;
+}
+
+Status CheckCounts(const PlyHeader& header, const std::string& place) {
+  for (const PlyElement& element : header.elements) {
+    const std::size_t row = LeastRowSize(element, header.encoding);
+    if (row == 0 && element.count > 0)
+      return DataLoss("{}: element \"{}\" has no property", place, element.name);
+    // The last number of a text may lack its space.
+    if (element.count > 0 && element.count > (header.data.size() + 1) / row) {
+      return DataLoss("{}: the header promises {} \"{}\", but only {} bytes follow", place,
+                      element.count, element.name, header.data.size());
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::size_t PlyTypeSize(PlyType type) { return kTypes[static_cast<std::size_t>(type)].size; }
+
+std::size_t PlyHeader::CountOf(std::string_view element) const {
+  for (const PlyElement& e : elements) {
+    if (e.name == element) return e.count;
+  }
+  return 0;
+}
+
+Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place) {
+  PlyHeader header;
+  Lines lines(file);
+  std::string_view line;
+  if (!lines.Next(line) || line != "ply") return DataLoss("{}: does not begin with \"ply\"", place);
+  while (lines.Next(line)) {
+    if (line.starts_with("end_header")) {
+      header.data = lines.Rest();
+      TILEGRAD_TRY(CheckCounts(header, place));
+      return header;
+    }
+    if (!ParseLine(line, header))
+      return DataLoss("{}: line {}: \"{}\" is no line of a PLY header", place, lines.Number(),
+                      line.substr(0, 80));
+  }
+  return DataLoss("{}: ends before end_header", place);
+}
+
+}  // namespace tilegrad::io

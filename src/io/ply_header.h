@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to io: the header of a PLY file.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad::io {
+
+enum class PlyType { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
+std::size_t PlyTypeSize(PlyType type);
+
+struct PlyProperty {
+  std::string name;
+  PlyType type;
+  std::optional<PlyType> count_type;  // set for a list, which begins with its length
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+struct PlyHeader {
+  enum class Encoding { kText, kLittleEndian, kBigEndian } encoding = Encoding::kText;
+  std::vector<PlyElement> elements;
+  std::string texture;    // from "comment TextureFile NAME", or empty
+  std::string_view data;  // what follows the header
+
+  // The number of rows of an element, 0 if there is none of that name.
+  std::size_t CountOf(std::string_view element) const;
+};
+
+// Errors name `place` and the line; an element with more rows than the data could hold is one.
+Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place);
+
+}  // namespace tilegrad::io

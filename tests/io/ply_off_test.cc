@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// PLY and OFF: every encoding and variant that is read, and broken files.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+class PlyOffTest : public TempFolderTest {
+ protected:
+  Status LoadPly(const std::string& text) { return LoadMesh(Write("bad.ply", text)).status(); }
+  Status LoadOff(const std::string& text) { return LoadMesh(Write("bad.off", text)).status(); }
+};
+
+std::string Header(const std::string& format, const std::string& faces = "1") {
+  return "ply\nformat " + format +
+         " 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty float y\n"
+         "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+         "property list uchar short neighbours\nelement face " +
+         faces + "\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
+const std::string kTextBody =
+    "0 0 0.5 255 0 0 0\n1 0 0.5 0 255 0 2 7 8\n1 1 0.5 0 0 255 0\n0 1 0.5 51 51 51 0\n4 0 1 2 3\n";
+
+// The same numbers as kTextBody.
+std::string BinaryBody(bool big_endian) {
+  std::string out;
+  const auto add = [&](auto value) {
+    char bytes[sizeof(value)];
+    std::memcpy(bytes, &value, sizeof(value));
+    if (big_endian) std::reverse(bytes, bytes + sizeof(value));
+    out.append(bytes, sizeof(value));
+  };
+  const float xy[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  const std::uint8_t rgb[4][3] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {51, 51, 51}};
+  for (int i = 0; i < 4; ++i) {
+    add(xy[i][0]), add(xy[i][1]), add(0.5);
+    for (const std::uint8_t c : rgb[i]) add(c);
+    add(std::uint8_t(i == 1 ? 2 : 0));
+    if (i == 1) add(std::int16_t{7}), add(std::int16_t{8});
+  }
+  add(std::uint8_t{4});
+  for (std::int32_t i = 0; i < 4; ++i) add(i);
+  return out;
+}
+
+TEST_F(PlyOffTest, PlyOfEveryEncodingIsTheSame) {
+  for (const std::string& text :
+       {Header("ascii") + kTextBody, Header("binary_little_endian") + BinaryBody(false),
+        Header("binary_big_endian") + BinaryBody(true)}) {
+    const auto loaded = LoadMesh(Write("a.ply", text));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+    EXPECT_EQ(loaded->mesh.positions[2], glm::vec3(1, 1, 0.5f));
+    EXPECT_EQ(loaded->mesh.colors[1], glm::vec4(0, 1, 0, 1));
+    EXPECT_EQ(loaded->mesh.colors[3], glm::vec4(0.2f, 0.2f, 0.2f, 1));
+  }
+}
+
+TEST_F(PlyOffTest, PlyWithATexture) {
+  ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 77)).ok());
+  const std::string vertices =
+      "ply\nformat ascii 1.0\ncomment TextureFile my wood.png\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\n";
+  const std::string by_vertex = vertices +
+                                "property float s\nproperty float t\nelement face 1\nproperty list "
+                                "uchar int vertex_index\nend_header\n"
+                                "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0.25 1\n3 0 1 2\n";
+  const std::string by_corner = vertices +
+                                "element face 1\nproperty list uchar int vertex_indices\n"
+                                "property list uchar float texcoord\nend_header\n"
+                                "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0.25 1\n";
+  for (const std::string& text : {by_vertex, by_corner}) {
+    const auto loaded = LoadMesh(Write("a.ply", text));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.corner_uvs, (std::vector<glm::vec2>{{0, 0}, {1, 0}, {0.25f, 1}}));
+    ASSERT_EQ(loaded->mesh.textures.size(), 1u);
+    EXPECT_EQ(loaded->mesh.materials.at(0).base_color_texture, 0);
+  }
+}
+
+TEST_F(PlyOffTest, PlyCutAtEveryLength) {
+  for (const std::string& whole :
+       {Header("ascii") + kTextBody, Header("binary_little_endian") + BinaryBody(false)}) {
+    for (std::size_t length = 0; length + 2 < whole.size(); ++length)
+      ExpectMessage(LoadPly(whole.substr(0, length)), "bad.ply");
+  }
+}
+
+TEST_F(PlyOffTest, PlyWithLyingNumbers) {
+  ExpectMessage(LoadPly(Header("ascii", "4000000000") + kTextBody), "bad.ply",
+                "promises 4000000000 \"face\"");
+  ExpectMessage(LoadPly(Header("ascii", "99999999999999999999") + kTextBody), "bad.ply", "line 12",
+                "element face");
+  ExpectMessage(LoadPly(Header("ascii", "-1") + kTextBody), "bad.ply", "line 12");
+  std::string body = kTextBody;
+  body.back() = '9';
+  ExpectMessage(LoadPly(Header("ascii") + body.replace(body.rfind("3"), 2, "4 ")), "bad.ply",
+                "face 0 uses vertex 4, but the file has 4");
+  std::string binary = BinaryBody(false);
+  binary[binary.size() - 17] = '\xff';  // corners of the face
+  ExpectMessage(LoadPly(Header("binary_little_endian") + binary), "bad.ply", "face 0",
+                "vertex_indices");
+  binary = BinaryBody(false);
+  binary[binary.size() - 1] = '\xff';  // a negative index
+  ExpectMessage(LoadPly(Header("binary_little_endian") + binary), "bad.ply", "face 0 uses");
+  binary = BinaryBody(false);
+  std::memset(&binary[0], 0xff, 4);  // NaN
+  ExpectMessage(LoadPly(Header("binary_little_endian") + binary), "bad.ply", "vertex 0", "\"x\"");
+}
+
+TEST_F(PlyOffTest, PlyHeadersThatMakeNoSense) {
+  ExpectMessage(LoadPly("plx\n"), "bad.ply", "\"ply\"");
+  ExpectMessage(LoadPly("ply\nformat martian 1.0\nend_header\n"), "bad.ply", "line 2");
+  ExpectMessage(LoadPly("ply\nproperty float x\nend_header\n"), "bad.ply", "line 2");
+  ExpectMessage(LoadPly("ply\nelement vertex 1\nproperty list float int x\nend_header\n1\n"),
+                "bad.ply", "line 3");
+  ExpectMessage(LoadPly("ply\nelement nothing 1000000000\nend_header\n"), "bad.ply", "nothing");
+  ExpectMessage(LoadPly("ply\nelement vertex 1\nproperty float x\nend_header\n1\n"), "bad.ply",
+                "no x, y and z");
+}
+
+TEST_F(PlyOffTest, OffAndItsVariants) {
+  const std::string body = "0 0 0\n1 0 0 # a comment\n\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n";
+  for (const std::string head :
+       {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\r\n", "# x\nOFF\n\n4 1 4\n"}) {
+    const auto loaded = LoadMesh(Write("a.off", head + body));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+  }
+  const auto colors = LoadMesh(Write(
+      "c.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0.5 0.25 1.0\n0 1 0 0 0 51\n3 0 1 2\n"));
+  ASSERT_TRUE(colors.ok()) << colors.status().message();
+  EXPECT_EQ(colors->mesh.colors,
+            (std::vector<glm::vec4>{{1, 0, 0, 1}, {0.5f, 0.25f, 1, 1}, {0, 0, 0.2f, 1}}));
+}
+
+TEST_F(PlyOffTest, BrokenOff) {
+  ExpectMessage(LoadOff(""), "bad.off", "empty");
+  ExpectMessage(LoadOff("OFF BINARY\n1 1 1\n"), "bad.off", "line 1");
+  ExpectMessage(LoadOff("NOFF\n1 1 1\n"), "bad.off", "line 1");
+  ExpectMessage(LoadOff("OFF\n4000000000 1 0\n0 0 0\n"), "bad.off", "line 2", "can hold");
+  ExpectMessage(LoadOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n"), "bad.off", "line 5");
+  ExpectMessage(LoadOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "bad.off", "line 6",
+                "vertex 3");
+  ExpectMessage(LoadOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n99999999 0 1 2\n"), "bad.off", "line 6");
+  ExpectMessage(LoadOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"), "bad.off", "face 0");
+}
+
+}  // namespace
+}  // namespace tilegrad::io
