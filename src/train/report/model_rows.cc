@@ -36,18 +36,31 @@ std::string ModelScoreHtml(const ReportFacts& facts, int model) {
   return "";
 }
 
-Result<std::string> PicturesHtml(const ShownModel& shown, const std::string& name, double step) {
+// How far the camera of each shown view has gone around from the first, in whole degrees.
+std::vector<int> Turns(const DatasetInfo& info) {
+  std::vector<int> turns;
+  const std::vector<int> views = ShownViews(info);
+  for (const int view : views) {
+    const int steps = (view - views[0] + info.views) % info.views;
+    turns.push_back(static_cast<int>(std::lround(std::abs(info.camera.azimuth_step) * steps)) %
+                    360);
+  }
+  return turns;
+}
+
+Result<std::string> PicturesHtml(const ShownModel& shown, const std::string& name,
+                                 const std::vector<int>& turns) {
   std::string out;
-  for (std::size_t v = 0; v < shown.truth_views.size(); ++v) {
-    const std::string turned = fmt::format("+{:.0f}°", std::abs(step) * static_cast<double>(v));
-    const std::string view = v == 0 ? "the input's view" : "view turned by " + turned;
-    TILEGRAD_ASSIGN(const std::string truth,
-                    FigureHtml({shown.truth_views[v], v == 0 ? "input" : "truth, " + turned,
-                                v == 0 ? name + ": the image that the network sees"
-                                       : name + ": truth, " + view}));
-    TILEGRAD_ASSIGN(const std::string predicted, FigureHtml({shown.predicted_views[v], "predicted",
-                                                             name + ": predicted, " + view}));
-    out += truth + predicted;
+  for (std::size_t v = 0; v < turns.size(); ++v) {
+    const std::string truth = v == 0 ? "input" : fmt::format("truth, +{}°", turns[v]);
+    const std::string view = v == 0 ? "" : fmt::format(", camera turned by {}°", turns[v]);
+    TILEGRAD_ASSIGN(
+        const std::string left,
+        FigureHtml({shown.truth_views[v], truth,
+                    name + (v == 0 ? ": the image that the network sees" : ": truth") + view}));
+    TILEGRAD_ASSIGN(const std::string right, FigureHtml({shown.predicted_views[v], "predicted",
+                                                         name + ": predicted" + view}));
+    out += left + right;
   }
   return out;
 }
@@ -57,8 +70,7 @@ Result<std::string> RowHtml(const ReportFacts& facts, std::size_t index) {
   const DatasetInfo& info = facts.dataset->info();
   const ModelInfo& model = facts.dataset->models()[static_cast<std::size_t>(shown.model)];
   const std::string name = model.name.empty() ? model.id : model.name;
-  const double turn = info.camera.azimuth_step * (info.views / kShownViews);
-  TILEGRAD_ASSIGN(const std::string pictures, PicturesHtml(shown, name, turn));
+  TILEGRAD_ASSIGN(const std::string pictures, PicturesHtml(shown, name, Turns(info)));
   return fmt::format(
       "<article class=\"model\" data-model=\"{}\">\n<div class=\"about\"><h3>{}</h3>"
       "<p class=\"class\">{}</p>{}</div>\n<div class=\"views\">\n{}</div>\n</article>\n",

@@ -34,7 +34,7 @@ std::vector<int> ChooseModels(const Dataset& dataset, int count) {
 std::vector<int> ShownViews(const DatasetInfo& info) {
   std::vector<int> views;
   for (int k = 0; k < kShownViews; ++k)
-    views.push_back((info.views / 12 + k * info.views / kShownViews) % info.views);
+    views.push_back((5 * info.views / 6 + k * info.views / kShownViews) % info.views);
   return views;
 }
 

@@ -24,7 +24,8 @@ struct ShownModel {
 // second of each, ...; where a round has more classes than are left to choose, evenly spaced ones.
 std::vector<int> ChooseModels(const Dataset& dataset, int count);
 
-// The dataset's views that are shown: the first at a twelfth of its circle, the others a third on.
+// The dataset's views that are shown: the first at five sixths of the circle, which sees models
+// that face +z obliquely from the front; the others a third of the circle on.
 std::vector<int> ShownViews(const DatasetInfo& info);
 
 Result<ShownModel> MakeShownModel(const Dataset& dataset, int model, const Predictor& predictor,
