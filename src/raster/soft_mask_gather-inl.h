@@ -75,6 +75,23 @@ HWY_INLINE void LoadCorners(GatherTag d, const ScreenMesh& mesh, const SoftFrame
   }
 }
 
+// Appends the lanes of `keep`: boxes, corners and position n + lane. By way of memory, since
+// compressing doubles loads a large table on some targets.
+HWY_INLINE void AppendLanes(GatherTag d, const GatherVec (&side)[4], const GatherVec (&corner)[6],
+                            std::size_t n, std::uint32_t keep, SoftFaces* out) {
+  if (keep == 0) return;
+  HWY_ALIGN double lanes[10][kGatherMost];
+  for (int a = 0; a < 4; ++a) hn::Store(side[a], d, lanes[a]);
+  for (int a = 0; a < 6; ++a) hn::Store(corner[a], d, lanes[4 + a]);
+  static_assert(SoftFaces::kLeft + 4 == SoftFaces::kEdges);
+  for (; keep != 0; keep &= keep - 1) {
+    const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(keep);
+    double* to = out->array(SoftFaces::kLeft) + out->count;
+    for (std::size_t a = 0; a < 10; ++a) to[a * out->stride] = lanes[a][lane];
+    out->array(SoftFaces::kPosition)[out->count++] = static_cast<double>(n + lane);
+  }
+}
+
 // Keeps the faces of a tile that are not far: their boxes, and their corners in place of edge 0.
 inline void KeepNearFaces(const ScreenMesh& mesh, const SoftFrame& frame,
                           std::span<const std::int32_t> faces, const SoftBox& box, SoftFaces* out) {
@@ -87,16 +104,7 @@ inline void KeepNearFaces(const ScreenMesh& mesh, const SoftFrame& frame,
       side[2 + a] = hn::Max(hn::Max(c[3 * a], c[3 * a + 1]), c[3 * a + 2]);
     }
     const auto keep = hn::And(IsBoxNear(d, side, box), hn::FirstN(d, faces.size() - n));
-    if (hn::AllFalse(d, keep)) continue;
-    const std::size_t at = out->count;
-    for (std::size_t k = 0; k < 4; ++k) {
-      hn::CompressStore(side[k], keep, d, out->array(SoftFaces::kLeft + k) + at);
-    }
-    for (std::size_t k = 0; k < 6; ++k) {
-      hn::CompressStore(c[k], keep, d, out->array(SoftFaces::kEdges + k) + at);
-    }
-    const auto position = hn::Iota(d, static_cast<double>(n));
-    out->count += hn::CompressStore(position, keep, d, out->array(SoftFaces::kPosition) + at);
+    AppendLanes(d, side, c, n, BitsOf(d, keep), out);
   }
 }
 
