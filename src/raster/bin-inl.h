@@ -49,20 +49,26 @@ HWY_INLINE void AxisTiles(const float* coordinate, const BinIntLane v[3], float 
   *end = hn::IfThenZeroElse(hn::RebindMask(di, none), *end);
 }
 
+// The first `count` lanes; the first of them again where there are more.
+HWY_INLINE BinIntLane LoadFaces(const std::int32_t* from, std::size_t count) {
+  const BinIntTag di;
+  if (count >= hn::Lanes(di)) return hn::LoadU(di, from);
+  HWY_ALIGN std::int32_t index[kTileSize];
+  for (std::size_t i = 0; i < hn::Lanes(di); ++i) index[i] = from[i < count ? i : 0];
+  return hn::Load(di, index);
+}
+
 // out[f] for every face; faces with a bit of `reject` get none.
 void FaceTiles(const ScreenMesh& mesh, const TileGrid& grid, const BinMargin& margin,
                TileRange* out) {
   const BinIntTag di;
   const std::size_t lanes = hn::Lanes(di), n = mesh.faces();
   for (std::size_t f = 0; f < n; f += lanes) {
-    HWY_ALIGN std::int32_t index[3][kTileSize] = {}, range[4][kTileSize];
+    HWY_ALIGN std::int32_t range[4][kTileSize];
     const std::size_t count = HWY_MIN(lanes, n - f);
     const std::int32_t* const corners[3] = {&mesh.v0[f], &mesh.v1[f], &mesh.v2[f]};
     BinIntLane v[3], begin, end;
-    for (int k = 0; k < 3; ++k) {
-      for (std::size_t i = 0; i < count; ++i) index[k][i] = corners[k][i];
-      v[k] = hn::Load(di, index[k]);
-    }
+    for (int k = 0; k < 3; ++k) v[k] = LoadFaces(corners[k], count);
     AxisTiles(mesh.x.data(), v, margin.x, grid.width, &begin, &end);
     hn::Store(begin, di, range[0]), hn::Store(end, di, range[1]);
     AxisTiles(mesh.y.data(), v, margin.y, grid.height, &begin, &end);

@@ -102,7 +102,8 @@ inline double MergeCell(std::size_t s, float* part, double* alpha) {
 
 inline void SoftMaskBlockTarget(const SoftBlock& block, SoftBlockAlpha* out) {
   const D d;
-  alignas(64) float part[kBlockPixels] = {};
+  alignas(64) float part[kBlockPixels];
+  for (std::size_t i = 0; i < kBlockPixels; i += hn::Lanes(d)) hn::Store(hn::Zero(d), d, part + i);
   std::fill_n(out->looked, kCells, 0u);
   out->stopped = 0;
   for (std::size_t begin = 0; begin < block.count; begin += kMergeEvery) {
