@@ -10,6 +10,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(LIBHWY REQUIRED IMPORTED_TARGET libhwy)    # libhwy-dev
 pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
 pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
+find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
 find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
 if(TILEGRAD_TESTS)
   find_package(GTest REQUIRED)            # libgtest-dev

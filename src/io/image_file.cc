@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "io/image_check.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -23,6 +24,13 @@
 #pragma GCC diagnostic pop
 
 namespace tilegrad::io {
+namespace {
+
+// No format packs more bytes of pixels into a byte of file: deflate reaches 1,032, and a PNG with
+// one bit a pixel and a palette unpacks each of those bytes to 8 pixels of 3 bytes: 24,768.
+constexpr std::size_t kMaxInflation = 32768;
+
+}  // namespace
 
 Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
   if (bytes.size() > std::size_t{1} << 30)
@@ -37,6 +45,12 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
     return DataLoss("{}: the header says {} x {} pixels; at most {} a side are read", name, width,
                     height, kMaxImageSide);
   }
+  const std::size_t unpacked = static_cast<std::size_t>(width) * height * channels;
+  if (unpacked / kMaxInflation > bytes.size()) {
+    return DataLoss("{}: the header says {} x {} pixels, more than {} bytes can hold", name, width,
+                    height, bytes.size());
+  }
+  TILEGRAD_TRY(CheckImageContainer(bytes, name));
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
   if (!pixels) {

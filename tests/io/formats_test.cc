@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images, npy and npz, zip archives, Java properties: round trips and broken files.
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <numeric>
 
@@ -9,6 +10,15 @@
 #include "io/npz.h"
 #include "io/sh3f.h"
 #include "support/temp_folder.h"
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#include <stb_image_write.h>
+#pragma GCC diagnostic pop
 
 namespace tilegrad::io {
 namespace {
@@ -37,14 +47,16 @@ TEST_F(FormatsTest, PngWithALyingHeader) {
   Bytes png = EncodePng(Gradient(8, 8, 3)).value();
   png[16] = 0x7f;  // width: over two thousand million pixels
   ExpectMessage(LoadImage(Write("lie.png", png)).status(), "lie.png");
-  Bytes larger = EncodePng(Gradient(8, 8, 3)).value();
-  larger[19] = 200;  // width 200: the data is too short (stb does not compare the checksum)
-  ExpectMessage(LoadImage(Write("larger.png", larger)).status(), "larger.png");
+  for (const std::uint8_t width : {3, 200}) {  // the data is too long, too short
+    Bytes other = EncodePng(Gradient(8, 8, 3)).value();
+    other[19] = width;
+    ExpectMessage(LoadImage(Write("other.png", other)).status(), "other.png", "checksum", "byte 8");
+  }
 }
 
 TEST_F(FormatsTest, TruncatedImagesAreErrors) {
   const Bytes png = EncodePng(Gradient(64, 64, 4)).value();
-  for (std::size_t length = 0; length + 20 < png.size(); length += 13) {
+  for (std::size_t length = 0; length < png.size(); length += 13) {
     ExpectMessage(
         LoadImage(
             Write("cut.png", Bytes(png.begin(), png.begin() + static_cast<std::ptrdiff_t>(length))))
@@ -53,6 +65,51 @@ TEST_F(FormatsTest, TruncatedImagesAreErrors) {
   }
   ExpectMessage(LoadImage(Write("text.png", "not an image")).status(), "text.png",
                 "not an image that can be read");
+}
+
+// A header with a right checksum that promises a gigabyte.
+TEST_F(FormatsTest, PngThatPromisesMoreThanItCanHold) {
+  Bytes png = EncodePng(Gradient(8, 8, 4)).value();
+  for (const std::size_t at : {18u, 22u}) png[at] = 0x3f;  // 16,136 x 16,136
+  const auto crc = static_cast<std::uint32_t>(crc32(0, &png[12], 17));
+  for (int i = 0; i < 4; ++i) png[29 + i] = static_cast<std::uint8_t>(crc >> (24 - 8 * i));
+  ExpectMessage(LoadImage(Write("bomb.png", png)).status(), "bomb.png", "16136 x 16136",
+                "can hold");
+}
+
+Bytes Jpeg(int width, int height) {
+  Bytes out;
+  std::vector<std::uint8_t> pixels(3 * static_cast<std::size_t>(width) * height);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i * i / 7);
+  const auto append = [](void* to, void* data, int size) {
+    const auto* begin = static_cast<const std::uint8_t*>(data);
+    static_cast<Bytes*>(to)->insert(static_cast<Bytes*>(to)->end(), begin, begin + size);
+  };
+  EXPECT_NE(stbi_write_jpg_to_func(append, &out, width, height, 3, pixels.data(), 80), 0);
+  return out;
+}
+
+TEST_F(FormatsTest, JpegWholeAndCut) {
+  const Bytes whole = Jpeg(40, 24);
+  const auto image = LoadImage(Write("a.jpg", whole));
+  ASSERT_TRUE(image.ok()) << image.status().message();
+  EXPECT_EQ(image->width, 40);
+  EXPECT_EQ(image->height, 24);
+  for (std::size_t length = 0; length < whole.size(); length += 5) {
+    const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
+    ExpectMessage(LoadImage(Write("cut.jpg", cut)).status(), "cut.jpg");
+  }
+}
+
+TEST_F(FormatsTest, ImagesWithFlippedBytesNeverCrash) {
+  for (const Bytes& whole : {EncodePng(Gradient(16, 16, 4)).value(), Jpeg(16, 16)}) {
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      Bytes broken = whole;
+      broken[i] ^= static_cast<std::uint8_t>(1 + i % 255);
+      const auto image = DecodeImage(broken, "flip");
+      EXPECT_TRUE(!image.ok() || !image->empty());
+    }
+  }
 }
 
 TEST_F(FormatsTest, NpzRoundTrip) {

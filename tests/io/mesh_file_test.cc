@@ -247,6 +247,7 @@ TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
   if (!std::filesystem::exists(folder))
     GTEST_SKIP() << "Debian's sweethome3d-furniture is not installed";
   int models = 0, textured = 0;
+  std::vector<std::string> warnings;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".sh3f") continue;
     const auto zip = OpenZip(entry.path());
@@ -255,12 +256,19 @@ TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
     ASSERT_TRUE(catalog.ok()) << catalog.status().message();
     for (const FurnitureEntry& item : catalog->entries) {
       const auto loaded = LoadMesh(**zip, item.model);
-      EXPECT_TRUE(loaded.ok()) << loaded.status().message();
       ++models;
-      textured += loaded.ok() && !loaded->mesh.textures.empty();
+      ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+      textured += !loaded->mesh.textures.empty();
+      for (const std::string& warning : loaded->warnings)
+        warnings.push_back(item.model + ": " + warning);
     }
   }
   EXPECT_EQ(models, 820);
+  for (const std::string& warning : warnings) {
+    const bool harmless = warning.find("not found") != std::string::npos ||
+                          warning.find("lines left out") != std::string::npos;
+    EXPECT_TRUE(harmless) << warning;
+  }
   EXPECT_GT(textured, 350);
 }
 

@@ -83,7 +83,7 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
        {"src/scene/", "src/raster/project", "src/io/", "src/train/", "src/shade/"}},
       {std::regex("^(tiny_gltf|stb_.*)\\.h$"), {"src/io/"}},
       {std::regex("^assimp/.*"), {"src/io/"}},
-      {std::regex("^zip\\.h$"), {"src/io/"}},
+      {std::regex("^(zip|zlib)\\.h$"), {"src/io/"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/"}},
       {std::regex("^CLI/.*"), {"src/cli/"}},
   };

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to io: what stb_image lets pass. It compares no PNG checksum, so that a changed header
+// gives a garbled picture, and fills the missing part of a cut JPEG with grey.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad::io {
+
+// OK for anything that is neither PNG nor JPEG. PNG: every chunk lies in the file, its checksum is
+// right, and the end chunk is there. JPEG: every segment lies in the file, and the end marker is
+// there. Errors name `name` and the byte.
+Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
+
+}  // namespace tilegrad::io
