@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program itself on broken inputs: a message that names what is wrong, a non-zero exit code, no
+// crash, nothing lost.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+struct Outcome {
+  int exit_code = -1;  // -1: ended by a signal
+  std::string output;  // both streams
+};
+
+Outcome Run(const std::string& arguments) {
+  Outcome outcome;
+  std::FILE* pipe =
+      ::popen((std::string(TILEGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+  std::array<char, 4096> buffer;
+  for (std::size_t n; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+    outcome.output.append(buffer.data(), n);
+  const int status = ::pclose(pipe);
+  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  return outcome;
+}
+
+// A tiny dataset and a run of two steps, made once for all cases.
+class BrokenInputs : public TempFolderTest {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = Path(testing::TempDir()) / ("tilegrad_cli_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(shared_);
+    const Outcome data = Run(
+        "dataset --source procedural --per-class 2 --size 16 --views 3 --out " + Data().string());
+    ASSERT_EQ(data.exit_code, 0) << data.output;
+    const Outcome train = Run("train --config " + Config() + " --data " + Data().string() +
+                              " --out " + RunFolder().string() + kTiny);
+    ASSERT_EQ(train.exit_code, 0) << train.output;
+  }
+  static void TearDownTestSuite() { std::filesystem::remove_all(shared_); }
+
+  static Path Data() { return shared_ / "data"; }
+  static Path RunFolder() { return shared_ / "run"; }
+  static std::string Config() { return std::string(TILEGRAD_SOURCE_DIR) + "/configs/quick.toml"; }
+  static constexpr const char* kTiny =
+      " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
+      "network.code=8 --set network.hidden1=8"
+      " --set network.hidden2=8 --set network.template_level=1";
+
+  template <class... Parts>
+  void ExpectRefused(const std::string& arguments, const Parts&... parts) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_GT(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    EXPECT_LT(outcome.exit_code, 126)
+        << outcome.output;  // neither a signal nor a shell's own failure
+    for (const std::string& part : {std::string(parts)...}) {
+      EXPECT_NE(outcome.output.find(part), std::string::npos)
+          << "\"" << part << "\" is not in: " << outcome.output;
+    }
+  }
+
+  // A folder source with this one model: nothing usable, so the command fails, and rejected.jsonl
+  // or the message names the file.
+  void ExpectRejectedModel(const std::string& file, const std::string& content) {
+    Write("in/thing/" + file, content);
+    const Path out = folder_ / "out";
+    ExpectRefused("dataset --source folder --input " + (folder_ / "in").string() + " --out " +
+                  out.string());
+    const auto list = ReadText(out / "rejected.jsonl");
+    ASSERT_TRUE(list.ok()) << list.status().message();
+    EXPECT_NE(list->find(file), std::string::npos) << *list;
+    std::filesystem::remove_all(folder_ / "in");
+    std::filesystem::remove_all(out);
+  }
+
+  std::string Predict(const Path& image, const std::string& more = "") {
+    return "predict --run " + RunFolder().string() + " --out " + folder_.string() + " " +
+           image.string() + more;
+  }
+  std::string Train(const Path& config, const Path& data) {
+    return "train --config " + config.string() + " --data " + data.string() + " --out " +
+           (folder_ / "new").string() + kTiny;
+  }
+  Path CopyOfData() {
+    std::filesystem::copy(Data(), folder_ / "copy", std::filesystem::copy_options::recursive);
+    return folder_ / "copy";
+  }
+
+  static inline Path shared_;
+};
+
+std::string Text(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
+
+TEST_F(BrokenInputs, Models) {
+  const std::string glb = Text(io::EncodeGlb(Icosphere(1, 1)).value());
+  ExpectRejectedModel("truncated.glb", glb.substr(0, glb.size() / 2));
+  ExpectRejectedModel("json.gltf", "{\"asset\": ");
+  ExpectRejectedModel("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+  ExpectRejectedModel("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  ExpectRejectedModel("empty.obj", "");
+  ExpectRejectedModel("point.obj", "v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n");
+  ExpectRejectedModel("garbage.ply", std::string(300, '\xfe'));
+}
+
+TEST_F(BrokenInputs, Images) {
+  ImageU8 image(8, 8, 4, 255);
+  ASSERT_TRUE(io::SavePng(folder_ / "opaque.png", image).ok());
+  ExpectRefused(Predict(folder_ / "opaque.png"), "opaque.png", "mask");
+  ASSERT_TRUE(io::SavePng(folder_ / "rgb.png", ImageU8(8, 8, 3, 9)).ok());
+  ExpectRefused(Predict(folder_ / "rgb.png"), "rgb.png", "alpha");
+  ExpectRefused(Predict(folder_ / "rgb.png", " --mask " + (folder_ / "opaque.png").string()),
+                "not cut out");
+  ASSERT_TRUE(io::SavePng(folder_ / "small.png", ImageU8(4, 4, 1, 255)).ok());
+  ExpectRefused(Predict(folder_ / "rgb.png", " --mask " + (folder_ / "small.png").string()),
+                "4 x 4", "8 x 8");
+  ASSERT_TRUE(io::SavePng(folder_ / "clear.png", ImageU8(8, 8, 4, 0)).ok());
+  ExpectRefused(Predict(folder_ / "clear.png"), "clear.png", "no pixel");
+  Bytes png = io::EncodePng(image).value();
+  Write("cut.png", Bytes(png.begin(), png.begin() + 40));
+  ExpectRefused(Predict(folder_ / "cut.png"), "cut.png");
+  png[16] = 0x7f;
+  Write("lie.png", png);
+  ExpectRefused(Predict(folder_ / "lie.png"), "lie.png");
+  ExpectRefused(Predict(folder_ / "none.png"), "none.png");
+}
+
+TEST_F(BrokenInputs, ConfigurationsAndCommandLines) {
+  ExpectRefused(Train(Write("key.toml", "[network]\nchanels = 3\n"), Data()), "key.toml", "line 2",
+                "network.channels");
+  ExpectRefused(Train(Write("range.toml", "[schedule]\nbatch = -1\n"), Data()), "line 2",
+                "schedule.batch");
+  ExpectRefused(Train(folder_ / "none.toml", Data()), "none.toml");
+  ExpectRefused(Train(Config(), folder_ / "nowhere"), "nowhere");
+  ExpectRefused("train --config " + Config() + " --data " + Data().string() + " --out " +
+                    RunFolder().string(),
+                "--resume");
+  ExpectRefused("dance", "dance");
+  ExpectRefused("predict --run " + folder_.string() + " x.png", folder_.string());
+  ::setenv("TILEGRAD_TARGET", "AVX9", 1);
+  ExpectRefused("info", "AVX9", "EMU128");
+  ::unsetenv("TILEGRAD_TARGET");
+}
+
+TEST_F(BrokenInputs, DatasetsAndCheckpoints) {
+  const Path copy = CopyOfData();
+  Write("copy/dataset.json", "{\"format\": 1,");
+  ExpectRefused(Train(Config(), copy), "dataset.json");
+  std::filesystem::remove_all(copy);
+  CopyOfData();
+  Write("copy/models.jsonl", "nonsense\n");
+  ExpectRefused(Train(Config(), copy), "models.jsonl", "line 1");
+  std::filesystem::remove_all(copy);
+  CopyOfData();
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(copy / "models")) {
+    if (entry.path().extension() == ".npz") std::filesystem::resize_file(entry.path(), 100);
+  }
+  ExpectRefused(Train(Config(), copy), ".npz");
+  std::filesystem::create_directories(folder_ / "half/checkpoints");
+  for (const auto& entry : std::filesystem::directory_iterator(RunFolder() / "checkpoints")) {
+    const Bytes whole = ReadFile(entry.path()).value();
+    Write("half/checkpoints/" + entry.path().filename().string(),
+          Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)));
+  }
+  ExpectRefused("predict --run " + (folder_ / "half").string() + " x.png", "half", "step_");
+}
+
+TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
+  Write("file", "in the way");
+  ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +
+                    (folder_ / "file/x").string(),
+                "file");
+  ExpectRefused("train --config " + Config() + " --data " + Data().string() + " --out " +
+                    (folder_ / "file/x").string() + kTiny,
+                "file");
+  EXPECT_EQ(ReadText(folder_ / "file").value(), "in the way");
+}
+
+}  // namespace
+}  // namespace tilegrad
