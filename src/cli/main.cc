@@ -48,6 +48,10 @@ int Run(int argc, char** argv) {
   AddReport(app, &action);
   AddDatasetView(app, &action);
   AddInfo(app, &action);
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommand_no_throw(argv[1]) == nullptr) {
+    return Report(Status(StatusCode::kInvalidArgument,
+                         std::string("unknown command \"") + argv[1] + "\"; see tilegrad --help"));
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

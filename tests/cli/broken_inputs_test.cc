@@ -21,7 +21,7 @@ struct Outcome {
   std::string output;  // both streams
 };
 
-Outcome Run(const std::string& arguments) {
+Outcome RunProgram(const std::string& arguments) {
   Outcome outcome;
   std::FILE* pipe =
       ::popen((std::string(TILEGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
@@ -39,11 +39,11 @@ class BrokenInputs : public TempFolderTest {
   static void SetUpTestSuite() {
     shared_ = Path(testing::TempDir()) / ("tilegrad_cli_" + std::to_string(::getpid()));
     std::filesystem::create_directories(shared_);
-    const Outcome data = Run(
+    const Outcome data = RunProgram(
         "dataset --source procedural --per-class 2 --size 16 --views 3 --out " + Data().string());
     ASSERT_EQ(data.exit_code, 0) << data.output;
-    const Outcome train = Run("train --config " + Config() + " --data " + Data().string() +
-                              " --out " + RunFolder().string() + kTiny);
+    const Outcome train = RunProgram("train --config " + Config() + " --data " + Data().string() +
+                                     " --out " + RunFolder().string() + kTiny);
     ASSERT_EQ(train.exit_code, 0) << train.output;
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(shared_); }
@@ -58,11 +58,11 @@ class BrokenInputs : public TempFolderTest {
 
   template <class... Parts>
   void ExpectRefused(const std::string& arguments, const Parts&... parts) {
-    const Outcome outcome = Run(arguments);
+    const Outcome outcome = RunProgram(arguments);
     EXPECT_GT(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
     EXPECT_LT(outcome.exit_code, 126)
         << outcome.output;  // neither a signal nor a shell's own failure
-    for (const std::string& part : {std::string(parts)...}) {
+    for (const std::string& part : std::vector<std::string>{parts...}) {
       EXPECT_NE(outcome.output.find(part), std::string::npos)
           << "\"" << part << "\" is not in: " << outcome.output;
     }
