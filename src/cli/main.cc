@@ -35,6 +35,11 @@ int Report(const Status& status) {
   return ExitCode(status.code());
 }
 
+bool IsCommand(const CLI::App& app, const std::string& name) {
+  return !app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; })
+              .empty();
+}
+
 int Run(int argc, char** argv) {
   CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
                "tilegrad");
@@ -48,9 +53,9 @@ int Run(int argc, char** argv) {
   AddReport(app, &action);
   AddDatasetView(app, &action);
   AddInfo(app, &action);
-  if (argc > 1 && argv[1][0] != '-' && app.get_subcommand_no_throw(argv[1]) == nullptr) {
-    return Report(Status(StatusCode::kInvalidArgument,
-                         std::string("unknown command \"") + argv[1] + "\"; see tilegrad --help"));
+  if (argc > 1 && argv[1][0] != '-' && !IsCommand(app, argv[1])) {
+    return Report({StatusCode::kInvalidArgument,
+                   fmt::format("unknown command \"{}\"; see tilegrad --help", argv[1])});
   }
   try {
     app.parse(argc, argv);
