@@ -11,6 +11,7 @@
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
+#include "scene/triangulate.h"
 
 namespace tilegrad::io {
 namespace {
@@ -29,7 +30,7 @@ constexpr std::array<Format, 8> kFormats = {{{".glb", ReadGltf},
                                              {".obj", ReadObj},
                                              {".ply", ReadPly},
                                              {".off", ReadOff},
-                                             {".ac", ReadByAssimp},
+                                             {".ac", ReadAc3d},
                                              {".stl", ReadByAssimp},
                                              {".3ds", ReadByAssimp}}};
 
@@ -65,6 +66,21 @@ ImageU8 ToColor(ImageU8 image) {
     if (alpha) to[3] = from[1];
   }
   return out;
+}
+
+// Files have many parts of few materials: the last one is dropped if it equals one before it.
+void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
+  const Material& last = mesh.materials.back();
+  const auto same = [&](const Material& m) {
+    return m.name == last.name && m.base_color == last.base_color &&
+           m.base_color_texture == last.base_color_texture;
+  };
+  const auto found = std::find_if(mesh.materials.begin(), mesh.materials.end() - 1, same);
+  if (found == mesh.materials.end() - 1) return;
+  const auto index = static_cast<std::int32_t>(found - mesh.materials.begin());
+  std::fill(mesh.face_materials.begin() + static_cast<std::ptrdiff_t>(first_face),
+            mesh.face_materials.end(), index);
+  mesh.materials.pop_back();
 }
 
 void ClampColors(Mesh& mesh) {
@@ -124,6 +140,7 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
       out.mesh.faces.size() + part.faces.size() > kMaxElements) {
     return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxElements);
   }
+  const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
   if (out.mesh.faces.empty()) {
@@ -133,12 +150,16 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
     Append(out.mesh, part);
   }
   out.mesh.materials.back() = material;
+  MergeLastMaterial(out.mesh, faces_before);
   return {};
 }
 
-void AddPolygon(std::span<const std::int32_t> corners, Mesh& mesh) {
-  for (std::size_t k = 2; k < corners.size(); ++k)
-    mesh.faces.push_back({corners[0], corners[k - 1], corners[k]});
+void Polygon::AddTo(Mesh& mesh) {
+  positions_.clear();
+  for (const std::int32_t v : corners) positions_.push_back(mesh.positions[v]);
+  TriangulatePolygon(positions_, triangles);
+  for (const auto& [a, b, c] : triangles)
+    mesh.faces.push_back({corners[a], corners[b], corners[c]});
 }
 
 bool IsMeshFileName(const std::string& name) { return FindFormat(name) != nullptr; }

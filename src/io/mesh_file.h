@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mesh files: glTF and GLB (tinygltf), OBJ with MTL, AC3D, STL and 3DS (Assimp), PLY and
-// OFF.
+// Mesh files: glTF and GLB (tinygltf), OBJ with MTL, STL and 3DS (Assimp), PLY, OFF and
+// AC3D.
 #pragma once
 
 #include <string>

@@ -2,9 +2,9 @@
 // Internal to io: what mesh_file.cc dispatches to, and what the readers share.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "io/mesh_file.h"
 
@@ -14,11 +14,21 @@ namespace tilegrad::io {
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
+Result<LoadedMesh> ReadAc3d(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name);
 
-// A fan over the corners; fewer than three add nothing.
-void AddPolygon(std::span<const std::int32_t> corners, Mesh& mesh);
+// A polygon of a file on its way into a mesh; kept by readers as scratch.
+struct Polygon {
+  std::vector<std::int32_t> corners;  // vertices of the mesh
+  std::vector<Face> triangles;        // set by AddTo: positions in `corners`
+
+  // Adds its triangles (scene/triangulate.h) to the faces.
+  void AddTo(Mesh& mesh);
+
+ private:
+  std::vector<glm::vec3> positions_;
+};
 
 // OBJ only, before Assimp, which drops or misreads what is wrong: the numbers of every vertex, and
 // every index of every face, line and point against the counts of v, vt and vn.

@@ -80,14 +80,14 @@ Status ReadVertices(OffFile& file, const OffCounts& counts, Mesh& mesh) {
 }
 
 Status ReadFaces(OffFile& file, const OffCounts& counts, LoadedMesh& out) {
-  std::vector<std::int32_t> polygon;
+  Polygon polygon;
   for (std::size_t f = 0; f < counts.faces; ++f) {
     std::string_view line;
     if (!file.Next(line)) return file.Error(fmt::format("ends at face {}", f));
     std::size_t corners = 0;
     if (!ParseNumber(NextToken(line), corners) || corners > line.size())
       return file.Error("expected the number of corners");
-    polygon.clear();
+    polygon.corners.clear();
     for (std::size_t k = 0; k < corners; ++k) {
       std::int32_t index = 0;
       if (!ParseNumber(NextToken(line), index))
@@ -96,9 +96,9 @@ Status ReadFaces(OffFile& file, const OffCounts& counts, LoadedMesh& out) {
         return file.Error(
             fmt::format("vertex {}, but the file has {} (from 0)", index, counts.vertices));
       }
-      polygon.push_back(index);
+      polygon.corners.push_back(index);
     }
-    AddPolygon(polygon, out.mesh);
+    polygon.AddTo(out.mesh);
   }
   return {};
 }

@@ -171,7 +171,7 @@ class PlyBody {
     for (std::size_t i = 0; i < element.count; ++i) {
       const std::size_t before = mesh.faces.size();
       uvs.clear();
-      polygon_.clear();
+      polygon_.corners.clear(), polygon_.triangles.clear();
       for (const PlyProperty& property : element.properties) {
         double ignored = 0;
         const bool read = property.count_type ? values_.NextList(property, list_)
@@ -179,7 +179,7 @@ class PlyBody {
         if (!read) return Error(element, i, property);
         if (!property.count_type) continue;
         if (property.name == "vertex_indices" || property.name == "vertex_index")
-          TILEGRAD_TRY(Polygon(i, mesh));
+          TILEGRAD_TRY(ReadPolygon(i, mesh));
         if (property.name == "texcoord") uvs = list_;
       }
       AddCornerUvs(uvs, before, mesh);
@@ -188,30 +188,27 @@ class PlyBody {
   }
 
   // The polygon whose corners are in list_.
-  Status Polygon(std::size_t row, Mesh& mesh) {
+  Status ReadPolygon(std::size_t row, Mesh& mesh) {
     const std::size_t vertices = header_.CountOf("vertex");
     for (const double index : list_) {
       if (index < 0 || index >= static_cast<double>(vertices) || index != std::floor(index)) {
         return DataLoss("{}: face {} uses vertex {}, but the file has {}", place_, row, index,
                         vertices);
       }
-      polygon_.push_back(static_cast<std::int32_t>(index));
+      polygon_.corners.push_back(static_cast<std::int32_t>(index));
     }
-    AddPolygon(polygon_, mesh);
+    polygon_.AddTo(mesh);
     return {};
   }
 
   // "texcoord": u and v of every corner of the polygon, in its order; 0 for a face without them.
   void AddCornerUvs(const std::vector<double>& uvs, std::size_t before, Mesh& mesh) {
-    if (uvs.size() != 2 * polygon_.size() && mesh.corner_uvs.empty()) return;
+    const bool given = uvs.size() == 2 * polygon_.corners.size();
+    if (!given && mesh.corner_uvs.empty()) return;
     mesh.corner_uvs.resize(3 * before, glm::vec2(0));
-    const bool given = uvs.size() == 2 * polygon_.size();
-    const auto corner = [&](std::size_t k) {
-      return given ? glm::vec2(uvs[2 * k], uvs[2 * k + 1]) : glm::vec2(0);
-    };
-    for (std::size_t t = 0; before + t < mesh.faces.size(); ++t) {
-      for (const std::size_t k : {std::size_t{0}, t + 1, t + 2})
-        mesh.corner_uvs.push_back(corner(k));
+    for (const Face& triangle : polygon_.triangles) {
+      for (const std::int32_t k : triangle)
+        mesh.corner_uvs.push_back(given ? glm::vec2(uvs[2 * k], uvs[2 * k + 1]) : glm::vec2(0));
     }
   }
 
@@ -238,8 +235,8 @@ class PlyBody {
   const std::string& place_;
   Values values_;
   std::vector<glm::vec2> vertex_uvs_;
-  std::vector<double> list_;           // scratch: the last list
-  std::vector<std::int32_t> polygon_;  // scratch: the last polygon
+  std::vector<double> list_;  // scratch: the last list
+  Polygon polygon_;           // scratch: the last polygon
 };
 
 }  // namespace

@@ -133,29 +133,24 @@ TEST_F(MeshFileTest, ObjWithSeveralMaterialsAndAwkwardNames) {
   EXPECT_NE(loaded->warnings[0].find("nowhere.jpg"), std::string::npos);
 }
 
-TEST_F(MeshFileTest, Ac3dAndPlyAndStl) {
-  Write("a.ac",
-        "AC3Db\nMATERIAL \"m\" rgb 1 0 0 amb 0.2 0.2 0.2 emis 0 0 0 spec 0.5 0.5 0.5 shi 10 trans "
-        "0\nOBJECT world\nkids 1\n"
-        "OBJECT poly\nname \"t\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x00\nmat "
-        "0\nrefs 3\n0 0 0\n1 1 0\n2 0 1\nkids 0\n");
-  const auto ac = LoadMesh(folder_ / "a.ac");
-  ASSERT_TRUE(ac.ok()) << ac.status().message();
-  EXPECT_EQ(ac->mesh.faces.size(), 1u);
-  EXPECT_EQ(ac->mesh.materials[ac->mesh.face_materials[0]].base_color.r, 1);
-  Write("a.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
-        "float z\nproperty uchar red\n"
-        "property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int "
-        "vertex_indices\nend_header\n"
-        "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n");
-  const auto ply = LoadMesh(folder_ / "a.ply");
-  ASSERT_TRUE(ply.ok()) << ply.status().message();
-  EXPECT_NEAR(ply->mesh.colors.at(1).g, 1, 1e-6);
-  Write("a.stl",
-        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
-        "0\nendloop\nendfacet\nendsolid a\n");
-  EXPECT_TRUE(LoadMesh(folder_ / "a.stl").ok());
+TEST_F(MeshFileTest, StlOfText) {
+  const Path path =
+      Write("a.stl",
+            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+            "0\nendloop\nendfacet\nendsolid a\n");
+  const auto loaded = LoadMesh(path);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces.size(), 1u);
+}
+
+TEST_F(MeshFileTest, EqualMaterialsOfManyPartsAreOne) {
+  Write("a.mtl", "newmtl m\nKd 1 0 0\nnewmtl n\nKd 0 1 0\n");
+  const auto loaded = LoadMesh(Write(
+      "a.obj", "mtllib a.mtl\n" + kTriangleObj.substr(0, kTriangleObj.find('f')) +
+                   "o a\nusemtl m\nf 1 2 3\no b\nusemtl n\nf 1 2 3\no c\nusemtl m\nf 3 2 1\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.materials.size(), 2u);
+  EXPECT_EQ(loaded->mesh.face_materials, (std::vector<std::int32_t>{0, 1, 0}));
 }
 
 // --- broken files: an error that names the file, never a crash ---

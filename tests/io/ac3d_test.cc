@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+class Ac3dTest : public TempFolderTest {
+ protected:
+  Status Load(const std::string& text) { return LoadMesh(Write("bad.ac", text)).status(); }
+};
+
+const std::string kHead =
+    "AC3Db\nMATERIAL \"red paint\" rgb 1 0 0  amb 0.2 0.2 0.2  emis 0 0 0  spec 0.5 0.5 0.5  shi "
+    "10 "
+    " trans 0.25\nMATERIAL \"white\" rgb 1 1 1 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\n";
+
+const std::string kTriangle =
+    "numvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x20\nmat 0\nrefs 3\n0 0 0\n1 1 0\n2 0 1\n";
+
+std::string World(const std::string& child) {
+  return kHead + "OBJECT world\nkids 1\nOBJECT poly\n" + child + "kids 0\n";
+}
+
+TEST_F(Ac3dTest, MaterialsTexturesAndUvs) {
+  ASSERT_TRUE(SavePng(folder_ / "my livery.png", ImageU8(2, 2, 3, 50)).ok());
+  // The texture is the parent's, with another computer's path; data may hold anything.
+  const auto loaded = LoadMesh(
+      Write("a.ac", kHead +
+                        "OBJECT world\nkids 1\nOBJECT group\nname \"a group\"\ndata 12\nkids "
+                        "9\nSURFx\ntexture \"C:\\art\\my livery.png\"\nkids 2\n"
+                        "OBJECT poly\ntexrep 2 3\ntexoff 0.5 0\nsubdiv 2\ncrease 45\n" +
+                        kTriangle + "kids 0\nOBJECT poly\n" + kTriangle + "kids 0\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const Mesh& mesh = loaded->mesh;
+  EXPECT_EQ(mesh.faces, (std::vector<Face>{{0, 1, 2}, {3, 4, 5}}));
+  ASSERT_EQ(mesh.materials.size(), 1u);
+  EXPECT_EQ(mesh.materials[0].name, "red paint");
+  EXPECT_EQ(mesh.materials[0].base_color, glm::vec4(1, 0, 0, 0.75f));
+  EXPECT_EQ(mesh.materials[0].base_color_texture, 0);
+  EXPECT_EQ(mesh.corner_uvs,
+            (std::vector<glm::vec2>{{0.5f, 0}, {2.5f, 0}, {0.5f, 3}, {0, 0}, {1, 0}, {0, 1}}));
+  EXPECT_TRUE(loaded->warnings.empty());
+}
+
+TEST_F(Ac3dTest, ChildrenMoveWithTheirParents) {
+  // A quarter turn about z takes x to y: rows of the matrix are written one after the other.
+  const auto loaded = LoadMesh(Write(
+      "a.ac", kHead +
+                  "OBJECT world\nkids 1\nOBJECT group\nloc 10 0 0\nrot 0 -1 0 1 0 0 0 0 1\nkids "
+                  "1\nOBJECT poly\nloc 1 0 0\n" +
+                  kTriangle + "kids 0\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.positions, (std::vector<glm::vec3>{{10, 1, 0}, {10, 2, 0}, {9, 1, 0}}));
+}
+
+TEST_F(Ac3dTest, ConcavePolygonsAndLines) {
+  const auto loaded = LoadMesh(
+      Write("a.ac", World("numvert 4\n-1 0 0\n0 -1 0\n-0.2 0 0\n0 1 0\nnumsurf 2\nSURF 0x00\nmat "
+                          "1\nrefs 4\n0 0 0\n1 1 0\n2 0 1\n3 0 0\nSURF 0x02\nmat 0\nrefs 2\n0 0 "
+                          "0\n1 0 0\n")));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_EQ(loaded->mesh.faces.size(), 2u);
+  for (const Face& f : loaded->mesh.faces)  // the notch at vertex 2 is a corner of both
+    EXPECT_TRUE(f[0] == 2 || f[1] == 2 || f[2] == 2);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("lines"), std::string::npos);
+}
+
+TEST_F(Ac3dTest, CutAtEveryLength) {
+  const std::string whole = World(kTriangle);
+  for (std::size_t length = 0; length + 2 < whole.size(); ++length)
+    ExpectMessage(Load(whole.substr(0, length)), "bad.ac");
+}
+
+TEST_F(Ac3dTest, CountsAndIndicesThatLie) {
+  const auto with = [](const std::string& from, const std::string& to) {
+    std::string text = World(kTriangle);
+    return text.replace(text.find(from), from.size(), to);
+  };
+  ExpectMessage(Load(with("numvert 3", "numvert 4000000000")), "bad.ac", "line 11",
+                "3 finite numbers");
+  ExpectMessage(Load(with("numvert 3", "numvert -3")), "bad.ac", "line 7", "numvert");
+  ExpectMessage(Load(with("numsurf 1", "numsurf 4000000000")), "bad.ac", "expected SURF");
+  ExpectMessage(Load(with("refs 3", "refs 4000000000")), "bad.ac", "line 18");
+  ExpectMessage(Load(with("kids 1", "kids 4000000000")), "bad.ac", "child 1 of 4000000000");
+  ExpectMessage(Load(with("2 0 1", "3 0 1")), "bad.ac", "line 17", "vertex 3");
+  ExpectMessage(Load(with("mat 0", "mat 2")), "bad.ac", "material 2, but the file has 2");
+  ExpectMessage(Load(with("1 0 0\n", "inf 0 0\n")), "bad.ac", "line 9");
+  ExpectMessage(Load(with("AC3Db", "AC4Db")), "bad.ac", "AC3D");
+}
+
+TEST_F(Ac3dTest, NestedTooDeep) {
+  std::string text = kHead;
+  for (int i = 0; i < 200000; ++i) text += "OBJECT group\nkids 1\n";
+  ExpectMessage(Load(text), "bad.ac", "line 518", "deep");
+}
+
+}  // namespace
+}  // namespace tilegrad::io
