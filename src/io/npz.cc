@@ -81,8 +81,10 @@ std::optional<Header> ParseHeader(std::string_view text) {
   if (!descr || !order || !shape || descr->empty()) return std::nullopt;
   const auto close = descr->find(descr->front(), 1);
   const auto dims = ParseShape(*shape);
-  if (close == std::string_view::npos || !dims) return std::nullopt;
-  return Header{std::string(descr->substr(1, close - 1)), order->starts_with("True"), *dims};
+  const bool fortran = order->starts_with("True");
+  if (close == std::string_view::npos || !dims || !(fortran || order->starts_with("False")))
+    return std::nullopt;
+  return Header{std::string(descr->substr(1, close - 1)), fortran, *dims};
 }
 
 // Splits magic, version and header length off; returns the header text and where data begins.
@@ -209,7 +211,14 @@ Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
 
 Status SaveNpz(const Path& path, const NpzArrays& arrays) {
   std::vector<std::pair<std::string, Bytes>> entries;
-  for (const auto& [name, array] : arrays) entries.emplace_back(EntryName(name), EncodeNpy(array));
+  for (const auto& [name, array] : arrays) {
+    const auto wanted = ByteCount(array.shape, NpyTypeSize(array.type));
+    if (wanted != array.data.size()) {
+      return InvalidArgument("{}: array \"{}\" has a shape of {} bytes, but data of {}",
+                             path.string(), name, wanted.value_or(0), array.data.size());
+    }
+    entries.emplace_back(EntryName(name), EncodeNpy(array));
+  }
   return WriteZip(path, entries);
 }
 

@@ -10,10 +10,14 @@
 
 namespace tilegrad::io {
 
-// Walks over lines; Number() is 1-based. A last line needs no line end.
+// Walks over lines; Number() is 1-based. A last line needs no line end; UTF-8's byte order mark at
+// the beginning is left out.
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  explicit Lines(std::string_view text) : rest_(text) {
+    constexpr std::string_view kMark = "\xef\xbb\xbf";
+    if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());
+  }
 
   bool Next(std::string_view& line) {
     if (rest_.empty()) return false;

@@ -70,6 +70,10 @@ TEST_F(Ac3dTest, ConcavePolygonsAndLines) {
   EXPECT_NE(loaded->warnings[0].find("lines"), std::string::npos);
 }
 
+TEST_F(Ac3dTest, ByteOrderMarkIsSkipped) {
+  EXPECT_TRUE(LoadMesh(Write("bom.ac", "\xef\xbb\xbf" + World(kTriangle))).ok());
+}
+
 TEST_F(Ac3dTest, CutAtEveryLength) {
   const std::string whole = World(kTriangle);
   for (std::size_t length = 0; length + 2 < whole.size(); ++length)

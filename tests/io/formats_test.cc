@@ -158,6 +158,36 @@ TEST_F(FormatsTest, NpyAsNumpyWritesIt) {
             4u);
 }
 
+// An archive as numpy.savez_compressed writes it: deflated, with 64-bit sizes in the local header.
+constexpr std::string_view kNumpyArchive =
+    "504b03042d0000000800000021007c9cdea2ffffffffffffffff05001400612e6e7079010010009800000000"
+    "00000058000000000000009bec17ea1b10c9c850c650ad9e925a9c5ca46ea5a06e9366a2aea3a09e965f5452"
+    "9498179f5f94920a12774bcc294e058a17672416a402f91a463a0ac69a3a0ab50a64032e0686067b06060607"
+    "2002e206205e00c4071c00504b01022d032d0000000800000021007c9cdea258000000980000000500000000"
+    "00000000000000800100000000612e6e7079504b05060000000001000100330000008f0000000000";
+
+TEST_F(FormatsTest, NpzAsNumpyWritesIt) {
+  Bytes bytes;
+  for (std::size_t i = 0; i < kNumpyArchive.size(); i += 2)
+    bytes.push_back(
+        static_cast<std::uint8_t>(std::stoi(std::string(kNumpyArchive.substr(i, 2)), nullptr, 16)));
+  const auto array = LoadNpzArray(Write("numpy.npz", bytes), "a");
+  ASSERT_TRUE(array.ok()) << array.status().message();
+  EXPECT_EQ(array->shape, (std::vector<std::size_t>{2, 3}));
+  EXPECT_EQ(array->As<float>().value(), (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  for (std::size_t length = 0; length < bytes.size(); length += 3) {
+    const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length));
+    ExpectMessage(LoadNpz(Write("cut.npz", cut)).status(), "cut.npz");
+  }
+}
+
+TEST_F(FormatsTest, SavingAnArrayWhoseShapeIsNotItsSize) {
+  NpyArray array = MakeNpy<float>({3}, std::vector<float>(3));
+  array.shape = {4};
+  ExpectMessage(SaveNpz(folder_ / "a.npz", {{"x", array}}), "a.npz", "\"x\"", "16 bytes", "12");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.npz"));
+}
+
 TEST_F(FormatsTest, FortranOrderIsConverted) {
   Bytes bytes = NpyWithHeader("{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3), }", 6);
   const std::size_t begin = bytes.size() - 6;
@@ -183,6 +213,7 @@ TEST_F(FormatsTest, BrokenNpyHeadersAreErrors) {
                 "big-endian");
   ExpectMessage(error("{'descr': '|O', 'fortran_order': False, 'shape': (2,), }", 16), "|O");
   ExpectMessage(error("nonsense", 8), "header");
+  ExpectMessage(error("{'descr': '<f4', 'fortran_order': Maybe, 'shape': (2,), }", 8), "header");
   ExpectMessage(DecodeNpy(Bytes(5, 0), "short.npy").status(), "short.npy");
 }
 
