@@ -120,7 +120,12 @@ Status Run::LoadData() {
     return InvalidArgument("{}: images are {} pixels a side; the network needs a multiple of 8",
                            job_.data.string(), dataset_->info().image_size);
   }
-  if (test.size() > kSampleRows) test.resize(kSampleRows);
+  // The pictures show models spread over the held-out ones, which stand in the order of their
+  // classes.
+  if (test.size() > kSampleRows) {
+    for (std::size_t i = 0; i < kSampleRows; ++i) test[i] = test[i * test.size() / kSampleRows];
+    test.resize(kSampleRows);
+  }
   TILEGRAD_ASSIGN(train_, LoadImageStore(*dataset_, train, workers_, progress_, stop_));
   TILEGRAD_ASSIGN(held_out_, LoadImageStore(*dataset_, test, workers_, progress_, stop_));
   const int views = std::min(kSampleViews, held_out_.views);
