@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <charconv>
 #include <cstring>
 #include <glm/gtc/quaternion.hpp>
@@ -303,6 +304,23 @@ std::vector<int> RootNodes(const tinygltf::Model& model) {
   return roots;
 }
 
+// The JSON text: the whole of a .gltf, the first chunk of a GLB whose length tinygltf checks.
+std::string_view JsonPart(const Bytes& bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  constexpr std::size_t kGlbHeader = 20;
+  if (!text.starts_with("glTF") || text.size() < kGlbHeader) return text;
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + 12, sizeof(length));
+  return text.substr(kGlbHeader, length);
+}
+
+constexpr std::array<std::string_view, 2> kCompressions = {"KHR_draco_mesh_compression",
+                                                           "EXT_meshopt_compression"};
+
+Status Compressed(const std::string& place, std::string_view extension) {
+  return DataLoss("{}: {} is not supported; save the file without compression", place, extension);
+}
+
 Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
              tinygltf::Model* model) {
   tinygltf::TinyGLTF loader;
@@ -317,18 +335,13 @@ Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
                                           reinterpret_cast<const char*>(bytes.data()), size,
                                           side.folder);
   if (ok) return {};
+  // Accessors of compressed geometry have no buffer view, about which tinygltf complains.
+  for (const std::string_view extension : kCompressions) {
+    if (JsonPart(bytes).find(extension) != std::string_view::npos)
+      return Compressed(place, extension);
+  }
   while (!error.empty() && std::isspace(static_cast<unsigned char>(error.back()))) error.pop_back();
   return DataLoss("{}: not valid glTF: {}", place, error.empty() ? "no reason given" : error);
-}
-
-// The JSON text: the whole of a .gltf, the first chunk of a GLB whose length tinygltf checks.
-std::string_view JsonPart(const Bytes& bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  constexpr std::size_t kGlbHeader = 20;
-  if (!text.starts_with("glTF") || text.size() < kGlbHeader) return text;
-  std::uint32_t length = 0;
-  std::memcpy(&length, bytes.data() + 12, sizeof(length));
-  return text.substr(kGlbHeader, length);
 }
 
 Status CheckNesting(std::string_view json, const std::string& place) {
@@ -352,11 +365,12 @@ Status CheckNesting(std::string_view json, const std::string& place) {
   return {};
 }
 
-// Extensions without which there is no geometry are errors, others that the file requires warnings.
-Status CheckExtensions(const tinygltf::Model& model, const std::string& place, LoadedMesh& out) {
+// Compressed geometry is an error, other extensions that the file requires are warnings.
+Status CheckVersion(const tinygltf::Model& model, const std::string& place, LoadedMesh& out) {
+  if (!model.asset.version.starts_with("2."))
+    return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
   for (const std::string& name : model.extensionsRequired) {
-    if (name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression")
-      return DataLoss("{}: {} is not supported; save the file without compression", place, name);
+    if (name == kCompressions[0] || name == kCompressions[1]) return Compressed(place, name);
     if (name != "KHR_mesh_quantization")
       out.warnings.push_back(fmt::format("the extension {} is not read", name));
   }
@@ -385,7 +399,7 @@ Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
                 {},
                 std::vector<std::optional<int>>(model.images.size()),
                 std::vector<bool>(model.nodes.size())};
-  TILEGRAD_TRY(CheckExtensions(model, place, walk.out));
+  TILEGRAD_TRY(CheckVersion(model, place, walk.out));
   for (const int root : RootNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::mat4(1), 0));
   return std::move(walk.out);
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <string_view>
 
 #include "base/error.h"
@@ -47,7 +48,21 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated PNG: it ends without an end chunk", name);
 }
 
-constexpr int kEndOfImage = 0xd9;
+constexpr int kHuffmanTables = 0xc4, kEndOfImage = 0xd9;
+
+// Tables of a class and number, 16 counts of codes by length, and as many values as the counts'
+// sum, which is at most 256 (T.81, B.2.4.2): stb_image 2.27 writes past its arrays if not.
+bool HuffmanTablesFit(ByteSpan segment) {
+  constexpr std::size_t kFixed = 17;
+  while (!segment.empty()) {
+    if (segment.size() < kFixed) return false;
+    const auto counts = segment.subspan(1, kFixed - 1);
+    const std::size_t values = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
+    if (values > 256 || values > segment.size() - kFixed) return false;
+    segment = segment.subspan(kFixed + values);
+  }
+  return true;
+}
 
 // Markers without a segment: TEM, RST0 to RST7, SOI.
 bool StandsAlone(int marker) { return marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8); }
@@ -71,6 +86,8 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
       return DataLoss(
           "{}: truncated or corrupt JPEG: the segment at byte {} reaches beyond the end", name, at);
     }
+    if (marker == kHuffmanTables && !HuffmanTablesFit(bytes.subspan(at + 2, length - 2)))
+      return DataLoss("{}: corrupt JPEG: the Huffman tables at byte {} are too long", name, at);
     at += length;  // after a scan's header follows its data, in which NextMarker finds the end
   }
   return DataLoss("{}: truncated JPEG: it ends without an end marker", name);

@@ -13,7 +13,7 @@ namespace tilegrad::io {
 
 // OK for anything that is neither PNG nor JPEG. PNG: every chunk lies in the file, its checksum is
 // right, and the end chunk is there. JPEG: every segment lies in the file, and the end marker is
-// there. Errors name `name` and the byte.
+// there, and Huffman tables have a size that stb_image can take. Errors name `name` and the byte.
 Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
 
 }  // namespace tilegrad::io

@@ -10,6 +10,10 @@
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_NO_STDIO
+#define STBI_NO_GIF
+#define STBI_NO_HDR
+#define STBI_NO_PIC
+#define STBI_NO_PSD
 #define STBI_MAX_DIMENSIONS 16384
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
@@ -37,8 +41,9 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   const auto length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
+  TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
-    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, GIF, PNM): {}", name,
+    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM): {}", name,
                     stbi_failure_reason());
   }
   if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide) {
@@ -50,7 +55,6 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
     return DataLoss("{}: the header says {} x {} pixels, more than {} bytes can hold", name, width,
                     height, bytes.size());
   }
-  TILEGRAD_TRY(CheckImageContainer(bytes, name));
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
   if (!pixels) {

@@ -172,6 +172,14 @@ TEST_F(BrokenGltfTest, CompressedGeometrySaysWhatToDo) {
   Json json = Triangle();
   json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
+  json["accessors"][0].erase("bufferView");
+  ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
+}
+
+TEST_F(BrokenGltfTest, Version1) {
+  Json json = Triangle();
+  json["asset"]["version"] = "1.0";
+  ExpectMessage(Load(json), "bad.gltf", "version \"1.0\"");
 }
 
 // An image whose place in the buffer is wrong costs the texture, not the mesh.

@@ -101,6 +101,15 @@ TEST_F(FormatsTest, JpegWholeAndCut) {
   }
 }
 
+TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
+  Bytes jpeg = Jpeg(16, 16);
+  const std::array<std::uint8_t, 2> marker = {0xff, 0xc4};
+  const auto table = std::search(jpeg.begin(), jpeg.end(), marker.begin(), marker.end());
+  ASSERT_NE(table, jpeg.end());
+  table[5] = 255;  // codes of one bit; the other counts are added
+  ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman");
+}
+
 TEST_F(FormatsTest, ImagesWithFlippedBytesNeverCrash) {
   for (const Bytes& whole : {EncodePng(Gradient(16, 16, 4)).value(), Jpeg(16, 16)}) {
     for (std::size_t i = 0; i < whole.size(); ++i) {
