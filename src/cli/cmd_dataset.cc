@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/run_folder.h"
 #include "train/data/build.h"
 
 namespace tilegrad::cli {
@@ -141,8 +142,7 @@ void AddDataset(CLI::App& app, Action* action) {
       ->capture_default_str();
   command->add_option("--split-list", options->split_list,
                       "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
-  command->add_option("--workers", options->workers, "threads; 0 is one a core")
-      ->capture_default_str();
+  AddWorkersOption(command, &options->workers);
   command->callback([options, action, size, views] {
     options->fixed_size = size->count() + views->count() > 0;
     *action = [options] { return Make(*options); };

@@ -12,17 +12,16 @@ namespace tilegrad::cli {
 namespace {
 
 struct EvalOptions {
-  std::string run, data;
+  RunOptions on;
   int views_per_model = 24;
   bool training_models = false;
-  int workers = 0;
 };
 
 Status RunEvaluation(const EvalOptions& options) {
-  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
-  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
+  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
+  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
   TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(data));
-  const Workers workers(options.workers);
+  const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(run, workers));
   train::EvaluationJob job;
   job.dataset = &dataset;
@@ -49,8 +48,7 @@ void AddEval(CLI::App& app, Action* action) {
   auto options = std::make_shared<EvalOptions>();
   auto* command = app.add_subcommand(
       "eval", "3D IoU and F-score of a run on held-out models, beside two baselines");
-  command->add_option("--run", options->run, "run folder [the newest below runs/]");
-  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+  AddRunOptions(command, &options->on);
   command
       ->add_option("--views-per-model", options->views_per_model,
                    "images of each model that are predicted from")
@@ -58,9 +56,6 @@ void AddEval(CLI::App& app, Action* action) {
       ->check(CLI::Range(1, 1000));
   command->add_flag("--training-models", options->training_models,
                     "score the training models instead and write nothing");
-  command->add_option("--workers", options->workers, "threads; 0: one per core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
   command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 

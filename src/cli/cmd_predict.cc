@@ -90,9 +90,7 @@ void AddPredict(CLI::App& app, Action* action) {
   command->add_option("--mask", options->mask, "grey image of the same size: white is the object");
   command->add_flag("--keep-framing", options->keep_framing,
                     "only resize: the image is framed like a training image already");
-  command->add_option("--workers", options->workers, "threads; 0: one per core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+  AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunPrediction(*options); }; });
 }
 

@@ -11,18 +11,18 @@ namespace tilegrad::cli {
 namespace {
 
 struct ReportOptions {
-  std::string run, data, out;
+  RunOptions on;
+  std::string out;
   int models = 8;
-  int workers = 0;
 };
 
 Status RunReport(const ReportOptions& options) {
   train::ReportJob job;
-  TILEGRAD_ASSIGN(job.run, ChooseRun(options.run));
-  TILEGRAD_ASSIGN(job.data, ChooseDataset(options.data, job.run));
+  TILEGRAD_ASSIGN(job.run, ChooseRun(options.on.run));
+  TILEGRAD_ASSIGN(job.data, ChooseDataset(options.on.data, job.run));
   job.out = options.out.empty() ? job.run / "report.html" : Path(options.out);
   job.models = options.models;
-  const Workers workers(options.workers);
+  const Workers workers(options.on.workers);
   ProgressLine line;
   const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
@@ -40,15 +40,11 @@ void AddReport(CLI::App& app, Action* action) {
   auto options = std::make_shared<ReportOptions>();
   auto* command = app.add_subcommand(
       "report", "One page about a run: scores, curves, pictures, meshes to turn in the browser");
-  command->add_option("--run", options->run, "run folder [the newest below runs/]");
-  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+  AddRunOptions(command, &options->on);
   command->add_option("--models", options->models, "held-out models to show")
       ->capture_default_str()
       ->check(CLI::Range(0, 200));
   command->add_option("--out", options->out, "the page [RUN/report.html]");
-  command->add_option("--workers", options->workers, "threads; 0: one per core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
   command->callback([options, action] { *action = [options] { return RunReport(*options); }; });
 }
 

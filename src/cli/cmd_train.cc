@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/run_folder.h"
 #include "train/trainer.h"
 
 namespace tilegrad::cli {
@@ -72,11 +73,7 @@ void AddTrain(CLI::App& app, Action* action) {
                    "save and stop after this many minutes; 0: no limit")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command
-      ->add_option("--workers", options->workers,
-                   "threads; 0: one per core. The result does not depend on it")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+  AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunTraining(*options); }; });
 }
 

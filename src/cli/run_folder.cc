@@ -8,6 +8,20 @@
 
 namespace tilegrad::cli {
 
+void AddWorkersOption(CLI::App* command, int* workers) {
+  command
+      ->add_option("--workers", *workers,
+                   "threads; 0: one per core. The result does not depend on it")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+}
+
+void AddRunOptions(CLI::App* command, RunOptions* options) {
+  command->add_option("--run", options->run, "run folder [the newest below runs/]");
+  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+  AddWorkersOption(command, &options->workers);
+}
+
 Result<Path> ChooseRun(const std::string& given) {
   if (!given.empty()) return Path(given);
   std::optional<std::filesystem::directory_entry> newest;

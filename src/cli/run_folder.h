@@ -2,11 +2,20 @@
 // What commands that work on a run share: which run, and which dataset it was trained on.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <string>
 
 #include "base/file.h"
 
 namespace tilegrad::cli {
+
+// Options of commands that look at a finished run.
+struct RunOptions {
+  std::string run, data;  // empty: see ChooseRun, ChooseDataset
+  int workers = 0;
+};
+void AddRunOptions(CLI::App* command, RunOptions* options);
+void AddWorkersOption(CLI::App* command, int* workers);
 
 // `given`, or if that is empty the folder below runs/ that was changed last; an error if there is
 // none.

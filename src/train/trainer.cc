@@ -131,7 +131,11 @@ Status Run::LoadData() {
   const int views = std::min(kSampleViews, held_out_.views);
   for (int m = 0; m < held_out_.models; ++m) {
     Sample sample{m, {}};
-    for (int v = 0; v < views; ++v) sample.views.push_back(v * held_out_.views / views);
+    // Spread over the circle, from the one that sees the front (as the report's).
+    for (int v = 0; v < views; ++v) {
+      sample.views.push_back((5 * held_out_.views / 6 + v * held_out_.views / views) %
+                             held_out_.views);
+    }
     samples_.push_back(std::move(sample));
   }
   return {};
@@ -150,6 +154,10 @@ Status Run::Restore() {
   }
   TILEGRAD_TRY(nn::LoadState(step_->network().module(), checkpoint.tensors).Within(file));
   TILEGRAD_TRY(step_->adam().LoadState(checkpoint.tensors).Within(file));
+  if (step_->adam().steps() != checkpoint.info.step) {
+    return InvalidArgument("{}: the optimizer has taken {} steps, the run {}", file,
+                           step_->adam().steps(), checkpoint.info.step);
+  }
   outcome_.first_step = saved_step_ = checkpoint.info.step;
   seconds_before_ = checkpoint.info.seconds;
   return {};

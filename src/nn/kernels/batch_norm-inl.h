@@ -188,25 +188,30 @@ void BackwardLanes(const BatchNormBackwardProblem<float>& p, std::size_t c, std:
   }
 }
 
-// Channels [begin, end) of either layout.
-void BatchNormForwardRange(const BatchNormForwardProblem<float>& p, std::size_t begin,
-                           std::size_t end) {
-  if (p.shape.pixels != 1) {
-    for (std::size_t c = begin; c < end; ++c) ForwardChannel(p, c);
+// Channels [begin, end) of either layout: one after the other, or a vector of them at a time.
+template <class Channel, class Channels>
+HWY_INLINE void ForChannels(const BatchNormShape& shape, std::size_t begin, std::size_t end,
+                            const Channel& channel, const Channels& channels) {
+  if (shape.pixels != 1) {
+    for (std::size_t c = begin; c < end; ++c) channel(c);
     return;
   }
   const std::size_t lanes = hn::Lanes(DF());
-  for (std::size_t c = begin; c < end; c += lanes) ForwardLanes(p, c, HWY_MIN(lanes, end - c));
+  for (std::size_t c = begin; c < end; c += lanes) channels(c, HWY_MIN(lanes, end - c));
+}
+
+void BatchNormForwardRange(const BatchNormForwardProblem<float>& p, std::size_t begin,
+                           std::size_t end) {
+  ForChannels(
+      p.shape, begin, end, [&](std::size_t c) HWY_ATTR { ForwardChannel(p, c); },
+      [&](std::size_t c, std::size_t count) HWY_ATTR { ForwardLanes(p, c, count); });
 }
 
 void BatchNormBackwardRange(const BatchNormBackwardProblem<float>& p, std::size_t begin,
                             std::size_t end) {
-  if (p.shape.pixels != 1) {
-    for (std::size_t c = begin; c < end; ++c) BackwardChannel(p, c);
-    return;
-  }
-  const std::size_t lanes = hn::Lanes(DF());
-  for (std::size_t c = begin; c < end; c += lanes) BackwardLanes(p, c, HWY_MIN(lanes, end - c));
+  ForChannels(
+      p.shape, begin, end, [&](std::size_t c) HWY_ATTR { BackwardChannel(p, c); },
+      [&](std::size_t c, std::size_t count) HWY_ATTR { BackwardLanes(p, c, count); });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE
