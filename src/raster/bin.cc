@@ -26,14 +26,9 @@ void ForEachTile(const AlignedVector<TileRange>& ranges, int columns, const Emit
   }
 }
 
-// A counting sort, which is stable.
-TileLists Bin(const ScreenMesh& mesh, const TileGrid& grid, const BinMargin& margin,
-              TileListBuffers* buffers) {
+// A counting sort of buffers->ranges, which is stable.
+TileLists SortIntoTiles(const TileGrid& grid, TileListBuffers* buffers) {
   auto& begin = buffers->begin;
-  buffers->ranges.resize(mesh.faces());
-  if (mesh.faces() > 0) {
-    HWY_DYNAMIC_DISPATCH(FaceTiles)(mesh, grid, margin, buffers->ranges.data());
-  }
   begin.assign(grid.tiles() + 1, 0);
   ForEachTile(buffers->ranges, grid.columns,
               [&](std::size_t tile, std::int32_t) { ++begin[tile + 1]; });
@@ -48,15 +43,28 @@ TileLists Bin(const ScreenMesh& mesh, const TileGrid& grid, const BinMargin& mar
 
 }  // namespace
 
-TileLists BinDrawnFaces(const ScreenMesh& mesh, const TileGrid& grid, TileListBuffers* buffers) {
-  // Coverage rounds coordinates by at most half a subpixel.
-  constexpr float kRounding = 1.0f / static_cast<float>(kSubpixels);
-  return Bin(mesh, grid, {kRounding, kRounding, 0xff}, buffers);
+TileLists BinDrawnFaces(std::span<const DrawnFace> faces, const TileGrid& grid,
+                        TileListBuffers* buffers) {
+  constexpr int kUp = kTileSize - 1;
+  buffers->ranges.resize(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const DrawnFace& f = faces[i];
+    buffers->ranges[i] = {static_cast<std::int16_t>(f.column_begin >> kTileBits),
+                          static_cast<std::int16_t>((f.column_end + kUp) >> kTileBits),
+                          static_cast<std::int16_t>(f.row_begin >> kTileBits),
+                          static_cast<std::int16_t>((f.row_end + kUp) >> kTileBits)};
+  }
+  return SortIntoTiles(grid, buffers);
 }
 
 TileLists BinSoftFaces(const ScreenMesh& mesh, const TileGrid& grid, float margin_x, float margin_y,
                        TileListBuffers* buffers) {
-  return Bin(mesh, grid, {margin_x, margin_y, kFaceNotInSoftMask}, buffers);
+  buffers->ranges.resize(mesh.faces());
+  if (mesh.faces() > 0) {
+    HWY_DYNAMIC_DISPATCH(FaceTiles)
+    (mesh, grid, {margin_x, margin_y, kFaceNotInSoftMask}, buffers->ranges.data());
+  }
+  return SortIntoTiles(grid, buffers);
 }
 
 }  // namespace tilegrad::raster

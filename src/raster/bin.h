@@ -8,6 +8,7 @@
 
 #include "base/aligned.h"
 #include "raster/conventions.h"
+#include "raster/drawn_faces.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {
@@ -20,7 +21,7 @@ struct TileRect {
 // One face list per tile, as compressed rows: tile t holds faces[begin[t]] .. faces[begin[t+1]-1].
 struct TileLists {
   std::span<const std::int32_t> begin;  // [tiles + 1]
-  std::span<const std::int32_t> faces;  // indices into the ScreenMesh, ascending within a tile
+  std::span<const std::int32_t> faces;  // indices into what was binned, ascending within a tile
 
   std::span<const std::int32_t> operator[](std::size_t tile) const {
     const auto from = static_cast<std::size_t>(begin[tile]);
@@ -66,8 +67,10 @@ struct TileListBuffers {
   TileLists View() const { return {begin, faces}; }
 };
 
-// Lists every drawn face for each tile in which its box holds a pixel centre.
-TileLists BinDrawnFaces(const ScreenMesh& mesh, const TileGrid& grid, TileListBuffers* buffers);
+// Lists every drawn face (its index in `faces`) for each tile in which its box holds a pixel
+// centre.
+TileLists BinDrawnFaces(std::span<const DrawnFace> faces, const TileGrid& grid,
+                        TileListBuffers* buffers);
 
 // Lists every face that takes part in the soft mask (drawn, culled or degenerate) for each tile
 // that has a pixel centre within `margin_x`, `margin_y` (pixels, >= 0, may be infinite) of its box.

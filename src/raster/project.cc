@@ -19,21 +19,18 @@ namespace {
 HWY_EXPORT(ProjectVertices);
 HWY_EXPORT(ProjectVerticesBackward);
 
-// AssembleFaces where every vertex is visible and finite, without its tests.
+// AssembleFaces where every vertex is visible and finite, without its tests. Leaves what follows
+// from shapes to the caller.
 void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out) {
   const std::size_t n = source.faces.size() / 3;
   for (auto* array : {&out->v0, &out->v1, &out->v2, &out->source_face}) array->resize(n);
-  out->reject.resize(n);
+  out->reject.assign(n, kFaceDrawn);
   out->clipped.clear();
   for (std::size_t f = 0; f < n; ++f) {
     out->v0[f] = source.faces[3 * f];
     out->v1[f] = source.faces[3 * f + 1];
     out->v2[f] = source.faces[3 * f + 2];
     out->source_face[f] = static_cast<std::int32_t>(f);
-  }
-  const ScreenMesh mesh = out->View();
-  for (std::size_t f = 0; f < n; ++f) {
-    out->reject[f] = ShapeReject(SnapFace(mesh, f), source.cull_back);
   }
 }
 
@@ -45,7 +42,8 @@ bool AllVisible(const ScreenMesh& mesh) {
 
 }  // namespace
 
-void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out) {
+void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
+             DrawnFaces* drawn) {
   const std::size_t n = source.positions.size() / 3;
   for (auto* array : {&out->x, &out->y, &out->depth, &out->inverse_depth}) array->resize(n);
   out->source_vertices = static_cast<std::int32_t>(n);
@@ -56,6 +54,7 @@ void Project(const FaceSource<float>& source, int width, int height, ScreenMeshB
   } else {
     AssembleFaces(source, out);
   }
+  SetUpDrawnFaces(out->View(), source.cull_back, out->reject, drawn);
 }
 
 void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,

@@ -5,14 +5,17 @@
 #include <span>
 
 #include "base/aligned.h"
+#include "raster/drawn_faces.h"
 #include "raster/near_clip.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {
 
-// Fills `out` with the screen mesh of a validated, finite source. Deterministic; allocates only to
-// grow `out`. Not thread-safe for one `out`.
-void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out);
+// Fills `out` with the screen mesh of a validated, finite source, and `drawn`, if not null, with
+// the faces that may cover a pixel. Deterministic; allocates only to grow them. Not thread-safe for
+// one `out`.
+void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
+             DrawnFaces* drawn = nullptr);
 
 // What the adjoint of Project is asked for, and scratch.
 struct ProjectGradients {

@@ -32,19 +32,6 @@ struct TileFaceSetup {
   }
 };
 
-inline constexpr int kSetupLanes = 16;
-
-// Several faces set up at once (visibility_setup-inl.h): TileFaceSetup as structure of arrays.
-// Where `small` is 0, only `face` is set.
-struct TileFaceBatch {
-  alignas(64) std::int32_t face[kSetupLanes], small[kSetupLanes];
-  alignas(64) std::int32_t edge[3][kSetupLanes], step_x[3][kSetupLanes], step_y[3][kSetupLanes];
-  alignas(64) std::int32_t column_begin[kSetupLanes], column_end[kSetupLanes];
-  alignas(64) std::int32_t row_begin[kSetupLanes], row_end[kSetupLanes];
-  alignas(64) float x0[kSetupLanes], y0[kSetupLanes], base[kSetupLanes];
-  alignas(64) float gx[kSetupLanes], gy[kSetupLanes], low[kSetupLanes], high[kSetupLanes];
-};
-
 // Returns false if the face's box holds no pixel centre of the tile.
 bool SetUpTileFace(const ScreenMesh& mesh, std::int32_t face, const TileRect& rect,
                    TileFaceSetup* out);

@@ -72,11 +72,11 @@ void DrawUnguarded(const ScreenMesh& mesh, const TileFaceSetup& face, const Tile
   }
 }
 
-void ComputeVisibility(const ScreenMesh& mesh, std::span<const std::int32_t> faces,
-                       const TileRect& rect, VisibilityTile* out) {
+void ComputeVisibility(const ScreenMesh& mesh, const TileDrawList& list, const TileRect& rect,
+                       VisibilityTile* out) {
   std::fill(out->face, out->face + kTilePixels, kNoFace);
   std::fill(out->inverse_depth, out->inverse_depth + kTilePixels, 0.0f);
-  if (!faces.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, faces, rect, out);
+  if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, out);
   // Vectors reach beyond the image where the tile is narrower; what they saw there is nothing.
   for (int i = 0; i < kTileSize && rect.x1 - rect.x0 < kTileSize; ++i) {
     const int from = i * kTileSize + rect.x1 - rect.x0, to = (i + 1) * kTileSize;

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "raster/bin.h"
+#include "raster/drawn_faces.h"
 #include "raster/screen_mesh.h"
 #include "raster/tile_faces.h"
 
@@ -17,9 +18,15 @@ struct VisibilityTile {
   alignas(128) float inverse_depth[kTilePixels];  // 1/depth; 0 at background
 };
 
-// `faces`: drawn faces that may cover the tile, ascending. The result does not depend on the
-// instruction set: the same bits as VisibilityRef<float> everywhere.
-void ComputeVisibility(const ScreenMesh& mesh, std::span<const std::int32_t> faces,
-                       const TileRect& rect, VisibilityTile* out);
+// The drawn faces of a mesh that may cover a tile.
+struct TileDrawList {
+  std::span<const DrawnFace> faces;       // of the image
+  std::span<const std::int32_t> indices;  // into them, ascending
+};
+
+// The result does not depend on the instruction set: the same bits as VisibilityRef<float>
+// everywhere.
+void ComputeVisibility(const ScreenMesh& mesh, const TileDrawList& list, const TileRect& rect,
+                       VisibilityTile* out);
 
 }  // namespace tilegrad::raster

@@ -10,6 +10,7 @@
 #include "base/aligned.h"
 #include "raster/attributes.h"
 #include "raster/bin.h"
+#include "raster/drawn_faces.h"
 #include "raster/interpolate.h"
 #include "raster/near_clip.h"
 #include "raster/screen_mesh.h"
@@ -38,6 +39,7 @@ struct ImageScratch {
   raster::ScreenMesh mesh;
   AlignedVector<float> clipped_attributes;
   raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
+  raster::DrawnFaces drawn_faces;
   raster::TileListBuffers drawn_buffers, soft_buffers;
   raster::TileLists drawn, soft;
   raster::SoftMaskPlan soft_plan;

@@ -55,11 +55,12 @@ void RememberPrepared(const SceneView& scene, const RenderOptions& options,
 
 void PrepareMesh(const SceneView& scene, const RenderOptions& options,
                  const PrepareRequest& request, ImageScratch* image) {
-  raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image->buffers);
+  raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image->buffers,
+                  request.drawn_bins ? &image->drawn_faces : nullptr);
   image->mesh = image->buffers.View();
   const raster::TileGrid grid(options.width, options.height);
   if (request.drawn_bins) {
-    image->drawn = raster::BinDrawnFaces(image->mesh, grid, &image->drawn_buffers);
+    image->drawn = raster::BinDrawnFaces(image->drawn_faces.faces(), grid, &image->drawn_buffers);
   }
   if (request.soft_bins) {
     image->soft_plan =

@@ -90,7 +90,8 @@ double RenderTile(const SceneView& scene, const RenderOptions& options, const Im
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
   raster::VisibilityTile& seen = worker->visibility;
-  raster::ComputeVisibility(image.mesh, image.drawn[task.tile], task.rect, &seen);
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.faces(), image.drawn[task.tile]},
+                            task.rect, &seen);
   WriteFaceIds(image.mesh, task.rect, seen.face, part.plane(frame->face_ids, 1));
   if (float* depth = part.plane(frame->depth, 1)) {
     WriteDepth(task.rect, options.width, seen.inverse_depth, depth);

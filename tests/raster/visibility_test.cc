@@ -52,16 +52,24 @@ struct Flat {
   }
 };
 
+DrawnFaces DrawnFacesOf(const ScreenMesh& mesh) {
+  std::vector<std::uint8_t> reject(mesh.reject.begin(), mesh.reject.end());
+  DrawnFaces out;
+  SetUpDrawnFaces(mesh, /*cull_back=*/false, reject, &out);
+  return out;
+}
+
 // Faces of a whole image, by tiles.
 std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
   const TileGrid grid(mesh.width, mesh.height);
+  const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
-  const TileLists bins = BinDrawnFaces(mesh, grid, &buffers);
+  const TileLists bins = BinDrawnFaces(drawn.faces(), grid, &buffers);
   std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
     VisibilityTile tile;
     const TileRect rect = grid.rect(t);
-    ComputeVisibility(mesh, bins[t], rect, &tile);
+    ComputeVisibility(mesh, {drawn.faces(), bins[t]}, rect, &tile);
     for (int i = rect.y0; i < rect.y1; ++i) {
       for (int j = rect.x0; j < rect.x1; ++j) {
         out[static_cast<std::size_t>(i) * mesh.width + j] =
@@ -218,8 +226,9 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   Flat flat = RandomTriangles(200, 40, &rng);
   const ScreenMesh mesh = flat.Finish();
   const TileGrid grid(mesh.width, mesh.height);
+  const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
-  const TileLists bins = BinDrawnFaces(mesh, grid, &buffers);
+  const TileLists bins = BinDrawnFaces(drawn.faces(), grid, &buffers);
   std::size_t listed = 0;
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
     EXPECT_TRUE(std::is_sorted(bins[t].begin(), bins[t].end()));
@@ -233,7 +242,9 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
         for (int j = rect.x0; j < rect.x1; ++j) covers |= Covers(shape, j, i);
       }
       if (!covers) continue;
-      EXPECT_TRUE(std::binary_search(bins[t].begin(), bins[t].end(), static_cast<int>(f)));
+      EXPECT_TRUE(std::any_of(bins[t].begin(), bins[t].end(), [&](std::int32_t i) {
+        return drawn.faces()[static_cast<std::size_t>(i)].face == static_cast<int>(f);
+      }));
     }
   }
   EXPECT_LT(listed, mesh.faces() * grid.tiles() / 2);  // it does reject

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of drawn_faces.h; lanes are faces. The same numbers, bit by bit, as the scalar code
+// of coverage.h and face_plane.h (no fused operations).
+#if defined(TILEGRAD_RASTER_DRAWN_FACES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_DRAWN_FACES_INL_H_
+#undef TILEGRAD_RASTER_DRAWN_FACES_INL_H_
+#else
+#define TILEGRAD_RASTER_DRAWN_FACES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstring>
+
+#include "raster/coverage.h"
+#include "raster/drawn_faces.h"
+#include "raster/face_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+struct CornerLanes {
+  FaceVec x[3], y[3], z[3];
+};
+
+HWY_INLINE CornerLanes GatherCorners(const ScreenMesh& mesh, const FaceVertices& vertices) {
+  const FaceTag d;
+  CornerLanes out;
+  for (int k = 0; k < 3; ++k) {
+    out.x[k] = hn::GatherIndex(d, mesh.x.data(), vertices.v[k]);
+    out.y[k] = hn::GatherIndex(d, mesh.y.data(), vertices.v[k]);
+    out.z[k] = hn::GatherIndex(d, mesh.inverse_depth.data(), vertices.v[k]);
+  }
+  return out;
+}
+
+// Corners in subpixels. What is beyond any image saturates.
+inline constexpr float kFarSubpixels = 0x1p30f;
+struct SnappedLanes {
+  FaceInt x[3], y[3];
+};
+
+HWY_INLINE FaceInt SnapLanes(FaceVec pixels) {
+  const FaceTag d;
+  const auto far = hn::Set(d, kFarSubpixels);
+  const auto scaled = hn::Mul(pixels, hn::Set(d, static_cast<float>(kSubpixels)));
+  return hn::NearestInt(hn::Min(hn::Max(scaled, hn::Neg(far)), far));
+}
+
+// The least and the largest of three along one axis.
+struct RangeLanes {
+  FaceInt low, high;
+};
+HWY_INLINE RangeLanes RangeOf(const FaceInt (&c)[3]) {
+  return {hn::Min(hn::Min(c[0], c[1]), c[2]), hn::Max(hn::Max(c[0], c[1]), c[2])};
+}
+
+HWY_INLINE FaceIntMask IsSmall(const RangeLanes& range) {
+  const FaceIntTag di;
+  const auto far = hn::Set(di, static_cast<std::int32_t>(kFarSubpixels));
+  const auto within = hn::And(hn::Gt(range.low, hn::Neg(far)), hn::Lt(range.high, far));
+  return hn::And(within, hn::Lt(hn::Sub(range.high, range.low), hn::Set(di, kSmallExtent + 1)));
+}
+
+// Pixels [begin, end) of the image along one axis whose centre lies in the range.
+struct PixelLanes {
+  FaceInt begin, end;
+};
+HWY_INLINE PixelLanes PixelsOf(const RangeLanes& range, int size) {
+  const FaceIntTag di;
+  constexpr auto kHalf = static_cast<std::int32_t>(kSubpixels / 2);
+  const auto clamp = [&](FaceInt v)
+                         HWY_ATTR { return hn::Min(hn::Max(v, hn::Zero(di)), hn::Set(di, size)); };
+  const auto first = hn::Add(range.low, hn::Set(di, kHalf - 1));
+  const auto last = hn::Add(range.high, hn::Set(di, kHalf));
+  return {clamp(hn::ShiftRight<kSubpixelBits>(first)), clamp(hn::ShiftRight<kSubpixelBits>(last))};
+}
+
+// Doubled area, positive if clockwise as seen.
+HWY_INLINE FaceInt AreaLanes(const SnappedLanes& s) {
+  return hn::Sub(hn::Mul(hn::Sub(s.x[1], s.x[0]), hn::Sub(s.y[2], s.y[0])),
+                 hn::Mul(hn::Sub(s.x[2], s.x[0]), hn::Sub(s.y[1], s.y[0])));
+}
+
+// The records of a vector of faces as words: word w of all of them.
+inline constexpr int kWords = sizeof(DrawnFace) / 4, kEdgeWord = 4, kDepthWord = 13;
+static_assert(offsetof(DrawnFace, edge) == 4 * kEdgeWord && offsetof(DrawnFace, small) == 4 &&
+              offsetof(DrawnFace, column_begin) == 8 &&
+              offsetof(DrawnFace, depth) == 4 * kDepthWord);
+struct FaceWords {
+  FaceInt word[kWords];
+};
+
+// Corners 1 and 2 change places where the doubled area is negative.
+HWY_INLINE void WindClockwise(FaceInt area, SnappedLanes* s) {
+  const auto swap = hn::Lt(area, hn::Zero(FaceIntTag()));
+  for (auto* a : {s->x, s->y}) {
+    const auto first = a[1];
+    a[1] = hn::IfThenElse(swap, a[2], first), a[2] = hn::IfThenElse(swap, first, a[2]);
+  }
+}
+
+HWY_INLINE FaceInt FromCentre(FaceInt subpixels, FaceInt pixel) {
+  const FaceIntTag di;
+  const auto centre = hn::Add(hn::ShiftLeft<kSubpixelBits>(pixel),
+                              hn::Set(di, static_cast<std::int32_t>(kSubpixels / 2)));
+  return hn::Sub(subpixels, centre);
+}
+
+// Edge functions at the first pixel of the box, for corners wound clockwise.
+HWY_INLINE void SetEdges(SnappedLanes s, FaceInt column, FaceInt row, FaceWords* out) {
+  const FaceIntTag di;
+  const auto zero = hn::Zero(di);
+  for (auto& x : s.x) x = FromCentre(x, column);
+  for (auto& y : s.y) y = FromCentre(y, row);
+  for (int k = 0; k < 3; ++k) {
+    const int n = k == 2 ? 0 : k + 1;
+    const auto dx = hn::Sub(s.x[n], s.x[k]), dy = hn::Sub(s.y[n], s.y[k]);
+    const auto left_or_top = hn::Or(hn::Lt(dy, zero), hn::And(hn::Eq(dy, zero), hn::Gt(dx, zero)));
+    const auto at = hn::Sub(hn::Mul(dy, s.x[k]), hn::Mul(dx, s.y[k]));
+    const auto exact = hn::Add(at, hn::IfThenZeroElse(left_or_top, hn::Set(di, -1)));
+    out->word[kEdgeWord + k] = hn::ShiftRight<kSubpixelBits>(exact);
+    out->word[kEdgeWord + 3 + k] = hn::Neg(dy), out->word[kEdgeWord + 6 + k] = dx;
+  }
+}
+
+// SwapUnlessOrdered of face_plane.h.
+HWY_INLINE void OrderLanes(CornerLanes* c, int i, int j) {
+  const auto ordered =
+      hn::Or(hn::Lt(c->x[i], c->x[j]), hn::And(hn::Eq(c->x[i], c->x[j]), hn::Le(c->y[i], c->y[j])));
+  for (auto* a : {c->x, c->y, c->z}) {
+    const auto first = a[i];
+    a[i] = hn::IfThenElse(ordered, first, a[j]), a[j] = hn::IfThenElse(ordered, a[j], first);
+  }
+}
+
+// MakeDepthPlane of face_plane.h, in the same order of operations.
+HWY_INLINE void SetDepth(CornerLanes c, FaceWords* out) {
+  const FaceTag d;
+  OrderLanes(&c, 0, 1), OrderLanes(&c, 1, 2), OrderLanes(&c, 0, 1);
+  const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
+  const auto x2 = hn::Sub(c.x[2], c.x[0]), y2 = hn::Sub(c.y[2], c.y[0]);
+  const auto x3 = hn::Sub(x2, x1), y3 = hn::Sub(y2, y1);
+  const auto area = hn::Sub(hn::Mul(x1, y2), hn::Mul(x2, y1));
+  const auto square = [&](FaceVec x, FaceVec y)
+                          HWY_ATTR { return hn::Add(hn::Mul(x, x), hn::Mul(y, y)); };
+  const auto longest = hn::Max(hn::Max(square(x1, y1), square(x2, y2)), square(x3, y3));
+  constexpr auto kThin = static_cast<float>(kFlatHeight * kFlatHeight);
+  const auto solid = hn::Gt(hn::Mul(area, area), hn::Mul(hn::Set(d, kThin), longest));
+  const auto inverse = hn::IfThenElseZero(solid, hn::Div(hn::Set(d, 1.0f), area));
+  const auto slope = [&](FaceVec g1, FaceVec g2) HWY_ATTR {
+    const auto g0 = hn::Neg(hn::Add(g1, g2));
+    const auto first = hn::Add(hn::Mul(g0, c.z[0]), hn::Mul(g1, c.z[1]));
+    return hn::IfThenElseZero(solid, hn::Add(first, hn::Mul(g2, c.z[2])));
+  };
+  const auto third = hn::Set(d, 1.0f / 3.0f);
+  const auto mean =
+      hn::Add(hn::Add(hn::Mul(third, c.z[0]), hn::Mul(third, c.z[1])), hn::Mul(third, c.z[2]));
+  const FaceVec plane[7] = {
+      c.x[0],
+      c.y[0],
+      hn::IfThenElse(solid, c.z[0], mean),
+      slope(hn::Mul(y2, inverse), hn::Mul(hn::Neg(y1), inverse)),
+      slope(hn::Mul(hn::Neg(x2), inverse), hn::Mul(x1, inverse)),
+      hn::Min(hn::Min(c.z[0], c.z[1]), c.z[2]),
+      hn::Max(hn::Max(c.z[0], c.z[1]), c.z[2]),
+  };
+  for (int i = 0; i < 7; ++i) out->word[kDepthWord + i] = hn::BitCast(FaceIntTag(), plane[i]);
+}
+
+// Writes the records of the lanes in `keep`. Returns where the next one goes.
+HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, DrawnFace* out) {
+  const FaceIntTag di;
+  constexpr int kPieces = kWords / 4;
+  HWY_ALIGN std::int32_t piece[kPieces][4 * kMostFaceLanes];
+  for (int p = 0; p < kPieces; ++p) {
+    const FaceInt* w = words.word + 4 * p;
+    hn::StoreInterleaved4(w[0], w[1], w[2], w[3], di, piece[p]);
+  }
+  for (; keep != 0; keep &= keep - 1, ++out) {
+    const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(keep);
+    auto* bytes = reinterpret_cast<char*>(out);
+    for (int p = 0; p < kPieces; ++p) std::memcpy(bytes + 16 * p, piece[p] + 4 * lane, 16);
+  }
+  return out;
+}
+
+HWY_INLINE std::uint32_t MaskBits(FaceIntMask mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(FaceIntTag(), mask, bytes);
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+// What the shapes of a vector of faces say.
+struct ShapeLanes {
+  SnappedLanes corners;
+  RangeLanes x, y;
+  FaceInt area;  // where small
+  FaceIntMask small;
+};
+
+HWY_INLINE ShapeLanes ShapesOf(const CornerLanes& c) {
+  ShapeLanes out;
+  for (int k = 0; k < 3; ++k) {
+    out.corners.x[k] = SnapLanes(c.x[k]), out.corners.y[k] = SnapLanes(c.y[k]);
+  }
+  out.x = RangeOf(out.corners.x), out.y = RangeOf(out.corners.y);
+  out.small = hn::And(IsSmall(out.x), IsSmall(out.y));
+  out.area = AreaLanes(out.corners);
+  return out;
+}
+
+// Sets reject[0] to reject[count - 1], of face f and those behind it. Returns bits of those that
+// are drawn.
+HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& shapes,
+                                      bool cull_back, std::size_t f, std::size_t count,
+                                      std::uint8_t* reject) {
+  const FaceIntTag di;
+  const std::uint32_t small = MaskBits(shapes.small);
+  const std::uint32_t flat = MaskBits(hn::Eq(shapes.area, hn::Zero(di)));
+  const std::uint32_t back = cull_back ? MaskBits(hn::Gt(shapes.area, hn::Zero(di))) : 0;
+  std::uint32_t drawn = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (reject[i] == kFaceDrawn) {
+      const auto shape = static_cast<std::uint8_t>((flat >> i & 1) * kFaceDegenerate |
+                                                   (back >> i & 1) * kFaceCulled);
+      reject[i] = (small >> i & 1) != 0 ? shape : ShapeReject(SnapFace(mesh, f + i), cull_back);
+    }
+    drawn |= static_cast<std::uint32_t>(reject[i] == kFaceDrawn) << i;
+  }
+  return drawn;
+}
+
+HWY_INLINE FaceWords WordsOf(const CornerLanes& corners, ShapeLanes* shapes, std::size_t f,
+                             const PixelLanes& columns, const PixelLanes& rows) {
+  const FaceIntTag di;
+  FaceWords words;
+  words.word[0] = hn::Iota(di, static_cast<std::int32_t>(f));
+  words.word[1] = hn::VecFromMask(di, shapes->small);
+  words.word[2] = hn::Or(columns.begin, hn::ShiftLeft<16>(columns.end));
+  words.word[3] = hn::Or(rows.begin, hn::ShiftLeft<16>(rows.end));
+  WindClockwise(shapes->area, &shapes->corners);
+  SetEdges(shapes->corners, columns.begin, rows.begin, &words);
+  SetDepth(corners, &words);
+  return words;
+}
+
+// `out` null, or room for all faces. Returns how many were written.
+std::size_t SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::uint8_t* reject,
+                       DrawnFace* out) {
+  const FaceIntTag di;
+  const std::size_t lanes = hn::Lanes(di), n = mesh.faces();
+  DrawnFace* to = out;
+  for (std::size_t f = 0; f < n; f += lanes) {
+    const std::size_t count = HWY_MIN(lanes, n - f);
+    const CornerLanes corners = GatherCorners(mesh, LoadFaceVertices(mesh, f, count));
+    ShapeLanes shapes = ShapesOf(corners);
+    const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);
+    if (out == nullptr || drawn == 0) continue;
+    const PixelLanes columns = PixelsOf(shapes.x, mesh.width),
+                     rows = PixelsOf(shapes.y, mesh.height);
+    const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
+    const std::uint32_t keep = drawn & MaskBits(covers);
+    if (keep != 0) to = StoreRecords(WordsOf(corners, &shapes, f, columns, rows), keep, to);
+  }
+  return static_cast<std::size_t>(to - out);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::raster
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What drawing needs of every face, set up once per image: shape, box, edge functions, depth.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/aligned.h"
+#include "raster/face_plane.h"
+#include "raster/screen_mesh.h"
+
+namespace tilegrad::raster {
+
+// Faces up to this wide and high are small: relative to a pixel centre within the face's box, the
+// products of their exact edge functions fit into 32 bits.
+inline constexpr std::int32_t kSmallExtent = 30 * 1024;  // subpixels
+
+// A face that has a pixel centre of the image in its box. Edge k at pixel (column, row) is
+// edge[k] + step_x[k] * (column - column_begin) + step_y[k] * (row - row_begin), and the pixel is
+// covered if none is negative: the exact edge functions, divided by kSubpixels and rounded down,
+// which keeps their sign because a step of one pixel is a multiple of kSubpixels.
+struct DrawnFace {
+  std::int32_t face;   // index into the ScreenMesh
+  std::int32_t small;  // 0: edge and steps are not set (TileFaceSetup makes them per tile)
+  std::int16_t column_begin, column_end, row_begin, row_end;  // pixels, within the image
+  std::int32_t edge[3], step_x[3], step_y[3];
+  DepthPlane<float> depth;
+};
+static_assert(sizeof(DrawnFace) == 80);
+
+// Memory of a list that is reused from frame to frame: grows to the largest mesh seen.
+struct DrawnFaces {
+  AlignedVector<DrawnFace> storage;
+  std::size_t count = 0;
+
+  std::span<const DrawnFace> faces() const { return {storage.data(), count}; }  // face ascends
+};
+
+// Sets the bits of `reject` [F] that follow from the shape on the screen (degenerate, culled);
+// bits that are set on entry stay, and such faces are not looked at. Where `out` is not null, lists
+// the faces that are drawn and may cover a pixel of the image.
+void SetUpDrawnFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
+                     DrawnFaces* out);
+
+}  // namespace tilegrad::raster
