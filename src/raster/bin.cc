@@ -9,6 +9,8 @@
 #include "raster/bin-inl.h"
 
 #if HWY_ONCE
+#include <numeric>
+
 namespace tilegrad::raster {
 namespace {
 
@@ -45,14 +47,20 @@ TileLists SortIntoTiles(const TileGrid& grid, TileListBuffers* buffers) {
 
 TileLists BinDrawnFaces(std::span<const DrawnFace> faces, const TileGrid& grid,
                         TileListBuffers* buffers) {
-  constexpr int kUp = kTileSize - 1;
+  if (grid.tiles() == 1) {
+    buffers->begin = {0, static_cast<std::int32_t>(faces.size())};
+    buffers->faces.resize(faces.size());
+    std::iota(buffers->faces.begin(), buffers->faces.end(), 0);
+    return buffers->View();
+  }
+  const int up = (1 << grid.bits) - 1;
   buffers->ranges.resize(faces.size());
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const DrawnFace& f = faces[i];
-    buffers->ranges[i] = {static_cast<std::int16_t>(f.column_begin >> kTileBits),
-                          static_cast<std::int16_t>((f.column_end + kUp) >> kTileBits),
-                          static_cast<std::int16_t>(f.row_begin >> kTileBits),
-                          static_cast<std::int16_t>((f.row_end + kUp) >> kTileBits)};
+    buffers->ranges[i] = {static_cast<std::int16_t>(f.column_begin >> grid.bits),
+                          static_cast<std::int16_t>((f.column_end + up) >> grid.bits),
+                          static_cast<std::int16_t>(f.row_begin >> grid.bits),
+                          static_cast<std::int16_t>((f.row_end + up) >> grid.bits)};
   }
   return SortIntoTiles(grid, buffers);
 }

@@ -32,22 +32,30 @@ struct TileLists {
 // The tiles of one image, row by row; the last column and row may be narrower.
 struct TileGrid {
   int width = 0, height = 0;  // pixels
+  int bits = kTileBits;       // a tile is 1 << bits pixels wide and high
   int columns = 0, rows = 0;  // tiles
 
   TileGrid() = default;
-  TileGrid(int w, int h)
+  TileGrid(int w, int h, int tile_bits = kTileBits)
       : width(w),
         height(h),
-        columns((w + kTileSize - 1) / kTileSize),
-        rows((h + kTileSize - 1) / kTileSize) {}
+        bits(tile_bits),
+        columns((w + (1 << bits) - 1) >> bits),
+        rows((h + (1 << bits) - 1) >> bits) {}
   std::size_t tiles() const { return static_cast<std::size_t>(columns) * rows; }
   TileRect rect(std::size_t tile) const {
-    const int x0 = static_cast<int>(tile % columns) * kTileSize;
-    const int y0 = static_cast<int>(tile / columns) * kTileSize;
-    return {x0, y0, x0 + kTileSize < width ? x0 + kTileSize : width,
-            y0 + kTileSize < height ? y0 + kTileSize : height};
+    const int x0 = static_cast<int>(tile % columns) << bits, size = 1 << bits;
+    const int y0 = static_cast<int>(tile / columns) << bits;
+    return {x0, y0, x0 + size < width ? x0 + size : width, y0 + size < height ? y0 + size : height};
+  }
+  // The tile that pixel (x, y) lies in.
+  std::size_t tile(int x, int y) const {
+    return static_cast<std::size_t>(y >> bits) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(x >> bits);
   }
 };
+// Faces are drawn by bins.
+inline TileGrid BinGrid(int width, int height) { return {width, height, kBinBits}; }
 
 // Tiles [column_begin, column_end) x [row_begin, row_end) of a face.
 struct TileRange {
@@ -73,7 +81,8 @@ TileLists BinDrawnFaces(std::span<const DrawnFace> faces, const TileGrid& grid,
                         TileListBuffers* buffers);
 
 // Lists every face that takes part in the soft mask (drawn, culled or degenerate) for each tile
-// that has a pixel centre within `margin_x`, `margin_y` (pixels, >= 0, may be infinite) of its box.
+// (of kTileSize) that has a pixel centre within `margin_x`, `margin_y` (pixels, >= 0, may be
+// infinite) of its box.
 TileLists BinSoftFaces(const ScreenMesh& mesh, const TileGrid& grid, float margin_x, float margin_y,
                        TileListBuffers* buffers);
 

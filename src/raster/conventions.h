@@ -72,7 +72,9 @@ inline constexpr int kSubpixelBits = 10;  // coverage: 1/1024 pixel
 inline constexpr std::int64_t kSubpixels = std::int64_t{1} << kSubpixelBits;
 inline constexpr int kTileBits = 4;
 inline constexpr int kTileSize = 1 << kTileBits;  // pixels; the unit of work
-inline constexpr int kMaxImageSize = 16384;       // pixels, each axis
+inline constexpr int kBinBits = 6;
+inline constexpr int kBinSize = 1 << kBinBits;  // pixels; faces are drawn by bins, of 4 x 4 tiles
+inline constexpr int kMaxImageSize = 16384;     // pixels, each axis
 // Coordinates up to here give edge functions that step through a tile in 32 bits (see coverage.h);
 // every vertex on the largest image is inside.
 inline constexpr float kGuardBand = 16384.0f;  // pixels

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What visibility needs of one face within one tile. Scalar, exact where coverage is decided.
+// What visibility needs of one large face within one tile. Scalar, exact where coverage is decided.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +16,9 @@ namespace tilegrad::raster {
 // the exact edge functions, divided by kSubpixels and rounded down, which keeps their sign because
 // a step of one pixel is a multiple of kSubpixels.
 struct TileFaceSetup {
-  std::int32_t face;
   bool guarded;  // else edge and steps are not set
   std::int32_t edge[3], step_x[3], step_y[3];
   int column_begin, column_end, row_begin, row_end;  // the box, clipped to the tile
-  DepthPlane<float> depth;
 
   bool CoversTile() const {
     for (int k = 0; k < 3; ++k) {
@@ -32,12 +30,7 @@ struct TileFaceSetup {
   }
 };
 
-// Returns false if the face's box holds no pixel centre of the tile.
-bool SetUpTileFace(const ScreenMesh& mesh, std::int32_t face, const TileRect& rect,
-                   TileFaceSetup* out);
-
-// The slow way, in 128 bits, for faces that leave the guard band.
-void DrawUnguarded(const ScreenMesh& mesh, const TileFaceSetup& face, const TileRect& rect,
-                   VisibilityTile* out);
+// `shape` wound clockwise. Returns false if the face's box holds no pixel centre of the tile.
+bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out);
 
 }  // namespace tilegrad::raster

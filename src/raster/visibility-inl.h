@@ -50,32 +50,36 @@ HWY_INLINE EdgeRows<DI> RowsFrom(DI di, const Face& from, int column, int row) {
   return out;
 }
 
-// Rows [begin, end) of the tile, one vector of columns from `column` on.
-struct TileRows {
+// What is drawn of a face: rows [begin, end), one vector of columns from `column` on. Counted from
+// pixel (x0, y0), where the arrays begin.
+struct DrawnRows {
   int column, begin, end;
+  int x0, y0;
+  std::int32_t* face;
+  float* inverse_depth;
 };
 
 // Mul and Add are kept apart (no fused MulAdd): the same bits on every instruction set.
-template <class D, class Rows>
-HWY_INLINE void DrawRows(D d, Rows edges, const DepthPlane<float>& plane, std::int32_t face,
-                         const TileRows& rows, const TileRect& rect, VisibilityTile* out) {
+template <class D, class Edges>
+HWY_INLINE void DrawRows(D d, Edges edges, const DrawnFace& face, const DrawnRows& rows) {
   const hn::RebindToSigned<D> di;
+  const DepthPlane<float>& plane = face.depth;
   const auto half = hn::Set(d, 0.5f);
-  const auto column = hn::Add(hn::Iota(di, 0), hn::Set(di, rect.x0 + rows.column));
+  const auto column = hn::Add(hn::Iota(di, 0), hn::Set(di, rows.x0 + rows.column));
   const auto px = hn::Add(hn::ConvertTo(d, column), half);
   const auto dx = hn::Mul(hn::Set(d, plane.gx), hn::Sub(px, hn::Set(d, plane.x0)));
   const auto y0 = hn::Set(d, plane.y0), gy = hn::Set(d, plane.gy), base = hn::Set(d, plane.base);
   const auto low = hn::Set(d, plane.low), high = hn::Set(d, plane.high);
-  const auto id = hn::Set(di, face);
-  auto py = hn::Set(d, static_cast<float>(rect.y0 + rows.begin) + 0.5f);
+  const auto id = hn::Set(di, face.face);
+  auto py = hn::Set(d, static_cast<float>(rows.y0 + rows.begin) + 0.5f);
   for (int i = rows.begin; i < rows.end; ++i) {
     const auto inside = edges.Inside(di);
     edges.Step();
     const auto dy = hn::Mul(gy, hn::Sub(py, y0));
     py = hn::Add(py, hn::Set(d, 1.0f));
     const auto z = hn::Min(hn::Max(hn::Add(base, hn::Add(dx, dy)), low), high);
-    float* nearest = out->inverse_depth + i * kTileSize + rows.column;
-    std::int32_t* ids = out->face + i * kTileSize + rows.column;
+    float* nearest = rows.inverse_depth + i * kBinSize + rows.column;
+    std::int32_t* ids = rows.face + i * kBinSize + rows.column;
     const auto old = hn::LoadU(d, nearest);
     const auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
     hn::StoreU(hn::IfThenElse(seen, z, old), d, nearest);
@@ -83,8 +87,8 @@ HWY_INLINE void DrawRows(D d, Rows edges, const DepthPlane<float>& plane, std::i
   }
 }
 
-// A face's box within a tile: columns [x0, x1), rows [y0, y1).
-HWY_INLINE TileRect BoxInTile(const DrawnFace& face, const TileRect& rect) {
+// A face's box within a bin: columns [x0, x1), rows [y0, y1).
+HWY_INLINE TileRect BoxIn(const TileRect& rect, const DrawnFace& face) {
   return {HWY_MAX(face.column_begin - rect.x0, 0), HWY_MAX(face.row_begin - rect.y0, 0),
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
@@ -94,72 +98,126 @@ HWY_INLINE TileRect BoxInTile(const DrawnFace& face, const TileRect& rect) {
 inline constexpr int kStamp = 4;
 
 HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& box, const TileRect& rect,
-                          VisibilityTile* out) {
+                          VisibilityBin* out) {
   const hn::FixedTag<float, kStamp> d;
   const hn::RebindToSigned<decltype(d)> di;
-  const int column = HWY_MIN(box.x0, kTileSize - kStamp), row = HWY_MIN(box.y0, kTileSize - kStamp);
+  const int column = HWY_MIN(box.x0, kBinSize - kStamp), row = HWY_MIN(box.y0, kBinSize - kStamp);
   const auto edges =
       RowsFrom(di, face, rect.x0 + column - face.column_begin, rect.y0 + row - face.row_begin);
-  DrawRows(d, edges, face.depth, face.face, {column, row, row + kStamp}, rect, out);
+  DrawRows(d, edges, face,
+           {column, row, row + kStamp, rect.x0, rect.y0, out->face, out->inverse_depth});
 }
 
 // No overflow in the edge functions: they are below 2^21 in a small face's box, and steps are up to
 // 2^15.
-HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, VisibilityTile* out) {
+HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, VisibilityBin* out) {
   const VisibilityTag d;
   const VisibilityIntTag di;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  const TileRect box = BoxInTile(face, rect);
+  const TileRect box = BoxIn(rect, face);
   if (box.x1 - box.x0 <= kStamp && box.y1 - box.y0 <= kStamp) {
     DrawStamp(face, box, rect, out);
     return;
   }
-  for (int at = HWY_MIN(box.x0, kTileSize - lanes); at < box.x1; at += lanes) {
-    const int column = HWY_MIN(at, kTileSize - lanes);
+  for (int at = HWY_MIN(box.x0, kBinSize - lanes); at < box.x1; at += lanes) {
+    const int column = HWY_MIN(at, kBinSize - lanes);
     const auto edges =
         RowsFrom(di, face, rect.x0 + column - face.column_begin, rect.y0 + box.y0 - face.row_begin);
-    DrawRows(d, edges, face.depth, face.face, {column, box.y0, box.y1}, rect, out);
+    DrawRows(d, edges, face,
+             {column, box.y0, box.y1, rect.x0, rect.y0, out->face, out->inverse_depth});
   }
 }
 
-HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const TileFaceSetup& face, const TileRect& rect,
-                          VisibilityTile* out) {
+// The slow way, in 128 bits, for faces that leave the guard band.
+HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
+                              const TileFaceSetup& tile, const DrawnRows& at) {
+  for (int i = tile.row_begin; i < tile.row_end; ++i) {
+    for (int j = tile.column_begin; j < tile.column_end; ++j) {
+      const int column = at.x0 + j, row = at.y0 + i, pixel = i * kBinSize + j;
+      if (!Covers(shape, column, row)) continue;
+      const float z =
+          face.depth.At(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
+      if (!(z > at.inverse_depth[pixel])) continue;
+      at.inverse_depth[pixel] = z, at.face[pixel] = face.face;
+    }
+  }
+}
+
+// A large face in one tile of a bin, whose arrays `rows` begins. Returns whether it covers all of
+// it.
+HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const TileRect& tile,
+                         DrawnRows rows) {
   const VisibilityTag d;
   const VisibilityIntTag di;
+  TileFaceSetup setup;
+  if (!SetUpTileFace(shape, tile, &setup)) return false;
+  if (!setup.guarded) {
+    DrawUnguarded(shape, face, setup, rows);
+    return false;
+  }
   const int lanes = static_cast<int>(hn::Lanes(d));
-  if (!face.guarded) {
-    DrawUnguarded(mesh, face, rect, out);
-    return;
+  rows.begin = setup.row_begin, rows.end = setup.row_end;
+  for (int at = HWY_MIN(setup.column_begin, kTileSize - lanes); at < setup.column_end;
+       at += lanes) {
+    rows.column = HWY_MIN(at, kTileSize - lanes);
+    DrawRows(d, RowsFrom(di, setup, rows.column, rows.begin), face, rows);
   }
-  for (int at = HWY_MIN(face.column_begin, kTileSize - lanes); at < face.column_end; at += lanes) {
-    const int column = HWY_MIN(at, kTileSize - lanes);
-    DrawRows(d, RowsFrom(di, face, column, face.row_begin), face.depth, face.face,
-             {column, face.row_begin, face.row_end}, rect, out);
-  }
+  return setup.CoversTile();
 }
 
-// `floor`: every pixel of the tile is at least this near. A face that covers the whole tile raises
-// it; what lies behind is rejected unseen.
-void DrawFaces(const ScreenMesh& mesh, const TileDrawList& list, const TileRect& rect,
-               VisibilityTile* out) {
-  constexpr std::size_t kAhead = 4;  // records lie in the order of the mesh, not of the tile
-  float floor = 0;
+// How near every pixel of a tile is at least. A large face that covers the tile raises it; what
+// lies behind is rejected unseen.
+struct DepthFloors {
+  float tile[kBinSize / kTileSize][kBinSize / kTileSize] = {};
+  float bin = 0;  // the least
+
+  HWY_INLINE void Update() {
+    bin = tile[0][0];
+    for (const auto& row : tile) {
+      for (const float floor : row) bin = HWY_MIN(bin, floor);
+    }
+  }
+};
+
+// Large faces go tile by tile: their exact edge functions step through a tile in 32 bits.
+HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const TileRect& rect,
+                          DepthFloors* floors, VisibilityBin* out) {
+  const SnappedFace shape = SnapFaceClockwise(mesh, static_cast<std::size_t>(face.face));
+  const TileRect box = BoxIn(rect, face);
+  for (int y = box.y0 >> kTileBits; y << kTileBits < box.y1; ++y) {
+    for (int x = box.x0 >> kTileBits; x << kTileBits < box.x1; ++x) {
+      float& floor = floors->tile[y][x];
+      if (face.depth.high <= floor) continue;
+      const int x0 = rect.x0 + (x << kTileBits), y0 = rect.y0 + (y << kTileBits);
+      const TileRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
+                          HWY_MIN(y0 + kTileSize, rect.y1)};
+      const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
+      if (DrawTile(shape, face, tile,
+                   {0, 0, 0, x0, y0, out->face + first, out->inverse_depth + first})) {
+        floor = HWY_MAX(floor, face.depth.low);
+      }
+    }
+  }
+  floors->Update();
+}
+
+void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+               VisibilityBin* out) {
+  constexpr std::size_t kAhead = 4;  // records lie in the order of the mesh, not of the bin
+  DepthFloors floors;
   for (std::size_t i = 0; i < list.indices.size(); ++i) {
     const auto record = [&](std::size_t at) -> const DrawnFace& {
       return list.faces[static_cast<std::size_t>(list.indices[at])];
     };
     const DrawnFace& ahead = record(HWY_MIN(i + kAhead, list.indices.size() - 1));
     hwy::Prefetch(&ahead), hwy::Prefetch(&ahead.depth.high);
-    const DrawnFace& drawn = record(i);
-    if (drawn.depth.high <= floor) continue;
-    if (drawn.small != 0) {
-      DrawSmall(drawn, rect, out);
-      continue;
+    const DrawnFace& face = record(i);
+    if (face.depth.high <= floors.bin) continue;
+    if (face.small != 0) {
+      DrawSmall(face, rect, out);
+    } else {
+      DrawLarge(mesh, face, rect, &floors, out);
     }
-    TileFaceSetup face;
-    if (!SetUpTileFace(mesh, drawn.face, rect, &face)) continue;
-    DrawLarge(mesh, face, rect, out);
-    if (face.guarded && face.CoversTile()) floor = HWY_MAX(floor, drawn.depth.low);
   }
 }
 

@@ -41,47 +41,37 @@ void SetUpEdges(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* o
 
 }  // namespace
 
-bool SetUpTileFace(const ScreenMesh& mesh, std::int32_t face, const TileRect& rect,
-                   TileFaceSetup* out) {
-  const auto f = static_cast<std::size_t>(face);
-  const SnappedFace shape = SnapFaceClockwise(mesh, f);
+bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out) {
   const auto [left, right] = std::minmax({shape.x[0], shape.x[1], shape.x[2]});
   const auto [top, bottom] = std::minmax({shape.y[0], shape.y[1], shape.y[2]});
   CentreRange(left, right, rect.x0, rect.x1, &out->column_begin, &out->column_end);
   CentreRange(top, bottom, rect.y0, rect.y1, &out->row_begin, &out->row_end);
   if (out->column_begin >= out->column_end || out->row_begin >= out->row_end) return false;
-  out->face = face;
   out->guarded = shape.guarded();
-  out->depth = MakeDepthPlane(mesh, f);
   if (out->guarded) SetUpEdges(shape, rect, out);
   return true;
 }
 
-void DrawUnguarded(const ScreenMesh& mesh, const TileFaceSetup& face, const TileRect& rect,
-                   VisibilityTile* out) {
-  const SnappedFace shape = SnapFaceClockwise(mesh, static_cast<std::size_t>(face.face));
-  for (int i = face.row_begin; i < face.row_end; ++i) {
-    for (int j = face.column_begin; j < face.column_end; ++j) {
-      const int column = rect.x0 + j, row = rect.y0 + i, pixel = i * kTileSize + j;
-      if (!Covers(shape, column, row)) continue;
-      const float z =
-          face.depth.At(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
-      if (!(z > out->inverse_depth[pixel])) continue;
-      out->inverse_depth[pixel] = z, out->face[pixel] = face.face;
-    }
-  }
+void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                       VisibilityBin* out) {
+  const int pixels = (rect.y1 - rect.y0) * kBinSize;
+  std::fill(out->face, out->face + pixels, kNoFace);
+  std::fill(out->inverse_depth, out->inverse_depth + pixels, 0.0f);
+  if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, out);
 }
 
-void ComputeVisibility(const ScreenMesh& mesh, const TileDrawList& list, const TileRect& rect,
-                       VisibilityTile* out) {
-  std::fill(out->face, out->face + kTilePixels, kNoFace);
-  std::fill(out->inverse_depth, out->inverse_depth + kTilePixels, 0.0f);
-  if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, out);
-  // Vectors reach beyond the image where the tile is narrower; what they saw there is nothing.
-  for (int i = 0; i < kTileSize && rect.x1 - rect.x0 < kTileSize; ++i) {
-    const int from = i * kTileSize + rect.x1 - rect.x0, to = (i + 1) * kTileSize;
-    std::fill(out->face + from, out->face + to, kNoFace);
-    std::fill(out->inverse_depth + from, out->inverse_depth + to, 0.0f);
+void CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out) {
+  constexpr int kInBin = kBinSize - 1;
+  const int columns = tile.x1 - tile.x0, rows = tile.y1 - tile.y0;
+  if (columns < kTileSize || rows < kTileSize) {
+    std::fill(out->face, out->face + kTilePixels, kNoFace);
+    std::fill(out->inverse_depth, out->inverse_depth + kTilePixels, 0.0f);
+  }
+  for (int i = 0; i < rows; ++i) {
+    const int from = ((tile.y0 & kInBin) + i) * kBinSize + (tile.x0 & kInBin), to = i * kTileSize;
+    std::copy(bin.face + from, bin.face + from + columns, out->face + to);
+    std::copy(bin.inverse_depth + from, bin.inverse_depth + from + columns,
+              out->inverse_depth + to);
   }
 }
 

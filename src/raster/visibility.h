@@ -18,15 +18,24 @@ struct VisibilityTile {
   alignas(128) float inverse_depth[kTilePixels];  // 1/depth; 0 at background
 };
 
-// The drawn faces of a mesh that may cover a tile.
-struct TileDrawList {
+// Pixel arrays of one bin, rows of kBinSize. Beyond the image they hold anything.
+struct VisibilityBin {
+  alignas(128) std::int32_t face[kBinSize * kBinSize];
+  alignas(128) float inverse_depth[kBinSize * kBinSize];
+};
+
+// The drawn faces of a mesh that may cover a bin.
+struct BinDrawList {
   std::span<const DrawnFace> faces;       // of the image
   std::span<const std::int32_t> indices;  // into them, ascending
 };
 
-// The result does not depend on the instruction set: the same bits as VisibilityRef<float>
-// everywhere.
-void ComputeVisibility(const ScreenMesh& mesh, const TileDrawList& list, const TileRect& rect,
-                       VisibilityTile* out);
+// Draws a bin: `rect` of BinGrid. The result does not depend on the instruction set: the same bits
+// as VisibilityRef<float> everywhere.
+void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                       VisibilityBin* out);
+
+// A tile of the bin; background beyond the image.
+void CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out);
 
 }  // namespace tilegrad::raster

@@ -64,6 +64,7 @@ struct TileGradients {
 };
 
 struct WorkerScratch {
+  raster::VisibilityBin bin;
   raster::VisibilityTile visibility;
   raster::TileFaces faces;
   raster::TilePlanes planes;

@@ -60,7 +60,9 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
   image->mesh = image->buffers.View();
   const raster::TileGrid grid(options.width, options.height);
   if (request.drawn_bins) {
-    image->drawn = raster::BinDrawnFaces(image->drawn_faces.faces(), grid, &image->drawn_buffers);
+    image->drawn = raster::BinDrawnFaces(image->drawn_faces.faces(),
+                                         raster::BinGrid(options.width, options.height),
+                                         &image->drawn_buffers);
   }
   if (request.soft_bins) {
     image->soft_plan =

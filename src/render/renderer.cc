@@ -26,10 +26,9 @@ struct Renderer::Impl {
     });
   }
 
-  // Calls run(task, worker) for all tiles of all images together.
+  // Calls run(task, worker) for all tiles of `grid` of all images together.
   template <class Run>
-  void ForTiles(std::size_t count, const RenderOptions& options, const Run& run) {
-    const raster::TileGrid grid(options.width, options.height);
+  void ForTiles(std::size_t count, const raster::TileGrid& grid, const Run& run) {
     workers->For(count * grid.tiles(), [&](std::size_t index, std::size_t worker) {
       const std::size_t tile = index % grid.tiles();
       run(TileTask{index / grid.tiles(), tile, grid.rect(tile)}, worker);
@@ -43,7 +42,7 @@ struct Renderer::Impl {
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
   std::vector<TileGradients> tile_gradients;  // [image][tile]
-  std::vector<double> tile_errors;            // of alpha, [image][tile]
+  std::vector<double> bin_errors;             // of alpha, [image][bin]
 };
 
 void Renderer::Impl::Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
@@ -69,15 +68,15 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateScenes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
-  impl_->tile_errors.assign(scenes.size() * tiles, 0.0);
+  const raster::TileGrid bins = raster::BinGrid(options.width, options.height);
+  impl_->bin_errors.assign(scenes.size() * bins.tiles(), 0.0);
   impl_->Prepare(scenes, options, {true, request.alpha, false});
-  impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
-    impl_->tile_errors[task.image * tiles + task.tile] =
-        RenderTile(scenes[task.image], options, impl_->images[task.image], task,
-                   &impl_->worker_scratch[worker], frame);
+  impl_->ForTiles(scenes.size(), bins, [&](const TileTask& task, std::size_t worker) {
+    impl_->bin_errors[task.image * bins.tiles() + task.tile] =
+        RenderBin(scenes[task.image], options, impl_->images[task.image], task,
+                  &impl_->worker_scratch[worker], frame);
   });
-  for (const double error : impl_->tile_errors) {
+  for (const double error : impl_->bin_errors) {
     frame->alpha_error_bound = std::max(frame->alpha_error_bound, error);
   }
   return {};
@@ -89,9 +88,10 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
   TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
   impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true});
   for (WorkerScratch& worker : impl_->worker_scratch) worker.ClearGradients();
-  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
+  const raster::TileGrid grid(options.width, options.height);
+  const std::size_t tiles = grid.tiles();
   impl_->tile_gradients.resize(scenes.size() * tiles);
-  impl_->ForTiles(scenes.size(), options, [&](const TileTask& task, std::size_t worker) {
+  impl_->ForTiles(scenes.size(), grid, [&](const TileTask& task, std::size_t worker) {
     const SceneGradients& wanted = d_scenes[task.image];
     const BackwardRequest request{!wanted.positions.empty() || wanted.camera,
                                   !wanted.attributes.empty()};

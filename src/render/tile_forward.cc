@@ -82,16 +82,14 @@ void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
   }
 }
 
-}  // namespace
-
+// A tile of a bin that is drawn.
 double RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
                   const TileTask& task, WorkerScratch* worker, Frame* frame) {
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
   raster::VisibilityTile& seen = worker->visibility;
-  raster::ComputeVisibility(image.mesh, {image.drawn_faces.faces(), image.drawn[task.tile]},
-                            task.rect, &seen);
+  raster::CopyTile(worker->bin, task.rect, &seen);
   WriteFaceIds(image.mesh, task.rect, seen.face, part.plane(frame->face_ids, 1));
   if (float* depth = part.plane(frame->depth, 1)) {
     WriteDepth(task.rect, options.width, seen.inverse_depth, depth);
@@ -105,6 +103,24 @@ double RenderTile(const SceneView& scene, const RenderOptions& options, const Im
       image.mesh, image.soft_plan,
       SoftTileOf(image, task, {part.plane(frame->face_ids, 1), part.pixels}), {alpha, part.pixels},
       &worker->soft);
+}
+
+}  // namespace
+
+double RenderBin(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
+                 const TileTask& task, WorkerScratch* worker, Frame* frame) {
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.faces(), image.drawn[task.tile]},
+                            task.rect, &worker->bin);
+  const raster::TileGrid tiles(options.width, options.height);
+  double spent = 0;
+  for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
+    for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
+      const std::size_t tile = tiles.tile(x, y);
+      spent = std::max(spent, RenderTile(scene, options, image,
+                                         {task.image, tile, tiles.rect(tile)}, worker, frame));
+    }
+  }
+  return spent;
 }
 
 }  // namespace tilegrad

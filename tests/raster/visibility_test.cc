@@ -59,21 +59,26 @@ DrawnFaces DrawnFacesOf(const ScreenMesh& mesh) {
   return out;
 }
 
-// Faces of a whole image, by tiles.
+// Faces of a whole image, by bins and tiles.
 std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
-  const TileGrid grid(mesh.width, mesh.height);
+  const TileGrid bins = BinGrid(mesh.width, mesh.height), tiles(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
-  const TileLists bins = BinDrawnFaces(drawn.faces(), grid, &buffers);
+  const TileLists lists = BinDrawnFaces(drawn.faces(), bins, &buffers);
   std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
-  for (std::size_t t = 0; t < grid.tiles(); ++t) {
-    VisibilityTile tile;
-    const TileRect rect = grid.rect(t);
-    ComputeVisibility(mesh, {drawn.faces(), bins[t]}, rect, &tile);
-    for (int i = rect.y0; i < rect.y1; ++i) {
-      for (int j = rect.x0; j < rect.x1; ++j) {
-        out[static_cast<std::size_t>(i) * mesh.width + j] =
-            tile.face[(i - rect.y0) * kTileSize + j - rect.x0];
+  VisibilityBin bin;
+  for (std::size_t b = 0; b < bins.tiles(); ++b) {
+    ComputeVisibility(mesh, {drawn.faces(), lists[b]}, bins.rect(b), &bin);
+    for (std::size_t t = 0; t < tiles.tiles(); ++t) {
+      const TileRect rect = tiles.rect(t);
+      if (bins.tile(rect.x0, rect.y0) != b) continue;
+      VisibilityTile tile;
+      CopyTile(bin, rect, &tile);
+      for (int i = rect.y0; i < rect.y1; ++i) {
+        for (int j = rect.x0; j < rect.x1; ++j) {
+          out[static_cast<std::size_t>(i) * mesh.width + j] =
+              tile.face[(i - rect.y0) * kTileSize + j - rect.x0];
+        }
       }
     }
   }
