@@ -33,10 +33,22 @@ std::vector<float> RotatedPositions(const Mesh& mesh, Rng* rng) {
   return out;
 }
 
+Mesh MakeMesh(const SceneSpec& spec) {
+  Mesh mesh = Icosphere(spec.level, 0.5f);
+  if (!spec.displaced) return mesh;
+  for (glm::vec3& p : mesh.positions) {
+    const glm::dvec3 unit = 2.0 * glm::dvec3(p);
+    const double bump =
+        std::sin(11 * unit.x) * std::sin(9 * unit.y + 1) * std::sin(10 * unit.z + 2);
+    p = glm::vec3((1 + 0.15 * bump) * glm::dvec3(p));
+  }
+  return mesh;
+}
+
 }  // namespace
 
 BenchBatch::BenchBatch(const SceneSpec& spec) {
-  const Mesh sphere = Icosphere(spec.level, 0.5f);
+  const Mesh sphere = MakeMesh(spec);
   Rng rng(1234);
   options.width = options.height = spec.size;
   options.interpolation = Interpolation::kScreenLinear;  // as the peers

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scenes that renderers are compared on: random rotations of an icosphere of radius 0.5, seen
-// with a field of view of 30 degrees from 2.732 away, random upstream gradients.
+// The scenes that renderers are compared on: random rotations of an icosphere of radius 0.5, smooth
+// or displaced by up to 15 %, seen with a field of view of 30 degrees from 2.732 away; random
+// upstream gradients.
 #pragma once
 
 #include <cstddef>
@@ -14,9 +15,13 @@ namespace tilegrad::bench {
 struct SceneSpec {
   const char* name;
   int images, size, level;  // icosphere level: 20 * 4^level faces
+  bool displaced = false;
 };
-inline constexpr SceneSpec kScenes[] = {
-    {"S1", 64, 64, 3}, {"S2", 8, 256, 3}, {"S3", 4, 256, 5}, {"Training", 128, 64, 3}};
+inline constexpr SceneSpec kScenes[] = {{"S1", 64, 64, 3},
+                                        {"S2", 8, 256, 3},
+                                        {"S3", 4, 256, 5},
+                                        {"S4", 1, 1024, 6, true},
+                                        {"Training", 128, 64, 3}};
 
 // A batch with everything that a forward and backward pass reads and writes.
 struct BenchBatch {
