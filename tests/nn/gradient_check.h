@@ -1,30 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives of functions of Vars held against central differences in double.
+// Derivatives of functions of Vars: in double against central differences, in float against double.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <vector>
 
 #include "base/rng.h"
+#include "nn/cases/cases.h"
 #include "nn/nn.h"
 
 namespace tilegrad::nn {
 
-using Inputs = std::vector<Var>;
-using Function = std::function<Var(const Inputs&)>;  // any shape
-
-inline Var RandomParameter(Context& context, const Shape& shape, Rng& rng, double low = -1.0,
-                           double high = 1.0) {
-  Tensor tensor = context.Empty(shape);
-  FillUniform(tensor, rng, low, high);
+// A parameter of an F64 context. Its numbers are floats, so that an F32 context can have the same.
+inline Var RandomParameter(Context& context, const InputSpec& spec, Rng& rng) {
+  Tensor tensor = context.Empty(spec.shape);
+  const auto values = tensor.span<double>();
+  if (spec.separated) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double middle = static_cast<double>(i) + 0.5;
+      values[i] = spec.low + (spec.high - spec.low) * middle / static_cast<double>(values.size());
+    }
+    for (std::size_t i = values.size(); i > 1; --i) std::swap(values[i - 1], values[rng.Below(i)]);
+  } else {
+    FillUniform(tensor, rng, spec.low, spec.high);
+  }
+  for (double& v : values) v = static_cast<double>(static_cast<float>(v));
   return Parameter(context, tensor);
 }
 
 inline Var RandomConstant(Context& context, const Shape& shape, Rng& rng) {
-  return Detach(RandomParameter(context, shape, rng));
+  return Detach(RandomParameter(context, {shape}, rng));
 }
 
 // The derivative of a scalar f at `inputs` along `direction`, by central differences of fourth
@@ -50,52 +59,122 @@ inline double Slope(const std::function<double(const Inputs&)>& f, const Inputs&
 inline double Dot(const std::vector<Var>& a, const std::vector<Var>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t k = 0; k < a[i].value().elements(); ++k) {
-      sum += a[i].value().data<double>()[k] * b[i].value().data<double>()[k];
-    }
+    const auto x = a[i].value().span<double>(), y = b[i].value().span<double>();
+    sum = std::inner_product(x.begin(), x.end(), y.begin(), sum);
   }
   return sum;
 }
 
-// First derivative of s(inputs) = sum weights f(inputs) and of |ds/dinputs|^2-like contractions of
-// it (which is what a gradient penalty differentiates), each along random directions. With h =
-// 1e-3, functions of scale 1 and directions of length about 1, the difference quotient is good to
-// about 1e-12 / 1e-3 (rounding) + 1e-12 f^(5) / 30 (truncation): 1e-8 relative leaves two digits.
-inline void CheckDerivatives(Context& context, const Function& f, const Inputs& inputs, Rng& rng,
-                             double tolerance = 1e-8) {
-  const Var shape_of = f(inputs);
-  ASSERT_TRUE(shape_of.valid()) << context.status().message();
-  const Var weights = RandomConstant(context, shape_of.shape(), rng);
-  const auto scalar = [&](const Inputs& x) { return Sum(Mul(weights, f(x))); };
-  Inputs direction, probe;
-  for (const Var& x : inputs) {
-    direction.push_back(RandomConstant(context, x.shape(), rng));
-    probe.push_back(RandomConstant(context, x.shape(), rng));
-  }
-  const auto gradient = Grad(scalar(inputs), inputs);
-  ASSERT_TRUE(context.status().ok()) << context.status().message();
-  const double first = Dot(gradient, direction);
-  const double first_slope =
-      Slope([&](const Inputs& x) { return scalar(x).item(); }, inputs, direction);
-  EXPECT_NEAR(first, first_slope, tolerance * (1.0 + std::abs(first))) << "first derivative";
+// What a case is examined at: its inputs, and the random numbers that make scalars of it.
+struct Leaves {
+  Inputs x;                 // the inputs
+  Inputs direction, probe;  // of their shapes
+  Inputs weights;           // one, of the output's shape
 
-  // t(inputs) = sum_i probe_i . g_i + |g_i|^2 / 2 with g the gradient, so dt mixes all second
-  // derivatives and those of third order rules that a graph of gradients records.
-  const auto contracted = [&](const Inputs& x) {
-    const auto g = Grad(scalar(x), x, {.create_graph = true});
-    Var t = Constant(context, 0.0);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      t = t + Sum(Mul(probe[i], g[i])) + 0.5 * Sum(Square(g[i]));
+  Inputs All() const {
+    Inputs all = x;
+    for (const Inputs* more : {&direction, &probe, &weights}) {
+      all.insert(all.end(), more->begin(), more->end());
     }
-    return t;
+    return all;
+  }
+};
+
+inline Var WeightedSum(const Inputs& a, const Inputs& b) {
+  Var sum = Sum(Mul(a[0], b[0]));
+  for (std::size_t i = 1; i < a.size(); ++i) sum = sum + Sum(Mul(a[i], b[i]));
+  return sum;
+}
+
+// The scalars that are compared. With g the gradient of s = weights . f(x):
+//   first  = direction . g
+//   t      = probe . g + |g|^2 / 2,  as a gradient penalty has it
+//   second = direction . dt/dx,      which mixes all second derivatives
+struct Derivatives {
+  Var s, first, t, second;
+};
+inline Derivatives Differentiate(const Function& f, const Leaves& at) {
+  Derivatives d;
+  d.s = WeightedSum(at.weights, {f(at.x)});
+  const Inputs g = Grad(d.s, at.x, {.create_graph = true});
+  d.first = WeightedSum(at.direction, g);
+  d.t = WeightedSum(at.probe, g) + 0.5 * WeightedSum(g, g);
+  d.second = WeightedSum(at.direction, Grad(d.t, at.x, {.create_graph = true}));
+  return d;
+}
+
+inline Leaves RandomLeaves(Context& context, const OpCase& c, Rng& rng) {
+  Leaves leaves;
+  for (const InputSpec& spec : c.inputs) {
+    leaves.x.push_back(RandomParameter(context, spec, rng));
+    leaves.direction.push_back(RandomParameter(context, {spec.shape}, rng));
+    leaves.probe.push_back(RandomParameter(context, {spec.shape}, rng));
+  }
+  const Var y = c.function(leaves.x);
+  if (y.valid()) leaves.weights.push_back(RandomParameter(context, {y.shape()}, rng));
+  return leaves;
+}
+
+// In double against differences. With h = 1e-3, functions of scale 1 and directions of length about
+// 1, the difference quotient is good to about 1e-12 / 1e-3 (rounding) + 1e-12 f^(5) / 30
+// (truncation): 1e-8 relative leaves two digits.
+inline void ExpectSlopes(const Function& f, const Leaves& at, const Derivatives& d,
+                         double tolerance = 1e-8) {
+  const auto along = [&](auto&& pick) {
+    const auto value = [&](const Inputs& x) {
+      Leaves moved = at;
+      moved.x = x;
+      return pick(Differentiate(f, moved)).item();
+    };
+    return Slope(value, at.x, at.direction);
   };
-  // Where f is linear the gradient is a constant without a graph, and its slope has to be zero.
-  const Var t = contracted(inputs);
-  const double second = t.requires_grad() ? Dot(Grad(t, inputs), direction) : 0.0;
-  ASSERT_TRUE(context.status().ok()) << context.status().message();
-  const double second_slope =
-      Slope([&](const Inputs& x) { return contracted(x).item(); }, inputs, direction);
-  EXPECT_NEAR(second, second_slope, tolerance * (1.0 + std::abs(second))) << "second derivative";
+  const double first = d.first.item(), second = d.second.item();
+  EXPECT_NEAR(first, along([](const Derivatives& e) { return e.s; }),
+              tolerance * (1.0 + std::abs(first)))
+      << "first derivative";
+  EXPECT_NEAR(second, along([](const Derivatives& e) { return e.t; }),
+              tolerance * (1.0 + std::abs(second)))
+      << "second derivative";
+}
+
+// How far a scalar moves, relative to the moves of the numbers it is computed from:
+// sum |d q / d leaf| |leaf|.
+inline double Condition(const Var& q, const Leaves& at) {
+  const Inputs all = at.All();
+  const Inputs d = Grad(q, all, {.keep_graph = true});
+  double sum = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto x = all[i].value().span<double>(), dx = d[i].value().span<double>();
+    for (std::size_t k = 0; k < x.size(); ++k) sum += std::abs(x[k] * dx[k]);
+  }
+  return sum;
+}
+
+inline Leaves InFloat(Context& context, const Leaves& leaves) {
+  const auto convert = [&](const Inputs& from) {
+    Inputs to;
+    for (const Var& v : from) {
+      to.push_back(Parameter(context, context.From(v.shape(), v.value().span<double>())));
+    }
+    return to;
+  };
+  return {convert(leaves.x), convert(leaves.direction), convert(leaves.probe),
+          convert(leaves.weights)};
+}
+
+// In float against double: where each number passes through n roundings, and none is enlarged by
+// cancellation of more than the inputs' own, the result is that of inputs moved by at most n u each
+// (u = 2^-24), hence off by n u Condition. A derivative reads two rounded numbers where the
+// function reads one, and rounds again as often: three times n for each order.
+inline void ExpectFloatAgrees(const OpCase& c, const Derivatives& want,
+                              const std::vector<double>& condition, const Derivatives& got) {
+  const double unit = c.roundings * 0x1.0p-24;
+  const auto near = [&](const Var& a, const Var& b, double bound) {
+    EXPECT_NEAR(a.item(), b.item(), bound);
+  };
+  near(got.s, want.s, unit * condition[0]);
+  near(got.first, want.first, 3 * unit * condition[1]);
+  near(got.second, want.second, 9 * unit * condition[2]);
 }
 
 }  // namespace tilegrad::nn

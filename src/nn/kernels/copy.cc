@@ -70,10 +70,39 @@ void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& worke
   });
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                               \
-  template void CopyStrided(const StridedBox&, const T*, T*, const Workers&); \
-  template void GatherRows(const IndexedRows&, const T*, T*, const Workers&); \
-  template void ScatterRows(const IndexedRows&, const T*, T*, const Workers&)
+template <class T>
+void TakeElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
+  workers.ForRanges(picked.outer, RowsPerTask(picked.count),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t o = begin; o < end; ++o) {
+                        const T* row = x + o * picked.extent;
+                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i) {
+                          y[i] = row[picked.indices[i]];
+                        }
+                      }
+                    });
+}
+
+template <class T>
+void PlaceElements(const PickedElements& picked, const T* x, T* y, const Workers& workers) {
+  workers.ForRanges(picked.outer, RowsPerTask(picked.extent),
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t o = begin; o < end; ++o) {
+                        T* row = y + o * picked.extent;
+                        std::fill_n(row, picked.extent, T(0));
+                        for (std::size_t i = o * picked.count; i < (o + 1) * picked.count; ++i) {
+                          row[picked.indices[i]] += x[i];
+                        }
+                      }
+                    });
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                    \
+  template void CopyStrided(const StridedBox&, const T*, T*, const Workers&);      \
+  template void GatherRows(const IndexedRows&, const T*, T*, const Workers&);      \
+  template void ScatterRows(const IndexedRows&, const T*, T*, const Workers&);     \
+  template void TakeElements(const PickedElements&, const T*, T*, const Workers&); \
+  template void PlaceElements(const PickedElements&, const T*, T*, const Workers&)
 TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);
 #undef TILEGRAD_INSTANTIATE

@@ -35,4 +35,17 @@ void GatherRows(const IndexedRows& rows, const T* x, T* y, const Workers& worker
 template <class T>
 void ScatterRows(const IndexedRows& rows, const T* x, T* y, const Workers& workers);
 
+// Elements picked along the last axis of [outer, extent], other ones for each row.
+struct PickedElements {
+  std::size_t outer = 1, extent = 1;
+  const std::int32_t* indices = nullptr;  // [outer, count], each in [0, extent)
+  std::size_t count = 0;
+};
+// y[o, i] = x[o, indices[o, i]]; y is [outer, count].
+template <class T>
+void TakeElements(const PickedElements& picked, const T* x, T* y, const Workers& workers);
+// y = 0, then y[o, indices[o, i]] += x[o, i] in the order of i; y is [outer, extent].
+template <class T>
+void PlaceElements(const PickedElements& picked, const T* x, T* y, const Workers& workers);
+
 }  // namespace tilegrad::nn

@@ -10,6 +10,9 @@
 
 #include <hwy/highway.h>
 
+#include <cmath>
+#include <limits>
+
 #include "nn/kernels/pointwise_ref.h"
 //
 #include <hwy/contrib/math/math-inl.h>
@@ -42,6 +45,45 @@ HWY_INLINE VF SafeTanh(DF d, VF x) {
   return hn::IfThenElse(hn::IsNaN(x), x, y);
 }
 
+HWY_INLINE VF SafeExpm1(DF d, VF x) {
+  const VF y = hn::IfThenElse(hn::Gt(x, hn::Set(d, kExpOverflow)), hn::Inf(d), hn::Expm1(d, x));
+  return hn::IfThenElse(hn::IsNaN(x), x, y);
+}
+HWY_INLINE VF Softplus(DF d, VF x) {
+  const VF y = hn::Log1p(d, SafeExp(d, hn::Neg(hn::Abs(x))));
+  return hn::IfThenElse(hn::IsNaN(x), x, hn::Add(hn::Max(x, hn::Zero(d)), y));
+}
+
+// |x|^p of half a vector, in double: exp(p log x) in float would lose a digit for each power of ten
+// of the result.
+HWY_INLINE hn::Vec<hn::Half<DF>> PowHalf(hn::Vec<hn::Half<DF>> x, double p) {
+  const hn::Repartition<double, DF> dd;
+  const auto exponent = hn::Mul(hn::Set(dd, p), hn::Log(dd, hn::PromoteTo(dd, x)));
+  // Beyond these the result is 0 or infinite in float; Exp is good to 706.
+  const auto low = hn::Set(dd, -200.0), high = hn::Set(dd, 200.0);
+  const auto y = hn::Exp(dd, hn::Min(hn::Max(exponent, low), high));
+  return hn::DemoteTo(hn::Half<DF>(), y);
+}
+
+// With the limits and signs of the C library.
+HWY_INLINE VF Pow(DF d, VF x, VF p) {
+  const hn::Half<DF> half;
+  const auto power = static_cast<double>(hn::GetLane(p));
+  const bool whole = power == std::floor(power);
+  const bool odd = whole && std::fmod(power, 2.0) != 0;
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f), inf = hn::Inf(d), a = hn::Abs(x);
+  const VF largest = hn::Set(d, std::numeric_limits<float>::max());
+  VF y = hn::Combine(d, PowHalf(hn::UpperHalf(half, a), power),
+                     PowHalf(hn::LowerHalf(half, a), power));
+  y = hn::IfThenElse(hn::Ge(y, largest), inf, y);  // some targets' DemoteTo saturates
+  y = hn::IfThenElse(hn::Eq(a, zero), power > 0 ? zero : inf, y);
+  y = hn::IfThenElse(hn::Eq(a, inf), power > 0 ? inf : zero, y);
+  if (odd) y = hn::CopySign(y, x);
+  if (!whole) y = hn::IfThenElse(hn::Lt(x, zero), hn::NaN(d), y);
+  y = hn::IfThenElse(hn::IsNaN(x), x, y);
+  return power == 0 ? one : y;
+}
+
 // kOp is a constant of each loop: the switch costs nothing.
 template <UnaryOp kOp>
 HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
@@ -55,12 +97,16 @@ HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
       return hn::Add(x, p);
     case UnaryOp::kExp:
       return SafeExp(d, x);
+    case UnaryOp::kExpm1:
+      return SafeExpm1(d, x);
     case UnaryOp::kLog:
       return SafeLog(d, x);
     case UnaryOp::kSqrt:
       return hn::Sqrt(x);
     case UnaryOp::kSquare:
       return hn::Mul(x, x);
+    case UnaryOp::kPow:
+      return Pow(d, x, p);
     case UnaryOp::kAbs:
       return hn::Abs(x);
     case UnaryOp::kSign:
@@ -73,6 +119,8 @@ HWY_INLINE VF ApplyUnary(DF d, VF x, VF p, VF q) {
       return SafeTanh(d, x);
     case UnaryOp::kSigmoid:
       return hn::Div(one, hn::Add(one, SafeExp(d, hn::Neg(x))));
+    case UnaryOp::kSoftplus:
+      return Softplus(d, x);
     case UnaryOp::kClamp:
       return hn::IfThenElse(hn::Lt(x, p), p, hn::IfThenElse(hn::Gt(x, q), q, x));
     case UnaryOp::kInRange:
@@ -105,15 +153,18 @@ void UnaryRange(const UnaryProblem<float>& problem, std::size_t begin, std::size
     TILEGRAD_CASE(kScale);
     TILEGRAD_CASE(kAddScalar);
     TILEGRAD_CASE(kExp);
+    TILEGRAD_CASE(kExpm1);
     TILEGRAD_CASE(kLog);
     TILEGRAD_CASE(kSqrt);
     TILEGRAD_CASE(kSquare);
+    TILEGRAD_CASE(kPow);
     TILEGRAD_CASE(kAbs);
     TILEGRAD_CASE(kSign);
     TILEGRAD_CASE(kRelu);
     TILEGRAD_CASE(kLeakyRelu);
     TILEGRAD_CASE(kTanh);
     TILEGRAD_CASE(kSigmoid);
+    TILEGRAD_CASE(kSoftplus);
     TILEGRAD_CASE(kClamp);
     TILEGRAD_CASE(kInRange);
 #undef TILEGRAD_CASE

@@ -15,17 +15,20 @@ enum class UnaryOp {
   kScale,      // p x
   kAddScalar,  // x + p
   kExp,
+  kExpm1,  // e^x - 1
   kLog,
   kSqrt,
   kSquare,
+  kPow,  // x^p; of x < 0 for whole p only, else NaN
   kAbs,
   kSign,  // -1, 0, 1
   kRelu,
   kLeakyRelu,  // x > 0 ? x : p x
   kTanh,
   kSigmoid,
-  kClamp,    // to [p, q]
-  kInRange,  // p <= x <= q ? 1 : 0
+  kSoftplus,  // log(1 + e^x)
+  kClamp,     // to [p, q]
+  kInRange,   // p <= x <= q ? 1 : 0
 };
 
 enum class BinaryOp {

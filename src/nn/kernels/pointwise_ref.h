@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <complex>
+#include <type_traits>
 
 #include "nn/kernels/pointwise.h"
 
@@ -13,6 +14,25 @@ namespace tilegrad::nn {
 template <class T>
 double RealPart(const T& x) {
   return static_cast<double>(std::real(x));
+}
+
+// e^x - 1 and log(1 + x) without cancellation. Of complex numbers, whose real part a complex step
+// does not read, by the plain formulas.
+template <class T>
+T Expm1Of(const T& x) {
+  if constexpr (std::is_floating_point_v<T>) {
+    return std::expm1(x);
+  } else {
+    return std::exp(x) - T(1);
+  }
+}
+template <class T>
+T Log1pOf(const T& x) {
+  if constexpr (std::is_floating_point_v<T>) {
+    return std::log1p(x);
+  } else {
+    return std::log(T(1) + x);
+  }
 }
 
 template <class T>
@@ -28,12 +48,16 @@ T UnaryRef(UnaryOp op, T x, double p, double q) {
       return x + tp;
     case UnaryOp::kExp:
       return std::exp(x);
+    case UnaryOp::kExpm1:
+      return Expm1Of(x);
     case UnaryOp::kLog:
       return std::log(x);
     case UnaryOp::kSqrt:
       return std::sqrt(x);
     case UnaryOp::kSquare:
       return x * x;
+    case UnaryOp::kPow:
+      return std::pow(x, tp);
     case UnaryOp::kAbs:
       return real < 0 ? -x : x;
     case UnaryOp::kSign:
@@ -46,6 +70,8 @@ T UnaryRef(UnaryOp op, T x, double p, double q) {
       return std::tanh(x);
     case UnaryOp::kSigmoid:
       return one / (one + std::exp(-x));
+    case UnaryOp::kSoftplus:
+      return real > 0 ? x + Log1pOf(std::exp(-x)) : Log1pOf(std::exp(x));
     case UnaryOp::kClamp:
       return real < p ? tp : real > q ? tq : x;
     case UnaryOp::kInRange:

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "nn/kernels/conv2d.h"
 #include "nn/kernels/conv2d_ref.h"
+#include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
 
 namespace tilegrad::nn {
@@ -22,6 +23,9 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
                            e.weight.ToString(), options.stride, options.padding);
   }
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
+  if (options.padding_mode != PadMode::kZero && options.padding > 0) {
+    return InvalidArgument("conv2d: this operation pads with zeros only");
+  }
   Conv2dShape s;
   s.batch = size(e.x[0]), s.in_channels = size(e.x[1]);
   s.in_height = size(e.x[2]), s.in_width = size(e.x[3]);
@@ -79,6 +83,10 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
   const bool usable =
       bias.has_context() ? Usable("conv2d", {&x, &weight, &bias}) : Usable("conv2d", {&x, &weight});
   if (!usable) return Invalid({&x, &weight, &bias});
+  if (options.padding_mode != PadMode::kZero && options.padding > 0) {
+    const Var padded = PadImage(x, Padding::All(options.padding), options.padding_mode);
+    return Conv2d(padded, weight, bias, {.stride = options.stride});
+  }
   const auto s = MakeShape({x.shape(), weight.shape()}, options);
   if (!s.ok()) return Fail(x, s.status());
   if (bias.valid() && !(bias.shape() == Shape{weight.shape()[0]})) {
@@ -98,6 +106,23 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
                             adj.needs(2) ? Sum(dy, {0, 2, 3}) : Var()};
   };
   return Record({"conv2d"}, std::move(y), {x, weight, bias}, rule);
+}
+
+Var ConvTranspose2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options,
+                    int output_padding) {
+  if (!Usable("transposed conv2d", {&x, &weight})) return Invalid({&x, &weight});
+  const bool images = x.shape().rank() == 4 && weight.shape().rank() == 4;
+  if (!images || output_padding < 0 || output_padding >= options.stride) {
+    return Fail(x,
+                InvalidArgument("transposed conv2d: input {}, weight {}, output padding {}",
+                                x.shape().ToString(), weight.shape().ToString(), output_padding));
+  }
+  const auto extent = [&](int axis) {
+    return (x.shape()[axis] - 1) * options.stride - 2 * options.padding + weight.shape()[axis] +
+           output_padding;
+  };
+  const Var y = Conv2dInputGrad(x, weight, {extent(2), extent(3)}, options);
+  return bias.has_context() ? Add(y, Reshape(bias, {1, -1, 1, 1})) : y;
 }
 
 Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options) {

@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cross-correlation of images with zero padding (what the field calls convolution), and the two
-// operations that are its derivatives. Each of the three is the derivative of the others, so
-// together they are closed.
+// Cross-correlation of images (what the field calls convolution), and the two operations that are
+// its derivatives. Each of the three is the derivative of the others, so together they are closed.
 #pragma once
 
+#include "nn/ops/pad.h"
+#include "nn/ops/shape.h"
 #include "nn/tape.h"
 
 namespace tilegrad::nn {
 
 struct ConvOptions {
-  int stride = 1;   // >= 1
-  int padding = 0;  // zeros on every side, >= 0
+  int stride = 1;                         // >= 1
+  int padding = 0;                        // pixels added on every side, >= 0
+  PadMode padding_mode = PadMode::kZero;  // the two gradients and the transposed one: zero only
 };
 
 // x [n, in, h, w], weight [out, in, kh, kw], bias [out] or an invalid Var for none ->
 // [n, out, (h + 2 padding - kh) / stride + 1, ...], rounded down.
 Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options);
 
-// The adjoint of x: dy [n, out, oh, ow] -> [n, in, height, width]. Also the transposed convolution.
-struct ImageSize {
-  std::int64_t height, width;
-};
+// x [n, in, h, w], weight [in, out, kh, kw], bias [out] or an invalid Var ->
+// [n, out, (h - 1) stride - 2 padding + kh + output_padding, ...]; output_padding < stride.
+Var ConvTranspose2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& options,
+                    int output_padding = 0);
+
+// The adjoint of x: dy [n, out, oh, ow] -> [n, in, height, width].
 Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const ConvOptions& options);
 
 // The adjoint of the weight -> [out, in, kernel.height, kernel.width].

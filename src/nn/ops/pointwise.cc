@@ -2,6 +2,7 @@
 #include "nn/ops/pointwise.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "base/error.h"
@@ -161,6 +162,12 @@ Var Exp(const Var& x) {
                   [](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), adj.y())}; });
 }
 
+Var Expm1(const Var& x) {
+  return UnaryVar({"expm1", true}, UnaryOp::kExpm1, x, {}, [](const Adjoint& adj) {
+    return std::vector<Var>{Mul(adj.dy(), AddScalar(adj.y(), 1.0))};
+  });
+}
+
 Var Log(const Var& x) {
   return UnaryVar({"log"}, UnaryOp::kLog, x, {},
                   [x](const Adjoint& adj) { return std::vector<Var>{Div(adj.dy(), x)}; });
@@ -177,6 +184,15 @@ Var Square(const Var& x) {
     return std::vector<Var>{Scale(Mul(adj.dy(), x), 2.0)};
   });
 }
+
+// The derivative of a constant is nothing, rather than 0 x^-1.
+Var Pow(const Var& x, double p) {
+  return UnaryVar({"pow"}, UnaryOp::kPow, x, {p}, [x, p](const Adjoint& adj) {
+    return std::vector<Var>{p == 0 ? Var() : Mul(adj.dy(), Scale(Pow(x, p - 1.0), p))};
+  });
+}
+
+Var Pow(const Var& x, const Var& p) { return Exp(Mul(p, Log(x))); }
 
 Var Abs(const Var& x) {
   return UnaryVar({"abs"}, UnaryOp::kAbs, x, {},
@@ -223,6 +239,19 @@ Var Sigmoid(const Var& x) {  // y (1 - y)
   return UnaryVar({"sigmoid", true}, UnaryOp::kSigmoid, x, {}, [](const Adjoint& adj) {
     return std::vector<Var>{Mul(adj.dy(), Sub(adj.y(), Square(adj.y())))};
   });
+}
+
+Var Softplus(const Var& x) {
+  return UnaryVar({"softplus"}, UnaryOp::kSoftplus, x, {},
+                  [x](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), Sigmoid(x))}; });
+}
+
+Var Silu(const Var& x) { return Mul(x, Sigmoid(x)); }
+
+// At 0 the gradient is that of the lower branch: Clamp passes it on at its bound, Relu does not.
+Var Elu(const Var& x, double alpha) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return Add(Relu(x), Scale(Expm1(Clamp(x, -kInfinity, 0.0)), alpha));
 }
 
 Var Clamp(const Var& x, double low, double high) {

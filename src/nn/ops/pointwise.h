@@ -18,12 +18,18 @@ Var Neg(const Var& x);
 Var Scale(const Var& x, double factor);
 Var AddScalar(const Var& x, double term);
 Var Exp(const Var& x);
-Var Log(const Var& x);   // natural; NaN below 0, -inf at 0
-Var Sqrt(const Var& x);  // gradient infinite at 0: add an epsilon before
+Var Expm1(const Var& x);  // e^x - 1, exact for small x
+Var Log(const Var& x);    // natural; NaN below 0, -inf at 0
+Var Sqrt(const Var& x);   // gradient infinite at 0: add an epsilon before
 Var Square(const Var& x);
+Var Pow(const Var& x, double p);            // of x < 0 for whole p only, else NaN; 0^0 = 1
+Var Pow(const Var& x, const Var& p);        // broadcasts; x > 0
 Var Abs(const Var& x);                      // gradient 0 at 0
 Var Relu(const Var& x);                     // gradient 0 at 0
 Var LeakyRelu(const Var& x, double slope);  // x > 0 ? x : slope x; slope at 0; slope >= 0
+Var Elu(const Var& x, double alpha = 1.0);  // x > 0 ? x : alpha (e^x - 1)
+Var Silu(const Var& x);                     // x sigmoid(x)
+Var Softplus(const Var& x);                 // log(1 + e^x)
 Var Tanh(const Var& x);
 Var Sigmoid(const Var& x);
 Var Clamp(const Var& x, double low, double high);  // gradient 1 within, bounds included; else 0
@@ -36,6 +42,7 @@ inline Var operator-(const Var& x) { return Neg(x); }
 inline Var operator*(double s, const Var& x) { return Scale(x, s); }
 inline Var operator*(const Var& x, double s) { return Scale(x, s); }
 inline Var operator/(const Var& x, double s) { return Scale(x, 1.0 / s); }
+inline Var operator/(double s, const Var& x) { return Scale(Pow(x, -1.0), s); }
 inline Var operator+(const Var& x, double s) { return AddScalar(x, s); }
 inline Var operator-(const Var& x, double s) { return AddScalar(x, -s); }
 inline Var operator+(double s, const Var& x) { return AddScalar(x, s); }

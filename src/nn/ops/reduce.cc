@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "nn/kernels/reduce.h"
 #include "nn/ops/broadcast.h"
+#include "nn/ops/index.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/shape.h"
 

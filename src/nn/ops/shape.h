@@ -9,6 +9,10 @@
 
 namespace tilegrad::nn {
 
+struct ImageSize {
+  std::int64_t height, width;
+};
+
 // Same elements, same order. One extent may be -1: it follows from the others.
 Var Reshape(const Var& x, Shape shape);
 // Repeats axes of extent 1 (and missing leading ones); adjoint: SumTo of ops/reduce.h.
@@ -25,11 +29,5 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after);
 // One after the other along `axis`; all other extents are equal.
 Var Concat(std::span<const Var> parts, int axis);
 Var Concat(std::initializer_list<Var> parts, int axis);
-
-// y[.., i, ..] = x[.., indices[i], ..] along `axis`; indices: [n] of kI32 within the extent, else
-// an error. Adjoint: ScatterAdd.
-Var Gather(const Var& x, int axis, const Tensor& indices);
-// y of extent `extent` along `axis`: y[.., indices[i], ..] += x[.., i, ..], in the order of i.
-Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t extent);
 
 }  // namespace tilegrad::nn

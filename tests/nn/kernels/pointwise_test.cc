@@ -16,14 +16,15 @@ struct UnaryCase {
   double low = -3, high = 3;
 };
 
-// The figures of exp (1), log (4) and tanh (4) are those Highway states; sigmoid adds a sum and a
-// quotient to exp.
+// The figures of exp (1), log (4), expm1 (4) and tanh (4) are those Highway states; sigmoid adds a
+// sum and a quotient to exp; softplus is log1p (2) of exp and a sum; pow is computed in double.
 const UnaryCase kUnary[] = {
     {UnaryOp::kNeg, 0},     {UnaryOp::kScale, 0},        {UnaryOp::kAddScalar, 0},
     {UnaryOp::kExp, 1},     {UnaryOp::kLog, 4, 1e-3, 9}, {UnaryOp::kSqrt, 0, 0, 9},
     {UnaryOp::kSquare, 0},  {UnaryOp::kAbs, 0},          {UnaryOp::kSign, 0},
     {UnaryOp::kRelu, 0},    {UnaryOp::kLeakyRelu, 0},    {UnaryOp::kTanh, 4},
-    {UnaryOp::kSigmoid, 2}, {UnaryOp::kClamp, 0},        {UnaryOp::kInRange, 0}};
+    {UnaryOp::kSigmoid, 2}, {UnaryOp::kClamp, 0},        {UnaryOp::kInRange, 0},
+    {UnaryOp::kExpm1, 4},   {UnaryOp::kSoftplus, 4},     {UnaryOp::kPow, 1, 1e-3, 9}};
 
 void CheckUnary(const UnaryCase& c, std::size_t n, Rng& rng, const Workers& workers) {
   std::vector<float> x(n), y(n, -77.0f);
@@ -66,6 +67,10 @@ TEST(Pointwise, LimitsAndNaN) {
     EXPECT_EQ(Apply(UnaryOp::kExp, 89.0f), inf);
     EXPECT_EQ(Apply(UnaryOp::kExp, inf), inf);
     EXPECT_EQ(Apply(UnaryOp::kExp, -inf), 0.0f);
+    EXPECT_EQ(Apply(UnaryOp::kExpm1, 89.0f), inf);
+    EXPECT_EQ(Apply(UnaryOp::kExpm1, -inf), -1.0f);
+    EXPECT_EQ(Apply(UnaryOp::kSoftplus, inf), inf);
+    EXPECT_EQ(Apply(UnaryOp::kSoftplus, -inf), 0.0f);
     EXPECT_EQ(Apply(UnaryOp::kLog, 0.0f), -inf);
     EXPECT_EQ(Apply(UnaryOp::kLog, inf), inf);
     EXPECT_TRUE(std::isnan(Apply(UnaryOp::kLog, -1.0f)));
@@ -74,6 +79,34 @@ TEST(Pointwise, LimitsAndNaN) {
     EXPECT_EQ(Apply(UnaryOp::kSigmoid, -200.0f), 0.0f);
     EXPECT_EQ(Apply(UnaryOp::kSigmoid, 200.0f), 1.0f);
     EXPECT_EQ(Apply(UnaryOp::kRelu, -inf), 0.0f);
+  }
+}
+
+// Signs, zeros, infinities, overflow and underflow of x^p as the C library has them.
+TEST(Pointwise, PowerEqualsTheLibraryAtTheLimits) {
+  const Workers workers(1);
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+  const std::vector<float> x = {0,     -0.0f,  1,      -1,     2,   -2,  -0.5f,
+                                1e30f, -1e30f, 1e-30f, 1e-42f, inf, -inf};
+  for (const auto& target : RunnableTargets()) {
+    const OnTarget on(target);
+    for (const double p : {2.0, 3.0, -1.0, -2.0, 0.5, -1.5, 0.0}) {
+      std::vector<float> y(x.size());
+      Unary(UnaryProblem<float>{UnaryOp::kPow, x.data(), y.data(), x.size(), p, 0}, workers);
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const float want = UnaryRef(UnaryOp::kPow, x[i], p, 0);
+        // The library gives sqrt(-0) = -0 by its own rule and (-inf)^0.5 = inf; ours stay in the
+        // reals.
+        if (p != std::floor(p) && std::signbit(x[i])) {
+          EXPECT_TRUE(std::isnan(y[i]) || x[i] == 0) << x[i] << "^" << p;
+        } else if (std::isfinite(want)) {
+          EXPECT_NEAR(y[i], want, kUlp * std::abs(want) + 1e-45) << x[i] << "^" << p;
+        } else {
+          EXPECT_EQ(y[i], want) << x[i] << "^" << p;
+        }
+      }
+    }
+    EXPECT_TRUE(std::isnan(Apply(UnaryOp::kPow, nan)));
   }
 }
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of axis_map.h: lanes run over the axes behind the mapped one. Along the last axis
+// there are none; a row's few terms are then summed one by one.
+#if defined(TILEGRAD_NN_AXIS_MAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_NN_AXIS_MAP_INL_H_
+#undef TILEGRAD_NN_AXIS_MAP_INL_H_
+#else
+#define TILEGRAD_NN_AXIS_MAP_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include "nn/kernels/axis_map_ref.h"
+#include "nn/kernels/vector-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::nn::HWY_NAMESPACE {
+
+// One row of y where inner > 1.
+HWY_INLINE void MapLongRow(const AxisMapProblem<float>& p, std::size_t row) {
+  const DF d;
+  const std::size_t i = row % p.out, lanes = hn::Lanes(d);
+  const float* x = p.x + row / p.out * p.in * p.inner;
+  for (std::size_t k = 0; k < p.inner; k += lanes) {
+    const std::size_t count = HWY_MIN(lanes, p.inner - k);
+    VF sum = hn::Zero(d);
+    for (std::int32_t t = p.begin[i]; t < p.begin[i + 1]; ++t) {
+      const float* from = x + static_cast<std::size_t>(p.index[t]) * p.inner + k;
+      sum = hn::MulAdd(hn::Set(d, p.weight[t]), LoadSome(d, from, count), sum);
+    }
+    StoreSome(sum, d, p.y + row * p.inner + k, count);
+  }
+}
+
+// Rows [first, last) of y.
+void AxisMapRange(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
+  if (p.inner == 1) return AxisMapRef(p, first, last);
+  for (std::size_t row = first; row < last; ++row) MapLongRow(p, row);
+}
+
+}  // namespace tilegrad::nn::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

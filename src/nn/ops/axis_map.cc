@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/ops/axis_map.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "nn/kernels/axis_map.h"
+
+namespace tilegrad::nn {
+namespace {
+
+AxisMap Allocate(Context& context, DType dtype, const AxisExtents& extents, std::int64_t terms) {
+  return {extents.in, extents.out, context.Empty({extents.out + 1}, DType::kI32),
+          context.Empty({terms}, DType::kI32), context.Empty({terms}, dtype)};
+}
+
+// A counting sort of the terms by column keeps the rows of each column in order.
+AxisMap Transposed(Context& context, const AxisMap& map) {
+  const DType dtype = map.weight.dtype();
+  AxisMap result = Allocate(context, dtype, {map.out, map.in}, map.index.shape()[0]);
+  const auto begin = result.begin.span<std::int32_t>();
+  std::fill(begin.begin(), begin.end(), 0);
+  const auto columns = std::as_const(map.index).span<std::int32_t>();
+  for (const std::int32_t column : columns) ++begin[static_cast<std::size_t>(column) + 1];
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
+  const auto* rows = map.begin.data<std::int32_t>();
+  WithFloatType(dtype, [&]<class T>(T) {
+    for (std::int32_t i = 0; i < map.out; ++i) {
+      for (std::int32_t t = rows[i]; t < rows[i + 1]; ++t) {
+        const std::int32_t place =
+            next[static_cast<std::size_t>(columns[static_cast<std::size_t>(t)])]++;
+        result.index.data<std::int32_t>()[place] = i;
+        result.weight.data<T>()[place] = map.weight.data<T>()[t];
+      }
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+AxisMap MakeAxisMap(const Var& like, const AxisExtents& extents,
+                    FunctionRef<void(std::int64_t i, AxisTerms& terms)> row) {
+  AxisTerms terms;
+  std::vector<std::int32_t> ends = {0};
+  for (std::int64_t i = 0; i < extents.out; ++i) {
+    row(i, terms);
+    ends.push_back(static_cast<std::int32_t>(terms.size()));
+  }
+  AxisMap map =
+      Allocate(like.context(), like.dtype(), extents, static_cast<std::int64_t>(terms.size()));
+  std::copy(ends.begin(), ends.end(), map.begin.data<std::int32_t>());
+  WithFloatType(like.dtype(), [&]<class T>(T) {
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      map.index.data<std::int32_t>()[t] = static_cast<std::int32_t>(terms[t].index);
+      map.weight.data<T>()[t] = static_cast<T>(terms[t].weight);
+    }
+  });
+  return map;
+}
+
+Var MapAxis(const Var& x, int axis, const AxisMap& map) {
+  if (!Usable("map axis", {&x})) return Invalid({&x});
+  Shape shape = x.shape();
+  if (axis < 0 || axis >= shape.rank() || shape[axis] != map.in ||
+      map.weight.dtype() != x.dtype()) {
+    return Fail(x, InvalidArgument("map axis: a map from {} along axis {} of {}", map.in, axis,
+                                   shape.ToString()));
+  }
+  shape[axis] = map.out;
+  Tensor y = x.context().Empty(shape, x.dtype());
+  const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    MapAxis(AxisMapProblem<T>{size(shape.Product(0, axis)), size(map.in), size(map.out),
+                              size(shape.Product(axis + 1, shape.rank())),
+                              map.begin.data<std::int32_t>(), map.index.data<std::int32_t>(),
+                              map.weight.data<T>(), x.value().data<T>(), y.data<T>()},
+            x.context().workers());
+  });
+  return Record({"map axis"}, std::move(y), {x}, [axis, map](const Adjoint& adj) {
+    return std::vector<Var>{MapAxis(adj.dy(), axis, Transposed(adj.dy().context(), map))};
+  });
+}
+
+}  // namespace tilegrad::nn

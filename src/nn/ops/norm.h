@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Normalisation within one sample, and of weights. Each of the first three is batch normalisation
+// of a reshaped input (ops/batch_norm.h), and so has its kernel and its rule.
+#pragma once
+
+#include "nn/tape.h"
+
+namespace tilegrad::nn {
+
+struct NormOptions {
+  double epsilon = 1e-5;  // added to the variance
+};
+
+// x [n, c, h, w], gamma and beta [c]; statistics over each image of each channel, h w >= 2 elements
+// (Ulyanov et al. 2016).
+Var InstanceNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions& options = {});
+
+// x [n, c, h, w] or [n, c]; statistics over c / groups channels of each sample (Wu, He 2018).
+Var GroupNorm(const Var& x, int groups, const Var& gamma, const Var& beta,
+              const NormOptions& options = {});
+
+// Statistics over the last axes, those of gamma's shape: x [.., gamma's shape], beta as gamma (Ba
+// et al. 2016).
+Var LayerNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions& options = {});
+
+// weight / sigma, sigma = |W^T u| with W = weight as [out, rest] and u [out] of length 1: the
+// largest singular value where u is its left singular vector (Miyato et al. 2018). u is constant.
+Var SpectralNorm(const Var& weight, const Tensor& u);
+// One power iteration: u = W W^T u, of length 1. Repeated, it turns u into that vector.
+void SpectralStep(const Var& weight, Tensor& u);
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/ops/pad.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "nn/ops/axis_map.h"
+#include "nn/ops/shape.h"
+
+namespace tilegrad::nn {
+namespace {
+
+// The element of [0, extent) that stands at position i, which may lie outside.
+std::int64_t SourceOf(std::int64_t i, std::int64_t extent, PadMode mode) {
+  if (mode == PadMode::kCircular) return ((i % extent) + extent) % extent;
+  if (mode == PadMode::kReplicate) return std::clamp<std::int64_t>(i, 0, extent - 1);
+  return i < 0 ? -i : i >= extent ? 2 * (extent - 1) - i : i;
+}
+
+}  // namespace
+
+Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode mode) {
+  if (!Usable("pad", {&x})) return Invalid({&x});
+  if (mode == PadMode::kZero) return Pad(x, axis, before, after);
+  const std::int64_t extent = axis >= 0 && axis < x.shape().rank() ? x.shape()[axis] : 0;
+  const std::int64_t most = std::max(before, after);
+  const bool fits = mode == PadMode::kReflect ? most < extent : extent > 0;
+  if (!fits || before < 0 || after < 0) {
+    return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", before, after,
+                                   axis, x.shape().ToString()));
+  }
+  if (most == 0) return x;
+  const AxisMap map =
+      MakeAxisMap(x, {extent, before + extent + after}, [&](std::int64_t i, AxisTerms& terms) {
+        terms.push_back({SourceOf(i - before, extent, mode), 1.0});
+      });
+  return MapAxis(x, axis, map);
+}
+
+Var PadImage(const Var& x, const Padding& padding, PadMode mode) {
+  if (!Usable("pad image", {&x})) return Invalid({&x});
+  if (x.shape().rank() != 4) {
+    return Fail(x, InvalidArgument("pad image: {} is not [n, c, h, w]", x.shape().ToString()));
+  }
+  return Pad(Pad(x, 2, padding.top, padding.bottom, mode), 3, padding.left, padding.right, mode);
+}
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/ops/pool.h"
+
+#include <limits>
+
+#include "base/error.h"
+#include "nn/kernels/max_pool.h"
+#include "nn/ops/axis_map.h"
+#include "nn/ops/index.h"
+#include "nn/ops/shape.h"
+
+namespace tilegrad::nn {
+namespace {
+
+std::int64_t Windows(std::int64_t extent, const PoolOptions& o, Rounding rounding) {
+  const std::int64_t room = extent + 2 * o.padding - o.kernel;
+  if (rounding == Rounding::kDown) return room / o.stride + 1;
+  const std::int64_t windows = (room + o.stride - 1) / o.stride + 1;
+  // The last one must begin in the image or in the padding before it.
+  return (windows - 1) * o.stride >= extent + o.padding ? windows - 1 : windows;
+}
+
+Status Check(const char* op, const Shape& x, const PoolOptions& o) {
+  const bool options =
+      o.kernel >= 1 && o.stride >= 1 && o.padding >= 0 && o.padding <= o.kernel / 2;
+  if (options && x.rank() == 4 && x[2] + 2 * o.padding >= o.kernel && x[2] > 0 && x[3] > 0 &&
+      x[3] + 2 * o.padding >= o.kernel &&
+      x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
+    return {};
+  }
+  return InvalidArgument("{}: input {}, kernel {}, stride {}, padding {}", op, x.ToString(),
+                         o.kernel, o.stride, o.padding);
+}
+
+Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
+  const AxisExtents extents{x.shape()[axis], Windows(x.shape()[axis], o, Rounding::kDown)};
+  const auto row = [&](std::int64_t i, AxisTerms& terms) {
+    for (std::int64_t k = 0; k < o.kernel; ++k) {
+      const std::int64_t at = i * o.stride - o.padding + k;
+      if (at >= 0 && at < extents.in) terms.push_back({at, 1.0 / o.kernel});
+    }
+  };
+  return MapAxis(x, axis, MakeAxisMap(x, extents, row));
+}
+
+}  // namespace
+
+Var AvgPool2d(const Var& x, const PoolOptions& options) {
+  if (!Usable("average pooling", {&x})) return Invalid({&x});
+  if (const Status s = Check("average pooling", x.shape(), options); !s.ok()) return Fail(x, s);
+  return MeanAlong(MeanAlong(x, 2, options), 3, options);
+}
+
+// The elements are picked by index; picking is linear, and its adjoint puts them back.
+Var MaxPool2d(const Var& x, const PoolOptions& options, Rounding rounding) {
+  if (!Usable("max pooling", {&x})) return Invalid({&x});
+  if (const Status s = Check("max pooling", x.shape(), options); !s.ok()) return Fail(x, s);
+  const Shape& in = x.shape();
+  const Shape out = {in[0], in[1], Windows(in[2], options, rounding),
+                     Windows(in[3], options, rounding)};
+  const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
+  const PoolShape shape{size(in[0] * in[1]),  size(in[2]),          size(in[3]),
+                        size(out[2]),         size(out[3]),         size(options.kernel),
+                        size(options.stride), size(options.padding)};
+  Context& context = x.context();
+  Tensor first = context.Empty({in[0] * in[1], out[2] * out[3]}, DType::kI32);
+  WithFloatType(x.dtype(), [&]<class T>(T) {
+    MaxPoolIndices(shape, x.value().data<T>(), first.data<std::int32_t>(), context.workers());
+  });
+  return Reshape(TakeAlong(Reshape(x, {in[0] * in[1], in[2] * in[3]}), first), out);
+}
+
+}  // namespace tilegrad::nn

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Softmax over one axis and the losses of classification. The largest element is taken out before
+// anything is exponentiated, so that no finite input overflows.
+#pragma once
+
+#include "nn/tape.h"
+
+namespace tilegrad::nn {
+
+Var Softmax(const Var& x, int axis);
+Var LogSoftmax(const Var& x, int axis);
+Var LogSumExp(const Var& x, int axis);  // the axis is dropped
+
+// logits [n, classes] -> mean over n of -log softmax[i, labels[i]]; labels: [n] of kI32.
+Var CrossEntropy(const Var& logits, const Tensor& labels);
+// The same for probabilities [n, classes]: mean over n of -sum target log softmax.
+Var CrossEntropy(const Var& logits, const Var& target);
+// Mean of softplus(x) - x target, the cross-entropy of sigmoid(x) with a target in [0, 1].
+Var BinaryCrossEntropy(const Var& logits, const Var& target);
+
+}  // namespace tilegrad::nn

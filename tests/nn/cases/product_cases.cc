@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nn/cases/cases.h"
+
+namespace tilegrad::nn {
+namespace {
+
+void AddConvolutions(CaseList& list) {
+  const std::int64_t n = list.Extent(), in = list.Extent(), out = list.Extent();
+  const ImageSize kernel{list.Extent(), list.Extent()};
+  const ConvOptions options{static_cast<int>(list.Extent(3)), static_cast<int>(list.rng.Below(3))};
+  const ImageSize size{kernel.height + list.Extent(), kernel.width + list.Extent(9)};
+  const auto extent = [&](std::int64_t from, std::int64_t window) {
+    return (from + 2 * options.padding - window) / options.stride + 1;
+  };
+  const Shape x = {n, in, size.height, size.width}, w = {out, in, kernel.height, kernel.width},
+              y = {n, out, extent(size.height, kernel.height), extent(size.width, kernel.width)};
+  const auto terms = std::max(w.Product(1, 4), std::max(n * y[2] * y[3], out * w.Product(2, 4)));
+  const int roundings = 16 + 3 * static_cast<int>(terms);
+  const std::string what = " " + x.ToString() + w.ToString() + " stride " +
+                           std::to_string(options.stride) + " padding " +
+                           std::to_string(options.padding);
+  list.Add({"conv2d" + what,
+            [=](const Inputs& v) { return Conv2d(v[0], v[1], v[2], options); },
+            {{x}, {w}, {{out}}},
+            roundings});
+  list.Add({"conv2d input gradient" + what,
+            [=](const Inputs& v) { return Conv2dInputGrad(v[0], v[1], size, options); },
+            {{y}, {w}},
+            roundings});
+  list.Add({"conv2d weight gradient" + what,
+            [=](const Inputs& v) { return Conv2dWeightGrad(v[0], v[1], kernel, options); },
+            {{x}, {y}},
+            roundings});
+}
+
+const char* NameOf(PadMode mode) {
+  const char* names[] = {"zero", "circular", "reflect", "replicate"};
+  return names[static_cast<int>(mode)];
+}
+
+void AddPaddedConvolution(CaseList& list, PadMode mode) {
+  const ConvOptions options{static_cast<int>(list.Extent(2)), static_cast<int>(list.Extent(2)),
+                            mode};
+  const Shape x = {list.Extent(2), list.Extent(3), 3 + list.Extent(3), 3 + list.Extent(9)};
+  const Shape w = {list.Extent(3), x[1], 3, 3};
+  list.Add({std::string("conv2d padded ") + NameOf(mode),
+            [=](const Inputs& v) { return Conv2d(v[0], v[1], v[2], options); },
+            {{x}, {w}, {{w[0]}}},
+            256});
+}
+
+void AddTransposedConvolution(CaseList& list) {
+  const int stride = static_cast<int>(list.Extent(3));
+  const ConvOptions options{stride, static_cast<int>(list.rng.Below(2))};
+  const int rest = static_cast<int>(list.rng.Below(static_cast<std::uint64_t>(stride)));
+  const Shape x = {list.Extent(2), list.Extent(3), list.Extent(3), list.Extent(7)};
+  const Shape w = {x[1], list.Extent(3), 3, 3 + list.Extent(2)};
+  list.Add({"transposed conv2d stride " + std::to_string(stride),
+            [=](const Inputs& v) { return ConvTranspose2d(v[0], v[1], v[2], options, rest); },
+            {{x}, {w}, {{w[1]}}},
+            256});
+}
+
+}  // namespace
+
+void AddProductCases(CaseList& list) {
+  for (const bool ta : {false, true}) {
+    for (const bool tb : {false, true}) {
+      const std::int64_t m = list.Extent(9), n = list.Extent(19), k = list.Extent(7);
+      list.Add({"matmul",
+                [=](const Inputs& v) {
+                  return Matmul(v[0], v[1], {ta, tb});
+                },
+                {{ta ? Shape{k, m} : Shape{m, k}}, {tb ? Shape{n, k} : Shape{k, n}}},
+                64});
+    }
+  }
+  list.Add({"linear",
+            [](const Inputs& v) { return Linear(v[0], v[1], v[2]); },
+            {{{3, 4}}, {{9, 4}}, {{9}}},
+            64});
+  list.Add({"linear without bias",
+            [](const Inputs& v) { return Linear(v[0], v[1], Var()); },
+            {{{3, 4}}, {{5, 4}}},
+            64});
+  for (int trial = 0; trial < 8; ++trial) AddConvolutions(list);
+  for (const PadMode mode :
+       {PadMode::kZero, PadMode::kCircular, PadMode::kReflect, PadMode::kReplicate}) {
+    AddPaddedConvolution(list, mode);
+  }
+  for (int trial = 0; trial < 4; ++trial) AddTransposedConvolution(list);
+}
+
+}  // namespace tilegrad::nn
