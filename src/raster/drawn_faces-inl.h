@@ -222,6 +222,11 @@ HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& 
   const std::uint32_t small = MaskBits(shapes.small);
   const std::uint32_t flat = MaskBits(hn::Eq(shapes.area, hn::Zero(di)));
   const std::uint32_t back = cull_back ? MaskBits(hn::Gt(shapes.area, hn::Zero(di))) : 0;
+  // Mostly there is nothing to say about any of them.
+  const std::uint32_t all = static_cast<std::uint32_t>((std::uint64_t{1} << count) - 1);
+  std::uint8_t before = 0;
+  for (std::size_t i = 0; i < count; ++i) before |= reject[i];
+  if (before == 0 && ((flat | back | ~small) & all) == 0) return all;
   std::uint32_t drawn = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (reject[i] == kFaceDrawn) {

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <limits>
 
 #include "raster/interpolate.h"
 
@@ -115,42 +116,70 @@ HWY_INLINE LaneInt AttributeRow(const InterpolateInput& input, LaneInt face, Lan
   return hn::Mul(row, hn::Set(di, input.attributes.channels));
 }
 
+// What the planes of one vector of slots are made of.
+struct CornerPlanes {
+  Plane weight[3], q;
+  Lane m[3];
+  LaneInt row[3];
+};
+
+HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, const TileFaces& faces,
+                                         std::size_t s) {
+  const LaneTag d;
+  const LaneIntTag di;
+  const auto face = hn::Load(di, faces.face + s);
+  const CornerLanes corners = GatherCorners(*input.mesh, face);
+  CornerPlanes out;
+  out.q = ZeroPlane();
+  WeightPlanes(corners, hn::Load(d, faces.origin_x + s), hn::Load(d, faces.origin_y + s),
+               out.weight);
+  for (int k = 0; k < 3; ++k) {
+    out.m[k] = input.mode == Interpolation::kPerspective
+                   ? hn::GatherIndex(d, input.mesh->inverse_depth.data(), corners.vertex[k])
+                   : hn::Set(d, 1.0f);
+    out.row[k] = AttributeRow(input, face, corners.vertex[k], k);
+    AddScaled(out.m[k], out.weight[k], &out.q);
+  }
+  return out;
+}
+
+// N of an output: a channel, or the barycentric of corner 1 or 2.
+HWY_INLINE Plane NumeratorPlane(const InterpolateInput& input, const CornerPlanes& corners,
+                                int output) {
+  const LaneTag d;
+  const int channels = input.attributes.channels;
+  Plane n = ZeroPlane();
+  if (output >= channels) {
+    const int k = output - channels + 1;
+    AddScaled(corners.m[k], corners.weight[k], &n);
+    return n;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const auto a = hn::GatherIndex(d, input.attributes.values.data() + output, corners.row[k]);
+    AddScaled(hn::Mul(corners.m[k], a), corners.weight[k], &n);
+  }
+  return n;
+}
+
+HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
+  return hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
+}
+
 // One vector of slots, from `s` on.
 HWY_INLINE void SetUpLanes(const InterpolateInput& input, const TileFaces& faces, std::size_t s,
                            TilePlanes* planes) {
   const LaneTag d;
   const LaneIntTag di;
-  const auto face = hn::Load(di, faces.face + s);
-  const CornerLanes corners = GatherCorners(*input.mesh, face);
-  Plane weight[3], q = ZeroPlane();
-  WeightPlanes(corners, hn::Load(d, faces.origin_x + s), hn::Load(d, faces.origin_y + s), weight);
-  Lane m[3];
-  LaneInt row[3];
+  const CornerPlanes corners = MakeCornerPlanes(input, faces, s);
   for (int k = 0; k < 3; ++k) {
-    m[k] = input.mode == Interpolation::kPerspective
-               ? hn::GatherIndex(d, input.mesh->inverse_depth.data(), corners.vertex[k])
-               : hn::Set(d, 1.0f);
-    row[k] = AttributeRow(input, face, corners.vertex[k], k);
-    AddScaled(m[k], weight[k], &q);
-    StorePlane(weight[k], planes->weight(k) + s);
-    hn::Store(m[k], d, planes->m(k) + s);
-    hn::Store(row[k], di, planes->row(k) + s);
+    StorePlane(corners.weight[k], planes->weight(k) + s);
+    hn::Store(corners.m[k], d, planes->m(k) + s);
+    hn::Store(corners.row[k], di, planes->row(k) + s);
   }
-  StorePlane(q, planes->q() + s);
-  hn::Store(hn::Min(hn::Min(m[0], m[1]), m[2]), d, planes->least_q() + s);
-  for (int c = 0; c < planes->channels(); ++c) {
-    Plane n = ZeroPlane();
-    for (int k = 0; k < 3; ++k) {
-      const auto a = hn::GatherIndex(d, input.attributes.values.data() + c, row[k]);
-      AddScaled(hn::Mul(m[k], a), weight[k], &n);
-    }
-    StorePlane(n, planes->numerator(c) + s);
-  }
-  for (int b = planes->channels(); b < planes->outputs(); ++b) {
-    const int k = b - planes->channels() + 1;
-    Plane n = ZeroPlane();
-    AddScaled(m[k], weight[k], &n);
-    StorePlane(n, planes->numerator(b) + s);
+  StorePlane(corners.q, planes->q() + s);
+  hn::Store(LeastQ(corners), d, planes->least_q() + s);
+  for (int o = 0; o < planes->outputs(); ++o) {
+    StorePlane(NumeratorPlane(input, corners, o), planes->numerator(o) + s);
   }
 }
 
@@ -189,18 +218,6 @@ HWY_INLINE PixelLanes LocatePixels(const InterpolateInput& input, const TileFace
   return out;
 }
 
-// The first `count` lanes to unaligned memory.
-HWY_INLINE void StoreFirst(Lane v, std::size_t count, float* to) {
-  const LaneTag d;
-  if (count >= hn::Lanes(d)) {
-    hn::StoreU(v, d, to);
-    return;
-  }
-  HWY_ALIGN float lanes[kTileSize];
-  hn::Store(v, d, lanes);
-  std::memcpy(to, lanes, count * sizeof(float));
-}
-
 HWY_INLINE Lane LoadFirst(const float* from, std::size_t count) {
   const LaneTag d;
   if (count >= hn::Lanes(d)) return hn::LoadU(d, from);
@@ -209,29 +226,169 @@ HWY_INLINE Lane LoadFirst(const float* from, std::size_t count) {
   return hn::Load(d, lanes);
 }
 
-HWY_INLINE float* OutputAt(int output, int channels, const PlanarView<float>& out,
-                           const PlanarView<float>& barycentrics) {
-  return output < channels ? out.data + output * out.plane
-                           : barycentrics.data + (output - channels) * barycentrics.plane;
+// Where an output stands: group 0 has three outputs and Q.
+HWY_INLINE int FirstOutput(int group) { return group == 0 ? 0 : 4 * group - 1; }
+HWY_INLINE int GroupOutputs(int group) { return group == 0 ? 3 : 4; }
+
+// One vector of slots of a group.
+HWY_INLINE void StoreQuads(const Plane (&p)[4], int group, std::size_t s, TileQuads* quads) {
+  const LaneTag d;
+  const auto store = [&](Lane a, Lane b, Lane c, Lane e, int part) HWY_ATTR {
+    hn::StoreInterleaved4(a, b, c, e, d, quads->quads(group, part) + 4 * s);
+  };
+  store(p[0].value, p[1].value, p[2].value, p[3].value, 0);
+  store(p[0].dx, p[1].dx, p[2].dx, p[3].dx, 1);
+  store(p[0].dy, p[1].dy, p[2].dy, p[3].dy, 2);
+}
+
+HWY_INLINE void SetUpQuads(const InterpolateInput& input, const TileFaces& faces, int outputs,
+                           TileQuads* quads) {
+  const LaneTag d;
+  const auto lowest = hn::Set(d, -std::numeric_limits<float>::max());
+  for (std::size_t s = 0; s < static_cast<std::size_t>(faces.count); s += hn::Lanes(d)) {
+    const CornerPlanes corners = MakeCornerPlanes(input, faces, s);
+    hn::StoreInterleaved4(lowest, lowest, lowest, LeastQ(corners), d, quads->least() + 4 * s);
+    for (int g = 0; g < quads->groups(); ++g) {
+      Plane planes[4];
+      planes[3] = corners.q;
+      for (int i = 0; i < GroupOutputs(g); ++i) {
+        const int o = FirstOutput(g) + i;
+        planes[i] = o < outputs ? NumeratorPlane(input, corners, o) : ZeroPlane();
+      }
+      StoreQuads(planes, g, s, quads);
+    }
+  }
+}
+
+inline constexpr int kQuadPixels = 4;
+using QuadTag = hn::FixedTag<float, kQuadPixels>;
+using Quad = hn::Vec<QuadTag>;
+
+// From four outputs of four pixels to four pixels of four outputs, in place.
+HWY_INLINE void Transpose(Quad (&q)[4]) {
+  const QuadTag d;
+  const Quad a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
+  const Quad e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
+  q[0] = hn::InterleaveLower(d, a, b), q[1] = hn::InterleaveUpper(d, a, b);
+  q[2] = hn::InterleaveLower(d, e, f), q[3] = hn::InterleaveUpper(d, e, f);
+}
+
+// Four pixels of a row: where their faces' quads are, and where they lie from the faces' origins.
+struct QuadPixels {
+  std::size_t at[kQuadPixels];
+  Quad x[kQuadPixels], y[kQuadPixels];
+  hn::Mask<QuadTag> seen;
+
+  HWY_INLINE QuadPixels(const TileFaces& faces, const TileRect& rect, int i, int j) {
+    const QuadTag d;
+    const hn::RebindToSigned<QuadTag> di;
+    const std::int32_t* slots = faces.slot + i * kTileSize + j;
+    seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, slots), hn::Set(di, -1)));
+    const float px = static_cast<float>(rect.x0 + j) + 0.5f;
+    const auto py = hn::Set(d, static_cast<float>(rect.y0 + i) + 0.5f);
+    for (int p = 0; p < kQuadPixels; ++p) {
+      const auto slot = static_cast<std::size_t>(HWY_MAX(slots[p], 0));
+      at[p] = 4 * slot;
+      x[p] = hn::Sub(hn::Set(d, px + static_cast<float>(p)), hn::Set(d, faces.origin_x[slot]));
+      y[p] = hn::Sub(py, hn::Set(d, faces.origin_y[slot]));
+    }
+  }
+
+  // The four planes of a group at the four pixels, as planes.
+  HWY_INLINE void Evaluate(TileQuads* quads, int group, Quad (&out)[4]) const {
+    const QuadTag d;
+    const float *value = quads->quads(group, 0), *dx = quads->quads(group, 1);
+    const float* dy = quads->quads(group, 2);
+    for (int p = 0; p < kQuadPixels; ++p) {
+      out[p] = hn::MulAdd(hn::Load(d, dx + at[p]), x[p],
+                          hn::MulAdd(hn::Load(d, dy + at[p]), y[p], hn::Load(d, value + at[p])));
+      if (group == 0) out[p] = hn::Max(out[p], hn::Load(d, quads->least() + at[p]));
+    }
+    Transpose(out);
+  }
+};
+
+// What the pixels of a tile are made of and where they go.
+struct InterpolateJob {
+  const InterpolateInput& input;
+  const TileFaces& faces;
+  const TileRect& rect;
+  const InterpolateOutput& out;
+  int outputs;
+  TileQuads* quads;
+};
+
+// One row of the outputs of a group.
+struct QuadRow {
+  float* to[4];  // the row's pixels of each output
+  int outputs;   // how many there are
+  int count;     // pixels
+
+  HWY_INLINE QuadRow(const InterpolateJob& job, int group, int i) {
+    const int first = FirstOutput(group), channels = job.input.attributes.channels;
+    outputs = HWY_MIN(GroupOutputs(group), job.outputs - first);
+    count = job.rect.x1 - job.rect.x0;
+    for (int k = 0; k < outputs; ++k) {
+      const int o = first + k;
+      const auto& view = o < channels ? job.out.attributes : job.out.barycentrics;
+      to[k] = view.data + (o < channels ? o : o - channels) * view.plane + i * view.row;
+    }
+  }
+  HWY_INLINE void Store(int k, int j, Quad v) const {
+    const QuadTag d;
+    if (j + kQuadPixels <= count) {
+      hn::StoreU(v, d, to[k] + j);
+      return;
+    }
+    HWY_ALIGN float lanes[kQuadPixels];
+    hn::Store(v, d, lanes);
+    std::memcpy(to[k] + j, lanes, static_cast<std::size_t>(count - j) * sizeof(float));
+  }
+};
+
+// One row of a group. inverse_q [kTileSize] of the row is set by group 0, for the others.
+template <bool kPerspective>
+HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, float* inverse_q) {
+  const QuadTag d;
+  const hn::RebindToSigned<QuadTag> di;
+  const QuadRow row(job, group, i);
+  for (int j = 0; j < row.count; j += kQuadPixels) {
+    const auto slots = hn::Load(di, job.faces.slot + i * kTileSize + j);
+    if (hn::AllTrue(di, hn::Lt(slots, hn::Zero(di)))) {
+      for (int k = 0; k < row.outputs; ++k) row.Store(k, j, hn::Zero(d));
+      continue;
+    }
+    const QuadPixels pixels(job.faces, job.rect, i, j);
+    Quad values[4];
+    pixels.Evaluate(job.quads, group, values);
+    auto scale = hn::Set(d, 1.0f);
+    if (kPerspective && group == 0) hn::Store(hn::Div(scale, values[3]), d, inverse_q + j);
+    if (kPerspective) scale = hn::Load(d, inverse_q + j);
+    for (int k = 0; k < row.outputs; ++k) {
+      const auto value = kPerspective ? hn::Mul(values[k], scale) : values[k];
+      row.Store(k, j, hn::IfThenElseZero(pixels.seen, value));
+    }
+  }
+}
+
+template <bool kPerspective>
+HWY_INLINE void InterpolateRows(const InterpolateJob& job) {
+  for (int i = 0; i < job.rect.y1 - job.rect.y0; ++i) {
+    HWY_ALIGN float inverse_q[kTileSize];
+    for (int g = 0; g < job.quads->groups(); ++g) {
+      InterpolateRow<kPerspective>(job, g, i, inverse_q);
+    }
+  }
 }
 
 void Interpolate(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                 TilePlanes* planes, const PlanarView<float>& out,
-                 const PlanarView<float>& barycentrics) {
-  const LaneTag d;
-  const int lanes = static_cast<int>(hn::Lanes(d)), width = rect.x1 - rect.x0;
-  for (int i = 0; i < rect.y1 - rect.y0; ++i) {
-    for (int j = 0; j < width; j += lanes) {
-      const PixelLanes at = LocatePixels(input, faces, rect, i, j, planes);
-      for (int o = 0; o < planes->outputs(); ++o) {
-        const auto value =
-            hn::Mul(EvaluatePlane(planes->numerator(o), at.slot, at.x, at.y), at.inverse_q);
-        float* to = OutputAt(o, planes->channels(), out, barycentrics);
-        const std::ptrdiff_t row = o < planes->channels() ? out.row : barycentrics.row;
-        StoreFirst(hn::IfThenElseZero(at.seen, value), static_cast<std::size_t>(width - j),
-                   to + i * row + j);
-      }
-    }
+                 TileQuads* quads, const InterpolateOutput& out) {
+  const InterpolateJob job{input, faces, rect, out, InterpolateOutputs(input), quads};
+  SetUpQuads(input, faces, job.outputs, quads);
+  if (input.mode == Interpolation::kPerspective) {
+    InterpolateRows<true>(job);
+  } else {
+    InterpolateRows<false>(job);
   }
 }
 

@@ -32,10 +32,15 @@ void SetUpTilePlanes(const InterpolateInput& input, const TileFaces& faces, Tile
   HWY_DYNAMIC_DISPATCH(SetUpPlanes)(input, faces, planes);
 }
 
+void TileQuads::Resize(int outputs) {
+  groups_ = 1 + outputs / 4;  // group 0 has three
+  data_.resize(4 * kTilePixels * static_cast<std::size_t>(3 * groups_ + 1));
+}
+
 void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                     TilePlanes* planes, const PlanarView<float>& out,
-                     const PlanarView<float>& barycentrics) {
-  HWY_DYNAMIC_DISPATCH(Interpolate)(input, faces, rect, planes, out, barycentrics);
+                     TileQuads* quads, const InterpolateOutput& out) {
+  quads->Resize(InterpolateOutputs(input));
+  HWY_DYNAMIC_DISPATCH(Interpolate)(input, faces, rect, quads, out);
 }
 
 void InterpolateTileBackward(const InterpolateInput& input, const TileFaces& faces,

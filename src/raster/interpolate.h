@@ -34,6 +34,29 @@ struct InterpolateInput {
   bool barycentrics;  // two more planes: the weights of corners 1 and 2
 };
 
+// Channels, and two more where barycentrics are wanted.
+inline int InterpolateOutputs(const InterpolateInput& input) {
+  return input.attributes.channels + (input.barycentrics ? 2 : 0);
+}
+
+// The same planes for the forward pass: four outputs of a slot stand side by side, so that a pixel
+// loads what it needs of its face at once. Group 0 holds outputs 0 to 2 and Q, the groups behind it
+// four outputs each. Scratch of one worker.
+class TileQuads {
+ public:
+  void Resize(int outputs);
+
+  int groups() const { return groups_; }
+  // [slot][4], of a group: 0 the values at the slot's origin, 1 d/dx, 2 d/dy.
+  float* quads(int group, int part) { return data_.data() + 4 * kTilePixels * (3 * group + part); }
+  // [slot][4]: what group 0 is kept at or above: only Q is.
+  float* least() { return data_.data() + 4 * kTilePixels * 3 * groups_; }
+
+ private:
+  int groups_ = 0;
+  AlignedVector<float> data_;
+};
+
 // Per slot of a tile, as structure of arrays with kTilePixels entries each: planes in terms of the
 // position relative to the slot's origin. Scratch of one worker.
 class TilePlanes {
@@ -69,11 +92,14 @@ struct PlanarView {
 // Fills `planes` for the faces of a tile.
 void SetUpTilePlanes(const InterpolateInput& input, const TileFaces& faces, TilePlanes* planes);
 
-// Writes the pixels of `rect`: outputs [0, channels) to `out`, the two barycentrics to
-// `barycentrics`; 0 at background pixels.
+// Where InterpolateTile writes: outputs [0, channels) to `attributes`, then the two barycentrics.
+struct InterpolateOutput {
+  PlanarView<float> attributes, barycentrics;
+};
+
+// Writes the pixels of `rect`; 0 at background pixels.
 void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                     TilePlanes* planes, const PlanarView<float>& out,
-                     const PlanarView<float>& barycentrics);
+                     TileQuads* quads, const InterpolateOutput& out);
 
 // Arrays of `stride` numbers per slot, one after the other: d_x[3], d_y[3], d_inverse_depth[3] of
 // the corners, then d_attribute [3][C].

@@ -14,7 +14,9 @@ namespace tilegrad::raster {
 
 // Pixel arrays of one tile.
 struct VisibilityTile {
-  alignas(128) std::int32_t face[kTilePixels];    // index into the ScreenMesh, kNoFace: background
+  // Index into the ScreenMesh, kNoFace: background. One row more, of anything: vectors may reach
+  // beyond the end.
+  alignas(128) std::int32_t face[kTilePixels + kTileSize];
   alignas(128) float inverse_depth[kTilePixels];  // 1/depth; 0 at background
 };
 
@@ -35,7 +37,8 @@ struct BinDrawList {
 void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
                        VisibilityBin* out);
 
-// A tile of the bin; background beyond the image.
-void CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out);
+// A tile of the bin; background beyond the image. Returns false where nothing is seen; then `out`
+// holds anything.
+bool CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out);
 
 }  // namespace tilegrad::raster

@@ -67,6 +67,7 @@ struct WorkerScratch {
   raster::VisibilityBin bin;
   raster::VisibilityTile visibility;
   raster::TileFaces faces;
+  raster::TileQuads quads;
   raster::TilePlanes planes;
   raster::SoftMaskScratch soft;
   // Lists that the TileGradients of this worker's tiles point into.

@@ -23,12 +23,27 @@ void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
   }
 }
 
+// Calls visit(first index in the tile's arrays, first index in an image) for each row of the tile.
+template <class Visit>
+void ForEachRow(const raster::TileRect& rect, int width, const Visit& visit) {
+  for (int i = rect.y0; i < rect.y1; ++i) {
+    visit((i - rect.y0) * raster::kTileSize,
+          static_cast<std::ptrdiff_t>(i) * width + static_cast<std::ptrdiff_t>(rect.x0));
+  }
+}
+
 void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
                   const std::int32_t* faces, std::int32_t* ids) {
-  const bool cut = mesh.was_clipped();
+  if (!mesh.was_clipped()) {
+    const std::ptrdiff_t columns = rect.x1 - rect.x0;
+    ForEachRow(rect, mesh.width, [&](int from, std::ptrdiff_t to) {
+      std::copy(faces + from, faces + from + columns, ids + to);
+    });
+    return;
+  }
   ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
     const std::int32_t face = faces[from];
-    ids[to] = cut && face >= 0 ? mesh.source_face[static_cast<std::size_t>(face)] : face;
+    ids[to] = face >= 0 ? mesh.source_face[static_cast<std::size_t>(face)] : face;
   });
 }
 
@@ -72,13 +87,42 @@ void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
                                  barycentrics != nullptr};
   if (attributes == nullptr) input.attributes.channels = 0;
   raster::FindTileFaces(worker->visibility.face, task.rect, &worker->faces);
-  raster::SetUpTilePlanes(input, worker->faces, &worker->planes);
-  raster::InterpolateTile(input, worker->faces, task.rect, &worker->planes,
-                          {attributes == nullptr ? nullptr : attributes + corner, plane, row},
-                          {barycentrics == nullptr ? nullptr : barycentrics + corner, plane, row});
+  raster::InterpolateTile(
+      input, worker->faces, task.rect, &worker->quads,
+      {{attributes == nullptr ? nullptr : attributes + corner, plane, row},
+       {barycentrics == nullptr ? nullptr : barycentrics + corner, plane, row}});
   if (barycentrics != nullptr && image.mesh.was_clipped()) {
     MixCutWeights(scene, image.mesh, task.rect, worker->visibility.face, barycentrics,
                   barycentrics + part.pixels);
+  }
+}
+
+// A tile in which nothing is seen.
+void ClearTile(const TileTask& task, const ImageOfFrame& part, Frame* frame) {
+  const std::ptrdiff_t columns = task.rect.x1 - task.rect.x0;
+  const auto clear = [&](auto* image, std::size_t planes, auto value) {
+    for (std::size_t p = 0; image != nullptr && p < planes; ++p, image += part.pixels) {
+      ForEachRow(task.rect, frame->width, [&](int, std::ptrdiff_t to) {
+        std::fill(image + to, image + to + columns, value);
+      });
+    }
+  };
+  clear(part.plane(frame->face_ids, 1), 1, raster::kNoFace);
+  clear(part.plane(frame->depth, 1), 1, std::numeric_limits<float>::infinity());
+  clear(part.plane(frame->attributes, part.channels), part.channels, 0.0f);
+  clear(part.plane(frame->barycentrics, 2), 2, 0.0f);
+}
+
+void WriteSeen(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
+               const TileTask& task, const ImageOfFrame& part, WorkerScratch* worker,
+               Frame* frame) {
+  const raster::VisibilityTile& seen = worker->visibility;
+  WriteFaceIds(image.mesh, task.rect, seen.face, part.plane(frame->face_ids, 1));
+  if (float* depth = part.plane(frame->depth, 1)) {
+    WriteDepth(task.rect, options.width, seen.inverse_depth, depth);
+  }
+  if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
+    InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
   }
 }
 
@@ -88,14 +132,10 @@ double RenderTile(const SceneView& scene, const RenderOptions& options, const Im
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
-  raster::VisibilityTile& seen = worker->visibility;
-  raster::CopyTile(worker->bin, task.rect, &seen);
-  WriteFaceIds(image.mesh, task.rect, seen.face, part.plane(frame->face_ids, 1));
-  if (float* depth = part.plane(frame->depth, 1)) {
-    WriteDepth(task.rect, options.width, seen.inverse_depth, depth);
-  }
-  if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
-    InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
+  if (raster::CopyTile(worker->bin, task.rect, &worker->visibility)) {
+    WriteSeen(scene, options, image, task, part, worker, frame);
+  } else {
+    ClearTile(task, part, frame);
   }
   float* alpha = part.plane(frame->alpha, 1);
   if (alpha == nullptr) return 0;

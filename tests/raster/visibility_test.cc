@@ -73,7 +73,7 @@ std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
       const TileRect rect = tiles.rect(t);
       if (bins.tile(rect.x0, rect.y0) != b) continue;
       VisibilityTile tile;
-      CopyTile(bin, rect, &tile);
+      if (!CopyTile(bin, rect, &tile)) std::fill_n(tile.face, kTilePixels, kNoFace);
       for (int i = rect.y0; i < rect.y1; ++i) {
         for (int j = rect.x0; j < rect.x1; ++j) {
           out[static_cast<std::size_t>(i) * mesh.width + j] =
