@@ -1,29 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optimisers.
+// Optimisers, and the norm of a gradient. Learning-rate schedules: schedule.h.
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "nn/kernels/adam.h"
 #include "nn/layers.h"
 #include "nn/tape.h"
 
 namespace tilegrad::nn {
 
-struct AdamCoefficients;  // of kernels/adam.h
-
-struct AdamOptions {
-  double learning_rate = 1e-3;
-  double beta1 = 0.9;
-  double beta2 = 0.999;
-  double epsilon = 1e-8;  // added to sqrt(v / (1 - beta2^t)), as PyTorch does
-};
-
-// Adam (Kingma, Ba 2015): one pass over parameter, gradient and both moments.
-class Adam {
+class Optimizer {
  public:
-  Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions& options);
+  virtual ~Optimizer() = default;
+  Optimizer(const Optimizer&) = delete;
+  Optimizer& operator=(const Optimizer&) = delete;
 
   // One step along `gradients` (as Grad returns them for parameters()), each multiplied by
   // `gradient_scale` on the way (see ClipFactor). A gradient that is not valid or does not fit is
@@ -32,23 +26,76 @@ class Adam {
 
   std::vector<Var> parameters() const;  // in the order given
   std::int64_t steps() const { return steps_; }
-  AdamOptions& options() { return options_; }  // schedules set learning_rate here
 
-  // "adam.m.<name>", "adam.v.<name>" and "adam.steps" ([1] of kI64). Loading restores the same
-  // bits; errors as CopyByName.
+  // "<name>.<moment>.<parameter>" for each moment, and "<name>.steps" ([1] of kI64); name: "adam"
+  // or "sgd". Loading restores the same bits; errors as CopyByName.
   std::vector<NamedTensor> State() const;
   Status LoadState(const std::vector<NamedTensor>& state);
 
- private:
+ protected:
   struct Slot {
     NamedVar parameter;
-    Tensor m, v;
+    std::vector<Tensor> moments;  // of the parameter's shape, 0 at the start
   };
-  void Update(Slot& slot, const Tensor& gradient, const AdamCoefficients& coefficients);
+  Optimizer(Context& context, std::string name, std::vector<std::string> moments,
+            std::vector<NamedVar> parameters);
+  // What all parameters of step steps() (1, 2, ..) share, then each of them.
+  virtual void BeginStep(double gradient_scale) = 0;
+  virtual void Update(Slot& slot, const Tensor& gradient) = 0;
+  const Workers& workers() const { return context_.workers(); }
+
+ private:
   Context& context_;
+  std::string name_;
+  std::vector<std::string> moments_;
   std::vector<Slot> slots_;
-  AdamOptions options_;
   std::int64_t steps_ = 0;
+};
+
+struct AdamOptions {
+  double learning_rate = 1e-3;
+  double beta1 = 0.9;
+  double beta2 = 0.999;
+  double epsilon = 1e-8;  // added to sqrt(v / (1 - beta2^t)), as PyTorch does
+  // AdamW (Loshchilov, Hutter 2019): each step also takes learning_rate * weight_decay of a
+  // parameter away. Biases and norms, which are of rank 1, do not decay.
+  double weight_decay = 0;
+};
+
+// Adam (Kingma, Ba 2015): one pass over parameter, gradient and both moments "m" and "v".
+class Adam : public Optimizer {
+ public:
+  Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions& options)
+      : Optimizer(context, "adam", {"m", "v"}, std::move(parameters)), options_(options) {}
+  AdamOptions& options() { return options_; }  // schedules set learning_rate here
+
+ private:
+  void BeginStep(double gradient_scale) override;
+  void Update(Slot& slot, const Tensor& gradient) override;
+  AdamOptions options_;
+  AdamCoefficients coefficients_;
+};
+
+struct SgdOptions {
+  double learning_rate = 1e-2;
+  double momentum = 0;      // in [0, 1)
+  bool nesterov = false;    // looks ahead along the momentum
+  double weight_decay = 0;  // times the parameter is added to the gradient, as for AdamOptions
+};
+
+// Stochastic gradient descent with momentum "v", as PyTorch writes it: v = momentum v + g,
+// p = p - learning_rate v.
+class Sgd : public Optimizer {
+ public:
+  Sgd(Context& context, std::vector<NamedVar> parameters, const SgdOptions& options)
+      : Optimizer(context, "sgd", {"v"}, std::move(parameters)), options_(options) {}
+  SgdOptions& options() { return options_; }
+
+ private:
+  void BeginStep(double gradient_scale) override { gradient_scale_ = gradient_scale; }
+  void Update(Slot& slot, const Tensor& gradient) override;
+  SgdOptions options_;
+  double gradient_scale_ = 1;
 };
 
 // Square root of the sum of all squares, summed in double and in a fixed order. Not finite where a

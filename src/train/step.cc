@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "base/error.h"
 #include "nn/nn.h"
@@ -63,11 +62,8 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
 
 double LearningRateAt(const TrainConfig& config, std::int64_t step) {
   const OptimizerConfig& o = config.optimizer;
-  const double progress = static_cast<double>(step) / static_cast<double>(config.schedule.steps);
-  const double cosine = 0.5 * (1 + std::cos(std::numbers::pi * std::min(progress, 1.0)));
-  const double rate = o.learning_rate * (o.final_factor + (1 - o.final_factor) * cosine);
-  return step < o.warmup ? rate * static_cast<double>(step + 1) / static_cast<double>(o.warmup)
-                         : rate;
+  const nn::CosineSchedule cosine{config.schedule.steps, o.final_factor};
+  return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
 }
 
 double SharpnessAt(const TrainConfig& config, std::int64_t step) {

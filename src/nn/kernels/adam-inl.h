@@ -28,6 +28,7 @@ void AdamRange(const AdamProblem<float>& problem, std::size_t begin, std::size_t
   const VF root = hn::Set(d, static_cast<float>(c.inverse_root));
   const VF epsilon = hn::Set(d, static_cast<float>(c.epsilon));
   const VF step = hn::Set(d, static_cast<float>(c.step));
+  const VF keep = hn::Set(d, static_cast<float>(c.keep));
   for (std::size_t i = begin; i < end; i += lanes) {
     const std::size_t count = HWY_MIN(lanes, end - i);
     const VF g = hn::Mul(scale, LoadSome(d, problem.gradient + i, count));
@@ -35,7 +36,7 @@ void AdamRange(const AdamProblem<float>& problem, std::size_t begin, std::size_t
     const VF v =
         hn::MulAdd(beta2, LoadSome(d, problem.v + i, count), hn::Mul(rest2, hn::Mul(g, g)));
     const VF denominator = hn::MulAdd(hn::Sqrt(v), root, epsilon);
-    const VF p = LoadSome(d, problem.parameter + i, count);
+    const VF p = hn::Mul(keep, LoadSome(d, problem.parameter + i, count));
     StoreSome(m, d, problem.m + i, count);
     StoreSome(v, d, problem.v + i, count);
     StoreSome(hn::Sub(p, hn::Div(hn::Mul(step, m), denominator)), d, problem.parameter + i, count);
