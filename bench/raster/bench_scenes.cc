@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "base/rng.h"
+#include "raster/project.h"
+#include "render/frame_layout.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::bench {
@@ -51,6 +53,7 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
   const Mesh sphere = MakeMesh(spec);
   Rng rng(1234);
   options.width = options.height = spec.size;
+  options.max_alpha_error = 1e-7;
   options.interpolation = Interpolation::kScreenLinear;  // as the peers
   for (const Face& face : sphere.faces) faces.insert(faces.end(), face.begin(), face.end());
   for (std::size_t i = 0; i < 3 * sphere.positions.size(); ++i) {
@@ -72,6 +75,53 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
   d_attributes.resize(3 * pixels), d_alpha.resize(pixels);
   for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
   for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
+}
+
+CulledBatch::CulledBatch(const BenchBatch& batch)
+    : faces(batch.faces), colors(batch.colors), d_alpha(batch.d_alpha) {
+  const RenderOptions& o = batch.options;
+  const std::size_t n = batch.scenes.size();
+  const auto pixels = static_cast<std::size_t>(o.width) * static_cast<std::size_t>(o.height);
+  frames.resize(n);
+  for (const SceneView& scene : batch.scenes) {
+    raster::ScreenMeshBuffers screen;
+    raster::Project(FaceSourceOf(scene, o), o.width, o.height, &screen);
+    std::vector<float>& xy = ndc.emplace_back();
+    for (std::size_t v = 0; v < screen.x.size(); ++v) {
+      xy.push_back(2 * screen.x[v] / static_cast<float>(o.width) - 1);
+      xy.push_back(1 - 2 * screen.y[v] / static_cast<float>(o.height));
+    }
+    depth.emplace_back(screen.depth.begin(), screen.depth.end());
+    d_ndc.emplace_back(xy.size());
+    d_vertex_colors.emplace_back(batch.colors.size());
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    scenes.push_back(
+        {o.width, o.height, static_cast<float>(o.delta), ndc[i], depth[i], faces, colors});
+  }
+  d_colors.resize(3 * pixels * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t p = 0; p < pixels; ++p) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        d_colors[3 * (i * pixels + p) + c] = batch.d_attributes[(3 * i + c) * pixels + p];
+      }
+    }
+  }
+}
+
+void CulledBatch::Forward(const CulledParts& parts) {
+  for (std::size_t i = 0; i < scenes.size(); ++i) CulledForward(scenes[i], parts, &frames[i]);
+}
+
+void CulledBatch::Backward(const CulledParts& parts) {
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    std::fill(d_ndc[i].begin(), d_ndc[i].end(), 0.0f);
+    std::fill(d_vertex_colors[i].begin(), d_vertex_colors[i].end(), 0.0f);
+    const std::size_t pixels = frames[i].face_ids.size();
+    CulledBackward(scenes[i], parts, frames[i],
+                   {std::span(d_colors).subspan(3 * pixels * i, 3 * pixels),
+                    std::span(d_alpha).subspan(pixels * i, pixels), d_ndc[i], d_vertex_colors[i]});
+  }
 }
 
 }  // namespace tilegrad::bench

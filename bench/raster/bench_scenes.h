@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "raster/culled.h"
 #include "render/renderer.h"
 
 namespace tilegrad::bench {
@@ -35,6 +36,22 @@ struct BenchBatch {
   std::vector<float> d_attributes, d_alpha;
   std::vector<std::vector<float>> d_positions, d_colors;
   std::vector<SceneGradients> d_scenes;
+};
+
+// The same batch for the yardstick, which starts on the screen.
+struct CulledBatch {
+  explicit CulledBatch(const BenchBatch& batch);
+
+  void Forward(const CulledParts& parts);
+  void Backward(const CulledParts& parts);  // after Forward; gradients are overwritten
+
+  std::vector<std::int32_t> faces;
+  std::vector<float> colors;
+  std::vector<CulledScene> scenes;
+  std::vector<CulledFrame> frames;
+  std::vector<std::vector<float>> ndc, depth;  // per image
+  std::vector<float> d_colors, d_alpha;        // [N,H,W,3], [N,H,W]
+  std::vector<std::vector<float>> d_ndc, d_vertex_colors;
 };
 
 }  // namespace tilegrad::bench

@@ -22,28 +22,60 @@ void CountImages(benchmark::State& state, double images) {
       benchmark::Counter(images, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-void Forward(benchmark::State& state, const SceneSpec& spec, const RenderRequest& request,
-             int worker_count) {
-  const BenchBatch batch(spec);
-  const Workers workers(worker_count);
-  Renderer renderer(workers);
-  Frame frame;
-  for (auto _ : state) Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
-  CountImages(state, spec.images);
+// What is rendered, and on how many workers.
+struct RunSpec {
+  SceneSpec scene;
+  bool color = true, alpha = true;
+  int workers = 1;
+  Interpolation interpolation = Interpolation::kScreenLinear;
+
+  RenderRequest request() const { return {color, alpha, false, false}; }
+  CulledParts parts() const { return {color, alpha}; }
+};
+
+BenchBatch MakeBatch(const RunSpec& spec) {
+  BenchBatch batch(spec.scene);
+  batch.options.interpolation = spec.interpolation;
+  return batch;
 }
 
-void Backward(benchmark::State& state, const SceneSpec& spec, int worker_count) {
-  BenchBatch batch(spec);
-  const Workers workers(worker_count);
+void Forward(benchmark::State& state, const RunSpec& spec) {
+  const BenchBatch batch = MakeBatch(spec);
+  const Workers workers(spec.workers);
+  Renderer renderer(workers);
+  Frame frame;
+  for (auto _ : state) {
+    Check(renderer.Render(batch.scenes, batch.options, spec.request(), &frame), state);
+  }
+  CountImages(state, spec.scene.images);
+}
+
+void Backward(benchmark::State& state, const RunSpec& spec) {
+  BenchBatch batch = MakeBatch(spec);
+  const Workers workers(spec.workers);
   Renderer renderer(workers);
   Frame frame;
   Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
+  FrameGradients d_frame;
+  if (spec.color) d_frame.attributes = batch.d_attributes;
+  if (spec.alpha) d_frame.alpha = batch.d_alpha;
   for (auto _ : state) {
-    Check(renderer.Backward(batch.scenes, batch.options, frame, {batch.d_attributes, batch.d_alpha},
-                            batch.d_scenes),
-          state);
+    Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
   }
-  CountImages(state, spec.images);
+  CountImages(state, spec.scene.images);
+}
+
+void RunCulledForward(benchmark::State& state, const RunSpec& spec) {
+  CulledBatch culled(MakeBatch(spec));
+  for (auto _ : state) culled.Forward(spec.parts());
+  CountImages(state, spec.scene.images);
+}
+
+void RunCulledBackward(benchmark::State& state, const RunSpec& spec) {
+  CulledBatch culled(MakeBatch(spec));
+  culled.Forward({});
+  for (auto _ : state) culled.Backward(spec.parts());
+  CountImages(state, spec.scene.images);
 }
 
 // Two middle rows: half of the pixels covered, as on average.
@@ -77,27 +109,45 @@ void NaiveBackward(benchmark::State& state, const SceneSpec& spec) {
   CountImages(state, SampledImages(spec));
 }
 
+void Add(const std::string& name, const RunSpec& spec,
+         void (*run)(benchmark::State&, const RunSpec&)) {
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [spec, run](benchmark::State& state) { run(state, spec); })
+      ->Unit(benchmark::kMillisecond)
+      ->MeasureProcessCPUTime()
+      ->UseRealTime();
+}
+
+void AddNaive(const SceneSpec& scene) {
+  const std::string name = scene.name;
+  const auto add = [&](const char* what, void (*run)(benchmark::State&, const SceneSpec&)) {
+    benchmark::RegisterBenchmark((name + what).c_str(),
+                                 [scene, run](benchmark::State& state) { run(state, scene); })
+        ->Unit(benchmark::kMillisecond)
+        ->MeasureProcessCPUTime()
+        ->UseRealTime();
+  };
+  add("/forward/both/naive", NaiveForward), add("/backward/both/naive", NaiveBackward);
+}
+
+// Names: scene/direction/what/who, who being a number of workers, `culled` or `naive`.
 const bool kRegistered = [] {
-  for (const SceneSpec& spec : kScenes) {
-    const std::string name = spec.name;
-    const auto add = [&](const std::string& what, auto run) {
-      benchmark::RegisterBenchmark((name + "/" + what).c_str(), run)
-          ->Unit(benchmark::kMillisecond)
-          ->MeasureProcessCPUTime()
-          ->UseRealTime();
+  for (const SceneSpec& scene : kScenes) {
+    const std::string name = scene.name;
+    const auto all = [&](const std::string& what, bool color, bool alpha) {
+      Add(name + "/forward/" + what + "/culled", {scene, color, alpha}, RunCulledForward);
+      Add(name + "/backward/" + what + "/culled", {scene, color, alpha}, RunCulledBackward);
+      for (const int workers : {1, 2}) {
+        const std::string who = "/" + std::to_string(workers);
+        Add(name + "/forward/" + what + who, {scene, color, alpha, workers}, Forward);
+        Add(name + "/backward/" + what + who, {scene, color, alpha, workers}, Backward);
+      }
     };
-    for (const int workers : {1, 2}) {
-      const std::string suffix = workers == 1 ? "" : "/2_workers";
-      add("forward" + suffix,
-          [&spec, workers](benchmark::State& state) { Forward(state, spec, {}, workers); });
-      add("forward_no_alpha" + suffix, [&spec, workers](benchmark::State& state) {
-        Forward(state, spec, {true, false, false, false}, workers);
-      });
-      add("backward" + suffix,
-          [&spec, workers](benchmark::State& state) { Backward(state, spec, workers); });
-    }
-    add("naive_forward", [&spec](benchmark::State& state) { NaiveForward(state, spec); });
-    add("naive_backward", [&spec](benchmark::State& state) { NaiveBackward(state, spec); });
+    all("both", true, true), all("color", true, false), all("alpha", false, true);
+    const RunSpec perspective{scene, true, true, 1, Interpolation::kPerspective};
+    Add(name + "/forward/perspective/1", perspective, Forward);
+    Add(name + "/backward/perspective/1", perspective, Backward);
+    AddNaive(scene);
   }
   return true;
 }();
