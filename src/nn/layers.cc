@@ -4,6 +4,7 @@
 #include "nn/init.h"
 #include "nn/named_tensors.h"
 #include "nn/ops/matmul.h"
+#include "nn/ops/pointwise.h"
 #include "nn/ops/shape.h"
 
 namespace tilegrad::nn {
@@ -76,18 +77,57 @@ void LinearLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
 }
 
+Spectral::Spectral(const Var& weight, Rng& rng)
+    : u_(weight.context().Empty({weight.shape()[0]}, weight.dtype())) {
+  FillNormal(u_, rng, 1.0);
+  SpectralStep(weight, u_);
+}
+
+Var Spectral::Normalised(const Var& weight, Mode mode) {
+  if (u_.empty()) return weight;
+  if (mode == Mode::kTrain) SpectralStep(weight, u_);
+  // A copy: what this pass records must not see the steps of later ones.
+  return SpectralNorm(weight, weight.context().Copy(u_));
+}
+
+void Spectral::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  if (!u_.empty()) visitor.Buffer(prefix + "spectral_u", u_);
+}
+
 Conv2dLayer::Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
     : options_(shape.options) {
   const Shape weights = {shape.out, shape.in, shape.kernel, shape.kernel};
   weight = Initialised(context, weights, rng, FanIn(weights));
   if (shape.bias) bias = Initialised(context, {shape.out}, rng, FanIn(weights));
+  if (shape.spectral) spectral_ = Spectral(weight, rng);
 }
 
-Var Conv2dLayer::Forward(const Var& x, Mode) { return Conv2d(x, weight, bias, options_); }
+Var Conv2dLayer::Forward(const Var& x, Mode mode) {
+  return Conv2d(x, spectral_.Normalised(weight, mode), bias, options_);
+}
 
 void Conv2dLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   visitor.Parameter(prefix + "weight", weight);
   if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
+  spectral_.Visit(prefix, visitor);
+}
+
+ConvTranspose2dLayer::ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng)
+    : options_(shape.options) {
+  const Shape weights = {shape.in, shape.out, shape.kernel, shape.kernel};
+  weight = Initialised(context, weights, rng, FanIn(weights));
+  if (shape.bias) bias = Initialised(context, {shape.out}, rng, FanIn(weights));
+  if (shape.spectral) spectral_ = Spectral(weight, rng);
+}
+
+Var ConvTranspose2dLayer::Forward(const Var& x, Mode mode) {
+  return ConvTranspose2d(x, spectral_.Normalised(weight, mode), bias, options_);
+}
+
+void ConvTranspose2dLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  visitor.Parameter(prefix + "weight", weight);
+  if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
+  spectral_.Visit(prefix, visitor);
 }
 
 BatchNorm::BatchNorm(Context& context, std::int64_t channels, const BatchNormOptions& options)
@@ -128,6 +168,28 @@ void BatchNorm::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   visitor.Buffer(prefix + "running_var", running_variance);
 }
 
+GroupNormLayer::GroupNormLayer(Context& context, std::int64_t channels, std::int64_t groups,
+                               const NormOptions& options)
+    : weight(Parameter(context, context.Full({channels}, 1.0))),
+      bias(Parameter(context, context.Zeros({channels}))),
+      groups_(groups),
+      options_(options) {}
+
+Var GroupNormLayer::Forward(const Var& x, Mode) {
+  return GroupNorm(x, static_cast<int>(groups_), weight, bias, options_);
+}
+
+void GroupNormLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  visitor.Parameter(prefix + "weight", weight);
+  visitor.Parameter(prefix + "bias", bias);
+}
+
+Var Upsample::Forward(const Var& x, Mode) {
+  if (!x.valid() || x.shape().rank() != 4)
+    return Resize(x, {0, 0}, mode_);  // which says what is wrong
+  return Resize(x, {2 * x.shape()[2], 2 * x.shape()[3]}, mode_);
+}
+
 Var Flatten::Forward(const Var& x, Mode) {
   if (!x.valid() || x.shape().rank() < 1) return x;
   return Reshape(x, {x.shape()[0], x.shape().Product(1, x.shape().rank())});
@@ -137,6 +199,15 @@ Var Sequential::Forward(const Var& x, Mode mode) {
   Var y = x;
   for (const auto& [name, module] : children_) y = module->Forward(y, mode);
   return y;
+}
+
+Var Residual::Forward(const Var& x, Mode mode) {
+  return Add(shortcut.Forward(x, mode), body.Forward(x, mode));
+}
+
+void Residual::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  body.Visit(prefix + "body.", visitor);
+  shortcut.Visit(prefix + "shortcut.", visitor);
 }
 
 void Sequential::Visit(const std::string& prefix, ModuleVisitor& visitor) {

@@ -16,6 +16,8 @@
 #include "nn/named_tensors.h"
 #include "nn/ops/batch_norm.h"
 #include "nn/ops/conv.h"
+#include "nn/ops/norm.h"
+#include "nn/ops/resize.h"
 #include "nn/tape.h"
 
 namespace tilegrad::nn {
@@ -56,6 +58,19 @@ struct LinearShape {
   bool bias = true;
 };
 
+// A weight that is used divided by its largest singular value (SpectralNorm of ops/norm.h), which
+// one power iteration at each training step follows. The buffer is "spectral_u".
+class Spectral {
+ public:
+  Spectral() = default;  // none: leaves weights as they are
+  Spectral(const Var& weight, Rng& rng);
+  Var Normalised(const Var& weight, Mode mode);
+  void Visit(const std::string& prefix, ModuleVisitor& visitor);
+
+ private:
+  Tensor u_;
+};
+
 class LinearLayer : public Module {
  public:
   LinearLayer(Context& context, const LinearShape& shape, Rng& rng);  // FillDefault
@@ -71,6 +86,7 @@ struct ConvShape {
   int kernel = 3;
   ConvOptions options = {};
   bool bias = true;
+  bool spectral = false;  // spectral norm of the weight
 };
 
 class Conv2dLayer : public Module {
@@ -84,6 +100,22 @@ class Conv2dLayer : public Module {
 
  private:
   ConvOptions options_;
+  Spectral spectral_;
+};
+
+class ConvTranspose2dLayer : public Module {
+ public:
+  // FillDefault by the inputs of one output as PyTorch counts them: out kernel^2.
+  ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng);
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Var weight;  // [in, out, kernel, kernel]
+  Var bias;    // [out]; invalid without
+
+ private:
+  ConvOptions options_;
+  Spectral spectral_;
 };
 
 // Of [n, c] and [n, c, h, w]. Running statistics as PyTorch: new = (1 - momentum) old + momentum
@@ -101,6 +133,33 @@ class BatchNorm : public Module {
  private:
   void Track(const BatchNormResult& batch, std::int64_t count);
   BatchNormOptions options_;
+};
+
+// Statistics over each sample: groups = 1 is layer norm with one gamma to a channel, groups =
+// channels instance norm.
+class GroupNormLayer : public Module {
+ public:
+  GroupNormLayer(Context& context, std::int64_t channels, std::int64_t groups,
+                 const NormOptions& options = {});
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Var weight, bias;  // [channels]: gamma 1, beta 0 at the start
+
+ private:
+  std::int64_t groups_;
+  NormOptions options_;
+};
+
+// Twice the height and the width.
+class Upsample : public Module {
+ public:
+  explicit Upsample(ResizeMode mode) : mode_(mode) {}
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string&, ModuleVisitor&) override {}
+
+ private:
+  ResizeMode mode_;
 };
 
 class Activation : public Module {
@@ -133,9 +192,19 @@ class Sequential : public Module {
   }
   Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+  std::size_t size() const { return children_.size(); }
 
  private:
   std::vector<std::pair<std::string, std::unique_ptr<Module>>> children_;
+};
+
+// y = shortcut(x) + body(x); an empty shortcut is x itself (He et al. 2016).
+class Residual : public Module {
+ public:
+  Var Forward(const Var& x, Mode mode) override;
+  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+
+  Sequential body, shortcut;
 };
 
 }  // namespace tilegrad::nn

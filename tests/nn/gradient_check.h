@@ -39,7 +39,7 @@ inline Var RandomConstant(Context& context, const Shape& shape, Rng& rng) {
 // The derivative of a scalar f at `inputs` along `direction`, by central differences of fourth
 // order: error about h^4 |f^(5)| / 30 + 2 eps |f| / h.
 inline double Slope(const std::function<double(const Inputs&)>& f, const Inputs& inputs,
-                    const Inputs& direction) {
+                    const Inputs& direction, double h = 1e-3) {
   const auto at = [&](double step) {
     Inputs moved;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
@@ -52,7 +52,6 @@ inline double Slope(const std::function<double(const Inputs&)>& f, const Inputs&
     }
     return f(moved);
   };
-  const double h = 1e-3;
   return (8.0 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12.0 * h);
 }
 

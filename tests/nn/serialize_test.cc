@@ -46,6 +46,46 @@ TEST_F(Safetensors, ReadsAFileWrittenByHand) {
   EXPECT_EQ(file->tensors[0].value.data<float>()[1], -2.5f);
 }
 
+// What the format's own implementation writes and reads (huggingface/safetensors): the bytes that
+// its tests of the Rust core and of the Python binding state.
+const char* kFromRust =
+    "40000000000000007b226174746e2e30223a7b226474797065223a22463332222c227368617065223a5b312c"
+    "322c335d2c22646174615f6f666673657473223a5b302c32345d7d7d000000000000803f0000004000004040"
+    "000080400000a040";
+const char* kFromPython =
+    "66000000000000007b225f5f6d657461646174615f5f223a7b226672616d65776f726b223a227074227d2c22"
+    "7465737431223a7b226474797065223a22493332222c227368617065223a5b322c325d2c22646174615f6f66"
+    "6673657473223a5b302c31365d7d7d2020202020202000000000000000000000000000000000";
+
+Bytes FromHex(const std::string& hex) {
+  Bytes bytes;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+    bytes.push_back(static_cast<std::uint8_t>(std::stoi(hex.substr(i, 2), nullptr, 16)));
+  }
+  return bytes;
+}
+
+TEST_F(Safetensors, AgreesWithTheFormatsOwnImplementation) {
+  const auto file = DecodeSafetensors(context_, FromHex(kFromRust));
+  ASSERT_TRUE(file.ok()) << file.status().message();
+  ASSERT_EQ(file->tensors.size(), 1u);
+  EXPECT_EQ(file->tensors[0].name, "attn.0");
+  EXPECT_EQ(file->tensors[0].value.shape(), (Shape{1, 2, 3}));
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_EQ(file->tensors[0].value.data<float>()[i], static_cast<float>(i));
+  }
+  EXPECT_EQ(EncodeSafetensors(*file).value(), FromHex(kFromRust));
+}
+
+TEST_F(Safetensors, ReadsMetadataAndPaddingOfOthers) {
+  const auto file = DecodeSafetensors(context_, FromHex(kFromPython));
+  ASSERT_TRUE(file.ok()) << file.status().message();
+  EXPECT_EQ(file->metadata.at("framework"), "pt");
+  ASSERT_EQ(file->tensors.size(), 1u);
+  EXPECT_EQ(file->tensors[0].value.dtype(), DType::kI32);
+  EXPECT_EQ(file->tensors[0].value.shape(), (Shape{2, 2}));
+}
+
 TEST_F(Safetensors, WritesThoseBytes) {
   const std::vector<float> values = {1.0f, -2.5f};
   const auto bytes = EncodeSafetensors({{{"b", context_.From({2}, values)}}, {}});
