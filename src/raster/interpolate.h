@@ -57,40 +57,12 @@ class TileQuads {
   AlignedVector<float> data_;
 };
 
-// Per slot of a tile, as structure of arrays with kTilePixels entries each: planes in terms of the
-// position relative to the slot's origin. Scratch of one worker.
-class TilePlanes {
- public:
-  void Resize(int channels, bool barycentrics);
-
-  int channels() const { return channels_; }
-  int outputs() const { return outputs_; }  // channels, and 2 where barycentrics are wanted
-  // Three consecutive arrays: value at the origin, d/dx, d/dy.
-  float* weight(int k) { return data_.data() + kTilePixels * 3 * k; }
-  float* q() { return weight(3); }
-  float* numerator(int output) { return weight(4 + output); }
-  float* m(int k) { return data_.data() + kTilePixels * (3 * (4 + outputs_) + k); }
-  float* least_q() { return m(3); }
-  std::int32_t* row(int k) { return rows_.data() + kTilePixels * k; }  // first value of corner k
-  // Scratch of the backward pass: h_c and s per pixel; moments [slot][3][channels + 1].
-  float* h(int channel) { return h_.data() + kTilePixels * channel; }
-  float* moments() { return moments_.data(); }
-
- private:
-  int channels_ = 0, outputs_ = 0;
-  AlignedVector<float> data_, h_, moments_;
-  AlignedVector<std::int32_t> rows_;
-};
-
-// A planar image, seen from the tile's top left pixel. T may be const.
+// A planar image, seen from the top left pixel of a part of it. T may be const.
 template <class T>
 struct PlanarView {
   T* data;
   std::ptrdiff_t plane, row;  // steps
 };
-
-// Fills `planes` for the faces of a tile.
-void SetUpTilePlanes(const InterpolateInput& input, const TileFaces& faces, TilePlanes* planes);
 
 // Where InterpolateTile writes: outputs [0, channels) to `attributes`, then the two barycentrics.
 struct InterpolateOutput {
@@ -100,17 +72,5 @@ struct InterpolateOutput {
 // Writes the pixels of `rect`; 0 at background pixels.
 void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
                      TileQuads* quads, const InterpolateOutput& out);
-
-// Arrays of `stride` numbers per slot, one after the other: d_x[3], d_y[3], d_inverse_depth[3] of
-// the corners, then d_attribute [3][C].
-inline std::size_t FaceGradientArrays(int channels) {
-  return 9 + 3 * static_cast<std::size_t>(channels);
-}
-
-// The adjoint: overwrites FaceGradientArrays(channels) * stride numbers; stride is a multiple of
-// kTileSize and >= count.
-void InterpolateTileBackward(const InterpolateInput& input, const TileFaces& faces,
-                             const TileRect& rect, const PlanarView<const float>& d_out,
-                             TilePlanes* planes, std::size_t stride, float* d_faces);
 
 }  // namespace tilegrad::raster

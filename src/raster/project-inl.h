@@ -102,20 +102,19 @@ HWY_INLINE void StoreCameraSums(ProjectTag d, const CameraSums& sums, Camera* ca
   camera->cx = total(sums.cx), camera->cy = total(sums.cy), camera->near_plane = 0;
 }
 
-// One vector of vertices of the adjoint: d = {d_x, d_y, d_inverse_depth}. Writes d_positions
-// [Lanes,3].
+// One vector of vertices of the adjoint: d_screen [Lanes][d_x, d_y, d_inverse_depth, -]. Writes
+// d_positions [Lanes,3].
 HWY_INLINE void ProjectLanesBackward(ProjectTag d, const Camera& camera, const float* positions,
-                                     const float* const d_screen[3], float* d_positions,
-                                     CameraSums* sums) {
-  ProjectVec position[3];
+                                     const float* d_screen, float* d_positions, CameraSums* sums) {
+  ProjectVec position[3], d_x, d_y, d_inverse, unused;
   hn::LoadInterleaved3(d, positions, position[0], position[1], position[2]);
   const CameraLanes p = ToCameraLanes(d, camera, position[0], position[1], position[2]);
   const auto inverse = hn::Div(hn::Set(d, 1.0f), p.depth);
   const auto u = hn::Mul(p.x, inverse), v = hn::Mul(p.y, inverse);
-  const auto d_x = hn::LoadU(d, d_screen[0]), d_y = hn::LoadU(d, d_screen[1]);
+  hn::LoadInterleaved4(d, d_screen, d_x, d_y, d_inverse, unused);
   const auto d_u = hn::Mul(hn::Set(d, camera.fx), d_x);
   const auto d_v = hn::Neg(hn::Mul(hn::Set(d, camera.fy), d_y));
-  auto d_z = hn::Mul(hn::LoadU(d, d_screen[2]), inverse);
+  auto d_z = hn::Mul(d_inverse, inverse);
   d_z = hn::Mul(hn::MulAdd(d_u, u, hn::MulAdd(d_v, v, d_z)), inverse);  // z = -depth
   const ProjectVec d_camera[3] = {hn::Mul(d_u, inverse), hn::Mul(d_v, inverse), d_z};
   ProjectVec d_position[3];
@@ -138,26 +137,29 @@ HWY_INLINE void ProjectLanesBackward(ProjectTag d, const Camera& camera, const f
   sums->fy = hn::NegMulAdd(v, d_y, sums->fy), sums->cy = hn::Add(sums->cy, d_y);
 }
 
-// The adjoint where nothing was cut and every vertex is visible.
-void ProjectVerticesBackward(const FaceSource<float>& source, const ScreenGradients& d_mesh,
+// The adjoint where nothing was cut and every vertex is visible. d_screen [V][4].
+void ProjectVerticesBackward(const FaceSource<float>& source, std::span<const float> d_screen,
                              const ProjectGradients& out) {
   const ProjectTag d;
   const std::size_t lanes = hn::Lanes(d), n = source.positions.size() / 3;
   CameraSums sums = ZeroCameraSums(d);
   CameraSums* wanted = out.d_camera == nullptr ? nullptr : &sums;
-  for (std::size_t i = 0; i < n; i += lanes) {
-    const std::size_t count = HWY_MIN(lanes, n - i);
-    float positions[3 * 16], d_screen[3][16] = {}, d_positions[3 * 16];
-    const float* const from[3] = {&d_mesh.d_x[i], &d_mesh.d_y[i], &d_mesh.d_inverse_depth[i]};
+  float unwanted[3 * 16];
+  std::size_t i = 0;
+  for (; i + lanes <= n; i += lanes) {
+    float* to = out.d_positions.empty() ? unwanted : &out.d_positions[3 * i];
+    ProjectLanesBackward(d, *source.camera, &source.positions[3 * i], &d_screen[4 * i], to, wanted);
+  }
+  if (i < n) {
+    float positions[3 * 16], rest[4 * 16] = {}, d_positions[3 * 16];
     for (std::size_t k = 0; k < lanes; ++k) {  // the last vertex again, with gradient zero
       std::memcpy(positions + 3 * k, &source.positions[3 * HWY_MIN(i + k, n - 1)],
                   3 * sizeof(float));
     }
-    for (int a = 0; a < 3; ++a) std::memcpy(d_screen[a], from[a], count * sizeof(float));
-    const float* const d_in[3] = {d_screen[0], d_screen[1], d_screen[2]};
-    ProjectLanesBackward(d, *source.camera, positions, d_in, d_positions, wanted);
+    std::memcpy(rest, &d_screen[4 * i], 4 * (n - i) * sizeof(float));
+    ProjectLanesBackward(d, *source.camera, positions, rest, d_positions, wanted);
     if (!out.d_positions.empty()) {
-      std::memcpy(&out.d_positions[3 * i], d_positions, 3 * count * sizeof(float));
+      std::memcpy(&out.d_positions[3 * i], d_positions, 3 * (n - i) * sizeof(float));
     }
   }
   if (out.d_camera != nullptr) StoreCameraSums(d, sums, out.d_camera);

@@ -40,6 +40,17 @@ bool AllVisible(const ScreenMesh& mesh) {
                      [](float inverse) { return inverse > 0; });
 }
 
+ScreenGradients Deinterleave(const VertexGradients& d_mesh, ProjectBackwardScratch* scratch) {
+  const std::size_t n = d_mesh.quads.size() / 4;
+  AlignedVector<float>* const arrays[3] = {&scratch->d_x, &scratch->d_y, &scratch->d_inverse_depth};
+  for (std::size_t k = 0; k < 3; ++k) {
+    arrays[k]->resize(n);
+    for (std::size_t v = 0; v < n; ++v) (*arrays[k])[v] = d_mesh.quads[4 * v + k];
+  }
+  scratch->d_clip_t.assign(d_mesh.d_clip_t.begin(), d_mesh.d_clip_t.end());
+  return {scratch->d_x, scratch->d_y, scratch->d_inverse_depth, scratch->d_clip_t};
+}
+
 }  // namespace
 
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
@@ -58,16 +69,17 @@ void Project(const FaceSource<float>& source, int width, int height, ScreenMeshB
 }
 
 void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,
-                     const ScreenGradients& d_mesh, AlignedVector<CameraPoint<float>>* scratch,
+                     const VertexGradients& d_mesh, ProjectBackwardScratch* scratch,
                      const ProjectGradients& out) {
   if (AllVisible(mesh)) {
-    HWY_DYNAMIC_DISPATCH(ProjectVerticesBackward)(source, d_mesh, out);
+    HWY_DYNAMIC_DISPATCH(ProjectVerticesBackward)(source, d_mesh.quads, out);
     return;
   }
   CameraT<float> d_camera = ZeroCamera<float>();
-  scratch->assign(static_cast<std::size_t>(mesh.source_vertices), {0, 0, 0});
+  scratch->points.assign(static_cast<std::size_t>(mesh.source_vertices), {0, 0, 0});
   std::fill(out.d_positions.begin(), out.d_positions.end(), 0.0f);
-  ProjectRefBackward<float>(source, mesh, d_mesh, *scratch, out.d_positions, &d_camera);
+  ProjectRefBackward<float>(source, mesh, Deinterleave(d_mesh, scratch), scratch->points,
+                            out.d_positions, &d_camera);
   if (out.d_camera != nullptr) *out.d_camera = d_camera;
 }
 

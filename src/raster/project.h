@@ -17,15 +17,27 @@ namespace tilegrad::raster {
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
              DrawnFaces* drawn = nullptr);
 
-// What the adjoint of Project is asked for, and scratch.
+// What the adjoint of Project is asked for.
 struct ProjectGradients {
   std::span<float> d_positions;        // [V,3] overwritten; empty: not wanted
   CameraT<float>* d_camera = nullptr;  // overwritten; null: not wanted
 };
 
-// Adjoint of Project: from d_mesh to the source. `scratch` grows to V points where faces were cut.
+// dL/d(ScreenMesh), one vertex after the other.
+struct VertexGradients {
+  std::span<const float> quads;     // [V][4] d_x, d_y, d_inverse_depth, and one that is not read
+  std::span<const float> d_clip_t;  // as in ScreenGradients
+};
+
+// Memory for meshes with faces that were cut.
+struct ProjectBackwardScratch {
+  AlignedVector<CameraPoint<float>> points;
+  AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t;
+};
+
+// Adjoint of Project: from d_mesh to the source. Allocates only to grow `scratch`.
 void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,
-                     const ScreenGradients& d_mesh, AlignedVector<CameraPoint<float>>* scratch,
+                     const VertexGradients& d_mesh, ProjectBackwardScratch* scratch,
                      const ProjectGradients& out);
 
 }  // namespace tilegrad::raster

@@ -12,7 +12,8 @@
 #include "raster/bin.h"
 #include "raster/drawn_faces.h"
 #include "raster/interpolate.h"
-#include "raster/near_clip.h"
+#include "raster/interpolate_backward.h"
+#include "raster/project.h"
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask.h"
 #include "raster/tile_faces.h"
@@ -46,21 +47,28 @@ struct ImageScratch {
   PreparedFrom prepared;
 
   // Backward: gradients in the layout of `mesh`.
-  AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t, d_attributes;
-  AlignedVector<raster::CameraPoint<float>> points;
+  AlignedVector<float> d_vertices;              // [V][4] d_x, d_y, d_inverse_depth, 0
+  AlignedVector<float> d_rows;                  // [rows of attributes][groups of channels][4]
+  AlignedVector<float> d_attributes, d_clip_t;  // where faces were cut
+  raster::ProjectBackwardScratch project;
 };
 
-// Gradients of one tile's faces: `count` faces, and arrays of `stride` numbers, in a worker's
-// lists.
-struct FaceGradientBlock {
-  std::size_t face_begin = 0, value_begin = 0;
-  std::size_t count = 0;
-  std::size_t stride = 0;  // of their arrays
+// Gradients of the faces seen in one band of an image.
+struct BandGradients {
+  std::size_t stride = 0;
+  AlignedVector<std::int32_t> faces;   // those of slots 1, 2, ...
+  AlignedVector<float> values;         // as FinishBand writes them; never shrinks
+  AlignedVector<std::int32_t> pieces;  // where faces were cut: which piece each pixel sees
 };
-struct TileGradients {
-  std::size_t worker = 0;
-  FaceGradientBlock interpolated;  // as InterpolateTileBackward writes them
-  FaceGradientBlock soft;          // as SoftMaskBackward writes them
+
+// Gradients through the alpha of one bin of an image.
+struct BinGradients {
+  struct Tile {
+    std::span<const std::int32_t> faces;  // of the image's soft lists
+    std::size_t value_begin;              // of 6 numbers per face, as SoftMaskBackward writes them
+  };
+  AlignedVector<Tile> tiles;
+  AlignedVector<float> values;  // never shrinks
 };
 
 struct WorkerScratch {
@@ -68,13 +76,8 @@ struct WorkerScratch {
   raster::VisibilityTile visibility;
   raster::TileFaces faces;
   raster::TileQuads quads;
-  raster::TilePlanes planes;
   raster::SoftMaskScratch soft;
-  // Lists that the TileGradients of this worker's tiles point into.
-  AlignedVector<std::int32_t> gradient_faces;
-  AlignedVector<float> gradient_values;
-
-  void ClearGradients() { gradient_faces.clear(), gradient_values.clear(); }
+  raster::BandSums band;
 };
 
 // One tile of one image of the batch.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// First stage of a frame, per image: scene -> screen -> tiles; and the last of the way back.
+// First stage of a frame, per image: scene -> screen -> tiles.
 #pragma once
 
 #include "render/image_scratch.h"
@@ -15,12 +15,5 @@ struct PrepareRequest {
 
 void PrepareImage(const SceneView& scene, const RenderOptions& options,
                   const PrepareRequest& request, ImageScratch* image);
-
-// Sizes and zeroes the gradients of a prepared image.
-void ClearImageGradients(const SceneView& scene, const SceneGradients& wanted, ImageScratch* image);
-
-// From the screen to the scene: overwrites what `d_scene` asks for.
-void FinishImageGradients(const SceneView& scene, const RenderOptions& options, ImageScratch* image,
-                          SceneGradients* d_scene);
 
 }  // namespace tilegrad

@@ -6,12 +6,37 @@
 #include <vector>
 
 #include "render/frame_layout.h"
+#include "render/merge_gradients.h"
 #include "render/prepare.h"
 #include "render/tile_backward.h"
 #include "render/tile_forward.h"
 #include "render/validate.h"
 
 namespace tilegrad {
+namespace {
+
+// Parts of each image that have a gradient.
+struct BackwardPlan {
+  raster::TileGrid grid;  // of bins
+  std::size_t bands, bins;
+
+  BackwardPlan(const RenderOptions& options, const FrameGradients& d_frame)
+      : grid(raster::BinGrid(options.width, options.height)),
+        bands(d_frame.attributes.empty() ? 0 : BandGrid(options.width, options.height).count()),
+        bins(d_frame.alpha.empty() ? 0 : grid.tiles()) {}
+};
+
+bool WantsGeometry(const SceneGradients& wanted) {
+  return !wanted.positions.empty() || wanted.camera;
+}
+
+// Where faces were cut, geometry moves the attributes at the cut.
+raster::BackwardRequest BandRequest(const SceneGradients& wanted, const raster::ScreenMesh& mesh) {
+  const bool geometry = WantsGeometry(wanted);
+  return {geometry, !wanted.attributes.empty() || (geometry && mesh.was_clipped())};
+}
+
+}  // namespace
 
 struct Renderer::Impl {
   explicit Impl(const Workers& w)
@@ -35,26 +60,56 @@ struct Renderer::Impl {
     });
   }
 
-  void Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
-             SceneGradients* d_scene);
+  void SumFaces(const BackwardInput& input, const BackwardPlan& plan, std::size_t count,
+                std::span<const SceneGradients> d_scenes);
+  void Merge(std::span<const SceneView> scenes, const RenderOptions& options,
+             const BackwardPlan& plan, std::span<SceneGradients> d_scenes);
 
   const Workers* workers;
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
-  std::vector<TileGradients> tile_gradients;  // [image][tile]
   std::vector<double> bin_errors;             // of alpha, [image][bin]
+  std::vector<BandGradients> band_gradients;  // [image][band]
+  std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-void Renderer::Impl::Merge(const SceneView& scene, const RenderOptions& options, std::size_t n,
-                           SceneGradients* d_scene) {
-  ImageScratch& image = images[n];
-  ClearImageGradients(scene, *d_scene, &image);
-  const std::size_t tiles = raster::TileGrid(options.width, options.height).tiles();
-  const std::span<float> d_attributes =
-      image.mesh.was_clipped() ? std::span<float>(image.d_attributes) : d_scene->attributes;
-  MergeTileGradients(image, std::span(tile_gradients).subspan(n * tiles, tiles), worker_scratch,
-                     d_attributes, {image.d_x, image.d_y, image.d_inverse_depth, image.d_clip_t});
-  FinishImageGradients(scene, options, &image, d_scene);
+void Renderer::Impl::SumFaces(const BackwardInput& input, const BackwardPlan& plan,
+                              std::size_t count, std::span<const SceneGradients> d_scenes) {
+  if (band_gradients.size() < count * plan.bands) band_gradients.resize(count * plan.bands);
+  if (bin_gradients.size() < count * plan.bins) bin_gradients.resize(count * plan.bins);
+  // Bands, which are longer, first.
+  workers->For(count * (plan.bands + plan.bins), [&](std::size_t task, std::size_t w) {
+    WorkerScratch& worker = worker_scratch[w];
+    if (task < count * plan.bands) {
+      const std::size_t n = task / plan.bands;
+      const raster::BackwardRequest request = BandRequest(d_scenes[n], images[n].mesh);
+      if (!request.geometry && !request.attributes) return;
+      RenderBandBackward(input, images[n], n, task % plan.bands, request, &worker.band,
+                         &band_gradients[task]);
+      return;
+    }
+    task -= count * plan.bands;
+    const std::size_t n = task / plan.bins, bin = task % plan.bins;
+    if (!WantsGeometry(d_scenes[n])) return;
+    RenderBinBackward(input, images[n], {n, bin, plan.grid.rect(bin)}, &worker.soft,
+                      &bin_gradients[task]);
+  });
+}
+
+// Positions and attributes are two tasks each, for the sake of a batch of one.
+void Renderer::Impl::Merge(std::span<const SceneView> scenes, const RenderOptions& options,
+                           const BackwardPlan& plan, std::span<SceneGradients> d_scenes) {
+  workers->For(2 * scenes.size(), [&](std::size_t task, std::size_t) {
+    const std::size_t n = task / 2;
+    const ImageGradients gradients{std::span(band_gradients).subspan(n * plan.bands, plan.bands),
+                                   std::span(bin_gradients).subspan(n * plan.bins, plan.bins),
+                                   BandRequest(d_scenes[n], images[n].mesh)};
+    if (task % 2 == 0) {
+      MergeGeometry(scenes[n], options, gradients, &images[n], &d_scenes[n]);
+    } else {
+      MergeAttributes(scenes[n], gradients, &images[n], &d_scenes[n]);
+    }
+  });
 }
 
 Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
@@ -87,21 +142,9 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           std::span<SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
   impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true});
-  for (WorkerScratch& worker : impl_->worker_scratch) worker.ClearGradients();
-  const raster::TileGrid grid(options.width, options.height);
-  const std::size_t tiles = grid.tiles();
-  impl_->tile_gradients.resize(scenes.size() * tiles);
-  impl_->ForTiles(scenes.size(), grid, [&](const TileTask& task, std::size_t worker) {
-    const SceneGradients& wanted = d_scenes[task.image];
-    const BackwardRequest request{!wanted.positions.empty() || wanted.camera,
-                                  !wanted.attributes.empty()};
-    impl_->tile_gradients[task.image * tiles + task.tile] =
-        RenderTileBackward(options, impl_->images[task.image], task, frame, d_frame, request,
-                           worker, &impl_->worker_scratch[worker]);
-  });
-  impl_->workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-    impl_->Merge(scenes[n], options, n, &d_scenes[n]);
-  });
+  const BackwardPlan plan(options, d_frame);
+  impl_->SumFaces({options, frame, d_frame}, plan, scenes.size(), d_scenes);
+  impl_->Merge(scenes, options, plan, d_scenes);
   return ValidateResult(d_scenes);
 }
 

@@ -1,30 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way back through one tile, from face ids alone; and the merging of tiles, in their order.
+// The way back from images to faces, from face ids and alpha alone: attributes by bands of rows,
+// alpha by bins.
 #pragma once
 
-#include <span>
+#include <algorithm>
+#include <cstddef>
 
 #include "render/image_scratch.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
 
-// Which adjoints of the screen are wanted.
-struct BackwardRequest {
-  bool geometry;    // positions or camera
-  bool attributes;  // of the mesh
+// The bands of an image: whole rows, so that faces are cut seldom; short enough to share one large
+// image among workers. They depend on the size of the image only.
+struct BandGrid {
+  int width, height, rows;  // pixels; a band has `rows` rows, the last may have fewer
+
+  BandGrid(int w, int h) : width(w), height(h), rows(std::clamp(kBandPixels / w, 16, 64)) {}
+  std::size_t count() const { return static_cast<std::size_t>((height + rows - 1) / rows); }
+
+ private:
+  static constexpr int kBandPixels = 1 << 15;
 };
 
-// Sums the tile's gradients per face into the worker's lists.
-TileGradients RenderTileBackward(const RenderOptions& options, const ImageScratch& image,
-                                 const TileTask& task, const Frame& frame,
-                                 const FrameGradients& d_frame, const BackwardRequest& request,
-                                 std::size_t worker_index, WorkerScratch* worker);
+// What a task of the backward pass reads.
+struct BackwardInput {
+  const RenderOptions& options;
+  const Frame& frame;
+  const FrameGradients& d_frame;
+};
 
-// Adds the gradients of an image's tiles, in order, to its vertices and to d_attributes (in the
-// layout of the screen mesh; empty: not wanted).
-void MergeTileGradients(const ImageScratch& image, std::span<const TileGradients> tiles,
-                        std::span<const WorkerScratch> workers, std::span<float> d_attributes,
-                        const raster::ScreenGradients& d_mesh);
+// Gradients of the faces seen in band `band` of image `n`, through their attributes.
+void RenderBandBackward(const BackwardInput& input, const ImageScratch& image, std::size_t n,
+                        std::size_t band, const raster::BackwardRequest& request,
+                        raster::BandSums* sums, BandGradients* out);
+
+// Gradients of the faces that reach the tiles of a bin, through alpha.
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
+                       raster::SoftMaskScratch* scratch, BinGradients* out);
 
 }  // namespace tilegrad

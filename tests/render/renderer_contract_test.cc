@@ -107,7 +107,7 @@ std::string Bytes(Renderer* renderer, Batch* batch, std::size_t first, std::size
 TEST(RendererBits, SameForAnyWorkerCountAndAnyRun) {
   Batch batch;
   std::string first;
-  for (const int count : {1, 2, 7}) {
+  for (const int count : {1, 2, 3, 7, 16}) {
     const Workers workers(count);
     Renderer renderer(workers);
     for (int run = 0; run < 3; ++run) {

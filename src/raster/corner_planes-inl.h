@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faces as planes, in vectors: what interpolate.h and interpolate_backward.h have in common.
+#if defined(TILEGRAD_RASTER_CORNER_PLANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_CORNER_PLANES_INL_H_
+#undef TILEGRAD_RASTER_CORNER_PLANES_INL_H_
+#else
+#define TILEGRAD_RASTER_CORNER_PLANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include "raster/interpolate.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Lanes are faces.
+using LaneTag = HWY_CAPPED(float, kTileSize);
+using LaneIntTag = hn::RebindToSigned<LaneTag>;
+using Lane = hn::Vec<LaneTag>;
+using LaneInt = hn::Vec<LaneIntTag>;
+
+// value + dx * x + dy * y
+struct Plane {
+  Lane value, dx, dy;
+};
+
+HWY_INLINE void AddScaled(Lane scale, const Plane& p, Plane* sum) {
+  sum->value = hn::MulAdd(scale, p.value, sum->value);
+  sum->dx = hn::MulAdd(scale, p.dx, sum->dx);
+  sum->dy = hn::MulAdd(scale, p.dy, sum->dy);
+}
+
+HWY_INLINE Plane ZeroPlane() {
+  const LaneTag d;
+  return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+}
+
+struct CornerLanes {
+  LaneInt vertex[3];
+  Lane x[3], y[3];
+};
+
+HWY_INLINE CornerLanes GatherCorners(const ScreenMesh& mesh, LaneInt face) {
+  const LaneTag d;
+  const LaneIntTag di;
+  CornerLanes out;
+  const std::int32_t* const corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
+  for (int k = 0; k < 3; ++k) {
+    out.vertex[k] = hn::GatherIndex(di, corners[k], face);
+    out.x[k] = hn::GatherIndex(d, mesh.x.data(), out.vertex[k]);
+    out.y[k] = hn::GatherIndex(d, mesh.y.data(), out.vertex[k]);
+  }
+  return out;
+}
+
+// Barycentric weights as planes: MakeFacePlane of face_plane.h.
+HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y, Plane out[3]) {
+  const LaneTag d;
+  const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
+  const auto x2 = hn::Sub(c.x[2], c.x[0]), y2 = hn::Sub(c.y[2], c.y[0]);
+  const auto x3 = hn::Sub(x2, x1), y3 = hn::Sub(y2, y1);
+  const auto area = hn::Sub(hn::Mul(x1, y2), hn::Mul(x2, y1));
+  const auto longest =
+      hn::Max(hn::Max(hn::MulAdd(x1, x1, hn::Mul(y1, y1)), hn::MulAdd(x2, x2, hn::Mul(y2, y2))),
+              hn::MulAdd(x3, x3, hn::Mul(y3, y3)));
+  constexpr auto kThin = static_cast<float>(kFlatHeight * kFlatHeight);
+  const auto solid = hn::Gt(hn::Mul(area, area), hn::Mul(hn::Set(d, kThin), longest));
+  const auto inverse = hn::IfThenElseZero(solid, hn::Div(hn::Set(d, 1.0f), area));
+  const auto x = hn::Sub(origin_x, c.x[0]), y = hn::Sub(origin_y, c.y[0]);
+  const auto third = hn::IfThenZeroElse(solid, hn::Set(d, 1.0f / 3.0f));
+  out[1].dx = hn::Mul(y2, inverse), out[1].dy = hn::Neg(hn::Mul(x2, inverse));
+  out[2].dx = hn::Neg(hn::Mul(y1, inverse)), out[2].dy = hn::Mul(x1, inverse);
+  for (int k = 1; k < 3; ++k) {
+    out[k].value = hn::MulAdd(out[k].dx, x, hn::MulAdd(out[k].dy, y, third));
+  }
+  out[0].value = hn::Sub(hn::Set(d, 1.0f), hn::Add(out[1].value, out[2].value));
+  out[0].dx = hn::Neg(hn::Add(out[1].dx, out[2].dx));
+  out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
+}
+
+// Index of a corner's first attribute.
+HWY_INLINE LaneInt AttributeRow(const InterpolateInput& input, LaneInt face, LaneInt vertex,
+                                int k) {
+  const LaneIntTag di;
+  const auto row = input.attributes.rate == AttributeRate::kVertex
+                       ? vertex
+                       : hn::Add(hn::Mul(face, hn::Set(di, 3)), hn::Set(di, k));
+  return hn::Mul(row, hn::Set(di, input.attributes.channels));
+}
+
+// What the planes of a vector of faces are made of.
+struct CornerPlanes {
+  Plane weight[3], q;
+  Lane m[3];
+  LaneInt row[3];
+};
+
+// Planes in terms of the position relative to an origin.
+HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt face, Lane origin_x,
+                                         Lane origin_y) {
+  const LaneTag d;
+  const CornerLanes corners = GatherCorners(*input.mesh, face);
+  CornerPlanes out;
+  out.q = ZeroPlane();
+  WeightPlanes(corners, origin_x, origin_y, out.weight);
+  for (int k = 0; k < 3; ++k) {
+    out.m[k] = input.mode == Interpolation::kPerspective
+                   ? hn::GatherIndex(d, input.mesh->inverse_depth.data(), corners.vertex[k])
+                   : hn::Set(d, 1.0f);
+    out.row[k] = AttributeRow(input, face, corners.vertex[k], k);
+    AddScaled(out.m[k], out.weight[k], &out.q);
+  }
+  return out;
+}
+
+// Attribute c at corner k.
+HWY_INLINE Lane CornerAttribute(const InterpolateInput& input, const CornerPlanes& corners, int k,
+                                int c) {
+  return hn::GatherIndex(LaneTag(), input.attributes.values.data() + c, corners.row[k]);
+}
+
+HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
+  return hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
+}
+
+inline constexpr int kQuadPixels = 4;
+using QuadTag = hn::FixedTag<float, kQuadPixels>;
+using Quad = hn::Vec<QuadTag>;
+
+// From four outputs of four pixels to four pixels of four outputs, in place.
+HWY_INLINE void Transpose(Quad (&q)[4]) {
+  const QuadTag d;
+  const Quad a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
+  const Quad e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
+  q[0] = hn::InterleaveLower(d, a, b), q[1] = hn::InterleaveUpper(d, a, b);
+  q[2] = hn::InterleaveLower(d, e, f), q[3] = hn::InterleaveUpper(d, e, f);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::raster
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of interpolate_backward.h. Lanes are faces where they are set up or finished, and the
+// channels of a pixel in between.
+#if defined(TILEGRAD_RASTER_INTERPOLATE_BACKWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_INTERPOLATE_BACKWARD_INL_H_
+#undef TILEGRAD_RASTER_INTERPOLATE_BACKWARD_INL_H_
+#else
+#define TILEGRAD_RASTER_INTERPOLATE_BACKWARD_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstring>
+
+#include "raster/corner_planes-inl.h"
+#include "raster/fragments.h"
+#include "raster/interpolate_backward.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using QuadIntTag = hn::RebindToSigned<QuadTag>;
+
+HWY_INLINE bool AllBackground(const std::int32_t* faces) {
+  const QuadIntTag di;
+  return hn::AllTrue(di, hn::Lt(hn::LoadU(di, faces), hn::Zero(di)));
+}
+
+// Gives pixel (x, y) the next slot if its face has none. No branch: whether a face is new is hard
+// to foretell where faces are small.
+HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, BandSums* sums) {
+  std::int32_t* slot = sums->slot_of_face.data() + 1 + face;
+  const std::int32_t found = *slot, fresh = found >> 31;
+  const auto next = static_cast<std::int32_t>(sums->count);
+  *slot = (next & fresh) | (found & ~fresh);
+  sums->face[sums->count] = face;
+  sums->origin_x[sums->count] = x, sums->origin_y[sums->count] = y;
+  sums->count += static_cast<std::size_t>(-fresh);
+}
+
+// The arrays by slot have room for one slot more than there can be.
+void NumberFaces(const BackwardBand& band, BandSums* sums) {
+  sums->count = 1;
+  for (int i = band.row_begin; i < band.row_end; ++i) {
+    const std::int32_t* row =
+        band.faces + static_cast<std::ptrdiff_t>(i - band.row_begin) * band.width;
+    const float y = static_cast<float>(i) + 0.5f;
+    int j = 0;
+    for (; j + kQuadPixels <= band.width; j += kQuadPixels) {
+      if (AllBackground(row + j)) continue;
+      for (int p = j; p < j + kQuadPixels; ++p) {
+        NumberPixel(row[p], static_cast<float>(p) + 0.5f, y, sums);
+      }
+    }
+    for (; j < band.width; ++j) NumberPixel(row[j], static_cast<float>(j) + 0.5f, y, sums);
+  }
+}
+
+HWY_INLINE CornerPlanes LoadCornerPlanes(const InterpolateInput& input, const BandSums& sums,
+                                         std::size_t s) {
+  const LaneTag d;
+  return MakeCornerPlanes(input, hn::Load(LaneIntTag(), sums.face.data() + s),
+                          hn::Load(d, sums.origin_x.data() + s),
+                          hn::Load(d, sums.origin_y.data() + s));
+}
+
+// Channels of a group: three, or what is left of them.
+HWY_INLINE int GroupChannels(const InterpolateInput& input, std::size_t group) {
+  return HWY_MIN(3, input.attributes.channels - 3 * static_cast<int>(group));
+}
+
+// What one group makes of a vector of faces: N of its channels.
+struct GroupPlanes {
+  Lane attribute[3][3];  // [corner][channel]
+  Plane numerator[3];    // [channel]
+};
+
+HWY_INLINE GroupPlanes MakeGroupPlanes(const InterpolateInput& input, const CornerPlanes& corners,
+                                       std::size_t group) {
+  GroupPlanes out;
+  const int channels = GroupChannels(input, group);
+  for (int c = 0; c < 3; ++c) {
+    out.numerator[c] = ZeroPlane();
+    for (int k = 0; k < 3; ++k) {
+      out.attribute[k][c] =
+          c < channels ? CornerAttribute(input, corners, k, 3 * static_cast<int>(group) + c)
+                       : hn::Zero(LaneTag());
+      AddScaled(hn::Mul(corners.m[k], out.attribute[k][c]), corners.weight[k], &out.numerator[c]);
+    }
+  }
+  return out;
+}
+
+// Fills sums->planes and least_q.
+void SetUpBand(const InterpolateInput& input, BandSums* sums) {
+  const LaneTag d;
+  const std::size_t stride = sums->stride();
+  for (std::size_t s = 0; s < stride; s += hn::Lanes(d)) {
+    const CornerPlanes corners = LoadCornerPlanes(input, *sums, s);
+    hn::Store(LeastQ(corners), d, sums->least_q.data() + s);
+    for (std::size_t g = 0; g < ChannelGroups(input.attributes.channels); ++g) {
+      const GroupPlanes p = MakeGroupPlanes(input, corners, g);
+      float* to = sums->planes.data() + 4 * (3 * g * stride + s);
+      const Plane* n = p.numerator;
+      hn::StoreInterleaved4(n[0].value, n[1].value, n[2].value, corners.q.value, d, to);
+      hn::StoreInterleaved4(n[0].dx, n[1].dx, n[2].dx, corners.q.dx, d, to + 4 * stride);
+      hn::StoreInterleaved4(n[0].dy, n[1].dy, n[2].dy, corners.q.dy, d, to + 8 * stride);
+    }
+  }
+}
+
+// (h_0, h_1, h_2, s) of a pixel, from (g_0, g_1, g_2, 0). `planes`: of the pixel's slot.
+HWY_INLINE Quad PerspectiveAdjoint(Quad d_out, const float* planes, std::size_t stride,
+                                   float least_q, Quad x, Quad y) {
+  const QuadTag d;
+  const auto numerator =
+      hn::MulAdd(hn::Load(d, planes + 4 * stride), x,
+                 hn::MulAdd(hn::Load(d, planes + 8 * stride), y, hn::Load(d, planes)));
+  const auto q = hn::Max(hn::Broadcast<3>(numerator), hn::Set(d, least_q));
+  const auto inverse = hn::Div(hn::Set(d, 1.0f), q);
+  const auto h = hn::Mul(d_out, inverse);
+  const auto s = hn::SumOfLanes(d, hn::Mul(h, hn::Mul(numerator, inverse)));
+  return hn::IfThenElse(hn::FirstN(d, 3), h, s);
+}
+
+// Four pixels of a row, all there.
+struct PixelQuad {
+  const std::int32_t* faces;
+  Quad d_out[4];  // by pixel: (g_0, g_1, g_2, 0)
+  float x, y;     // centre of the first pixel
+};
+
+template <bool kPerspective>
+HWY_INLINE void AddMoments(const PixelQuad& pixels, std::size_t group, std::size_t stride,
+                           BandSums* sums) {
+  const QuadTag d;
+  const float* const planes = sums->planes.data() + 12 * group * stride;
+  float* const moments = sums->moments.data() + 12 * group * stride;
+  for (int p = 0; p < kQuadPixels; ++p) {
+    const auto slot =
+        static_cast<std::size_t>(sums->slot_of_face[static_cast<std::size_t>(1 + pixels.faces[p])]);
+    const auto x = hn::Set(d, pixels.x + static_cast<float>(p) - sums->origin_x[slot]);
+    const auto y = hn::Set(d, pixels.y - sums->origin_y[slot]);
+    Quad f = pixels.d_out[p];
+    if (kPerspective) {
+      f = PerspectiveAdjoint(f, planes + 4 * slot, stride, sums->least_q[slot], x, y);
+    }
+    float* to = moments + 4 * slot;
+    hn::Store(hn::Add(f, hn::Load(d, to)), d, to);
+    to += 4 * stride;
+    hn::Store(hn::MulAdd(f, x, hn::Load(d, to)), d, to);
+    to += 4 * stride;
+    hn::Store(hn::MulAdd(f, y, hn::Load(d, to)), d, to);
+  }
+}
+
+template <bool kPerspective>
+HWY_INLINE void SumRow(const InterpolateInput& input, const BackwardBand& band, int i,
+                       std::size_t group, BandSums* sums) {
+  const QuadTag d;
+  const std::size_t stride = sums->stride();
+  const std::ptrdiff_t row = i - band.row_begin;
+  const std::int32_t* const faces = band.faces + row * band.width;
+  const int channels = GroupChannels(input, group);
+  const float* const d_row = band.d_out.data +
+                             3 * static_cast<std::ptrdiff_t>(group) * band.d_out.plane +
+                             row * band.d_out.row;
+  const float y = static_cast<float>(i) + 0.5f;
+  const auto add = [&](PixelQuad* pixels) HWY_ATTR {
+    Transpose(pixels->d_out);
+    AddMoments<kPerspective>(*pixels, group, stride, sums);
+  };
+  int j = 0;
+  for (; j + kQuadPixels <= band.width; j += kQuadPixels) {
+    if (AllBackground(faces + j)) continue;
+    PixelQuad pixels{faces + j, {}, static_cast<float>(j) + 0.5f, y};
+    for (int c = 0; c < 4; ++c) {
+      pixels.d_out[c] = c < channels ? hn::LoadU(d, d_row + c * band.d_out.plane + j) : hn::Zero(d);
+    }
+    add(&pixels);
+  }
+  if (j == band.width) return;
+  std::int32_t last[kQuadPixels] = {kNoFace, kNoFace, kNoFace, kNoFace};
+  const auto rest = static_cast<std::size_t>(band.width - j);
+  std::memcpy(last, faces + j, rest * sizeof(last[0]));
+  PixelQuad pixels{last, {}, static_cast<float>(j) + 0.5f, y};
+  for (int c = 0; c < 4; ++c) {
+    HWY_ALIGN float values[kQuadPixels] = {};
+    if (c < channels) {
+      std::memcpy(values, d_row + c * band.d_out.plane + j, rest * sizeof(values[0]));
+    }
+    pixels.d_out[c] = hn::Load(d, values);
+  }
+  add(&pixels);
+}
+
+void SumMoments(const InterpolateInput& input, const BackwardBand& band, BandSums* sums) {
+  const std::size_t groups = ChannelGroups(input.attributes.channels);
+  const bool perspective = input.mode == Interpolation::kPerspective;
+  std::memset(sums->moments.data(), 0, 12 * groups * sums->stride() * sizeof(float));
+  if (perspective) SetUpBand(input, sums);
+  for (int i = band.row_begin; i < band.row_end; ++i) {
+    for (std::size_t g = 0; g < groups; ++g) {
+      if (perspective) {
+        SumRow<true>(input, band, i, g, sums);
+      } else {
+        SumRow<false>(input, band, i, g, sums);
+      }
+    }
+  }
+}
+
+// S_k of a group, [corner][channel or s], for a vector of faces.
+struct GroupSums {
+  Lane sum[3][4];
+};
+
+HWY_INLINE GroupSums LoadGroupSums(const CornerPlanes& corners, const float* moments,
+                                   std::size_t stride) {
+  const LaneTag d;
+  Lane m[3][4];
+  for (std::size_t part = 0; part < 3; ++part) {
+    hn::LoadInterleaved4(d, moments + 4 * part * stride, m[part][0], m[part][1], m[part][2],
+                         m[part][3]);
+  }
+  GroupSums out;
+  for (int k = 0; k < 3; ++k) {
+    const Plane& w = corners.weight[k];
+    for (int c = 0; c < 4; ++c) {
+      out.sum[k][c] =
+          hn::MulAdd(w.value, m[0][c], hn::MulAdd(w.dx, m[1][c], hn::Mul(w.dy, m[2][c])));
+    }
+  }
+  return out;
+}
+
+// Gradients of a vector of faces' corners.
+struct CornerAdjoints {
+  Lane d_x[3], d_y[3], d_m[3];
+};
+
+// Adds what one group says.
+HWY_INLINE void AddGroup(const GroupPlanes& planes, const Plane& q, const GroupSums& sums,
+                         bool perspective, CornerAdjoints* out) {
+  for (int k = 0; k < 3; ++k) {
+    for (int c = 0; c < 3; ++c) {
+      out->d_x[k] = hn::NegMulAdd(planes.numerator[c].dx, sums.sum[k][c], out->d_x[k]);
+      out->d_y[k] = hn::NegMulAdd(planes.numerator[c].dy, sums.sum[k][c], out->d_y[k]);
+    }
+    if (!perspective) continue;  // Q is constant, and so is m
+    out->d_x[k] = hn::MulAdd(q.dx, sums.sum[k][3], out->d_x[k]);
+    out->d_y[k] = hn::MulAdd(q.dy, sums.sum[k][3], out->d_y[k]);
+    out->d_m[k] = hn::Sub(out->d_m[k], sums.sum[k][3]);
+    for (int c = 0; c < 3; ++c) {
+      out->d_m[k] = hn::MulAdd(planes.attribute[k][c], sums.sum[k][c], out->d_m[k]);
+    }
+  }
+}
+
+// One vector of slots from `s` on; `to`: its place in the first array.
+HWY_INLINE void FinishLanes(const InterpolateInput& input, const BandSums& sums, std::size_t s,
+                            const BackwardRequest& request, float* to) {
+  const LaneTag d;
+  const auto zero = hn::Zero(d);
+  const std::size_t stride = sums.stride(), groups = ChannelGroups(input.attributes.channels);
+  const CornerPlanes corners = LoadCornerPlanes(input, sums, s);
+  CornerAdjoints adjoints;
+  for (int k = 0; k < 3; ++k) adjoints.d_x[k] = adjoints.d_y[k] = adjoints.d_m[k] = zero;
+  float* attribute = to + (request.geometry ? 12 * stride : 0);
+  for (std::size_t g = 0; g < groups; ++g) {
+    const GroupSums group =
+        LoadGroupSums(corners, sums.moments.data() + 4 * (3 * g * stride + s), stride);
+    if (request.geometry) {
+      AddGroup(MakeGroupPlanes(input, corners, g), corners.q, group,
+               input.mode == Interpolation::kPerspective, &adjoints);
+    }
+    for (int k = 0; k < 3 && request.attributes; ++k, attribute += 4 * stride) {
+      const auto m = corners.m[k];
+      hn::StoreInterleaved4(hn::Mul(m, group.sum[k][0]), hn::Mul(m, group.sum[k][1]),
+                            hn::Mul(m, group.sum[k][2]), zero, d, attribute);
+    }
+  }
+  for (int k = 0; k < 3 && request.geometry; ++k, to += 4 * stride) {
+    hn::StoreInterleaved4(adjoints.d_x[k], adjoints.d_y[k], adjoints.d_m[k], zero, d, to);
+  }
+}
+
+void Finish(const InterpolateInput& input, const BandSums& sums, const BackwardRequest& request,
+            float* d_faces) {
+  for (std::size_t s = 0; s < sums.stride(); s += hn::Lanes(LaneTag())) {
+    FinishLanes(input, sums, s, request, d_faces + 4 * s);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::raster
+HWY_AFTER_NAMESPACE();
+
+#endif

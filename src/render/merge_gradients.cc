@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/merge_gradients.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+
+#include "raster/project.h"
+#include "render/frame_layout.h"
+
+namespace tilegrad {
+namespace {
+
+void AddQuad(const float* __restrict from, float* __restrict to) {
+  for (int i = 0; i < 4; ++i) to[i] += from[i];
+}
+
+// Calls add(face, slot in the band's arrays) for the faces of all bands.
+template <class Add>
+void ForEachBandFace(const BandGradients& band, const Add& add) {
+  for (std::size_t i = 0; i < band.faces.size(); ++i) {
+    add(static_cast<std::size_t>(band.faces[i]), i + 1);
+  }
+}
+
+void AddBandGeometry(const raster::ScreenMesh& mesh, const BandGradients& band, float* d_vertices) {
+  ForEachBandFace(band, [&](std::size_t face, std::size_t slot) {
+    const float* from = band.values.data() + 4 * slot;
+    for (int k = 0; k < 3; ++k, from += 4 * band.stride) {
+      AddQuad(from, d_vertices + 4 * static_cast<std::size_t>(mesh.vertex(face, k)));
+    }
+  });
+}
+
+void AddBinGeometry(const raster::ScreenMesh& mesh, const BinGradients& bin, float* d_vertices) {
+  for (const auto& tile : bin.tiles) {
+    const std::size_t faces = tile.faces.size();
+    const float* d_corners = bin.values.data() + tile.value_begin;
+    for (std::size_t i = 0; i < faces; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        const auto corner = static_cast<std::size_t>(k);
+        const auto v = mesh.vertex(static_cast<std::size_t>(tile.faces[i]), k);
+        float* to = d_vertices + 4 * static_cast<std::size_t>(v);
+        to[0] += d_corners[corner * faces + i], to[1] += d_corners[(3 + corner) * faces + i];
+      }
+    }
+  }
+}
+
+// `d_rows` [row][group][4] of the attributes' rows.
+void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradients& band,
+                       float* d_rows) {
+  const std::size_t groups = raster::ChannelGroups(image.attributes.channels);
+  const bool by_vertex = image.attributes.rate == AttributeRate::kVertex;
+  ForEachBandFace(band, [&](std::size_t face, std::size_t slot) {
+    const float* from = band.values.data() + 4 * slot + (geometry ? 12 * band.stride : 0);
+    for (std::size_t g = 0; g < groups; ++g) {
+      for (int k = 0; k < 3; ++k, from += 4 * band.stride) {
+        const std::size_t row = by_vertex ? static_cast<std::size_t>(image.mesh.vertex(face, k))
+                                          : 3 * face + static_cast<std::size_t>(k);
+        AddQuad(from, d_rows + 4 * (row * groups + g));
+      }
+    }
+  });
+}
+
+// [row][channels] <- [row][group][4]: whole quads as long as what is too much of one is written
+// over by the next.
+void PackRows(const AlignedVector<float>& quads, std::size_t channels, std::span<float> rows) {
+  const std::size_t groups = (channels + 2) / 3;
+  for (std::size_t q = 0; 4 * q < quads.size(); ++q) {
+    const std::size_t to = q / groups * channels + 3 * (q % groups);
+    const std::size_t left = std::min<std::size_t>(4, rows.size() - to);
+    std::memcpy(rows.data() + to, quads.data() + 4 * q, left * sizeof(float));
+  }
+}
+
+// Sums the bands' gradients of attributes into `d_attributes`, in the layout of the screen mesh.
+void SumAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
+                   std::span<float> d_attributes) {
+  if (scene.channels == 0) return;
+  const std::size_t rows = d_attributes.size() / static_cast<std::size_t>(scene.channels);
+  image->d_rows.assign(4 * rows * raster::ChannelGroups(scene.channels), 0.0f);
+  for (const BandGradients& band : gradients.bands) {
+    AddBandAttributes(*image, gradients.request.geometry, band, image->d_rows.data());
+  }
+  PackRows(image->d_rows, static_cast<std::size_t>(scene.channels), d_attributes);
+}
+
+// Attributes of a mesh that was cut; d_clip_t is wanted wherever geometry is.
+void FinishClippedAttributes(const SceneView& scene, const ImageGradients& gradients,
+                             ImageScratch* image, SceneGradients* d_scene) {
+  std::fill(d_scene->attributes.begin(), d_scene->attributes.end(), 0.0f);
+  image->d_clip_t.assign(image->mesh.clipped.size(), 0.0f);
+  if (gradients.bands.empty()) return;
+  image->d_attributes.resize(raster::AttributeRows(image->mesh, scene.rate) *
+                             static_cast<std::size_t>(scene.channels));
+  SumAttributes(scene, gradients, image, image->d_attributes);
+  raster::ClipAttributesBackward<float>(image->mesh, scene.faces, AttributesOf(scene),
+                                        image->d_attributes, d_scene->attributes, image->d_clip_t);
+}
+
+}  // namespace
+
+void MergeGeometry(const SceneView& scene, const RenderOptions& options,
+                   const ImageGradients& gradients, ImageScratch* image, SceneGradients* d_scene) {
+  if (image->mesh.was_clipped() && gradients.request.attributes) {
+    FinishClippedAttributes(scene, gradients, image, d_scene);
+  }
+  if (!gradients.request.geometry) return;
+  image->d_vertices.assign(4 * image->mesh.vertices(), 0.0f);
+  for (const BandGradients& band : gradients.bands) {
+    AddBandGeometry(image->mesh, band, image->d_vertices.data());
+  }
+  for (const BinGradients& bin : gradients.bins) {
+    AddBinGeometry(image->mesh, bin, image->d_vertices.data());
+  }
+  raster::ProjectBackward(FaceSourceOf(scene, options), image->mesh,
+                          {image->d_vertices, image->d_clip_t}, &image->project,
+                          {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
+}
+
+void MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
+                     SceneGradients* d_scene) {
+  if (d_scene->attributes.empty() || image->mesh.was_clipped()) return;
+  SumAttributes(scene, gradients, image, d_scene->attributes);
+}
+
+}  // namespace tilegrad

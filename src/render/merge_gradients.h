@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Last stage of the way back, per image: from gradients of faces to those of the scene. Sums are
+// made in the order of bands, bins and their faces, whoever computed them.
+#pragma once
+
+#include <span>
+
+#include "render/image_scratch.h"
+#include "render/renderer.h"
+
+namespace tilegrad {
+
+// The gradients of an image, one span per kind of part; empty where that part of the image has no
+// gradient.
+struct ImageGradients {
+  std::span<const BandGradients> bands;
+  std::span<const BinGradients> bins;
+  raster::BackwardRequest request;  // what the bands were asked for
+};
+
+// Overwrites d_scene's positions and d_camera, where they are wanted.
+void MergeGeometry(const SceneView& scene, const RenderOptions& options,
+                   const ImageGradients& gradients, ImageScratch* image, SceneGradients* d_scene);
+
+// Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
+// MergeGeometry, since attributes at the cut depend on geometry.
+void MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
+                     SceneGradients* d_scene);
+
+}  // namespace tilegrad
