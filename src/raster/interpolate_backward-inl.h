@@ -29,8 +29,7 @@ HWY_INLINE bool AllBackground(const std::int32_t* faces) {
   return hn::AllTrue(di, hn::Lt(hn::LoadU(di, faces), hn::Zero(di)));
 }
 
-// Gives pixel (x, y) the next slot if its face has none. No branch: whether a face is new is hard
-// to foretell where faces are small.
+// Gives the face of pixel (x, y) the next slot if it has none. No branch: that is hard to foretell.
 HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, BandSums* sums) {
   std::int32_t* slot = sums->slot_of_face.data() + 1 + face;
   const std::int32_t found = *slot, fresh = found >> 31;
@@ -41,22 +40,41 @@ HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, BandSums* sums)
   sums->count += static_cast<std::size_t>(-fresh);
 }
 
+// Bit p: pixel p sees a face that neither its left neighbour sees nor the one above it. `above`
+// null: the band's first row.
+HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32_t* above) {
+  const LaneIntTag di;
+  const auto here = hn::LoadU(di, faces);
+  auto known = hn::Or(hn::Lt(here, hn::Zero(di)), hn::Eq(here, hn::LoadU(di, faces - 1)));
+  if (above != nullptr) known = hn::Or(known, hn::Eq(here, hn::LoadU(di, above)));
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(di, hn::Not(known), bytes);
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+HWY_INLINE void NumberRow(const BackwardBand& band, int i, BandSums* sums) {
+  const int lanes = static_cast<int>(hn::Lanes(LaneIntTag()));
+  const std::int32_t* row =
+      band.faces + static_cast<std::ptrdiff_t>(i - band.row_begin) * band.width;
+  const std::int32_t* above = i == band.row_begin ? nullptr : row - band.width;
+  const float y = static_cast<float>(i) + 0.5f;
+  const auto number = [&](int j)
+                          HWY_ATTR { NumberPixel(row[j], static_cast<float>(j) + 0.5f, y, sums); };
+  number(0);
+  int j = 1;
+  for (; j + lanes <= band.width; j += lanes) {
+    std::uint32_t bits = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
+    for (; bits != 0; bits &= bits - 1) {
+      number(j + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)));
+    }
+  }
+  for (; j < band.width; ++j) number(j);
+}
+
 // The arrays by slot have room for one slot more than there can be.
 void NumberFaces(const BackwardBand& band, BandSums* sums) {
   sums->count = 1;
-  for (int i = band.row_begin; i < band.row_end; ++i) {
-    const std::int32_t* row =
-        band.faces + static_cast<std::ptrdiff_t>(i - band.row_begin) * band.width;
-    const float y = static_cast<float>(i) + 0.5f;
-    int j = 0;
-    for (; j + kQuadPixels <= band.width; j += kQuadPixels) {
-      if (AllBackground(row + j)) continue;
-      for (int p = j; p < j + kQuadPixels; ++p) {
-        NumberPixel(row[p], static_cast<float>(p) + 0.5f, y, sums);
-      }
-    }
-    for (; j < band.width; ++j) NumberPixel(row[j], static_cast<float>(j) + 0.5f, y, sums);
-  }
+  for (int i = band.row_begin; i < band.row_end; ++i) NumberRow(band, i, sums);
 }
 
 HWY_INLINE CornerPlanes LoadCornerPlanes(const InterpolateInput& input, const BandSums& sums,
@@ -133,27 +151,57 @@ struct PixelQuad {
   float x, y;     // centre of the first pixel
 };
 
+// A pixel's share of the moments of its slot.
+struct PixelShare {
+  std::size_t slot;
+  Quad f, x, y;
+};
+
+template <bool kPerspective>
+HWY_INLINE PixelShare ShareOf(const PixelQuad& pixels, int p, std::size_t group, std::size_t stride,
+                              const BandSums& sums) {
+  const QuadTag d;
+  PixelShare out;
+  out.slot =
+      static_cast<std::size_t>(sums.slot_of_face[static_cast<std::size_t>(1 + pixels.faces[p])]);
+  out.x = hn::Set(d, pixels.x + static_cast<float>(p) - sums.origin_x[out.slot]);
+  out.y = hn::Set(d, pixels.y - sums.origin_y[out.slot]);
+  out.f = pixels.d_out[p];
+  if (kPerspective) {
+    const float* planes = sums.planes.data() + 4 * (3 * group * stride + out.slot);
+    out.f = PerspectiveAdjoint(out.f, planes, stride, sums.least_q[out.slot], out.x, out.y);
+  }
+  return out;
+}
+
+// Neighbours mostly see the same face. So that the second need not wait for the first to be stored,
+// it adds the first's share again if both have one slot, and is stored last.
+HWY_INLINE void AddPair(const PixelShare& a, const PixelShare& b, float* moments,
+                        std::size_t stride) {
+  const QuadTag d;
+  const QuadIntTag di;
+  const auto same = hn::RebindMask(d, hn::Eq(hn::Set(di, static_cast<std::int32_t>(a.slot)),
+                                             hn::Set(di, static_cast<std::int32_t>(b.slot))));
+  const Quad again = hn::IfThenElseZero(same, a.f);
+  float* to_a = moments + 4 * a.slot;
+  float* to_b = moments + 4 * b.slot;
+  const Quad sum = hn::Add(hn::Load(d, to_b), hn::Add(again, b.f));
+  hn::Store(hn::Add(hn::Load(d, to_a), a.f), d, to_a), hn::Store(sum, d, to_b);
+  to_a += 4 * stride, to_b += 4 * stride;
+  const Quad sum_x = hn::MulAdd(again, a.x, hn::MulAdd(b.f, b.x, hn::Load(d, to_b)));
+  hn::Store(hn::MulAdd(a.f, a.x, hn::Load(d, to_a)), d, to_a), hn::Store(sum_x, d, to_b);
+  to_a += 4 * stride, to_b += 4 * stride;
+  const Quad sum_y = hn::MulAdd(again, a.y, hn::MulAdd(b.f, b.y, hn::Load(d, to_b)));
+  hn::Store(hn::MulAdd(a.f, a.y, hn::Load(d, to_a)), d, to_a), hn::Store(sum_y, d, to_b);
+}
+
 template <bool kPerspective>
 HWY_INLINE void AddMoments(const PixelQuad& pixels, std::size_t group, std::size_t stride,
                            BandSums* sums) {
-  const QuadTag d;
-  const float* const planes = sums->planes.data() + 12 * group * stride;
   float* const moments = sums->moments.data() + 12 * group * stride;
-  for (int p = 0; p < kQuadPixels; ++p) {
-    const auto slot =
-        static_cast<std::size_t>(sums->slot_of_face[static_cast<std::size_t>(1 + pixels.faces[p])]);
-    const auto x = hn::Set(d, pixels.x + static_cast<float>(p) - sums->origin_x[slot]);
-    const auto y = hn::Set(d, pixels.y - sums->origin_y[slot]);
-    Quad f = pixels.d_out[p];
-    if (kPerspective) {
-      f = PerspectiveAdjoint(f, planes + 4 * slot, stride, sums->least_q[slot], x, y);
-    }
-    float* to = moments + 4 * slot;
-    hn::Store(hn::Add(f, hn::Load(d, to)), d, to);
-    to += 4 * stride;
-    hn::Store(hn::MulAdd(f, x, hn::Load(d, to)), d, to);
-    to += 4 * stride;
-    hn::Store(hn::MulAdd(f, y, hn::Load(d, to)), d, to);
+  for (int p = 0; p < kQuadPixels; p += 2) {
+    AddPair(ShareOf<kPerspective>(pixels, p, group, stride, *sums),
+            ShareOf<kPerspective>(pixels, p + 1, group, stride, *sums), moments, stride);
   }
 }
 

@@ -67,11 +67,17 @@ void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradi
 // [row][channels] <- [row][group][4]: whole quads as long as what is too much of one is written
 // over by the next.
 void PackRows(const AlignedVector<float>& quads, std::size_t channels, std::span<float> rows) {
-  const std::size_t groups = (channels + 2) / 3;
-  for (std::size_t q = 0; 4 * q < quads.size(); ++q) {
-    const std::size_t to = q / groups * channels + 3 * (q % groups);
-    const std::size_t left = std::min<std::size_t>(4, rows.size() - to);
-    std::memcpy(rows.data() + to, quads.data() + 4 * q, left * sizeof(float));
+  const std::size_t groups = raster::ChannelGroups(static_cast<int>(channels));
+  const float* from = quads.data();
+  for (std::size_t row = 0; row < rows.size(); row += channels) {
+    for (std::size_t g = 0; g < groups; ++g, from += 4) {
+      const std::size_t to = row + 3 * g;
+      if (to + 4 <= rows.size()) {
+        std::memcpy(rows.data() + to, from, 4 * sizeof(float));
+      } else {
+        std::copy(from, from + (rows.size() - to), rows.data() + to);
+      }
+    }
   }
 }
 
