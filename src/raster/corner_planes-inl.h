@@ -9,6 +9,12 @@
 
 #include <hwy/highway.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "raster/face_lanes-inl.h"
 #include "raster/interpolate.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -17,10 +23,10 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Lanes are faces.
-using LaneTag = HWY_CAPPED(float, kTileSize);
-using LaneIntTag = hn::RebindToSigned<LaneTag>;
-using Lane = hn::Vec<LaneTag>;
-using LaneInt = hn::Vec<LaneIntTag>;
+using LaneTag = FaceTag;
+using LaneIntTag = FaceIntTag;
+using Lane = FaceVec;
+using LaneInt = FaceInt;
 
 // value + dx * x + dy * y
 struct Plane {
@@ -40,18 +46,21 @@ HWY_INLINE Plane ZeroPlane() {
 
 struct CornerLanes {
   LaneInt vertex[3];
-  Lane x[3], y[3];
+  Lane x[3], y[3], inverse_depth[3];
 };
 
-HWY_INLINE CornerLanes GatherCorners(const ScreenMesh& mesh, LaneInt face) {
-  const LaneTag d;
+HWY_INLINE CornerLanes LoadFaceCorners(const ScreenMesh& mesh, LaneInt faces) {
   const LaneIntTag di;
+  HWY_ALIGN std::int32_t face[kMostFaceLanes], vertex[kMostFaceLanes];
+  hn::Store(faces, di, face);
   CornerLanes out;
   const std::int32_t* const corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
   for (int k = 0; k < 3; ++k) {
-    out.vertex[k] = hn::GatherIndex(di, corners[k], face);
-    out.x[k] = hn::GatherIndex(d, mesh.x.data(), out.vertex[k]);
-    out.y[k] = hn::GatherIndex(d, mesh.y.data(), out.vertex[k]);
+    for (std::size_t i = 0; i < hn::Lanes(di); ++i) vertex[i] = corners[k][face[i]];
+    Lane v[4];
+    LoadVertices(mesh, vertex, v);
+    out.vertex[k] = hn::Load(di, vertex);
+    out.x[k] = v[0], out.y[k] = v[1], out.inverse_depth[k] = v[2];
   }
   return out;
 }
@@ -102,24 +111,45 @@ struct CornerPlanes {
 HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt face, Lane origin_x,
                                          Lane origin_y) {
   const LaneTag d;
-  const CornerLanes corners = GatherCorners(*input.mesh, face);
+  const CornerLanes corners = LoadFaceCorners(*input.mesh, face);
   CornerPlanes out;
   out.q = ZeroPlane();
   WeightPlanes(corners, origin_x, origin_y, out.weight);
   for (int k = 0; k < 3; ++k) {
-    out.m[k] = input.mode == Interpolation::kPerspective
-                   ? hn::GatherIndex(d, input.mesh->inverse_depth.data(), corners.vertex[k])
-                   : hn::Set(d, 1.0f);
+    out.m[k] =
+        input.mode == Interpolation::kPerspective ? corners.inverse_depth[k] : hn::Set(d, 1.0f);
     out.row[k] = AttributeRow(input, face, corners.vertex[k], k);
     AddScaled(out.m[k], out.weight[k], &out.q);
   }
   return out;
 }
 
-// Attribute c at corner k.
-HWY_INLINE Lane CornerAttribute(const InterpolateInput& input, const CornerPlanes& corners, int k,
-                                int c) {
-  return hn::GatherIndex(LaneTag(), input.attributes.values.data() + c, corners.row[k]);
+// Four attributes of each lane from a channel on; at the end of the array as many as there are.
+class AttributeQuads {
+ public:
+  HWY_INLINE AttributeQuads(std::span<const float> values, const std::int32_t* row, int first)
+      : values_(values), row_(row), first_(first) {}
+
+  HWY_INLINE const float* operator()(std::size_t lane) const {
+    const auto at = static_cast<std::size_t>(row_[lane] + first_);
+    if (at + 4 <= values_.size()) return values_.data() + at;
+    std::memcpy(last_, values_.data() + at, (values_.size() - at) * sizeof(float));
+    return last_;
+  }
+
+ private:
+  std::span<const float> values_;
+  const std::int32_t* row_;
+  int first_;
+  mutable float last_[4] = {};
+};
+
+// Channels `first` to first + 3 at corner k; those that do not exist hold anything finite.
+HWY_INLINE void CornerAttributes(const InterpolateInput& input, const CornerPlanes& corners, int k,
+                                 int first, Lane (&out)[4]) {
+  HWY_ALIGN std::int32_t row[kMostFaceLanes];
+  hn::Store(corners.row[k], LaneIntTag(), row);
+  LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, row, first), 0, out);
 }
 
 HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
@@ -127,17 +157,6 @@ HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
 }
 
 inline constexpr int kQuadPixels = 4;
-using QuadTag = hn::FixedTag<float, kQuadPixels>;
-using Quad = hn::Vec<QuadTag>;
-
-// From four outputs of four pixels to four pixels of four outputs, in place.
-HWY_INLINE void Transpose(Quad (&q)[4]) {
-  const QuadTag d;
-  const Quad a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
-  const Quad e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
-  q[0] = hn::InterleaveLower(d, a, b), q[1] = hn::InterleaveUpper(d, a, b);
-  q[2] = hn::InterleaveLower(d, e, f), q[3] = hn::InterleaveUpper(d, e, f);
-}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace tilegrad::raster

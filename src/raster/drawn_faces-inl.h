@@ -26,13 +26,20 @@ struct CornerLanes {
   FaceVec x[3], y[3], z[3];
 };
 
-HWY_INLINE CornerLanes GatherCorners(const ScreenMesh& mesh, const FaceVertices& vertices) {
-  const FaceTag d;
+// Faces f to f + count - 1; the first of them again in lanes beyond.
+HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, std::size_t f, std::size_t count) {
+  const std::int32_t* const corners[3] = {&mesh.v0[f], &mesh.v1[f], &mesh.v2[f]};
   CornerLanes out;
   for (int k = 0; k < 3; ++k) {
-    out.x[k] = hn::GatherIndex(d, mesh.x.data(), vertices.v[k]);
-    out.y[k] = hn::GatherIndex(d, mesh.y.data(), vertices.v[k]);
-    out.z[k] = hn::GatherIndex(d, mesh.inverse_depth.data(), vertices.v[k]);
+    const std::int32_t* vertices = corners[k];
+    HWY_ALIGN std::int32_t some[kMostFaceLanes];
+    if (count < hn::Lanes(FaceTag())) {
+      hn::Store(LoadSome(vertices, count), FaceIntTag(), some);
+      vertices = some;
+    }
+    FaceVec v[4];
+    LoadVertices(mesh, vertices, v);
+    out.x[k] = v[0], out.y[k] = v[1], out.z[k] = v[2];
   }
   return out;
 }
@@ -261,7 +268,7 @@ std::size_t SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::uint8_t* rej
   DrawnFace* to = out;
   for (std::size_t f = 0; f < n; f += lanes) {
     const std::size_t count = HWY_MIN(lanes, n - f);
-    const CornerLanes corners = GatherCorners(mesh, LoadFaceVertices(mesh, f, count));
+    const CornerLanes corners = LoadCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);
     if (out == nullptr || drawn == 0) continue;

@@ -22,20 +22,23 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// N of an output: a channel, or the barycentric of corner 1 or 2.
-HWY_INLINE Plane NumeratorPlane(const InterpolateInput& input, const CornerPlanes& corners,
-                                int output) {
-  const int channels = input.attributes.channels;
-  Plane n = ZeroPlane();
-  if (output >= channels) {
-    const int k = output - channels + 1;
-    AddScaled(corners.m[k], corners.weight[k], &n);
-    return n;
-  }
+// N of `count` channels from `first` on, at most four.
+HWY_INLINE void ChannelPlanes(const InterpolateInput& input, const CornerPlanes& corners, int first,
+                              int count, Plane* out) {
+  for (int c = 0; c < count; ++c) out[c] = ZeroPlane();
   for (int k = 0; k < 3; ++k) {
-    AddScaled(hn::Mul(corners.m[k], CornerAttribute(input, corners, k, output)), corners.weight[k],
-              &n);
+    Lane a[4];
+    CornerAttributes(input, corners, k, first, a);
+    for (int c = 0; c < count; ++c) {
+      AddScaled(hn::Mul(corners.m[k], a[c]), corners.weight[k], &out[c]);
+    }
   }
+}
+
+// N of the barycentric of corner 1 or 2.
+HWY_INLINE Plane BarycentricPlane(const CornerPlanes& corners, int k) {
+  Plane n = ZeroPlane();
+  AddScaled(corners.m[k], corners.weight[k], &n);
   return n;
 }
 
@@ -66,9 +69,12 @@ HWY_INLINE void SetUpQuads(const InterpolateInput& input, const TileFaces& faces
     for (int g = 0; g < quads->groups(); ++g) {
       Plane planes[4];
       planes[3] = corners.q;
-      for (int i = 0; i < GroupOutputs(g); ++i) {
-        const int o = FirstOutput(g) + i;
-        planes[i] = o < outputs ? NumeratorPlane(input, corners, o) : ZeroPlane();
+      const int first = FirstOutput(g), all = GroupOutputs(g), channels = input.attributes.channels;
+      const int count = HWY_MIN(HWY_MAX(channels - first, 0), all);
+      if (count > 0) ChannelPlanes(input, corners, first, count, planes);
+      for (int i = count; i < all; ++i) {
+        const int k = first + i - channels + 1;
+        planes[i] = first + i < outputs ? BarycentricPlane(corners, k) : ZeroPlane();
       }
       StoreQuads(planes, g, s, quads);
     }

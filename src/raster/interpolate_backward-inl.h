@@ -100,12 +100,12 @@ HWY_INLINE GroupPlanes MakeGroupPlanes(const InterpolateInput& input, const Corn
                                        std::size_t group) {
   GroupPlanes out;
   const int channels = GroupChannels(input, group);
-  for (int c = 0; c < 3; ++c) {
-    out.numerator[c] = ZeroPlane();
-    for (int k = 0; k < 3; ++k) {
-      out.attribute[k][c] =
-          c < channels ? CornerAttribute(input, corners, k, 3 * static_cast<int>(group) + c)
-                       : hn::Zero(LaneTag());
+  for (Plane& n : out.numerator) n = ZeroPlane();
+  for (int k = 0; k < 3; ++k) {
+    Lane a[4];
+    CornerAttributes(input, corners, k, 3 * static_cast<int>(group), a);
+    for (int c = 0; c < 3; ++c) {
+      out.attribute[k][c] = c < channels ? a[c] : hn::Zero(LaneTag());
       AddScaled(hn::Mul(corners.m[k], out.attribute[k][c]), corners.weight[k], &out.numerator[c]);
     }
   }

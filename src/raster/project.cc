@@ -65,6 +65,7 @@ void Project(const FaceSource<float>& source, int width, int height, ScreenMeshB
   } else {
     AssembleFaces(source, out);
   }
+  out->Pack();
   SetUpDrawnFaces(out->View(), source.cull_back, out->reject, drawn);
 }
 

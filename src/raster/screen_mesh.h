@@ -19,6 +19,12 @@ struct ClipVertexT {
   T t;
 };
 
+// A vertex for kernels that look at one after the other: one load instead of four.
+template <class T>
+struct PackedVertexT {
+  T x, y, inverse_depth, depth;
+};
+
 // Views over scratch that belongs to the renderer; valid for one frame. V and F count the vertices
 // and faces *after* near clipping: clipping appends vertices and replaces a cut face by one or two,
 // which stand in its place in the order and keep the identity of their source. Screen coordinates
@@ -29,6 +35,7 @@ struct ScreenMeshT {
   std::span<const T> x, y;                   // [V] pixels
   std::span<const T> depth;                  // [V] -p_cam.z; >= near plane where a face is drawn
   std::span<const T> inverse_depth;          // [V] 1 / depth
+  std::span<const PackedVertexT<T>> packed;  // [V] the same numbers again
   std::span<const std::int32_t> v0, v1, v2;  // [F] vertex indices
   // [F] the face of the caller's mesh, ascending; equals the index where nothing was clipped.
   std::span<const std::int32_t> source_face;
@@ -63,6 +70,7 @@ inline constexpr std::uint8_t kFaceNotInSoftMask = kFaceBehind | kFaceOverflow;
 template <class T>
 struct ScreenMeshBuffersT {
   AlignedVector<T> x, y, depth, inverse_depth;
+  AlignedVector<PackedVertexT<T>> packed;
   AlignedVector<std::int32_t> v0, v1, v2, source_face;
   AlignedVector<ClipVertexT<T>> clipped;
   AlignedVector<std::uint8_t> reject;
@@ -70,8 +78,13 @@ struct ScreenMeshBuffersT {
   int width = 0, height = 0;
 
   ScreenMeshT<T> View() const {
-    return {x,           y,       depth,  inverse_depth,   v0,           v1,    v2,
+    return {x,           y,       depth,  inverse_depth,   packed,       v0,    v1,    v2,
             source_face, clipped, reject, source_vertices, source_faces, width, height};
+  }
+  // Fills `packed` from the other arrays of vertices.
+  void Pack() {
+    packed.resize(x.size());
+    for (std::size_t v = 0; v < x.size(); ++v) packed[v] = {x[v], y[v], inverse_depth[v], depth[v]};
   }
 };
 using ScreenMeshBuffers = ScreenMeshBuffersT<float>;

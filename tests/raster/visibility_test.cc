@@ -43,6 +43,7 @@ struct Flat {
   }
   ScreenMesh Finish() {
     buffers.width = width, buffers.height = height;
+    buffers.Pack();
     buffers.source_vertices = static_cast<std::int32_t>(buffers.x.size());
     buffers.source_faces = static_cast<std::int32_t>(buffers.v0.size());
     for (std::size_t f = 0; f < buffers.v0.size(); ++f) {
