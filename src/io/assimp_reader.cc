@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
-#include <assimp/IOStream.hpp>
-#include <assimp/IOSystem.hpp>
-#include <assimp/Importer.hpp>
+// Meshes by Assimp, which works in a process of its own; what it hands over becomes a mesh here.
+#include <algorithm>
 #include <cstring>
-#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <optional>
 #include <unordered_map>
 
 #include "base/error.h"
+#include "io/assimp_import.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
@@ -18,66 +15,18 @@
 namespace tilegrad::io {
 namespace {
 
-class MemoryStream : public Assimp::IOStream {
- public:
-  explicit MemoryStream(Bytes bytes) : bytes_(std::move(bytes)) {}
-  std::size_t Read(void* to, std::size_t size, std::size_t count) override {
-    if (size == 0) return 0;
-    const std::size_t whole = std::min(count, (bytes_.size() - at_) / size);
-    std::memcpy(to, bytes_.data() + at_, whole * size);
-    at_ += whole * size;
-    return whole;
-  }
-  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
-  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-    const std::size_t base = origin == aiOrigin_SET   ? 0
-                             : origin == aiOrigin_CUR ? at_
-                                                      : bytes_.size();
-    const std::size_t target = origin == aiOrigin_END ? base - offset : base + offset;
-    if (target > bytes_.size()) return aiReturn_FAILURE;
-    at_ = target;
-    return aiReturn_SUCCESS;
-  }
-  std::size_t Tell() const override { return at_; }
-  std::size_t FileSize() const override { return bytes_.size(); }
-  void Flush() override {}
-
- private:
-  Bytes bytes_;
-  std::size_t at_ = 0;
-};
-
-// Lets Assimp read side files (MTL) from a folder or archive; nothing is ever written.
-class SourceSystem : public Assimp::IOSystem {
- public:
-  explicit SourceSystem(const FileSource& source) : source_(source) {}
-  bool Exists(const char* name) const override { return source_.Exists(name); }
-  char getOsSeparator() const override { return '/'; }
-  Assimp::IOStream* Open(const char* name, const char*) override {
-    auto bytes = source_.Read(name);
-    return bytes.ok() ? new MemoryStream(std::move(bytes).value())
-                      : nullptr;  // Assimp owns it and calls Close
-  }
-  void Close(Assimp::IOStream* stream) override { delete stream; }
-
- private:
-  const FileSource& source_;
-};
-
-glm::vec3 ToVec3(const aiVector3D& v) { return {v.x, v.y, v.z}; }
-
 // Corners that agree in position and colour become one vertex; uv and normals stay per corner.
 class Welder {
  public:
   explicit Welder(Mesh& mesh) : mesh_(mesh) {}
-  std::int32_t Add(glm::vec3 position, const aiColor4D* color) {
+  std::int32_t Add(glm::vec3 position, const glm::vec4* color) {
     std::string key(reinterpret_cast<const char*>(&position), sizeof(position));
     if (color != nullptr) key.append(reinterpret_cast<const char*>(color), sizeof(*color));
     const auto [it, added] =
         seen_.try_emplace(std::move(key), static_cast<std::int32_t>(mesh_.positions.size()));
     if (added) {
       mesh_.positions.push_back(position);
-      if (color != nullptr) mesh_.colors.emplace_back(color->r, color->g, color->b, color->a);
+      if (color != nullptr) mesh_.colors.push_back(*color);
     }
     return it->second;
   }
@@ -87,160 +36,142 @@ class Welder {
   std::unordered_map<std::string, std::int32_t> seen_;
 };
 
-Result<Mesh> ConvertPart(const aiMesh& part, const std::string& place) {
+Mesh ConvertPart(const ImportedPart& part) {
   Mesh mesh;
   Welder welder(mesh);
-  const aiColor4D* colors = part.mColors[0];
-  std::vector<std::int32_t> vertex(part.mNumVertices);
-  for (unsigned i = 0; i < part.mNumVertices; ++i) {
-    vertex[i] = welder.Add(ToVec3(part.mVertices[i]), colors == nullptr ? nullptr : &colors[i]);
+  std::vector<std::int32_t> vertex;
+  for (std::size_t i = 0; i < part.positions.size(); ++i) {
+    vertex.push_back(
+        welder.Add(part.positions[i], part.colors.empty() ? nullptr : &part.colors[i]));
   }
-  for (unsigned f = 0; f < part.mNumFaces; ++f) {
-    const aiFace& face = part.mFaces[f];
-    if (face.mNumIndices != 3) continue;
-    for (int k = 0; k < 3; ++k) {
-      if (face.mIndices[k] >= part.mNumVertices) {
-        return DataLoss("{}: face {} uses vertex {} of {}", place, f, face.mIndices[k],
-                        part.mNumVertices);
-      }
-    }
-    mesh.faces.push_back(
-        {vertex[face.mIndices[0]], vertex[face.mIndices[1]], vertex[face.mIndices[2]]});
-    for (int k = 0; k < 3; ++k) {
-      const unsigned i = face.mIndices[k];
-      if (part.mTextureCoords[0] != nullptr) {
-        mesh.corner_uvs.emplace_back(part.mTextureCoords[0][i].x, part.mTextureCoords[0][i].y);
-      }
-      if (part.mNormals != nullptr) mesh.corner_normals.push_back(ToVec3(part.mNormals[i]));
+  for (const auto& [a, b, c] : part.triangles) {
+    mesh.faces.push_back({vertex[a], vertex[b], vertex[c]});
+    for (const std::uint32_t v : {a, b, c}) {
+      if (!part.uvs.empty()) mesh.corner_uvs.push_back(part.uvs[v]);
+      if (!part.normals.empty()) mesh.corner_normals.push_back(part.normals[v]);
     }
   }
   return mesh;
 }
 
-// Materials of one scene, converted at first use, so that unused ones ask for no texture.
-class Materials {
+class Assembly {
  public:
-  Materials(const aiScene& scene, const FileSource& source, const std::string& name)
-      : scene_(scene), source_(source), name_(name) {}
+  Assembly(ImportedScene scene, const FileSource& source, const std::string& name)
+      : scene_(std::move(scene)),
+        source_(source),
+        name_(name),
+        images_(scene_.images.size()),
+        materials_(scene_.materials.size()) {}
 
-  Material Get(unsigned index, LoadedMesh& out) {
-    Material material;
-    if (index >= scene_.mNumMaterials) return material;
-    const aiMaterial& from = *scene_.mMaterials[index];
-    aiString text;
-    if (from.Get(AI_MATKEY_NAME, text) == AI_SUCCESS) material.name = text.C_Str();
-    aiColor3D diffuse(0.8f, 0.8f, 0.8f);
-    float opacity = 1;
-    from.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse);
-    from.Get(AI_MATKEY_OPACITY, opacity);
-    material.base_color = {diffuse.r, diffuse.g, diffuse.b, opacity};
-    if (from.GetTexture(aiTextureType_DIFFUSE, 0, &text) == AI_SUCCESS) {
-      material.base_color_texture = Texture(text.C_Str(), out);
-      // With a texture, OBJ's Kd is often left black or grey by exporters; the image alone is what
-      // people meant.
-      if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, opacity};
-    }
-    return material;
+  Result<LoadedMesh> Run() {
+    out_.warnings = std::move(scene_.warnings);
+    for (const ImportedInstance& instance : scene_.instances) TILEGRAD_TRY(Add(instance));
+    return std::move(out_);
   }
 
  private:
-  int Texture(const std::string& image, LoadedMesh& out) {
-    const aiTexture* embedded = scene_.GetEmbeddedTexture(image.c_str());
-    if (embedded == nullptr) return AddTexture(source_, name_, image, out);
-    if (embedded->mHeight != 0) {
-      out.warnings.push_back(
-          fmt::format("texture \"{}\" left out: embedded without compression", image));
-      return -1;
-    }
-    const auto* bytes = reinterpret_cast<const std::uint8_t*>(embedded->pcData);
-    return AddTexture(DecodeImage({bytes, embedded->mWidth}, image), image, out);
+  Status Add(const ImportedInstance& instance) {
+    const ImportedPart& part = scene_.parts[instance.part];
+    if (part.triangles.empty()) return {};
+    Mesh mesh = ConvertPart(part);
+    if (const glm::mat4x3& m = instance.to_scene; m != glm::mat4x3(1))
+      Transform(mesh, {m[0], m[1], m[2]}, m[3]);
+    const Material material =
+        part.material < materials_.size() ? MaterialOf(part.material) : Material{};
+    return AppendWithMaterial(std::move(mesh), material, out_);
   }
 
-  const aiScene& scene_;
+  // Converted at first use, so that materials without a face ask for no texture.
+  Material MaterialOf(std::size_t index) {
+    if (!materials_[index]) materials_[index] = Convert(scene_.materials[index]);
+    return *materials_[index];
+  }
+
+  Material Convert(const ImportedMaterial& from) {
+    Material material;
+    material.name = from.name;
+    material.base_color = from.color;
+    if (!from.image.empty()) material.base_color_texture = Texture(from);
+    // With a texture, OBJ's Kd is often left black or grey by exporters; the image alone is what
+    // people meant.
+    if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};
+    return material;
+  }
+
+  int Texture(const ImportedMaterial& from) {
+    if (from.embedded < 0) return AddTexture(source_, name_, from.image, out_);
+    std::optional<int>& image = images_[static_cast<std::size_t>(from.embedded)];
+    if (!image)
+      image = Embedded(scene_.images[static_cast<std::size_t>(from.embedded)], from.image);
+    return *image;
+  }
+
+  int Embedded(const ImportedImage& image, const std::string& label) {
+    if (!image.bytes.empty()) return AddTexture(DecodeImage(image.bytes, label), label, out_);
+    out_.warnings.push_back(
+        fmt::format("texture \"{}\" left out: embedded without compression", label));
+    return -1;
+  }
+
+  ImportedScene scene_;
   const FileSource& source_;
   const std::string& name_;
+  LoadedMesh out_;
+  std::vector<std::optional<int>> images_;          // texture of each image that was asked for
+  std::vector<std::optional<Material>> materials_;  // those that were asked for
 };
 
-struct NodeWalk {
-  const aiScene& scene;
-  std::string place;
-  Materials materials;
-  LoadedMesh out;
-  std::unordered_map<unsigned, Material> converted;
-
-  Status Visit(const aiNode& node, const aiMatrix4x4& parent) {
-    const aiMatrix4x4 m = parent * node.mTransformation;
-    for (unsigned i = 0; i < node.mNumMeshes; ++i)
-      TILEGRAD_TRY(AddPart(*scene.mMeshes[node.mMeshes[i]], m));
-    for (unsigned i = 0; i < node.mNumChildren; ++i) TILEGRAD_TRY(Visit(*node.mChildren[i], m));
-    return {};
-  }
-
-  Status AddPart(const aiMesh& part, const aiMatrix4x4& m) {
-    if ((part.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
-      out.warnings.push_back(
-          fmt::format("part \"{}\": points or lines left out", part.mName.C_Str()));
-      return {};
-    }
-    TILEGRAD_ASSIGN(Mesh mesh, ConvertPart(part, place));
-    if (mesh.faces.empty()) return {};
-    if (!m.IsIdentity()) {
-      Transform(
-          mesh,
-          {glm::vec3(m.a1, m.b1, m.c1), glm::vec3(m.a2, m.b2, m.c2), glm::vec3(m.a3, m.b3, m.c3)},
-          {m.a4, m.b4, m.c4});
-    }
-    auto it = converted.find(part.mMaterialIndex);
-    if (it == converted.end()) {
-      it = converted.emplace(part.mMaterialIndex, materials.Get(part.mMaterialIndex, out)).first;
-    }
-    return AppendWithMaterial(std::move(mesh), it->second, out).Within(place);
-  }
-};
-
-// Says what a part really holds. Some importers claim polygons where there are lines only, upon
-// which triangulation aborts the program.
-void CorrectPrimitiveTypes(const aiScene& scene) {
-  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
-    aiMesh& part = *scene.mMeshes[m];
-    part.mPrimitiveTypes = 0;
-    for (unsigned f = 0; f < part.mNumFaces; ++f)
-      part.mPrimitiveTypes |= AI_PRIMITIVE_TYPE_FOR_N_INDICES(part.mFaces[f].mNumIndices);
-  }
+std::optional<Bytes> Answer(const FileSource& source, std::string_view question) {
+  const std::string name(question.substr(1));
+  if (name.find('\0') != std::string::npos) return std::nullopt;
+  if (question[0] == kAskExists) return source.Exists(name) ? std::optional(Bytes()) : std::nullopt;
+  auto content = source.Read(name);
+  return content.ok() ? std::optional(std::move(content).value()) : std::nullopt;
 }
 
-Result<LoadedMesh> Import(const FileSource& source, const std::string& name) {
-  const std::string place = source.Describe(name);
-  Assimp::Importer importer;
-  importer.SetIOHandler(new SourceSystem(source));  // the importer owns it
-  if (importer.ReadFile(name, 0) != nullptr) CorrectPrimitiveTypes(*importer.GetScene());
-  const aiScene* scene =
-      importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType);
-  if (scene == nullptr || scene->mRootNode == nullptr) {
-    return DataLoss("{}: {}", place, importer.GetErrorString());
-  }
-  NodeWalk walk{*scene, place, Materials(*scene, source, name), {}, {}};
-  TILEGRAD_TRY(walk.Visit(*scene->mRootNode, aiMatrix4x4()));
-  return std::move(walk.out);
+// Far above what sound files take: 0.3 s and 100 MB a MiB of OBJ text were the most seen.
+GuardLimits LimitsFor(std::size_t bytes) {
+  GuardLimits limits;
+  const auto mebibytes = static_cast<int>(bytes >> 20);
+  limits.cpu_seconds += 2 * mebibytes;
+  limits.wall_seconds += 10.0 * mebibytes;
+  limits.memory_bytes += 200 * bytes;
+  return limits;
+}
+
+Status Explain(const Status& failure, const std::string& place, const std::string& name) {
+  return Status(failure.code(),
+                fmt::format("{}: the {} reader {}; the file is probably damaged, try to save it "
+                            "anew or as .glb",
+                            place, MeshEnding(name), failure.message()));
 }
 
 }  // namespace
 
-Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
+Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
+                                const Bytes& file, const GuardLimits& limits) {
   const std::string place = source.Describe(name);
-  if (!source.Exists(name)) return NotFound("{}: no such file", place);
-  try {
-    return Import(source, name);
-  } catch (const std::exception& error) {  // Assimp's importers throw on some broken files
-    return DataLoss("{}: {}", place, error.what());
-  }
+  const auto bytes =
+      RunGuarded([&](AskParent ask) { return EncodeScene(ImportByAssimp(name, file, ask)); },
+                 [&](std::string_view question) { return Answer(source, question); }, limits);
+  if (!bytes.ok()) return Explain(bytes.status(), place, name);
+  auto scene = DecodeScene(*bytes);
+  if (!scene.ok()) return scene.status().Within(place);
+  auto loaded = Assembly(std::move(*scene), source, name).Run();
+  if (!loaded.ok()) return loaded.status().Within(place);
+  return loaded;
+}
+
+Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
+  TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
+  return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
-  TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
+  TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
   TILEGRAD_TRY(
-      CheckObj({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, source.Describe(name)));
-  return ReadByAssimp(source, name);
+      CheckObj({reinterpret_cast<const char*>(file.data()), file.size()}, source.Describe(name)));
+  return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 
 }  // namespace tilegrad::io

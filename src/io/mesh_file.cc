@@ -24,25 +24,27 @@ struct Format {
   std::string_view ending;
   Result<LoadedMesh> (*read)(const FileSource& source, const std::string& name);
 };
-// Of the formats that Assimp knows, those whose importers stood up to mutated files.
-constexpr std::array<Format, 8> kFormats = {{{".glb", ReadGltf},
-                                             {".gltf", ReadGltf},
-                                             {".obj", ReadObj},
-                                             {".ply", ReadPly},
-                                             {".off", ReadOff},
-                                             {".ac", ReadAc3d},
-                                             {".stl", ReadByAssimp},
-                                             {".3ds", ReadByAssimp}}};
-
-std::string Ending(const std::string& name) {
-  std::string ending = Path(name).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return ending;
-}
+// Assimp's importers run in a process of their own; the list holds those that read a sound file
+// right (tests/io/assimp_formats_test.cc).
+constexpr std::array<Format, 16> kFormats = {{{".glb", ReadGltf},
+                                              {".gltf", ReadGltf},
+                                              {".obj", ReadObj},
+                                              {".ply", ReadPly},
+                                              {".off", ReadOff},
+                                              {".ac", ReadAc3d},
+                                              {".stl", ReadByAssimp},
+                                              {".3ds", ReadByAssimp},
+                                              {".dae", ReadByAssimp},
+                                              {".fbx", ReadByAssimp},
+                                              {".3mf", ReadByAssimp},
+                                              {".x", ReadByAssimp},
+                                              {".x3d", ReadByAssimp},
+                                              {".ase", ReadByAssimp},
+                                              {".lwo", ReadByAssimp},
+                                              {".ms3d", ReadByAssimp}}};
 
 const Format* FindFormat(const std::string& name) {
-  const std::string ending = Ending(name);
+  const std::string ending = MeshEnding(name);
   const auto* found = std::find_if(kFormats.begin(), kFormats.end(),
                                    [&](const Format& f) { return f.ending == ending; });
   return found == kFormats.end() ? nullptr : found;
@@ -162,17 +164,30 @@ void Polygon::AddTo(Mesh& mesh) {
     mesh.faces.push_back({corners[a], corners[b], corners[c]});
 }
 
+std::string MeshEnding(const std::string& name) {
+  std::string ending = Path(name).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return ending;
+}
+
+std::string MeshFileEndings() {
+  std::string list;
+  for (const Format& format : kFormats) {
+    list += list.empty() ? "" : ", ";
+    list += format.ending;
+  }
+  return list;
+}
+
 bool IsMeshFileName(const std::string& name) { return FindFormat(name) != nullptr; }
 
 Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   const std::string place = source.Describe(name);
   const Format* format = FindFormat(name);
   if (format == nullptr) {
-    return InvalidArgument(
-        "{}: the ending \"{}\" is none of a mesh format that is read (glb, gltf, obj, ply, off, "
-        "ac, "
-        "stl, 3ds)",
-        place, Ending(name));
+    return InvalidArgument("{}: the ending \"{}\" is of no mesh format that is read ({})", place,
+                           MeshEnding(name), MeshFileEndings());
   }
   auto loaded = format->read(source, name);
   if (!loaded.ok()) return loaded.status();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mesh files: glTF and GLB (tinygltf), OBJ with MTL, STL and 3DS (Assimp), PLY, OFF and
-// AC3D.
+// Mesh files: glTF and GLB (tinygltf); PLY, OFF and AC3D; OBJ with MTL, STL, 3DS, Collada, FBX,
+// 3MF, DirectX X, X3D, ASE, LWO and MS3D (Assimp, in a process of its own for each file).
 #pragma once
 
 #include <string>
@@ -23,6 +23,9 @@ struct LoadedMesh {
 // and in the folders beside it.
 Result<LoadedMesh> LoadMesh(const Path& path);
 Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name);
+
+// The endings that are read, for messages: ".glb, .gltf, ...".
+std::string MeshFileEndings();
 
 // Whether the ending (any case) is one that LoadMesh reads.
 bool IsMeshFileName(const std::string& name);

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/guarded_process.h"
 #include "io/mesh_file.h"
 
 namespace tilegrad::io {
@@ -17,6 +18,13 @@ Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadAc3d(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name);
+
+// The same of a file that is read already, with limits other than those that suit its size.
+Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
+                                const Bytes& file, const GuardLimits& limits);
+
+// The ending of a file name in lower case, with its point.
+std::string MeshEnding(const std::string& name);
 
 // A polygon of a file on its way into a mesh; kept by readers as scratch.
 struct Polygon {

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/assimp_import.h"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/IOStream.hpp>
+#include <assimp/IOSystem.hpp>
+#include <assimp/Importer.hpp>
+#include <cstring>
+#include <iterator>
+#include <memory>
+
+#include "base/error.h"
+
+namespace tilegrad::io {
+namespace {
+
+using SharedBytes = std::shared_ptr<const Bytes>;
+
+class MemoryStream : public Assimp::IOStream {
+ public:
+  explicit MemoryStream(SharedBytes bytes) : bytes_(std::move(bytes)) {}
+  std::size_t Read(void* to, std::size_t size, std::size_t count) override {
+    if (size == 0) return 0;
+    const std::size_t whole = std::min(count, (bytes_->size() - at_) / size);
+    if (whole > 0) std::memcpy(to, bytes_->data() + at_, whole * size);
+    at_ += whole * size;
+    return whole;
+  }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    const std::size_t base = origin == aiOrigin_SET   ? 0
+                             : origin == aiOrigin_CUR ? at_
+                                                      : bytes_->size();
+    const std::size_t target = origin == aiOrigin_END ? base - offset : base + offset;
+    if (target > bytes_->size()) return aiReturn_FAILURE;
+    at_ = target;
+    return aiReturn_SUCCESS;
+  }
+  std::size_t Tell() const override { return at_; }
+  std::size_t FileSize() const override { return bytes_->size(); }
+  void Flush() override {}
+
+ private:
+  SharedBytes bytes_;
+  std::size_t at_ = 0;
+};
+
+// The file itself from memory, others from the parent; nothing is ever written.
+class ParentFiles : public Assimp::IOSystem {
+ public:
+  ParentFiles(const std::string& name, const Bytes& file, AskParent ask)
+      : name_(name), file_(SharedBytes(), &file), ask_(ask) {}
+  bool Exists(const char* name) const override {
+    return name == name_ || ask_(kAskExists + std::string(name)).has_value();
+  }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* name, const char*) override {
+    if (name == name_) return new MemoryStream(file_);  // Assimp owns it and calls Close
+    auto bytes = ask_(kAskContent + std::string(name));
+    return bytes ? new MemoryStream(std::make_shared<const Bytes>(std::move(*bytes))) : nullptr;
+  }
+  void Close(Assimp::IOStream* stream) override { delete stream; }
+
+ private:
+  const std::string& name_;
+  SharedBytes file_;
+  AskParent ask_;
+};
+
+ImportedPart ConvertPart(const aiMesh& from) {
+  ImportedPart part;
+  part.name = from.mName.C_Str();
+  part.material = from.mMaterialIndex;
+  const auto vec3 = [](const aiVector3D& v) { return glm::vec3(v.x, v.y, v.z); };
+  const auto vec2 = [](const aiVector3D& v) { return glm::vec2(v.x, v.y); };
+  const auto vec4 = [](const aiColor4D& c) { return glm::vec4(c.r, c.g, c.b, c.a); };
+  const auto copy = [&](const auto* array, auto convert, auto& to) {
+    if (array == nullptr) return;
+    to.reserve(from.mNumVertices);
+    std::transform(array, array + from.mNumVertices, std::back_inserter(to), convert);
+  };
+  copy(from.mVertices, vec3, part.positions);
+  copy(from.mNormals, vec3, part.normals);
+  copy(from.mTextureCoords[0], vec2, part.uvs);
+  copy(from.mColors[0], vec4, part.colors);
+  part.triangles.reserve(from.mNumFaces);
+  for (unsigned f = 0; f < from.mNumFaces; ++f) {
+    const aiFace& face = from.mFaces[f];
+    if (face.mNumIndices == 3)
+      part.triangles.push_back({face.mIndices[0], face.mIndices[1], face.mIndices[2]});
+  }
+  return part;
+}
+
+ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
+  ImportedMaterial material;
+  aiString text;
+  if (from.Get(AI_MATKEY_NAME, text) == AI_SUCCESS) material.name = text.C_Str();
+  aiColor3D diffuse(0.8f, 0.8f, 0.8f);
+  float opacity = 1;
+  from.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse);
+  from.Get(AI_MATKEY_OPACITY, opacity);
+  material.color = {diffuse.r, diffuse.g, diffuse.b, opacity};
+  if (from.GetTexture(aiTextureType_DIFFUSE, 0, &text) != AI_SUCCESS) return material;
+  material.image = text.C_Str();
+  const aiTexture* embedded = scene.GetEmbeddedTexture(text.C_Str());
+  for (unsigned i = 0; embedded != nullptr && i < scene.mNumTextures; ++i) {
+    if (scene.mTextures[i] == embedded) material.embedded = static_cast<std::int32_t>(i);
+  }
+  return material;
+}
+
+ImportedImage ConvertImage(const aiTexture& from) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(from.pcData);
+  const bool encoded = from.mHeight == 0 && bytes != nullptr;  // then the width is its size
+  return {from.mFilename.C_Str(), encoded ? Bytes(bytes, bytes + from.mWidth) : Bytes()};
+}
+
+void PlaceParts(const aiNode& node, const aiMatrix4x4& parent, ImportedScene& scene) {
+  const aiMatrix4x4 m = parent * node.mTransformation;
+  const glm::mat4x3 to_scene(m.a1, m.b1, m.c1, m.a2, m.b2, m.c2, m.a3, m.b3, m.c3, m.a4, m.b4,
+                             m.c4);
+  for (unsigned i = 0; i < node.mNumMeshes; ++i)
+    scene.instances.push_back({node.mMeshes[i], to_scene});
+  for (unsigned i = 0; i < node.mNumChildren; ++i) PlaceParts(*node.mChildren[i], m, scene);
+}
+
+ImportedScene ConvertScene(const aiScene& from) {
+  ImportedScene scene;
+  for (unsigned i = 0; i < from.mNumMeshes; ++i) {
+    const aiMesh& mesh = *from.mMeshes[i];
+    scene.parts.push_back(ConvertPart(mesh));
+    if ((mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
+      scene.warnings.push_back(
+          fmt::format("part \"{}\": points or lines left out", mesh.mName.C_Str()));
+    }
+  }
+  for (unsigned i = 0; i < from.mNumMaterials; ++i)
+    scene.materials.push_back(ConvertMaterial(*from.mMaterials[i], from));
+  for (unsigned i = 0; i < from.mNumTextures; ++i)
+    scene.images.push_back(ConvertImage(*from.mTextures[i]));
+  PlaceParts(*from.mRootNode, aiMatrix4x4(), scene);
+  return scene;
+}
+
+// Says what a part really holds. Some importers claim polygons where there are lines only, upon
+// which triangulation aborts the program.
+void CorrectPrimitiveTypes(const aiScene& scene) {
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    aiMesh& part = *scene.mMeshes[m];
+    part.mPrimitiveTypes = 0;
+    for (unsigned f = 0; f < part.mNumFaces; ++f)
+      part.mPrimitiveTypes |= AI_PRIMITIVE_TYPE_FOR_N_INDICES(part.mFaces[f].mNumIndices);
+  }
+}
+
+}  // namespace
+
+Result<ImportedScene> ImportByAssimp(const std::string& name, const Bytes& file, AskParent ask) {
+  try {
+    auto* importer = new Assimp::Importer;
+    importer->SetIOHandler(new ParentFiles(name, file, ask));  // the importer owns it
+    if (importer->ReadFile(name, 0) != nullptr) CorrectPrimitiveTypes(*importer->GetScene());
+    const aiScene* scene =
+        importer->ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType);
+    if (scene == nullptr || scene->mRootNode == nullptr)
+      return DataLoss("{}", importer->GetErrorString());
+    return ConvertScene(*scene);
+  } catch (const std::bad_alloc&) {
+    throw;                                 // the guard's to report
+  } catch (const std::exception& error) {  // Assimp's importers throw on some broken files
+    return DataLoss("{}", error.what());
+  }
+}
+
+}  // namespace tilegrad::io

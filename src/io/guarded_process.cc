@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/guarded_process.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+
+#include "base/error.h"
+#include "io/guarded_channel.h"
+
+#ifndef __has_feature
+#define __has_feature(x) 0
+#endif
+
+namespace tilegrad::io {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMaxQuestions = 4096;
+
+// What the child may map in all: what this process has mapped, which it inherits, and the limit.
+// 0, no limit, under sanitizers: they map terabytes.
+std::size_t AddressSpace(const GuardLimits& limits) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
+    __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+  (void)limits;
+  return 0;
+#else
+  std::size_t pages = 0;
+  if (!(std::ifstream("/proc/self/statm") >> pages)) return 0;
+  return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + limits.memory_bytes;
+#endif
+}
+
+class BlockedSignals {
+ public:
+  BlockedSignals() {
+    sigset_t all;
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~BlockedSignals() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals&) = delete;
+  BlockedSignals& operator=(const BlockedSignals&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+class Child {
+ public:
+  explicit Child(pid_t pid)
+      : pid_(pid), end_(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))) {}
+  ~Child() {
+    if (reaped_) return;
+    ::kill(pid_, SIGKILL);
+    Reap(0);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  // True once it has ended. Somebody else may have reaped it (SIGCHLD ignored, a wait for any
+  // child): then it counts as having ended well, and the mailbox tells the rest.
+  bool Reap(int flags) {
+    if (reaped_) return true;
+    pid_t got = 0;
+    do {
+      got = ::waitpid(pid_, &status_, flags);
+    } while (got < 0 && errno == EINTR);
+    reaped_ = got != 0;
+    return reaped_;
+  }
+  int status() const { return status_; }
+  int end_fd() const { return end_.get(); }  // readable once it has ended; -1 on old kernels
+
+ private:
+  pid_t pid_;
+  UniqueFd end_;
+  int status_ = 0;
+  bool reaped_ = false;
+};
+
+class Guard {
+ public:
+  Guard(Child& child, UniqueFd socket, const Mailbox& mailbox, AnswerFunction answer,
+        const GuardLimits& limits)
+      : child_(child),
+        socket_(std::move(socket)),
+        mailbox_(mailbox),
+        answer_(answer),
+        limits_(limits),
+        deadline_(Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                     std::chrono::duration<double>(limits.wall_seconds))) {}
+
+  // Until the child ends.
+  Status Watch() {
+    while (!child_.Reap(WNOHANG)) {
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(deadline_ - Clock::now()).count();
+      if (left <= 0) return DataLoss("took more than {} s", limits_.wall_seconds);
+      std::array<pollfd, 2> wait = {{{socket_.get(), POLLIN, 0}, {child_.end_fd(), POLLIN, 0}}};
+      const std::int64_t slice = child_.end_fd() < 0 ? 5 : 60'000;
+      if (::poll(wait.data(), wait.size(), static_cast<int>(std::min<std::int64_t>(left, slice))) >
+              0 &&
+          wait[0].revents != 0) {
+        TILEGRAD_TRY(Serve());
+      }
+    }
+    return {};
+  }
+
+ private:
+  Status Serve() {
+    std::array<char, kMaxQuestionBytes> question;
+    const ssize_t size = ::recv(socket_.get(), question.data(), question.size(), MSG_DONTWAIT);
+    if (size <= 0) {
+      if (size == 0 || errno != EINTR) socket_.Close();  // it asks no more
+      return {};
+    }
+    if (++questions_ > kMaxQuestions) return DataLoss("asked more than {} times", kMaxQuestions);
+    const auto content = answer_({question.data(), static_cast<std::size_t>(size)});
+    if (content && !mailbox_.Put(*content))
+      return IoError("could not be given {} bytes: {}", content->size(), std::strerror(errno));
+    const char known = content.has_value();
+    // A child that asks without taking answers fills the socket; that must not block us.
+    if (::send(socket_.get(), &known, 1, MSG_NOSIGNAL | MSG_DONTWAIT) != 1) socket_.Close();
+    return {};
+  }
+
+  Child& child_;
+  UniqueFd socket_;
+  const Mailbox& mailbox_;
+  AnswerFunction answer_;
+  const GuardLimits& limits_;
+  Clock::time_point deadline_;
+  int questions_ = 0;
+};
+
+Status TooMuchMemory(const GuardLimits& limits) {
+  return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
+}
+
+Status OfSignal(int signal, const GuardLimits& limits) {
+  if (signal == SIGXCPU)
+    return DataLoss("took more than {} s of processor time", limits.cpu_seconds);
+  if (signal == SIGXFSZ) return TooMuchMemory(limits);
+  const char* name = ::sigdescr_np(signal);
+  return DataLoss("crashed ({})", name == nullptr ? "unknown signal" : name);
+}
+
+Status OfEnd(int status, const GuardLimits& limits) {
+  if (WIFSIGNALED(status)) return OfSignal(WTERMSIG(status), limits);
+  const int code = WEXITSTATUS(status);
+  if (code == kChildDone) return {};
+  if (code == kChildOutOfMemory) return TooMuchMemory(limits);
+  if (code == kChildCannotDeliver) return IoError("could not hand over its result");
+  if (code == kChildThrew) return DataLoss("failed with an exception");
+  return DataLoss("ended the process with code {}", code);
+}
+
+}  // namespace
+
+Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLimits& limits) {
+  TILEGRAD_ASSIGN(const Mailbox mailbox, Mailbox::Open());
+  TILEGRAD_ASSIGN(SocketPair sockets, SocketPair::Open());
+  const ChildSetup setup{::getpid(), sockets.child.get(), mailbox, AddressSpace(limits), limits};
+  pid_t pid = -1;
+  {
+    const BlockedSignals blocked;  // no handler of ours may run in the child
+    pid = ::fork();
+    if (pid == 0) LiveAsChild(setup, run);
+  }
+  if (pid < 0) return ResourceExhausted("could not be started: {}", std::strerror(errno));
+  sockets.child.Close();
+  Child child(pid);
+  TILEGRAD_TRY(Guard(child, std::move(sockets.parent), mailbox, answer, limits).Watch());
+  TILEGRAD_TRY(OfEnd(child.status(), limits));
+  auto result = mailbox.Get(limits.memory_bytes);
+  if (!result) return DataLoss("returned nothing that is whole");
+  return std::move(*result);
+}
+
+}  // namespace tilegrad::io

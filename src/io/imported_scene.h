@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to io: what an Assimp importer found in a file, as the process that ran it hands it
+// over. Plain data, no Assimp type.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat4x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tilegrad::io {
+
+struct ImportedPart {
+  std::string name;
+  std::uint32_t material = 0;                 // in materials; beyond them: none
+  std::vector<glm::vec3> positions, normals;  // normals, uvs, colors: empty or one
+  std::vector<glm::vec2> uvs;                 // a vertex
+  std::vector<glm::vec4> colors;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // vertices of this part
+};
+
+struct ImportedMaterial {
+  std::string name;
+  glm::vec4 color{0.8f, 0.8f, 0.8f, 1};
+  std::string image;           // as the file names it; empty: none
+  std::int32_t embedded = -1;  // in images, or -1 if the image is a file of its own
+};
+
+struct ImportedImage {
+  std::string name;
+  Bytes bytes;  // an image file; empty if it is embedded in a form that is not read
+};
+
+// A part at a place of the scene.
+struct ImportedInstance {
+  std::uint32_t part = 0;
+  glm::mat4x3 to_scene{1};
+};
+
+struct ImportedScene {
+  std::vector<ImportedPart> parts;
+  std::vector<ImportedMaterial> materials;
+  std::vector<ImportedImage> images;
+  std::vector<ImportedInstance> instances;
+  std::vector<std::string> warnings;
+};
+
+// A scene, or why there is none, as bytes of one version of this program.
+Bytes EncodeScene(const Result<ImportedScene>& scene);
+
+// The other way, from bytes that nobody vouches for: every count is checked against what is left
+// before anything is allocated, every index against what it points into. Whether numbers are finite
+// is left to Validate (scene/mesh.h). Errors: that of the encoded Result, or kDataLoss.
+Result<ImportedScene> DecodeScene(std::span<const std::uint8_t> bytes);
+
+}  // namespace tilegrad::io

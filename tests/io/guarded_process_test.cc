@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// A function in a child process: what it returns arrives, and nothing that it does harms the
+// parent.
+#include "io/guarded_process.h"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "base/parallel.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::io {
+namespace {
+
+const auto kNoAnswer = [](std::string_view) { return std::optional<Bytes>(); };
+
+Result<Bytes> Guarded(ChildFunction run, const GuardLimits& limits = {}) {
+  return RunGuarded(run, kNoAnswer, limits);
+}
+
+std::ptrdiff_t OpenDescriptors() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+}
+
+// After each test no child is left, dead or alive, and no descriptor.
+class GuardedProcessTest : public testing::Test {
+ protected:
+  ~GuardedProcessTest() override {
+    EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1);
+    EXPECT_EQ(OpenDescriptors(), descriptors_);
+  }
+  const std::ptrdiff_t descriptors_ = OpenDescriptors();
+};
+
+TEST_F(GuardedProcessTest, BytesOfAnySizeArrive) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{50} << 20}) {
+    const auto got = Guarded([&](AskParent) { return Bytes(size, 7); });
+    ASSERT_TRUE(got.ok()) << got.status().message();
+    EXPECT_EQ(*got, Bytes(size, 7));
+  }
+}
+
+TEST_F(GuardedProcessTest, QuestionsAreAnsweredByTheParent) {
+  int asked = 0;
+  const auto got = RunGuarded(
+      [](AskParent ask) {
+        const auto large = ask("large"), none = ask("none");
+        if (none || ask("") || ask(std::string(5000, 'x'))) std::abort();
+        return large.value();
+      },
+      [&](std::string_view question) {
+        ++asked;
+        return question == "large" ? std::optional(Bytes(3'000'000, 9)) : std::nullopt;
+      },
+      {});
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  EXPECT_EQ(*got, Bytes(3'000'000, 9));
+  EXPECT_EQ(asked, 2);
+}
+
+TEST_F(GuardedProcessTest, CrashesAreErrors) {
+  ExpectMessage(Guarded([](AskParent) -> Bytes { std::abort(); }).status(), "crashed", "Abort");
+  ExpectMessage(Guarded([](AskParent) -> Bytes {
+                  ::raise(SIGSEGV);
+                  return {};
+                }).status(),
+                "crashed", "Segmentation");
+  ExpectMessage(Guarded([](AskParent) -> Bytes { throw std::runtime_error("x"); }).status(),
+                "exception");
+  ExpectMessage(Guarded([](AskParent) -> Bytes { ::_exit(3); }).status(), "code 3");
+  ExpectMessage(Guarded([](AskParent) -> Bytes { ::_exit(0); }).status(), "nothing that is whole");
+}
+
+TEST_F(GuardedProcessTest, WhatLoopsIsStoppedByProcessorTime) {
+  GuardLimits limits;
+  limits.cpu_seconds = 1;
+  const auto got = Guarded(
+      [](AskParent) -> Bytes {
+        for (std::atomic<int> i = 0;; ++i) {
+        }
+      },
+      limits);
+  ExpectMessage(got.status(), "more than 1 s of processor time");
+}
+
+TEST_F(GuardedProcessTest, WhatWaitsIsStoppedByTheClock) {
+  GuardLimits limits;
+  limits.wall_seconds = 0.2;
+  const auto sleep = [](AskParent) -> Bytes {
+    for (;;) ::pause();
+  };
+  ExpectMessage(Guarded(sleep, limits).status(), "more than 0.2 s");
+  const auto deaf = [](AskParent) -> Bytes {  // closes its end of everything, ignores what it can
+    for (int fd = 3; fd < 100; ++fd) ::close(fd);
+    for (int signal = 1; signal < NSIG; ++signal) std::signal(signal, SIG_IGN);
+    for (;;) ::pause();
+  };
+  ExpectMessage(Guarded(deaf, limits).status(), "more than 0.2 s");
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_F(GuardedProcessTest, MemoryHasALimit) {
+  GuardLimits limits;
+  limits.memory_bytes = std::size_t{200} << 20;
+  const auto of_size = [&](std::size_t mebibytes) {
+    return Guarded([&](AskParent) { return Bytes(Bytes(mebibytes << 20, 1).size() / 1000, 1); },
+                   limits);
+  };
+  EXPECT_TRUE(of_size(100).ok());
+  const Status status = of_size(300).status();
+  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  ExpectMessage(status, "more than 200 MB of memory");
+}
+#endif
+
+TEST_F(GuardedProcessTest, ResultsHaveALimit) {
+  GuardLimits limits;
+  limits.memory_bytes = std::size_t{100} << 20;
+  static const Bytes large(std::size_t{101} << 20, 1);  // the parent's: allocates nothing here
+  const auto got = RunGuarded(
+      [](AskParent ask) {
+        (void)ask("x");
+        return Bytes(1, 1);
+      },
+      [](std::string_view) { return std::optional<Bytes>(large); }, limits);
+  ASSERT_TRUE(got.ok()) << got.status().message();  // an answer that is too large is none
+  limits.memory_bytes = std::size_t{1} << 20;
+  ExpectMessage(Guarded([](AskParent) { return Bytes(2 << 20, 1); }, limits).status(),
+                "more than 1 MB of memory");
+}
+
+TEST_F(GuardedProcessTest, EndlessQuestionsAreCutOff) {
+  const auto got = RunGuarded(
+      [](AskParent ask) -> Bytes {
+        for (;;) (void)ask("more");
+      },
+      [](std::string_view) { return std::optional(Bytes(10)); }, {});
+  ExpectMessage(got.status(), "asked more than");
+}
+
+std::atomic<int> handled = 0;
+
+// Neither handlers nor the terminal's signals, which go to the group, reach the child.
+TEST_F(GuardedProcessTest, SignalHandlersStayInTheParent) {
+  const auto before = std::signal(SIGTERM, [](int) { ++handled; });
+  const auto got = Guarded([](AskParent) -> Bytes {
+    ::raise(SIGTERM);
+    return {};
+  });
+  ExpectMessage(got.status(), "crashed", "Terminated");
+  const auto group = Guarded([](AskParent) { return Bytes(1, ::getpgrp() == ::getpid()); });
+  ASSERT_TRUE(group.ok());
+  EXPECT_EQ((*group)[0], 1);
+  std::raise(SIGTERM);
+  EXPECT_EQ(handled, 1);
+  std::signal(SIGTERM, before);
+}
+
+TEST_F(GuardedProcessTest, WorksWhereChildrenAreReapedBySomebodyElse) {
+  const auto before = std::signal(SIGCHLD, SIG_IGN);
+  const auto good = Guarded([](AskParent) { return Bytes(1, 5); });
+  const auto bad = Guarded([](AskParent) -> Bytes { std::abort(); });
+  std::signal(SIGCHLD, before);
+  ASSERT_TRUE(good.ok()) << good.status().message();
+  EXPECT_EQ(*good, Bytes(1, 5));
+  ExpectMessage(bad.status(), "nothing that is whole");
+}
+
+TEST_F(GuardedProcessTest, NothingIsPrintedTwice) {
+  testing::internal::CaptureStdout();
+  std::printf("once ");
+  const auto got = Guarded([](AskParent) {
+    std::printf("never ");
+    std::fflush(stdout);
+    return Bytes();
+  });
+  std::printf("end");
+  std::fflush(stdout);
+  EXPECT_EQ(testing::internal::GetCapturedStdout().find("never"), std::string::npos);
+  EXPECT_TRUE(got.ok());
+}
+
+TEST_F(GuardedProcessTest, DescriptorsOfTheParentAreClosed) {
+  const auto got =
+      Guarded([](AskParent) { return Bytes(static_cast<std::size_t>(OpenDescriptors()), 0); });
+  ASSERT_TRUE(got.ok());
+  EXPECT_LE(got->size(), 7u);  // three streams, socket, memory file, those of the listing itself
+}
+
+// While other threads allocate and fork: no lock is left held in a child.
+TEST_F(GuardedProcessTest, ManyThreadsAtOnce) {
+  std::atomic<int> good = 0;
+  const Workers workers(7);
+  workers.For(200, [&](std::size_t i, std::size_t) {
+    std::vector<std::string> garbage(100, std::string(i + 100, 'x'));
+    const auto got = Guarded([&](AskParent) {
+      std::vector<std::string> more(100, std::string(i + 100, 'y'));
+      return Bytes(i + more.size(), 3);
+    });
+    good += got.ok() && *got == Bytes(i + 100, 3);
+  });
+  EXPECT_EQ(good, 200);
+}
+
+}  // namespace
+}  // namespace tilegrad::io
