@@ -11,6 +11,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
+#include "io/mesh_file.h"
 #include "train/data/build.h"
 
 namespace tilegrad::cli {
@@ -114,8 +115,10 @@ void AddDataset(CLI::App& app, Action* action) {
   command
       ->add_option("--source", options->source,
                    "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
-                   "shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL.glb, "
-                   ".obj, ...), procedural (built in), nmr (.npz renders of N3MR and SoftRas)")
+                   "shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL with "
+                   "one of " +
+                       io::MeshFileEndings() +
+                       "), procedural (built in), nmr (.npz renders of N3MR and SoftRas)")
       ->check(CLI::IsMember({"sweethome3d", "shapenet", "folder", "procedural", "nmr"}))
       ->capture_default_str();
   command->add_option("--input", options->input,

@@ -80,8 +80,8 @@ Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
     }
   }
   if (entries.empty()) {
-    return NotFound("{}: no models; expected <class>/<model> with .glb, .gltf, .obj, .ply, ...",
-                    folder.string());
+    return NotFound("{}: no models; expected <class>/<model> with one of {}", folder.string(),
+                    io::MeshFileEndings());
   }
   return std::unique_ptr<ModelSource>(
       std::make_unique<FileModels>("folder", "Models of the user.", std::move(entries)));
