@@ -27,7 +27,7 @@ namespace tilegrad {
 struct PreparedFrom {
   bool valid = false, drawn_bins = false, soft_bins = false;
   AlignedVector<float> positions;
-  AlignedVector<std::int32_t> faces;
+  AlignedVector<std::int32_t> faces;  // all in [0, V) for the V of `positions`
   CameraT<float> camera;
   int width = 0, height = 0;
   double delta = 0, max_alpha_error = 0;

@@ -7,6 +7,7 @@
 
 #include "raster/project.h"
 #include "render/frame_layout.h"
+#include "render/quick_checks.h"
 
 namespace tilegrad {
 namespace {
@@ -108,12 +109,14 @@ void FinishClippedAttributes(const SceneView& scene, const ImageGradients& gradi
 
 }  // namespace
 
-void MergeGeometry(const SceneView& scene, const RenderOptions& options,
+bool MergeGeometry(const SceneView& scene, const RenderOptions& options,
                    const ImageGradients& gradients, ImageScratch* image, SceneGradients* d_scene) {
+  bool finite = true;
   if (image->mesh.was_clipped() && gradients.request.attributes) {
     FinishClippedAttributes(scene, gradients, image, d_scene);
+    finite = AllFinite(d_scene->attributes);
   }
-  if (!gradients.request.geometry) return;
+  if (!gradients.request.geometry) return finite;
   image->d_vertices.assign(4 * image->mesh.vertices(), 0.0f);
   for (const BandGradients& band : gradients.bands) {
     AddBandGeometry(image->mesh, band, image->d_vertices.data());
@@ -124,12 +127,15 @@ void MergeGeometry(const SceneView& scene, const RenderOptions& options,
   raster::ProjectBackward(FaceSourceOf(scene, options), image->mesh,
                           {image->d_vertices, image->d_clip_t}, &image->project,
                           {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
+  return finite && AllFinite(d_scene->positions) &&
+         (!d_scene->camera || IsFiniteCamera(d_scene->d_camera));
 }
 
-void MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
+bool MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
                      SceneGradients* d_scene) {
-  if (d_scene->attributes.empty() || image->mesh.was_clipped()) return;
+  if (d_scene->attributes.empty() || image->mesh.was_clipped()) return true;
   SumAttributes(scene, gradients, image, d_scene->attributes);
+  return AllFinite(d_scene->attributes);
 }
 
 }  // namespace tilegrad

@@ -18,13 +18,14 @@ struct ImageGradients {
   raster::BackwardRequest request;  // what the bands were asked for
 };
 
-// Overwrites d_scene's positions and d_camera, where they are wanted.
-void MergeGeometry(const SceneView& scene, const RenderOptions& options,
+// Overwrites d_scene's positions and d_camera, where they are wanted. Returns whether all that it
+// has written is finite.
+bool MergeGeometry(const SceneView& scene, const RenderOptions& options,
                    const ImageGradients& gradients, ImageScratch* image, SceneGradients* d_scene);
 
 // Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
 // MergeGeometry, since attributes at the cut depend on geometry.
-void MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
+bool MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
                      SceneGradients* d_scene);
 
 }  // namespace tilegrad

@@ -6,6 +6,7 @@
 
 #include "raster/project.h"
 #include "render/frame_layout.h"
+#include "render/quick_checks.h"
 
 namespace tilegrad {
 namespace {
@@ -31,22 +32,41 @@ bool SameCamera(const Camera& a, const Camera& b) {
   return std::memcmp(&a, &b, sizeof(Camera)) == 0;
 }
 
-// Bits, not hashes: what was kept is what would be computed again.
+// Which arrays of a scene are, bit by bit, those that were prepared. Bits, not hashes: what was
+// kept is what would be computed again.
+struct Unchanged {
+  bool positions, faces;
+};
+
+// Positions are compared only if that may save something: they change from frame to frame.
+Unchanged CompareScene(const SceneView& scene, const PrepareRequest& request,
+                       const PreparedFrom& from) {
+  return {request.reuse && SameBits(scene.positions, from.positions),
+          scene.positions.size() == from.positions.size() && SameBits(scene.faces, from.faces)};
+}
+
+bool IsSoundScene(const SceneView& scene, const Unchanged& unchanged) {
+  const auto vertices = static_cast<std::int32_t>(scene.positions.size() / 3);
+  return (unchanged.faces || AllWithin(scene.faces, 0, vertices)) &&
+         (unchanged.positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
+         IsFiniteCamera(scene.camera) && scene.camera.near_plane > 0;
+}
+
 bool IsPrepared(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
-                const PreparedFrom& from) {
-  return request.reuse && from.valid && (from.drawn_bins || !request.drawn_bins) &&
-         (from.soft_bins || !request.soft_bins) && from.width == options.width &&
-         from.height == options.height && from.delta == options.delta &&
-         from.max_alpha_error == options.max_alpha_error && from.culling == options.culling &&
-         SameCamera(scene.camera, from.camera) && SameBits(scene.positions, from.positions) &&
-         SameBits(scene.faces, from.faces);
+                const Unchanged& unchanged, const PreparedFrom& from) {
+  return request.reuse && from.valid && unchanged.positions && unchanged.faces &&
+         (from.drawn_bins || !request.drawn_bins) && (from.soft_bins || !request.soft_bins) &&
+         from.width == options.width && from.height == options.height &&
+         from.delta == options.delta && from.max_alpha_error == options.max_alpha_error &&
+         from.culling == options.culling && SameCamera(scene.camera, from.camera);
 }
 
 void RememberPrepared(const SceneView& scene, const RenderOptions& options,
-                      const PrepareRequest& request, PreparedFrom* from) {
+                      const PrepareRequest& request, const Unchanged& unchanged,
+                      PreparedFrom* from) {
   from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_bins = request.soft_bins;
-  from->positions.assign(scene.positions.begin(), scene.positions.end());
-  from->faces.assign(scene.faces.begin(), scene.faces.end());
+  if (!unchanged.positions) from->positions.assign(scene.positions.begin(), scene.positions.end());
+  if (!unchanged.faces) from->faces.assign(scene.faces.begin(), scene.faces.end());
   from->camera = scene.camera;
   from->width = options.width, from->height = options.height;
   from->delta = options.delta, from->max_alpha_error = options.max_alpha_error;
@@ -75,14 +95,17 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
 
 }  // namespace
 
-void PrepareImage(const SceneView& scene, const RenderOptions& options,
+bool PrepareImage(const SceneView& scene, const RenderOptions& options,
                   const PrepareRequest& request, ImageScratch* image) {
-  if (!IsPrepared(scene, options, request, image->prepared)) {
+  const Unchanged unchanged = CompareScene(scene, request, image->prepared);
+  if (!IsSoundScene(scene, unchanged)) return false;
+  if (!IsPrepared(scene, options, request, unchanged, image->prepared)) {
     image->prepared.valid = false;
     PrepareMesh(scene, options, request, image);
-    RememberPrepared(scene, options, request, &image->prepared);
+    RememberPrepared(scene, options, request, unchanged, &image->prepared);
   }
   PrepareAttributes(scene, image);
+  return true;
 }
 
 }  // namespace tilegrad

@@ -13,7 +13,8 @@ struct PrepareRequest {
   bool reuse = false;      // what was prepared last, if it was for the same scene and options
 };
 
-void PrepareImage(const SceneView& scene, const RenderOptions& options,
+// Returns false, and prepares nothing, if a number of the scene is not finite or out of range.
+bool PrepareImage(const SceneView& scene, const RenderOptions& options,
                   const PrepareRequest& request, ImageScratch* image);
 
 }  // namespace tilegrad

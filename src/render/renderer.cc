@@ -2,6 +2,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <vector>
 
@@ -15,14 +16,14 @@
 namespace tilegrad {
 namespace {
 
-// Parts of each image that have a gradient.
+// Tasks of each image.
 struct BackwardPlan {
-  raster::TileGrid grid;  // of bins
-  std::size_t bands, bins;
+  raster::TileGrid grid;    // of bins
+  std::size_t bands, bins;  // no bins where alpha has no gradient
 
   BackwardPlan(const RenderOptions& options, const FrameGradients& d_frame)
       : grid(raster::BinGrid(options.width, options.height)),
-        bands(d_frame.attributes.empty() ? 0 : BandGrid(options.width, options.height).count()),
+        bands(BandGrid(options.width, options.height).count()),
         bins(d_frame.alpha.empty() ? 0 : grid.tiles()) {}
 };
 
@@ -43,12 +44,18 @@ struct Renderer::Impl {
       : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {}
 
   // Projects and bins every scene of the batch.
-  void Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
-               const PrepareRequest& request) {
+  Status Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
+                 const PrepareRequest& request) {
     if (images.size() < scenes.size()) images.resize(scenes.size());
+    sound = true;
     workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-      PrepareImage(scenes[n], options, request, &images[n]);
+      Require(PrepareImage(scenes[n], options, request, &images[n]));
     });
+    return sound ? Status() : ValidateSceneNumbers(scenes);
+  }
+
+  void Require(bool holds) {
+    if (!holds) sound = false;
   }
 
   // Calls run(task, worker) for all tiles of `grid` of all images together.
@@ -60,12 +67,13 @@ struct Renderer::Impl {
     });
   }
 
-  void SumFaces(const BackwardInput& input, const BackwardPlan& plan, std::size_t count,
-                std::span<const SceneGradients> d_scenes);
-  void Merge(std::span<const SceneView> scenes, const RenderOptions& options,
-             const BackwardPlan& plan, std::span<SceneGradients> d_scenes);
+  Status SumFaces(std::span<const SceneView> scenes, const BackwardInput& input,
+                  const BackwardPlan& plan, std::span<const SceneGradients> d_scenes);
+  Status Merge(std::span<const SceneView> scenes, const RenderOptions& options,
+               const BackwardPlan& plan, std::span<SceneGradients> d_scenes);
 
   const Workers* workers;
+  std::atomic<bool> sound = true;  // false: some task met a number that is an error
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
   std::vector<double> bin_errors;             // of alpha, [image][bin]
@@ -73,43 +81,47 @@ struct Renderer::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-void Renderer::Impl::SumFaces(const BackwardInput& input, const BackwardPlan& plan,
-                              std::size_t count, std::span<const SceneGradients> d_scenes) {
-  if (band_gradients.size() < count * plan.bands) band_gradients.resize(count * plan.bands);
-  if (bin_gradients.size() < count * plan.bins) bin_gradients.resize(count * plan.bins);
-  // Bands, which are longer, first.
-  workers->For(count * (plan.bands + plan.bins), [&](std::size_t task, std::size_t w) {
+Status Renderer::Impl::SumFaces(std::span<const SceneView> scenes, const BackwardInput& input,
+                                const BackwardPlan& plan,
+                                std::span<const SceneGradients> d_scenes) {
+  const std::size_t bands = scenes.size() * plan.bands, bins = scenes.size() * plan.bins;
+  if (band_gradients.size() < bands) band_gradients.resize(bands);
+  if (bin_gradients.size() < bins) bin_gradients.resize(bins);
+  sound = true;
+  workers->For(bands + bins, [&](std::size_t task, std::size_t w) {
     WorkerScratch& worker = worker_scratch[w];
-    if (task < count * plan.bands) {
+    if (task < bands) {
       const std::size_t n = task / plan.bands;
-      const raster::BackwardRequest request = BandRequest(d_scenes[n], images[n].mesh);
-      if (!request.geometry && !request.attributes) return;
-      RenderBandBackward(input, images[n], n, task % plan.bands, request, &worker.band,
-                         &band_gradients[task]);
+      Require(RenderBandBackward(input, images[n], {n, task % plan.bands},
+                                 BandRequest(d_scenes[n], images[n].mesh), &worker.band,
+                                 &band_gradients[task]));
       return;
     }
-    task -= count * plan.bands;
+    task -= bands;
     const std::size_t n = task / plan.bins, bin = task % plan.bins;
     if (!WantsGeometry(d_scenes[n])) return;
     RenderBinBackward(input, images[n], {n, bin, plan.grid.rect(bin)}, &worker.soft,
                       &bin_gradients[task]);
   });
+  return sound ? Status() : ValidateBackwardNumbers(scenes, input.frame, input.d_frame);
 }
 
 // Positions and attributes are two tasks each, for the sake of a batch of one.
-void Renderer::Impl::Merge(std::span<const SceneView> scenes, const RenderOptions& options,
-                           const BackwardPlan& plan, std::span<SceneGradients> d_scenes) {
+Status Renderer::Impl::Merge(std::span<const SceneView> scenes, const RenderOptions& options,
+                             const BackwardPlan& plan, std::span<SceneGradients> d_scenes) {
+  sound = true;
   workers->For(2 * scenes.size(), [&](std::size_t task, std::size_t) {
     const std::size_t n = task / 2;
     const ImageGradients gradients{std::span(band_gradients).subspan(n * plan.bands, plan.bands),
                                    std::span(bin_gradients).subspan(n * plan.bins, plan.bins),
                                    BandRequest(d_scenes[n], images[n].mesh)};
     if (task % 2 == 0) {
-      MergeGeometry(scenes[n], options, gradients, &images[n], &d_scenes[n]);
+      Require(MergeGeometry(scenes[n], options, gradients, &images[n], &d_scenes[n]));
     } else {
-      MergeAttributes(scenes[n], gradients, &images[n], &d_scenes[n]);
+      Require(MergeAttributes(scenes[n], gradients, &images[n], &d_scenes[n]));
     }
   });
+  return sound ? Status() : ValidateResult(d_scenes);
 }
 
 Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
@@ -120,12 +132,12 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
                         const RenderRequest& request, Frame* frame) {
   TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_TRY(ValidateScenes(scenes));
+  TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
   const raster::TileGrid bins = raster::BinGrid(options.width, options.height);
   impl_->bin_errors.assign(scenes.size() * bins.tiles(), 0.0);
-  impl_->Prepare(scenes, options, {true, request.alpha, false});
+  TILEGRAD_TRY(impl_->Prepare(scenes, options, {true, request.alpha, false}));
   impl_->ForTiles(scenes.size(), bins, [&](const TileTask& task, std::size_t worker) {
     impl_->bin_errors[task.image * bins.tiles() + task.tile] =
         RenderBin(scenes[task.image], options, impl_->images[task.image], task,
@@ -140,12 +152,11 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
 Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                           const Frame& frame, const FrameGradients& d_frame,
                           std::span<SceneGradients> d_scenes) {
-  TILEGRAD_TRY(ValidateBackward(scenes, options, frame, d_frame, d_scenes));
-  impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true});
+  TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
+  TILEGRAD_TRY(impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true}));
   const BackwardPlan plan(options, d_frame);
-  impl_->SumFaces({options, frame, d_frame}, plan, scenes.size(), d_scenes);
-  impl_->Merge(scenes, options, plan, d_scenes);
-  return ValidateResult(d_scenes);
+  TILEGRAD_TRY(impl_->SumFaces(scenes, {options, frame, d_frame}, plan, d_scenes));
+  return impl_->Merge(scenes, options, plan, d_scenes);
 }
 
 }  // namespace tilegrad

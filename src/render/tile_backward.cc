@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "raster/fragments.h"
 #include "raster/visibility_ref.h"
 #include "render/frame_layout.h"
+#include "render/quick_checks.h"
 
 namespace tilegrad {
 namespace {
@@ -21,41 +23,75 @@ void FindPieces(const raster::ScreenMesh& mesh, int row_begin, std::span<const s
   }
 }
 
+// Where a band lies in the batch.
+struct BandPlace {
+  int row_begin, row_end;
+  std::size_t plane;         // pixels of an image
+  std::size_t first, count;  // its pixels in an image
+  std::size_t image;
+
+  BandPlace(const BandGrid& bands, const BandTask& task)
+      : row_begin(static_cast<int>(task.band) * bands.rows),
+        row_end(std::min(row_begin + bands.rows, bands.height)),
+        plane(static_cast<std::size_t>(bands.width) * static_cast<std::size_t>(bands.height)),
+        first(static_cast<std::size_t>(row_begin) * static_cast<std::size_t>(bands.width)),
+        count(static_cast<std::size_t>(row_end - row_begin) *
+              static_cast<std::size_t>(bands.width)),
+        image(task.image) {}
+
+  // The band's pixels of plane c of an image of `planes` planes.
+  template <class T>
+  std::span<const T> Of(std::span<const T> batch, std::size_t planes, std::size_t c) const {
+    return batch.subspan((image * planes + c) * plane + first, count);
+  }
+};
+
+bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std::size_t channels,
+                 const BandPlace& place) {
+  const std::span<const std::int32_t> ids(input.frame.face_ids);
+  if (!AllWithin(place.Of(ids, 1, 0), raster::kNoFace, mesh.source_faces)) return false;
+  const FrameGradients& d_frame = input.d_frame;
+  if (!d_frame.alpha.empty() && !AllFinite(place.Of(d_frame.alpha, 1, 0))) return false;
+  for (std::size_t c = 0; c < channels && !d_frame.attributes.empty(); ++c) {
+    if (!AllFinite(place.Of(d_frame.attributes, channels, c))) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-void RenderBandBackward(const BackwardInput& input, const ImageScratch& image, std::size_t n,
-                        std::size_t band, const raster::BackwardRequest& request,
-                        raster::BandSums* sums, BandGradients* out) {
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, raster::BandSums* sums,
+                        BandGradients* out) {
   const BandGrid bands(input.options.width, input.options.height);
-  const auto row = static_cast<std::size_t>(bands.width);
-  const std::size_t plane = row * static_cast<std::size_t>(bands.height);
+  const BandPlace place(bands, task);
   const auto channels = static_cast<std::size_t>(image.attributes.channels);
-  const int row_begin = static_cast<int>(band) * bands.rows;
-  const int row_end = std::min(row_begin + bands.rows, bands.height);
-  const std::size_t first = static_cast<std::size_t>(row_begin) * row;
-  auto ids = std::span(input.frame.face_ids)
-                 .subspan(n * plane + first, static_cast<std::size_t>(row_end - row_begin) * row);
+  out->faces.clear();
+  if (!IsSoundBand(input, image.mesh, channels, place)) return false;
+  if (input.d_frame.attributes.empty() || !(request.geometry || request.attributes)) return true;
+  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
   if (image.mesh.was_clipped()) {
-    FindPieces(image.mesh, row_begin, ids, &out->pieces);
+    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
     ids = out->pieces;
   }
   const raster::InterpolateInput interpolate{&image.mesh, image.attributes,
                                              input.options.interpolation, false};
   raster::SumBand(interpolate,
                   {bands.width,
-                   row_begin,
-                   row_end,
+                   place.row_begin,
+                   place.row_end,
                    ids.data(),
-                   {input.d_frame.attributes.data() + n * channels * plane + first,
-                    static_cast<std::ptrdiff_t>(plane), static_cast<std::ptrdiff_t>(row)}},
+                   {place.Of(input.d_frame.attributes, channels, 0).data(),
+                    static_cast<std::ptrdiff_t>(place.plane), bands.width}},
                   sums);
+  if (sums->faces() == 0) return true;
   out->stride = sums->stride();
   out->faces.assign(sums->face.data() + 1, sums->face.data() + sums->count);
-  if (out->faces.empty()) return;
   const std::size_t arrays = raster::FaceGradientArrays(image.attributes.channels, request);
   const std::size_t numbers = 4 * arrays * out->stride;
   if (out->values.size() < numbers) out->values.resize(numbers);
   raster::FinishBand(interpolate, *sums, request, out->values);
+  return true;
 }
 
 void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,

@@ -30,10 +30,16 @@ struct BackwardInput {
   const FrameGradients& d_frame;
 };
 
-// Gradients of the faces seen in band `band` of image `n`, through their attributes.
-void RenderBandBackward(const BackwardInput& input, const ImageScratch& image, std::size_t n,
-                        std::size_t band, const raster::BackwardRequest& request,
-                        raster::BandSums* sums, BandGradients* out);
+// One band of one image of the batch.
+struct BandTask {
+  std::size_t image, band;
+};
+
+// Gradients of the faces seen in a band, through their attributes. Returns false, and does nothing
+// else, if a number of the frame or its gradients in the band is not finite or out of range.
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, raster::BandSums* sums,
+                        BandGradients* out);
 
 // Gradients of the faces that reach the tiles of a bin, through alpha.
 void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "raster/conventions.h"
+#include "render/quick_checks.h"
 
 namespace tilegrad {
 namespace {
@@ -20,15 +21,7 @@ Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
 }
 
 Status CheckFinite(const char* array, std::span<const float> values) {
-  // Sums of zeros, or of NaN where a value is not finite; several, so that they run side by side.
-  constexpr std::size_t kSums = 8;
-  float sums[kSums] = {};
-  const std::size_t whole = values.size() / kSums * kSums;
-  for (std::size_t i = 0; i < whole; i += kSums) {
-    for (std::size_t k = 0; k < kSums; ++k) sums[k] += values[i + k] - values[i + k];
-  }
-  for (const float v : values.subspan(whole)) sums[0] += v - v;
-  if (std::all_of(sums, sums + kSums, [](float sum) { return sum == 0; })) return {};
+  if (AllFinite(values)) return {};
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
   }
@@ -36,9 +29,6 @@ Status CheckFinite(const char* array, std::span<const float> values) {
 }
 
 Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
-  if (faces.size() % 3 != 0) {
-    return InvalidArgument("faces must be [F,3], got {} indices", faces.size());
-  }
   for (std::size_t i = 0; i < faces.size(); ++i) {
     if (faces[i] < 0 || static_cast<std::size_t>(faces[i]) >= vertices) {
       return InvalidArgument("faces[{}] is {}, outside of [0, {})", i, faces[i], vertices);
@@ -62,10 +52,13 @@ Status CheckCamera(const Camera& camera) {
   return {};
 }
 
-Status CheckScene(const SceneView& scene) {
+Status CheckSceneSizes(const SceneView& scene) {
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
   if (scene.positions.size() % 3 != 0) {
     return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
+  }
+  if (scene.faces.size() % 3 != 0) {
+    return InvalidArgument("faces must be [F,3], got {} indices", scene.faces.size());
   }
   if (std::max({scene.positions.size(), scene.faces.size(), scene.attributes.size()}) > kMost) {
     return ResourceExhausted(
@@ -73,11 +66,14 @@ Status CheckScene(const SceneView& scene) {
         scene.positions.size(), scene.faces.size(), scene.attributes.size(), kMost);
   }
   const std::size_t vertices = scene.positions.size() / 3;
-  TILEGRAD_TRY(CheckFaces(scene.faces, vertices));
   if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
   const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
-  TILEGRAD_TRY(CheckSize("attributes", scene.attributes.size(),
-                         rows * static_cast<std::size_t>(scene.channels)));
+  return CheckSize("attributes", scene.attributes.size(),
+                   rows * static_cast<std::size_t>(scene.channels));
+}
+
+Status CheckSceneNumbers(const SceneView& scene) {
+  TILEGRAD_TRY(CheckFaces(scene.faces, scene.positions.size() / 3));
   TILEGRAD_TRY(CheckFinite("positions", scene.positions));
   TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
   return CheckCamera(scene.camera);
@@ -100,17 +96,16 @@ Status CheckImageSize(const char* axis, int pixels) {
                          raster::kMaxImageSize);
 }
 
-Status CheckFrame(std::size_t images, const RenderOptions& options, const Frame& frame,
-                  const FrameGradients& d_frame) {
+Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const Frame& frame,
+                       const FrameGradients& d_frame) {
   const std::size_t pixels =
       images * static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   TILEGRAD_TRY(CheckSize("frame.face_ids", frame.face_ids.size(), pixels));
   if (!d_frame.alpha.empty()) {
     TILEGRAD_TRY(CheckSize("d_frame.alpha", d_frame.alpha.size(), pixels));
     TILEGRAD_TRY(CheckSize("frame.alpha", frame.alpha.size(), pixels));
-    TILEGRAD_TRY(CheckFinite("d_frame.alpha", d_frame.alpha));
   }
-  return CheckFinite("d_frame.attributes", d_frame.attributes);
+  return {};
 }
 
 Status CheckFaceIds(const SceneView& scene, std::span<const std::int32_t> ids) {
@@ -141,9 +136,9 @@ Status ValidateOptions(const RenderOptions& options) {
   return {};
 }
 
-Status ValidateScenes(std::span<const SceneView> scenes) {
+Status ValidateSceneSizes(std::span<const SceneView> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (const Status status = CheckScene(scenes[n]); !status.ok()) {
+    if (const Status status = CheckSceneSizes(scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
     }
     if (scenes[n].channels != scenes[0].channels) {
@@ -154,26 +149,44 @@ Status ValidateScenes(std::span<const SceneView> scenes) {
   return {};
 }
 
-Status ValidateBackward(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const Frame& frame, const FrameGradients& d_frame,
-                        std::span<const SceneGradients> d_scenes) {
+Status ValidateSceneNumbers(std::span<const SceneView> scenes) {
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (const Status status = CheckSceneNumbers(scenes[n]); !status.ok()) {
+      return status.Within(SceneName(n));
+    }
+  }
+  return {};
+}
+
+Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOptions& options,
+                             const Frame& frame, const FrameGradients& d_frame,
+                             std::span<const SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_TRY(ValidateScenes(scenes));
+  TILEGRAD_TRY(ValidateSceneSizes(scenes));
   if (d_scenes.size() != scenes.size()) {
     return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
   }
-  TILEGRAD_TRY(CheckFrame(scenes.size(), options, frame, d_frame));
-  const std::size_t pixels =
-      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  TILEGRAD_TRY(CheckFrameSizes(scenes.size(), options, frame, d_frame));
   if (!scenes.empty() && !d_frame.attributes.empty()) {
     TILEGRAD_TRY(CheckSize("d_frame.attributes", d_frame.attributes.size(),
-                           scenes.size() * pixels * static_cast<std::size_t>(scenes[0].channels)));
+                           frame.face_ids.size() * static_cast<std::size_t>(scenes[0].channels)));
   }
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    Status status = CheckGradients(scenes[n], d_scenes[n]);
-    if (status.ok()) {
-      status = CheckFaceIds(scenes[n], std::span(frame.face_ids).subspan(n * pixels, pixels));
+    if (const Status status = CheckGradients(scenes[n], d_scenes[n]); !status.ok()) {
+      return status.Within(SceneName(n));
     }
+  }
+  return {};
+}
+
+Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& frame,
+                               const FrameGradients& d_frame) {
+  TILEGRAD_TRY(CheckFinite("d_frame.alpha", d_frame.alpha));
+  TILEGRAD_TRY(CheckFinite("d_frame.attributes", d_frame.attributes));
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    const std::size_t pixels = frame.face_ids.size() / scenes.size();
+    const Status status =
+        CheckFaceIds(scenes[n], std::span(frame.face_ids).subspan(n * pixels, pixels));
     if (!status.ok()) return status.Within(SceneName(n));
   }
   return {};

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The border of the renderer: every input is checked here, once, and relied on behind.
+// The border of the renderer: every input is checked here, once, and relied on behind. Sizes and
+// options are checked first. The numbers in arrays are checked where they are read first, in
+// parallel (quick_checks.h); only if that finds something, they are searched here.
 #pragma once
 
 #include <span>
@@ -11,10 +13,13 @@ namespace tilegrad {
 
 // Errors name the scene, the array, the index and what was expected.
 Status ValidateOptions(const RenderOptions& options);
-Status ValidateScenes(std::span<const SceneView> scenes);
-Status ValidateBackward(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const Frame& frame, const FrameGradients& d_frame,
-                        std::span<const SceneGradients> d_scenes);
+Status ValidateSceneSizes(std::span<const SceneView> scenes);
+Status ValidateSceneNumbers(std::span<const SceneView> scenes);
+Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOptions& options,
+                             const Frame& frame, const FrameGradients& d_frame,
+                             std::span<const SceneGradients> d_scenes);
+Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& frame,
+                               const FrameGradients& d_frame);
 // Gradients that overflow float are an error, not an Inf that spreads.
 Status ValidateResult(std::span<const SceneGradients> d_scenes);
 
