@@ -98,6 +98,44 @@ TEST_F(Ops, PooledImages) {
   EXPECT_FALSE(context_.TakeStatus().ok());
 }
 
+TEST_F(Ops, MaximaKeepNaNAndGiveTheirGradientToTheFirst) {
+  const double nan = std::nan("");
+  const Var x = Parameter(
+      context_, context_.From({1, 1, 2, 4}, std::vector<double>{5, 1, 2, nan, 5, 5, 3, 4}));
+  const Var y = MaxPool2d(x, {2, 2});
+  EXPECT_EQ(Numbers(y)[0], 5);
+  EXPECT_TRUE(std::isnan(Numbers(y)[1]));
+  EXPECT_EQ(Numbers(Grad(Sum(y), {x})[0]), (std::vector<double>{1, 0, 0, 1, 0, 0, 0, 0}));
+}
+
+TEST_F(Ops, WhatDoesNotFitIsNamed) {
+  const Var x = Random({2, 3, 4, 4}), w = Random({5, 3, 3, 3}), c = Random({4});
+  const auto refused = [&](const Var& y, const char* word) {
+    EXPECT_FALSE(y.valid());
+    EXPECT_NE(context_.TakeStatus().message().find(word), std::string::npos) << word;
+  };
+  const auto indices = [&](std::vector<std::int32_t> i) { return context_.Indices(i); };
+  refused(Gather(x, 4, indices({0})), "axis 4");
+  refused(Gather(x, 1, indices({3})), "index 3 of 3");
+  refused(ScatterAdd(x, 1, indices({0}), 3), "1 indices");
+  refused(TakeAlong(x, indices({0})), "[1] for [2, 3, 4, 4]");
+  refused(PlaceAlong(c, indices({0, 1}), 4), "[2]");
+  refused(Resize(x, {0, 3}, ResizeMode::kArea), "to 0 x 3");
+  refused(AvgPool2d(x, {3, 0}), "stride 0");
+  refused(ConvTranspose2d(x, w, Var(), {}), "conv2d");
+  refused(ConvTranspose2d(x, Random({3, 2, 3, 3}), c, {}), "bias [4]");
+  refused(ConvTranspose2d(x, w, Var(), {.stride = 2}, 2), "output padding 2");
+  refused(Conv2dInputGrad(x, w, {4, 4}, {1, 1, PadMode::kReflect}), "zeros only");
+  refused(Conv2d(x, w, Var(), {1, 9, PadMode::kReflect}), "pad: 9 and 9");
+  refused(InstanceNorm(x, c, c), "gamma [4]");
+  refused(GroupNorm(x, 2, Random({3}), Random({3})), "3 channels in 2 groups");
+  refused(LayerNorm(x, Random({3}), Random({3})), "layer norm");
+  refused(InstanceNorm(Random({1, 4, 1, 1}), c, c), "no two elements");
+  refused(SpectralNorm(w, context_.Zeros({3})), "u [3]");
+  refused(LogSoftmax(x, 7), "axis 7");
+  refused(CrossEntropy(x, indices({0, 1})), "2 labels");
+}
+
 TEST_F(Ops, ConvolutionsOverTheEdge) {
   const Var x = Constant(context_, context_.From({1, 1, 1, 4}, std::vector<double>{1, 2, 3, 5}));
   const Var w = Constant(context_, context_.From({1, 1, 1, 3}, std::vector<double>{1, 10, 100}));
