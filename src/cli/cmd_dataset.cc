@@ -2,6 +2,7 @@
 // tilegrad dataset: renders models into a dataset that training reads.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <memory>
@@ -81,6 +82,15 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
   for (const auto& [reason, count] : reasons) fmt::print("  {:>5}  {}\n", count, reason);
 }
 
+void PrintWarnings(const train::BuildSummary& summary) {
+  constexpr std::size_t kShown = 10;
+  if (summary.warnings.empty()) return;
+  fmt::print("{} warnings of reading models:\n", summary.warnings.size());
+  for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
+    fmt::print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
+  if (summary.warnings.size() > kShown) fmt::print("  ...\n");
+}
+
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.source : Path(options.out);
@@ -94,6 +104,7 @@ Status Make(const DatasetOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   PrintTable(summary);
   PrintRejected(summary, folder);
+  PrintWarnings(summary);
   fmt::print(
       "{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
       "earlier), {:.1f} s\n",

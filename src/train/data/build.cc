@@ -19,6 +19,7 @@ namespace {
 struct Outcome {
   std::optional<ModelStamp> stamp;  // of a finished file
   Status failure;                   // of a model that cannot be used
+  std::vector<std::string> warnings;
 };
 
 DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
@@ -141,8 +142,9 @@ class Builder {
     failed_ = true;
   }
 
-  Result<MadeModel> Load(std::size_t i, LitRenderer& renderer) const {
+  Result<MadeModel> Load(std::size_t i, LitRenderer& renderer) {
     TILEGRAD_ASSIGN(SourceModel model, source_.Load(chosen_[i]));
+    outcomes_[i].warnings = std::move(model.warnings);
     return MakeModel(entry(i), std::move(model), info_, renderer);
   }
 
@@ -171,6 +173,8 @@ class Builder {
         continue;
       }
       usable_.push_back(chosen_[i]);
+      for (std::string& text : outcomes_[i].warnings)
+        summary_.warnings.push_back({e.file, std::move(text)});
     }
     info_.classes = ClassesOf(source_, usable_);
     for (std::size_t i = 0; i < chosen_.size(); ++i) {

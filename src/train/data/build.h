@@ -23,12 +23,18 @@ struct BuildOptions {
   int limit = 0;      // at most that many in all; 0: all
 };
 
+// What was left out of a model that is used all the same.
+struct ModelWarning {
+  std::string file, text;
+};
+
 struct BuildSummary {
   std::vector<ModelInfo> models;
   DatasetInfo info;
   std::vector<RejectedModel> rejected;
-  int reused = 0;           // model files that an earlier run had finished
-  std::uint64_t bytes = 0;  // of the dataset's files
+  std::vector<ModelWarning> warnings;  // of models that this run read; kept ones are not read again
+  int reused = 0;                      // model files that an earlier run had finished
+  std::uint64_t bytes = 0;             // of the dataset's files
 };
 
 // Fills `folder` (dataset.h says with what). Model files that are there, readable and of the same

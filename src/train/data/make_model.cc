@@ -51,10 +51,10 @@ Status CheckVisible(const ModelData& data, int size) {
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
                             LitRenderer& renderer) {
   MadeModel made;
-  if (auto* data = std::get_if<ModelData>(&model)) {
+  if (auto* data = std::get_if<ModelData>(&model.data)) {
     made.data = std::move(*data);
   } else {
-    TILEGRAD_ASSIGN(made, FromMesh(entry, std::move(std::get<Mesh>(model)), info, renderer));
+    TILEGRAD_ASSIGN(made, FromMesh(entry, std::move(std::get<Mesh>(model.data)), info, renderer));
   }
   TILEGRAD_TRY(CheckVisible(made.data, info.image_size));
   made.stamp.recipe = info.recipe;

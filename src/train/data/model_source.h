@@ -23,9 +23,12 @@ struct SourceEntry {
   std::optional<Split> split;  // where the source fixes it
 };
 
-// A mesh still to be normalised and rendered (y up, front towards +z), or finished data where the
-// source holds images instead.
-using SourceModel = std::variant<Mesh, ModelData>;
+struct SourceModel {
+  // A mesh still to be normalised and rendered (y up, front towards +z), or finished data where the
+  // source holds images instead.
+  std::variant<Mesh, ModelData> data;
+  std::vector<std::string> warnings = {};  // of reading it: a texture is missing, ...
+};
 
 class ModelSource {
  public:

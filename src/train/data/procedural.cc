@@ -256,7 +256,7 @@ class Procedural : public ModelSource {
   const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
     const auto n = static_cast<std::size_t>(per_class_);
-    return SourceModel(ProceduralModel(static_cast<int>(entry / n), entry % n, seed_));
+    return SourceModel{ProceduralModel(static_cast<int>(entry / n), entry % n, seed_)};
   }
 
  private:

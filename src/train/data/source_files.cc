@@ -21,7 +21,7 @@ class FileModels : public ModelSource {
   const std::vector<SourceEntry>& entries() const override { return entries_; }
   Result<SourceModel> Load(std::size_t entry) const override {
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(entries_[entry].file)));
-    return SourceModel(std::move(loaded.mesh));
+    return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
   }
 
  private:

@@ -103,7 +103,7 @@ class Nmr : public ModelSource {
     ModelData data;
     data.images.assign(images, images + kImageBytes);
     data.occupancy = ToOurFrame(arrays->voxels.data.data() + row * kSide * kSide * kSide);
-    return SourceModel(std::move(data));
+    return SourceModel{std::move(data)};
   }
 
  private:

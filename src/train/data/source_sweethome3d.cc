@@ -76,7 +76,7 @@ class SweetHome3d : public ModelSource {
     TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(*library.files, model));
     const auto rotation = library.rotations.find(model);
     if (rotation != library.rotations.end()) io::ApplyRotation(loaded.mesh, rotation->second);
-    return SourceModel(std::move(loaded.mesh));
+    return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
   }
 
  private:

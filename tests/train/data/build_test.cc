@@ -171,13 +171,15 @@ class MixedSource : public ModelSource {
   Result<SourceModel> Load(std::size_t entry) const override {
     const std::string& id = entries_[entry].id;
     if (id == "broken") return DataLoss("broken.obj: line 3: no number");
-    if (id == "empty") return SourceModel(Mesh{});
+    if (id == "empty") return SourceModel{Mesh{}};
     Mesh mesh = Icosphere(1, 1.0f);
     if (id == "flat-point") {
       for (auto& p : mesh.positions) p = glm::vec3(1, 2, 3);
     }
     if (id == "red") SetColor(mesh, {1, 0, 0, 1});
-    return SourceModel(mesh);
+    SourceModel model{mesh};
+    if (id == "red") model.warnings = {"texture \"red.png\" not found"};
+    return model;
   }
 
  private:
@@ -195,6 +197,14 @@ TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
   for (const char* word : {"\"broken\"", "\"empty.obj\"", "\"flat-point\""}) {
     EXPECT_NE(list.find(word), std::string::npos) << word;
   }
+}
+
+TEST_F(BuildTest, WarningsOfReadingAreReported) {
+  const auto summary = Build(MixedSource(), root_ / "set", 2);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  ASSERT_EQ(summary->warnings.size(), 1u);
+  EXPECT_EQ(summary->warnings[0].file, "red.obj");
+  EXPECT_EQ(summary->warnings[0].text, "texture \"red.png\" not found");
 }
 
 TEST_F(BuildTest, RecolouredCopiesAreOnOneSideOfTheSplit) {

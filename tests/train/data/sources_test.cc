@@ -222,7 +222,7 @@ TEST_F(SourcesTest, NmrVoxelsMeetTheirImages) {
   WriteNmr(root_ / "car_train", 1, grid);
   const auto source = NmrSource(root_);
   ASSERT_TRUE(source.ok());
-  const auto data = std::get<ModelData>((*source)->Load(0).value());
+  const auto data = std::get<ModelData>((*source)->Load(0).value().data);
   const auto at = std::find(data.occupancy.begin(), data.occupancy.end(), 1);
   ASSERT_NE(at, data.occupancy.end());
   const int index = static_cast<int>(at - data.occupancy.begin());
