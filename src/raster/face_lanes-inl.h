@@ -90,6 +90,14 @@ HWY_INLINE void LoadVertices(const ScreenMesh& mesh, const std::int32_t* vertex,
   LoadQuads(FaceTag(), at, 0, out);
 }
 
+// Four pixels.
+using QuadIntTag = hn::RebindToSigned<QuadTag>;
+
+HWY_INLINE bool AllBackground(const std::int32_t* faces) {
+  const QuadIntTag di;
+  return hn::AllTrue(di, hn::Lt(hn::LoadU(di, faces), hn::Zero(di)));
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace tilegrad::raster
 HWY_AFTER_NAMESPACE();

@@ -47,7 +47,7 @@ HWY_INLINE int FirstOutput(int group) { return group == 0 ? 0 : 4 * group - 1; }
 HWY_INLINE int GroupOutputs(int group) { return group == 0 ? 3 : 4; }
 
 // One vector of slots of a group.
-HWY_INLINE void StoreQuads(const Plane (&p)[4], int group, std::size_t s, TileQuads* quads) {
+HWY_INLINE void StoreQuads(const Plane (&p)[4], int group, std::size_t s, PlaneQuads* quads) {
   const LaneTag d;
   const auto store = [&](Lane a, Lane b, Lane c, Lane e, int part) HWY_ATTR {
     hn::StoreInterleaved4(a, b, c, e, d, quads->quads(group, part) + 4 * s);
@@ -57,14 +57,14 @@ HWY_INLINE void StoreQuads(const Plane (&p)[4], int group, std::size_t s, TileQu
   store(p[0].dy, p[1].dy, p[2].dy, p[3].dy, 2);
 }
 
-HWY_INLINE void SetUpQuads(const InterpolateInput& input, const TileFaces& faces, int outputs,
-                           TileQuads* quads) {
+HWY_INLINE void SetUpQuads(const InterpolateInput& input, const SeenFaces& seen, int outputs,
+                           PlaneQuads* quads) {
   const LaneTag d;
   const auto lowest = hn::Set(d, -std::numeric_limits<float>::max());
-  for (std::size_t s = 0; s < static_cast<std::size_t>(faces.count); s += hn::Lanes(d)) {
-    const CornerPlanes corners =
-        MakeCornerPlanes(input, hn::Load(LaneIntTag(), faces.face + s),
-                         hn::Load(d, faces.origin_x + s), hn::Load(d, faces.origin_y + s));
+  for (std::size_t s = 0; s < seen.stride(); s += hn::Lanes(d)) {
+    const CornerPlanes corners = MakeCornerPlanes(
+        input, hn::Load(LaneIntTag(), seen.face.data() + s), hn::Load(d, seen.origin_x.data() + s),
+        hn::Load(d, seen.origin_y.data() + s));
     hn::StoreInterleaved4(lowest, lowest, lowest, LeastQ(corners), d, quads->least() + 4 * s);
     for (int g = 0; g < quads->groups(); ++g) {
       Plane planes[4];
@@ -87,23 +87,22 @@ struct QuadPixels {
   Quad x[kQuadPixels], y[kQuadPixels];
   hn::Mask<QuadTag> seen;
 
-  HWY_INLINE QuadPixels(const TileFaces& faces, const TileRect& rect, int i, int j) {
+  // `faces`: of the four; (px, py): the centre of the first.
+  HWY_INLINE QuadPixels(const SeenFaces& known, const std::int32_t* faces, float px, float py) {
     const QuadTag d;
-    const hn::RebindToSigned<QuadTag> di;
-    const std::int32_t* slots = faces.slot + i * kTileSize + j;
-    seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, slots), hn::Set(di, -1)));
-    const float px = static_cast<float>(rect.x0 + j) + 0.5f;
-    const auto py = hn::Set(d, static_cast<float>(rect.y0 + i) + 0.5f);
+    const QuadIntTag di;
+    seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, faces), hn::Set(di, -1)));
     for (int p = 0; p < kQuadPixels; ++p) {
-      const auto slot = static_cast<std::size_t>(HWY_MAX(slots[p], 0));
+      const auto slot =
+          static_cast<std::size_t>(known.slot_of_face[static_cast<std::size_t>(1 + faces[p])]);
       at[p] = 4 * slot;
-      x[p] = hn::Sub(hn::Set(d, px + static_cast<float>(p)), hn::Set(d, faces.origin_x[slot]));
-      y[p] = hn::Sub(py, hn::Set(d, faces.origin_y[slot]));
+      x[p] = hn::Sub(hn::Set(d, px + static_cast<float>(p)), hn::Set(d, known.origin_x[slot]));
+      y[p] = hn::Sub(hn::Set(d, py), hn::Set(d, known.origin_y[slot]));
     }
   }
 
   // The four planes of a group at the four pixels, as planes.
-  HWY_INLINE void Evaluate(TileQuads* quads, int group, Quad (&out)[4]) const {
+  HWY_INLINE void Evaluate(PlaneQuads* quads, int group, Quad (&out)[4]) const {
     const QuadTag d;
     const float *value = quads->quads(group, 0), *dx = quads->quads(group, 1);
     const float* dy = quads->quads(group, 2);
@@ -116,14 +115,13 @@ struct QuadPixels {
   }
 };
 
-// What the pixels of a tile are made of and where they go.
+// What pixels are made of and where they go.
 struct InterpolateJob {
   const InterpolateInput& input;
-  const TileFaces& faces;
-  const TileRect& rect;
+  const FaceRows& rows;
   const InterpolateOutput& out;
   int outputs;
-  TileQuads* quads;
+  InterpolateScratch* scratch;
 };
 
 // One row of the outputs of a group.
@@ -135,11 +133,12 @@ struct QuadRow {
   HWY_INLINE QuadRow(const InterpolateJob& job, int group, int i) {
     const int first = FirstOutput(group), channels = job.input.attributes.channels;
     outputs = HWY_MIN(GroupOutputs(group), job.outputs - first);
-    count = job.rect.x1 - job.rect.x0;
+    count = job.out.columns;
     for (int k = 0; k < outputs; ++k) {
       const int o = first + k;
       const auto& view = o < channels ? job.out.attributes : job.out.barycentrics;
-      to[k] = view.data + (o < channels ? o : o - channels) * view.plane + i * view.row;
+      to[k] = view.data + (o < channels ? o : o - channels) * view.plane +
+              (i - job.rows.row_begin) * view.row;
     }
   }
   HWY_INLINE void Store(int k, int j, Quad v) const {
@@ -154,21 +153,22 @@ struct QuadRow {
   }
 };
 
-// One row of a group. inverse_q [kTileSize] of the row is set by group 0, for the others.
+// One row of a group. inverse_q [kBinSize] of the row is set by group 0, for the others.
 template <bool kPerspective>
 HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, float* inverse_q) {
   const QuadTag d;
-  const hn::RebindToSigned<QuadTag> di;
   const QuadRow row(job, group, i);
+  const std::int32_t* const faces = job.rows.row(i);
+  const float py = static_cast<float>(i) + 0.5f;
   for (int j = 0; j < row.count; j += kQuadPixels) {
-    const auto slots = hn::Load(di, job.faces.slot + i * kTileSize + j);
-    if (hn::AllTrue(di, hn::Lt(slots, hn::Zero(di)))) {
+    if (AllBackground(faces + j)) {
       for (int k = 0; k < row.outputs; ++k) row.Store(k, j, hn::Zero(d));
       continue;
     }
-    const QuadPixels pixels(job.faces, job.rect, i, j);
+    const QuadPixels pixels(job.scratch->seen, faces + j,
+                            static_cast<float>(job.rows.x0 + j) + 0.5f, py);
     Quad values[4];
-    pixels.Evaluate(job.quads, group, values);
+    pixels.Evaluate(&job.scratch->quads, group, values);
     auto scale = hn::Set(d, 1.0f);
     if (kPerspective && group == 0) hn::Store(hn::Div(scale, values[3]), d, inverse_q + j);
     if (kPerspective) scale = hn::Load(d, inverse_q + j);
@@ -181,22 +181,36 @@ HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, floa
 
 template <bool kPerspective>
 HWY_INLINE void InterpolateRows(const InterpolateJob& job) {
-  for (int i = 0; i < job.rect.y1 - job.rect.y0; ++i) {
-    HWY_ALIGN float inverse_q[kTileSize];
-    for (int g = 0; g < job.quads->groups(); ++g) {
+  for (int i = job.rows.row_begin; i < job.rows.row_end; ++i) {
+    HWY_ALIGN float inverse_q[kBinSize];
+    for (int g = 0; g < job.scratch->quads.groups(); ++g) {
       InterpolateRow<kPerspective>(job, g, i, inverse_q);
     }
   }
 }
 
-void Interpolate(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                 TileQuads* quads, const InterpolateOutput& out) {
-  const InterpolateJob job{input, faces, rect, out, InterpolateOutputs(input), quads};
-  SetUpQuads(input, faces, job.outputs, quads);
+// Rows are [kBinSize] wide.
+void InterpolateFaces(const InterpolateInput& input, const FaceRows& rows,
+                      const InterpolateOutput& out, InterpolateScratch* scratch) {
+  const InterpolateJob job{input, rows, out, InterpolateOutputs(input), scratch};
+  SetUpQuads(input, scratch->seen, job.outputs, &scratch->quads);
   if (input.mode == Interpolation::kPerspective) {
     InterpolateRows<true>(job);
   } else {
     InterpolateRows<false>(job);
+  }
+}
+
+// Where nothing is seen.
+void ClearPixels(const InterpolateInput& input, const FaceRows& rows,
+                 const InterpolateOutput& out) {
+  const InterpolateJob job{input, rows, out, InterpolateOutputs(input), nullptr};
+  const auto bytes = static_cast<std::size_t>(out.columns) * sizeof(float);
+  for (int g = 0; g < 1 + job.outputs / 4; ++g) {
+    for (int i = rows.row_begin; i < rows.row_end; ++i) {
+      const QuadRow row(job, g, i);
+      for (int k = 0; k < row.outputs; ++k) std::memset(row.to[k], 0, bytes);
+    }
   }
 }
 

@@ -12,19 +12,29 @@
 namespace tilegrad::raster {
 namespace {
 
-HWY_EXPORT(Interpolate);
+HWY_EXPORT(InterpolateFaces);
+HWY_EXPORT(ClearPixels);
 
 }  // namespace
 
-void TileQuads::Resize(int outputs) {
+void PlaneQuads::Reserve(int outputs, std::size_t slots) {
   groups_ = 1 + outputs / 4;  // group 0 has three
-  data_.resize(4 * kTilePixels * static_cast<std::size_t>(3 * groups_ + 1));
+  slots_ = slots;
+  const std::size_t size = 4 * slots * static_cast<std::size_t>(3 * groups_ + 1);
+  if (data_.size() < size) data_.resize(size);
 }
 
-void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                     TileQuads* quads, const InterpolateOutput& out) {
-  quads->Resize(InterpolateOutputs(input));
-  HWY_DYNAMIC_DISPATCH(Interpolate)(input, faces, rect, quads, out);
+void Interpolate(const InterpolateInput& input, const FaceRows& rows, const InterpolateOutput& out,
+                 InterpolateScratch* scratch) {
+  const std::size_t faces = input.mesh->faces();
+  scratch->quads.Reserve(InterpolateOutputs(input), SeenFaces::MostSlots(faces, rows.pixels()));
+  NumberFaces(rows, faces, &scratch->seen);
+  if (scratch->seen.faces() == 0) {
+    HWY_DYNAMIC_DISPATCH(ClearPixels)(input, rows, out);
+    return;
+  }
+  HWY_DYNAMIC_DISPATCH(InterpolateFaces)(input, rows, out, scratch);
+  ForgetFaces(&scratch->seen);
 }
 
 }  // namespace tilegrad::raster

@@ -23,7 +23,7 @@
 
 #include "base/aligned.h"
 #include "raster/attributes.h"
-#include "raster/tile_faces.h"
+#include "raster/seen_faces.h"
 
 namespace tilegrad::raster {
 
@@ -39,22 +39,32 @@ inline int InterpolateOutputs(const InterpolateInput& input) {
   return input.attributes.channels + (input.barycentrics ? 2 : 0);
 }
 
-// The same planes for the forward pass: four outputs of a slot stand side by side, so that a pixel
-// loads what it needs of its face at once. Group 0 holds outputs 0 to 2 and Q, the groups behind it
-// four outputs each. Scratch of one worker.
-class TileQuads {
+// The planes of the faces seen, for the forward pass: four outputs of a slot stand side by side, so
+// that a pixel loads what it needs of its face at once. Group 0 holds outputs 0 to 2 and Q, the
+// groups behind it four outputs each. Scratch of one worker.
+class PlaneQuads {
  public:
-  void Resize(int outputs);
+  // For up to `slots` slots. Never shrinks.
+  void Reserve(int outputs, std::size_t slots);
 
   int groups() const { return groups_; }
   // [slot][4], of a group: 0 the values at the slot's origin, 1 d/dx, 2 d/dy.
-  float* quads(int group, int part) { return data_.data() + 4 * kTilePixels * (3 * group + part); }
+  float* quads(int group, int part) {
+    return data_.data() + 4 * slots_ * static_cast<std::size_t>(3 * group + part);
+  }
   // [slot][4]: what group 0 is kept at or above: only Q is.
-  float* least() { return data_.data() + 4 * kTilePixels * 3 * groups_; }
+  float* least() { return quads(groups_, 0); }
 
  private:
   int groups_ = 0;
+  std::size_t slots_ = 0;
   AlignedVector<float> data_;
+};
+
+// What Interpolate needs of a worker.
+struct InterpolateScratch {
+  SeenFaces seen;
+  PlaneQuads quads;
 };
 
 // A planar image, seen from the top left pixel of a part of it. T may be const.
@@ -64,13 +74,15 @@ struct PlanarView {
   std::ptrdiff_t plane, row;  // steps
 };
 
-// Where InterpolateTile writes: outputs [0, channels) to `attributes`, then the two barycentrics.
+// Where Interpolate writes: outputs [0, channels) to `attributes`, then the two barycentrics. From
+// the first pixel of the rows on, and only the first `columns` of each.
 struct InterpolateOutput {
   PlanarView<float> attributes, barycentrics;
+  int columns;
 };
 
-// Writes the pixels of `rect`; 0 at background pixels.
-void InterpolateTile(const InterpolateInput& input, const TileFaces& faces, const TileRect& rect,
-                     TileQuads* quads, const InterpolateOutput& out);
+// Writes pixels of `rows`, which are kBinSize wide; 0 at background pixels.
+void Interpolate(const InterpolateInput& input, const FaceRows& rows, const InterpolateOutput& out,
+                 InterpolateScratch* scratch);
 
 }  // namespace tilegrad::raster

@@ -22,61 +22,6 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using QuadIntTag = hn::RebindToSigned<QuadTag>;
-
-HWY_INLINE bool AllBackground(const std::int32_t* faces) {
-  const QuadIntTag di;
-  return hn::AllTrue(di, hn::Lt(hn::LoadU(di, faces), hn::Zero(di)));
-}
-
-// Gives the face of pixel (x, y) the next slot if it has none. No branch: that is hard to foretell.
-HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, BandSums* sums) {
-  std::int32_t* slot = sums->slot_of_face.data() + 1 + face;
-  const std::int32_t found = *slot, fresh = found >> 31;
-  const auto next = static_cast<std::int32_t>(sums->count);
-  *slot = (next & fresh) | (found & ~fresh);
-  sums->face[sums->count] = face;
-  sums->origin_x[sums->count] = x, sums->origin_y[sums->count] = y;
-  sums->count += static_cast<std::size_t>(-fresh);
-}
-
-// Bit p: pixel p sees a face that neither its left neighbour sees nor the one above it. `above`
-// null: the band's first row.
-HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32_t* above) {
-  const LaneIntTag di;
-  const auto here = hn::LoadU(di, faces);
-  auto known = hn::Or(hn::Lt(here, hn::Zero(di)), hn::Eq(here, hn::LoadU(di, faces - 1)));
-  if (above != nullptr) known = hn::Or(known, hn::Eq(here, hn::LoadU(di, above)));
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(di, hn::Not(known), bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
-
-HWY_INLINE void NumberRow(const BackwardBand& band, int i, BandSums* sums) {
-  const int lanes = static_cast<int>(hn::Lanes(LaneIntTag()));
-  const std::int32_t* row =
-      band.faces + static_cast<std::ptrdiff_t>(i - band.row_begin) * band.width;
-  const std::int32_t* above = i == band.row_begin ? nullptr : row - band.width;
-  const float y = static_cast<float>(i) + 0.5f;
-  const auto number = [&](int j)
-                          HWY_ATTR { NumberPixel(row[j], static_cast<float>(j) + 0.5f, y, sums); };
-  number(0);
-  int j = 1;
-  for (; j + lanes <= band.width; j += lanes) {
-    std::uint32_t bits = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
-    for (; bits != 0; bits &= bits - 1) {
-      number(j + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)));
-    }
-  }
-  for (; j < band.width; ++j) number(j);
-}
-
-// The arrays by slot have room for one slot more than there can be.
-void NumberFaces(const BackwardBand& band, BandSums* sums) {
-  sums->count = 1;
-  for (int i = band.row_begin; i < band.row_end; ++i) NumberRow(band, i, sums);
-}
-
 HWY_INLINE CornerPlanes LoadCornerPlanes(const InterpolateInput& input, const BandSums& sums,
                                          std::size_t s) {
   const LaneTag d;
@@ -210,8 +155,8 @@ HWY_INLINE void SumRow(const InterpolateInput& input, const BackwardBand& band, 
                        std::size_t group, BandSums* sums) {
   const QuadTag d;
   const std::size_t stride = sums->stride();
-  const std::ptrdiff_t row = i - band.row_begin;
-  const std::int32_t* const faces = band.faces + row * band.width;
+  const std::ptrdiff_t row = i - band.rows.row_begin;
+  const std::int32_t* const faces = band.rows.row(i);
   const int channels = GroupChannels(input, group);
   const float* const d_row = band.d_out.data +
                              3 * static_cast<std::ptrdiff_t>(group) * band.d_out.plane +
@@ -222,19 +167,19 @@ HWY_INLINE void SumRow(const InterpolateInput& input, const BackwardBand& band, 
     AddMoments<kPerspective>(*pixels, group, stride, sums);
   };
   int j = 0;
-  for (; j + kQuadPixels <= band.width; j += kQuadPixels) {
+  for (; j + kQuadPixels <= band.rows.width; j += kQuadPixels) {
     if (AllBackground(faces + j)) continue;
-    PixelQuad pixels{faces + j, {}, static_cast<float>(j) + 0.5f, y};
+    PixelQuad pixels{faces + j, {}, static_cast<float>(band.rows.x0 + j) + 0.5f, y};
     for (int c = 0; c < 4; ++c) {
       pixels.d_out[c] = c < channels ? hn::LoadU(d, d_row + c * band.d_out.plane + j) : hn::Zero(d);
     }
     add(&pixels);
   }
-  if (j == band.width) return;
+  if (j == band.rows.width) return;
   std::int32_t last[kQuadPixels] = {kNoFace, kNoFace, kNoFace, kNoFace};
-  const auto rest = static_cast<std::size_t>(band.width - j);
+  const auto rest = static_cast<std::size_t>(band.rows.width - j);
   std::memcpy(last, faces + j, rest * sizeof(last[0]));
-  PixelQuad pixels{last, {}, static_cast<float>(j) + 0.5f, y};
+  PixelQuad pixels{last, {}, static_cast<float>(band.rows.x0 + j) + 0.5f, y};
   for (int c = 0; c < 4; ++c) {
     HWY_ALIGN float values[kQuadPixels] = {};
     if (c < channels) {
@@ -250,7 +195,7 @@ void SumMoments(const InterpolateInput& input, const BackwardBand& band, BandSum
   const bool perspective = input.mode == Interpolation::kPerspective;
   std::memset(sums->moments.data(), 0, 12 * groups * sums->stride() * sizeof(float));
   if (perspective) SetUpBand(input, sums);
-  for (int i = band.row_begin; i < band.row_end; ++i) {
+  for (int i = band.rows.row_begin; i < band.rows.row_end; ++i) {
     for (std::size_t g = 0; g < groups; ++g) {
       if (perspective) {
         SumRow<true>(input, band, i, g, sums);

@@ -10,13 +10,13 @@
 
 #include "base/aligned.h"
 #include "raster/interpolate.h"
+#include "raster/seen_faces.h"
 
 namespace tilegrad::raster {
 
-// Rows [row_begin, row_end) of an image of `width` pixels.
+// Rows of an image, all their pixels.
 struct BackwardBand {
-  int width, row_begin, row_end;
-  const std::int32_t* faces;      // [rows][width] faces of the mesh, kNoFace at background pixels
+  FaceRows rows;
   PlanarView<const float> d_out;  // dL/d(attributes), from the band's first pixel on
 };
 
@@ -25,22 +25,11 @@ inline std::size_t ChannelGroups(int channels) {
   return static_cast<std::size_t>(channels + 2) / 3;
 }
 
-// What is summed over a band. Scratch of one worker, which grows to the largest band and mesh.
-// Slots number the faces in order of first appearance; slot 0 takes what belongs to no face.
-struct BandSums {
-  AlignedVector<std::int32_t> slot_of_face;  // [1 + F], -1 between bands; [0] is kNoFace, slot 0
-  std::size_t count = 0;                     // slots in use, slot 0 among them
-  AlignedVector<std::int32_t> face;          // [slot]
-  // [slot] the centre of the first pixel seen: positions relative to it keep the digits of tiny
-  // faces.
-  AlignedVector<float> origin_x, origin_y;
+// What is summed over a band. Slot 0 takes what belongs to no face.
+struct BandSums : SeenFaces {
   AlignedVector<float> least_q;  // [slot], and
   AlignedVector<float> planes;   // [group][value, d/dx, d/dy][slot][4] N and Q: if perspective
   AlignedVector<float> moments;  // [group][1, x, y][slot][4]
-
-  std::size_t faces() const { return count - 1; }
-  // Slots of the arrays above and of what FinishBand writes, for whole vectors.
-  std::size_t stride() const { return (count + kTileSize - 1) / kTileSize * kTileSize; }
 };
 
 // Which gradients are wanted.

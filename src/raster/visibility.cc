@@ -58,29 +58,12 @@ void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const Ti
   std::fill(out->face, out->face + pixels, kNoFace);
   std::fill(out->inverse_depth, out->inverse_depth + pixels, 0.0f);
   if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, out);
-}
-
-bool CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out) {
-  constexpr int kInBin = kBinSize - 1;
-  const int columns = tile.x1 - tile.x0, rows = tile.y1 - tile.y0;
-  const int corner = (tile.y0 & kInBin) * kBinSize + (tile.x0 & kInBin);
-  std::int32_t all = kNoFace;  // its bits are all set
-  for (int i = 0; i < rows; ++i) {
-    const std::int32_t* row = bin.face + corner + i * kBinSize;
-    for (int j = 0; j < columns; ++j) all &= row[j];
+  // Vectors reach beyond the image where the bin is narrower; what they saw there is nothing.
+  for (int i = 0; i < rect.y1 - rect.y0 && rect.x1 - rect.x0 < kBinSize; ++i) {
+    const int from = i * kBinSize + rect.x1 - rect.x0, to = (i + 1) * kBinSize;
+    std::fill(out->face + from, out->face + to, kNoFace);
+    std::fill(out->inverse_depth + from, out->inverse_depth + to, 0.0f);
   }
-  if (all == kNoFace) return false;
-  if (columns < kTileSize || rows < kTileSize) {
-    std::fill(out->face, out->face + kTilePixels, kNoFace);
-    std::fill(out->inverse_depth, out->inverse_depth + kTilePixels, 0.0f);
-  }
-  for (int i = 0; i < rows; ++i) {
-    const int from = corner + i * kBinSize, to = i * kTileSize;
-    std::copy(bin.face + from, bin.face + from + columns, out->face + to);
-    std::copy(bin.inverse_depth + from, bin.inverse_depth + from + columns,
-              out->inverse_depth + to);
-  }
-  return true;
 }
 
 }  // namespace tilegrad::raster

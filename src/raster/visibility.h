@@ -8,22 +8,15 @@
 #include "raster/bin.h"
 #include "raster/drawn_faces.h"
 #include "raster/screen_mesh.h"
-#include "raster/tile_faces.h"
 
 namespace tilegrad::raster {
 
-// Pixel arrays of one tile.
-struct VisibilityTile {
-  // Index into the ScreenMesh, kNoFace: background. One row more, of anything: vectors may reach
-  // beyond the end.
-  alignas(128) std::int32_t face[kTilePixels + kTileSize];
-  alignas(128) float inverse_depth[kTilePixels];  // 1/depth; 0 at background
-};
-
-// Pixel arrays of one bin, rows of kBinSize. Beyond the image they hold anything.
+// Pixel arrays of one bin, rows of kBinSize; columns beyond the image are background, rows beyond
+// hold anything.
 struct VisibilityBin {
+  // Index into the ScreenMesh, kNoFace: background.
   alignas(128) std::int32_t face[kBinSize * kBinSize];
-  alignas(128) float inverse_depth[kBinSize * kBinSize];
+  alignas(128) float inverse_depth[kBinSize * kBinSize];  // 1/depth; 0 at background
 };
 
 // The drawn faces of a mesh that may cover a bin.
@@ -36,9 +29,5 @@ struct BinDrawList {
 // as VisibilityRef<float> everywhere.
 void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
                        VisibilityBin* out);
-
-// A tile of the bin; background beyond the image. Returns false where nothing is seen; then `out`
-// holds anything.
-bool CopyTile(const VisibilityBin& bin, const TileRect& tile, VisibilityTile* out);
 
 }  // namespace tilegrad::raster

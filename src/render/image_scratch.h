@@ -16,7 +16,6 @@
 #include "raster/project.h"
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask.h"
-#include "raster/tile_faces.h"
 #include "raster/visibility.h"
 #include "render/renderer.h"
 
@@ -73,9 +72,7 @@ struct BinGradients {
 
 struct WorkerScratch {
   raster::VisibilityBin bin;
-  raster::VisibilityTile visibility;
-  raster::TileFaces faces;
-  raster::TileQuads quads;
+  raster::InterpolateScratch interpolate;
   raster::SoftMaskScratch soft;
   raster::BandSums band;
 };

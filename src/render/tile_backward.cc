@@ -77,10 +77,7 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
   const raster::InterpolateInput interpolate{&image.mesh, image.attributes,
                                              input.options.interpolation, false};
   raster::SumBand(interpolate,
-                  {bands.width,
-                   place.row_begin,
-                   place.row_end,
-                   ids.data(),
+                  {{ids.data(), bands.width, 0, place.row_begin, place.row_end},
                    {place.Of(input.d_frame.attributes, channels, 0).data(),
                     static_cast<std::ptrdiff_t>(place.plane), bands.width}},
                   sums);

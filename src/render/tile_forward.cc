@@ -11,34 +11,25 @@
 namespace tilegrad {
 namespace {
 
-// Calls visit(index in the tile's arrays, index in an image) for each pixel of the tile.
+// Calls visit(index in the bin's arrays, index in an image) for each pixel of the bin.
 template <class Visit>
 void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
   for (int i = rect.y0; i < rect.y1; ++i) {
     for (int j = rect.x0; j < rect.x1; ++j) {
-      visit(static_cast<std::size_t>((i - rect.y0) * raster::kTileSize + j - rect.x0),
+      visit(static_cast<std::size_t>((i - rect.y0) * raster::kBinSize + j - rect.x0),
             static_cast<std::size_t>(i) * static_cast<std::size_t>(width) +
                 static_cast<std::size_t>(j));
     }
   }
 }
 
-// Calls visit(first index in the tile's arrays, first index in an image) for each row of the tile.
-template <class Visit>
-void ForEachRow(const raster::TileRect& rect, int width, const Visit& visit) {
-  for (int i = rect.y0; i < rect.y1; ++i) {
-    visit((i - rect.y0) * raster::kTileSize,
-          static_cast<std::ptrdiff_t>(i) * width + static_cast<std::ptrdiff_t>(rect.x0));
-  }
-}
-
 void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
                   const std::int32_t* faces, std::int32_t* ids) {
   if (!mesh.was_clipped()) {
-    const std::ptrdiff_t columns = rect.x1 - rect.x0;
-    ForEachRow(rect, mesh.width, [&](int from, std::ptrdiff_t to) {
-      std::copy(faces + from, faces + from + columns, ids + to);
-    });
+    for (int i = rect.y0; i < rect.y1; ++i, faces += raster::kBinSize) {
+      std::copy(faces, faces + rect.x1 - rect.x0,
+                ids + static_cast<std::ptrdiff_t>(i) * mesh.width + rect.x0);
+    }
     return;
   }
   ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
@@ -86,63 +77,35 @@ void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
   raster::InterpolateInput input{&image.mesh, image.attributes, options.interpolation,
                                  barycentrics != nullptr};
   if (attributes == nullptr) input.attributes.channels = 0;
-  raster::FindTileFaces(worker->visibility.face, task.rect, &worker->faces);
-  raster::InterpolateTile(
-      input, worker->faces, task.rect, &worker->quads,
-      {{attributes == nullptr ? nullptr : attributes + corner, plane, row},
-       {barycentrics == nullptr ? nullptr : barycentrics + corner, plane, row}});
+  const raster::TileRect& rect = task.rect;
+  raster::Interpolate(input, {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
+                      {{attributes == nullptr ? nullptr : attributes + corner, plane, row},
+                       {barycentrics == nullptr ? nullptr : barycentrics + corner, plane, row},
+                       rect.x1 - rect.x0},
+                      &worker->interpolate);
   if (barycentrics != nullptr && image.mesh.was_clipped()) {
-    MixCutWeights(scene, image.mesh, task.rect, worker->visibility.face, barycentrics,
+    MixCutWeights(scene, image.mesh, rect, worker->bin.face, barycentrics,
                   barycentrics + part.pixels);
   }
 }
 
-// A tile in which nothing is seen.
-void ClearTile(const TileTask& task, const ImageOfFrame& part, Frame* frame) {
-  const std::ptrdiff_t columns = task.rect.x1 - task.rect.x0;
-  const auto clear = [&](auto* image, std::size_t planes, auto value) {
-    for (std::size_t p = 0; image != nullptr && p < planes; ++p, image += part.pixels) {
-      ForEachRow(task.rect, frame->width, [&](int, std::ptrdiff_t to) {
-        std::fill(image + to, image + to + columns, value);
-      });
+// Alpha of the tiles of a bin. Returns the error spent.
+double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const TileTask& task,
+                 const ImageOfFrame& part, WorkerScratch* worker, Frame* frame) {
+  const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
+  const std::span<float> alpha(part.plane(frame->alpha, 1), part.pixels);
+  const raster::TileGrid tiles(options.width, options.height);
+  double spent = 0;
+  for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
+    for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
+      const std::size_t tile = tiles.tile(x, y);
+      const TileTask of_tile{task.image, tile, tiles.rect(tile)};
+      spent = std::max(
+          spent, raster::SoftMaskForward(image.mesh, image.soft_plan,
+                                         SoftTileOf(image, of_tile, ids), alpha, &worker->soft));
     }
-  };
-  clear(part.plane(frame->face_ids, 1), 1, raster::kNoFace);
-  clear(part.plane(frame->depth, 1), 1, std::numeric_limits<float>::infinity());
-  clear(part.plane(frame->attributes, part.channels), part.channels, 0.0f);
-  clear(part.plane(frame->barycentrics, 2), 2, 0.0f);
-}
-
-void WriteSeen(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-               const TileTask& task, const ImageOfFrame& part, WorkerScratch* worker,
-               Frame* frame) {
-  const raster::VisibilityTile& seen = worker->visibility;
-  WriteFaceIds(image.mesh, task.rect, seen.face, part.plane(frame->face_ids, 1));
-  if (float* depth = part.plane(frame->depth, 1)) {
-    WriteDepth(task.rect, options.width, seen.inverse_depth, depth);
   }
-  if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
-    InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
-  }
-}
-
-// A tile of a bin that is drawn.
-double RenderTile(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                  const TileTask& task, WorkerScratch* worker, Frame* frame) {
-  const ImageOfFrame part{
-      static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
-      static_cast<std::size_t>(frame->channels), task.image};
-  if (raster::CopyTile(worker->bin, task.rect, &worker->visibility)) {
-    WriteSeen(scene, options, image, task, part, worker, frame);
-  } else {
-    ClearTile(task, part, frame);
-  }
-  float* alpha = part.plane(frame->alpha, 1);
-  if (alpha == nullptr) return 0;
-  return raster::SoftMaskForward(
-      image.mesh, image.soft_plan,
-      SoftTileOf(image, task, {part.plane(frame->face_ids, 1), part.pixels}), {alpha, part.pixels},
-      &worker->soft);
+  return spent;
 }
 
 }  // namespace
@@ -151,16 +114,17 @@ double RenderBin(const SceneView& scene, const RenderOptions& options, const Ima
                  const TileTask& task, WorkerScratch* worker, Frame* frame) {
   raster::ComputeVisibility(image.mesh, {image.drawn_faces.faces(), image.drawn[task.tile]},
                             task.rect, &worker->bin);
-  const raster::TileGrid tiles(options.width, options.height);
-  double spent = 0;
-  for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
-    for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
-      const std::size_t tile = tiles.tile(x, y);
-      spent = std::max(spent, RenderTile(scene, options, image,
-                                         {task.image, tile, tiles.rect(tile)}, worker, frame));
-    }
+  const ImageOfFrame part{
+      static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
+      static_cast<std::size_t>(frame->channels), task.image};
+  WriteFaceIds(image.mesh, task.rect, worker->bin.face, part.plane(frame->face_ids, 1));
+  if (float* depth = part.plane(frame->depth, 1)) {
+    WriteDepth(task.rect, options.width, worker->bin.inverse_depth, depth);
   }
-  return spent;
+  if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
+    InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
+  }
+  return frame->alpha.empty() ? 0 : SoftAlpha(options, image, task, part, worker, frame);
 }
 
 }  // namespace tilegrad

@@ -60,26 +60,21 @@ DrawnFaces DrawnFacesOf(const ScreenMesh& mesh) {
   return out;
 }
 
-// Faces of a whole image, by bins and tiles.
+// Faces of a whole image, by bins.
 std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
-  const TileGrid bins = BinGrid(mesh.width, mesh.height), tiles(mesh.width, mesh.height);
+  const TileGrid bins = BinGrid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
   const TileLists lists = BinDrawnFaces(drawn.faces(), bins, &buffers);
   std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
   VisibilityBin bin;
   for (std::size_t b = 0; b < bins.tiles(); ++b) {
-    ComputeVisibility(mesh, {drawn.faces(), lists[b]}, bins.rect(b), &bin);
-    for (std::size_t t = 0; t < tiles.tiles(); ++t) {
-      const TileRect rect = tiles.rect(t);
-      if (bins.tile(rect.x0, rect.y0) != b) continue;
-      VisibilityTile tile;
-      if (!CopyTile(bin, rect, &tile)) std::fill_n(tile.face, kTilePixels, kNoFace);
-      for (int i = rect.y0; i < rect.y1; ++i) {
-        for (int j = rect.x0; j < rect.x1; ++j) {
-          out[static_cast<std::size_t>(i) * mesh.width + j] =
-              tile.face[(i - rect.y0) * kTileSize + j - rect.x0];
-        }
+    const TileRect rect = bins.rect(b);
+    ComputeVisibility(mesh, {drawn.faces(), lists[b]}, rect, &bin);
+    for (int i = rect.y0; i < rect.y1; ++i) {
+      for (int j = rect.x0; j < rect.x1; ++j) {
+        out[static_cast<std::size_t>(i) * mesh.width + j] =
+            bin.face[(i - rect.y0) * kBinSize + j - rect.x0];
       }
     }
   }

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of seen_faces.h: lanes are the pixels of a row.
+#if defined(TILEGRAD_RASTER_SEEN_FACES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SEEN_FACES_INL_H_
+#undef TILEGRAD_RASTER_SEEN_FACES_INL_H_
+#else
+#define TILEGRAD_RASTER_SEEN_FACES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "raster/face_lanes-inl.h"
+#include "raster/seen_faces.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Gives the face of pixel (x, y) the next slot if it has none. No branch: that is hard to foretell.
+HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen) {
+  std::int32_t* slot = seen->slot_of_face.data() + 1 + face;
+  const std::int32_t found = *slot, fresh = found >> 31;
+  const auto next = static_cast<std::int32_t>(seen->count);
+  *slot = (next & fresh) | (found & ~fresh);
+  seen->face[seen->count] = face;
+  seen->origin_x[seen->count] = x, seen->origin_y[seen->count] = y;
+  seen->count += static_cast<std::size_t>(-fresh);
+}
+
+// Bit p: pixel p sees a face that neither its left neighbour sees nor the one above it. `above`
+// null: the band's first row.
+HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32_t* above) {
+  const FaceIntTag di;
+  const auto here = hn::LoadU(di, faces);
+  auto known = hn::Or(hn::Lt(here, hn::Zero(di)), hn::Eq(here, hn::LoadU(di, faces - 1)));
+  if (above != nullptr) known = hn::Or(known, hn::Eq(here, hn::LoadU(di, above)));
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(di, hn::Not(known), bytes);
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
+  const int lanes = static_cast<int>(hn::Lanes(FaceIntTag()));
+  const std::int32_t* row = rows.row(i);
+  const std::int32_t* above = i == rows.row_begin ? nullptr : rows.row(i - 1);
+  const float y = static_cast<float>(i) + 0.5f;
+  const auto number = [&](int j) HWY_ATTR {
+    NumberPixel(row[j], static_cast<float>(rows.x0 + j) + 0.5f, y, seen);
+  };
+  number(0);
+  int j = 1;
+  for (; j + lanes <= rows.width; j += lanes) {
+    std::uint32_t bits = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
+    for (; bits != 0; bits &= bits - 1) {
+      number(j + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)));
+    }
+  }
+  for (; j < rows.width; ++j) number(j);
+}
+
+// The arrays by slot have room for one slot more than there can be.
+void NumberAllRows(const FaceRows& rows, SeenFaces* seen) {
+  seen->count = 1;
+  for (int i = rows.row_begin; i < rows.row_end; ++i) NumberRow(rows, i, seen);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::raster
+HWY_AFTER_NAMESPACE();
+
+#endif

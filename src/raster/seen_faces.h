@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// The faces seen in a part of an image, numbered: what is per face is then set up once, and
+// gradients are summed per face before they leave the part.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/aligned.h"
+#include "raster/conventions.h"
+
+namespace tilegrad::raster {
+
+// Pixels [x0, x0 + width) of rows [row_begin, row_end) of an image.
+struct FaceRows {
+  const std::int32_t* faces;  // [rows][width] faces of the mesh, kNoFace at background pixels
+  int width, x0;
+  int row_begin, row_end;
+
+  const std::int32_t* row(int i) const {
+    return faces + static_cast<std::ptrdiff_t>(i - row_begin) * width;
+  }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(row_end - row_begin);
+  }
+};
+
+// Slots number the faces in order of first appearance; slot 0 is that of background pixels. Scratch
+// of one worker, which grows to the largest part and mesh.
+struct SeenFaces {
+  AlignedVector<std::int32_t> slot_of_face;  // [1 + F], -1 where not seen; [0] is kNoFace, slot 0
+  std::size_t count = 0;                     // slots in use, slot 0 among them
+  AlignedVector<std::int32_t> face;          // [slot]
+  // [slot] the centre of the first pixel seen: positions relative to it keep the digits of tiny
+  // faces.
+  AlignedVector<float> origin_x, origin_y;
+
+  std::size_t faces() const { return count - 1; }
+  // Slots of arrays for whole vectors: those beyond `count`, and slot 0, are copies of slot 1.
+  std::size_t stride() const { return (count + kTileSize - 1) / kTileSize * kTileSize; }
+  // Slots that `pixels` of a mesh can need.
+  static std::size_t MostSlots(std::size_t mesh_faces, std::size_t pixels) {
+    return std::min(mesh_faces, pixels) + 2 + kTileSize;
+  }
+};
+
+// Grows the arrays to what the part can need, not what it does: which part comes to which worker is
+// not determined, and nothing shall be allocated once every size has been seen.
+void ReserveSeenFaces(std::size_t mesh_faces, std::size_t pixels, SeenFaces* out);
+
+// Reserves and numbers. `out` knows no face, as at first or after ForgetFaces.
+void NumberFaces(const FaceRows& rows, std::size_t mesh_faces, SeenFaces* out);
+void ForgetFaces(SeenFaces* faces);
+
+}  // namespace tilegrad::raster
