@@ -44,6 +44,13 @@ Status CheckCameraNumbers(const Camera& camera) {
   return CheckFinite("camera.{fx, fy, cx, cy, near_plane}", numbers);
 }
 
+Status CheckCameraGradient(const Camera& d_camera) {
+  TILEGRAD_TRY(CheckFinite("d_scene.d_camera.rotation", d_camera.rotation));
+  TILEGRAD_TRY(CheckFinite("d_scene.d_camera.translation", d_camera.translation));
+  const float numbers[4] = {d_camera.fx, d_camera.fy, d_camera.cx, d_camera.cy};
+  return CheckFinite("d_scene.d_camera.{fx, fy, cx, cy}", numbers);
+}
+
 Status CheckCamera(const Camera& camera) {
   TILEGRAD_TRY(CheckCameraNumbers(camera));
   if (!(camera.near_plane > 0)) {
@@ -196,7 +203,7 @@ Status ValidateResult(std::span<const SceneGradients> d_scenes) {
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
     Status status = CheckFinite("d_scene.positions", d_scenes[n].positions);
     if (status.ok()) status = CheckFinite("d_scene.attributes", d_scenes[n].attributes);
-    if (status.ok() && d_scenes[n].camera) status = CheckCameraNumbers(d_scenes[n].d_camera);
+    if (status.ok() && d_scenes[n].camera) status = CheckCameraGradient(d_scenes[n].d_camera);
     if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
   }
   return {};

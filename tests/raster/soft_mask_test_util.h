@@ -98,6 +98,7 @@ class SoftTruth {
     const double unit = 1 / std::sqrt(o.delta);
     radius_ = 3.5 * std::hypot(scale_.x * unit, scale_.y * unit);
     largest_unit_ = std::max(scale_.x, scale_.y) * unit;
+    for (std::size_t f = 0; f < faces_.size(); ++f) cancelled_.push_back(CancelledIn(f));
   }
   double X(std::size_t i) const {
     return static_cast<double>(i % static_cast<std::size_t>(scene_.options.width)) + 0.5;
@@ -111,16 +112,17 @@ class SoftTruth {
   double Z(std::size_t i, std::size_t face) const {
     return NearestOnFace(mesh_, face, X(i), Y(i), scale_).squared_distance * scale_.inverse_delta;
   }
-  // Error of a computed z ("Rounding": Delta z).
-  double ErrorOfZ(double z) const {
-    const double cross = 6 * kU * radius_;
-    return kU * (8 * z + 17 * radius_ * std::sqrt(z)) + 2 * cross * cross;
+  // Error of a computed z of `face` ("Rounding": Delta z).
+  double ErrorOfZ(double z, std::size_t face) const {
+    const double cross = 6 * kU * radius_, cancelled = cancelled_[face];
+    return kU * (8 * z + 17 * radius_ * std::sqrt(z)) + 2 * cross * cross +
+           2 * std::sqrt(z) * cancelled + cancelled * cancelled;
   }
   // Error of a computed A.
-  double ErrorOfA(double z) const {
-    const double error = ErrorOfZ(z);
+  double ErrorOfA(double z, std::size_t face) const {
+    const double error = ErrorOfZ(z, face);
     const bool both_end = z - error > 87;  // and so the computed one is 0
-    return both_end ? std::exp(-z) : std::exp(-z) * std::expm1(error + 3 * kU);
+    return both_end ? std::exp(-z) : std::min(1.0, std::exp(-z) * std::expm1(error + 3 * kU));
   }
   // Rounding of alpha at pixel i: the running bound of docs/numerics.md.
   double Rounding(std::size_t i) const {
@@ -128,20 +130,32 @@ class SoftTruth {
     const auto others = ProductsOfOthers(zs);
     double sum = 20 * kU * Alpha(i);
     for (std::size_t f = 0; f < zs.size(); ++f) {
-      sum += others[f] * ErrorOfA(zs[f]);
+      sum += others[f] * ErrorOfA(zs[f], f);
     }
     return sum + 1e-16 * static_cast<double>(zs.size());
   }
-  // Two features of a face are equally near within rounding and move differently with its corners:
+  // Whether coordinates are small enough for double to tell how far the pixel is from each face
+  // that may matter. Far beyond 1e8 pixels neither this truth nor a kernel knows.
+  bool Resolved(std::size_t i) const {
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+      const double z = Z(i, f), c = cancelled_[f], lost = 2 * std::sqrt(z) * c + c * c;
+      if (z - ErrorOfZ(z, f) <= 87 && !(lost <= 1e-6)) return false;
+    }
+    return true;
+  }
+  // Two features of a face are equally near within rounding and move differently with its corners
+  // (of which those at one place count as one, or if `by_vertex` only those that are one vertex):
   // its gradient is not defined.
-  bool Ambiguous(std::size_t i) const {
+  bool Ambiguous(std::size_t i, bool by_vertex = false) const {
     for (std::size_t f = 0; f < faces_.size(); ++f) {
       const auto best = NearestOnFace(mesh_, f, X(i), Y(i), scale_);
+      const double z = best.squared_distance * scale_.inverse_delta, error = ErrorOfZ(z, f);
+      if (z - error > 100) continue;  // no gradient either way
       for (int k = 0; k < 3; ++k) {
         const auto other = NearestOnEdge(mesh_, f, k, X(i), Y(i), scale_);
         const double gap = (other.squared_distance - best.squared_distance) * scale_.inverse_delta;
-        if (gap > 4 * ErrorOfZ(best.squared_distance * scale_.inverse_delta)) continue;
-        const auto a = WeightsOf(f, best), b = WeightsOf(f, other);
+        if (gap > 4 * error) continue;
+        const auto a = WeightsOf(f, best, by_vertex), b = WeightsOf(f, other, by_vertex);
         for (std::size_t c = 0; c < 3; ++c) {
           if (std::abs(a[c] - b[c]) > 1e-9) return true;
         }
@@ -174,17 +188,29 @@ class SoftTruth {
     return zs;
   }
   // How the nearest point moves with the corners; coinciding corners share their weight.
-  std::array<double, 3> WeightsOf(std::size_t f, const NearestFeature<double>& at) const {
+  std::array<double, 3> WeightsOf(std::size_t f, const NearestFeature<double>& at,
+                                  bool by_vertex) const {
     const double weight[2] = {1 - at.tau, at.tau};
     std::array<double, 3> out{};
     for (int k = 0; k < 3; ++k) {
       const auto v = static_cast<std::size_t>(mesh_.vertex(f, k));
       for (int end = 0; end < 2; ++end) {
         const auto w = static_cast<std::size_t>(mesh_.vertex(f, (at.edge + end) % 3));
-        if (x_[v] == x_[w] && y_[v] == y_[w]) out[static_cast<std::size_t>(k)] += weight[end];
+        const bool same = by_vertex ? v == w : x_[v] == x_[w] && y_[v] == y_[w];
+        if (same) out[static_cast<std::size_t>(k)] += weight[end];
       }
     }
     return out;
+  }
+  // Kernel units: what the differences of a face's coordinates, taken in double, lose of the
+  // distance to a pixel.
+  double CancelledIn(std::size_t f) const {
+    double reach = std::max(scene_.options.width, scene_.options.height);
+    for (int k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(mesh_.vertex(f, k));
+      reach = std::max({reach, std::abs(x_[v]), std::abs(y_[v])});
+    }
+    return 0x1p-50 * reach * largest_unit_;
   }
   static std::vector<double> ProductsOfOthers(const std::vector<double>& zs) {
     std::vector<double> out(zs.size(), 1.0);
@@ -211,13 +237,14 @@ class SoftTruth {
     const auto others = ProductsOfOthers(zs);
     const double dropped = scene_.options.max_alpha_error + 1e-30;
     double d_product = dropped;
-    for (const double z : zs) d_product += 4 * kU + ErrorOfA(z);
+    for (std::size_t f = 0; f < zs.size(); ++f) d_product += 4 * kU + ErrorOfA(zs[f], f);
     for (std::size_t f = 0; f < zs.size(); ++f) {
       const double d = std::sqrt(zs[f]), a = std::exp(-zs[f]);
-      const double d_r = kU * (5 * d + 9 * radius_);
-      const double d_weight = std::min(1.0, kU * (8 * d + 12 * radius_) / ShortestEdge(f) + 4 * kU);
+      const double d_r = kU * (5 * d + 9 * radius_) + cancelled_[f];
+      const double d_weight =
+          std::min(1.0, (kU * (8 * d + 12 * radius_) + cancelled_[f]) / ShortestEdge(f) + 4 * kU);
       const double error =
-          others[f] * (d * ErrorOfA(zs[f]) + a * (80 * kU * d + d_r + d * d_weight)) +
+          others[f] * (d * ErrorOfA(zs[f], f) + a * (80 * kU * d + d_r + d * d_weight)) +
           a * (d + d_r) * d_product + dropped * (1 + d);
       for (std::size_t k = 0; k < 6; ++k) {
         (*tolerance)[6 * f + k] += 2 * largest_unit_ * d_alpha * error;
@@ -226,7 +253,7 @@ class SoftTruth {
   }
 
   const SoftScene& scene_;
-  std::vector<double> x_, y_;
+  std::vector<double> x_, y_, cancelled_;
   ScreenMeshT<double> mesh_;
   std::vector<std::int32_t> faces_;
   SoftScale<double> scale_{};

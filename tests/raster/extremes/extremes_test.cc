@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// The renderer at the edge of what floats can hold: images and gradients are finite and within the
+// derived tolerance of the references, or there is a clear error. A scene that fails is named by
+// its number; TILEGRAD_SCENE=<number> runs that one alone.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/simd_target.h"
+#include "raster/extremes/truth.h"
+
+namespace tilegrad::test {
+namespace {
+
+struct SceneRange {
+  std::uint64_t first, count;
+  std::size_t most_faces;
+};
+
+CheckCounts CheckScenes(const SceneRange& range) {
+  const Workers workers, one(1);
+  const auto count = static_cast<std::size_t>(workers.count());
+  std::vector<std::unique_ptr<Renderer>> renderers;
+  for (std::size_t w = 0; w < count; ++w) renderers.push_back(std::make_unique<Renderer>(one));
+  std::vector<CheckCounts> counts(count);
+  std::vector<std::string> failures(range.count);
+  workers.For(range.count, [&](std::size_t n, std::size_t w) {
+    const std::uint64_t number = range.first + n;
+    const ExtremeScene scene = MakeExtremeScene(number, range.most_faces);
+    const std::string wrong = CheckExtremeScene(scene, number, renderers[w].get(), &counts[w]);
+    if (!wrong.empty()) {
+      failures[n] = std::string(scene.kind) + ", scene " + std::to_string(number) + ": " + wrong;
+    }
+  });
+  std::size_t failed = 0;
+  for (const std::string& failure : failures) {
+    if (!failure.empty() && ++failed <= 20) ADD_FAILURE() << ActiveTarget() << ": " << failure;
+  }
+  EXPECT_EQ(failed, 0u) << "of " << range.count << " scenes";
+  for (std::size_t w = 1; w < count; ++w) counts[0].Add(counts[w]);
+  return counts[0];
+}
+
+void Report(const SceneRange& range, const CheckCounts& c) {
+  std::printf(
+      "extremes: %zu scenes on %s: %zu numbers compared (%zu sharply), %zu only finite; gradients "
+      "of %zu compared, of %zu too large for float; worst error / tolerance %.3g\n",
+      static_cast<std::size_t>(range.count), ActiveTarget().c_str(), c.compared, c.sharp,
+      c.left_out, c.gradients, c.overflows, c.worst);
+  // The comparison means something: most numbers, sharply.
+  EXPECT_GT(c.compared, 10 * c.left_out);
+  EXPECT_GT(c.sharp, c.compared / 2);
+  EXPECT_GT(c.gradients, range.count / 2);
+}
+
+void CheckOnTargets(std::uint64_t first, std::uint64_t count, std::size_t most_faces) {
+  for (const std::string& target : RunnableTargets()) {
+    ASSERT_TRUE(ForceTarget(target).ok());
+    const SceneRange range{first, count, most_faces};
+    Report(range, CheckScenes(range));
+    first += count;
+  }
+  ASSERT_TRUE(ForceTarget("").ok());
+}
+
+TEST(Extremes, ScenesOnEveryTarget) { CheckOnTargets(0, 700, 2000); }
+
+TEST(ExtremesLong, HundredThousandScenes) { CheckOnTargets(1000000, 35000, 50000); }
+
+void CheckHeap(std::size_t faces) {
+  const Workers one(1);
+  Renderer renderer(one);
+  CheckCounts counts;
+  EXPECT_EQ(CheckExtremeScene(MakeHeap(1, faces), 1, &renderer, &counts), "");
+  EXPECT_GT(counts.compared, 0u);
+}
+
+TEST(Extremes, FiftyThousandFacesOnOnePixel) { CheckHeap(50000); }
+TEST(ExtremesLong, AMillionFacesOnOnePixel) { CheckHeap(1000000); }
+
+// Every float that goes in, at its first and last place, is named if it is not finite.
+class NonFinite : public testing::TestWithParam<float> {
+ protected:
+  NonFinite() {
+    Rng rng(3);
+    e_.scene = TriangleSoup(5, 0.5, 8, 8, &rng);
+    e_.options = RenderOptions();
+    e_.options.width = e_.options.height = 8;
+    d_attributes_.resize(3 * 64), d_alpha_.resize(64);
+  }
+  std::string Run() {
+    const Workers one(1);
+    Renderer renderer(one);
+    Frame frame;
+    const SceneView views[] = {e_.scene.View()};
+    Status status = renderer.Render(views, e_.options, {}, &frame);
+    if (!status.ok()) return status.message();
+    std::vector<float> d_positions(e_.scene.positions.size());
+    SceneGradients d[] = {{d_positions, {}, true, {}}};
+    return renderer.Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, d).message();
+  }
+  // Spoils one number after the other.
+  void ExpectNamed(const std::string& array, std::span<float> values) {
+    for (const std::size_t i : {std::size_t{0}, values.size() / 2, values.size() - 1}) {
+      const float kept = values[i];
+      values[i] = GetParam();
+      const std::string message = Run(), place = array + "[" + std::to_string(i) + "] is ";
+      EXPECT_NE(message.find(place), std::string::npos) << place << ": " << message;
+      values[i] = kept;
+    }
+    EXPECT_EQ(Run(), "");
+  }
+
+  ExtremeScene e_;
+  std::vector<float> d_attributes_, d_alpha_;
+};
+
+TEST_P(NonFinite, InputIsNamed) {
+  Camera& c = e_.scene.camera;
+  ExpectNamed("scene 0: positions", e_.scene.positions);
+  ExpectNamed("scene 0: attributes", e_.scene.attributes);
+  ExpectNamed("scene 0: camera.rotation", c.rotation);
+  ExpectNamed("scene 0: camera.translation", c.translation);
+  ExpectNamed("d_frame.attributes", d_attributes_);
+  ExpectNamed("d_frame.alpha", d_alpha_);
+  float* const lens[] = {&c.fx, &c.fy, &c.cx, &c.cy, &c.near_plane};
+  for (std::size_t i = 0; i < std::size(lens); ++i) {
+    const float kept = *lens[i];
+    *lens[i] = GetParam();
+    EXPECT_NE(Run().find("near_plane}[" + std::to_string(i) + "] is "), std::string::npos) << Run();
+    *lens[i] = kept;
+  }
+  const double kept = e_.options.delta;
+  for (double* option : {&e_.options.delta, &e_.options.max_alpha_error}) {
+    *option = static_cast<double>(GetParam());
+    EXPECT_NE(Run().find("options."), std::string::npos) << Run();
+    *option = kept;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Values, NonFinite,
+    testing::Values(std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                    -std::numeric_limits<float>::infinity()),
+    [](const auto& p) {
+      return std::string(std::isnan(p.param) ? "NaN" : p.param > 0 ? "Infinity" : "MinusInfinity");
+    });
+
+TEST(Extremes, OneSceneAlone) {
+  const char* number = std::getenv("TILEGRAD_SCENE");
+  if (number == nullptr) GTEST_SKIP() << "TILEGRAD_SCENE names no scene";
+  for (const std::string& target : RunnableTargets()) {
+    ASSERT_TRUE(ForceTarget(target).ok());
+    const std::uint64_t n = std::strtoull(number, nullptr, 10);
+    CheckScenes({n, 1, n < 1000000 ? 2000u : 50000u});
+  }
+  ASSERT_TRUE(ForceTarget("").ok());
+}
+
+}  // namespace
+}  // namespace tilegrad::test

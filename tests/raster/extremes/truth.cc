@@ -1,0 +1,453 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/extremes/truth.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "raster/extremes/bounded.h"
+#include "raster/project.h"
+#include "raster/soft_mask_test_util.h"
+#include "render/renderer_ref.h"
+
+namespace tilegrad::test {
+namespace {
+
+using raster::test::SoftScene;
+using raster::test::SoftTruth;
+
+// Kernels take the operations of the references in another order and with fused products: at most
+// so many times their bound.
+constexpr double kOtherOrder = 4;
+constexpr double kBits = kUnitRoundoff;
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+class Comparison {
+ public:
+  explicit Comparison(CheckCounts* counts) : counts_(counts) {}
+
+  // `tolerance` in absolute numbers.
+  void Check(const char* array, std::size_t index, float got, double expected, double tolerance) {
+    const double error = std::abs(static_cast<double>(got) - expected);
+    if (!std::isfinite(got)) return Fail(array, index, got, expected, tolerance);
+    if (!std::isfinite(tolerance)) return static_cast<void>(++counts_->left_out);
+    ++counts_->compared;
+    counts_->sharp += tolerance <= std::max(0.01 * std::abs(expected), 1e-6);
+    if (tolerance > 0) counts_->worst = std::max(counts_->worst, error / tolerance);
+    if (!(error <= tolerance)) Fail(array, index, got, expected, tolerance);
+  }
+  void Check(const char* array, std::size_t index, float got, const Bounded& expected) {
+    Check(array, index, got, expected.value, kOtherOrder * expected.error);
+  }
+  void Require(bool what, const std::string& otherwise) {
+    if (!what && failure_.empty()) failure_ = otherwise;
+  }
+  const std::string& failure() const { return failure_; }
+
+ private:
+  void Fail(const char* array, std::size_t index, float got, double expected, double tolerance) {
+    Require(false, fmt::format("{}[{}] is {}, expected {} within {}", array, index, got, expected,
+                               tolerance));
+  }
+
+  CheckCounts* counts_;
+  std::string failure_;
+};
+
+template <class To, class From>
+raster::ScreenMeshBuffersT<To> MeshCast(const raster::ScreenMeshBuffersT<From>& m) {
+  raster::ScreenMeshBuffersT<To> out;
+  out.x.assign(m.x.begin(), m.x.end()), out.y.assign(m.y.begin(), m.y.end());
+  out.depth.assign(m.depth.begin(), m.depth.end());
+  out.inverse_depth.assign(m.inverse_depth.begin(), m.inverse_depth.end());
+  out.v0 = m.v0, out.v1 = m.v1, out.v2 = m.v2, out.source_face = m.source_face;
+  for (const auto& c : m.clipped) out.clipped.push_back({c.a, c.b, To(c.t)});
+  out.reject = m.reject, out.source_vertices = m.source_vertices;
+  out.source_faces = m.source_faces, out.width = m.width, out.height = m.height;
+  return out;
+}
+
+// The faces that take part in alpha, as the soft mask's own tests see them.
+SoftScene SoftSceneOf(const raster::ScreenMeshBuffers& mesh, const RenderOptions& options) {
+  SoftScene out;
+  out.Resize(options.width, options.height);
+  out.options.delta = options.delta, out.options.max_alpha_error = options.max_alpha_error;
+  out.mesh.x = mesh.x, out.mesh.y = mesh.y;
+  for (std::size_t f = 0; f < mesh.v0.size(); ++f) {
+    if ((mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
+    out.mesh.v0.push_back(mesh.v0[f]), out.mesh.v1.push_back(mesh.v1[f]);
+    out.mesh.v2.push_back(mesh.v2[f]), out.mesh.reject.push_back(mesh.reject[f]);
+  }
+  out.options.faces = out.mesh.v0.size();
+  return out;
+}
+
+// All pixels, or some if that were too many pairs with faces.
+std::vector<std::size_t> PixelsToCheck(const ExtremeScene& e, Rng* rng) {
+  constexpr std::size_t kPairs = 2000;
+  const std::size_t pixels = e.pixels(), faces = std::max<std::size_t>(e.scene.face_count(), 1);
+  std::vector<std::size_t> out;
+  if (pixels * faces <= kPairs) {
+    for (std::size_t i = 0; i < pixels; ++i) out.push_back(i);
+    return out;
+  }
+  const std::size_t most = std::max<std::size_t>(kPairs / faces, 1);
+  while (out.size() < most) out.push_back(rng->Below(pixels));
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+// What interpolation does at one pixel.
+struct PixelTruth {
+  std::size_t face;  // of the screen mesh
+  raster::FacePlane<Bounded> plane;
+  raster::PixelWeights<Bounded> weights;
+  bool decided;  // it is not a matter of rounding whether the face is flat (rule 8), nor which
+                 // piece of a cut face is seen
+};
+
+class Truth {
+ public:
+  Truth(const ExtremeScene& e, std::uint64_t number)
+      : e_(e), rng_(number, 99), scene_(SceneCast<Bounded>(e.scene)) {
+    const SceneView view = e.scene.View();
+    raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
+    mesh_ = buffers_.View();
+    soft_ = SoftSceneOf(buffers_, e.options);
+    prepared_.buffers = MeshCast<Bounded>(buffers_), prepared_.mesh = prepared_.buffers.View();
+    PrepareAttributes();
+    pixels_ = PixelsToCheck(e, &rng_);
+    d_attributes_.resize(e.pixels() * Channels()), d_alpha_.resize(e.pixels());
+    for (const std::size_t i : pixels_) {
+      d_alpha_[i] = static_cast<float>(rng_.Uniform(-1, 1));
+      for (std::size_t c = 0; c < Channels(); ++c) {
+        d_attributes_[c * e.pixels() + i] = static_cast<float>(rng_.Uniform(-1, 1));
+      }
+    }
+  }
+
+  void CheckProjection(Comparison* comparison);
+  void CheckForward(const Frame& frame, Comparison* comparison);
+  void CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
+                     CheckCounts* counts);
+
+ private:
+  std::size_t Channels() const { return static_cast<std::size_t>(e_.scene.channels); }
+  void PrepareAttributes() {
+    prepared_.attributes = {scene_.attributes, scene_.channels, scene_.rate};
+    if (!mesh_.was_clipped()) return;
+    prepared_.clipped_attributes.resize(raster::AttributeRows(prepared_.mesh, scene_.rate) *
+                                        Channels());
+    raster::ClipAttributes<Bounded>(prepared_.mesh, scene_.faces, prepared_.attributes,
+                                    prepared_.clipped_attributes);
+    prepared_.attributes.values = prepared_.clipped_attributes;
+  }
+  PixelTruth At(std::size_t pixel, std::int32_t id) const;
+  void CheckFaceIds(const Frame& frame, Comparison* comparison) const;
+  void CheckForeground(const Frame& frame, std::size_t pixel, Comparison* comparison) const;
+  bool SameVerticesVisible() const;
+  void Mask(const Frame& frame, const SoftTruth& soft);
+  void AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const;
+  void AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const;
+  void CompareGradients(const Frame& frame, const SoftTruth& soft, const Status& status,
+                        const SceneGradients& got, Comparison* comparison, CheckCounts* counts);
+
+  const ExtremeScene& e_;
+  Rng rng_;
+  TestScene<Bounded> scene_;
+  raster::ScreenMeshBuffers buffers_;
+  raster::ScreenMesh mesh_;
+  PreparedScene<Bounded> prepared_;
+  SoftScene soft_;
+  std::vector<std::size_t> pixels_;
+  std::vector<float> d_attributes_, d_alpha_;
+};
+
+void Truth::CheckProjection(Comparison* comparison) {
+  raster::ScreenMeshBuffersT<Bounded> truth;
+  const auto view = scene_.View();
+  raster::ProjectVerticesRef(FaceSourceOf(view, e_.options), &truth);
+  for (std::size_t v = 0; v < truth.x.size(); ++v) {
+    if (!std::isfinite(mesh_.depth[v]) || !std::isfinite(mesh_.x[v]) ||
+        !std::isfinite(mesh_.y[v])) {
+      comparison->Require(
+          !std::isfinite(truth.x[v].error + truth.y[v].error + truth.depth[v].error),
+          fmt::format("vertex {} overflows and need not", v));
+      continue;
+    }
+    comparison->Check("depth of vertex", v, mesh_.depth[v], truth.depth[v]);
+    if (!(mesh_.inverse_depth[v] > 0 && truth.inverse_depth[v] > 0)) continue;
+    comparison->Check("x of vertex", v, mesh_.x[v], truth.x[v]);
+    comparison->Check("y of vertex", v, mesh_.y[v], truth.y[v]);
+    comparison->Check("inverse depth of vertex", v, mesh_.inverse_depth[v], truth.inverse_depth[v]);
+  }
+}
+
+// The height of a face against kFlatHeight: true if rounding cannot change who is larger.
+bool ShapeIsDecided(const raster::ScreenCorners<Bounded>& c) {
+  const Bounded x1 = c.x[1] - c.x[0], y1 = c.y[1] - c.y[0];
+  const Bounded x2 = c.x[2] - c.x[0], y2 = c.y[2] - c.y[0];
+  const Bounded area = x1 * y2 - x2 * y1;
+  const Bounded square = area * area;  // overflows like the kernel's
+  const double longest = std::max({std::hypot(x1.value, y1.value), std::hypot(x2.value, y2.value),
+                                   std::hypot(x2.value - x1.value, y2.value - y1.value)});
+  const double limit = raster::kFlatHeight * longest;
+  return std::isfinite(square.error) &&
+         std::abs(std::abs(area.value) - limit) > kOtherOrder * area.error + 1e-5 * limit;
+}
+
+// Whether another piece of the same cut face covers the pixel: where depths differ by more than
+// floats resolve, the corners that cutting makes can be anywhere.
+bool PiecesOverlap(const raster::ScreenMesh& mesh, std::size_t face, int column, int row) {
+  const std::size_t next = face + 1;
+  return next < mesh.faces() && mesh.source_face[next] == mesh.source_face[face] &&
+         mesh.reject[next] == raster::kFaceDrawn &&
+         raster::Covers(raster::SnapFaceClockwise(mesh, next), column, row);
+}
+
+PixelTruth Truth::At(std::size_t pixel, std::int32_t id) const {
+  const int column = static_cast<int>(pixel) % e_.options.width;
+  const int row = static_cast<int>(pixel) / e_.options.width;
+  PixelTruth out;
+  out.face = static_cast<std::size_t>(raster::PieceAt(mesh_, id, column, row));
+  const auto corners = raster::CornersOf(prepared_.mesh, out.face);
+  out.decided = ShapeIsDecided(corners) && !PiecesOverlap(mesh_, out.face, column, row);
+  out.plane = raster::MakeFacePlane(corners);
+  const auto b = out.plane.Weights(column + 0.5, row + 0.5);
+  const bool perspective = e_.options.interpolation == Interpolation::kPerspective;
+  Bounded q = 0.0, least = corners.z[0];
+  for (std::size_t k = 0; k < 3; ++k) {
+    // Kernels step through a tile from its corner: weights are as large there as it is away.
+    const Bounded &gx = out.plane.gx[k], &gy = out.plane.gy[k];
+    constexpr double kAway = 2 * raster::kTileSize;
+    const double steps =
+        kAway * (gx.error + gy.error + 4 * kBits * (std::abs(gx.value) + std::abs(gy.value)));
+    out.weights.b[k] = {b[k].value, b[k].error + steps};
+    out.weights.w[k] = perspective ? out.weights.b[k] * corners.z[k] : out.weights.b[k];
+    q += out.weights.w[k];
+    if (corners.z[k] < least) least = corners.z[k];
+  }
+  // Both values are kept at or above `least`, which does not enlarge their difference.
+  out.weights.q = perspective ? Bounded(std::max(q.value, least.value), q.error) : Bounded(1.0);
+  const double low = std::max(out.weights.q.value - out.weights.q.error, least.value);
+  for (Bounded& w : out.weights.w) {
+    if (!perspective) continue;
+    const double value = w.value / out.weights.q.value;
+    const double error = (w.error + std::abs(value) * out.weights.q.error) / low;
+    w = Rounded(value, error, std::abs(value));
+  }
+  return out;
+}
+
+void Truth::CheckFaceIds(const Frame& frame, Comparison* comparison) const {
+  std::vector<std::int32_t> ids(e_.pixels(), raster::kNoFace);
+  raster::VisibilityRef<float>(mesh_, 0, e_.options.height, ids);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids[i] >= 0) ids[i] = mesh_.source_face[static_cast<std::size_t>(ids[i])];
+    comparison->Require(frame.face_ids[i] == ids[i], fmt::format("face_ids[{}] is {}, expected {}",
+                                                                 i, frame.face_ids[i], ids[i]));
+  }
+}
+
+void Truth::CheckForeground(const Frame& frame, std::size_t pixel, Comparison* comparison) const {
+  const PixelTruth at = this->At(pixel, frame.face_ids[pixel]);
+  const auto check = [&](const char* array, std::size_t index, float got, const Bounded& expected) {
+    if (at.decided) return comparison->Check(array, index, got, expected);
+    comparison->Check(array, index, got, expected.value, kUnbounded);
+  };
+  std::vector<Bounded> values(Channels());
+  raster::InterpolateRef<Bounded>(prepared_.mesh, prepared_.attributes, at.face, at.weights,
+                                  values);
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    const std::size_t i = c * e_.pixels() + pixel;
+    check("attributes", i, frame.attributes[i], values[c]);
+  }
+  Bounded source[3];
+  raster::SourceWeights<Bounded>(prepared_.mesh, scene_.faces, at.face, at.weights.w, source);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::size_t i = k * e_.pixels() + pixel;
+    check("barycentrics", i, frame.barycentrics[i], source[k + 1]);
+  }
+  // The plane that visibility compares, kept between the corners' depths.
+  const auto plane = raster::MakeDepthPlane(prepared_.mesh, at.face);
+  const int column = static_cast<int>(pixel) % e_.options.width;
+  const int row = static_cast<int>(pixel) / e_.options.width;
+  const Bounded z =
+      plane.base + (plane.gx * (column + 0.5 - plane.x0) + plane.gy * (row + 0.5 - plane.y0));
+  const double kept = std::clamp(z.value, plane.low.value, plane.high.value);
+  const auto d = static_cast<double>(frame.depth[pixel]);
+  comparison->Require(d > 0 && std::isfinite(d), fmt::format("depth[{}] is {}", pixel, d));
+  check("inverse depth", pixel, static_cast<float>(1 / d), {kept, z.error + 2 * kBits * kept});
+}
+
+void Truth::CheckForward(const Frame& frame, Comparison* comparison) {
+  CheckFaceIds(frame, comparison);
+  soft_.face_ids.assign(frame.face_ids.begin(), frame.face_ids.end());
+  const SoftTruth soft(soft_);
+  const double spent = frame.alpha_error_bound, e = e_.options.max_alpha_error;
+  comparison->Require(
+      spent >= 0 && spent <= e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(soft_.options.faces),
+      fmt::format("alpha_error_bound is {}, allowed {}", spent, e));
+  for (const auto* image : {&frame.attributes, &frame.alpha, &frame.barycentrics}) {
+    for (const float v : *image) comparison->Require(std::isfinite(v), "an image is not finite");
+  }
+  for (const std::size_t i : pixels_) {
+    const bool background = frame.face_ids[i] < 0;
+    comparison->Require(std::isinf(frame.depth[i]) == background, "depth of background");
+    comparison->Require(frame.alpha[i] >= 0 && frame.alpha[i] <= 1, "alpha outside of [0, 1]");
+    comparison->Require(background || frame.alpha[i] == 1, "alpha of foreground");
+    if (background) {
+      const double rounding = soft.Resolved(i) ? soft.Rounding(i) : kUnbounded;
+      comparison->Check("alpha", i, frame.alpha[i], soft.Alpha(i), spent + rounding);
+    } else {
+      CheckForeground(frame, i, comparison);
+    }
+  }
+}
+
+// Which vertices are behind the near plane can be a matter of rounding; then gradients differ.
+bool Truth::SameVerticesVisible() const {
+  for (std::size_t v = 0; v < static_cast<std::size_t>(mesh_.source_vertices); ++v) {
+    const auto p = raster::ToCamera(scene_.camera, &scene_.positions[3 * v]);
+    if (raster::IsVisibleDepth(p.depth, scene_.camera) != (mesh_.inverse_depth[v] > 0))
+      return false;
+  }
+  return true;
+}
+
+// Takes the gradient away from pixels where it does not exist, or depends on rounding.
+void Truth::Mask(const Frame& frame, const SoftTruth& soft) {
+  for (const std::size_t i : pixels_) {
+    if (frame.face_ids[i] < 0) {
+      if (!soft.Resolved(i) || soft.Ambiguous(i, true)) d_alpha_[i] = 0;
+    } else if (!this->At(i, frame.face_ids[i]).decided) {
+      for (std::size_t c = 0; c < Channels(); ++c) d_attributes_[c * e_.pixels() + i] = 0;
+    }
+  }
+}
+
+void Truth::AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const {
+  std::vector<Bounded> d_out(Channels());
+  for (const std::size_t i : pixels_) {
+    if (frame.face_ids[i] < 0) continue;
+    for (std::size_t c = 0; c < d_out.size(); ++c) {
+      d_out[c] = static_cast<double>(d_attributes_[c * e_.pixels() + i]);
+    }
+    const PixelTruth at = this->At(i, frame.face_ids[i]);
+    if (!at.decided) continue;  // masked
+    raster::InterpolateRefBackward<Bounded>(prepared_.mesh, prepared_.attributes, at.plane, at.face,
+                                            e_.options.interpolation, at.weights, d_out, d->screen,
+                                            d->attributes);
+  }
+}
+
+void Truth::AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const {
+  std::vector<double> exact, tolerance;
+  soft.Gradient(d_alpha_, &exact, &tolerance);
+  const auto view = soft_.mesh.View();
+  for (std::size_t f = 0; f < soft_.options.faces; ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(view.vertex(f, k));
+      const std::size_t at = 6 * f + 2 * static_cast<std::size_t>(k);
+      d->screen.d_x[v] += Bounded(exact[at], tolerance[at]);
+      d->screen.d_y[v] += Bounded(exact[at + 1], tolerance[at + 1]);
+    }
+  }
+}
+
+struct GradientStorage {
+  std::vector<float> positions, attributes;
+  SceneGradients d;
+
+  explicit GradientStorage(const TestScene<float>& scene)
+      : positions(scene.positions.size()),
+        attributes(scene.attributes.size()),
+        d{positions, attributes, true, {}} {}
+};
+
+bool NamesWhatOverflows(const Status& status) {
+  const std::string& m = status.message();
+  const auto at = m.find("the gradient overflows: d_scene.");
+  return at != std::string::npos && m.find('[', at) != std::string::npos;
+}
+
+void Truth::CompareGradients(const Frame& frame, const SoftTruth& soft, const Status& status,
+                             const SceneGradients& got, Comparison* comparison,
+                             CheckCounts* counts) {
+  PreparedGradients<Bounded> d(scene_.View(), prepared_);
+  AddInterpolated(frame, &d);
+  AddSoft(soft, &d);
+  std::vector<Bounded> positions(scene_.positions.size()), attributes(scene_.attributes.size());
+  SceneGradientsT<Bounded> expected{positions, attributes, true, {}};
+  PrepareRefBackward(scene_.View(), e_.options, prepared_, d, &expected);
+  const CameraT<Bounded>& c = expected.d_camera;
+  const Bounded lens[] = {c.fx, c.fy, c.cx, c.cy};
+  bool fits = true;
+  for (const auto& array :
+       {std::span<const Bounded>(positions), std::span<const Bounded>(attributes),
+        std::span<const Bounded>(c.rotation), std::span<const Bounded>(c.translation),
+        std::span<const Bounded>(lens)}) {
+    for (const Bounded& x : array) fits &= std::isfinite(x.error);
+  }
+  if (!status.ok()) {
+    ++counts->overflows;
+    comparison->Require(!fits, "refused, but the gradient fits: " + status.message());
+    return comparison->Require(NamesWhatOverflows(status), "unclear error: " + status.message());
+  }
+  counts->gradients += fits;
+  const auto check = [&](const char* array, const auto& actual, const auto& truth) {
+    for (std::size_t i = 0; i < std::size(actual); ++i) {
+      comparison->Check(array, i, actual[i], truth[i]);
+    }
+  };
+  check("d_positions", got.positions, positions);
+  check("d_attributes", got.attributes, attributes);
+  check("d_rotation", got.d_camera.rotation, c.rotation);
+  check("d_translation", got.d_camera.translation, c.translation);
+  const float got_lens[] = {got.d_camera.fx, got.d_camera.fy, got.d_camera.cx, got.d_camera.cy};
+  check("d_{fx, fy, cx, cy}", got_lens, lens);
+}
+
+void Truth::CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
+                          CheckCounts* counts) {
+  const SceneView views[] = {e_.scene.View()};
+  GradientStorage storage(e_.scene);
+  const auto run = [&] {
+    return renderer->Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, {&storage.d, 1});
+  };
+  const Status all = run();
+  comparison->Require(all.ok() || NamesWhatOverflows(all), "unclear error: " + all.message());
+  if (!SameVerticesVisible()) return;
+  const SoftTruth soft(soft_);
+  Mask(frame, soft);
+  const Status masked = run();
+  CompareGradients(frame, soft, masked, storage.d, comparison, counts);
+}
+
+}  // namespace
+
+void CheckCounts::Add(const CheckCounts& other) {
+  compared += other.compared, sharp += other.sharp, left_out += other.left_out;
+  gradients += other.gradients, overflows += other.overflows;
+  worst = std::max(worst, other.worst);
+}
+
+std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Renderer* renderer,
+                              CheckCounts* counts) {
+  Frame frame;
+  const SceneView views[] = {scene.scene.View()};
+  const Status status = renderer->Render(views, scene.options, {true, true, true, true}, &frame);
+  if (!status.ok()) return "Render: " + status.message();
+  Comparison comparison(counts);
+  Truth truth(scene, number);
+  truth.CheckProjection(&comparison);
+  truth.CheckForward(frame, &comparison);
+  truth.CheckBackward(frame, renderer, &comparison, counts);
+  return comparison.failure();
+}
+
+}  // namespace tilegrad::test
