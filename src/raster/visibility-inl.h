@@ -22,33 +22,61 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using VisibilityTag = HWY_CAPPED(float, kTileSize);
-using VisibilityIntTag = hn::RebindToSigned<VisibilityTag>;
 
-// Rows of a face's edge functions, one vector wide: at its first row, and from row to row.
-template <class DI>
-struct EdgeRows {
-  hn::Vec<DI> edge[3], step[3];
+// How the pixels of a bin lie in a vector: one row of them, as many as D has lanes.
+template <class D>
+struct OneRow {
+  using Tag = D;
+  using IntTag = hn::RebindToSigned<D>;
+  static constexpr int kRows = 1;
 
-  HWY_INLINE hn::Mask<DI> Inside(DI di) const {
-    return hn::Gt(hn::Or(hn::Or(edge[0], edge[1]), edge[2]), hn::Set(di, -1));
+  HWY_INLINE static hn::Vec<IntTag> Columns() { return hn::Iota(IntTag(), 0); }
+  HWY_INLINE static hn::Vec<IntTag> Rows() { return hn::Zero(IntTag()); }
+  template <class T>
+  HWY_INLINE static auto Load(const T* from) {
+    return hn::LoadU(hn::Rebind<T, D>(), from);
   }
-  HWY_INLINE void Step() {
-    for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], step[k]);
+  template <class T, class V>
+  HWY_INLINE static void Store(V v, T* to) {
+    hn::StoreU(v, hn::Rebind<T, D>(), to);
   }
 };
 
-// `edge` at pixel (0, 0) of `from`, and pixels (column, row) onwards wanted.
-template <class DI, class Face>
-HWY_INLINE EdgeRows<DI> RowsFrom(DI di, const Face& from, int column, int row) {
-  const auto columns = hn::Add(hn::Iota(di, 0), hn::Set(di, column)), rows = hn::Set(di, row);
-  EdgeRows<DI> out;
-  for (int k = 0; k < 3; ++k) {
-    out.step[k] = hn::Set(di, from.step_y[k]);
-    const auto across = hn::Mul(hn::Set(di, from.step_x[k]), columns);
-    out.edge[k] = hn::Add(hn::Add(hn::Set(di, from.edge[k]), across), hn::Mul(out.step[k], rows));
+// A box up to kStamp wide and high is drawn as one square of that size, without a branch: what lies
+// outside the box is not covered.
+inline constexpr int kStamp = 4;
+
+#if HWY_MAX_BYTES >= 32 && !HWY_HAVE_SCALABLE
+// Two rows of kStamp pixels.
+struct TwoRows {
+  using Tag = hn::FixedTag<float, 2 * kStamp>;
+  using IntTag = hn::RebindToSigned<Tag>;
+  static constexpr int kRows = 2;
+
+  HWY_INLINE static hn::Vec<IntTag> Columns() {
+    alignas(32) static constexpr std::int32_t kColumns[] = {0, 1, 2, 3, 0, 1, 2, 3};
+    return hn::Load(IntTag(), kColumns);
   }
-  return out;
-}
+  HWY_INLINE static hn::Vec<IntTag> Rows() {
+    alignas(32) static constexpr std::int32_t kRowOf[] = {0, 0, 0, 0, 1, 1, 1, 1};
+    return hn::Load(IntTag(), kRowOf);
+  }
+  template <class T>
+  HWY_INLINE static auto Load(const T* from) {
+    const hn::FixedTag<T, kStamp> d;
+    const hn::FixedTag<T, 2 * kStamp> both;
+    return hn::Combine(both, hn::LoadU(d, from + kBinSize), hn::LoadU(d, from));
+  }
+  template <class T, class V>
+  HWY_INLINE static void Store(V v, T* to) {
+    const hn::FixedTag<T, kStamp> d;
+    hn::StoreU(hn::LowerHalf(d, v), d, to), hn::StoreU(hn::UpperHalf(d, v), d, to + kBinSize);
+  }
+};
+using StampLayout = TwoRows;
+#else
+using StampLayout = OneRow<hn::FixedTag<float, kStamp>>;
+#endif
 
 // What is drawn of a face: rows [begin, end), one vector of columns from `column` on. Counted from
 // pixel (x0, y0), where the arrays begin.
@@ -59,31 +87,51 @@ struct DrawnRows {
   float* inverse_depth;
 };
 
+// Where the edge functions are known: in a record of `Face`, at a pixel (column, row) before.
+template <class Face>
+struct EdgesAt {
+  const Face& from;
+  int columns, rows;  // from that pixel to the first that is drawn
+};
+
 // Mul and Add are kept apart (no fused MulAdd): the same bits on every instruction set.
-template <class D, class Edges>
-HWY_INLINE void DrawRows(D d, Edges edges, const DrawnFace& face, const DrawnRows& rows) {
-  const hn::RebindToSigned<D> di;
+template <class Layout, class Face>
+HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, const DrawnRows& rows) {
+  const typename Layout::Tag d;
+  const typename Layout::IntTag di;
+  const auto columns = Layout::Columns(), inner_rows = Layout::Rows();
+  hn::Vec<typename Layout::IntTag> edge[3], step[3];
+  for (int k = 0; k < 3; ++k) {
+    const auto across = hn::Set(di, edges.from.step_x[k]), down = hn::Set(di, edges.from.step_y[k]);
+    const auto x = hn::Add(columns, hn::Set(di, edges.columns));
+    const auto y = hn::Add(inner_rows, hn::Set(di, edges.rows));
+    edge[k] =
+        hn::Add(hn::Set(di, edges.from.edge[k]), hn::Add(hn::Mul(across, x), hn::Mul(down, y)));
+    step[k] = Layout::kRows == 1 ? down : hn::Add(down, down);
+  }
   const DepthPlane<float>& plane = face.depth;
-  const auto half = hn::Set(d, 0.5f);
-  const auto column = hn::Add(hn::Iota(di, 0), hn::Set(di, rows.x0 + rows.column));
-  const auto px = hn::Add(hn::ConvertTo(d, column), half);
+  const auto half = hn::Set(d, 0.5f), next = hn::Set(d, static_cast<float>(Layout::kRows));
+  const auto centre = [&](hn::Vec<typename Layout::IntTag> inner, int first) HWY_ATTR {
+    return hn::Add(hn::ConvertTo(d, hn::Add(inner, hn::Set(di, first))), half);
+  };
+  const auto px = centre(columns, rows.x0 + rows.column);
+  auto py = centre(inner_rows, rows.y0 + rows.begin);
   const auto dx = hn::Mul(hn::Set(d, plane.gx), hn::Sub(px, hn::Set(d, plane.x0)));
   const auto y0 = hn::Set(d, plane.y0), gy = hn::Set(d, plane.gy), base = hn::Set(d, plane.base);
   const auto low = hn::Set(d, plane.low), high = hn::Set(d, plane.high);
   const auto id = hn::Set(di, face.face);
-  auto py = hn::Set(d, static_cast<float>(rows.y0 + rows.begin) + 0.5f);
-  for (int i = rows.begin; i < rows.end; ++i) {
-    const auto inside = edges.Inside(di);
-    edges.Step();
+  for (int i = rows.begin; i < rows.end; i += Layout::kRows) {
+    const auto inside = hn::Gt(hn::Or(hn::Or(edge[0], edge[1]), edge[2]), hn::Set(di, -1));
+    for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], step[k]);
     const auto dy = hn::Mul(gy, hn::Sub(py, y0));
-    py = hn::Add(py, hn::Set(d, 1.0f));
+    py = hn::Add(py, next);
     const auto z = hn::Min(hn::Max(hn::Add(base, hn::Add(dx, dy)), low), high);
     float* nearest = rows.inverse_depth + i * kBinSize + rows.column;
     std::int32_t* ids = rows.face + i * kBinSize + rows.column;
-    const auto old = hn::LoadU(d, nearest);
+    const auto old = Layout::Load(nearest);
     const auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
-    hn::StoreU(hn::IfThenElse(seen, z, old), d, nearest);
-    hn::StoreU(hn::IfThenElse(hn::RebindMask(di, seen), id, hn::LoadU(di, ids)), di, ids);
+    Layout::Store(hn::IfThenElse(seen, z, old), nearest);
+    Layout::Store(hn::IfThenElse(hn::RebindMask(di, seen), id, Layout::Load(ids)), ids);
   }
 }
 
@@ -93,27 +141,19 @@ HWY_INLINE TileRect BoxIn(const TileRect& rect, const DrawnFace& face) {
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
 
-// A box up to kStamp wide and high is drawn as one square of that size, without a branch: what lies
-// outside the box is not covered.
-inline constexpr int kStamp = 4;
-
 HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& box, const TileRect& rect,
                           VisibilityBin* out) {
-  const hn::FixedTag<float, kStamp> d;
-  const hn::RebindToSigned<decltype(d)> di;
   const int column = HWY_MIN(box.x0, kBinSize - kStamp), row = HWY_MIN(box.y0, kBinSize - kStamp);
-  const auto edges =
-      RowsFrom(di, face, rect.x0 + column - face.column_begin, rect.y0 + row - face.row_begin);
-  DrawRows(d, edges, face,
-           {column, row, row + kStamp, rect.x0, rect.y0, out->face, out->inverse_depth});
+  DrawRows<StampLayout>(
+      EdgesAt<DrawnFace>{face, rect.x0 + column - face.column_begin,
+                         rect.y0 + row - face.row_begin},
+      face, {column, row, row + kStamp, rect.x0, rect.y0, out->face, out->inverse_depth});
 }
 
 // No overflow in the edge functions: they are below 2^21 in a small face's box, and steps are up to
 // 2^15.
 HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, VisibilityBin* out) {
-  const VisibilityTag d;
-  const VisibilityIntTag di;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
   const TileRect box = BoxIn(rect, face);
   if (box.x1 - box.x0 <= kStamp && box.y1 - box.y0 <= kStamp) {
     DrawStamp(face, box, rect, out);
@@ -121,10 +161,10 @@ HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, Visibilit
   }
   for (int at = HWY_MIN(box.x0, kBinSize - lanes); at < box.x1; at += lanes) {
     const int column = HWY_MIN(at, kBinSize - lanes);
-    const auto edges =
-        RowsFrom(di, face, rect.x0 + column - face.column_begin, rect.y0 + box.y0 - face.row_begin);
-    DrawRows(d, edges, face,
-             {column, box.y0, box.y1, rect.x0, rect.y0, out->face, out->inverse_depth});
+    DrawRows<OneRow<VisibilityTag>>(
+        EdgesAt<DrawnFace>{face, rect.x0 + column - face.column_begin,
+                           rect.y0 + box.y0 - face.row_begin},
+        face, {column, box.y0, box.y1, rect.x0, rect.y0, out->face, out->inverse_depth});
   }
 }
 
@@ -147,20 +187,19 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
 // it.
 HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const TileRect& tile,
                          DrawnRows rows) {
-  const VisibilityTag d;
-  const VisibilityIntTag di;
   TileFaceSetup setup;
   if (!SetUpTileFace(shape, tile, &setup)) return false;
   if (!setup.guarded) {
     DrawUnguarded(shape, face, setup, rows);
     return false;
   }
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
   rows.begin = setup.row_begin, rows.end = setup.row_end;
   for (int at = HWY_MIN(setup.column_begin, kTileSize - lanes); at < setup.column_end;
        at += lanes) {
     rows.column = HWY_MIN(at, kTileSize - lanes);
-    DrawRows(d, RowsFrom(di, setup, rows.column, rows.begin), face, rows);
+    DrawRows<OneRow<VisibilityTag>>(EdgesAt<TileFaceSetup>{setup, rows.column, rows.begin}, face,
+                                    rows);
   }
   return setup.CoversTile();
 }
