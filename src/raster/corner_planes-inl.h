@@ -103,7 +103,8 @@ HWY_INLINE LaneInt AttributeRow(const InterpolateInput& input, LaneInt face, Lan
 // What the planes of a vector of faces are made of.
 struct CornerPlanes {
   Plane weight[3], q;
-  Lane m[3];
+  Lane m[3];   // 1/depth times `scale`, or 1
+  Lane scale;  // makes the largest m 1: N and Q then stay in range whatever unit depth has
   LaneInt row[3];
 };
 
@@ -115,9 +116,12 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   CornerPlanes out;
   out.q = ZeroPlane();
   WeightPlanes(corners, origin_x, origin_y, out.weight);
+  const auto one = hn::Set(d, 1.0f);
+  const auto& z = corners.inverse_depth;
+  const bool perspective = input.mode == Interpolation::kPerspective;
+  out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
   for (int k = 0; k < 3; ++k) {
-    out.m[k] =
-        input.mode == Interpolation::kPerspective ? corners.inverse_depth[k] : hn::Set(d, 1.0f);
+    out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
     out.row[k] = AttributeRow(input, face, corners.vertex[k], k);
     AddScaled(out.m[k], out.weight[k], &out.q);
   }

@@ -9,9 +9,10 @@
 // (Q is kept at or above the smallest m_k: rounding in coverage lets a pixel centre lie a hair
 // outside of its face, where a plane that varies much may cross zero)
 //
-// where N_c and Q are planes: three numbers per face and channel. With h_c = dL/dI_c / Q and
-// s = sum_c h_c I_c, the adjoint of a face needs only sums of h_c and s over its pixels, weighted
-// by 1, x and y (their moments): with S_k(f) = sum over pixels of b_k f, a combination of those,
+// where N_c and Q are planes: three numbers per face and channel. (m is scaled so that its largest
+// is 1, which changes neither I nor its gradient.) With h_c = dL/dI_c / Q and s = sum_c h_c I_c,
+// the adjoint of a face needs only sums of h_c and s over its pixels, weighted by 1, x and y (their
+// moments): with S_k(f) = sum over pixels of b_k f, a combination of those,
 //
 //     d_a_kc = m_k S_k(h_c)                  d_m_k = sum_c a_kc S_k(h_c) - S_k(s)
 //     d_v_k  = -(sum_c grad N_c S_k(h_c) - grad Q S_k(s))        (weights are dragged along)

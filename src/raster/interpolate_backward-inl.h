@@ -277,7 +277,8 @@ HWY_INLINE void FinishLanes(const InterpolateInput& input, const BandSums& sums,
     }
   }
   for (int k = 0; k < 3 && request.geometry; ++k, to += 4 * stride) {
-    hn::StoreInterleaved4(adjoints.d_x[k], adjoints.d_y[k], adjoints.d_m[k], zero, d, to);
+    const auto d_inverse_depth = hn::Mul(adjoints.d_m[k], corners.scale);
+    hn::StoreInterleaved4(adjoints.d_x[k], adjoints.d_y[k], d_inverse_depth, zero, d, to);
   }
 }
 

@@ -126,13 +126,17 @@ class SoftTruth {
   }
   // Rounding of alpha at pixel i: the running bound of docs/numerics.md.
   double Rounding(std::size_t i) const {
-    const auto zs = AllZ(i);
-    const auto others = ProductsOfOthers(zs);
-    double sum = 20 * kU * Alpha(i);
-    for (std::size_t f = 0; f < zs.size(); ++f) {
-      sum += others[f] * ErrorOfA(zs[f], f);
+    std::vector<double> most, errors;  // of 1 - A
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+      const double z = Z(i, f);
+      errors.push_back(ErrorOfA(z, f));
+      most.push_back(std::min(1.0, errors.back() - std::expm1(-z)));
     }
-    return sum + 1e-16 * static_cast<double>(zs.size());
+    const auto others = ProductsOfOthers(most);
+    double sum = 20 * kU * Alpha(i);
+    for (std::size_t f = 0; f < errors.size(); ++f) sum += others[f] * errors[f];
+
+    return sum + 1e-16 * static_cast<double>(errors.size());
   }
   // Whether coordinates are small enough for double to tell how far the pixel is from each face
   // that may matter. Far beyond 1e8 pixels neither this truth nor a kernel knows.
@@ -212,12 +216,12 @@ class SoftTruth {
     }
     return 0x1p-50 * reach * largest_unit_;
   }
-  static std::vector<double> ProductsOfOthers(const std::vector<double>& zs) {
-    std::vector<double> out(zs.size(), 1.0);
+  static std::vector<double> ProductsOfOthers(const std::vector<double>& factors) {
+    std::vector<double> out(factors.size(), 1.0);
     double product = 1;
-    for (std::size_t f = 0; f < zs.size(); ++f) out[f] *= product, product *= -std::expm1(-zs[f]);
+    for (std::size_t f = 0; f < factors.size(); ++f) out[f] *= product, product *= factors[f];
     product = 1;
-    for (std::size_t f = zs.size(); f-- > 0;) out[f] *= product, product *= -std::expm1(-zs[f]);
+    for (std::size_t f = factors.size(); f-- > 0;) out[f] *= product, product *= factors[f];
     return out;
   }
   double ShortestEdge(std::size_t f) const {
@@ -234,7 +238,9 @@ class SoftTruth {
   // "Gradients": what culling and rounding may do to each corner of each face.
   void AddTolerance(std::size_t i, double d_alpha, std::vector<double>* tolerance) const {
     const auto zs = AllZ(i);
-    const auto others = ProductsOfOthers(zs);
+    std::vector<double> factors;
+    for (const double z : zs) factors.push_back(-std::expm1(-z));
+    const auto others = ProductsOfOthers(factors);
     const double dropped = scene_.options.max_alpha_error + 1e-30;
     double d_product = dropped;
     for (std::size_t f = 0; f < zs.size(); ++f) d_product += 4 * kU + ErrorOfA(zs[f], f);

@@ -110,6 +110,11 @@ struct PixelTruth {
                  // piece of a cut face is seen
 };
 
+// Sums of the absolute terms of d_w_k and of their mean.
+struct PixelAdjoints {
+  double weight[3] = {}, mean = 0;
+};
+
 class Truth {
  public:
   Truth(const ExtremeScene& e, std::uint64_t number)
@@ -150,6 +155,7 @@ class Truth {
   void CheckFaceIds(const Frame& frame, Comparison* comparison) const;
   void CheckForeground(const Frame& frame, std::size_t pixel, Comparison* comparison) const;
   bool SameVerticesVisible() const;
+  PixelAdjoints AdjointSizes(const PixelTruth& at, const std::vector<Bounded>& d_out) const;
   void Mask(const Frame& frame, const SoftTruth& soft);
   void AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const;
   void AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const;
@@ -332,6 +338,38 @@ void Truth::Mask(const Frame& frame, const SoftTruth& soft) {
   }
 }
 
+PixelAdjoints Truth::AdjointSizes(const PixelTruth& at, const std::vector<Bounded>& d_out) const {
+  PixelAdjoints out;
+  for (int k = 0; k < 3; ++k) {
+    const Bounded* values = prepared_.attributes.corner(prepared_.mesh, at.face, k);
+    for (std::size_t c = 0; c < d_out.size(); ++c) {
+      out.weight[k] += std::abs(d_out[c].value * values[c].value);
+    }
+    out.mean += std::abs(at.weights.w[k].value) * out.weight[k];
+  }
+  return out;
+}
+
+// Moving corner m drags the weights along: d_v_m = -b_m sum_k d_b_k grad b_k
+// (BarycentricRefBackward). The reference takes the difference d_w - mean in d_b first; kernels
+// take it last, so that the error of b_m meets both terms in full.
+void AllowLateDifferences(const raster::ScreenMesh& mesh, const PixelTruth& at, bool perspective,
+                          const PixelAdjoints& size, PreparedGradients<Bounded>* d) {
+  double x = 0, y = 0;
+  for (int k = 0; k < 3; ++k) {
+    const auto v = static_cast<std::size_t>(mesh.vertex(at.face, k));
+    const double m = perspective ? static_cast<double>(mesh.inverse_depth[v]) : 1;
+    const double d_b = (size.weight[k] + size.mean) * m / at.weights.q.value;
+    x += d_b * std::abs(at.plane.gx[k].value), y += d_b * std::abs(at.plane.gy[k].value);
+  }
+  for (int k = 0; k < 3; ++k) {
+    const auto v = static_cast<std::size_t>(mesh.vertex(at.face, k));
+    const Bounded& b = at.weights.b[k];
+    const double error = b.error + 4 * kBits * std::abs(b.value);
+    d->screen.d_x[v] += Bounded(0, error * x), d->screen.d_y[v] += Bounded(0, error * y);
+  }
+}
+
 void Truth::AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const {
   std::vector<Bounded> d_out(Channels());
   for (const std::size_t i : pixels_) {
@@ -341,6 +379,8 @@ void Truth::AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) c
     }
     const PixelTruth at = this->At(i, frame.face_ids[i]);
     if (!at.decided) continue;  // masked
+    AllowLateDifferences(mesh_, at, e_.options.interpolation == Interpolation::kPerspective,
+                         AdjointSizes(at, d_out), d);
     raster::InterpolateRefBackward<Bounded>(prepared_.mesh, prepared_.attributes, at.plane, at.face,
                                             e_.options.interpolation, at.weights, d_out, d->screen,
                                             d->attributes);
