@@ -12,8 +12,11 @@
 namespace tilegrad {
 namespace {
 
-void AddQuad(const float* __restrict from, float* __restrict to) {
-  for (int i = 0; i < 4; ++i) to[i] += from[i];
+// All is loaded before anything is stored, so that compilers see one vector.
+void AddQuad(const float* from, float* to) {
+  float sum[4];
+  for (int i = 0; i < 4; ++i) sum[i] = to[i] + from[i];
+  std::memcpy(to, sum, sizeof(sum));
 }
 
 // Calls add(face, slot in the band's arrays) for the faces of all bands.
