@@ -70,15 +70,16 @@ struct BinMargin {
 
 // Owns the memory of a TileLists; reused from frame to frame.
 struct TileListBuffers {
-  AlignedVector<std::int32_t> begin, faces, cursor;
+  AlignedVector<std::int32_t> begin, faces;
+  AlignedVector<std::int32_t> cursor;  // [chunks of faces][tiles] where a chunk's next face goes
   AlignedVector<TileRange> ranges;
   TileLists View() const { return {begin, faces}; }
 };
 
-// Lists every drawn face (its index in `faces`) for each tile in which its box holds a pixel
-// centre.
-TileLists BinDrawnFaces(std::span<const DrawnFace> faces, const TileGrid& grid,
-                        TileListBuffers* buffers);
+// Lists every drawn face (its index in `faces.storage`) for each tile in which its box holds a
+// pixel centre. `workers` null: the calling thread.
+TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
+                        const Workers* workers = nullptr);
 
 // Lists every face that takes part in the soft mask (drawn, culled or degenerate) for each tile
 // (of kTileSize) that has a pixel centre within `margin_x`, `margin_y` (pixels, >= 0, may be

@@ -260,14 +260,13 @@ HWY_INLINE FaceWords WordsOf(const CornerLanes& corners, ShapeLanes* shapes, std
   return words;
 }
 
-// `out` null, or room for all faces. Returns how many were written.
-std::size_t SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::uint8_t* reject,
-                       DrawnFace* out) {
-  const FaceIntTag di;
-  const std::size_t lanes = hn::Lanes(di), n = mesh.faces();
+// Faces [begin, end). `out` null, or room for all of them. Returns how many were written.
+std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t end, bool cull_back,
+                       std::uint8_t* reject, DrawnFace* out) {
+  const std::size_t lanes = hn::Lanes(FaceIntTag());
   DrawnFace* to = out;
-  for (std::size_t f = 0; f < n; f += lanes) {
-    const std::size_t count = HWY_MIN(lanes, n - f);
+  for (std::size_t f = begin; f < end; f += lanes) {
+    const std::size_t count = HWY_MIN(lanes, end - f);
     const CornerLanes corners = LoadCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);

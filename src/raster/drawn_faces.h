@@ -7,6 +7,7 @@
 #include <span>
 
 #include "base/aligned.h"
+#include "base/parallel.h"
 #include "raster/face_plane.h"
 #include "raster/screen_mesh.h"
 
@@ -29,18 +30,23 @@ struct DrawnFace {
 };
 static_assert(sizeof(DrawnFace) == 80);
 
-// Memory of a list that is reused from frame to frame: grows to the largest mesh seen.
+// Faces are set up in chunks, which workers share; each lists its own, from the place in `storage`
+// that the chunk's first face has in the mesh. Reused from frame to frame: grows to the largest
+// mesh seen.
 struct DrawnFaces {
-  AlignedVector<DrawnFace> storage;
-  std::size_t count = 0;
+  static constexpr std::size_t kChunk = 8192;  // faces
+  AlignedVector<DrawnFace> storage;            // between the lists: anything
+  AlignedVector<std::size_t> counts;           // [chunks] how many each has listed
 
-  std::span<const DrawnFace> faces() const { return {storage.data(), count}; }  // face ascends
+  std::span<const DrawnFace> list(std::size_t chunk) const {  // face ascends
+    return std::span(storage).subspan(chunk * kChunk, counts[chunk]);
+  }
 };
 
 // Sets the bits of `reject` [F] that follow from the shape on the screen (degenerate, culled);
 // bits that are set on entry stay, and such faces are not looked at. Where `out` is not null, lists
-// the faces that are drawn and may cover a pixel of the image.
+// the faces that are drawn and may cover a pixel of the image. `workers` null: the calling thread.
 void SetUpDrawnFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
-                     DrawnFaces* out);
+                     DrawnFaces* out, const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

@@ -59,13 +59,15 @@ HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* po
   return hn::AllTrue(d, hn::And(visible, hn::Eq(zero, hn::Zero(d))));
 }
 
-// Projects all vertices into out's arrays of size V. Returns whether all are visible and finite.
-bool ProjectVertices(const FaceSource<float>& source, ScreenMeshBuffers* out) {
+// Projects vertices [begin, n) into out's arrays of size V. Returns whether all are visible and
+// finite.
+bool ProjectVertices(const FaceSource<float>& source, std::size_t begin, std::size_t n,
+                     ScreenMeshBuffers* out) {
   const ProjectTag d;
-  const std::size_t lanes = hn::Lanes(d), n = source.positions.size() / 3;
+  const std::size_t lanes = hn::Lanes(d);
   const float* in = source.positions.data();
   bool plain = true;
-  std::size_t i = 0;
+  std::size_t i = begin;
   for (; i + lanes <= n; i += lanes) {
     plain &= ProjectLanes(d, *source.camera, in + 3 * i, &out->x[i], &out->y[i], &out->depth[i],
                           &out->inverse_depth[i]);

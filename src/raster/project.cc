@@ -10,7 +10,9 @@
 
 #if HWY_ONCE
 #include <algorithm>
+#include <atomic>
 
+#include "raster/chunks.h"
 #include "raster/project_ref.h"
 
 namespace tilegrad::raster {
@@ -19,19 +21,37 @@ namespace {
 HWY_EXPORT(ProjectVertices);
 HWY_EXPORT(ProjectVerticesBackward);
 
+constexpr std::size_t kVertexChunk = 8192;
+
+// Vertices of the source, all arrays. Returns whether all are visible and finite.
+bool ProjectSource(const FaceSource<float>& source, ScreenMeshBuffers* out,
+                   const Workers* workers) {
+  std::atomic<bool> plain = true;
+  ForChunks(workers, source.positions.size() / 3, kVertexChunk,
+            [&](std::size_t begin, std::size_t end) {
+              if (!HWY_DYNAMIC_DISPATCH(ProjectVertices)(source, begin, end, out)) plain = false;
+              out->Pack(begin, end);
+            });
+  return plain;
+}
+
 // AssembleFaces where every vertex is visible and finite, without its tests. Leaves what follows
 // from shapes to the caller.
-void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out) {
+void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out,
+                        const Workers* workers) {
   const std::size_t n = source.faces.size() / 3;
   for (auto* array : {&out->v0, &out->v1, &out->v2, &out->source_face}) array->resize(n);
-  out->reject.assign(n, kFaceDrawn);
+  out->reject.resize(n);
   out->clipped.clear();
-  for (std::size_t f = 0; f < n; ++f) {
-    out->v0[f] = source.faces[3 * f];
-    out->v1[f] = source.faces[3 * f + 1];
-    out->v2[f] = source.faces[3 * f + 2];
-    out->source_face[f] = static_cast<std::int32_t>(f);
-  }
+  ForChunks(workers, n, DrawnFaces::kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) {
+      out->v0[f] = source.faces[3 * f];
+      out->v1[f] = source.faces[3 * f + 1];
+      out->v2[f] = source.faces[3 * f + 2];
+      out->source_face[f] = static_cast<std::int32_t>(f);
+      out->reject[f] = kFaceDrawn;
+    }
+  });
 }
 
 bool AllVisible(const ScreenMesh& mesh) {
@@ -54,19 +74,21 @@ ScreenGradients Deinterleave(const VertexGradients& d_mesh, ProjectBackwardScrat
 }  // namespace
 
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
-             DrawnFaces* drawn) {
+             DrawnFaces* drawn, const Workers* workers) {
   const std::size_t n = source.positions.size() / 3;
   for (auto* array : {&out->x, &out->y, &out->depth, &out->inverse_depth}) array->resize(n);
+  out->packed.resize(n);
   out->source_vertices = static_cast<std::int32_t>(n);
   out->source_faces = static_cast<std::int32_t>(source.faces.size() / 3);
   out->width = width, out->height = height;
-  if (HWY_DYNAMIC_DISPATCH(ProjectVertices)(source, out)) {
-    AssembleWholeFaces(source, out);
+  if (ProjectSource(source, out, workers)) {
+    AssembleWholeFaces(source, out, workers);
   } else {
     AssembleFaces(source, out);
+    out->packed.resize(out->x.size());
+    out->Pack(n, out->x.size());
   }
-  out->Pack();
-  SetUpDrawnFaces(out->View(), source.cull_back, out->reject, drawn);
+  SetUpDrawnFaces(out->View(), source.cull_back, out->reject, drawn, workers);
 }
 
 void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,

@@ -13,9 +13,9 @@ namespace tilegrad::raster {
 
 // Fills `out` with the screen mesh of a validated, finite source, and `drawn`, if not null, with
 // the faces that may cover a pixel. Deterministic; allocates only to grow them. Not thread-safe for
-// one `out`.
+// one `out`. `workers` null: the calling thread.
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
-             DrawnFaces* drawn = nullptr);
+             DrawnFaces* drawn = nullptr, const Workers* workers = nullptr);
 
 // What the adjoint of Project is asked for.
 struct ProjectGradients {

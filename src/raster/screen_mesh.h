@@ -81,10 +81,9 @@ struct ScreenMeshBuffersT {
     return {x,           y,       depth,  inverse_depth,   packed,       v0,    v1,    v2,
             source_face, clipped, reject, source_vertices, source_faces, width, height};
   }
-  // Fills `packed` from the other arrays of vertices.
-  void Pack() {
-    packed.resize(x.size());
-    for (std::size_t v = 0; v < x.size(); ++v) packed[v] = {x[v], y[v], inverse_depth[v], depth[v]};
+  // Fills vertices [begin, end) of `packed` from the other arrays.
+  void Pack(std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) packed[v] = {x[v], y[v], inverse_depth[v], depth[v]};
   }
 };
 using ScreenMeshBuffers = ScreenMeshBuffersT<float>;

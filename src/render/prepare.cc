@@ -74,15 +74,15 @@ void RememberPrepared(const SceneView& scene, const RenderOptions& options,
 }
 
 void PrepareMesh(const SceneView& scene, const RenderOptions& options,
-                 const PrepareRequest& request, ImageScratch* image) {
+                 const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
   raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image->buffers,
-                  request.drawn_bins ? &image->drawn_faces : nullptr);
+                  request.drawn_bins ? &image->drawn_faces : nullptr, &workers);
   image->mesh = image->buffers.View();
   const raster::TileGrid grid(options.width, options.height);
   if (request.drawn_bins) {
-    image->drawn = raster::BinDrawnFaces(image->drawn_faces.faces(),
-                                         raster::BinGrid(options.width, options.height),
-                                         &image->drawn_buffers);
+    image->drawn =
+        raster::BinDrawnFaces(image->drawn_faces, raster::BinGrid(options.width, options.height),
+                              &image->drawn_buffers, &workers);
   }
   if (request.soft_bins) {
     image->soft_plan =
@@ -96,12 +96,12 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
 }  // namespace
 
 bool PrepareImage(const SceneView& scene, const RenderOptions& options,
-                  const PrepareRequest& request, ImageScratch* image) {
+                  const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
   const Unchanged unchanged = CompareScene(scene, request, image->prepared);
   if (!IsSoundScene(scene, unchanged)) return false;
   if (!IsPrepared(scene, options, request, unchanged, image->prepared)) {
     image->prepared.valid = false;
-    PrepareMesh(scene, options, request, image);
+    PrepareMesh(scene, options, request, workers, image);
     RememberPrepared(scene, options, request, unchanged, &image->prepared);
   }
   PrepareAttributes(scene, image);

@@ -49,7 +49,7 @@ struct Renderer::Impl {
     if (images.size() < scenes.size()) images.resize(scenes.size());
     sound = true;
     workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-      Require(PrepareImage(scenes[n], options, request, &images[n]));
+      Require(PrepareImage(scenes[n], options, request, *workers, &images[n]));
     });
     return sound ? Status() : ValidateSceneNumbers(scenes);
   }

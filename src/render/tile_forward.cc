@@ -112,7 +112,7 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
 
 double RenderBin(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
                  const TileTask& task, WorkerScratch* worker, Frame* frame) {
-  raster::ComputeVisibility(image.mesh, {image.drawn_faces.faces(), image.drawn[task.tile]},
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]},
                             task.rect, &worker->bin);
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),

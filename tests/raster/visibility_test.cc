@@ -43,7 +43,8 @@ struct Flat {
   }
   ScreenMesh Finish() {
     buffers.width = width, buffers.height = height;
-    buffers.Pack();
+    buffers.packed.resize(buffers.x.size());
+    buffers.Pack(0, buffers.x.size());
     buffers.source_vertices = static_cast<std::int32_t>(buffers.x.size());
     buffers.source_faces = static_cast<std::int32_t>(buffers.v0.size());
     for (std::size_t f = 0; f < buffers.v0.size(); ++f) {
@@ -65,12 +66,12 @@ std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
   const TileGrid bins = BinGrid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
-  const TileLists lists = BinDrawnFaces(drawn.faces(), bins, &buffers);
+  const TileLists lists = BinDrawnFaces(drawn, bins, &buffers);
   std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
   VisibilityBin bin;
   for (std::size_t b = 0; b < bins.tiles(); ++b) {
     const TileRect rect = bins.rect(b);
-    ComputeVisibility(mesh, {drawn.faces(), lists[b]}, rect, &bin);
+    ComputeVisibility(mesh, {drawn.storage, lists[b]}, rect, &bin);
     for (int i = rect.y0; i < rect.y1; ++i) {
       for (int j = rect.x0; j < rect.x1; ++j) {
         out[static_cast<std::size_t>(i) * mesh.width + j] =
@@ -229,7 +230,7 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   const TileGrid grid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
-  const TileLists bins = BinDrawnFaces(drawn.faces(), grid, &buffers);
+  const TileLists bins = BinDrawnFaces(drawn, grid, &buffers);
   std::size_t listed = 0;
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
     EXPECT_TRUE(std::is_sorted(bins[t].begin(), bins[t].end()));
@@ -244,7 +245,7 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
       }
       if (!covers) continue;
       EXPECT_TRUE(std::any_of(bins[t].begin(), bins[t].end(), [&](std::int32_t i) {
-        return drawn.faces()[static_cast<std::size_t>(i)].face == static_cast<int>(f);
+        return drawn.storage[static_cast<std::size_t>(i)].face == static_cast<int>(f);
       }));
     }
   }
