@@ -124,20 +124,25 @@ class SoftTruth {
     const bool both_end = z - error > 87;  // and so the computed one is 0
     return both_end ? std::exp(-z) : std::min(1.0, std::exp(-z) * std::expm1(error + 3 * kU));
   }
-  // Rounding of alpha at pixel i: the running bound of docs/numerics.md.
-  double Rounding(std::size_t i) const {
+  struct AlphaBound {
+    double alpha, rounding;
+  };
+  // Alpha of pixel i, and its rounding: the running bound of docs/numerics.md.
+  AlphaBound Bound(std::size_t i) const {
     std::vector<double> most, errors;  // of 1 - A
+    double outside = 1;
     for (std::size_t f = 0; f < faces_.size(); ++f) {
-      const double z = Z(i, f);
+      const double z = Z(i, f), factor = -std::expm1(-z);
       errors.push_back(ErrorOfA(z, f));
-      most.push_back(std::min(1.0, errors.back() - std::expm1(-z)));
+      most.push_back(std::min(1.0, errors.back() + factor));
+      outside *= factor;
     }
     const auto others = ProductsOfOthers(most);
-    double sum = 20 * kU * Alpha(i);
+    double sum = 20 * kU * (1 - outside);
     for (std::size_t f = 0; f < errors.size(); ++f) sum += others[f] * errors[f];
-
-    return sum + 1e-16 * static_cast<double>(errors.size());
+    return {1 - outside, sum + 1e-16 * static_cast<double>(errors.size())};
   }
+  double Rounding(std::size_t i) const { return Bound(i).rounding; }
   // Whether coordinates are small enough for double to tell how far the pixel is from each face
   // that may matter. Far beyond 1e8 pixels neither this truth nor a kernel knows.
   bool Resolved(std::size_t i) const {

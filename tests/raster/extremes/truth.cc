@@ -9,19 +9,16 @@
 #include <vector>
 
 #include "raster/extremes/bounded.h"
+#include "raster/extremes/soft_scene.h"
 #include "raster/project.h"
-#include "raster/soft_mask_test_util.h"
 #include "render/renderer_ref.h"
 
 namespace tilegrad::test {
 namespace {
 
-using raster::test::SoftScene;
-using raster::test::SoftTruth;
-
 // Kernels take the operations of the references in another order and with fused products: at most
 // so many times their bound.
-constexpr double kOtherOrder = 4;
+constexpr double kOtherOrder = 8;
 constexpr double kBits = kUnitRoundoff;
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
@@ -67,21 +64,6 @@ raster::ScreenMeshBuffersT<To> MeshCast(const raster::ScreenMeshBuffersT<From>& 
   for (const auto& c : m.clipped) out.clipped.push_back({c.a, c.b, To(c.t)});
   out.reject = m.reject, out.source_vertices = m.source_vertices;
   out.source_faces = m.source_faces, out.width = m.width, out.height = m.height;
-  return out;
-}
-
-// The faces that take part in alpha, as the soft mask's own tests see them.
-SoftScene SoftSceneOf(const raster::ScreenMeshBuffers& mesh, const RenderOptions& options) {
-  SoftScene out;
-  out.Resize(options.width, options.height);
-  out.options.delta = options.delta, out.options.max_alpha_error = options.max_alpha_error;
-  out.mesh.x = mesh.x, out.mesh.y = mesh.y;
-  for (std::size_t f = 0; f < mesh.v0.size(); ++f) {
-    if ((mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
-    out.mesh.v0.push_back(mesh.v0[f]), out.mesh.v1.push_back(mesh.v1[f]);
-    out.mesh.v2.push_back(mesh.v2[f]), out.mesh.reject.push_back(mesh.reject[f]);
-  }
-  out.options.faces = out.mesh.v0.size();
   return out;
 }
 
