@@ -44,8 +44,10 @@ struct ImageScratch {
   raster::TileLists drawn, soft;
   raster::SoftMaskPlan soft_plan;
   PreparedFrom prepared;
+};
 
-  // Backward: gradients in the layout of `mesh`.
+// Gradients of one image in the layout of its screen mesh.
+struct MergeScratch {
   AlignedVector<float> d_vertices;              // [V][4] d_x, d_y, d_inverse_depth, 0
   AlignedVector<float> d_rows;                  // [rows of attributes][groups of channels][4]
   AlignedVector<float> d_attributes, d_clip_t;  // where faces were cut
@@ -75,6 +77,11 @@ struct WorkerScratch {
   raster::InterpolateScratch interpolate;
   raster::SoftMaskScratch soft;
   raster::BandSums band;
+  MergeScratch merge;
+  // Of an image that is small enough to be one task: it stays in the worker's cache.
+  raster::DrawnFaces drawn_faces;
+  BandGradients band_gradients;
+  BinGradients bin_gradients;
 };
 
 // One tile of one image of the batch.

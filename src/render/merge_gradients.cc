@@ -86,58 +86,61 @@ void PackRows(const AlignedVector<float>& quads, std::size_t channels, std::span
 }
 
 // Sums the bands' gradients of attributes into `d_attributes`, in the layout of the screen mesh.
-void SumAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
-                   std::span<float> d_attributes) {
-  if (scene.channels == 0) return;
-  const std::size_t rows = d_attributes.size() / static_cast<std::size_t>(scene.channels);
-  image->d_rows.assign(4 * rows * raster::ChannelGroups(scene.channels), 0.0f);
+void SumAttributes(const ImageScratch& image, const ImageGradients& gradients,
+                   AlignedVector<float>* d_rows, std::span<float> d_attributes) {
+  const auto channels = static_cast<std::size_t>(image.attributes.channels);
+  if (channels == 0) return;
+  const std::size_t groups = raster::ChannelGroups(image.attributes.channels);
+  d_rows->assign(4 * groups * (d_attributes.size() / channels), 0.0f);
   for (const BandGradients& band : gradients.bands) {
-    AddBandAttributes(*image, gradients.request.geometry, band, image->d_rows.data());
+    AddBandAttributes(image, gradients.request.geometry, band, d_rows->data());
   }
-  PackRows(image->d_rows, static_cast<std::size_t>(scene.channels), d_attributes);
+  PackRows(*d_rows, channels, d_attributes);
 }
 
 // Attributes of a mesh that was cut; d_clip_t is wanted wherever geometry is.
-void FinishClippedAttributes(const SceneView& scene, const ImageGradients& gradients,
-                             ImageScratch* image, SceneGradients* d_scene) {
+void MergeClippedAttributes(const SceneView& scene, const ImageScratch& image,
+                            const ImageGradients& gradients, MergeScratch* scratch,
+                            SceneGradients* d_scene) {
   std::fill(d_scene->attributes.begin(), d_scene->attributes.end(), 0.0f);
-  image->d_clip_t.assign(image->mesh.clipped.size(), 0.0f);
-  if (gradients.bands.empty()) return;
-  image->d_attributes.resize(raster::AttributeRows(image->mesh, scene.rate) *
-                             static_cast<std::size_t>(scene.channels));
-  SumAttributes(scene, gradients, image, image->d_attributes);
-  raster::ClipAttributesBackward<float>(image->mesh, scene.faces, AttributesOf(scene),
-                                        image->d_attributes, d_scene->attributes, image->d_clip_t);
+  scratch->d_clip_t.assign(image.mesh.clipped.size(), 0.0f);
+  scratch->d_attributes.resize(raster::AttributeRows(image.mesh, scene.rate) *
+                               static_cast<std::size_t>(scene.channels));
+  SumAttributes(image, gradients, &scratch->d_rows, scratch->d_attributes);
+  raster::ClipAttributesBackward<float>(image.mesh, scene.faces, AttributesOf(scene),
+                                        scratch->d_attributes, d_scene->attributes,
+                                        scratch->d_clip_t);
 }
 
 }  // namespace
 
-bool MergeGeometry(const SceneView& scene, const RenderOptions& options,
-                   const ImageGradients& gradients, ImageScratch* image, SceneGradients* d_scene) {
+bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
+                   const ImageGradients& gradients, MergeScratch* scratch,
+                   SceneGradients* d_scene) {
   bool finite = true;
-  if (image->mesh.was_clipped() && gradients.request.attributes) {
-    FinishClippedAttributes(scene, gradients, image, d_scene);
+  if (image.mesh.was_clipped() && gradients.request.attributes) {
+    MergeClippedAttributes(scene, image, gradients, scratch, d_scene);
     finite = AllFinite(d_scene->attributes);
   }
   if (!gradients.request.geometry) return finite;
-  image->d_vertices.assign(4 * image->mesh.vertices(), 0.0f);
+  scratch->d_vertices.assign(4 * image.mesh.vertices(), 0.0f);
   for (const BandGradients& band : gradients.bands) {
-    AddBandGeometry(image->mesh, band, image->d_vertices.data());
+    AddBandGeometry(image.mesh, band, scratch->d_vertices.data());
   }
   for (const BinGradients& bin : gradients.bins) {
-    AddBinGeometry(image->mesh, bin, image->d_vertices.data());
+    AddBinGeometry(image.mesh, bin, scratch->d_vertices.data());
   }
-  raster::ProjectBackward(FaceSourceOf(scene, options), image->mesh,
-                          {image->d_vertices, image->d_clip_t}, &image->project,
+  raster::ProjectBackward(FaceSourceOf(scene, options), image.mesh,
+                          {scratch->d_vertices, scratch->d_clip_t}, &scratch->project,
                           {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
   return finite && AllFinite(d_scene->positions) &&
          (!d_scene->camera || IsFiniteCamera(d_scene->d_camera));
 }
 
-bool MergeAttributes(const SceneView& scene, const ImageGradients& gradients, ImageScratch* image,
-                     SceneGradients* d_scene) {
-  if (d_scene->attributes.empty() || image->mesh.was_clipped()) return true;
-  SumAttributes(scene, gradients, image, d_scene->attributes);
+bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
+                     MergeScratch* scratch, SceneGradients* d_scene) {
+  if (d_scene->attributes.empty() || image.mesh.was_clipped()) return true;
+  SumAttributes(image, gradients, &scratch->d_rows, d_scene->attributes);
   return AllFinite(d_scene->attributes);
 }
 

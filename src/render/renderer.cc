@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "render/frame_layout.h"
@@ -16,61 +17,66 @@
 namespace tilegrad {
 namespace {
 
-// Tasks of each image.
-struct BackwardPlan {
-  raster::TileGrid grid;    // of bins
-  std::size_t bands, bins;  // no bins where alpha has no gradient
-
-  BackwardPlan(const RenderOptions& options, const FrameGradients& d_frame)
-      : grid(raster::BinGrid(options.width, options.height)),
-        bands(BandGrid(options.width, options.height).count()),
-        bins(d_frame.alpha.empty() ? 0 : grid.tiles()) {}
+// A call of Render or Backward.
+struct ForwardCall {
+  std::span<const SceneView> scenes;
+  const RenderOptions& options;
+  PrepareRequest request;
+  Frame* frame;
 };
 
-bool WantsGeometry(const SceneGradients& wanted) {
-  return !wanted.positions.empty() || wanted.camera;
-}
+struct BackwardCall {
+  std::span<const SceneView> scenes;
+  BackwardInput input;
+  PrepareRequest request;
+  std::span<SceneGradients> d_scenes;
+  raster::TileGrid grid;    // of bins
+  std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
 
-// Where faces were cut, geometry moves the attributes at the cut.
-raster::BackwardRequest BandRequest(const SceneGradients& wanted, const raster::ScreenMesh& mesh) {
-  const bool geometry = WantsGeometry(wanted);
-  return {geometry, !wanted.attributes.empty() || (geometry && mesh.was_clipped())};
+  bool wants_geometry(std::size_t n) const {
+    return !d_scenes[n].positions.empty() || d_scenes[n].camera;
+  }
+  // Where faces were cut, geometry moves the attributes at the cut.
+  raster::BackwardRequest request_of(std::size_t n, const raster::ScreenMesh& mesh) const {
+    const bool geometry = wants_geometry(n);
+    return {geometry, !d_scenes[n].attributes.empty() || (geometry && mesh.was_clipped())};
+  }
+};
+
+// Only after something was found to be wrong.
+Status FindError(const BackwardCall& call) {
+  TILEGRAD_TRY(ValidateSceneNumbers(call.scenes));
+  TILEGRAD_TRY(ValidateBackwardNumbers(call.scenes, call.input.frame, call.input.d_frame));
+  return ValidateResult(call.d_scenes);
 }
 
 }  // namespace
 
+// How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
+// cache of its worker from beginning to end; the stages of larger ones are shared, part by part.
 struct Renderer::Impl {
   explicit Impl(const Workers& w)
       : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {}
 
-  // Projects and bins every scene of the batch.
-  Status Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
-                 const PrepareRequest& request) {
-    if (images.size() < scenes.size()) images.resize(scenes.size());
-    sound = true;
-    workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-      Require(PrepareImage(scenes[n], options, request, *workers, &images[n]));
-    });
-    return sound ? Status() : ValidateSceneNumbers(scenes);
-  }
+  Status Render(const ForwardCall& call);
+  Status Backward(const BackwardCall& call);
+
+  bool Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
+               const PrepareRequest& request);
+  void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
+  void RenderOneBin(const ForwardCall& call, const TileTask& bin, WorkerScratch* worker);
+
+  void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
+  bool BackwardParts(const BackwardCall& call);
+  bool Merge(const BackwardCall& call);
+  void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
+                    BandGradients* out);
+  void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
+                   BinGradients* out);
 
   void Require(bool holds) {
     if (!holds) sound = false;
   }
-
-  // Calls run(task, worker) for all tiles of `grid` of all images together.
-  template <class Run>
-  void ForTiles(std::size_t count, const raster::TileGrid& grid, const Run& run) {
-    workers->For(count * grid.tiles(), [&](std::size_t index, std::size_t worker) {
-      const std::size_t tile = index % grid.tiles();
-      run(TileTask{index / grid.tiles(), tile, grid.rect(tile)}, worker);
-    });
-  }
-
-  Status SumFaces(std::span<const SceneView> scenes, const BackwardInput& input,
-                  const BackwardPlan& plan, std::span<const SceneGradients> d_scenes);
-  Status Merge(std::span<const SceneView> scenes, const RenderOptions& options,
-               const BackwardPlan& plan, std::span<SceneGradients> d_scenes);
 
   const Workers* workers;
   std::atomic<bool> sound = true;  // false: some task met a number that is an error
@@ -81,47 +87,137 @@ struct Renderer::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-Status Renderer::Impl::SumFaces(std::span<const SceneView> scenes, const BackwardInput& input,
-                                const BackwardPlan& plan,
-                                std::span<const SceneGradients> d_scenes) {
-  const std::size_t bands = scenes.size() * plan.bands, bins = scenes.size() * plan.bins;
+// Projects and bins every scene of the batch.
+bool Renderer::Impl::Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
+                             const PrepareRequest& request) {
+  workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
+    Require(PrepareImage(scenes[n], options, request, *workers, &images[n]));
+  });
+  return sound;
+}
+
+void Renderer::Impl::RenderOneBin(const ForwardCall& call, const TileTask& bin,
+                                  WorkerScratch* worker) {
+  const std::size_t bins = bin_errors.size() / call.scenes.size();
+  bin_errors[bin.image * bins + bin.tile] =
+      RenderBin(call.scenes[bin.image], call.options, images[bin.image], bin, worker, call.frame);
+}
+
+// The list of drawn faces, the largest thing of all, is the worker's, not the image's.
+void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
+                                      WorkerScratch* worker) {
+  ImageScratch& image = images[n];
+  std::swap(image.drawn_faces, worker->drawn_faces);
+  if (PrepareImage(call.scenes[n], call.options, call.request, *workers, &image)) {
+    RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
+  } else {
+    sound = false;
+  }
+  image.prepared.drawn_bins = false;
+  std::swap(image.drawn_faces, worker->drawn_faces);
+}
+
+Status Renderer::Impl::Render(const ForwardCall& call) {
+  const std::size_t count = call.scenes.size();
+  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  if (images.size() < count) images.resize(count);
+  bin_errors.assign(count * bins.tiles(), 0.0);
+  sound = true;
+  if (bins.tiles() == 1) {
+    workers->For(count, [&](std::size_t n, std::size_t worker) {
+      RenderWholeImage(call, n, &worker_scratch[worker]);
+    });
+  } else if (Prepare(call.scenes, call.options, call.request)) {
+    workers->For(count * bins.tiles(), [&](std::size_t task, std::size_t worker) {
+      const std::size_t bin = task % bins.tiles();
+      RenderOneBin(call, {task / bins.tiles(), bin, bins.rect(bin)}, &worker_scratch[worker]);
+    });
+  }
+  if (!sound) return ValidateSceneNumbers(call.scenes);
+  for (const double error : bin_errors) {
+    call.frame->alpha_error_bound = std::max(call.frame->alpha_error_bound, error);
+  }
+  return {};
+}
+
+void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
+                                  WorkerScratch* worker, BandGradients* out) {
+  const ImageScratch& image = images[task.image];
+  Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
+                             &worker->band, out));
+}
+
+void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
+                                 WorkerScratch* worker, BinGradients* out) {
+  if (!call.wants_geometry(n)) return;
+  RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, &worker->soft, out);
+}
+
+void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
+                                        WorkerScratch* worker) {
+  ImageScratch& image = images[n];
+  const SceneView& scene = call.scenes[n];
+  if (!PrepareImage(scene, call.input.options, call.request, *workers, &image)) {
+    sound = false;
+    return;
+  }
+  BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
+  if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
+  const ImageGradients gradients{{&worker->band_gradients, 1},
+                                 {&worker->bin_gradients, call.bins},
+                                 call.request_of(n, image.mesh)};
+  SceneGradients* d_scene = &call.d_scenes[n];
+  Require(MergeGeometry(scene, call.input.options, image, gradients, &worker->merge, d_scene));
+  Require(MergeAttributes(image, gradients, &worker->merge, d_scene));
+}
+
+// Bands and bins of all images together.
+bool Renderer::Impl::BackwardParts(const BackwardCall& call) {
+  const std::size_t bands = call.scenes.size() * call.bands, bins = call.scenes.size() * call.bins;
   if (band_gradients.size() < bands) band_gradients.resize(bands);
   if (bin_gradients.size() < bins) bin_gradients.resize(bins);
-  sound = true;
   workers->For(bands + bins, [&](std::size_t task, std::size_t w) {
-    WorkerScratch& worker = worker_scratch[w];
+    WorkerScratch* worker = &worker_scratch[w];
     if (task < bands) {
-      const std::size_t n = task / plan.bands;
-      Require(RenderBandBackward(input, images[n], {n, task % plan.bands},
-                                 BandRequest(d_scenes[n], images[n].mesh), &worker.band,
-                                 &band_gradients[task]));
+      BackwardBand(call, {task / call.bands, task % call.bands}, worker, &band_gradients[task]);
       return;
     }
     task -= bands;
-    const std::size_t n = task / plan.bins, bin = task % plan.bins;
-    if (!WantsGeometry(d_scenes[n])) return;
-    RenderBinBackward(input, images[n], {n, bin, plan.grid.rect(bin)}, &worker.soft,
-                      &bin_gradients[task]);
+    BackwardBin(call, task / call.bins, task % call.bins, worker, &bin_gradients[task]);
   });
-  return sound ? Status() : ValidateBackwardNumbers(scenes, input.frame, input.d_frame);
+  return sound;
 }
 
-// Positions and attributes are two tasks each, for the sake of a batch of one.
-Status Renderer::Impl::Merge(std::span<const SceneView> scenes, const RenderOptions& options,
-                             const BackwardPlan& plan, std::span<SceneGradients> d_scenes) {
-  sound = true;
-  workers->For(2 * scenes.size(), [&](std::size_t task, std::size_t) {
+// Positions and attributes are two tasks, for the sake of a batch of one.
+bool Renderer::Impl::Merge(const BackwardCall& call) {
+  workers->For(2 * call.scenes.size(), [&](std::size_t task, std::size_t w) {
     const std::size_t n = task / 2;
-    const ImageGradients gradients{std::span(band_gradients).subspan(n * plan.bands, plan.bands),
-                                   std::span(bin_gradients).subspan(n * plan.bins, plan.bins),
-                                   BandRequest(d_scenes[n], images[n].mesh)};
+    const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
+                                   std::span(bin_gradients).subspan(n * call.bins, call.bins),
+                                   call.request_of(n, images[n].mesh)};
+    MergeScratch* scratch = &worker_scratch[w].merge;
     if (task % 2 == 0) {
-      Require(MergeGeometry(scenes[n], options, gradients, &images[n], &d_scenes[n]));
+      Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, scratch,
+                            &call.d_scenes[n]));
     } else {
-      Require(MergeAttributes(scenes[n], gradients, &images[n], &d_scenes[n]));
+      Require(MergeAttributes(images[n], gradients, scratch, &call.d_scenes[n]));
     }
   });
-  return sound ? Status() : ValidateResult(d_scenes);
+  return sound;
+}
+
+Status Renderer::Impl::Backward(const BackwardCall& call) {
+  if (images.size() < call.scenes.size()) images.resize(call.scenes.size());
+  sound = true;
+  if (call.grid.tiles() == 1 && call.bands == 1) {
+    workers->For(call.scenes.size(), [&](std::size_t n, std::size_t worker) {
+      BackwardWholeImage(call, n, &worker_scratch[worker]);
+    });
+    return sound ? Status() : FindError(call);
+  }
+  const bool done =
+      Prepare(call.scenes, call.input.options, call.request) && BackwardParts(call) && Merge(call);
+  return done ? Status() : FindError(call);
 }
 
 Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
@@ -135,28 +231,22 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  const raster::TileGrid bins = raster::BinGrid(options.width, options.height);
-  impl_->bin_errors.assign(scenes.size() * bins.tiles(), 0.0);
-  TILEGRAD_TRY(impl_->Prepare(scenes, options, {true, request.alpha, false}));
-  impl_->ForTiles(scenes.size(), bins, [&](const TileTask& task, std::size_t worker) {
-    impl_->bin_errors[task.image * bins.tiles() + task.tile] =
-        RenderBin(scenes[task.image], options, impl_->images[task.image], task,
-                  &impl_->worker_scratch[worker], frame);
-  });
-  for (const double error : impl_->bin_errors) {
-    frame->alpha_error_bound = std::max(frame->alpha_error_bound, error);
-  }
-  return {};
+  return impl_->Render({scenes, options, {true, request.alpha, false}, frame});
 }
 
 Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                           const Frame& frame, const FrameGradients& d_frame,
                           std::span<SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
-  TILEGRAD_TRY(impl_->Prepare(scenes, options, {false, !d_frame.alpha.empty(), true}));
-  const BackwardPlan plan(options, d_frame);
-  TILEGRAD_TRY(impl_->SumFaces(scenes, {options, frame, d_frame}, plan, d_scenes));
-  return impl_->Merge(scenes, options, plan, d_scenes);
+  const raster::TileGrid grid = raster::BinGrid(options.width, options.height);
+  const bool alpha = !d_frame.alpha.empty();
+  return impl_->Backward({scenes,
+                          {options, frame, d_frame},
+                          {false, alpha, true},
+                          d_scenes,
+                          grid,
+                          BandGrid(options.width, options.height).count(),
+                          alpha ? grid.tiles() : 0});
 }
 
 }  // namespace tilegrad
