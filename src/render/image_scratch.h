@@ -78,6 +78,7 @@ struct WorkerScratch {
   raster::SoftMaskScratch soft;
   raster::BandSums band;
   MergeScratch merge;
+  RenderStats stats;
   // Of an image that is small enough to be one task: it stays in the worker's cache.
   raster::DrawnFaces drawn_faces;
   BandGradients band_gradients;

@@ -115,14 +115,17 @@ void MergeClippedAttributes(const SceneView& scene, const ImageScratch& image,
 }  // namespace
 
 bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                   const ImageGradients& gradients, MergeScratch* scratch,
+                   const ImageGradients& gradients, WorkerScratch* worker,
                    SceneGradients* d_scene) {
+  MergeScratch* const scratch = &worker->merge;
   bool finite = true;
   if (image.mesh.was_clipped() && gradients.request.attributes) {
     MergeClippedAttributes(scene, image, gradients, scratch, d_scene);
     finite = AllFinite(d_scene->attributes);
+    ++worker->stats.merged;
   }
   if (!gradients.request.geometry) return finite;
+  ++worker->stats.merged;
   scratch->d_vertices.assign(4 * image.mesh.vertices(), 0.0f);
   for (const BandGradients& band : gradients.bands) {
     AddBandGeometry(image.mesh, band, scratch->d_vertices.data());
@@ -138,9 +141,10 @@ bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const I
 }
 
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
-                     MergeScratch* scratch, SceneGradients* d_scene) {
+                     WorkerScratch* worker, SceneGradients* d_scene) {
   if (d_scene->attributes.empty() || image.mesh.was_clipped()) return true;
-  SumAttributes(image, gradients, &scratch->d_rows, d_scene->attributes);
+  ++worker->stats.merged;
+  SumAttributes(image, gradients, &worker->merge.d_rows, d_scene->attributes);
   return AllFinite(d_scene->attributes);
 }
 

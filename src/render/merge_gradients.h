@@ -21,11 +21,11 @@ struct ImageGradients {
 // Overwrites d_scene's positions and d_camera, where they are wanted. Returns whether all that it
 // has written is finite.
 bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                   const ImageGradients& gradients, MergeScratch* scratch, SceneGradients* d_scene);
+                   const ImageGradients& gradients, WorkerScratch* worker, SceneGradients* d_scene);
 
 // Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
 // MergeGeometry, since attributes at the cut depend on geometry.
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
-                     MergeScratch* scratch, SceneGradients* d_scene);
+                     WorkerScratch* worker, SceneGradients* d_scene);
 
 }  // namespace tilegrad

@@ -96,10 +96,12 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
 }  // namespace
 
 bool PrepareImage(const SceneView& scene, const RenderOptions& options,
-                  const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
+                  const PrepareRequest& request, const Workers& workers, ImageScratch* image,
+                  RenderStats* stats) {
   const Unchanged unchanged = CompareScene(scene, request, image->prepared);
   if (!IsSoundScene(scene, unchanged)) return false;
   if (!IsPrepared(scene, options, request, unchanged, image->prepared)) {
+    ++stats->prepared;
     image->prepared.valid = false;
     PrepareMesh(scene, options, request, workers, image);
     RememberPrepared(scene, options, request, unchanged, &image->prepared);

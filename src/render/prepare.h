@@ -15,6 +15,7 @@ struct PrepareRequest {
 
 // Returns false, and prepares nothing, if a number of the scene is not finite or out of range.
 bool PrepareImage(const SceneView& scene, const RenderOptions& options,
-                  const PrepareRequest& request, const Workers& workers, ImageScratch* image);
+                  const PrepareRequest& request, const Workers& workers, ImageScratch* image,
+                  RenderStats* stats);
 
 }  // namespace tilegrad

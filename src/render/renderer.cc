@@ -74,6 +74,11 @@ struct Renderer::Impl {
   void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
                    BinGradients* out);
 
+  void Begin(std::size_t count) {
+    if (images.size() < count) images.resize(count);
+    for (WorkerScratch& worker : worker_scratch) worker.stats = {};
+    sound = true;
+  }
   void Require(bool holds) {
     if (!holds) sound = false;
   }
@@ -90,8 +95,9 @@ struct Renderer::Impl {
 // Projects and bins every scene of the batch.
 bool Renderer::Impl::Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
                              const PrepareRequest& request) {
-  workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-    Require(PrepareImage(scenes[n], options, request, *workers, &images[n]));
+  workers->For(scenes.size(), [&](std::size_t n, std::size_t worker) {
+    Require(PrepareImage(scenes[n], options, request, *workers, &images[n],
+                         &worker_scratch[worker].stats));
   });
   return sound;
 }
@@ -108,7 +114,7 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
-  if (PrepareImage(call.scenes[n], call.options, call.request, *workers, &image)) {
+  if (PrepareImage(call.scenes[n], call.options, call.request, *workers, &image, &worker->stats)) {
     RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
   } else {
     sound = false;
@@ -120,9 +126,8 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
 Status Renderer::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  if (images.size() < count) images.resize(count);
+  Begin(count);
   bin_errors.assign(count * bins.tiles(), 0.0);
-  sound = true;
   if (bins.tiles() == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
       RenderWholeImage(call, n, &worker_scratch[worker]);
@@ -144,20 +149,20 @@ void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task
                                   WorkerScratch* worker, BandGradients* out) {
   const ImageScratch& image = images[task.image];
   Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
-                             &worker->band, out));
+                             worker, out));
 }
 
 void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
                                  WorkerScratch* worker, BinGradients* out) {
   if (!call.wants_geometry(n)) return;
-  RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, &worker->soft, out);
+  RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, worker, out);
 }
 
 void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
   const SceneView& scene = call.scenes[n];
-  if (!PrepareImage(scene, call.input.options, call.request, *workers, &image)) {
+  if (!PrepareImage(scene, call.input.options, call.request, *workers, &image, &worker->stats)) {
     sound = false;
     return;
   }
@@ -167,8 +172,8 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                  {&worker->bin_gradients, call.bins},
                                  call.request_of(n, image.mesh)};
   SceneGradients* d_scene = &call.d_scenes[n];
-  Require(MergeGeometry(scene, call.input.options, image, gradients, &worker->merge, d_scene));
-  Require(MergeAttributes(image, gradients, &worker->merge, d_scene));
+  Require(MergeGeometry(scene, call.input.options, image, gradients, worker, d_scene));
+  Require(MergeAttributes(image, gradients, worker, d_scene));
 }
 
 // Bands and bins of all images together.
@@ -195,20 +200,19 @@ bool Renderer::Impl::Merge(const BackwardCall& call) {
     const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
                                    std::span(bin_gradients).subspan(n * call.bins, call.bins),
                                    call.request_of(n, images[n].mesh)};
-    MergeScratch* scratch = &worker_scratch[w].merge;
+    WorkerScratch* worker = &worker_scratch[w];
     if (task % 2 == 0) {
-      Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, scratch,
+      Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, worker,
                             &call.d_scenes[n]));
     } else {
-      Require(MergeAttributes(images[n], gradients, scratch, &call.d_scenes[n]));
+      Require(MergeAttributes(images[n], gradients, worker, &call.d_scenes[n]));
     }
   });
   return sound;
 }
 
 Status Renderer::Impl::Backward(const BackwardCall& call) {
-  if (images.size() < call.scenes.size()) images.resize(call.scenes.size());
-  sound = true;
+  Begin(call.scenes.size());
   if (call.grid.tiles() == 1 && call.bands == 1) {
     workers->For(call.scenes.size(), [&](std::size_t n, std::size_t worker) {
       BackwardWholeImage(call, n, &worker_scratch[worker]);
@@ -247,6 +251,16 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           grid,
                           BandGrid(options.width, options.height).count(),
                           alpha ? grid.tiles() : 0});
+}
+
+RenderStats Renderer::stats() const {
+  RenderStats sum;
+  for (const WorkerScratch& worker : impl_->worker_scratch) {
+    sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
+    sum.interpolated += worker.stats.interpolated, sum.softened += worker.stats.softened;
+    sum.merged += worker.stats.merged;
+  }
+  return sum;
 }
 
 }  // namespace tilegrad

@@ -93,6 +93,16 @@ using Frame = FrameT<float>;
 using FrameGradients = FrameGradientsT<float>;
 using SceneGradients = SceneGradientsT<float>;
 
+// What a call of Render or Backward did. Parts: bins of an image where it is drawn or given alpha,
+// bands of it on the way back through attributes.
+struct RenderStats {
+  std::int64_t prepared = 0;  // images projected and listed; others were as they had been before
+  std::int64_t drawn = 0;     // parts
+  std::int64_t interpolated = 0;  // parts, forward or backward
+  std::int64_t softened = 0;      // parts, forward or backward
+  std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
+};
+
 // Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
 // at a time per Renderer. Same bits for any worker count and any run. All scenes of a batch have
 // the same number of channels.
@@ -114,6 +124,8 @@ class Renderer {
   Status Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                   const Frame& frame, const FrameGradients& d_frame,
                   std::span<SceneGradients> d_scenes);
+
+  RenderStats stats() const;  // of the last call
 
  private:
   struct Impl;

@@ -61,7 +61,7 @@ bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std
 }  // namespace
 
 bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
-                        const raster::BackwardRequest& request, raster::BandSums* sums,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
                         BandGradients* out) {
   const BandGrid bands(input.options.width, input.options.height);
   const BandPlace place(bands, task);
@@ -69,6 +69,8 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
   out->faces.clear();
   if (!IsSoundBand(input, image.mesh, channels, place)) return false;
   if (input.d_frame.attributes.empty() || !(request.geometry || request.attributes)) return true;
+  ++worker->stats.interpolated;
+  raster::BandSums* const sums = &worker->band;
   auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
   if (image.mesh.was_clipped()) {
     FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
@@ -92,12 +94,13 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
 }
 
 void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
-                       raster::SoftMaskScratch* scratch, BinGradients* out) {
+                       WorkerScratch* worker, BinGradients* out) {
   const raster::TileGrid tiles(input.options.width, input.options.height);
   const std::size_t pixels =
       static_cast<std::size_t>(tiles.width) * static_cast<std::size_t>(tiles.height);
   const auto part = [&](auto batch) { return batch.subspan(bin.image * pixels, pixels); };
   out->tiles.clear();
+  ++worker->stats.softened;
   std::size_t end = 0;
   for (int y = bin.rect.y0; y < bin.rect.y1; y += raster::kTileSize) {
     for (int x = bin.rect.x0; x < bin.rect.x1; x += raster::kTileSize) {
@@ -109,7 +112,7 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
       end += 6 * tile.faces.size();
       if (out->values.size() < end) out->values.resize(end);
       raster::SoftMaskBackward(image.mesh, image.soft_plan, tile, part(input.d_frame.alpha),
-                               std::span(out->values).subspan(begin, end - begin), scratch);
+                               std::span(out->values).subspan(begin, end - begin), &worker->soft);
       out->tiles.push_back({tile.faces, begin});
     }
   }

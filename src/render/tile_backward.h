@@ -38,11 +38,11 @@ struct BandTask {
 // Gradients of the faces seen in a band, through their attributes. Returns false, and does nothing
 // else, if a number of the frame or its gradients in the band is not finite or out of range.
 bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
-                        const raster::BackwardRequest& request, raster::BandSums* sums,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
                         BandGradients* out);
 
 // Gradients of the faces that reach the tiles of a bin, through alpha.
 void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
-                       raster::SoftMaskScratch* scratch, BinGradients* out);
+                       WorkerScratch* worker, BinGradients* out);
 
 }  // namespace tilegrad

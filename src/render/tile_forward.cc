@@ -77,6 +77,7 @@ void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
   raster::InterpolateInput input{&image.mesh, image.attributes, options.interpolation,
                                  barycentrics != nullptr};
   if (attributes == nullptr) input.attributes.channels = 0;
+  ++worker->stats.interpolated;
   const raster::TileRect& rect = task.rect;
   raster::Interpolate(input, {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
                       {{attributes == nullptr ? nullptr : attributes + corner, plane, row},
@@ -96,6 +97,7 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
   const std::span<float> alpha(part.plane(frame->alpha, 1), part.pixels);
   const raster::TileGrid tiles(options.width, options.height);
   double spent = 0;
+  ++worker->stats.softened;
   for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
     for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
       const std::size_t tile = tiles.tile(x, y);
@@ -112,6 +114,7 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
 
 double RenderBin(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
                  const TileTask& task, WorkerScratch* worker, Frame* frame) {
+  ++worker->stats.drawn;
   raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]},
                             task.rect, &worker->bin);
   const ImageOfFrame part{

@@ -11,7 +11,7 @@
 #include <new>
 
 #include "render/renderer.h"
-#include "render/test_scenes.h"
+#include "render/test_batch.h"
 
 // Counts heap allocations of the whole program.
 static std::atomic<long> g_allocations{0};
@@ -34,140 +34,21 @@ void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::fre
 namespace tilegrad {
 namespace {
 
+using test::Batch;
+using test::kHeight;
+using test::kWidth;
+using test::Options;
 using test::TestScene;
 
-constexpr int kWidth = 40, kHeight = 36;
-
-RenderOptions Options() {
-  RenderOptions options;
-  options.width = kWidth, options.height = kHeight, options.delta = 1e-3;
-  return options;
-}
-
-// A batch with its gradients: a sphere, soups, one of them cut by the near plane.
-struct Batch {
-  std::vector<TestScene<float>> scenes;
-  std::vector<SceneView> views;
-  std::vector<float> d_attributes, d_alpha;
-  std::vector<std::vector<float>> positions, attributes;
-  std::vector<SceneGradients> d_scenes;
-
-  Batch() {
-    Rng rng(21, 1);
-    scenes = {test::BumpySphere(10, 12, kWidth, kHeight, &rng),
-              test::TriangleSoup(40, 0.3, kWidth, kHeight, &rng),
-              test::SoupAroundCamera(20, kWidth, kHeight, &rng)};
-    for (const auto& scene : scenes) {
-      views.push_back(scene.View());
-      positions.emplace_back(scene.positions.size());
-      attributes.emplace_back(scene.attributes.size());
-    }
-    for (std::size_t n = 0; n < scenes.size(); ++n) {
-      d_scenes.push_back({positions[n], attributes[n], true, {}});
-    }
-    d_alpha.resize(scenes.size() * kWidth * kHeight), d_attributes.resize(3 * d_alpha.size());
-    for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
-    for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
-  }
-};
-
-// Everything a forward and a backward pass put out, as bytes.
-std::string Bytes(Renderer* renderer, Batch* batch, std::size_t first, std::size_t count) {
-  Frame frame;
-  const auto views = std::span(batch->views).subspan(first, count);
-  const auto d_scenes = std::span(batch->d_scenes).subspan(first, count);
-  const auto part = [&](const std::vector<float>& values) {
-    const std::size_t one = values.size() / batch->views.size();
-    return std::span<const float>(values).subspan(first * one, count * one);
-  };
-  EXPECT_TRUE(renderer->Render(views, Options(), {true, true, true, true}, &frame).ok());
-  EXPECT_TRUE(renderer
-                  ->Backward(views, Options(), frame,
-                             {part(batch->d_attributes), part(batch->d_alpha)}, d_scenes)
-                  .ok());
-  std::string out;
-  const auto add = [&](const auto& values) {
-    out.append(reinterpret_cast<const char*>(std::data(values)),
-               std::size(values) * sizeof(*std::data(values)));
-  };
-  for (std::size_t n = 0; n < count; ++n) {
-    const auto image = [&](const auto& values) {
-      add(std::span(values).subspan(n * values.size() / count, values.size() / count));
-    };
-    image(frame.face_ids), image(frame.attributes), image(frame.alpha);
-    image(frame.depth), image(frame.barycentrics);
-    add(d_scenes[n].positions), add(d_scenes[n].attributes);
-    add(d_scenes[n].d_camera.rotation), add(d_scenes[n].d_camera.translation);
-    const CameraT<float>& d_camera = d_scenes[n].d_camera;
-    add(std::vector<float>{d_camera.fx, d_camera.fy, d_camera.cx, d_camera.cy});
-  }
-  return out;
-}
-
-TEST(RendererBits, SameForAnyWorkerCountAndAnyRun) {
-  Batch batch;
-  std::string first;
-  for (const int count : {1, 2, 3, 7, 16}) {
-    const Workers workers(count);
-    Renderer renderer(workers);
-    for (int run = 0; run < 3; ++run) {
-      const std::string bytes = Bytes(&renderer, &batch, 0, 3);
-      if (first.empty()) first = bytes;
-      EXPECT_TRUE(bytes == first) << count << " workers, run " << run;
-    }
-  }
-}
-
-TEST(RendererBits, SameBatchedAndOneByOne) {
-  Batch batch;
-  const Workers workers(2);
-  Renderer renderer(workers);
-  const std::string together = Bytes(&renderer, &batch, 0, 3);
-  std::string single;
-  for (std::size_t n = 0; n < 3; ++n) single += Bytes(&renderer, &batch, n, 1);
-  EXPECT_TRUE(together == single);
-}
-
-// Backward may reuse what Render prepared, but only for the same scenes and options.
-TEST(RendererBits, BackwardDoesNotDependOnWhatWasRenderedLast) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame, other;
-  const auto backward = [&] {
-    return renderer.Backward(batch.views, Options(), frame, {batch.d_attributes, batch.d_alpha},
-                             batch.d_scenes);
-  };
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  ASSERT_TRUE(backward().ok());
-  const auto expected = batch.positions;
-  const auto check_after = [&](const RenderOptions& options, const char* what) {
-    ASSERT_TRUE(renderer.Render(batch.views, options, {}, &other).ok());
-    batch = Batch();  // the scenes as they were, at other addresses
-    ASSERT_TRUE(backward().ok());
-    EXPECT_EQ(batch.positions, expected) << what;
-  };
-  batch.scenes[0].positions[4] += 0.05f;
-  check_after(Options(), "a vertex moved");
-  std::swap(batch.scenes[1].faces[0], batch.scenes[1].faces[1]);
-  check_after(Options(), "a face turned");
-  batch.views[2].camera.fx += 3;
-  check_after(Options(), "another camera");
-  RenderOptions wide = Options();
-  wide.delta = 0.1;
-  check_after(wide, "another kernel");
-}
-
-TEST(RendererMemory, SteadyStateAllocatesNothing) {
-  Batch batch;
+void ExpectSteadyStateAllocatesNothing(Batch batch) {
   const Workers workers(1);
   Renderer renderer(workers);
   Frame frame;
   const auto step = [&] {
-    ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &frame).ok());
+    ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
     ASSERT_TRUE(renderer
-                    .Backward(batch.views, Options(), frame, {batch.d_attributes, batch.d_alpha},
-                              batch.d_scenes)
+                    .Backward(batch.views, batch.options, frame,
+                              {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
                     .ok());
   };
   const long before_first = g_allocations;
@@ -176,6 +57,75 @@ TEST(RendererMemory, SteadyStateAllocatesNothing) {
   const long before = g_allocations;
   for (int i = 0; i < 3; ++i) step();
   EXPECT_EQ(g_allocations - before, 0);
+}
+
+TEST(RendererMemory, SteadyStateAllocatesNothing) {
+  ExpectSteadyStateAllocatesNothing(Batch());
+  ExpectSteadyStateAllocatesNothing(Batch::Large());
+}
+
+// What a caller must keep from Render to Backward: at most 16 bytes a pixel, whatever was rendered.
+TEST(RendererMemory, BackwardNeedsFaceIdsAndAlphaOnly) {
+  Batch batch = Batch::Large();
+  const Workers workers(1);
+  Frame frame;
+  const auto backward = [&] {  // by a renderer that has not seen the batch before
+    Renderer renderer(workers);
+    return renderer.Backward(batch.views, batch.options, frame, {batch.d_attributes, batch.d_alpha},
+                             batch.d_scenes);
+  };
+  Renderer renderer(workers);
+  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
+  ASSERT_TRUE(backward().ok());
+  const auto positions = batch.positions, attributes = batch.attributes;
+  frame.attributes.clear(), frame.depth.clear(), frame.barycentrics.clear();
+  ASSERT_TRUE(backward().ok());
+  EXPECT_EQ(batch.positions, positions);
+  EXPECT_EQ(batch.attributes, attributes);
+  const std::size_t bytes = frame.face_ids.size() * sizeof(frame.face_ids[0]) +
+                            frame.alpha.size() * sizeof(frame.alpha[0]);
+  EXPECT_LE(bytes, 16 * batch.d_alpha.size());
+}
+
+bool operator==(const RenderStats& a, const RenderStats& b) {
+  return a.prepared == b.prepared && a.drawn == b.drawn && a.interpolated == b.interpolated &&
+         a.softened == b.softened && a.merged == b.merged;
+}
+
+// Only what is asked for runs. Images of 150 x 139: 3 x 3 bins, 3 bands.
+TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
+  Batch batch = Batch::Large();
+  for (const int count : {1, 3}) {
+    const Workers workers(count);
+    Renderer renderer(workers);
+    Frame frame;
+    const auto forward = [&](const RenderRequest& request) {
+      EXPECT_TRUE(renderer.Render(batch.views, batch.options, request, &frame).ok());
+      return renderer.stats();
+    };
+    EXPECT_TRUE(forward({false, false, false, false}) == (RenderStats{3, 27, 0, 0, 0}));
+    EXPECT_TRUE(forward({false, false, true, false}) == (RenderStats{3, 27, 0, 0, 0}));
+    EXPECT_TRUE(forward({true, false, false, false}) == (RenderStats{3, 27, 27, 0, 0}));
+    EXPECT_TRUE(forward({false, true, false, false}) == (RenderStats{3, 27, 0, 27, 0}));
+    EXPECT_TRUE(forward({true, true, true, true}) == (RenderStats{3, 27, 27, 27, 0}));
+    const auto backward = [&](const FrameGradients& d_frame, bool positions, bool attributes) {
+      std::vector<SceneGradients> wanted(3);
+      for (std::size_t n = 0; n < 3; ++n) {
+        if (positions) wanted[n].positions = batch.positions[n];
+        if (attributes) wanted[n].attributes = batch.attributes[n];
+      }
+      EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, wanted).ok());
+      return renderer.stats();
+    };
+    const FrameGradients colour{batch.d_attributes, {}}, alpha{{}, batch.d_alpha};
+    const FrameGradients both{batch.d_attributes, batch.d_alpha};
+    EXPECT_TRUE(backward(colour, true, true) == (RenderStats{0, 0, 9, 0, 6}));
+    EXPECT_TRUE(backward(colour, false, true) == (RenderStats{0, 0, 9, 0, 3}));
+    EXPECT_TRUE(backward(alpha, true, false).interpolated == 0);
+    EXPECT_TRUE(backward(alpha, true, false).softened == 27);
+    EXPECT_TRUE(backward(both, true, true) == (RenderStats{0, 0, 9, 27, 6}));
+    EXPECT_TRUE(backward(both, false, false) == (RenderStats{0, 0, 0, 0, 0}));
+  }
 }
 
 TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
