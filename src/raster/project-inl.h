@@ -39,9 +39,15 @@ HWY_INLINE CameraLanes ToCameraLanes(ProjectTag d, const Camera& camera, Project
   return {row(0), row(1), hn::Neg(row(2))};
 }
 
+// Where the vertices of a vector go.
+struct VertexPlaces {
+  float *x, *y, *depth, *inverse_depth;
+  float* packed;  // [Lanes][4]
+};
+
 // Projects one vector of vertices. Returns whether all are visible and finite.
-HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* positions, float* x,
-                             float* y, float* depth, float* inverse_depth) {
+HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* positions,
+                             const VertexPlaces& to) {
   ProjectVec px, py, pz;
   hn::LoadInterleaved3(d, positions, px, py, pz);
   const CameraLanes p = ToCameraLanes(d, camera, px, py, pz);
@@ -52,8 +58,9 @@ HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* po
       hn::IfThenElseZero(visible, hn::MulAdd(hn::Set(d, camera.fx), u, hn::Set(d, camera.cx)));
   const auto sy =
       hn::IfThenElseZero(visible, hn::NegMulAdd(hn::Set(d, camera.fy), v, hn::Set(d, camera.cy)));
-  hn::StoreU(sx, d, x), hn::StoreU(sy, d, y);
-  hn::StoreU(p.depth, d, depth), hn::StoreU(inverse, d, inverse_depth);
+  hn::StoreU(sx, d, to.x), hn::StoreU(sy, d, to.y);
+  hn::StoreU(p.depth, d, to.depth), hn::StoreU(inverse, d, to.inverse_depth);
+  hn::StoreInterleaved4(sx, sy, inverse, p.depth, d, to.packed);
   // v - v is NaN, and not zero, for what is not finite.
   const auto zero = hn::Add(hn::Sub(sx, sx), hn::Add(hn::Sub(sy, sy), hn::Sub(p.depth, p.depth)));
   return hn::AllTrue(d, hn::And(visible, hn::Eq(zero, hn::Zero(d))));
@@ -63,24 +70,50 @@ HWY_INLINE bool ProjectLanes(ProjectTag d, const Camera& camera, const float* po
 // finite.
 bool ProjectVertices(const FaceSource<float>& source, std::size_t begin, std::size_t n,
                      ScreenMeshBuffers* out) {
+  static_assert(sizeof(PackedVertexT<float>) == 4 * sizeof(float));
   const ProjectTag d;
   const std::size_t lanes = hn::Lanes(d);
   const float* in = source.positions.data();
   bool plain = true;
   std::size_t i = begin;
+  const auto places = [&](std::size_t at) HWY_ATTR {
+    return VertexPlaces{&out->x[at], &out->y[at], &out->depth[at], &out->inverse_depth[at],
+                        &out->packed[at].x};
+  };
   for (; i + lanes <= n; i += lanes) {
-    plain &= ProjectLanes(d, *source.camera, in + 3 * i, &out->x[i], &out->y[i], &out->depth[i],
-                          &out->inverse_depth[i]);
+    plain &= ProjectLanes(d, *source.camera, in + 3 * i, places(i));
   }
   if (i == n) return plain;
-  float rest[3 * 16], results[4][16];
+  float rest[3 * 16], results[4][16], packed[4 * 16];
   for (std::size_t k = 0; k < lanes; ++k) {  // the last vertex again where there is none
     std::memcpy(rest + 3 * k, in + 3 * HWY_MIN(i + k, n - 1), 3 * sizeof(float));
   }
-  plain &= ProjectLanes(d, *source.camera, rest, results[0], results[1], results[2], results[3]);
-  float* const to[4] = {&out->x[i], &out->y[i], &out->depth[i], &out->inverse_depth[i]};
+  plain &= ProjectLanes(d, *source.camera, rest,
+                        {results[0], results[1], results[2], results[3], packed});
+  const VertexPlaces at = places(i);
+  float* const to[4] = {at.x, at.y, at.depth, at.inverse_depth};
   for (int a = 0; a < 4; ++a) std::memcpy(to[a], results[a], (n - i) * sizeof(float));
+  std::memcpy(at.packed, packed, 4 * (n - i) * sizeof(float));
   return plain;
+}
+
+// Corners of faces [begin, end), each in an array of its own; the faces' numbers.
+void SplitFaces(std::span<const std::int32_t> faces, std::size_t begin, std::size_t end,
+                ScreenMeshBuffers* out) {
+  const hn::RebindToSigned<ProjectTag> di;
+  const std::size_t lanes = hn::Lanes(di);
+  std::size_t f = begin;
+  for (; f + lanes <= end; f += lanes) {
+    hn::Vec<decltype(di)> v[3];
+    hn::LoadInterleaved3(di, &faces[3 * f], v[0], v[1], v[2]);
+    hn::StoreU(v[0], di, &out->v0[f]), hn::StoreU(v[1], di, &out->v1[f]);
+    hn::StoreU(v[2], di, &out->v2[f]);
+    hn::StoreU(hn::Iota(di, static_cast<std::int32_t>(f)), di, &out->source_face[f]);
+  }
+  for (; f < end; ++f) {
+    out->v0[f] = faces[3 * f], out->v1[f] = faces[3 * f + 1], out->v2[f] = faces[3 * f + 2];
+    out->source_face[f] = static_cast<std::int32_t>(f);
+  }
 }
 
 // Sums over vertices of the sixteen entries of a camera's gradient, as lanes.

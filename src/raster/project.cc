@@ -19,6 +19,7 @@ namespace tilegrad::raster {
 namespace {
 
 HWY_EXPORT(ProjectVertices);
+HWY_EXPORT(SplitFaces);
 HWY_EXPORT(ProjectVerticesBackward);
 
 constexpr std::size_t kVertexChunk = 8192;
@@ -30,7 +31,6 @@ bool ProjectSource(const FaceSource<float>& source, ScreenMeshBuffers* out,
   ForChunks(workers, source.positions.size() / 3, kVertexChunk,
             [&](std::size_t begin, std::size_t end) {
               if (!HWY_DYNAMIC_DISPATCH(ProjectVertices)(source, begin, end, out)) plain = false;
-              out->Pack(begin, end);
             });
   return plain;
 }
@@ -44,13 +44,9 @@ void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out,
   out->reject.resize(n);
   out->clipped.clear();
   ForChunks(workers, n, DrawnFaces::kChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      out->v0[f] = source.faces[3 * f];
-      out->v1[f] = source.faces[3 * f + 1];
-      out->v2[f] = source.faces[3 * f + 2];
-      out->source_face[f] = static_cast<std::int32_t>(f);
-      out->reject[f] = kFaceDrawn;
-    }
+    HWY_DYNAMIC_DISPATCH(SplitFaces)(source.faces, begin, end, out);
+    std::fill(out->reject.begin() + static_cast<std::ptrdiff_t>(begin),
+              out->reject.begin() + static_cast<std::ptrdiff_t>(end), kFaceDrawn);
   });
 }
 
