@@ -55,7 +55,12 @@ Var InstanceNorm(const Var& x, const Var& gamma, const Var& beta, const NormOpti
     status = InvalidArgument("instance norm: {} is not [n, c, h, w]", x.shape().ToString());
   }
   if (!status.ok()) return Fail(x, status);
-  return Affine(Standardised(x, x.shape().Product(0, 2), options), gamma, beta);
+  const std::int64_t n = x.shape()[0], c = x.shape()[1];
+  // One gamma and beta to each image of each channel.
+  const auto repeated = [&](const Var& v) { return Reshape(BroadcastTo(v, {n, c}), {n * c}); };
+  const Var planes = Reshape(x, {1, n * c, x.shape()[2], x.shape()[3]});
+  const BatchNormOptions batch{.epsilon = options.epsilon};
+  return Reshape(BatchNormTrain(planes, repeated(gamma), repeated(beta), batch).y, x.shape());
 }
 
 Var GroupNorm(const Var& x, int groups, const Var& gamma, const Var& beta,
@@ -66,6 +71,7 @@ Var GroupNorm(const Var& x, int groups, const Var& gamma, const Var& beta,
     status = InvalidArgument("group norm: {} channels in {} groups", x.shape()[1], groups);
   }
   if (!status.ok()) return Fail(x, status);
+  if (groups == x.shape()[1] && x.shape().rank() == 4) return InstanceNorm(x, gamma, beta, options);
   return Affine(Standardised(x, x.shape()[0] * groups, options), gamma, beta);
 }
 
