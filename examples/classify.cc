@@ -201,10 +201,10 @@ Status Run(const Path& folder, std::int64_t steps) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "usage: classify_example DATASET [STEPS = 500]\n");
+    fmt::print(stderr, "usage: classify_example DATASET [STEPS = 400]\n");
     return 2;
   }
-  const tilegrad::Status status = tilegrad::Run(argv[1], argc > 2 ? std::atoll(argv[2]) : 500);
+  const tilegrad::Status status = tilegrad::Run(argv[1], argc > 2 ? std::atoll(argv[2]) : 400);
   if (!status.ok()) fmt::print(stderr, "classify_example: {}\n", status.message());
   return status.ok() ? 0 : 1;
 }

@@ -16,35 +16,49 @@ class Networks : public ::testing::Test {
  protected:
   Var Input(const Shape& shape) { return RandomParameter(context_, {shape, 0, 1}, rng_); }
 
-  // d(loss)/d(parameters) along a random direction against differences; `loss` reads `module`. The
-  // step is small because a rectifier of the thousands must not pass its kink: 1e-16 / 1e-6 leaves
-  // 1e-8 of slopes of size 0.01.
-  void ExpectGradient(Module& module, const std::function<Var()>& loss, double tolerance = 1e-6) {
+  // d(loss)/d(parameters) against differences, along a random direction of all parameters and then
+  // of each: to 1e-6 of the slope, and what rounding leaves of a difference of two losses, 16 eps
+  // loss / step. The step is small because a rectifier of the thousands must not pass its kink.
+  void ExpectGradient(Module& module, const std::function<Var()>& loss) {
     std::vector<Var> parameters;
     for (const NamedVar& p : Parameters(module)) parameters.push_back(p.value);
     const Var value = loss();
     ASSERT_TRUE(value.valid()) << context_.status().message();
     const auto gradient = Grad(value, parameters);
     ASSERT_TRUE(context_.status().ok()) << context_.status().message();
-    Inputs direction;
+    Inputs direction, none;
     for (const Var& p : parameters) {
       direction.push_back(RandomConstant(context_, p.shape(), rng_));
+      none.push_back(Constant(context_, context_.Zeros(p.shape())));
     }
-    const auto at = [&](const Inputs& moved) {
-      std::vector<Tensor> before;
-      for (std::size_t i = 0; i < moved.size(); ++i) {
-        before.push_back(context_.Copy(parameters[i].value()));
-        std::memcpy(parameters[i].value().raw(), moved[i].value().raw(), before[i].bytes());
-      }
-      const double result = loss().item();
-      for (std::size_t i = 0; i < moved.size(); ++i) {
-        std::memcpy(parameters[i].value().raw(), before[i].raw(), before[i].bytes());
-      }
-      return result;
+    constexpr double kStep = 1e-6;
+    const double rounding = 16 * 0x1.0p-52 * std::abs(value.item()) / kStep;
+    const auto check = [&](const Inputs& along) {
+      const double slope = Slope([&](const Inputs& moved) { return At(parameters, moved, loss); },
+                                 parameters, along, kStep);
+      EXPECT_NEAR(Dot(gradient, along), slope, 1e-6 * std::abs(slope) + rounding);
+      return slope;
     };
-    const double slope = Slope(at, parameters, direction, 1e-6);
-    EXPECT_NEAR(Dot(gradient, direction), slope, tolerance * std::abs(slope));
-    EXPECT_GT(std::abs(slope), 1e-6);
+    EXPECT_GT(std::abs(check(direction)), 1000 * rounding);
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      Inputs one = none;
+      one[i] = direction[i];
+      check(one);
+    }
+  }
+
+  // The loss with other values of the parameters.
+  double At(std::vector<Var> parameters, const Inputs& values, const std::function<Var()>& loss) {
+    std::vector<Tensor> before;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      before.push_back(context_.Copy(parameters[i].value()));
+      std::memcpy(parameters[i].value().raw(), values[i].value().raw(), before[i].bytes());
+    }
+    const double result = loss().item();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      std::memcpy(parameters[i].value().raw(), before[i].raw(), before[i].bytes());
+    }
+    return result;
   }
 
   Workers workers_{2};
@@ -84,6 +98,20 @@ TEST_F(Networks, UNetDifferentiated) {
   UNet net(context_, {.base = 2, .levels = 2}, rng_);
   EXPECT_FALSE(net.Forward(Input({1, 3, 6, 8}), Mode::kTrain).valid());
   EXPECT_NE(context_.TakeStatus().message().find("multiple of 4"), std::string::npos);
+}
+
+// 64 to 1024 channels: 31.0 million parameters, as the field's implementations count them.
+TEST_F(Networks, ConvUNetDifferentiated) {
+  {
+    Context context(workers_);
+    ConvUNet net(context, {}, rng_);
+    EXPECT_NEAR(static_cast<double>(CountParameters(net)), 31.04e6, 0.01e6);
+  }
+  ConvUNet net(context_, {.in = 2, .out = 3, .base = 3, .depth = 3}, rng_);
+  const Var x = Input({2, 2, 8, 12});
+  EXPECT_EQ(net.Forward(x, Mode::kEval).shape(), (Shape{2, 3, 8, 12}));
+  ExpectGradient(net, [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); });
+  EXPECT_FALSE(net.Forward(Input({1, 2, 6, 8}), Mode::kTrain).valid());
 }
 
 TEST_F(Networks, LightHeadHasSixLayers) {

@@ -2,15 +2,26 @@
 #include "nn/networks/unet.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "base/error.h"
 #include "nn/ops/pointwise.h"
+#include "nn/ops/pool.h"
 
 namespace tilegrad::nn {
 namespace {
 
 constexpr ConvOptions kHalve = {.stride = 2, .padding = 1};  // of a 4x4 kernel
+
+// What an image must be so that halving it `halvings` times leaves no rest.
+Status CheckImage(const Var& x, std::size_t halvings) {
+  const std::int64_t step = std::int64_t{1} << halvings;
+  const Shape& shape = x.shape();
+  if (shape.rank() == 4 && shape[2] % step == 0 && shape[3] % step == 0) return {};
+  return InvalidArgument("U-Net: {} is not an image with sides a multiple of {}", shape.ToString(),
+                         step);
+}
 
 }  // namespace
 
@@ -51,12 +62,9 @@ UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) {
 }
 
 UNet::Result UNet::Run(const Var& x, Mode mode) {
-  const std::int64_t step = std::int64_t{1} << down_.size();
-  if (x.valid() &&
-      (x.shape().rank() != 4 || x.shape()[2] % step != 0 || x.shape()[3] % step != 0)) {
-    const Var failed =
-        Fail(x, InvalidArgument("U-Net: {} is not an image with sides a multiple of {}",
-                                x.shape().ToString(), step));
+  if (!x.valid()) return {x, x};
+  if (const Status s = CheckImage(x, down_.size()); !s.ok()) {
+    const Var failed = Fail(x, s);
     return {failed, failed};
   }
   std::vector<Var> levels = {x};
@@ -75,6 +83,59 @@ void UNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
     down_[i].Visit(level, visitor);
     up_[i].Visit(level, visitor);
   }
+}
+
+ConvUNet::ConvUNet(Context& context, const ConvUNetShape& shape, Rng& rng) {
+  const auto channels = [&](int level) { return shape.base << level; };
+  const auto twice = [&](std::int64_t in, std::int64_t out) {
+    Sequential net;
+    for (const char* name : {"1", "2"}) {
+      AddConvBlock(net, name, context,
+                   {.conv = {.in = in, .out = out, .options = {.padding = 1}},
+                    .norm = shape.norm,
+                    .activation = &Relu},
+                   rng);
+      in = out;
+    }
+    return net;
+  };
+  for (int i = 0; i < shape.depth; ++i) {
+    down_.push_back(twice(i == 0 ? shape.in : channels(i - 1), channels(i)));
+  }
+  for (int i = 0; i + 1 < shape.depth; ++i) {
+    const ConvShape up{
+        .in = channels(i + 1), .out = channels(i), .kernel = 2, .options = {.stride = 2}};
+    up_.emplace_back().Add<ConvTranspose2dLayer>("conv", context, up, rng);
+    merge_.push_back(twice(2 * channels(i), channels(i)));
+  }
+  out_.Add<Conv2dLayer>("conv", context,
+                        ConvShape{.in = channels(0), .out = shape.out, .kernel = 1}, rng);
+}
+
+Var ConvUNet::Forward(const Var& x, Mode mode) {
+  if (!x.valid()) return x;
+  if (const Status s = CheckImage(x, up_.size()); !s.ok()) return Fail(x, s);
+  std::vector<Var> levels = {down_[0].Forward(x, mode)};
+  for (std::size_t i = 1; i < down_.size(); ++i) {
+    levels.push_back(down_[i].Forward(MaxPool2d(levels.back(), {}), mode));
+  }
+  Var y = levels.back();
+  for (std::size_t i = up_.size(); i-- > 0;) {
+    y = merge_[i].Forward(Concat({levels[i], up_[i].Forward(y, mode)}, 1), mode);
+  }
+  return out_.Forward(y, mode);
+}
+
+void ConvUNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  const auto visit = [&](std::vector<Sequential>& nets, const char* name) {
+    for (std::size_t i = 0; i < nets.size(); ++i) {
+      nets[i].Visit(prefix + name + std::to_string(i + 1) + ".", visitor);
+    }
+  };
+  visit(down_, "down");
+  visit(up_, "up");
+  visit(merge_, "merge");
+  out_.Visit(prefix + "out.", visitor);
 }
 
 }  // namespace tilegrad::nn
