@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The soft mask alone, on one image of each scene: binning and all tiles, one worker, against the
-// scalar reference over the same lists in the same process. Counters: pixels evaluated a second
-// (background pixels in tiles that list faces), pairs of pixel and listed face a second, alpha
-// error bound spent.
+// The soft mask alone, on one image of each scene: all tiles, one worker, against the scalar
+// reference over all faces for a few rows in the same process. Counters: background pixels a
+// second, pairs of pixel and face a second, alpha error bound spent.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
@@ -23,44 +23,38 @@ struct SoftBench {
     const SceneView& scene = batch.scenes[0];
     raster::Project(FaceSourceOf(scene, batch.options), spec.size, spec.size, &buffers);
     mesh = buffers.View();
+    grid = raster::TileGrid(spec.size, spec.size);
     Workers one(1);
     Renderer renderer(one);
     const Status status =
         renderer.Render({&scene, 1}, batch.options, {false, false, false, false}, &frame);
     failed = !status.ok();
-    plan = raster::PlanSoftMask({spec.size, spec.size, delta, error, raster::CountSoftFaces(mesh)});
-    grid = raster::TileGrid(spec.size, spec.size);
+    Build();
     alpha.resize(frame.face_ids.size());
   }
-  void Bin() {
-    lists = raster::BinSoftFaces(mesh, grid, plan.margin_x, plan.margin_y, &list_buffers);
+  void Build() {
+    raster::BuildSoftTree(mesh, &tree);
+    plan = raster::PlanSoftMask(
+        {grid.width, grid.height, batch.options.delta, batch.options.max_alpha_error, tree.faces});
   }
-  raster::SoftMaskTile Tile(std::size_t t) const {
-    return {grid.rect(t), lists[t], raster::BinnedError(plan, lists[t].size()), frame.face_ids};
-  }
-  // Calls visit(tile, pixel) for every background pixel of a tile that lists faces.
+  raster::SoftMaskTile Tile(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
+  // Calls visit(pixel) for the background pixels of every `step`th row.
   template <class Visit>
-  void ForPixels(const Visit& visit) const {
-    for (std::size_t t = 0; t < grid.tiles(); ++t) {
-      const raster::TileRect r = grid.rect(t);
-      if (lists[t].empty()) continue;
-      for (int y = r.y0; y < r.y1; ++y) {
-        for (int x = r.x0; x < r.x1; ++x) {
-          const auto i = static_cast<std::size_t>(y * grid.width + x);
-          if (frame.face_ids[i] < 0) visit(t, i);
-        }
+  void ForPixels(int step, const Visit& visit) const {
+    for (int y = step / 2; y < grid.height; y += step) {
+      for (int x = 0; x < grid.width; ++x) {
+        const auto i = static_cast<std::size_t>(y * grid.width + x);
+        if (frame.face_ids[i] < 0) visit(i);
       }
     }
   }
-  void Count(benchmark::State& state) const {
-    double pixels = 0, pairs = 0;
-    ForPixels([&](std::size_t t, std::size_t) {
-      pixels += 1, pairs += static_cast<double>(lists[t].size());
-    });
+  void Count(benchmark::State& state, int step) const {
+    double pixels = 0;
+    ForPixels(step, [&](std::size_t) { pixels += 1; });
     state.counters["pixels"] =
         benchmark::Counter(pixels, benchmark::Counter::kIsIterationInvariantRate);
-    state.counters["pairs"] =
-        benchmark::Counter(pairs, benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["pairs"] = benchmark::Counter(pixels * static_cast<double>(tree.faces),
+                                                 benchmark::Counter::kIsIterationInvariantRate);
   }
 
   BenchBatch batch;
@@ -70,9 +64,9 @@ struct SoftBench {
   bool failed = false;
   raster::SoftMaskPlan plan;
   raster::TileGrid grid;
-  raster::TileListBuffers list_buffers;
-  raster::TileLists lists;
-  std::vector<float> alpha, d_corners;
+  raster::SoftTree tree;
+  std::vector<float> alpha;
+  AlignedVector<raster::SoftFaceGradient> gradients;
   raster::SoftMaskScratch scratch;
 };
 
@@ -81,12 +75,12 @@ void SoftForward(benchmark::State& state, const SceneSpec& spec, double delta, d
   if (b.failed) return state.SkipWithError("the scene did not render");
   double spent = 0;
   for (auto _ : state) {
-    b.Bin();
+    b.Build();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      spent = std::max(spent, SoftMaskForward(b.mesh, b.plan, b.Tile(t), b.alpha, &b.scratch));
+      spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Tile(t), b.alpha, &b.scratch));
     }
   }
-  b.Count(state);
+  b.Count(state, 1);
   state.counters["spent"] = spent;
 }
 
@@ -94,30 +88,35 @@ void SoftBackward(benchmark::State& state, const SceneSpec& spec, double delta, 
   SoftBench b(spec, delta, error);
   if (b.failed) return state.SkipWithError("the scene did not render");
   const auto d_alpha = std::span<const float>(b.batch.d_alpha).first(b.alpha.size());
+  for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
+    SoftMaskForward(b.tree, b.plan, b.Tile(t), b.alpha, &b.scratch);
+  }
   for (auto _ : state) {
-    b.Bin();
+    b.gradients.clear();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      b.d_corners.resize(6 * b.lists[t].size());
-      SoftMaskBackward(b.mesh, b.plan, b.Tile(t), d_alpha, b.d_corners, &b.scratch);
+      SoftMaskBackward(b.tree, b.plan, b.Tile(t), {b.alpha, d_alpha}, &b.gradients, &b.scratch);
     }
   }
-  b.Count(state);
+  b.Count(state, 1);
 }
 
+// All faces for the pixels of a few rows.
 void SoftReference(benchmark::State& state, const SceneSpec& spec, double delta, double error) {
   SoftBench b(spec, delta, error);
   if (b.failed) return state.SkipWithError("the scene did not render");
   const float size = static_cast<float>(spec.size);
   const raster::SoftScale<float> scale{2 / size, 2 / size, static_cast<float>(1 / delta)};
+  std::vector<std::int32_t> faces(b.mesh.faces());
+  std::iota(faces.begin(), faces.end(), 0);
+  const int step = spec.size / 4;
   for (auto _ : state) {
-    b.Bin();
-    b.ForPixels([&](std::size_t t, std::size_t i) {
+    b.ForPixels(step, [&](std::size_t i) {
       const auto n = static_cast<std::size_t>(spec.size);
-      b.alpha[i] = raster::SoftAlphaRef<float>(b.mesh, b.lists[t], static_cast<float>(i % n) + 0.5f,
+      b.alpha[i] = raster::SoftAlphaRef<float>(b.mesh, faces, static_cast<float>(i % n) + 0.5f,
                                                static_cast<float>(i / n) + 0.5f, scale);
     });
   }
-  b.Count(state);
+  b.Count(state, step);
 }
 
 const bool kRegistered = [] {

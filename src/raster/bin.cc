@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raster/bin.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "raster/bin.cc"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
-#include "raster/bin-inl.h"
-
-#if HWY_ONCE
 #include <algorithm>
 #include <numeric>
 
@@ -16,8 +8,6 @@
 
 namespace tilegrad::raster {
 namespace {
-
-HWY_EXPORT(FaceTiles);
 
 // The tiles of faces [begin, end).
 template <class Emit>
@@ -108,15 +98,4 @@ TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListB
   return SortIntoTiles(grid, buffers, workers);
 }
 
-TileLists BinSoftFaces(const ScreenMesh& mesh, const TileGrid& grid, float margin_x, float margin_y,
-                       TileListBuffers* buffers) {
-  buffers->ranges.resize(mesh.faces());
-  if (mesh.faces() > 0) {
-    HWY_DYNAMIC_DISPATCH(FaceTiles)
-    (mesh, grid, {margin_x, margin_y, kFaceNotInSoftMask}, buffers->ranges.data());
-  }
-  return SortIntoTiles(grid, buffers, nullptr);
-}
-
 }  // namespace tilegrad::raster
-#endif

@@ -62,12 +62,6 @@ struct TileRange {
   std::int16_t column_begin, column_end, row_begin, row_end;
 };
 
-// How far a face reaches, in pixels, and the bits of FaceReject that keep it out of the lists.
-struct BinMargin {
-  float x, y;
-  std::uint8_t reject;
-};
-
 // Owns the memory of a TileLists; reused from frame to frame.
 struct TileListBuffers {
   AlignedVector<std::int32_t> begin, faces;
@@ -80,11 +74,5 @@ struct TileListBuffers {
 // pixel centre. `workers` null: the calling thread.
 TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
                         const Workers* workers = nullptr);
-
-// Lists every face that takes part in the soft mask (drawn, culled or degenerate) for each tile
-// (of kTileSize) that has a pixel centre within `margin_x`, `margin_y` (pixels, >= 0, may be
-// infinite) of its box.
-TileLists BinSoftFaces(const ScreenMesh& mesh, const TileGrid& grid, float margin_x, float margin_y,
-                       TileListBuffers* buffers);
 
 }  // namespace tilegrad::raster

@@ -1,102 +1,132 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records of the soft mask's kernel. Lengths are kernel units (soft_mask.h) and double where a
-// small difference of large coordinates is taken; the vector code sees floats relative to the
-// centre of a block of 8x8 pixels. docs/numerics.md: "The distance to a boundary".
+// Records of the soft mask's kernel. Lengths are kernel units (soft_mask.h) unless they say pixels.
+// The vector code sees coordinates relative to the middle of a block's background.
+// docs/numerics.md: "The distance to a boundary".
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "base/aligned.h"
+#include "raster/conventions.h"
 
 namespace tilegrad::raster {
 
-inline constexpr int kBlockSize = 8;  // pixels; faces are set up per block
-inline constexpr int kBlockPixels = kBlockSize * kBlockSize;
-// Pixels are evaluated in cells, which is also how arrays of a block are ordered: cell by cell, the
-// left one of two rows first, and within a cell row by row.
-inline constexpr int kCellWidth = 4, kCellHeight = 2;
-inline constexpr int kCellPixels = kCellWidth * kCellHeight;
-inline constexpr int kCells = kBlockPixels / kCellPixels;
-// Members whose products are taken in float before they are merged in double: bounds rounding
-// independently of the number of faces.
-inline constexpr std::size_t kMergeEvery = 16;
+inline constexpr std::size_t kBlockSize = 8;  // pixels
+inline constexpr std::size_t kBlockPixels = kBlockSize * kBlockSize;
+inline constexpr std::size_t kTileBlocks = (kTileSize / kBlockSize) * (kTileSize / kBlockSize);
+inline constexpr std::size_t kSoftLanes = 8;  // the most that vectors of this kernel have
+// Faces that a tile looks at before its blocks merge what they have in double, and look whether
+// they may stop. Bounds rounding independently of the number of faces.
+inline constexpr std::size_t kChunkFaces = 256;
+inline constexpr std::size_t kChunkRoom = kChunkFaces + kSoftLanes;
+// Faces with an edge that spans more than this in x or y are set up in double.
+inline constexpr float kLongEdge = 32;  // pixels
 
-inline constexpr std::size_t CellOf(int x, int y) {
-  return static_cast<std::size_t>(y / kCellHeight * (kBlockSize / kCellWidth) + x / kCellWidth);
-}
-// Where pixel (x, y) of a block stands in arrays.
-inline constexpr std::size_t PixelOf(int x, int y) {
-  return CellOf(x, y) * kCellPixels +
-         static_cast<std::size_t>(y % kCellHeight * kCellWidth + x % kCellWidth);
-}
+// Row m has the bits that are set in m, from the lowest.
+struct ChosenLanes {
+  alignas(64) std::uint8_t lane[1 << kSoftLanes][kSoftLanes] = {};
+  constexpr ChosenLanes() {
+    for (std::size_t mask = 0; mask < 1 << kSoftLanes; ++mask) {
+      std::size_t n = 0;
+      for (std::uint8_t i = 0; i < kSoftLanes; ++i) {
+        if ((mask >> i & 1) != 0) lane[mask][n++] = i;
+      }
+    }
+  }
+};
+inline constexpr ChosenLanes kChosenLanes;
 
-// Pixel centres in a box around (x, y), and from where on a face is far from them.
+// Pixel centres of a rectangle.
 struct SoftBox {
-  double x, y, half_x, half_y;
-  double z;      // squared distance of the face's box to this one
-  double reach;  // squared distance of (x, y) to the face's boundary
+  float left, top, right, bottom;  // pixels
+  float unit_x, unit_y;            // kernel units per pixel
 };
 
-// Faces of a tile that are not far from its background, as structure of arrays, seen from the
-// tile's centre. A directed edge has the unit direction t and normal n = (-t.y, t.x); the origin
-// lies at `side` along n and at `along` along t from the edge's first corner.
-struct SoftFaces {
-  enum Array { kPosition, kLeft, kTop, kRight, kBottom, kEdges };
-  enum EdgeArray { kTx, kTy, kSide, kAlong, kLength, kInverseLength, kEdgeArrays };  // of edge k
-  static constexpr std::size_t kArrays = kEdges + 3 * kEdgeArrays;
-  static constexpr std::size_t kPadding = 8;  // vectors may reach beyond the end
-
-  AlignedVector<double> values;  // kPosition: in the tile's list
-  std::size_t stride = 0, count = 0;
-
-  void Reserve(std::size_t faces) {
-    stride = (faces + kPadding + 7) / 8 * 8;
-    if (values.size() < kArrays * stride) values.resize(kArrays * stride);
-  }
-  double* array(std::size_t a) { return values.data() + a * stride; }
-  const double* array(std::size_t a) const { return values.data() + a * stride; }
-  static constexpr std::size_t Edge(int k, EdgeArray a) {
-    return static_cast<std::size_t>(kEdges + k * kEdgeArrays + a);
-  }
+// A tile's faces, some at a time: corners in pixels; unit direction t of edge k, from corner k to
+// the next, and 1 / its length. An edge of no length has t = (1, 0) and inverse 0.
+struct SoftFaceArrays {
+  enum Array { kX = 0, kY = 3, kTx = 6, kTy = 9, kInverse = 12, kArrays = 15 };
+  alignas(64) float v[kArrays][kChunkRoom];
+  alignas(64) std::int32_t face[kChunkRoom];  // of the mesh
+  std::size_t count = 0;
+};
+struct SoftChunk {
+  SoftFaceArrays shorts, longs;  // of longs only the corners are set
 };
 
-// An edge for the vector code, seen from the centre of a block.
-struct SoftBlockEdge {
-  float tx, ty, side, along;
-  float past;            // along - length, from double
-  float inverse_length;  // 0 for an edge of no length, which belongs to its first corner
-};
-struct SoftBlockFace {
-  SoftBlockEdge edge[3];
-  std::int32_t position;  // in the tile's list
-  std::uint32_t cells;    // bit s: cell s looks at it
-};
-
-// One block for the vector code.
+// A block of a tile. Pixels are row by row.
 struct SoftBlock {
-  alignas(64) float x[kBlockPixels], y[kBlockPixels];  // pixel centres from the block's centre
-  alignas(64) float cell_x[kCells], cell_y[kCells];    // centres of cells
-  float cell_reach;     // a cell drops a face whose z, seen from the cell's centre, is larger
-  std::uint32_t cells;  // bit s: cell s has pixels to compute
-  SoftBlockFace* members;
+  int x0, y0, width, height;                       // pixels, cut off by the image
+  std::uint64_t bits;                              // of pixels to compute
+  std::uint64_t live;                              // those that have not stopped
+  float centre_x, centre_y;                        // pixels, the middle of the box of those pixels
+  float half_x, half_y, radius;                    // half the box, and half its diagonal
+  alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
+  std::size_t whole;                               // faces that all pixels have seen
+  alignas(64) double alpha[kBlockPixels];          // 1 where there is nothing to compute
+};
+
+// From where on faces are far. Kernel units.
+struct SoftReach {
+  float z;       // squared distance at which a face is dropped
+  float root;    // its root, and something for rounding
+  float near;    // A may exceed kFarInfluence within this distance
+  double share;  // A at z
+};
+
+// Members of a block, by what of a face its pixels see. Structures of arrays, filled up to whole
+// vectors with members that no pixel sees.
+struct SoftList {
+  static constexpr std::size_t kRoom = 2 * kChunkRoom + kSoftLanes;
+  alignas(64) std::int32_t slot[kRoom];  // in the chunk; longs behind shorts
+  alignas(64) std::int32_t part[kRoom];  // which corner or edge
+  // First row, the one behind the last, first column, the one behind the last: 4 bits each.
+  alignas(64) std::int32_t range[kRoom];
   std::size_t count;
-  double stop;  // a remaining product up to here may be taken as 0
+};
+template <std::size_t kArrays>
+struct SoftListOf : SoftList {
+  alignas(64) float v[kArrays][kRoom];
+};
+struct SoftLists {
+  enum Edge { kTx, kTy, kSide, kAlong, kPast, kInverse, kEdgeArrays };
+  SoftListOf<2> vertices;                  // the nearest point is one corner: x, y
+  SoftListOf<kEdgeArrays> segments;        // ... is on one edge
+  SoftListOf<3 * kEdgeArrays> boundaries;  // ... is anywhere; edge after edge
 };
 
-// Forward: alpha in double, 1 for pixels that need not be computed.
-struct SoftBlockAlpha {
-  alignas(64) double alpha[kBlockPixels];
-  std::uint32_t stopped;         // bit s: cell s left out members behind
-  std::uint32_t looked[kCells];  // how many members each cell looked at
+// dL/d(corners) of a face, pixels.
+struct SoftFaceGradient {
+  std::int32_t face;
+  float d_x[3], d_y[3];
 };
 
-// Backward.
-struct SoftBlockGradient {
-  alignas(64) float d_alpha[kBlockPixels];  // 0 for pixels that have none
-  float* products;                          // [count][kBlockPixels]
-  float* d_corners;                         // [6][stride] d_x[3], d_y[3]; added to, per kernel unit
-  std::size_t stride;                       // the length of the tile's list
+// Backward: a vector of faces near a block, and the product before them.
+struct SoftNearFaces {
+  alignas(64) float edge[3 * SoftLists::kEdgeArrays][kSoftLanes];
+  std::int32_t face[kSoftLanes];
+  std::size_t count;
+  std::uint64_t bits;  // of the pixels that see them
+  alignas(64) float before[kBlockPixels];
+};
+
+// A node that a tile looks at, and the whole part of its squared distance.
+struct SoftNodeAt {
+  std::int32_t node, z;
+};
+
+// Memory of one worker. Grows to its largest use, then nothing is allocated.
+struct SoftMaskScratch {
+  SoftChunk chunk;
+  SoftLists lists;
+  SoftBlock blocks[kTileBlocks];
+  AlignedVector<SoftNodeAt> found;
+  AlignedVector<std::int32_t> nodes;  // near ones first
+  AlignedVector<SoftNearFaces> near[kTileBlocks];
+  alignas(
+      64) float partial[kBlockPixels][kSoftLanes] = {};  // forward: alpha by lanes; 0 between uses
+  alignas(64) float sums[6][2 * kChunkRoom];
 };
 
 }  // namespace tilegrad::raster

@@ -24,7 +24,7 @@ namespace tilegrad {
 // What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
 // the forward pass of the same scenes.
 struct PreparedFrom {
-  bool valid = false, drawn_bins = false, soft_bins = false;
+  bool valid = false, drawn_bins = false, soft_tree = false;
   AlignedVector<float> positions;
   AlignedVector<std::int32_t> faces;  // all in [0, V) for the V of `positions`
   CameraT<float> camera;
@@ -40,8 +40,9 @@ struct ImageScratch {
   AlignedVector<float> clipped_attributes;
   raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
   raster::DrawnFaces drawn_faces;
-  raster::TileListBuffers drawn_buffers, soft_buffers;
-  raster::TileLists drawn, soft;
+  raster::TileListBuffers drawn_buffers;
+  raster::TileLists drawn;
+  raster::SoftTree soft;
   raster::SoftMaskPlan soft_plan;
   PreparedFrom prepared;
 };
@@ -63,14 +64,7 @@ struct BandGradients {
 };
 
 // Gradients through the alpha of one bin of an image.
-struct BinGradients {
-  struct Tile {
-    std::span<const std::int32_t> faces;  // of the image's soft lists
-    std::size_t value_begin;              // of 6 numbers per face, as SoftMaskBackward writes them
-  };
-  AlignedVector<Tile> tiles;
-  AlignedVector<float> values;  // never shrinks
-};
+using BinGradients = AlignedVector<raster::SoftFaceGradient>;
 
 struct WorkerScratch {
   raster::VisibilityBin bin;
@@ -90,12 +84,5 @@ struct TileTask {
   std::size_t image, tile;
   raster::TileRect rect;
 };
-
-// The tile's share of the soft mask; face_ids [H,W] of its image.
-inline raster::SoftMaskTile SoftTileOf(const ImageScratch& image, const TileTask& task,
-                                       std::span<const std::int32_t> face_ids) {
-  const auto near = image.soft[task.tile];
-  return {task.rect, near, raster::BinnedError(image.soft_plan, near.size()), face_ids};
-}
 
 }  // namespace tilegrad

@@ -37,16 +37,11 @@ void AddBandGeometry(const raster::ScreenMesh& mesh, const BandGradients& band, 
 }
 
 void AddBinGeometry(const raster::ScreenMesh& mesh, const BinGradients& bin, float* d_vertices) {
-  for (const auto& tile : bin.tiles) {
-    const std::size_t faces = tile.faces.size();
-    const float* d_corners = bin.values.data() + tile.value_begin;
-    for (std::size_t i = 0; i < faces; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        const auto corner = static_cast<std::size_t>(k);
-        const auto v = mesh.vertex(static_cast<std::size_t>(tile.faces[i]), k);
-        float* to = d_vertices + 4 * static_cast<std::size_t>(v);
-        to[0] += d_corners[corner * faces + i], to[1] += d_corners[(3 + corner) * faces + i];
-      }
+  for (const raster::SoftFaceGradient& g : bin) {
+    for (int k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(mesh.vertex(static_cast<std::size_t>(g.face), k));
+      float* to = d_vertices + 4 * v;
+      to[0] += g.d_x[k], to[1] += g.d_y[k];
     }
   }
 }

@@ -55,7 +55,7 @@ bool IsSoundScene(const SceneView& scene, const Unchanged& unchanged) {
 bool IsPrepared(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
                 const Unchanged& unchanged, const PreparedFrom& from) {
   return request.reuse && from.valid && unchanged.positions && unchanged.faces &&
-         (from.drawn_bins || !request.drawn_bins) && (from.soft_bins || !request.soft_bins) &&
+         (from.drawn_bins || !request.drawn_bins) && (from.soft_tree || !request.soft_tree) &&
          from.width == options.width && from.height == options.height &&
          from.delta == options.delta && from.max_alpha_error == options.max_alpha_error &&
          from.culling == options.culling && SameCamera(scene.camera, from.camera);
@@ -64,7 +64,7 @@ bool IsPrepared(const SceneView& scene, const RenderOptions& options, const Prep
 void RememberPrepared(const SceneView& scene, const RenderOptions& options,
                       const PrepareRequest& request, const Unchanged& unchanged,
                       PreparedFrom* from) {
-  from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_bins = request.soft_bins;
+  from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_tree = request.soft_tree;
   if (!unchanged.positions) from->positions.assign(scene.positions.begin(), scene.positions.end());
   if (!unchanged.faces) from->faces.assign(scene.faces.begin(), scene.faces.end());
   from->camera = scene.camera;
@@ -78,18 +78,15 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
   raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image->buffers,
                   request.drawn_bins ? &image->drawn_faces : nullptr, &workers);
   image->mesh = image->buffers.View();
-  const raster::TileGrid grid(options.width, options.height);
   if (request.drawn_bins) {
     image->drawn =
         raster::BinDrawnFaces(image->drawn_faces, raster::BinGrid(options.width, options.height),
                               &image->drawn_buffers, &workers);
   }
-  if (request.soft_bins) {
-    image->soft_plan =
-        raster::PlanSoftMask({options.width, options.height, options.delta, options.max_alpha_error,
-                              raster::CountSoftFaces(image->mesh)});
-    image->soft = raster::BinSoftFaces(image->mesh, grid, image->soft_plan.margin_x,
-                                       image->soft_plan.margin_y, &image->soft_buffers);
+  if (request.soft_tree) {
+    raster::BuildSoftTree(image->mesh, &image->soft);
+    image->soft_plan = raster::PlanSoftMask(
+        {options.width, options.height, options.delta, options.max_alpha_error, image->soft.faces});
   }
 }
 

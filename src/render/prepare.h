@@ -9,7 +9,7 @@ namespace tilegrad {
 
 struct PrepareRequest {
   bool drawn_bins = true;  // visibility will run
-  bool soft_bins = true;   // alpha or its gradient will run
+  bool soft_tree = true;   // alpha or its gradient will run
   bool reuse = false;      // what was prepared last, if it was for the same scene and options
 };
 

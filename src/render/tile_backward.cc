@@ -99,21 +99,15 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
   const std::size_t pixels =
       static_cast<std::size_t>(tiles.width) * static_cast<std::size_t>(tiles.height);
   const auto part = [&](auto batch) { return batch.subspan(bin.image * pixels, pixels); };
-  out->tiles.clear();
+  const raster::SoftMaskAdjoint adjoint{part(std::span<const float>(input.frame.alpha)),
+                                        part(input.d_frame.alpha)};
+  out->clear();
   ++worker->stats.softened;
-  std::size_t end = 0;
   for (int y = bin.rect.y0; y < bin.rect.y1; y += raster::kTileSize) {
     for (int x = bin.rect.x0; x < bin.rect.x1; x += raster::kTileSize) {
-      const std::size_t t = tiles.tile(x, y);
-      if (image.soft[t].empty()) continue;
-      const auto tile = SoftTileOf(image, {bin.image, t, tiles.rect(t)},
-                                   part(std::span<const std::int32_t>(input.frame.face_ids)));
-      const std::size_t begin = end;
-      end += 6 * tile.faces.size();
-      if (out->values.size() < end) out->values.resize(end);
-      raster::SoftMaskBackward(image.mesh, image.soft_plan, tile, part(input.d_frame.alpha),
-                               std::span(out->values).subspan(begin, end - begin), &worker->soft);
-      out->tiles.push_back({tile.faces, begin});
+      const raster::SoftMaskTile tile{tiles.rect(tiles.tile(x, y)),
+                                      part(std::span<const std::int32_t>(input.frame.face_ids))};
+      raster::SoftMaskBackward(image.soft, image.soft_plan, tile, adjoint, out, &worker->soft);
     }
   }
 }

@@ -100,11 +100,9 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
   ++worker->stats.softened;
   for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
     for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
-      const std::size_t tile = tiles.tile(x, y);
-      const TileTask of_tile{task.image, tile, tiles.rect(tile)};
+      const raster::SoftMaskTile tile{tiles.rect(tiles.tile(x, y)), ids};
       spent = std::max(
-          spent, raster::SoftMaskForward(image.mesh, image.soft_plan,
-                                         SoftTileOf(image, of_tile, ids), alpha, &worker->soft));
+          spent, raster::SoftMaskForward(image.soft, image.soft_plan, tile, alpha, &worker->soft));
     }
   }
   return spent;

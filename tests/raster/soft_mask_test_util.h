@@ -13,6 +13,7 @@
 
 #include "base/rng.h"
 #include "raster/soft_mask.h"
+#include "raster/soft_mask_plan.h"
 #include "raster/soft_mask_ref.h"
 
 namespace tilegrad::raster::test {
@@ -98,7 +99,9 @@ class SoftTruth {
     const double unit = 1 / std::sqrt(o.delta);
     radius_ = 3.5 * std::hypot(scale_.x * unit, scale_.y * unit);
     largest_unit_ = std::max(scale_.x, scale_.y) * unit;
-    for (std::size_t f = 0; f < faces_.size(); ++f) cancelled_.push_back(CancelledIn(f));
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+      cancelled_.push_back(CancelledIn(f)), edges_.push_back(LongestEdge(f));
+    }
   }
   double X(std::size_t i) const {
     return static_cast<double>(i % static_cast<std::size_t>(scene_.options.width)) + 0.5;
@@ -114,9 +117,12 @@ class SoftTruth {
   }
   // Error of a computed z of `face` ("Rounding": Delta z).
   double ErrorOfZ(double z, std::size_t face) const {
-    const double cross = 6 * kU * radius_, cancelled = cancelled_[face];
-    return kU * (8 * z + 17 * radius_ * std::sqrt(z)) + 2 * cross * cross +
-           2 * std::sqrt(z) * cancelled + cancelled * cancelled;
+    const double d = std::sqrt(z), fixed = FixedErrorOfD(face);
+    return kU * 34 * z + 2 * std::sqrt(2.0) * d * fixed + 2 * fixed * fixed;
+  }
+  // Error of a side or beyond that does not shrink with the distance.
+  double FixedErrorOfD(std::size_t face) const {
+    return kU * (14 * radius_ + 11 * edges_[face]) + cancelled_[face];
   }
   // Error of a computed A.
   double ErrorOfA(double z, std::size_t face) const {
@@ -138,7 +144,7 @@ class SoftTruth {
       outside *= factor;
     }
     const auto others = ProductsOfOthers(most);
-    double sum = 20 * kU * (1 - outside);
+    double sum = 42 * kU * (1 - outside);
     for (std::size_t f = 0; f < errors.size(); ++f) sum += others[f] * errors[f];
     return {1 - outside, sum + 1e-16 * static_cast<double>(errors.size())};
   }
@@ -229,6 +235,18 @@ class SoftTruth {
     for (std::size_t f = factors.size(); f-- > 0;) out[f] *= product, product *= factors[f];
     return out;
   }
+  // Of faces that are set up in float; 0 of those with long edges.
+  double LongestEdge(std::size_t f) const {
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(mesh_.vertex(f, k));
+      const auto b = static_cast<std::size_t>(mesh_.vertex(f, (k + 1) % 3));
+      const double x = std::abs(x_[a] - x_[b]), y = std::abs(y_[a] - y_[b]);
+      if (std::max(x, y) > static_cast<double>(kLongEdge)) return 0;
+      longest = std::max(longest, largest_unit_ * std::hypot(x, y));
+    }
+    return longest;
+  }
   double ShortestEdge(std::size_t f) const {
     double shortest = 1e300;
     for (int k = 0; k < 3; ++k) {
@@ -247,13 +265,13 @@ class SoftTruth {
     for (const double z : zs) factors.push_back(-std::expm1(-z));
     const auto others = ProductsOfOthers(factors);
     const double dropped = scene_.options.max_alpha_error + 1e-30;
-    double d_product = dropped;
+    double d_product = dropped + 64 * kU;
     for (std::size_t f = 0; f < zs.size(); ++f) d_product += 4 * kU + ErrorOfA(zs[f], f);
     for (std::size_t f = 0; f < zs.size(); ++f) {
       const double d = std::sqrt(zs[f]), a = std::exp(-zs[f]);
-      const double d_r = kU * (5 * d + 9 * radius_) + cancelled_[f];
+      const double d_r = kU * 12 * d + FixedErrorOfD(f);
       const double d_weight =
-          std::min(1.0, (kU * (8 * d + 12 * radius_) + cancelled_[f]) / ShortestEdge(f) + 4 * kU);
+          std::min(1.0, (kU * 12 * d + FixedErrorOfD(f)) / ShortestEdge(f) + 4 * kU);
       const double error =
           others[f] * (d * ErrorOfA(zs[f], f) + a * (80 * kU * d + d_r + d * d_weight)) +
           a * (d + d_r) * d_product + dropped * (1 + d);
@@ -264,7 +282,7 @@ class SoftTruth {
   }
 
   const SoftScene& scene_;
-  std::vector<double> x_, y_, cancelled_;
+  std::vector<double> x_, y_, cancelled_, edges_;
   ScreenMeshT<double> mesh_;
   std::vector<std::int32_t> faces_;
   SoftScale<double> scale_{};
@@ -281,23 +299,21 @@ struct SoftResult {
 inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& d_alpha,
                               SoftMaskScratch* scratch) {
   const ScreenMesh mesh = scene.mesh.View();
+  SoftTree tree;
+  BuildSoftTree(mesh, &tree);
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
   const TileGrid grid(scene.options.width, scene.options.height);
-  TileListBuffers buffers;
-  const TileLists lists = BinSoftFaces(mesh, grid, plan.margin_x, plan.margin_y, &buffers);
   SoftResult out;
   out.alpha.assign(scene.pixels(), -1.0f), out.d_corners.assign(6 * mesh.faces(), 0.0f);
+  AlignedVector<SoftFaceGradient> gradients;
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
-    const SoftMaskTile tile{grid.rect(t), lists[t], BinnedError(plan, lists[t].size()),
-                            scene.face_ids};
-    out.spent = std::max(out.spent, SoftMaskForward(mesh, plan, tile, out.alpha, scratch));
-    std::vector<float> d_tile(6 * lists[t].size(), -1.0f);
-    SoftMaskBackward(mesh, plan, tile, d_alpha, d_tile, scratch);
-    for (std::size_t n = 0; n < lists[t].size(); ++n) {
-      float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(lists[t][n]);
-      for (std::size_t a = 0; a < 6; ++a)
-        to[2 * (a % 3) + a / 3] += d_tile[a * lists[t].size() + n];
-    }
+    const SoftMaskTile tile{grid.rect(t), scene.face_ids};
+    out.spent = std::max(out.spent, SoftMaskForward(tree, plan, tile, out.alpha, scratch));
+    SoftMaskBackward(tree, plan, tile, {out.alpha, d_alpha}, &gradients, scratch);
+  }
+  for (const SoftFaceGradient& g : gradients) {
+    float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(g.face);
+    for (std::size_t k = 0; k < 3; ++k) to[2 * k] += g.d_x[k], to[2 * k + 1] += g.d_y[k];
   }
   return out;
 }

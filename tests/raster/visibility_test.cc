@@ -252,35 +252,5 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   EXPECT_LT(listed, mesh.faces() * grid.tiles() / 2);  // it does reject
 }
 
-TEST(Bin, SoftListsHoldEveryFaceWithinTheMarginAndNotMuchMore) {
-  Rng rng(9, 4);
-  Flat flat = RandomTriangles(100, 10, &rng);
-  const ScreenMesh mesh = flat.Finish();
-  const TileGrid grid(mesh.width, mesh.height);
-  TileListBuffers buffers;
-  const float inf = std::numeric_limits<float>::infinity();
-  const TileLists all = BinSoftFaces(mesh, grid, inf, inf, &buffers);
-  for (std::size_t t = 0; t < grid.tiles(); ++t) EXPECT_EQ(all[t].size(), mesh.faces());
-
-  const float margin = 2.5f;
-  const TileLists near = BinSoftFaces(mesh, grid, margin, margin, &buffers);
-  const auto outside = [&](float low, float high, int from, int to) {
-    return high + margin < static_cast<float>(from) + 0.5f ||
-           low - margin > static_cast<float>(to) - 0.5f;
-  };
-  for (std::size_t t = 0; t < grid.tiles(); ++t) {
-    const TileRect rect = grid.rect(t);
-    for (std::size_t f = 0; f < mesh.faces(); ++f) {
-      const auto v = 3 * f;  // RandomTriangles shares no vertices
-      const auto [left, right] = std::minmax({mesh.x[v], mesh.x[v + 1], mesh.x[v + 2]});
-      const auto [top, bottom] = std::minmax({mesh.y[v], mesh.y[v + 1], mesh.y[v + 2]});
-      const bool expected =
-          !outside(left, right, rect.x0, rect.x1) && !outside(top, bottom, rect.y0, rect.y1);
-      EXPECT_EQ(std::binary_search(near[t].begin(), near[t].end(), static_cast<int>(f)), expected)
-          << "face " << f << " tile " << t;
-    }
-  }
-}
-
 }  // namespace
 }  // namespace tilegrad::raster

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way back through alpha. Where A is not close to 1, the product over all other faces is the
+// whole product times 1 + A + A^2 + ... So it is in light pixels, which take the product from
+// alpha, and with the far faces of dark ones. For the near faces of dark pixels the products before
+// and behind each are kept. Nothing is divided by 1 - A. Lanes are faces, pixels are in the loop.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <numbers>
+
+#include "raster/soft_mask_forward-inl.h"
+#include "raster/soft_mask_gradient-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+
+// Pixels that have a gradient to hand on: all faces together have A <= about alpha, so that one may
+// be dropped where alpha is within `least`.
+HWY_INLINE std::uint64_t GradientBitsOf(const SoftMaskPlan& plan, const SoftBlock& block,
+                                        const std::int32_t* face_ids,
+                                        const SoftMaskAdjoint& adjoint) {
+  const SoftTag d;
+  const SoftVec least = hn::Set(d, static_cast<float>(plan.stop_error));
+  const auto matter = [&](const float* alpha, const float* d_alpha) HWY_ATTR {
+    const SoftMask none =
+        hn::Or(hn::Le(hn::LoadU(d, alpha), least), hn::Eq(hn::LoadU(d, d_alpha), hn::Zero(d)));
+    return std::uint64_t{BitsOf(d, hn::Not(none))};
+  };
+  std::uint64_t bits = BackgroundOf(plan, block, face_ids);
+  if (bits == 0) return 0;
+  ForRows(plan, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
+    alignas(64) float alpha[kBlockSize] = {}, d_alpha[kBlockSize] = {};
+    std::copy_n(adjoint.alpha.data() + from, block.width, alpha);
+    std::copy_n(adjoint.d_alpha.data() + from, block.width, d_alpha);
+    std::uint64_t row = 0;
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      row |= matter(alpha + x, d_alpha + x) << x;
+    }
+    bits &= ~(std::uint64_t{0xff} << to) | row << to;
+  });
+  return bits;
+}
+
+// Backward through one tile.
+class TileBackward {
+ public:
+  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+               const SoftMaskAdjoint& adjoint, SoftMaskScratch* scratch,
+               AlignedVector<SoftFaceGradient>* out)
+      : tree_(tree), plan_(plan), adjoint_(adjoint), scratch_(scratch), out_(out) {
+    box_ = SetUpBlocks(
+        plan, tile.rect,
+        [&](const SoftBlock& b)
+            HWY_ATTR { return GradientBitsOf(plan, b, tile.face_ids.data(), adjoint); },
+        scratch->blocks);
+    // dz / d(pixel) has the unit, dA / dz has ln 2.
+    scale_ = {static_cast<float>(plan.unit_x * std::numbers::ln2),
+              static_cast<float>(plan.unit_y * std::numbers::ln2)};
+  }
+
+  void Run() {
+    if (!AnyLive(scratch_->blocks)) return;
+    nodes_ = FindSoftNodes(tree_, plan_, box_, scratch_);
+    reach_ = ReachOf(plan_, nodes_.faces);
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (scratch_->blocks[b].bits != 0) TakeLightPixels(b);
+    }
+    if (AnyLive(scratch_->blocks)) FindProducts();
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (dark_[b] != 0) DarkGradients(b);
+    }
+    WeakGradients();
+  }
+
+ private:
+  std::span<const std::int32_t> Order() const {
+    return std::span(scratch_->nodes).first(nodes_.count);
+  }
+  std::size_t IndexOf(const SoftBlock& block, std::size_t i) const {
+    return PixelIndex(plan_, block.x0 + static_cast<int>(i % kBlockSize),
+                      block.y0 + static_cast<int>(i / kBlockSize));
+  }
+
+  // push_[b] is 2 d_alpha times the product over all faces: moving the nearest point along the way
+  // to the pixel lowers z. In light pixels it is 1 - alpha, at least 1/16; the others stay live.
+  void TakeLightPixels(std::size_t b) {
+    SoftBlock& block = scratch_->blocks[b];
+    const double spent = plan_.node_error + plan_.face_error + plan_.stop_error;
+    ForPixels(block.bits, [&](std::size_t i) {
+      const std::size_t at = IndexOf(block, i);
+      const float product = 1 - adjoint_.alpha[at];
+      push_[b][i] = 2 * adjoint_.d_alpha[at] * product;
+      if (static_cast<double>(product) < kLightProduct + spent) dark_[b] |= std::uint64_t{1} << i;
+    });
+    weak_[b] = block.bits, block.live = dark_[b];
+  }
+
+  // The products over all faces in dark pixels: near ones by and by, far ones in block.alpha.
+  void FindProducts() {
+    SoftBlock* blocks = scratch_->blocks;
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (dark_[b] == 0) continue;
+      ClearAlpha(&blocks[b]);
+      scratch_->near[b].clear();
+      std::fill_n(near_product_[b], kBlockPixels, 1.0f);
+    }
+    for (std::size_t next = 0; next < Order().size() && AnyLive(blocks);) {
+      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      for (std::size_t b = 0; b < kTileBlocks; ++b) {
+        if (blocks[b].live == 0) continue;
+        SoftLists& lists = scratch_->lists;
+        FindFeatures(scratch_->chunk, plan_, box_, blocks[b], reach_, true, &lists);
+        PartialAlpha far(&blocks[b], scratch_->partial);
+        far.AddVertices(lists.vertices), far.AddSegments(lists.segments), far.Merge();
+        AppendNear(blocks[b], lists.boundaries, scratch_->chunk, near_product_[b],
+                   &scratch_->near[b]);
+        // The square: a face's gradient may be as large as the root of the product
+        // (docs/numerics.md).
+        const double stop = plan_.stop_error * plan_.stop_error;
+        ForPixels(blocks[b].live, [&](std::size_t i) {
+          if (ProductAt(b, i) <= stop) blocks[b].live &= ~(std::uint64_t{1} << i);
+        });
+      }
+    }
+  }
+
+  double ProductAt(std::size_t b, std::size_t i) const {
+    return (1 - scratch_->blocks[b].alpha[i]) * static_cast<double>(near_product_[b][i]);
+  }
+
+  // Gradients of the near faces in dark pixels, for which the push is that of the product over the
+  // far ones; then the push of the others, if they can matter.
+  void DarkGradients(std::size_t b) {
+    const SoftBlock& block = scratch_->blocks[b];
+    const auto push = [&](std::size_t i, double product) {
+      push_[b][i] = static_cast<float>(
+          2 * static_cast<double>(adjoint_.d_alpha[IndexOf(block, i)]) * product);
+    };
+    ForPixels(dark_[b], [&](std::size_t i) { push(i, 1 - block.alpha[i]); });
+    AppendNearGradients(block, scratch_->near[b], push_[b], scale_, out_);
+    ForPixels(dark_[b], [&](std::size_t i) {
+      push(i, ProductAt(b, i));
+      if (ProductAt(b, i) <= plan_.stop_error) weak_[b] &= ~(std::uint64_t{1} << i);
+    });
+  }
+
+  void WeakGradients() {
+    for (std::size_t next = 0; next < Order().size();) {
+      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      for (auto& array : scratch_->sums) std::fill(std::begin(array), std::end(array), 0.0f);
+      for (std::size_t b = 0; b < kTileBlocks; ++b) {
+        if (weak_[b] == 0) continue;
+        const SoftBlock& block = scratch_->blocks[b];
+        SoftLists& lists = scratch_->lists;
+        FindFeatures(scratch_->chunk, plan_, box_, block, reach_, dark_[b] != 0, &lists);
+        const WeakFaces faces{block, push_[b], {scratch_->sums}};
+        faces.Vertices(lists.vertices, weak_[b]), faces.Segments(lists.segments, weak_[b]);
+        faces.Boundaries(lists.boundaries, weak_[b] & ~dark_[b]);
+      }
+      Emit(scratch_->chunk.shorts, 0);
+      Emit(scratch_->chunk.longs, kChunkRoom);
+    }
+  }
+
+  void Emit(const SoftFaceArrays& faces, std::size_t slot) {
+    const auto& v = scratch_->sums;
+    for (std::size_t i = 0; i < faces.count; ++i) {
+      const std::size_t s = slot + i;
+      const float x[3] = {v[0][s], v[1][s], v[2][s]}, y[3] = {v[3][s], v[4][s], v[5][s]};
+      AppendGradient(faces.face[i], x, y, scale_, out_);
+    }
+  }
+
+  const SoftTree& tree_;
+  const SoftMaskPlan& plan_;
+  const SoftMaskAdjoint& adjoint_;
+  SoftMaskScratch* scratch_;
+  AlignedVector<SoftFaceGradient>* out_;
+  SoftBox box_;
+  SoftNodes nodes_;
+  SoftReach reach_;
+  PixelScale scale_;
+  std::uint64_t dark_[kTileBlocks] = {};
+  std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter
+  alignas(64) float push_[kTileBlocks][kBlockPixels];
+  alignas(64) float near_product_[kTileBlocks][kBlockPixels];
+};
+
+inline void SoftMaskBackwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
+                                   const SoftMaskTile& tile, const SoftMaskAdjoint& adjoint,
+                                   SoftMaskScratch* scratch, AlignedVector<SoftFaceGradient>* out) {
+  TileBackward(tree, plan, tile, adjoint, scratch, out).Run();
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// The blocks of a tile: which pixels are background, and where they lie.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+
+#include "raster/soft_mask_tree-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+
+HWY_INLINE std::size_t PixelIndex(const SoftMaskPlan& plan, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
+         static_cast<std::size_t>(x);
+}
+
+// Calls visit(pixel of the image, pixel of the block) for the first pixel of each row.
+template <class Visit>
+HWY_INLINE void ForRows(const SoftMaskPlan& plan, const SoftBlock& block, const Visit& visit) {
+  for (int y = 0; y < block.height; ++y) {
+    visit(PixelIndex(plan, block.x0, block.y0 + y), static_cast<std::size_t>(y) * kBlockSize);
+  }
+}
+
+// Bits of the background pixels.
+HWY_INLINE std::uint64_t BackgroundOf(const SoftMaskPlan& plan, const SoftBlock& block,
+                                      const std::int32_t* face_ids) {
+  const SoftTag d;
+  const SoftIntTag di;
+  std::uint64_t bits = 0;
+  ForRows(plan, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
+    std::uint64_t row = 0;
+    if (block.width == static_cast<int>(kBlockSize)) {
+      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(di)) {
+        const auto ids = hn::LoadU(di, face_ids + from + x);
+        row |= std::uint64_t{BitsOf(d, hn::RebindMask(d, hn::Lt(ids, hn::Zero(di))))} << x;
+      }
+    } else {
+      for (int x = 0; x < block.width; ++x) {
+        row |= std::uint64_t{face_ids[from + static_cast<std::size_t>(x)] < 0} << x;
+      }
+    }
+    bits |= row << to;
+  });
+  return bits;
+}
+
+// Bit x: some row has column x. Bit y: row y has a pixel.
+HWY_INLINE std::uint32_t ColumnsOf(std::uint64_t bits) {
+  for (const int shift : {32, 16, 8}) bits |= bits >> shift;
+  return static_cast<std::uint32_t>(bits & 0xff);
+}
+HWY_INLINE std::uint32_t RowsOf(std::uint64_t bits) {
+  for (const int shift : {4, 2, 1}) bits |= bits >> shift;
+  // The lowest bit of each row to bits 56, 57, ... in turn.
+  return static_cast<std::uint32_t>((bits & 0x0101010101010101u) * 0x0102040810204080u >> 56);
+}
+
+// The bounding box of the block's pixels to compute.
+struct PixelBox {
+  int x0, y0, x1, y1;  // the last ones are inside
+};
+HWY_INLINE PixelBox BoxOf(const SoftBlock& block) {
+  const std::uint32_t columns = ColumnsOf(block.bits), rows = RowsOf(block.bits);
+  return {block.x0 + std::countr_zero(columns), block.y0 + std::countr_zero(rows),
+          block.x0 + 31 - std::countl_zero(columns), block.y0 + 31 - std::countl_zero(rows)};
+}
+
+// Everything that follows from block.bits, which must not be 0.
+HWY_INLINE void PlaceBlock(const SoftBox& unit, SoftBlock* block) {
+  const PixelBox box = BoxOf(*block);
+  block->live = block->bits, block->whole = 0;
+  block->centre_x = 0.5f * static_cast<float>(box.x0 + box.x1 + 1);
+  block->centre_y = 0.5f * static_cast<float>(box.y0 + box.y1 + 1);
+  block->half_x = 0.5f * static_cast<float>(box.x1 - box.x0) * unit.unit_x;
+  block->half_y = 0.5f * static_cast<float>(box.y1 - box.y0) * unit.unit_y;
+  block->radius = std::hypot(block->half_x, block->half_y);
+  for (std::size_t i = 0; i < kBlockSize; ++i) {
+    const float at = static_cast<float>(i) + 0.5f;
+    block->x[i] = (static_cast<float>(block->x0) + at - block->centre_x) * unit.unit_x;
+    block->y[i] = (static_cast<float>(block->y0) + at - block->centre_y) * unit.unit_y;
+  }
+}
+
+// The blocks of a tile, and the box around all pixels to compute. `bits_of` says which.
+template <class Bits>
+HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, const Bits& bits_of,
+                               SoftBlock* blocks) {
+  PixelBox all{rect.x1, rect.y1, rect.x0 - 1, rect.y0 - 1};
+  SoftBox box{0, 0, 0, 0, static_cast<float>(plan.unit_x), static_cast<float>(plan.unit_y)};
+  for (std::size_t b = 0; b < kTileBlocks; ++b) {
+    SoftBlock& block = blocks[b];
+    block.x0 = rect.x0 + static_cast<int>(b % 2 * kBlockSize);
+    block.y0 = rect.y0 + static_cast<int>(b / 2 * kBlockSize);
+    block.width = std::clamp(rect.x1 - block.x0, 0, static_cast<int>(kBlockSize));
+    block.height = std::clamp(rect.y1 - block.y0, 0, static_cast<int>(kBlockSize));
+    block.bits = block.width == 0 ? 0 : bits_of(block);
+    block.live = 0;
+    if (block.bits == 0) continue;
+    PlaceBlock(box, &block);
+    const PixelBox own = BoxOf(block);
+    all = {std::min(all.x0, own.x0), std::min(all.y0, own.y0), std::max(all.x1, own.x1),
+           std::max(all.y1, own.y1)};
+  }
+  box.left = static_cast<float>(all.x0) + 0.5f, box.right = static_cast<float>(all.x1) + 0.5f;
+  box.top = static_cast<float>(all.y0) + 0.5f, box.bottom = static_cast<float>(all.y1) + 0.5f;
+  return box;
+}
+
+HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
+  return std::any_of(blocks, blocks + kTileBlocks, [](const SoftBlock& b) { return b.live != 0; });
+}
+
+// Alpha of a block over no faces: 0 for the pixels to compute.
+HWY_INLINE void ClearAlpha(SoftBlock* block) {
+  for (std::size_t i = 0; i < kBlockPixels; ++i)
+    block->alpha[i] = (block->bits >> i & 1) != 0 ? 0 : 1;
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

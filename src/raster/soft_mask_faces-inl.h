@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// The faces of a tile, and what a block sees of them. Lanes are faces.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cmath>
+#include <cstddef>
+
+#include "raster/soft_mask_compact-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+
+HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&corner)[6], SoftInt face, SoftMask keep,
+                            SoftFaceArrays* to) {
+  const Compactor compact(d, keep);
+  for (std::size_t a = 0; a < 6; ++a) compact.Store(corner[a], to->v[a] + to->count);
+  compact.Store(face, to->face + to->count);
+  to->count += compact.count();
+}
+
+// Appends the faces of a node that are within `z` of the box.
+HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, const SoftBox& box,
+                           float z, SoftChunk* chunk) {
+  const SoftIntTag di;
+  const SoftVec limit = hn::Set(d, z), long_edge = hn::Set(d, kLongEdge);
+  for (std::size_t f = node * kNodeFaces; f < (node + 1) * kNodeFaces; f += hn::Lanes(d)) {
+    SoftVec c[6];
+    for (std::size_t a = 0; a < 6; ++a) c[a] = hn::Load(d, tree.corner(a) + f);
+    const auto left = hn::Min(hn::Min(c[0], c[1]), c[2]);
+    const auto right = hn::Max(hn::Max(c[0], c[1]), c[2]);
+    const auto top = hn::Min(hn::Min(c[3], c[4]), c[5]);
+    const auto bottom = hn::Max(hn::Max(c[3], c[4]), c[5]);
+    const auto near = hn::Le(BoxDistance(d, left, top, right, bottom, box), limit);
+    if (hn::AllFalse(d, near)) continue;
+    const auto is_long = hn::Gt(hn::Max(hn::Sub(right, left), hn::Sub(bottom, top)), long_edge);
+    const SoftInt face = hn::Iota(di, static_cast<std::int32_t>(f));
+    AppendFaces(d, c, face, hn::AndNot(is_long, near), &chunk->shorts);
+    if (hn::AllFalse(d, hn::And(is_long, near))) continue;
+    AppendFaces(d, c, face, hn::And(is_long, near), &chunk->longs);
+  }
+}
+
+// Directions of the edges of faces that are not long.
+HWY_INLINE void SetUpDirections(SoftTag d, float unit_x, float unit_y, SoftFaceArrays* faces) {
+  const SoftVec zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const SoftVec ux = hn::Set(d, unit_x), uy = hn::Set(d, unit_y);
+  for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = k == 2 ? 0 : k + 1;
+      const auto span = [&](std::size_t a) HWY_ATTR {
+        return hn::Sub(hn::Load(d, faces->v[a + next] + i), hn::Load(d, faces->v[a + k] + i));
+      };
+      const SoftVec ex = hn::Mul(span(SoftFaceArrays::kX), ux);
+      const SoftVec ey = hn::Mul(span(SoftFaceArrays::kY), uy);
+      const SoftVec length = hn::Sqrt(hn::MulAdd(ex, ex, hn::Mul(ey, ey)));
+      const SoftMask real = hn::Gt(length, zero);
+      const SoftVec inverse = hn::IfThenElseZero(real, hn::Div(one, length));
+      hn::Store(hn::IfThenElse(real, hn::Mul(ex, inverse), one), d,
+                faces->v[SoftFaceArrays::kTx + k] + i);
+      hn::Store(hn::Mul(ey, inverse), d, faces->v[SoftFaceArrays::kTy + k] + i);
+      hn::Store(inverse, d, faces->v[SoftFaceArrays::kInverse + k] + i);
+    }
+  }
+}
+
+// The next faces of a tile: fills the chunk from nodes[*next] on.
+inline void FillChunk(const SoftTree& tree, std::span<const std::int32_t> nodes, const SoftBox& box,
+                      float z, std::size_t* next, SoftChunk* chunk) {
+  const SoftTag d;
+  chunk->shorts.count = chunk->longs.count = 0;
+  while (*next < nodes.size() &&
+         chunk->shorts.count + chunk->longs.count + kNodeFaces <= kChunkFaces) {
+    AppendNode(d, tree, static_cast<std::size_t>(nodes[(*next)++]), box, z, chunk);
+  }
+  SetUpDirections(d, box.unit_x, box.unit_y, &chunk->shorts);
+}
+
+// Faces seen from the middle of a block's background: corners, and for each edge where that point
+// lies relative to it ("The distance to a boundary").
+struct FaceEdges {
+  SoftVec x[3], y[3];
+  SoftVec tx[3], ty[3], side[3], along[3], past[3], inverse[3];
+};
+
+HWY_INLINE void LoadCorners(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
+                            const SoftBox& unit, const SoftBlock& block, FaceEdges* f) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto from = [&](std::size_t a, float centre, float scale) HWY_ATTR {
+      return hn::Mul(hn::Sub(hn::Load(d, faces.v[a + k] + i), hn::Set(d, centre)),
+                     hn::Set(d, scale));
+    };
+    f->x[k] = from(SoftFaceArrays::kX, block.centre_x, unit.unit_x);
+    f->y[k] = from(SoftFaceArrays::kY, block.centre_y, unit.unit_y);
+  }
+}
+
+// The edges between the corners in `f`.
+HWY_INLINE void ShortEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i, FaceEdges* f) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t next = k == 2 ? 0 : k + 1;
+    const SoftVec tx = f->tx[k] = hn::Load(d, faces.v[SoftFaceArrays::kTx + k] + i);
+    const SoftVec ty = f->ty[k] = hn::Load(d, faces.v[SoftFaceArrays::kTy + k] + i);
+    f->side[k] = hn::MulSub(ty, f->x[k], hn::Mul(tx, f->y[k]));
+    f->along[k] = hn::NegMulSub(tx, f->x[k], hn::Mul(ty, f->y[k]));
+    f->past[k] = hn::NegMulSub(tx, f->x[next], hn::Mul(ty, f->y[next]));
+    f->inverse[k] = hn::Load(d, faces.v[SoftFaceArrays::kInverse + k] + i);
+  }
+}
+
+// The same of faces with long edges, one by one in double: a difference of large numbers.
+struct LongFace {
+  enum { kX = 0, kY = 3, kEdges = 6, kAll = 24 };
+  float v[kAll];
+};
+inline LongFace LongEdges(const SoftFaceArrays& faces, std::size_t i, const SoftMaskPlan& plan,
+                          const SoftBlock& block) {
+  // Finite, and the square is at most infinite.
+  const auto to_float = [](double v) {
+    return static_cast<float>(std::fmin(std::fmax(v, -1e30), 1e30));
+  };
+  LongFace out;
+  double x[3], y[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    x[k] = (static_cast<double>(faces.v[SoftFaceArrays::kX + k][i]) -
+            static_cast<double>(block.centre_x)) *
+           plan.unit_x;
+    y[k] = (static_cast<double>(faces.v[SoftFaceArrays::kY + k][i]) -
+            static_cast<double>(block.centre_y)) *
+           plan.unit_y;
+    out.v[LongFace::kX + k] = to_float(x[k]), out.v[LongFace::kY + k] = to_float(y[k]);
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t next = k == 2 ? 0 : k + 1;
+    const double ex = x[next] - x[k], ey = y[next] - y[k], length = std::sqrt(ex * ex + ey * ey);
+    const double inverse = length > 0 ? 1 / length : 0;
+    const double tx = length > 0 ? ex * inverse : 1, ty = ey * inverse;
+    const double along = -(tx * x[k] + ty * y[k]);
+    const double edge[] = {tx, ty, ty * x[k] - tx * y[k], along, along - length, inverse};
+    for (std::size_t a = 0; a < 6; ++a) out.v[LongFace::kEdges + 6 * k + a] = to_float(edge[a]);
+  }
+  return out;
+}
+
+HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
+                               const SoftMaskPlan& plan, const SoftBlock& block) {
+  HWY_ALIGN float lanes[LongFace::kAll][kSoftLanes];
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+    const LongFace face = LongEdges(faces, i + lane < faces.count ? i + lane : i, plan, block);
+    for (std::size_t a = 0; a < LongFace::kAll; ++a) lanes[a][lane] = face.v[a];
+  }
+  FaceEdges f;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto edge = [&](std::size_t a)
+                          HWY_ATTR { return hn::Load(d, lanes[LongFace::kEdges + 6 * k + a]); };
+    f.x[k] = hn::Load(d, lanes[LongFace::kX + k]), f.y[k] = hn::Load(d, lanes[LongFace::kY + k]);
+    f.tx[k] = edge(0), f.ty[k] = edge(1), f.side[k] = edge(2);
+    f.along[k] = edge(3), f.past[k] = edge(4), f.inverse[k] = edge(5);
+  }
+  return f;
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

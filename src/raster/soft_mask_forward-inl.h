@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// Alpha of a block's pixels. Lanes are faces, pixels are in the loop; lanes are merged per chunk.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_FORWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_FORWARD_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_FORWARD_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_FORWARD_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "raster/soft_mask_members-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+
+// a + (1 - a) A: keeps small alphas precise, which 1 - product would not.
+HWY_INLINE SoftVec Over(SoftTag d, SoftVec a, SoftVec influence) {
+  return hn::MulAdd(hn::Sub(hn::Set(d, 1.0f), a), influence, a);
+}
+
+// Alpha over the members of a chunk, pixel by pixel and lane by lane, for a block.
+class PartialAlpha {
+ public:
+  // `partial` is 0, and is again after Merge.
+  PartialAlpha(SoftBlock* block, float (*partial)[kSoftLanes]) : block_(block), partial_(partial) {}
+
+  HWY_INLINE void AddVertices(const SoftListOf<2>& list) {
+    const SoftTag d;
+    for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      const std::uint64_t bits = See(list, m);
+      if (bits == 0) continue;
+      const VertexMembers members(d, list, m, *block_, bits);
+      ForPixels(bits, [&](std::size_t i) HWY_ATTR { Put(d, i, members.Influence(i)); });
+    }
+  }
+
+  HWY_INLINE void AddSegments(const SoftListOf<SoftLists::kEdgeArrays>& list) {
+    const SoftTag d;
+    for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      const EdgeMembers members(d, list.v[0] + m, list.kRoom);
+      ForPixels(See(list, m), [&](std::size_t i) HWY_ATTR {
+        Put(d, i, simd::HalvingOf(d, SquaredLength(members.At(d, *block_, i))).power);
+      });
+    }
+  }
+
+  HWY_INLINE void AddBoundaries(const SoftListOf<3 * SoftLists::kEdgeArrays>& list) {
+    const SoftTag d;
+    for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
+      ForPixels(See(list, m), [&](std::size_t i) HWY_ATTR {
+        Put(d, i, simd::HalvingOf(d, members.Z(d, *block_, i)).power);
+      });
+    }
+  }
+
+  // Into the block's alpha, in double.
+  HWY_INLINE void Merge() {
+    const SoftTag d;
+    ForPixels(touched_, [&](std::size_t i) HWY_ATTR {
+      SoftVec a = hn::Load(d, partial_[i]);
+      hn::Store(hn::Zero(d), d, partial_[i]);
+      if constexpr (hn::MaxLanes(d) > 4) a = Over(d, a, NextQuartet(d, a));
+      a = Over(d, a, NextPair(d, a));
+      a = Over(d, a, Neighbour(d, a));
+      block_->alpha[i] += (1 - block_->alpha[i]) * static_cast<double>(hn::GetLane(a));
+    });
+    touched_ = 0;
+  }
+
+ private:
+  // The pixels that see a vector of members. Counts members that all pixels see.
+  HWY_INLINE std::uint64_t See(const SoftList& list, std::size_t m) {
+    const SoftTag d;
+    for (std::size_t lane = 0; lane < hn::Lanes(d) && m + lane < list.count; ++lane) {
+      block_->whole += (block_->bits & ~RangeBits(list.range[m + lane])) == 0;
+    }
+    const std::uint64_t bits = PixelsOf(d, list, m, block_->live);
+    touched_ |= bits;
+    return bits;
+  }
+  HWY_INLINE void Put(SoftTag d, std::size_t pixel, SoftVec influence) {
+    float* at = partial_[pixel];
+    hn::Store(Over(d, hn::Load(d, at), influence), d, at);
+  }
+
+  SoftBlock* block_;
+  float (*partial_)[kSoftLanes];
+  std::uint64_t touched_ = 0;
+};
+
+// Pixels whose product is within `stop` need no more faces.
+HWY_INLINE void StopPixels(double stop, SoftBlock* block) {
+  ForPixels(block->live, [&](std::size_t i) {
+    if (1 - block->alpha[i] <= stop) block->live &= ~(std::uint64_t{1} << i);
+  });
+}
+
+// What the block's pixels spent: those that stopped, their product; the others, what was dropped.
+HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double share) {
+  double spent = 0;
+  if (block.live != 0) {
+    spent = nodes.dropped + static_cast<double>(nodes.faces - block.whole) * share;
+  }
+  ForPixels(block.bits & ~block.live, [&](std::size_t i) {
+    const double product = 1 - block.alpha[i];
+    if (product > kUnseenProduct) spent = std::max(spent, product);
+  });
+  return std::min(spent, 1.0);
+}
+
+HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
+  ForRows(plan, block, [&](std::size_t to, std::size_t from) {
+    for (int x = 0; x < block.width; ++x) {
+      alpha[to + static_cast<std::size_t>(x)] =
+          static_cast<float>(block.alpha[from + static_cast<std::size_t>(x)]);
+    }
+  });
+}
+
+// Alpha of the blocks of a tile, and what they spent.
+inline double FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
+                        SoftMaskScratch* scratch) {
+  SoftBlock* blocks = scratch->blocks;
+  const SoftNodes nodes = FindSoftNodes(tree, plan, box, scratch);
+  const SoftReach reach = ReachOf(plan, nodes.faces);
+  const double stop = StopProduct(plan);
+  const std::span<const std::int32_t> order = std::span(scratch->nodes).first(nodes.count);
+  for (std::size_t next = 0; next < order.size() && AnyLive(blocks);) {
+    FillChunk(tree, order, box, reach.z, &next, &scratch->chunk);
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (blocks[b].live == 0) continue;
+      const SoftLists& lists = scratch->lists;
+      FindFeatures(scratch->chunk, plan, box, blocks[b], reach, false, &scratch->lists);
+      PartialAlpha partial(&blocks[b], scratch->partial);
+      partial.AddVertices(lists.vertices), partial.AddSegments(lists.segments);
+      partial.AddBoundaries(lists.boundaries), partial.Merge();
+      if (next < order.size()) StopPixels(stop, &blocks[b]);
+    }
+  }
+  double spent = 0;
+  for (std::size_t b = 0; b < kTileBlocks; ++b) {
+    if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
+  }
+  return spent;
+}
+
+inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
+                                    const SoftMaskTile& tile, float* alpha,
+                                    SoftMaskScratch* scratch) {
+  SoftBlock* blocks = scratch->blocks;
+  const SoftBox box = SetUpBlocks(
+      plan, tile.rect,
+      [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, tile.face_ids.data()); },
+      blocks);
+  for (std::size_t b = 0; b < kTileBlocks; ++b) ClearAlpha(&blocks[b]);
+  const double spent = AnyLive(blocks) ? FindAlpha(tree, plan, box, scratch) : 0;
+  for (std::size_t b = 0; b < kTileBlocks; ++b) {
+    if (blocks[b].width > 0) WriteAlpha(plan, blocks[b], alpha);
+  }
+  return spent;
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

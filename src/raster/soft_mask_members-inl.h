@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// The members of a block's lists, a vector at a time, and the pixels that see them. Lanes are
+// faces.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_MEMBERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_MEMBERS_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_MEMBERS_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_MEMBERS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <bit>
+#include <cstddef>
+
+#include "base/simd_math-inl.h"
+#include "raster/soft_mask_block-inl.h"
+#include "raster/soft_mask_features-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+namespace simd = tilegrad::HWY_NAMESPACE;
+
+// Calls visit(pixel) for each bit.
+template <class Visit>
+HWY_INLINE void ForPixels(std::uint64_t bits, const Visit& visit) {
+  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::size_t>(std::countr_zero(bits)));
+}
+
+// The pixels of `among` that see one of a vector of members.
+HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftList& list, std::size_t m,
+                                  std::uint64_t among) {
+  std::uint64_t bits = 0;
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) bits |= RangeBits(list.range[m + lane]);
+  return bits & among;
+}
+
+// Squared lengths along one axis, halved that often, and the ways themselves: [column or row].
+struct AxisInfluence {
+  SoftVec power[kBlockSize], way[kBlockSize];
+
+  // For the bits of `pixels`, columns or rows at `at`.
+  HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels) {
+    for (; pixels != 0; pixels &= pixels - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
+      way[i] = hn::Sub(hn::Set(d, at[i]), vertex);
+      power[i] = simd::HalvingOf(d, hn::Mul(way[i], way[i])).power;
+    }
+  }
+};
+
+// A vector of corners: A = 2^-(x - vx)^2 2^-(y - vy)^2, so the powers are those of columns and
+// rows.
+struct VertexMembers {
+  AxisInfluence columns, rows;
+
+  HWY_INLINE VertexMembers(SoftTag d, const SoftListOf<2>& list, std::size_t m,
+                           const SoftBlock& block, std::uint64_t bits)
+      : columns(d, block.x, hn::Load(d, list.v[0] + m), ColumnsOf(bits)),
+        rows(d, block.y, hn::Load(d, list.v[1] + m), RowsOf(bits)) {}
+  HWY_INLINE SoftVec Influence(std::size_t pixel) const {
+    return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);
+  }
+};
+
+// Where a pixel lies relative to edges; (side, beyond) is the way from the nearest point, in the
+// frame (n, t) of the edge.
+struct EdgeOffset {
+  SoftVec side, beyond, along;
+};
+HWY_INLINE SoftVec SquaredLength(const EdgeOffset& o) {
+  return hn::MulAdd(o.beyond, o.beyond, hn::Mul(o.side, o.side));
+}
+
+// A vector of edges.
+struct EdgeMembers {
+  SoftVec tx, ty, side, along, past, inverse;
+
+  // From arrays `stride` apart.
+  HWY_INLINE EdgeMembers(SoftTag d, const float* v, std::size_t stride)
+      : tx(hn::Load(d, v + SoftLists::kTx * stride)),
+        ty(hn::Load(d, v + SoftLists::kTy * stride)),
+        side(hn::Load(d, v + SoftLists::kSide * stride)),
+        along(hn::Load(d, v + SoftLists::kAlong * stride)),
+        past(hn::Load(d, v + SoftLists::kPast * stride)),
+        inverse(hn::Load(d, v + SoftLists::kInverse * stride)) {}
+  HWY_INLINE EdgeOffset At(SoftTag d, const SoftBlock& block, std::size_t pixel) const {
+    const SoftVec x = hn::Set(d, block.x[pixel % kBlockSize]);
+    const SoftVec y = hn::Set(d, block.y[pixel / kBlockSize]), zero = hn::Zero(d);
+    EdgeOffset o;
+    o.side = hn::MulAdd(tx, y, hn::NegMulAdd(ty, x, side));
+    const SoftVec step = hn::MulAdd(tx, x, hn::Mul(ty, y));
+    o.along = hn::Add(step, along);
+    o.beyond = hn::Add(hn::Max(hn::Add(step, past), zero), hn::Min(o.along, zero));
+    return o;
+  }
+};
+
+// A vector of boundaries: three edges each.
+struct BoundaryMembers {
+  EdgeMembers edge[3];
+
+  HWY_INLINE BoundaryMembers(SoftTag d, const float* v, std::size_t stride)
+      : edge{{d, v, stride},
+             {d, v + SoftLists::kEdgeArrays * stride, stride},
+             {d, v + 2 * SoftLists::kEdgeArrays * stride, stride}} {}
+  HWY_INLINE SoftVec Z(SoftTag d, const SoftBlock& block, std::size_t pixel) const {
+    const auto z = [&](std::size_t k)
+                       HWY_ATTR { return SquaredLength(edge[k].At(d, block, pixel)); };
+    return hn::Min(hn::Min(z(0), z(1)), z(2));
+  }
+};
+
+// v of the other half of each pair, quartet, octet of lanes.
+HWY_INLINE SoftVec Neighbour(SoftTag, SoftVec v) { return hn::Shuffle2301(v); }
+HWY_INLINE SoftVec NextPair(SoftTag, SoftVec v) { return hn::Shuffle1032(v); }
+HWY_INLINE SoftVec NextQuartet(SoftTag d, SoftVec v) { return hn::ReverseBlocks(d, v); }
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

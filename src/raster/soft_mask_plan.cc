@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/soft_mask_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tilegrad::raster {
+
+double DropZ(std::size_t n, double share) {
+  const double count = static_cast<double>(std::max<std::size_t>(n, 1));
+  return share > 0 ? std::clamp<double>(std::log2(count / share), 0.0, kEndZ) : kEndZ;
+}
+
+SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
+  SoftMaskPlan plan;
+  plan.width = options.width, plan.height = options.height;
+  // Sharper kernels than 1e-15 pixel are not resolved, and would overflow; nor wider ones than
+  // 1e37 pixels.
+  const double longer = std::max(options.width, options.height);
+  const double root =
+      std::clamp(std::sqrt(options.delta * std::numbers::ln2), 2e-15 / longer, 1e37 / longer);
+  plan.unit_x = 2.0 / options.width / root, plan.unit_y = 2.0 / options.height / root;
+  const double error = options.max_alpha_error;
+  plan.node_error = plan.stop_error = error / 4, plan.face_error = error / 2;
+  plan.group_z = DropZ(options.faces, plan.node_error / 2);
+  return plan;
+}
+
+double StopProduct(const SoftMaskPlan& plan) { return std::max(plan.stop_error, kUnseenProduct); }
+
+SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
+  const double z = DropZ(faces, plan.face_error);
+  const double pixel = std::hypot(plan.unit_x, plan.unit_y);
+  // Covers the rounding of distances ("Rounding" 2), and of z to float.
+  const auto with_rounding = [&](double root) {
+    return static_cast<float>(root + 0x1p-18 * (root + (kLongEdge + kBlockSize) * pixel));
+  };
+  return {static_cast<float>(z * (1 + 0x1p-20)), with_rounding(std::sqrt(z)),
+          with_rounding(std::sqrt(kFarZ)), std::exp2(-z)};
+}
+
+}  // namespace tilegrad::raster

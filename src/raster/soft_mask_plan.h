@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What of the error budget is spent where (docs/numerics.md, "Budget").
+#pragma once
+
+#include "raster/soft_mask.h"
+
+namespace tilegrad::raster {
+
+// At this z the vector code takes A as 0; nothing is looked at beyond.
+inline constexpr int kEndZ = 126;
+// A remaining product up to here changes alpha by less than half a unit in the last place of 1.
+inline constexpr double kUnseenProduct = 0x1p-26;
+// Backward: faces nearer than this to a block are near ones. A <= 1/8 for the others.
+inline constexpr double kFarZ = 3;
+// Backward: the product in light pixels. A <= 15/16 in them for all faces.
+inline constexpr double kLightProduct = 1.0 / 16;
+
+// z from which on `n` faces have A <= share / n each, and together no more than `share`.
+double DropZ(std::size_t n, double share);
+
+// The product at which a pixel may stop.
+double StopProduct(const SoftMaskPlan& plan);
+
+// What the faces of nodes may drop, `faces` of them.
+SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces);
+
+}  // namespace tilegrad::raster

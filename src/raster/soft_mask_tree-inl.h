@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of soft_mask_tree.h, and which nodes a tile looks at. Lanes are faces, nodes, groups.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include "raster/soft_mask_plan.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using SoftTag = hn::CappedTag<float, kSoftLanes>;
+using SoftVec = hn::Vec<SoftTag>;
+using SoftMask = hn::Mask<SoftTag>;
+using SoftIntTag = hn::RebindToSigned<SoftTag>;
+using SoftInt = hn::Vec<SoftIntTag>;
+
+// Bit i: lane i.
+HWY_INLINE std::uint32_t BitsOf(SoftTag d, SoftMask mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return bytes[0];
+}
+
+// A lower bound of the squared distance between lanes of boxes and one box, kernel units. Sides are
+// subtracted with one rounding, so it is relatively exact to 8 u, which the last factor covers.
+HWY_INLINE SoftVec BoxDistance(SoftTag d, SoftVec left, SoftVec top, SoftVec right, SoftVec bottom,
+                               const SoftBox& box) {
+  const SoftVec zero = hn::Zero(d);
+  const auto gap_x =
+      hn::Max(hn::Sub(left, hn::Set(d, box.right)), hn::Sub(hn::Set(d, box.left), right));
+  const auto gap_y =
+      hn::Max(hn::Sub(top, hn::Set(d, box.bottom)), hn::Sub(hn::Set(d, box.top), bottom));
+  const auto x = hn::Mul(hn::Max(gap_x, zero), hn::Set(d, box.unit_x));
+  const auto y = hn::Mul(hn::Max(gap_y, zero), hn::Set(d, box.unit_y));
+  return hn::Mul(hn::MulAdd(x, x, hn::Mul(y, y)), hn::Set(d, 1 - 0x1p-20f));
+}
+
+HWY_INLINE SoftVec BoxDistance(SoftTag d, const SoftBoxes& boxes, std::size_t i,
+                               const SoftBox& box) {
+  const auto side = [&](SoftBoxes::Array a) HWY_ATTR { return hn::LoadU(d, boxes.array(a) + i); };
+  return BoxDistance(d, side(SoftBoxes::kLeft), side(SoftBoxes::kTop), side(SoftBoxes::kRight),
+                     side(SoftBoxes::kBottom), box);
+}
+
+// Corners of faces f, f + 1, ...; kNowhere where there is none that takes part.
+HWY_INLINE void StoreCorners(SoftTag d, const ScreenMesh& mesh, std::size_t f, SoftTree* tree) {
+  const SoftIntTag di;
+  const std::size_t lanes = hn::Lanes(d);
+  const std::int32_t* corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
+  HWY_ALIGN std::int32_t out_of_it[kSoftLanes];
+  HWY_ALIGN std::int32_t last[kSoftLanes];
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const bool in = f + i < mesh.faces() && (mesh.reject[f + i] & kFaceNotInSoftMask) == 0;
+    out_of_it[i] = in ? 0 : -1;
+    tree->faces += in;
+  }
+  const SoftMask nowhere = hn::RebindMask(d, hn::Lt(hn::Load(di, out_of_it), hn::Zero(di)));
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::int32_t* from = corners[k] + f;
+    if (f + lanes > mesh.faces()) {
+      for (std::size_t i = 0; i < lanes; ++i) last[i] = f + i < mesh.faces() ? from[i] : 0;
+      from = last;
+    }
+    const SoftInt vertex = hn::LoadU(di, from);
+    const auto store = [&](const float* coordinate, std::size_t a) HWY_ATTR {
+      const SoftVec at = hn::GatherIndex(d, coordinate, vertex);
+      hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), at), d,
+                tree->corners.data() + a * tree->stride + f);
+    };
+    store(mesh.x.data(), k), store(mesh.y.data(), 3 + k);
+  }
+}
+
+// The box around boxes [from, from + n).
+template <class Load>
+HWY_INLINE void StoreBox(SoftTag d, std::size_t n, const Load& load, std::size_t at,
+                         SoftBoxes* out) {
+  for (std::size_t a = 0; a < 4; ++a) {
+    const bool low = a < SoftBoxes::kRight;
+    SoftVec v = load(0, a);
+    for (std::size_t i = hn::Lanes(d); i < n; i += hn::Lanes(d)) {
+      v = low ? hn::Min(v, load(i, a)) : hn::Max(v, load(i, a));
+    }
+    out->array(a)[at] = hn::GetLane(low ? hn::MinOfLanes(d, v) : hn::MaxOfLanes(d, v));
+  }
+}
+
+HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
+  const std::size_t first = node * kNodeFaces;
+  float faces = 0;
+  for (std::size_t f = first; f < first + kNodeFaces; ++f) faces += tree->corner(0)[f] < kNowhere;
+  tree->nodes.array(SoftBoxes::kFaces)[node] = faces;
+  StoreBox(
+      d, kNodeFaces,
+      [&](std::size_t i, std::size_t a) HWY_ATTR {
+        const std::size_t axis = a == SoftBoxes::kLeft || a == SoftBoxes::kRight ? 0 : 3;
+        const auto corner = [&](std::size_t k) HWY_ATTR {
+          const SoftVec at = hn::Load(d, tree->corner(axis + k) + first + i);
+          // On the far side, too, a face that is nowhere widens no box.
+          return a < SoftBoxes::kRight
+                     ? at
+                     : hn::IfThenElse(hn::Eq(at, hn::Set(d, kNowhere)), hn::Set(d, -kNowhere), at);
+        };
+        return a < SoftBoxes::kRight ? hn::Min(hn::Min(corner(0), corner(1)), corner(2))
+                                     : hn::Max(hn::Max(corner(0), corner(1)), corner(2));
+      },
+      node, &tree->nodes);
+}
+
+HWY_INLINE void StoreGroup(SoftTag d, std::size_t group, SoftTree* tree) {
+  const std::size_t first = group * kGroupNodes;
+  float faces = 0;
+  for (std::size_t n = first; n < first + kGroupNodes; ++n) {
+    faces += tree->nodes.array(SoftBoxes::kFaces)[n];
+  }
+  tree->groups.array(SoftBoxes::kFaces)[group] = faces;
+  StoreBox(
+      d, kGroupNodes,
+      [&](std::size_t i, std::size_t a)
+          HWY_ATTR { return hn::LoadU(d, tree->nodes.array(a) + first + i); },
+      group, &tree->groups);
+}
+
+inline void BuildSoftTreeTarget(const ScreenMesh& mesh, SoftTree* tree) {
+  const SoftTag d;
+  const std::size_t groups = (mesh.faces() + kGroupFaces - 1) / kGroupFaces;
+  tree->faces = 0, tree->stride = groups * kGroupFaces;
+  tree->corners.resize(6 * tree->stride);
+  tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
+  for (std::size_t f = 0; f < tree->stride; f += hn::Lanes(d)) StoreCorners(d, mesh, f, tree);
+  for (std::size_t n = 0; n < tree->nodes.count; ++n) StoreNode(d, n, tree);
+  for (std::size_t g = 0; g < groups; ++g) StoreGroup(d, g, tree);
+}
+
+// The nodes that a tile looks at.
+struct SoftNodes {
+  std::size_t count = 0;
+  std::size_t faces = 0;  // in them
+  double dropped = 0;     // bound on the sum of A of all other faces
+};
+
+// How many faces nodes have by the whole part of their z, at most kEndZ.
+struct SoftHistogram {
+  double faces[kEndZ + 1] = {};
+  std::size_t nodes[kEndZ + 1] = {};
+  std::size_t found = 0;  // nodes in all
+};
+
+// Nodes of groups nearer than group_z into `found`.
+HWY_INLINE double FindNodesOfGroups(const SoftTree& tree, const SoftBox& box, double group_z,
+                                    AlignedVector<SoftNodeAt>* found, SoftHistogram* histogram) {
+  const SoftTag d;
+  const SoftIntTag di;
+  double far = 0;
+  if (found->size() < tree.nodes.count) found->resize(tree.nodes.count);
+  std::size_t& count = histogram->found;
+  const auto nodes_of = [&](std::size_t group) HWY_ATTR {
+    const float* faces = tree.nodes.array(SoftBoxes::kFaces);
+    for (std::size_t n = group * kGroupNodes; n < (group + 1) * kGroupNodes; n += hn::Lanes(d)) {
+      HWY_ALIGN std::int32_t whole[kSoftLanes];
+      const SoftVec z = hn::Min(BoxDistance(d, tree.nodes, n, box), hn::Set(d, float{kEndZ}));
+      hn::Store(hn::ConvertTo(di, z), di, whole);
+      for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+        if (faces[n + i] == 0) continue;
+        histogram->faces[whole[i]] += static_cast<double>(faces[n + i]);
+        ++histogram->nodes[whole[i]];
+        (*found)[count++] = {static_cast<std::int32_t>(n + i), whole[i]};
+      }
+    }
+  };
+  const float* faces = tree.groups.array(SoftBoxes::kFaces);
+  const SoftVec limit = hn::Set(d, static_cast<float>(group_z * (1 + 0x1p-20)));
+  for (std::size_t g = 0; g < tree.groups.count; g += hn::Lanes(d)) {
+    const auto near = BitsOf(d, hn::Le(BoxDistance(d, tree.groups, g, box), limit));
+    for (std::size_t i = 0; i < std::min(hn::Lanes(d), tree.groups.count - g); ++i) {
+      if ((near >> i & 1) != 0) {
+        nodes_of(g + i);
+      } else {
+        far += static_cast<double>(faces[g + i]);
+      }
+    }
+  }
+  return far * std::exp2(-group_z);
+}
+
+// Drops the farthest whole z from the histogram as long as `budget` lasts; returns the first
+// dropped one and adds what that costs to `dropped`.
+inline int DropFarNodes(const SoftHistogram& histogram, double budget, double* dropped) {
+  int end = kEndZ;
+  double cost = histogram.faces[kEndZ] * std::exp2(-kEndZ);
+  while (end > 0) {
+    const double more = histogram.faces[end - 1] * std::exp2(1 - end);
+    if (cost + more > budget) break;
+    cost += more, --end;
+  }
+  *dropped += cost;
+  return end;
+}
+
+// The nodes that a tile with background in `box` must look at, near ones first: a counting sort.
+inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
+                               SoftMaskScratch* scratch) {
+  SoftHistogram histogram;
+  SoftNodes out;
+  out.dropped = FindNodesOfGroups(tree, box, plan.group_z, &scratch->found, &histogram);
+  const int end = DropFarNodes(histogram, plan.node_error / 2, &out.dropped);
+  std::size_t begin[kEndZ];
+  for (int z = 0; z < end; ++z) {
+    out.faces += static_cast<std::size_t>(histogram.faces[z]);
+    begin[z] = out.count, out.count += histogram.nodes[z];
+  }
+  if (scratch->nodes.size() < out.count) scratch->nodes.resize(out.count);
+  for (const SoftNodeAt& at : std::span(scratch->found).first(histogram.found)) {
+    if (at.z < end) scratch->nodes[begin[at.z]++] = at.node;
+  }
+  return out;
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard
