@@ -47,6 +47,7 @@ int Run(int argc, char** argv) {
   app.require_subcommand(1);
   Action action;
   AddDataset(app, &action);
+  AddTradeoff(app, &action);
   AddTrain(app, &action);
   AddEval(app, &action);
   AddPredict(app, &action);

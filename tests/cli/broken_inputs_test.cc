@@ -2,36 +2,17 @@
 // The program itself on broken inputs: a message that names what is wrong, a non-zero exit code, no
 // crash, nothing lost.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
+#include "support/run_program.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
 namespace {
-
-struct Outcome {
-  int exit_code = -1;  // -1: ended by a signal
-  std::string output;  // both streams
-};
-
-Outcome RunProgram(const std::string& arguments) {
-  Outcome outcome;
-  std::FILE* pipe =
-      ::popen((std::string(TILEGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
-  std::array<char, 4096> buffer;
-  for (std::size_t n; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-    outcome.output.append(buffer.data(), n);
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
-  return outcome;
-}
 
 // A tiny dataset and a run of two steps, made once for all cases.
 class BrokenInputs : public TempFolderTest {

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad tradeoff: what accuracy costs, measured.
+#include <fmt/core.h>
+
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "cli/tradeoff_study.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct TradeoffOptions {
+  std::string mesh, out = "tradeoff", data, config = "configs/quick.toml";
+  int size = 256, repetitions = 7, steps = 1000, workers = 0;
+  std::vector<double> errors = {0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
+  std::vector<double> deltas = {1.0 / 7000, 1e-2};
+  std::vector<double> training_errors = {1e-6, 1e-3, 3e-2};
+};
+
+Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
+                  const std::vector<StudyTraining>& training) {
+  TILEGRAD_TRY(MakeFolder(folder));
+  const std::string tables = StudyMarkdown(results, training);
+  TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.md", tables));
+  TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.csv", StudyCsv(results)));
+  TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.svg", StudyPicture(results)));
+  fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg\n", tables, folder.string());
+  return {};
+}
+
+Result<std::vector<StudyScene>> ChooseScenes(const TradeoffOptions& options) {
+  if (options.mesh.empty()) return BuiltInScenes();
+  std::vector<StudyScene> scenes;
+  TILEGRAD_ASSIGN(scenes.emplace_back(), SceneFromFile(options.mesh, options.size));
+  return scenes;
+}
+
+Status RunTradeoff(const TradeoffOptions& options) {
+  TILEGRAD_ASSIGN(const std::vector<StudyScene> scenes, ChooseScenes(options));
+  ProgressLine line;
+  std::vector<StudyResult> results;
+  for (const StudyScene& scene : scenes) {
+    for (const double delta : options.deltas) {
+      TradeoffJob job;
+      job.scene.positions = scene.positions, job.scene.faces = scene.faces;
+      job.scene.camera = scene.camera;
+      job.options.width = job.options.height = scene.size;
+      job.options.delta = delta;
+      job.errors = options.errors, job.repetitions = options.repetitions;
+      auto tradeoff = MeasureTradeoff(job, line.Sink(), StopOnSignals());
+      if (!tradeoff.ok()) {
+        return tradeoff.status().Within(fmt::format("{}, delta = {:g}", scene.name, delta));
+      }
+      results.push_back({scene.name, scene.size, delta, std::move(*tradeoff)});
+    }
+  }
+  std::vector<StudyTraining> training;
+  if (!options.data.empty()) {
+    const Workers workers(options.workers);
+    const TrainingStudyJob job{options.data, options.config, options.out, options.training_errors,
+                               options.steps};
+    TILEGRAD_ASSIGN(training, RunTrainingStudy(job, workers, line.Sink(), StopOnSignals()));
+  }
+  line.Finish();
+  return WriteStudy(options.out, results, training);
+}
+
+}  // namespace
+
+void AddTradeoff(CLI::App& app, Action* action) {
+  auto options = std::make_shared<TradeoffOptions>();
+  auto* command = app.add_subcommand(
+      "tradeoff",
+      "Measure what max_alpha_error costs and gains: time, error of alpha and of gradients against "
+      "float64, and what a network learns with it");
+  command->add_option("mesh", options->mesh, "mesh file [two built-in scenes]");
+  command->add_option("--out", options->out, "folder for tradeoff.md, .csv, .svg and the runs")
+      ->capture_default_str();
+  command->add_option("--size", options->size, "pixels of a mesh file's image, each axis")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 4096));
+  command->add_option("--errors", options->errors, "values of max_alpha_error, in [0, 1]")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      ->add_option("--deltas", options->deltas,
+                   "kernels: A = exp(-d^2 / delta), d in NDC (the paper's code: 1/7000)")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command->add_option("--repetitions", options->repetitions, "timings of each setting")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--training", options->data,
+                      "dataset folder: also train and evaluate with --training-errors");
+  command->add_option("--training-errors", options->training_errors, "for --training")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--config", options->config, "for --training")->capture_default_str();
+  command->add_option("--steps", options->steps, "of each training")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000000));
+  AddWorkersOption(command, &options->workers);
+  command->callback([options, action] { *action = [options] { return RunTradeoff(*options); }; });
+}
+
+}  // namespace tilegrad::cli

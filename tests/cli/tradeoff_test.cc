@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad tradeoff, from its command line to its files.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+class TradeoffCommand : public TempFolderTest {
+ protected:
+  Outcome Run(const std::string& arguments) {
+    return RunProgram("tradeoff --out " + (folder_ / "out").string() + " " + arguments);
+  }
+  std::string Out(const std::string& name) {
+    const auto text = ReadText(folder_ / "out" / name);
+    EXPECT_TRUE(text.ok()) << text.status().message();
+    return text.ok() ? *text : "";
+  }
+};
+
+std::vector<std::vector<std::string>> Cells(const std::string& csv) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    auto& row = rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
+  }
+  return rows;
+}
+
+TEST_F(TradeoffCommand, MeasuresAMeshFileAndWritesTableCsvAndPicture) {
+  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
+  const Outcome outcome = Run((folder_ / "tent.obj").string() +
+                              " --size 24 --errors 0,1e-2 --deltas 1e-3,1e-2 --repetitions 1");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const auto rows = Cells(Out("tradeoff.csv"));
+  ASSERT_EQ(rows.size(), 5u);
+  for (const auto& row : rows) EXPECT_EQ(row.size(), rows[0].size());
+  EXPECT_EQ(rows[0][0], "scene");
+  EXPECT_EQ(rows[0][4], "max_alpha_error");
+  EXPECT_EQ(rows[1][0], "tent");
+  EXPECT_EQ(rows[1][1], "2");
+  EXPECT_EQ(rows[1][4], "0");
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const double bound = std::stod(rows[i][4]), largest = std::stod(rows[i][8]);
+    EXPECT_LE(largest, bound + 1e-5) << i;  // and rounding: docs/numerics.md
+  }
+  EXPECT_NE(Out("tradeoff.md").find("tent, 2 faces"), std::string::npos);
+  const std::string picture = Out("tradeoff.svg");
+  EXPECT_EQ(picture.rfind("<svg", 0), 0u);
+  EXPECT_GT(std::count(picture.begin(), picture.end(), '\n'), 10);
+}
+
+TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
+  const auto refused = [&](const std::string& arguments, const std::string& part) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_GT(outcome.exit_code, 0) << arguments;
+    EXPECT_LT(outcome.exit_code, 126) << arguments;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out")) << arguments;
+  };
+  refused("nowhere.obj", "nowhere.obj");
+  refused("--errors 2", "--errors");
+  refused("--errors x", "--errors");
+  refused("--deltas 0", "--deltas");
+  refused("--repetitions 0", "--repetitions");
+  Write("flat.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
+  refused((folder_ / "flat.obj").string(), "flat.obj");
+}
+
+TEST_F(TradeoffCommand, HelpSaysUnits) {
+  const Outcome outcome = RunProgram("tradeoff --help");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.output.find("delta"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tilegrad
