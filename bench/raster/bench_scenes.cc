@@ -36,6 +36,7 @@ std::vector<float> RotatedPositions(const Mesh& mesh, Rng* rng) {
 }
 
 Mesh MakeMesh(const SceneSpec& spec) {
+  if (spec.mesh != nullptr) return *spec.mesh;
   Mesh mesh = Icosphere(spec.level, 0.5f);
   if (!spec.displaced) return mesh;
   for (glm::vec3& p : mesh.positions) {
@@ -50,18 +51,18 @@ Mesh MakeMesh(const SceneSpec& spec) {
 }  // namespace
 
 BenchBatch::BenchBatch(const SceneSpec& spec) {
-  const Mesh sphere = MakeMesh(spec);
+  const Mesh mesh = MakeMesh(spec);
   Rng rng(1234);
   options.width = options.height = spec.size;
   options.max_alpha_error = 1e-7;
   options.interpolation = Interpolation::kScreenLinear;  // as the peers
-  for (const Face& face : sphere.faces) faces.insert(faces.end(), face.begin(), face.end());
-  for (std::size_t i = 0; i < 3 * sphere.positions.size(); ++i) {
+  for (const Face& face : mesh.faces) faces.insert(faces.end(), face.begin(), face.end());
+  for (std::size_t i = 0; i < 3 * mesh.positions.size(); ++i) {
     colors.push_back(static_cast<float>(rng.Uniform()));
   }
   const Camera camera = OrbitCamera({30.0, spec.size, spec.size}, 90, 0, 2.732);
   for (int n = 0; n < spec.images; ++n) {
-    positions.push_back(RotatedPositions(sphere, &rng));
+    positions.push_back(RotatedPositions(mesh, &rng));
     d_positions.emplace_back(positions.back().size());
     d_colors.emplace_back(colors.size());
   }

@@ -10,6 +10,7 @@
 
 #include "raster/culled.h"
 #include "render/renderer.h"
+#include "scene/mesh.h"
 
 namespace tilegrad::bench {
 
@@ -17,6 +18,7 @@ struct SceneSpec {
   const char* name;
   int images, size, level;  // icosphere level: 20 * 4^level faces
   bool displaced = false;
+  const Mesh* mesh = nullptr;  // instead of an icosphere
 };
 inline constexpr SceneSpec kScenes[] = {{"S1", 64, 64, 3},
                                         {"S2", 8, 256, 3},

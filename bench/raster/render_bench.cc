@@ -1,156 +1,77 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward and backward of whole batches, beside the naive reference in the same process. The naive
-// renderer runs on a sample of rows of the first image, so compare images per second. One worker
-// unless the name says two.
+// Forward and backward of whole batches beside two references in the same process: the plain
+// program with boxes (culled.h) and the naive one (renderer_ref.h), on synthetic scenes and on real
+// furniture; and how time grows. `bench_report` makes tables and curves of the JSON.
+//
+// Names: scene/direction/what/who, who being a number of workers, `1-default` (one worker, the
+// default max_alpha_error), `culled` or `naive`.
 #include <benchmark/benchmark.h>
 
-#include <cstdlib>
+#include <cstdio>
 
-#include "raster/bench_scenes.h"
-#include "render/renderer_ref.h"
+#include "raster/furniture.h"
+#include "raster/render_runs.h"
 
 namespace tilegrad::bench {
 namespace {
 
-void Check(const Status& status, benchmark::State& state) {
-  if (!status.ok()) state.SkipWithError(status.message().c_str());
-}
-
-// Images per second, of the whole batch or of a sample that makes `images` images.
-void CountImages(benchmark::State& state, double images) {
-  state.counters["images"] =
-      benchmark::Counter(images, benchmark::Counter::kIsIterationInvariantRate);
-}
-
-// What is rendered, and on how many workers.
-struct RunSpec {
-  SceneSpec scene;
-  bool color = true, alpha = true;
-  int workers = 1;
-  Interpolation interpolation = Interpolation::kScreenLinear;
-
-  RenderRequest request() const { return {color, alpha, false, false}; }
-  CulledParts parts() const { return {color, alpha}; }
-};
-
-BenchBatch MakeBatch(const RunSpec& spec) {
-  BenchBatch batch(spec.scene);
-  batch.options.interpolation = spec.interpolation;
-  return batch;
-}
-
-void Forward(benchmark::State& state, const RunSpec& spec) {
-  const BenchBatch batch = MakeBatch(spec);
-  const Workers workers(spec.workers);
-  Renderer renderer(workers);
-  Frame frame;
-  for (auto _ : state) {
-    Check(renderer.Render(batch.scenes, batch.options, spec.request(), &frame), state);
+void AddOurs(const std::string& scene, const std::string& what, RunSpec spec) {
+  for (const int workers : {1, 2}) {
+    spec.workers = workers;
+    AddRun({scene, what, std::to_string(workers)}, spec, Who::kRenderer);
   }
-  CountImages(state, spec.scene.images);
 }
 
-void Backward(benchmark::State& state, const RunSpec& spec) {
-  BenchBatch batch = MakeBatch(spec);
-  const Workers workers(spec.workers);
-  Renderer renderer(workers);
-  Frame frame;
-  Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
-  FrameGradients d_frame;
-  if (spec.color) d_frame.attributes = batch.d_attributes;
-  if (spec.alpha) d_frame.alpha = batch.d_alpha;
-  for (auto _ : state) {
-    Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
+void AddBoth(const std::string& name, RunSpec spec) {
+  AddRun({name, "both", "culled"}, spec, Who::kCulled);
+  AddRun({name, "both", "naive"}, spec, Who::kNaive);
+  AddOurs(name, "both", spec);
+  spec.max_alpha_error = RenderOptions().max_alpha_error;
+  AddRun({name, "both", "1-default"}, spec, Who::kRenderer);
+}
+
+void AddParts(const std::string& name, RunSpec spec) {
+  for (const bool color : {true, false}) {
+    spec.color = color, spec.alpha = !color;
+    AddRun({name, color ? "color" : "alpha", "culled"}, spec, Who::kCulled);
+    AddOurs(name, color ? "color" : "alpha", spec);
   }
-  CountImages(state, spec.scene.images);
 }
 
-void RunCulledForward(benchmark::State& state, const RunSpec& spec) {
-  CulledBatch culled(MakeBatch(spec));
-  for (auto _ : state) culled.Forward(spec.parts());
-  CountImages(state, spec.scene.images);
+void AddSphere(const SceneSpec& scene) {
+  const RunSpec spec{scene};
+  AddBoth(scene.name, spec);
+  AddParts(scene.name, spec);
+  RunSpec perspective = spec;
+  perspective.interpolation = Interpolation::kPerspective;
+  AddRun({scene.name, "perspective", "1"}, perspective, Who::kRenderer);
 }
 
-void RunCulledBackward(benchmark::State& state, const RunSpec& spec) {
-  CulledBatch culled(MakeBatch(spec));
-  culled.Forward({});
-  for (auto _ : state) culled.Backward(spec.parts());
-  CountImages(state, spec.scene.images);
-}
-
-// Two middle rows: half of the pixels covered, as on average.
-RowRange SampleRows(const SceneSpec& spec) {
-  return {spec.size / 4, spec.size / 4 + (spec.level > 3 ? 1 : 2)};
-}
-
-double SampledImages(const SceneSpec& spec) {
-  const RowRange rows = SampleRows(spec);
-  return static_cast<double>(rows.end - rows.begin) / spec.size;
-}
-
-void NaiveForward(benchmark::State& state, const SceneSpec& spec) {
-  const BenchBatch batch(spec);
-  Frame frame;
-  for (auto _ : state) {
-    const auto ids = FaceIdsRef(batch.scenes[0], batch.options, SampleRows(spec));
-    RenderRefWithFaces<float>(batch.scenes[0], batch.options, {}, ids, SampleRows(spec), &frame);
+// Eight views of 256^2 of each.
+void AddFurniture(const std::vector<FurnitureMesh>& furniture) {
+  for (const FurnitureMesh& model : furniture) {
+    SceneSpec scene{model.name.c_str(), 8, 256, 0};
+    scene.mesh = &model.mesh;
+    AddBoth(model.name, {scene});
   }
-  CountImages(state, SampledImages(spec));
 }
-
-void NaiveBackward(benchmark::State& state, const SceneSpec& spec) {
-  BenchBatch batch(spec);
-  const auto ids = FaceIdsRef(batch.scenes[0], batch.options, SampleRows(spec));
-  for (auto _ : state) {
-    RenderRefBackward<float>(batch.scenes[0], batch.options, ids,
-                             {batch.d_attributes, batch.d_alpha}, SampleRows(spec),
-                             &batch.d_scenes[0]);
-  }
-  CountImages(state, SampledImages(spec));
-}
-
-void Add(const std::string& name, const RunSpec& spec,
-         void (*run)(benchmark::State&, const RunSpec&)) {
-  benchmark::RegisterBenchmark(name.c_str(),
-                               [spec, run](benchmark::State& state) { run(state, spec); })
-      ->Unit(benchmark::kMillisecond)
-      ->MeasureProcessCPUTime()
-      ->UseRealTime();
-}
-
-void AddNaive(const SceneSpec& scene) {
-  const std::string name = scene.name;
-  const auto add = [&](const char* what, void (*run)(benchmark::State&, const SceneSpec&)) {
-    benchmark::RegisterBenchmark((name + what).c_str(),
-                                 [scene, run](benchmark::State& state) { run(state, scene); })
-        ->Unit(benchmark::kMillisecond)
-        ->MeasureProcessCPUTime()
-        ->UseRealTime();
-  };
-  add("/forward/both/naive", NaiveForward), add("/backward/both/naive", NaiveBackward);
-}
-
-// Names: scene/direction/what/who, who being a number of workers, `culled` or `naive`.
-const bool kRegistered = [] {
-  for (const SceneSpec& scene : kScenes) {
-    const std::string name = scene.name;
-    const auto all = [&](const std::string& what, bool color, bool alpha) {
-      Add(name + "/forward/" + what + "/culled", {scene, color, alpha}, RunCulledForward);
-      Add(name + "/backward/" + what + "/culled", {scene, color, alpha}, RunCulledBackward);
-      for (const int workers : {1, 2}) {
-        const std::string who = "/" + std::to_string(workers);
-        Add(name + "/forward/" + what + who, {scene, color, alpha, workers}, Forward);
-        Add(name + "/backward/" + what + who, {scene, color, alpha, workers}, Backward);
-      }
-    };
-    all("both", true, true), all("color", true, false), all("alpha", false, true);
-    const RunSpec perspective{scene, true, true, 1, Interpolation::kPerspective};
-    Add(name + "/forward/perspective/1", perspective, Forward);
-    Add(name + "/backward/perspective/1", perspective, Backward);
-    AddNaive(scene);
-  }
-  return true;
-}();
 
 }  // namespace
 }  // namespace tilegrad::bench
+
+int main(int argc, char** argv) {
+  using namespace tilegrad::bench;
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  for (const SceneSpec& scene : kScenes) AddSphere(scene);
+  const auto furniture = LoadFurniture();
+  if (furniture.ok()) {
+    AddFurniture(furniture.value());
+  } else {
+    std::fprintf(stderr, "Furniture is left out: %s\n", furniture.status().message().c_str());
+  }
+  AddGrowthSeries();
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}

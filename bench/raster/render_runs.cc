@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/render_runs.h"
+
+#include <benchmark/benchmark.h>
+
+#include <map>
+#include <tuple>
+
+#include "raster/work_count.h"
+#include "render/renderer_ref.h"
+
+namespace tilegrad::bench {
+namespace {
+
+void Check(const Status& status, benchmark::State& state) {
+  if (!status.ok()) state.SkipWithError(status.message().c_str());
+}
+
+BenchBatch MakeBatch(const RunSpec& spec) {
+  BenchBatch batch(spec.scene);
+  batch.options.interpolation = spec.interpolation;
+  batch.options.delta = spec.delta;
+  batch.options.max_alpha_error = spec.max_alpha_error;
+  return batch;
+}
+
+CulledParts PartsOf(const RunSpec& spec) { return {spec.color, spec.alpha}; }
+
+// Rows of the first image: across its middle, where half of the pixels are covered.
+RowRange SampleRows(const SceneSpec& spec) {
+  return {spec.size / 4, spec.size / 4 + (spec.level > 3 ? 1 : 2)};
+}
+
+double SampledShare(const SceneSpec& spec) {
+  const RowRange rows = SampleRows(spec);
+  return static_cast<double>(rows.end - rows.begin) / (spec.size * spec.images);
+}
+
+// Counting takes longer than rendering: once for each scene and kernel.
+const WorkCount& WorkOf(const RunSpec& spec) {
+  using Key = std::tuple<int, int, int, const Mesh*, double>;
+  static std::map<Key, WorkCount> known;
+  const SceneSpec& s = spec.scene;
+  const auto [at, is_new] = known.try_emplace(Key{s.images, s.size, s.level, s.mesh, spec.delta});
+  if (is_new) {
+    CulledBatch culled(MakeBatch(spec));
+    culled.Forward({true, false});
+    for (std::size_t i = 0; i < culled.scenes.size(); ++i) {
+      at->second += CountWork(culled.scenes[i], culled.frames[i]);
+    }
+  }
+  return at->second;
+}
+
+void SetCounters(benchmark::State& state, const RunSpec& spec, Direction direction, double share) {
+  const WorkCount& work = WorkOf(spec);
+  const Limit limit = direction == Direction::kForward ? ForwardLimit(work, PartsOf(spec))
+                                                       : BackwardLimit(work, PartsOf(spec));
+  state.counters["images"] = spec.scene.images;
+  state.counters["pixels"] = work.pixels;
+  state.counters["faces"] = work.faces;
+  state.counters["pairs"] = state.counters["exps"] = spec.alpha ? work.pairs : 0;
+  state.counters["bytes"] = limit.bytes;
+  state.counters["limit_ms"] = limit.low;
+  state.counters["limit_high_ms"] = limit.high;
+  state.counters["share"] = share;
+}
+
+void Forward(benchmark::State& state, const RunSpec& spec) {
+  const BenchBatch batch = MakeBatch(spec);
+  const Workers workers(spec.workers);
+  Renderer renderer(workers);
+  Frame frame;
+  const RenderRequest request{spec.color, spec.alpha, false, false};
+  for (auto _ : state) {
+    Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
+  }
+}
+
+void Backward(benchmark::State& state, const RunSpec& spec) {
+  BenchBatch batch = MakeBatch(spec);
+  const Workers workers(spec.workers);
+  Renderer renderer(workers);
+  Frame frame;
+  Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
+  FrameGradients d_frame;
+  if (spec.color) d_frame.attributes = batch.d_attributes;
+  if (spec.alpha) d_frame.alpha = batch.d_alpha;
+  for (auto _ : state) {
+    Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
+  }
+}
+
+void CulledForwardRun(benchmark::State& state, const RunSpec& spec) {
+  CulledBatch culled(MakeBatch(spec));
+  for (auto _ : state) culled.Forward(PartsOf(spec));
+}
+
+void CulledBackwardRun(benchmark::State& state, const RunSpec& spec) {
+  CulledBatch culled(MakeBatch(spec));
+  culled.Forward({});
+  for (auto _ : state) culled.Backward(PartsOf(spec));
+}
+
+void NaiveForward(benchmark::State& state, const RunSpec& spec) {
+  const BenchBatch batch = MakeBatch(spec);
+  const RowRange rows = SampleRows(spec.scene);
+  Frame frame;
+  for (auto _ : state) {
+    const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
+    RenderRefWithFaces<float>(batch.scenes[0], batch.options, {}, ids, rows, &frame);
+  }
+}
+
+void NaiveBackward(benchmark::State& state, const RunSpec& spec) {
+  BenchBatch batch = MakeBatch(spec);
+  const RowRange rows = SampleRows(spec.scene);
+  const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
+  for (auto _ : state) {
+    RenderRefBackward<float>(batch.scenes[0], batch.options, ids,
+                             {batch.d_attributes, batch.d_alpha}, rows, &batch.d_scenes[0]);
+  }
+}
+
+using Run = void (*)(benchmark::State&, const RunSpec&);
+
+Run RunOf(Who who, Direction direction) {
+  const bool forward = direction == Direction::kForward;
+  switch (who) {
+    case Who::kRenderer:
+      return forward ? Forward : Backward;
+    case Who::kCulled:
+      return forward ? CulledForwardRun : CulledBackwardRun;
+    case Who::kNaive:
+      break;
+  }
+  return forward ? NaiveForward : NaiveBackward;
+}
+
+}  // namespace
+
+void AddRun(const RunName& name, const RunSpec& spec, Who who) {
+  for (const Direction direction : {Direction::kForward, Direction::kBackward}) {
+    const char* way = direction == Direction::kForward ? "/forward/" : "/backward/";
+    const std::string full = name.scene + way + name.what + "/" + name.who;
+    const auto run = [=](benchmark::State& state) {
+      RunOf(who, direction)(state, spec);
+      SetCounters(state, spec, direction, who == Who::kNaive ? SampledShare(spec.scene) : 1);
+    };
+    benchmark::RegisterBenchmark(full.c_str(), run)
+        ->Unit(benchmark::kMillisecond)
+        ->MeasureProcessCPUTime()
+        ->UseRealTime();
+  }
+}
+
+}  // namespace tilegrad::bench
