@@ -36,14 +36,14 @@ std::vector<float> ToWorld(const BenchBatch& batch, std::size_t image,
   raster::Project(FaceSourceOf(scene, batch.options), batch.options.width, batch.options.height,
                   &screen);
   const std::size_t vertices = screen.x.size();
-  std::vector<float> d_x(vertices), d_y(vertices), none(vertices), out(3 * vertices);
+  std::vector<float> quads(4 * vertices), out(3 * vertices);
   for (std::size_t v = 0; v < vertices; ++v) {
-    d_x[v] = d_ndc[2 * v] * 2 / static_cast<float>(batch.options.width);
-    d_y[v] = -d_ndc[2 * v + 1] * 2 / static_cast<float>(batch.options.height);
+    quads[4 * v] = d_ndc[2 * v] * 2 / static_cast<float>(batch.options.width);
+    quads[4 * v + 1] = -d_ndc[2 * v + 1] * 2 / static_cast<float>(batch.options.height);
   }
-  AlignedVector<raster::CameraPoint<float>> scratch;
-  raster::ProjectBackward(FaceSourceOf(scene, batch.options), screen.View(), {d_x, d_y, none, {}},
-                          &scratch, {out, nullptr});
+  raster::ProjectBackwardScratch scratch;
+  raster::ProjectBackward(FaceSourceOf(scene, batch.options), screen.View(), {quads, {}}, &scratch,
+                          {out, nullptr});
   return out;
 }
 
