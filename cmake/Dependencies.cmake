@@ -2,19 +2,21 @@
 find_package(TBB REQUIRED)                # libtbb-dev
 find_package(glm REQUIRED)                # libglm-dev
 find_package(fmt REQUIRED)                # libfmt-dev
-find_package(assimp REQUIRED)             # libassimp-dev
-find_package(CLI11 REQUIRED)              # libcli11-dev
-find_package(tomlplusplus REQUIRED)       # libtomlplusplus-dev
 find_package(nlohmann_json REQUIRED)      # nlohmann-json3-dev
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(LIBHWY REQUIRED IMPORTED_TARGET libhwy)    # libhwy-dev
-pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
-pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
-find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
-find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
+if(TILEGRAD_PROGRAM)
+  find_package(assimp REQUIRED)             # libassimp-dev
+  find_package(CLI11 REQUIRED)              # libcli11-dev
+  find_package(tomlplusplus REQUIRED)       # libtomlplusplus-dev
+  pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
+  pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
+  find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
+  find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
+endif()
 if(TILEGRAD_TESTS)
   find_package(GTest REQUIRED)            # libgtest-dev
 endif()
-if(TILEGRAD_BENCH)
+if(TILEGRAD_BENCH AND TILEGRAD_PROGRAM)
   find_package(benchmark REQUIRED)        # libbenchmark-dev
 endif()

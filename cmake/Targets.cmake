@@ -20,14 +20,24 @@ if(TILEGRAD_SANITIZE)
 endif()
 
 # Highway: every kernel is compiled for each attainable target and EMU128, chosen at run time. Left out: targets between two
-# kept ones that would only cost compile time.
+# kept ones that would only cost compile time; and targets whose vectors have no size at compile time (SVE, RVV): records here hold
+# vectors. NEON serves machines with SVE.
 add_library(tilegrad_simd INTERFACE)
 target_link_libraries(tilegrad_simd INTERFACE PkgConfig::LIBHWY)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV")
+  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that.
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+    target_compile_options(tilegrad_simd INTERFACE -march=armv8-a+crypto)
+  endif()
+else()
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL")
+endif()
 if(TILEGRAD_SIMD STREQUAL "scalar")
   target_compile_definitions(tilegrad_simd INTERFACE HWY_COMPILE_ONLY_EMU128)
 else()
   target_compile_definitions(tilegrad_simd INTERFACE
-    HWY_COMPILE_ALL_ATTAINABLE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
+    HWY_COMPILE_ALL_ATTAINABLE "HWY_DISABLED_TARGETS=(${TILEGRAD_DISABLED_TARGETS})")
 endif()
 # Highway falls back from EMU128 to its one-lane target for GCC before 12.3; Debian 12 has 12.2. The tests hold EMU128 to the
 # reference with that very compiler, so the block is lifted: vectors of four lanes everywhere, one code path less.

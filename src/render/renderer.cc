@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "render/frame_layout.h"
 #include "render/merge_gradients.h"
+#include "render/paper_alpha.h"
 #include "render/prepare.h"
 #include "render/tile_backward.h"
 #include "render/tile_forward.h"
@@ -235,7 +237,16 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  return impl_->Render({scenes, options, {true, request.alpha, false}, frame});
+  if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
+    return impl_->Render({scenes, options, {true, request.alpha, false}, frame});
+  }
+  AlignedVector<float> alpha;  // kept away from the tiles
+  alpha.swap(frame->alpha);
+  TILEGRAD_TRY(impl_->Render({scenes, options, {true, false, false}, frame}));
+  alpha.swap(frame->alpha);
+  PaperAlpha(scenes, options, *impl_->workers, frame);
+  frame->alpha_error_bound = std::numeric_limits<double>::infinity();
+  return {};
 }
 
 Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
@@ -243,14 +254,21 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           std::span<SceneGradients> d_scenes) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::TileGrid grid = raster::BinGrid(options.width, options.height);
-  const bool alpha = !d_frame.alpha.empty();
-  return impl_->Backward({scenes,
-                          {options, frame, d_frame},
-                          {false, alpha, true},
-                          d_scenes,
-                          grid,
-                          BandGrid(options.width, options.height).count(),
-                          alpha ? grid.tiles() : 0});
+  const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
+  const bool alpha = !d_frame.alpha.empty() && !paper;
+  const FrameGradients d_tiles{d_frame.attributes,
+                               alpha ? d_frame.alpha : std::span<const float>()};
+  const Status status = impl_->Backward({scenes,
+                                         {options, frame, d_tiles},
+                                         {false, alpha, true},
+                                         d_scenes,
+                                         grid,
+                                         BandGrid(options.width, options.height).count(),
+                                         alpha ? grid.tiles() : 0});
+  if (!status.ok() || !paper) return status;
+  TILEGRAD_TRY(ValidateBackwardNumbers(scenes, frame, d_frame));
+  PaperAlphaBackward(scenes, options, *impl_->workers, frame, d_frame.alpha, d_scenes);
+  return ValidateResult(d_scenes);
 }
 
 RenderStats Renderer::stats() const {

@@ -37,6 +37,17 @@ struct SceneViewT {
   CameraT<T> camera;
 };
 
+// How alpha of background pixels is made.
+enum class SoftRule {
+  kAllFaces,  // equation 6 over all faces, within max_alpha_error
+  kPaper      // as the paper's implementations: no bound, depends on the order of the faces, slow.
+              // For comparisons with them.
+};
+// Of SoftRule::kPaper.
+struct PaperSoftRule {
+  double box = 0.02;   // NDC, >= 0: a face counts where its box, grown by this, holds the pixel
+  int max_faces = 30;  // >= 0: only the first so many count, in the order of the faces
+};
 struct RenderOptions {
   int width = 64, height = 64;  // pixels, 1..16384
   double delta = 1.0 / 7000;    // equation 5: A = exp(-d^2 / delta), d in NDC (the image spans [-1,
@@ -45,6 +56,8 @@ struct RenderOptions {
       1e-6;  // |alpha - equation 6 over all faces| <= this, in [0, 1]; 0 drops nothing
   Interpolation interpolation = Interpolation::kPerspective;
   FaceCulling culling = FaceCulling::kNone;
+  SoftRule soft_rule = SoftRule::kAllFaces;
+  PaperSoftRule paper;  // with SoftRule::kPaper, which has no use for max_alpha_error
 };
 
 // Which images are wanted. What is not wanted is not computed and takes no memory.
@@ -67,8 +80,8 @@ struct FrameT {
   AlignedVector<T> depth;       // [N,H,W]; +infinity at background pixels
   AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
                                   // at background
-  double alpha_error_bound =
-      0;  // what culling really spent: no pixel is farther than this from equation 6
+  double alpha_error_bound = 0;   // what culling really spent: no pixel is farther than this from
+                                 // equation 6; infinite with SoftRule::kPaper
 };
 
 // dL/d(image); an empty span is zero. Shapes as in Frame.

@@ -17,6 +17,7 @@
 #include "raster/soft_mask_ref.h"
 #include "raster/visibility_ref.h"
 #include "render/frame_layout.h"
+#include "render/paper_alpha.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -30,6 +31,7 @@ struct PreparedScene {
   raster::AttributeViewT<const T> attributes;
   std::vector<std::int32_t> soft_faces;  // that take part in alpha
   raster::SoftScale<T> scale;
+  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, where SoftRule::kPaper asks for them
 };
 
 template <class T>
@@ -41,12 +43,24 @@ void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, Prepar
   for (std::size_t f = 0; f < out->mesh.faces(); ++f) {
     if ((out->mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
     out->soft_faces.push_back(static_cast<std::int32_t>(f));
+    if (options.soft_rule == SoftRule::kPaper) out->paper_faces.push_back(NdcFaceOf(out->mesh, f));
   }
   if (!out->mesh.was_clipped()) return;
   out->clipped_attributes.resize(raster::AttributeRows(out->mesh, scene.rate) *
                                  static_cast<std::size_t>(scene.channels));
   raster::ClipAttributes<T>(out->mesh, scene.faces, out->attributes, out->clipped_attributes);
   out->attributes.values = out->clipped_attributes;
+}
+
+// Alpha of a background pixel by the rule that the options ask for.
+template <class T>
+T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& options, const T& px,
+                     const T& py) {
+  if (options.soft_rule == SoftRule::kPaper) {
+    return raster::PaperAlphaRef<T>(prepared.paper_faces, NdcX(px, options.width),
+                                    NdcY(py, options.height), PaperRuleOf(options));
+  }
+  return raster::SoftAlphaRef<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale);
 }
 
 // One pixel of the smooth images, given its face of the prepared mesh. `frame` holds one image.
@@ -61,9 +75,7 @@ void ShadePixelRef(const SceneViewT<T>& scene, const PreparedScene<T>& prepared,
   const T px = T(column) + T(0.5), py = T(row) + T(0.5);
   const bool background = face == raster::kNoFace;
   if (!frame->alpha.empty()) {
-    frame->alpha[pixel] = background ? raster::SoftAlphaRef<T>(prepared.mesh, prepared.soft_faces,
-                                                               px, py, prepared.scale)
-                                     : T(1);
+    frame->alpha[pixel] = background ? BackgroundAlphaRef(prepared, options, px, py) : T(1);
   }
   std::vector<T> values(static_cast<std::size_t>(frame->channels), T(0));
   T source[3] = {T(0), T(0), T(0)};
@@ -146,6 +158,31 @@ struct PreparedGradients {
   }
 };
 
+template <class T>
+void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOptions& options,
+                                const T& px, const T& py, const T& d_alpha,
+                                PreparedGradients<T>* d) {
+  const auto add = [&](std::size_t n, int corner, const T& d_x, const T& d_y) {
+    const auto f = static_cast<std::size_t>(prepared.soft_faces[n]);
+    const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
+    d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
+  };
+  if (options.soft_rule == SoftRule::kAllFaces) {
+    raster::SoftAlphaRefBackward<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale,
+                                    d_alpha, add);
+    return;
+  }
+  std::vector<raster::NdcFace<T>> d_faces(prepared.paper_faces.size());
+  raster::PaperAlphaRefBackward<T>(prepared.paper_faces, NdcX(px, options.width),
+                                   NdcY(py, options.height), PaperRuleOf(options), d_alpha,
+                                   d_faces);
+  for (std::size_t n = 0; n < d_faces.size(); ++n) {
+    for (int k = 0; k < 3; ++k) {
+      add(n, k, d_faces[n].x[k] * prepared.scale.x, -d_faces[n].y[k] * prepared.scale.y);
+    }
+  }
+}
+
 // Adds the adjoint of one pixel; `d_frame` holds one image.
 template <class T>
 void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions& options,
@@ -158,13 +195,7 @@ void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions
   const T px = T(column) + T(0.5), py = T(row) + T(0.5);
   if (face == raster::kNoFace) {
     if (d_frame.alpha.empty()) return;
-    raster::SoftAlphaRefBackward<T>(
-        prepared.mesh, prepared.soft_faces, px, py, prepared.scale, d_frame.alpha[pixel],
-        [&](std::size_t n, int corner, T d_x, T d_y) {
-          const auto f = static_cast<std::size_t>(prepared.soft_faces[n]);
-          const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
-          d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
-        });
+    BackgroundAlphaRefBackward(prepared, options, px, py, d_frame.alpha[pixel], d);
     return;
   }
   if (d_frame.attributes.empty()) return;

@@ -140,6 +140,11 @@ Status ValidateOptions(const RenderOptions& options) {
     return InvalidArgument("options.max_alpha_error is {}, must be in [0, 1]",
                            options.max_alpha_error);
   }
+  const double box = options.paper.box;
+  if (!(box >= 0 && std::isfinite(box)) || options.paper.max_faces < 0) {
+    return InvalidArgument("options.paper is {{box {}, max_faces {}}}, must be finite and >= 0",
+                           box, options.paper.max_faces);
+  }
   return {};
 }
 

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Alpha by the rule of the paper's implementations (SoftRule::kPaper), forward and backward: for
+// comparisons, so scalar code. Independent of the renderer's own soft mask.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "raster/project.h"
+#include "raster/screen_mesh.h"
+#include "raster/soft_mask_paper_ref.h"
+#include "render/renderer.h"
+
+namespace tilegrad {
+
+inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
+  return {.inverse_delta = 1 / options.delta,
+          .box = options.paper.box,
+          .max_faces = options.paper.max_faces};
+}
+
+// Pixels to NDC.
+template <class T>
+T NdcX(const T& x, int width) {
+  return T(2) * x / T(width) - T(1);
+}
+template <class T>
+T NdcY(const T& y, int height) {
+  return T(1) - T(2) * y / T(height);
+}
+
+template <class T>
+raster::NdcFace<T> NdcFaceOf(const raster::ScreenMeshT<T>& mesh, std::size_t face) {
+  raster::NdcFace<T> out;
+  for (int k = 0; k < 3; ++k) {
+    const auto v = static_cast<std::size_t>(mesh.vertex(face, k));
+    out.x[k] = NdcX(mesh.x[v], mesh.width), out.y[k] = NdcY(mesh.y[v], mesh.height);
+  }
+  return out;
+}
+
+// Fills frame->alpha [N,H,W], given frame->face_ids. `scenes` are valid.
+void PaperAlpha(std::span<const SceneView> scenes, const RenderOptions& options,
+                const Workers& workers, Frame* frame);
+
+// Adds the gradient of alpha to positions and cameras. d_alpha [N,H,W].
+void PaperAlphaBackward(std::span<const SceneView> scenes, const RenderOptions& options,
+                        const Workers& workers, const Frame& frame, std::span<const float> d_alpha,
+                        std::span<SceneGradients> d_scenes);
+
+}  // namespace tilegrad
