@@ -102,6 +102,7 @@ struct QuadPixels {
   }
 
   // The four planes of a group at the four pixels, as planes.
+  template <bool kPerspective>
   HWY_INLINE void Evaluate(PlaneQuads* quads, int group, Quad (&out)[4]) const {
     const QuadTag d;
     const float *value = quads->quads(group, 0), *dx = quads->quads(group, 1);
@@ -109,7 +110,7 @@ struct QuadPixels {
     for (int p = 0; p < kQuadPixels; ++p) {
       out[p] = hn::MulAdd(hn::Load(d, dx + at[p]), x[p],
                           hn::MulAdd(hn::Load(d, dy + at[p]), y[p], hn::Load(d, value + at[p])));
-      if (group == 0) out[p] = hn::Max(out[p], hn::Load(d, quads->least() + at[p]));
+      if (kPerspective && group == 0) out[p] = hn::Max(out[p], hn::Load(d, quads->least() + at[p]));
     }
     Transpose(out);
   }
@@ -168,7 +169,7 @@ HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, floa
     const QuadPixels pixels(job.scratch->seen, faces + j,
                             static_cast<float>(job.rows.x0 + j) + 0.5f, py);
     Quad values[4];
-    pixels.Evaluate(&job.scratch->quads, group, values);
+    pixels.Evaluate<kPerspective>(&job.scratch->quads, group, values);
     auto scale = hn::Set(d, 1.0f);
     if (kPerspective && group == 0) hn::Store(hn::Div(scale, values[3]), d, inverse_q + j);
     if (kPerspective) scale = hn::Load(d, inverse_q + j);

@@ -3,12 +3,14 @@
 // for.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <new>
+#include <utility>
 
 #include "render/renderer.h"
 #include "render/test_batch.h"
@@ -294,6 +296,32 @@ TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
   const std::vector<float> d_alpha(frame.alpha.size(), 1.0f);
   ASSERT_TRUE(renderer.Backward(empty, Options(), frame, {{}, d_alpha}, d).ok());
   EXPECT_EQ(d[0].d_camera.fx, 0);
+}
+
+// Weights sum to one, so the gradients of a channel at all vertices sum to those at all pixels that
+// are covered.
+TEST(RendererEdgeCases, TheSmallestAndTheLongestImages) {
+  const std::vector<float> positions = {-50, -50, 0, 50, -50, 0.1f, 0, 80, -0.1f};
+  const std::vector<std::int32_t> faces = {0, 1, 2};
+  const std::vector<float> attributes = {0.1f, 0.5f, 0.9f};
+  const Workers workers(3);
+  Renderer renderer(workers);
+  for (const auto& [width, height] : {std::pair{1, 1}, {16384, 1}, {1, 16384}, {16384, 5}}) {
+    const Camera camera = OrbitCamera({40.0, width, height}, 90, 0, 3);
+    const SceneView scenes[] = {{positions, faces, attributes, 1, AttributeRate::kVertex, camera}};
+    const RenderOptions options = Options(width, height);
+    Frame frame;
+    ASSERT_TRUE(renderer.Render(scenes, options, {}, &frame).ok());
+    const std::vector<float> d_attributes(frame.face_ids.size(), 0.25f);
+    std::vector<float> d_positions(9), d_rows(3);
+    SceneGradients d[] = {{d_positions, d_rows, false, {}}};
+    ASSERT_TRUE(renderer.Backward(scenes, options, frame, {d_attributes, {}}, d).ok());
+    const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), 0);
+    EXPECT_GT(covered, 0);
+    const double expected = 0.25 * static_cast<double>(covered);
+    EXPECT_NEAR(d_rows[0] + d_rows[1] + d_rows[2], expected, 1e-4 * expected)
+        << width << " x " << height;
+  }
 }
 
 TEST(RendererEdgeCases, BehindOffScreenAndDegenerateFacesAreFiniteBackground) {
