@@ -94,40 +94,24 @@ void Spectral::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   if (!u_.empty()) visitor.Buffer(prefix + "spectral_u", u_);
 }
 
-Conv2dLayer::Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-    : options_(shape.options) {
-  const Shape weights = {shape.out, shape.in, shape.kernel, shape.kernel};
-  weight = Initialised(context, weights, rng, FanIn(weights));
+ConvLayer::ConvLayer(Context& context, const ConvShape& shape, const Shape& weights, Rng& rng)
+    : weight(Initialised(context, weights, rng, FanIn(weights))), options_(shape.options) {
   if (shape.bias) bias = Initialised(context, {shape.out}, rng, FanIn(weights));
   if (shape.spectral) spectral_ = Spectral(weight, rng);
+}
+
+void ConvLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+  visitor.Parameter(prefix + "weight", weight);
+  if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
+  spectral_.Visit(prefix, visitor);
 }
 
 Var Conv2dLayer::Forward(const Var& x, Mode mode) {
   return Conv2d(x, spectral_.Normalised(weight, mode), bias, options_);
 }
 
-void Conv2dLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  visitor.Parameter(prefix + "weight", weight);
-  if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
-  spectral_.Visit(prefix, visitor);
-}
-
-ConvTranspose2dLayer::ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-    : options_(shape.options) {
-  const Shape weights = {shape.in, shape.out, shape.kernel, shape.kernel};
-  weight = Initialised(context, weights, rng, FanIn(weights));
-  if (shape.bias) bias = Initialised(context, {shape.out}, rng, FanIn(weights));
-  if (shape.spectral) spectral_ = Spectral(weight, rng);
-}
-
 Var ConvTranspose2dLayer::Forward(const Var& x, Mode mode) {
   return ConvTranspose2d(x, spectral_.Normalised(weight, mode), bias, options_);
-}
-
-void ConvTranspose2dLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  visitor.Parameter(prefix + "weight", weight);
-  if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
-  spectral_.Visit(prefix, visitor);
 }
 
 BatchNorm::BatchNorm(Context& context, std::int64_t channels, const BatchNormOptions& options)

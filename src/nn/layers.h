@@ -89,33 +89,35 @@ struct ConvShape {
   bool spectral = false;  // spectral norm of the weight
 };
 
-class Conv2dLayer : public Module {
+// What the two convolutions share.
+class ConvLayer : public Module {
  public:
-  Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng);  // FillDefault
-  Var Forward(const Var& x, Mode mode) override;
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
-  Var weight;  // [out, in, kernel, kernel]
-  Var bias;    // [out]; invalid without
+  Var weight;
+  Var bias;  // [out]; invalid without
 
- private:
+ protected:
+  // FillDefault by the fan-in of `weights`, the weight's shape, as PyTorch counts it.
+  ConvLayer(Context& context, const ConvShape& shape, const Shape& weights, Rng& rng);
   ConvOptions options_;
   Spectral spectral_;
 };
 
-class ConvTranspose2dLayer : public Module {
+class Conv2dLayer : public ConvLayer {
  public:
-  // FillDefault by the inputs of one output as PyTorch counts them: out kernel^2.
-  ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng);
+  // weight: [out, in, kernel, kernel]
+  Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
+      : ConvLayer(context, shape, {shape.out, shape.in, shape.kernel, shape.kernel}, rng) {}
   Var Forward(const Var& x, Mode mode) override;
-  void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
+};
 
-  Var weight;  // [in, out, kernel, kernel]
-  Var bias;    // [out]; invalid without
-
- private:
-  ConvOptions options_;
-  Spectral spectral_;
+class ConvTranspose2dLayer : public ConvLayer {
+ public:
+  // weight: [in, out, kernel, kernel]
+  ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng)
+      : ConvLayer(context, shape, {shape.in, shape.out, shape.kernel, shape.kernel}, rng) {}
+  Var Forward(const Var& x, Mode mode) override;
 };
 
 // Of [n, c] and [n, c, h, w]. Running statistics as PyTorch: new = (1 - momentum) old + momentum
