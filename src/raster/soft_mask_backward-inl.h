@@ -70,6 +70,7 @@ class TileBackward {
   void Run() {
     if (!AnyLive(scratch_->blocks)) return;
     nodes_ = FindSoftNodes(tree_, plan_, box_, scratch_);
+    if (nodes_.count == 0) return;
     reach_ = ReachOf(plan_, nodes_.faces);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (scratch_->blocks[b].bits != 0) TakeLightPixels(b);
@@ -114,7 +115,9 @@ class TileBackward {
       std::fill_n(near_product_[b], kBlockPixels, 1.0f);
     }
     for (std::size_t next = 0; next < Order().size() && AnyLive(blocks);) {
+      const bool first = next == 0;
       FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      only_chunk_ = first && next == Order().size();
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
         if (blocks[b].live == 0) continue;
         SoftLists& lists = scratch_->lists;
@@ -155,7 +158,8 @@ class TileBackward {
 
   void WeakGradients() {
     for (std::size_t next = 0; next < Order().size();) {
-      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      if (!only_chunk_) FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      if (only_chunk_) next = Order().size();
       for (auto& array : scratch_->sums) std::fill(std::begin(array), std::end(array), 0.0f);
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
         if (weak_[b] == 0) continue;
@@ -189,6 +193,7 @@ class TileBackward {
   SoftNodes nodes_;
   SoftReach reach_;
   PixelScale scale_;
+  bool only_chunk_ = false;  // all faces are in the chunk of the scratch
   std::uint64_t dark_[kTileBlocks] = {};
   std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter
   alignas(64) float push_[kTileBlocks][kBlockPixels];

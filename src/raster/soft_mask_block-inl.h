@@ -85,7 +85,7 @@ HWY_INLINE void PlaceBlock(const SoftBox& unit, SoftBlock* block) {
   block->centre_y = 0.5f * static_cast<float>(box.y0 + box.y1 + 1);
   block->half_x = 0.5f * static_cast<float>(box.x1 - box.x0) * unit.unit_x;
   block->half_y = 0.5f * static_cast<float>(box.y1 - box.y0) * unit.unit_y;
-  block->radius = std::hypot(block->half_x, block->half_y);
+  block->radius = std::sqrt(block->half_x * block->half_x + block->half_y * block->half_y);
   for (std::size_t i = 0; i < kBlockSize; ++i) {
     const float at = static_cast<float>(i) + 0.5f;
     block->x[i] = (static_cast<float>(block->x0) + at - block->centre_x) * unit.unit_x;

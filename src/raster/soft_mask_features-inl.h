@@ -188,10 +188,8 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan, const
   const SoftTag d;
   const SoftIntTag di;
   lists->vertices.count = lists->segments.count = lists->boundaries.count = 0;
-  const auto append = [&](const FaceEdges& f, SoftMask valid, std::size_t slot) HWY_ATTR {
-    AppendFeatures(d, f, valid, hn::Iota(di, static_cast<std::int32_t>(slot)), block, reach, unit,
-                   split, lists);
-  };
+  const auto slots = [&](std::size_t first)
+                         HWY_ATTR { return hn::Iota(di, static_cast<std::int32_t>(first)); };
   for (std::size_t i = 0; i < chunk.shorts.count; i += hn::Lanes(d)) {
     FaceEdges f;
     LoadCorners(d, chunk.shorts, i, unit, block, &f);
@@ -199,11 +197,12 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan, const
         hn::And(hn::FirstN(d, chunk.shorts.count - i), IsBoxNear(d, f, block, reach.root));
     if (hn::AllFalse(d, near)) continue;
     ShortEdges(d, chunk.shorts, i, &f);
-    append(f, near, i);
+    AppendFeatures(d, f, near, slots(i), block, reach, unit, split, lists);
   }
   for (std::size_t i = 0; i < chunk.longs.count; i += hn::Lanes(d)) {
-    append(LongEdges(d, chunk.longs, i, plan, block), hn::FirstN(d, chunk.longs.count - i),
-           kChunkRoom + i);
+    AppendFeatures(d, LongEdges(d, chunk.longs, i, plan, block),
+                   hn::FirstN(d, chunk.longs.count - i), slots(kChunkRoom + i), block, reach, unit,
+                   split, lists);
   }
   PadList({0}, &lists->vertices);
   PadList({SoftLists::kSide}, &lists->segments);

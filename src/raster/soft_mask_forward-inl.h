@@ -77,11 +77,13 @@ class PartialAlpha {
   // The pixels that see a vector of members. Counts members that all pixels see.
   HWY_INLINE std::uint64_t See(const SoftList& list, std::size_t m) {
     const SoftTag d;
-    for (std::size_t lane = 0; lane < hn::Lanes(d) && m + lane < list.count; ++lane) {
-      block_->whole += (block_->bits & ~RangeBits(list.range[m + lane])) == 0;
+    std::uint64_t bits = 0;
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+      const std::uint64_t near = RangeBits(list.range[m + lane]);
+      block_->whole += (block_->bits & ~near) == 0;
+      bits |= near;
     }
-    const std::uint64_t bits = PixelsOf(d, list, m, block_->live);
-    touched_ |= bits;
+    bits &= block_->live, touched_ |= bits;
     return bits;
   }
   HWY_INLINE void Put(SoftTag d, std::size_t pixel, SoftVec influence) {
@@ -114,21 +116,33 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
   return std::min(spent, 1.0);
 }
 
+// Before any face: 0 for the pixels to compute, else 1.
+HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
+  const auto width = static_cast<std::size_t>(block.width);
+  ForRows(plan, block, [&](std::size_t to, std::size_t from) {
+    const std::uint64_t row = block.bits >> from & 0xff;
+    std::fill_n(alpha + to, width, row == 0 ? 1.0f : 0.0f);
+    if (row == 0 || row == 0xff) return;
+    for (std::size_t x = 0; x < width; ++x) alpha[to + x] = static_cast<float>(~row >> x & 1);
+  });
+}
+
 HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
   ForRows(plan, block, [&](std::size_t to, std::size_t from) {
-    for (int x = 0; x < block.width; ++x) {
-      alpha[to + static_cast<std::size_t>(x)] =
-          static_cast<float>(block.alpha[from + static_cast<std::size_t>(x)]);
+    for (std::size_t x = 0; x < static_cast<std::size_t>(block.width); ++x) {
+      alpha[to + x] = static_cast<float>(block.alpha[from + x]);
     }
   });
 }
 
-// Alpha of the blocks of a tile, and what they spent.
-inline double FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
-                        SoftMaskScratch* scratch) {
+// Alpha of the blocks of a tile over the faces of `nodes`.
+HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
+                          const SoftNodes& nodes, const SoftReach& reach,
+                          SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
-  const SoftNodes nodes = FindSoftNodes(tree, plan, box, scratch);
-  const SoftReach reach = ReachOf(plan, nodes.faces);
+  for (std::size_t b = 0; b < kTileBlocks; ++b) {
+    if (blocks[b].bits != 0) ClearAlpha(&blocks[b]);
+  }
   const double stop = StopProduct(plan);
   const std::span<const std::int32_t> order = std::span(scratch->nodes).first(nodes.count);
   for (std::size_t next = 0; next < order.size() && AnyLive(blocks);) {
@@ -143,11 +157,6 @@ inline double FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const So
       if (next < order.size()) StopPixels(stop, &blocks[b]);
     }
   }
-  double spent = 0;
-  for (std::size_t b = 0; b < kTileBlocks; ++b) {
-    if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
-  }
-  return spent;
 }
 
 inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
@@ -158,10 +167,21 @@ inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& pl
       plan, tile.rect,
       [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, tile.face_ids.data()); },
       blocks);
-  for (std::size_t b = 0; b < kTileBlocks; ++b) ClearAlpha(&blocks[b]);
-  const double spent = AnyLive(blocks) ? FindAlpha(tree, plan, box, scratch) : 0;
+  SoftNodes nodes;
+  SoftReach reach{};
+  if (AnyLive(blocks)) nodes = FindSoftNodes(tree, plan, box, scratch);
+  if (nodes.count > 0) {
+    reach = ReachOf(plan, nodes.faces);
+    FindAlpha(tree, plan, box, nodes, reach, scratch);
+  }
+  double spent = 0;
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
-    if (blocks[b].width > 0) WriteAlpha(plan, blocks[b], alpha);
+    if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
+    if (blocks[b].bits != 0 && nodes.count > 0) {
+      WriteAlpha(plan, blocks[b], alpha);
+    } else if (blocks[b].width > 0) {
+      WriteClear(plan, blocks[b], alpha);
+    }
   }
   return spent;
 }

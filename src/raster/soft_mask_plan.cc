@@ -24,6 +24,7 @@ SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
   const double error = options.max_alpha_error;
   plan.node_error = plan.stop_error = error / 4, plan.face_error = error / 2;
   plan.group_z = DropZ(options.faces, plan.node_error / 2);
+  plan.group_influence = std::exp2(-plan.group_z);
   return plan;
 }
 

@@ -152,21 +152,15 @@ struct SoftNodes {
   double dropped = 0;     // bound on the sum of A of all other faces
 };
 
-// How many faces nodes have by the whole part of their z, at most kEndZ.
-struct SoftHistogram {
-  double faces[kEndZ + 1] = {};
-  std::size_t nodes[kEndZ + 1] = {};
-  std::size_t found = 0;  // nodes in all
-};
-
-// Nodes of groups nearer than group_z into `found`.
-HWY_INLINE double FindNodesOfGroups(const SoftTree& tree, const SoftBox& box, double group_z,
-                                    AlignedVector<SoftNodeAt>* found, SoftHistogram* histogram) {
+// Nodes of groups nearer than group_z into `found`; returns how many. Adds a bound on the sum of A
+// of the other groups to `dropped`.
+HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPlan& plan,
+                                         const SoftBox& box, AlignedVector<SoftNodeAt>* found,
+                                         double* dropped) {
   const SoftTag d;
   const SoftIntTag di;
-  double far = 0;
   if (found->size() < tree.nodes.count) found->resize(tree.nodes.count);
-  std::size_t& count = histogram->found;
+  std::size_t count = 0;
   const auto nodes_of = [&](std::size_t group) HWY_ATTR {
     const float* faces = tree.nodes.array(SoftBoxes::kFaces);
     for (std::size_t n = group * kGroupNodes; n < (group + 1) * kGroupNodes; n += hn::Lanes(d)) {
@@ -174,15 +168,14 @@ HWY_INLINE double FindNodesOfGroups(const SoftTree& tree, const SoftBox& box, do
       const SoftVec z = hn::Min(BoxDistance(d, tree.nodes, n, box), hn::Set(d, float{kEndZ}));
       hn::Store(hn::ConvertTo(di, z), di, whole);
       for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        if (faces[n + i] == 0) continue;
-        histogram->faces[whole[i]] += static_cast<double>(faces[n + i]);
-        ++histogram->nodes[whole[i]];
-        (*found)[count++] = {static_cast<std::int32_t>(n + i), whole[i]};
+        (*found)[count] = {static_cast<std::int32_t>(n + i), whole[i]};
+        count += faces[n + i] != 0;
       }
     }
   };
   const float* faces = tree.groups.array(SoftBoxes::kFaces);
-  const SoftVec limit = hn::Set(d, static_cast<float>(group_z * (1 + 0x1p-20)));
+  const SoftVec limit = hn::Set(d, static_cast<float>(plan.group_z * (1 + 0x1p-20)));
+  double far = 0;
   for (std::size_t g = 0; g < tree.groups.count; g += hn::Lanes(d)) {
     const auto near = BitsOf(d, hn::Le(BoxDistance(d, tree.groups, g, box), limit));
     for (std::size_t i = 0; i < std::min(hn::Lanes(d), tree.groups.count - g); ++i) {
@@ -193,37 +186,52 @@ HWY_INLINE double FindNodesOfGroups(const SoftTree& tree, const SoftBox& box, do
       }
     }
   }
-  return far * std::exp2(-group_z);
+  *dropped += far * plan.group_influence;
+  return count;
 }
 
-// Drops the farthest whole z from the histogram as long as `budget` lasts; returns the first
-// dropped one and adds what that costs to `dropped`.
-inline int DropFarNodes(const SoftHistogram& histogram, double budget, double* dropped) {
-  int end = kEndZ;
-  double cost = histogram.faces[kEndZ] * std::exp2(-kEndZ);
-  while (end > 0) {
-    const double more = histogram.faces[end - 1] * std::exp2(1 - end);
-    if (cost + more > budget) break;
-    cost += more, --end;
+// Nodes by the whole part of their z.
+struct SoftHistogram {
+  float faces[kEndZ + 1] = {};
+  std::int32_t nodes[kEndZ + 1] = {};
+
+  HWY_INLINE SoftHistogram(const SoftBoxes& boxes, std::span<const SoftNodeAt> found) {
+    const float* in = boxes.array(SoftBoxes::kFaces);
+    for (const SoftNodeAt& at : found) faces[at.z] += in[at.node], ++nodes[at.z];
   }
-  *dropped += cost;
-  return end;
-}
+  // Drops the farthest as long as `budget` lasts; returns the first whole z that is dropped, and
+  // adds what that costs to `dropped`.
+  int DropFar(double budget, double* dropped) const {
+    int end = kEndZ;
+    double influence = 0x1p-126, cost = static_cast<double>(faces[kEndZ]) * influence;
+    static_assert(kEndZ == 126);
+    while (end > 0) {
+      influence *= 2;
+      const double more = static_cast<double>(faces[end - 1]) * influence;
+      if (cost + more > budget) break;
+      cost += more, --end;
+    }
+    *dropped += cost;
+    return end;
+  }
+};
 
 // The nodes that a tile with background in `box` must look at, near ones first: a counting sort.
 inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
                                SoftMaskScratch* scratch) {
-  SoftHistogram histogram;
   SoftNodes out;
-  out.dropped = FindNodesOfGroups(tree, box, plan.group_z, &scratch->found, &histogram);
-  const int end = DropFarNodes(histogram, plan.node_error / 2, &out.dropped);
+  const std::size_t count = FindNodesOfGroups(tree, plan, box, &scratch->found, &out.dropped);
+  if (count == 0) return out;
+  const auto found = std::span<const SoftNodeAt>(scratch->found).first(count);
+  const SoftHistogram histogram(tree.nodes, found);
+  const int end = histogram.DropFar(plan.node_error / 2, &out.dropped);
   std::size_t begin[kEndZ];
   for (int z = 0; z < end; ++z) {
     out.faces += static_cast<std::size_t>(histogram.faces[z]);
-    begin[z] = out.count, out.count += histogram.nodes[z];
+    begin[z] = out.count, out.count += static_cast<std::size_t>(histogram.nodes[z]);
   }
   if (scratch->nodes.size() < out.count) scratch->nodes.resize(out.count);
-  for (const SoftNodeAt& at : std::span(scratch->found).first(histogram.found)) {
+  for (const SoftNodeAt& at : found) {
     if (at.z < end) scratch->nodes[begin[at.z]++] = at.node;
   }
   return out;

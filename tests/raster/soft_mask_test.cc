@@ -103,6 +103,8 @@ void CheckScenes(std::uint64_t first, std::uint64_t count, std::size_t most_face
 
 TEST(SoftMask, FewFacesOnEveryTarget) { CheckScenes(0, 1800, 12); }
 TEST(SoftMask, ManyFacesOnEveryTarget) { CheckScenes(100000, 200, 150); }
+// More than a chunk, and than a group of nodes: pixels may stop in between.
+TEST(SoftMask, HundredsOfFacesOnEveryTarget) { CheckScenes(150000, 20, 900); }
 TEST(SoftMaskLong, TwentyThousandScenes) {
   CheckScenes(200000, 18000, 12);
   CheckScenes(300000, 2000, 300);
@@ -125,6 +127,26 @@ TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
     for (std::size_t i = 0; i < scene.pixels(); ++i) {
       EXPECT_NEAR(static_cast<double>(a.alpha[i]), static_cast<double>(b.alpha[i]),
                   a.spent + b.spent + 2 * truth.Rounding(i));
+    }
+  }
+}
+
+// Far faces are dropped by groups and nodes without being looked at; what is reported covers them.
+TEST(SoftMask, DroppedNodesAreBooked) {
+  SoftScene scene;
+  scene.Resize(16, 16);
+  scene.options.max_alpha_error = 1e-2;
+  for (const float x : {60.0f, 600.0f}) {
+    for (int f = 0; f < 1000; ++f) scene.AddFace({x, x + 1, x}, {8, 8, 9});
+  }
+  SoftMaskScratch scratch;
+  for (const double delta : {0.5, 1.0, 3.0, 10.0}) {
+    scene.options.delta = delta;
+    const SoftTruth at(scene);
+    const SoftResult result = RunSoftMask(scene, scene.d_alpha, &scratch);
+    EXPECT_LE(result.spent, scene.options.max_alpha_error);
+    for (std::size_t i = 0; i < scene.pixels(); ++i) {
+      EXPECT_NEAR(static_cast<double>(result.alpha[i]), at.Alpha(i), result.spent + at.Rounding(i));
     }
   }
 }
