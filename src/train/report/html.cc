@@ -22,14 +22,6 @@ std::string ReplaceAll(std::string_view text, char from, std::string_view to) {
 
 }  // namespace
 
-std::string EscapeHtml(std::string_view text) {
-  std::string out = ReplaceAll(text, '&', "&amp;");
-  out = ReplaceAll(out, '<', "&lt;");
-  out = ReplaceAll(out, '>', "&gt;");
-  out = ReplaceAll(out, '"', "&quot;");
-  return ReplaceAll(out, '\'', "&#39;");
-}
-
 std::string Base64(std::span<const std::uint8_t> bytes) {
   static constexpr char kDigits[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

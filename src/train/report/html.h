@@ -9,13 +9,11 @@
 #include <string>
 #include <string_view>
 
+#include "base/escape_html.h"
 #include "scene/image.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::train {
-
-// For text and for attribute values in double quotes.
-std::string EscapeHtml(std::string_view text);
 
 std::string Base64(std::span<const std::uint8_t> bytes);
 

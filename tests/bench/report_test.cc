@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the JSON of Google Benchmark to tables and curves.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "report/tables.h"
+
+namespace tilegrad::bench {
+namespace {
+
+std::string Sample(const std::string& name, double cpu, double wall, const std::string& more) {
+  return R"({"run_name":")" + name + R"(/process_time/real_time","run_type":"iteration",)" +
+         R"("cpu_time":)" + std::to_string(cpu) + R"(,"real_time":)" + std::to_string(wall) + more +
+         "}";
+}
+
+std::vector<Measurement> Parse(const std::string& samples) {
+  const auto all = ParseMeasurements(R"({"benchmarks":[)" + samples + "]}");
+  EXPECT_TRUE(all.ok()) << all.status().message();
+  return all.ok() ? *all : std::vector<Measurement>();
+}
+
+const std::string kLimits = R"(,"limit_ms":0.5,"limit_high_ms":1.0,"share":1,"faces":7)";
+
+const std::string kSamples =
+    Sample("S1/forward/both/1", 3, 4, kLimits) + "," + Sample("S1/forward/both/1", 2, 4, kLimits) +
+    "," + Sample("S1/forward/both/1", 9, 3, kLimits) + "," + Sample("S1/forward/both/2", 4, 2, "") +
+    "," + Sample("S1/forward/both/culled", 30, 30, "") + "," +
+    Sample("S1/forward/both/naive", 15, 16, R"(,"share":0.01)") + "," +
+    Sample("S1/backward/both/1", 1, 1, R"(,"error_occurred":true)") + "," +
+    Sample("delta-0.01/forward/both/1", 5, 6, "") + "," +
+    Sample("delta-1/forward/both/1", 50, 60, "") + "," +
+    Sample("delta-0.01/forward/both/culled", 500, 600, "");
+
+TEST(BenchReport, MediansOfRepetitionsScaledToTheWholeBatch) {
+  const auto all = Parse(kSamples);
+  ASSERT_EQ(all.size(), 7u);  // the one with an error is left out
+  EXPECT_EQ(all[0].scene + all[0].direction + all[0].what + all[0].who, "S1forwardboth1");
+  EXPECT_EQ(all[0].repetitions, 3);
+  EXPECT_EQ(all[0].cpu_ms, 3);
+  EXPECT_EQ(all[0].wall_ms, 4);
+  EXPECT_EQ(Find(all, all[0], "naive")->cpu_ms, 1500);
+  EXPECT_EQ(Find(all, all[0], "nobody"), nullptr);
+}
+
+TEST(BenchReport, SpeedTableHasRatiosAndLimits) {
+  const std::string table = SpeedTable(Parse(kSamples));
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);  // head, line, one row
+  EXPECT_NE(
+      table.find("| S1 | forward | both | 3.00 |  | 10 | 500 | 2.00 | 0.50-1.00 | 17-33 % |\n"),
+      std::string::npos)
+      << table;
+}
+
+TEST(BenchReport, CsvHasAllMeasurements) {
+  const std::string csv = MeasurementsCsv(Parse(kSamples));
+  EXPECT_EQ(csv.rfind("scene,direction,what,who,repetitions,cpu_ms,wall_ms,share,images,pixels,"
+                      "faces,pairs,exps,bytes,limit_ms,limit_high_ms\n",
+                      0),
+            0u);
+  EXPECT_NE(csv.find("\nS1,forward,both,naive,1,1500,1600,0.01,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("S1,forward,both,1,3,3,4,1,0,0,7,0,0,0,0.5,1\n"), std::string::npos) << csv;
+}
+
+TEST(BenchReport, GrowthAsCurvesAndTable) {
+  const auto all = Parse(kSamples);
+  const LogPlot plot = GrowthPlot(all, "delta");
+  ASSERT_EQ(plot.series.size(), 2u);
+  ASSERT_EQ(plot.series[0].points.size(), 2u);
+  EXPECT_EQ(plot.series[0].points[1].x, 1);
+  EXPECT_EQ(plot.series[0].points[1].y, 50);
+  EXPECT_NE(GrowthTable(all, "delta").find("| 0.01 | 5 | 500 |\n| 1 | 50 |  |\n"),
+            std::string::npos);
+  EXPECT_TRUE(GrowthTable(all, "faces").empty());
+}
+
+TEST(BenchReport, RefusesOtherFiles) {
+  EXPECT_FALSE(ParseMeasurements("").ok());
+  EXPECT_FALSE(ParseMeasurements("{}").ok());
+  EXPECT_FALSE(ParseMeasurements(R"({"benchmarks":[]})").ok());
+  EXPECT_FALSE(ParseMeasurements(R"({"benchmarks":[{"run_type":"iteration"}]})").ok());
+}
+
+TEST(LogPlotSvg, DrawsPointsWhereTheyBelongAndEscapesTexts) {
+  const std::string svg = LogPlotSvg({"a & b", "y", {{{"<s>"}, {{1, 1, ""}, {100, 10, ""}}}}});
+  EXPECT_EQ(svg.rfind("<svg", 0), 0u);
+  EXPECT_NE(svg.find("points=\"80.0,384.0 470.0,24.0 \""), std::string::npos) << svg;
+  EXPECT_NE(svg.find("a &amp; b"), std::string::npos);
+  EXPECT_NE(svg.find("&lt;s&gt;"), std::string::npos);
+  EXPECT_NE(LogPlotSvg({"x", "y", {}}).find("</svg>"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tilegrad::bench
