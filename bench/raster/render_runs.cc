@@ -59,7 +59,9 @@ void SetCounters(benchmark::State& state, const RunSpec& spec, Direction directi
   state.counters["images"] = spec.scene.images;
   state.counters["pixels"] = work.pixels;
   state.counters["faces"] = work.faces;
-  state.counters["pairs"] = state.counters["exps"] = spec.alpha ? work.pairs : 0;
+  if (spec.alpha && work.pairs > 0) {  // the variation of zeros is no number, and no JSON
+    state.counters["pairs"] = state.counters["exps"] = work.pairs;
+  }
   state.counters["bytes"] = limit.bytes;
   state.counters["limit_ms"] = limit.low;
   state.counters["limit_high_ms"] = limit.high;

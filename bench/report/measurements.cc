@@ -15,6 +15,7 @@ using nlohmann::ordered_json;
 struct Samples {
   Measurement result;
   std::vector<double> cpu, wall;
+  int family = 0;  // counts benchmarks as they were registered; they may run in any order
 };
 
 double Median(std::vector<double> v) {
@@ -52,9 +53,12 @@ Result<std::vector<Measurement>> Collect(const ordered_json& runs) {
     Measurement parts;
     if (!SplitName(name, &parts)) continue;
     const auto [at, is_new] = places.try_emplace(name, all.size());
-    if (is_new) all.push_back({std::move(parts), {}, {}});
+    if (is_new) all.push_back({std::move(parts), {}, {}, 0});
     AddSample(run, &all[at->second]);
+    all[at->second].family = run.value("family_index", 0);
   }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Samples& a, const Samples& b) { return a.family < b.family; });
   std::vector<Measurement> out;
   for (Samples& s : all) {
     s.result.cpu_ms = Median(s.cpu), s.result.wall_ms = Median(s.wall);

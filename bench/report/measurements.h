@@ -22,8 +22,8 @@ struct Measurement {
   double counter(const std::string& name) const;  // 0 where there is none
 };
 
-// Benchmarks that reported an error are left out; so are those whose name has fewer parts. Errors:
-// not JSON, or no measurement in it.
+// In the order of registration. Benchmarks that reported an error are left out; so are those whose
+// name has fewer parts. Errors: not JSON, or no measurement in it.
 Result<std::vector<Measurement>> ParseMeasurements(std::string_view json);
 
 // Null if there is none.

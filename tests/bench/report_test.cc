@@ -44,6 +44,13 @@ TEST(BenchReport, MediansOfRepetitionsScaledToTheWholeBatch) {
   EXPECT_EQ(Find(all, all[0], "nobody"), nullptr);
 }
 
+TEST(BenchReport, OrderIsThatOfRegistration) {
+  const auto all = Parse(Sample("S2/forward/both/1", 1, 1, R"(,"family_index":5)") + "," +
+                         Sample("S1/forward/both/1", 1, 1, R"(,"family_index":2)"));
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].scene, "S1");
+}
+
 TEST(BenchReport, SpeedTableHasRatiosAndLimits) {
   const std::string table = SpeedTable(Parse(kSamples));
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);  // head, line, one row
