@@ -22,14 +22,14 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-struct CornerLanes {
+struct ShapeCorners {
   FaceVec x[3], y[3], z[3];
 };
 
 // Faces f to f + count - 1; the first of them again in lanes beyond.
-HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, std::size_t f, std::size_t count) {
+HWY_INLINE ShapeCorners LoadShapeCorners(const ScreenMesh& mesh, std::size_t f, std::size_t count) {
   const std::int32_t* const corners[3] = {&mesh.v0[f], &mesh.v1[f], &mesh.v2[f]};
-  CornerLanes out;
+  ShapeCorners out;
   for (int k = 0; k < 3; ++k) {
     const std::int32_t* vertices = corners[k];
     HWY_ALIGN std::int32_t some[kMostFaceLanes];
@@ -135,7 +135,7 @@ HWY_INLINE void SetEdges(SnappedLanes s, FaceInt column, FaceInt row, FaceWords*
 }
 
 // SwapUnlessOrdered of face_plane.h.
-HWY_INLINE void OrderLanes(CornerLanes* c, int i, int j) {
+HWY_INLINE void OrderLanes(ShapeCorners* c, int i, int j) {
   const auto ordered =
       hn::Or(hn::Lt(c->x[i], c->x[j]), hn::And(hn::Eq(c->x[i], c->x[j]), hn::Le(c->y[i], c->y[j])));
   for (auto* a : {c->x, c->y, c->z}) {
@@ -145,7 +145,7 @@ HWY_INLINE void OrderLanes(CornerLanes* c, int i, int j) {
 }
 
 // MakeDepthPlane of face_plane.h, in the same order of operations.
-HWY_INLINE void SetDepth(CornerLanes c, FaceWords* out) {
+HWY_INLINE void SetDepth(ShapeCorners c, FaceWords* out) {
   const FaceTag d;
   OrderLanes(&c, 0, 1), OrderLanes(&c, 1, 2), OrderLanes(&c, 0, 1);
   const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
@@ -209,7 +209,7 @@ struct ShapeLanes {
   FaceIntMask small;
 };
 
-HWY_INLINE ShapeLanes ShapesOf(const CornerLanes& c) {
+HWY_INLINE ShapeLanes ShapesOf(const ShapeCorners& c) {
   ShapeLanes out;
   for (int k = 0; k < 3; ++k) {
     out.corners.x[k] = SnapLanes(c.x[k]), out.corners.y[k] = SnapLanes(c.y[k]);
@@ -246,7 +246,7 @@ HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& 
   return drawn;
 }
 
-HWY_INLINE FaceWords WordsOf(const CornerLanes& corners, ShapeLanes* shapes, std::size_t f,
+HWY_INLINE FaceWords WordsOf(const ShapeCorners& corners, ShapeLanes* shapes, std::size_t f,
                              const PixelLanes& columns, const PixelLanes& rows) {
   const FaceIntTag di;
   FaceWords words;
@@ -267,7 +267,7 @@ std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t en
   DrawnFace* to = out;
   for (std::size_t f = begin; f < end; f += lanes) {
     const std::size_t count = HWY_MIN(lanes, end - f);
-    const CornerLanes corners = LoadCorners(mesh, f, count);
+    const ShapeCorners corners = LoadShapeCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);
     if (out == nullptr || drawn == 0) continue;

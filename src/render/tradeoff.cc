@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <numbers>
 
 #include "base/error.h"
@@ -51,13 +52,18 @@ class Measurement {
  public:
   Measurement(const TradeoffJob& job, const ProgressSink& progress, const StopFlag& stop)
       : job_(job), progress_(progress), stop_(stop), renderer_(one_) {
-    total_ = job.errors.size() * static_cast<std::size_t>(job.repetitions + 1);
+    for (const double error : job.errors) settings_.push_back(WithError(error));
+    if (job.paper_rule) {
+      settings_.push_back(job.options);
+      settings_.back().soft_rule = SoftRule::kPaper;
+    }
+    total_ = settings_.size() * static_cast<std::size_t>(job.repetitions + 1);
   }
 
   Result<Tradeoff> Run() {
     TILEGRAD_TRY(FindIds());
     TILEGRAD_TRY(FindTruth());
-    for (const double error : job_.errors) TILEGRAD_TRY(AddAccuracy(error));
+    for (const RenderOptions& setting : settings_) TILEGRAD_TRY(AddAccuracy(setting));
     TILEGRAD_TRY(Time());
     out_.faces = job_.scene.faces.size() / 3;
     out_.truth_rows = static_cast<int>(truth_.rows.size());
@@ -69,9 +75,9 @@ class Measurement {
   }
 
  private:
-  RenderOptions With(double error) const {
+  RenderOptions WithError(double error) const {
     RenderOptions options = job_.options;
-    options.max_alpha_error = error;
+    options.soft_rule = SoftRule::kAllFaces, options.max_alpha_error = error;
     return options;
   }
   Status Step(const char* stage, std::size_t done, std::size_t total) {
@@ -86,15 +92,15 @@ class Measurement {
 
   Status FindIds();
   Status FindTruth();
-  Status AddAccuracy(double error);
+  Status AddAccuracy(const RenderOptions& setting);
   Status Time();
-  Status Forward(double error) {
-    return renderer_.Render({&job_.scene, 1}, With(error), {false, true, false, false}, &frame_);
+  Status Forward(const RenderOptions& setting) {
+    return renderer_.Render({&job_.scene, 1}, setting, {false, true, false, false}, &frame_);
   }
   // d_positions_ <- the gradient of L with upstream gradients `d_alpha`.
-  Status Backward(double error, const std::vector<float>& d_alpha) {
+  Status Backward(const RenderOptions& setting, const std::vector<float>& d_alpha) {
     SceneGradients d_scene{d_positions_, {}, false, {}};
-    return renderer_.Backward({&job_.scene, 1}, With(error), frame_, {{}, d_alpha}, {&d_scene, 1});
+    return renderer_.Backward({&job_.scene, 1}, setting, frame_, {{}, d_alpha}, {&d_scene, 1});
   }
 
   const TradeoffJob& job_;
@@ -102,6 +108,7 @@ class Measurement {
   const StopFlag& stop_;
   const Workers one_{1};
   Renderer renderer_;
+  std::vector<RenderOptions> settings_;
   Frame frame_;
   std::vector<std::int32_t> ids_;
   std::vector<float> d_alpha_, d_alpha_truth_;  // [H,W]; the second only where there is a truth
@@ -113,7 +120,7 @@ class Measurement {
 
 Status Measurement::FindIds() {
   TILEGRAD_TRY(Step("ids", 0, 1));
-  TILEGRAD_TRY(Forward(0.1));
+  TILEGRAD_TRY(Forward(WithError(0.1)));
   ids_.assign(frame_.face_ids.begin(), frame_.face_ids.end());
   Rng rng(1, 0);
   d_alpha_.resize(pixels()), d_alpha_truth_.assign(pixels(), 0.0f);
@@ -169,11 +176,14 @@ Status Measurement::FindTruth() {
   return {};
 }
 
-Status Measurement::AddAccuracy(double error) {
+Status Measurement::AddAccuracy(const RenderOptions& setting) {
   TILEGRAD_TRY(Step("measuring", out_.rows.size(), total_));
   TradeoffRow row;
-  row.max_alpha_error = error;
-  TILEGRAD_TRY(Forward(error));
+  row.rule = setting.soft_rule;
+  row.max_alpha_error = setting.soft_rule == SoftRule::kPaper
+                            ? std::numeric_limits<double>::infinity()
+                            : setting.max_alpha_error;
+  TILEGRAD_TRY(Forward(setting));
   row.reported = frame_.alpha_error_bound;
   std::size_t background = 0;
   for (const int y : truth_.rows) {
@@ -185,7 +195,7 @@ Status Measurement::AddAccuracy(double error) {
     }
   }
   row.mean /= static_cast<double>(std::max<std::size_t>(background, 1));
-  TILEGRAD_TRY(Backward(error, d_alpha_truth_));
+  TILEGRAD_TRY(Backward(setting, d_alpha_truth_));
   const std::vector<double> d(d_positions_.begin(), d_positions_.end());
   std::vector<double> off = d;
   for (std::size_t i = 0; i < d.size(); ++i) off[i] -= truth_.d_positions[i];
@@ -210,10 +220,10 @@ Status Measurement::Time() {
   for (int k = 0; k < job_.repetitions; ++k) {
     for (std::size_t i = 0; i < out_.rows.size(); ++i) {
       TILEGRAD_TRY(Step("measuring", done++, total_));
-      const double error = out_.rows[i].max_alpha_error, started = CpuMilliseconds();
-      TILEGRAD_TRY(Forward(error));
+      const double started = CpuMilliseconds();
+      TILEGRAD_TRY(Forward(settings_[i]));
       const double between = CpuMilliseconds();
-      TILEGRAD_TRY(Backward(error, d_alpha_));
+      TILEGRAD_TRY(Backward(settings_[i], d_alpha_));
       forward[i].push_back(between - started), backward[i].push_back(CpuMilliseconds() - between);
     }
   }

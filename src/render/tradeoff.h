@@ -16,6 +16,7 @@ struct TradeoffJob {
   SceneView scene;             // its positions, faces and camera; attributes are not looked at
   RenderOptions options;       // max_alpha_error is replaced
   std::vector<double> errors;  // values of max_alpha_error to try, each in [0, 1]
+  bool paper_rule = true;      // also try SoftRule::kPaper, last
   int repetitions = 7;         // timings of each setting, taken in turns
   // Pairs of pixel and face that the truth may cost, twice (forward, backward): where the whole
   // image would cost more, evenly spread rows stand for it.
@@ -24,7 +25,8 @@ struct TradeoffJob {
 
 // One setting. Errors are over the background pixels of the rows that have a truth.
 struct TradeoffRow {
-  double max_alpha_error = 0;
+  SoftRule rule = SoftRule::kAllFaces;
+  double max_alpha_error = 0;              // infinite with SoftRule::kPaper
   double forward_ms = 0, backward_ms = 0;  // median CPU time of the whole image, one thread
   double reported = 0;                     // Frame::alpha_error_bound
   double largest = 0, mean = 0;            // |alpha - truth|
@@ -33,7 +35,7 @@ struct TradeoffRow {
 };
 
 struct Tradeoff {
-  std::vector<TradeoffRow> rows;       // as TradeoffJob::errors
+  std::vector<TradeoffRow> rows;       // as TradeoffJob::errors, then the paper's rule
   int truth_rows = 0, image_rows = 0;  // of pixels
   std::size_t faces = 0;
   double truth_forward_ms = 0, truth_backward_ms = 0;  // float64, all faces, of the whole image
