@@ -37,7 +37,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
                 store.bytes.begin() + static_cast<std::ptrdiff_t>(i * per_model));
     failures[i] = images.status();
     const std::scoped_lock lock(mutex);
-    progress({"loading images", ++done, models.size(), ""});
+    if (progress) progress({"loading images", ++done, models.size(), ""});
   });
   if (stop) return Cancelled("stopped while loading the dataset");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);

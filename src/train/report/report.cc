@@ -46,7 +46,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
     if (stop) return Cancelled("stopped while predicting; nothing was written");
     TILEGRAD_ASSIGN(ShownModel shown, MakeShownModel(dataset, model, predictor, workers));
     facts.models.push_back(std::move(shown));
-    progress({"predicting", facts.models.size(), chosen.size(), ""});
+    if (progress) progress({"predicting", facts.models.size(), chosen.size(), ""});
   }
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
   TILEGRAD_TRY(WriteTextAtomic(job.out, page));
