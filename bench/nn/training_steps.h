@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// The three training steps that this library is measured by. pytorch_steps.py has the same ones.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string_view>
+
+#include "nn/context.h"
+
+namespace tilegrad::nn::bench {
+
+class TrainingStep {
+ public:
+  virtual ~TrainingStep() = default;
+  virtual Status Run() = 0;         // forward, backward, Adam
+  virtual double loss() const = 0;  // of the last step
+};
+
+// "reconstruction": the network of the paper's section 5.1 (34.1 million parameters, batch 64), its
+//   loss replaced by a mean of squares. 55 GFLOP.
+// "unet": a U-Net of 31 million parameters on 4 images of 256 x 256. 1155 GFLOP.
+// "critic": the critic of a WGAN with gradient penalty, channels 64 to 512, 32 images of 64 x 64:
+//   three forward passes, one inner gradient, the backward pass through both. 66 GFLOP.
+inline constexpr std::array<std::string_view, 3> kTrainingSteps = {"reconstruction", "unet",
+                                                                   "critic"};
+
+// One of the above; null for another name.
+std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context);
+
+}  // namespace tilegrad::nn::bench
