@@ -29,7 +29,9 @@ class Context {
   Context& operator=(const Context&) = delete;
 
   const Workers& workers() const { return workers_; }
-  KernelContext kernels() { return {workers_, scratch_}; }
+  KernelContext kernels() { return {workers_, scratch_, winograd_}; }
+  // Whether convolutions may use kernels/conv2d_winograd.h (they do unless told otherwise).
+  void set_winograd(bool on) { winograd_ = on; }
   DType dtype() const { return dtype_; }
 
   Tensor Empty(const Shape& shape, DType dtype) const;  // uninitialised
@@ -59,6 +61,7 @@ class Context {
   KernelScratch scratch_;
   Status status_;
   bool recording_ = true;
+  bool winograd_ = true;
   std::uint64_t order_ = 0;
 };
 

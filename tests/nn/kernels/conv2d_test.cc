@@ -1,77 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
+// The direct convolutions; conv2d_winograd_test.cc has the others.
 #include "nn/kernels/conv2d.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
-#include <string>
 
-#include "nn/kernels/conv2d_ref.h"
-#include "nn/kernels/kernel_test_util.h"
+#include "nn/kernels/conv2d_test_util.h"
 
 namespace tilegrad::nn {
 namespace {
-
-std::string Describe(const Conv2dShape& s) {
-  const auto pair = [](std::size_t a, std::size_t b) {
-    return std::to_string(a) + "x" + std::to_string(b);
-  };
-  return "batch " + std::to_string(s.batch) + ", channels " + pair(s.in_channels, s.out_channels) +
-         ", image " + pair(s.in_height, s.in_width) + ", kernel " +
-         pair(s.kernel_height, s.kernel_width) + ", stride " + std::to_string(s.stride) +
-         ", padding " + std::to_string(s.padding);
-}
-
-struct Operands {
-  std::vector<float> x, weight, bias, d_y;
-};
-
-Operands RandomOperands(const Conv2dShape& s, std::uint64_t seed) {
-  Rng rng(seed);
-  return {RandomFloats(rng, s.in_size()), RandomFloats(rng, s.weight_size()),
-          RandomFloats(rng, s.out_channels), RandomFloats(rng, s.out_size())};
-}
-
-struct Results {
-  std::vector<float> y, d_x, d_weight;
-  bool operator==(const Results&) const = default;
-};
-
-Results RunConv2d(const Conv2dShape& s, const Operands& o, int worker_count, bool bias = true) {
-  const Workers workers(worker_count);
-  KernelScratch scratch;
-  const KernelContext context{workers, scratch};
-  const float poison = std::numeric_limits<float>::quiet_NaN();  // all of it must be overwritten
-  Results r{std::vector<float>(s.out_size(), poison), std::vector<float>(s.in_size(), poison),
-            std::vector<float>(s.weight_size(), poison)};
-  Conv2dForward(s, o.x.data(), o.weight.data(), bias ? o.bias.data() : nullptr, r.y.data(),
-                context);
-  Conv2dInputGrad(s, o.d_y.data(), o.weight.data(), r.d_x.data(), context);
-  Conv2dWeightGrad(s, o.x.data(), o.d_y.data(), r.d_weight.data(), context);
-  return r;
-}
-
-struct ReferenceResults {
-  std::vector<double> y, d_x, d_weight;
-};
-
-ReferenceResults RunReference(const Conv2dShape& s, const Operands& o,
-                              std::vector<double> (*convert)(const std::vector<float>&)) {
-  const std::vector<double> x = convert(o.x), weight = convert(o.weight), bias = convert(o.bias),
-                            d_y = convert(o.d_y);
-  ReferenceResults r{std::vector<double>(s.out_size()), std::vector<double>(s.in_size()),
-                     std::vector<double>(s.weight_size())};
-  Conv2dForwardRef(s, x.data(), weight.data(), bias.data(), r.y.data());
-  Conv2dInputGradRef(s, d_y.data(), weight.data(), r.d_x.data());
-  Conv2dWeightGradRef(s, x.data(), d_y.data(), r.d_weight.data());
-  return r;
-}
 
 void CheckAgainstReference(const Conv2dShape& s, std::uint64_t seed) {
   SCOPED_TRACE(Describe(s));
   ASSERT_TRUE(s.Check().ok()) << s.Check().message();
   const Operands o = RandomOperands(s, seed);
-  const Results got = RunConv2d(s, o, 1);
+  const Results got = RunConv2d(s, o, {});
   const ReferenceResults want = RunReference(s, o, ToDouble);
   const ReferenceResults magnitude = RunReference(s, o, Magnitudes);
   // Products of one sum, plus bias, plus the additions of blocks (at most one a channel, or one an
@@ -133,9 +77,9 @@ TEST(Conv2d, BitsDoNotDependOnWorkers) {
   for (const Conv2dShape& s : kBlockCrossers) {
     SCOPED_TRACE(Describe(s));
     const Operands o = RandomOperands(s, 3);
-    const Results one = RunConv2d(s, o, 1);
-    EXPECT_EQ(RunConv2d(s, o, 2), one);
-    EXPECT_EQ(RunConv2d(s, o, 7), one);
+    const Results one = RunConv2d(s, o, {});
+    EXPECT_EQ(RunConv2d(s, o, {.workers = 2}), one);
+    EXPECT_EQ(RunConv2d(s, o, {.workers = 7}), one);
   }
 }
 
@@ -150,7 +94,7 @@ TEST(Conv2d, GradientsAreAdjoints) {
     const Conv2dShape s = RandomShape(rng);
     SCOPED_TRACE(Describe(s));
     const Operands o = RandomOperands(s, i);
-    const Results r = RunConv2d(s, o, 2, /*bias=*/false);
+    const Results r = RunConv2d(s, o, {.workers = 2, .bias = false});
     // Every entry of y carries at most gamma_n of its own terms' magnitude; summed over y that is
     // gamma_n times the trilinear form of absolute values. The other two likewise.
     const std::vector<double> ax = Magnitudes(o.x), aw = Magnitudes(o.weight),
@@ -168,7 +112,7 @@ TEST(Conv2d, GradientsAreAdjoints) {
 
 TEST(Conv2d, EmptyBatchHasZeroWeightGradient) {
   const Conv2dShape s{0, 2, 4, 4, 3, 3, 3, 1, 1};
-  const Results r = RunConv2d(s, RandomOperands(s, 1), 2);
+  const Results r = RunConv2d(s, RandomOperands(s, 1), {.workers = 2});
   EXPECT_EQ(r.d_weight, std::vector<float>(s.weight_size(), 0.0f));
 }
 
