@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lets one scalar template serve float, double and std::complex<double>: every decision is
-// taken on the real part, so a complex step follows the branch of its base point.
 #pragma once
 
-#include <complex>
+#include "base/scalar.h"
 
 namespace tilegrad::raster {
 
-template <class T>
-T RealPart(T x) {
-  return x;
-}
-template <class T>
-T RealPart(const std::complex<T>& x) {
-  return x.real();
-}
+using tilegrad::RealPart;
 
 }  // namespace tilegrad::raster

@@ -39,6 +39,8 @@ struct ImageScratch {
   raster::ScreenMesh mesh;
   AlignedVector<float> clipped_attributes;
   raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
+  AlignedVector<float> clipped_recomputed;
+  raster::AttributeViewT<const float> recomputed;  // of a PixelStage, in the layout of `mesh`
   raster::DrawnFaces drawn_faces;
   raster::TileListBuffers drawn_buffers;
   raster::TileLists drawn;
@@ -67,12 +69,17 @@ struct BandGradients {
 using BinGradients = AlignedVector<raster::SoftFaceGradient>;
 
 struct WorkerScratch {
+  std::size_t index;  // of the worker
   raster::VisibilityBin bin;
   raster::InterpolateScratch interpolate;
   raster::SoftMaskScratch soft;
   raster::BandSums band;
   MergeScratch merge;
   RenderStats stats;
+  // Of a PixelStage: attributes of a block, the faces of a block on the way back, cotangents of a
+  // band.
+  AlignedVector<float> varyings, d_varyings;
+  AlignedVector<std::int32_t> block_faces;
   // Of an image that is small enough to be one task: it stays in the worker's cache.
   raster::DrawnFaces drawn_faces;
   BandGradients band_gradients;

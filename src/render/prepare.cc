@@ -11,14 +11,17 @@
 namespace tilegrad {
 namespace {
 
-void PrepareAttributes(const SceneView& scene, ImageScratch* image) {
-  image->attributes = AttributesOf(scene);
-  if (!image->mesh.was_clipped()) return;
-  image->clipped_attributes.resize(raster::AttributeRows(image->mesh, scene.rate) *
-                                   static_cast<std::size_t>(scene.channels));
-  raster::ClipAttributes<float>(image->mesh, scene.faces, image->attributes,
-                                image->clipped_attributes);
-  image->attributes.values = image->clipped_attributes;
+// `attributes` of the scene, in the layout of the mesh; `storage` is for a mesh that was cut.
+raster::AttributeViewT<const float> InMeshLayout(const SceneView& scene,
+                                                 const raster::ScreenMesh& mesh,
+                                                 raster::AttributeViewT<const float> attributes,
+                                                 AlignedVector<float>* storage) {
+  if (!mesh.was_clipped()) return attributes;
+  storage->resize(raster::AttributeRows(mesh, attributes.rate) *
+                  static_cast<std::size_t>(attributes.channels));
+  raster::ClipAttributes<float>(mesh, scene.faces, attributes, *storage);
+  attributes.values = *storage;
+  return attributes;
 }
 
 template <class T>
@@ -103,8 +106,16 @@ bool PrepareImage(const SceneView& scene, const RenderOptions& options,
     PrepareMesh(scene, options, request, workers, image);
     RememberPrepared(scene, options, request, unchanged, &image->prepared);
   }
-  PrepareAttributes(scene, image);
+  image->attributes =
+      InMeshLayout(scene, image->mesh, AttributesOf(scene), &image->clipped_attributes);
   return true;
+}
+
+void PrepareRecomputed(const PixelStage* stage, const SceneView& scene, std::size_t n,
+                       ImageScratch* image) {
+  if (stage == nullptr) return;
+  image->recomputed =
+      InMeshLayout(scene, image->mesh, stage->recomputed(n), &image->clipped_recomputed);
 }
 
 }  // namespace tilegrad

@@ -2,7 +2,10 @@
 // First stage of a frame, per image: scene -> screen -> tiles.
 #pragma once
 
+#include <cstddef>
+
 #include "render/image_scratch.h"
+#include "render/pixel_stage.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -17,5 +20,9 @@ struct PrepareRequest {
 bool PrepareImage(const SceneView& scene, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats);
+
+// The attributes that a stage needs again on the way back; null: none. `image` is prepared.
+void PrepareRecomputed(const PixelStage* stage, const SceneView& scene, std::size_t n,
+                       ImageScratch* image);
 
 }  // namespace tilegrad

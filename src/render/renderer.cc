@@ -11,6 +11,7 @@
 #include "render/frame_layout.h"
 #include "render/merge_gradients.h"
 #include "render/paper_alpha.h"
+#include "render/pixel_stage.h"
 #include "render/prepare.h"
 #include "render/tile_backward.h"
 #include "render/tile_forward.h"
@@ -25,6 +26,7 @@ struct ForwardCall {
   const RenderOptions& options;
   PrepareRequest request;
   Frame* frame;
+  PixelStage* stage;
 };
 
 struct BackwardCall {
@@ -58,7 +60,9 @@ Status FindError(const BackwardCall& call) {
 // cache of its worker from beginning to end; the stages of larger ones are shared, part by part.
 struct Renderer::Impl {
   explicit Impl(const Workers& w)
-      : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {}
+      : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {
+    for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
+  }
 
   Status Render(const ForwardCall& call);
   Status Backward(const BackwardCall& call);
@@ -108,7 +112,8 @@ void Renderer::Impl::RenderOneBin(const ForwardCall& call, const TileTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
   bin_errors[bin.image * bins + bin.tile] =
-      RenderBin(call.scenes[bin.image], call.options, images[bin.image], bin, worker, call.frame);
+      RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.stage}, bin, worker,
+                call.frame);
 }
 
 // The list of drawn faces, the largest thing of all, is the worker's, not the image's.
@@ -168,6 +173,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
     sound = false;
     return;
   }
+  PrepareRecomputed(call.input.stage, scene, n, &image);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
   if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
   const ImageGradients gradients{{&worker->band_gradients, 1},
@@ -180,6 +186,9 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
 
 // Bands and bins of all images together.
 bool Renderer::Impl::BackwardParts(const BackwardCall& call) {
+  for (std::size_t n = 0; n < call.scenes.size(); ++n) {
+    PrepareRecomputed(call.input.stage, call.scenes[n], n, &images[n]);
+  }
   const std::size_t bands = call.scenes.size() * call.bands, bins = call.scenes.size() * call.bins;
   if (band_gradients.size() < bands) band_gradients.resize(bands);
   if (bin_gradients.size() < bins) bin_gradients.resize(bins);
@@ -232,17 +241,17 @@ Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const RenderRequest& request, Frame* frame) {
+                        const RenderRequest& request, Frame* frame, PixelStage* stage) {
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
-  const int channels = scenes.empty() ? 0 : scenes[0].channels;
+  const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
   if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
-    return impl_->Render({scenes, options, {true, request.alpha, false}, frame});
+    return impl_->Render({scenes, options, {true, request.alpha, false}, frame, stage});
   }
   AlignedVector<float> alpha;  // kept away from the tiles
   alpha.swap(frame->alpha);
-  TILEGRAD_TRY(impl_->Render({scenes, options, {true, false, false}, frame}));
+  TILEGRAD_TRY(impl_->Render({scenes, options, {true, false, false}, frame, stage}));
   alpha.swap(frame->alpha);
   PaperAlpha(scenes, options, *impl_->workers, frame);
   frame->alpha_error_bound = std::numeric_limits<double>::infinity();
@@ -251,7 +260,7 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
 
 Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                           const Frame& frame, const FrameGradients& d_frame,
-                          std::span<SceneGradients> d_scenes) {
+                          std::span<SceneGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::TileGrid grid = raster::BinGrid(options.width, options.height);
   const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
@@ -259,7 +268,7 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
   const FrameGradients d_tiles{d_frame.attributes,
                                alpha ? d_frame.alpha : std::span<const float>()};
   const Status status = impl_->Backward({scenes,
-                                         {options, frame, d_tiles},
+                                         {options, frame, d_tiles, stage},
                                          {false, alpha, true},
                                          d_scenes,
                                          grid,

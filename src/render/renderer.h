@@ -81,7 +81,7 @@ struct FrameT {
   AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
                                   // at background
   double alpha_error_bound = 0;   // what culling really spent: no pixel is farther than this from
-                                 // equation 6; infinite with SoftRule::kPaper
+                                  // equation 6; infinite with SoftRule::kPaper
 };
 
 // dL/d(image); an empty span is zero. Shapes as in Frame.
@@ -116,6 +116,8 @@ struct RenderStats {
   std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
 };
 
+class PixelStage;  // pixel_stage.h
+
 // Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
 // at a time per Renderer. Same bits for any worker count and any run. All scenes of a batch have
 // the same number of channels.
@@ -129,15 +131,18 @@ class Renderer {
   // Errors: a span of the wrong size (names scene, array, expected and got), an index out of range,
   // a non-finite input (names scene, array, index), options out of range. Then `frame` is left
   // unspecified.
+  // With a stage, `attributes` of the scenes are its input, and it writes frame->attributes, whose
+  // `channels` the caller has set.
   Status Render(std::span<const SceneView> scenes, const RenderOptions& options,
-                const RenderRequest& request, Frame* frame);
+                const RenderRequest& request, Frame* frame, PixelStage* stage = nullptr);
 
   // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` needs alpha
   // where d_frame has it. A gradient that overflows float is an error too; after an error d_scenes
   // may be written in part.
+  // With a stage, the cotangents of `attributes` come from it, and d_frame.attributes is empty.
   Status Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                   const Frame& frame, const FrameGradients& d_frame,
-                  std::span<SceneGradients> d_scenes);
+                  std::span<SceneGradients> d_scenes, PixelStage* stage = nullptr);
 
   RenderStats stats() const;  // of the last call
 

@@ -58,38 +58,120 @@ bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std
   return true;
 }
 
-}  // namespace
+// Pixels [x0, x0 + columns) of the rows of a band, whose faces are `faces` [rows][width of image].
+struct BlockPlace {
+  const BandPlace& band;
+  std::span<const std::int32_t> faces;
+  int width, x0;
 
-bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
-                        const raster::BackwardRequest& request, WorkerScratch* worker,
-                        BandGradients* out) {
-  const BandGrid bands(input.options.width, input.options.height);
-  const BandPlace place(bands, task);
-  const auto channels = static_cast<std::size_t>(image.attributes.channels);
-  out->faces.clear();
-  if (!IsSoundBand(input, image.mesh, channels, place)) return false;
-  if (input.d_frame.attributes.empty() || !(request.geometry || request.attributes)) return true;
-  ++worker->stats.interpolated;
-  raster::BandSums* const sums = &worker->band;
-  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
-  if (image.mesh.was_clipped()) {
-    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
-    ids = out->pieces;
+  int columns() const { return std::min(raster::kBinSize, width - x0); }
+  int row_count() const { return band.row_end - band.row_begin; }
+};
+
+// The faces of a block, in rows of kBinSize. Returns whether there is one.
+bool GatherBlockFaces(const BlockPlace& block, AlignedVector<std::int32_t>* faces) {
+  faces->assign(static_cast<std::size_t>(raster::kBinSize * block.row_count()), raster::kNoFace);
+  std::int32_t all = raster::kNoFace;
+  for (int i = 0; i < block.row_count(); ++i) {
+    const std::int32_t* from =
+        block.faces.data() + static_cast<std::ptrdiff_t>(i) * block.width + block.x0;
+    std::int32_t* to = faces->data() + static_cast<std::ptrdiff_t>(i) * raster::kBinSize;
+    for (int j = 0; j < block.columns(); ++j) to[j] = from[j], all &= from[j];
   }
+  return all != raster::kNoFace;
+}
+
+void RunStageBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                      const BlockPlace& place, WorkerScratch* worker) {
+  if (!GatherBlockFaces(place, &worker->block_faces)) return;
+  const PixelBlock block{.image = task.image,
+                         .band = task.band,
+                         .worker = worker->index,
+                         .mesh = &image.mesh,
+                         .attributes = image.recomputed,
+                         .rows = {worker->block_faces.data(), raster::kBinSize, place.x0,
+                                  place.band.row_begin, place.band.row_end},
+                         .columns = place.columns(),
+                         .first = place.band.first + static_cast<std::size_t>(place.x0),
+                         .varyings = worker->varyings.data(),
+                         .any_face = true};
+  if (image.recomputed.channels > 0) {
+    raster::Interpolate(
+        {&image.mesh, image.recomputed, input.options.interpolation, false}, block.rows,
+        {{worker->varyings.data(), static_cast<std::ptrdiff_t>(block.plane()), raster::kBinSize},
+         {},
+         block.columns},
+        &worker->interpolate);
+  }
+  input.stage->Backward(block, {worker->d_varyings.data() + place.x0,
+                                static_cast<std::ptrdiff_t>(place.band.count), place.width});
+}
+
+// The cotangents of the attributes of a band, from the stage. False: it met a number that is not
+// finite.
+bool BandCotangents(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                    const BandPlace& place, std::span<const std::int32_t> faces,
+                    WorkerScratch* worker) {
+  if (!input.stage->BeginBand(task.image, task.band, place.first, place.count)) return false;
+  const auto grow = [](std::size_t size, AlignedVector<float>* array) {
+    if (array->size() < size) array->resize(size);
+  };
+  const auto rows = static_cast<std::size_t>(place.row_end - place.row_begin);
+  grow(static_cast<std::size_t>(image.recomputed.channels) * rows * raster::kBinSize,
+       &worker->varyings);
+  grow(static_cast<std::size_t>(image.attributes.channels) * place.count, &worker->d_varyings);
+  for (int x0 = 0; x0 < input.options.width; x0 += raster::kBinSize) {
+    RunStageBackward(input, image, task, {place, faces, input.options.width, x0}, worker);
+  }
+  return true;
+}
+
+// Gradients of a band's faces from the cotangents of its pixels' attributes.
+void SumBandFaces(const BackwardInput& input, const ImageScratch& image,
+                  const raster::BackwardBand& band, const raster::BackwardRequest& request,
+                  raster::BandSums* sums, BandGradients* out) {
   const raster::InterpolateInput interpolate{&image.mesh, image.attributes,
                                              input.options.interpolation, false};
-  raster::SumBand(interpolate,
-                  {{ids.data(), bands.width, 0, place.row_begin, place.row_end},
-                   {place.Of(input.d_frame.attributes, channels, 0).data(),
-                    static_cast<std::ptrdiff_t>(place.plane), bands.width}},
-                  sums);
-  if (sums->faces() == 0) return true;
+  raster::SumBand(interpolate, band, sums);
+  if (sums->faces() == 0) return;
   out->stride = sums->stride();
   out->faces.assign(sums->face.data() + 1, sums->face.data() + sums->count);
   const std::size_t arrays = raster::FaceGradientArrays(image.attributes.channels, request);
   const std::size_t numbers = 4 * arrays * out->stride;
   if (out->values.size() < numbers) out->values.resize(numbers);
   raster::FinishBand(interpolate, *sums, request, out->values);
+}
+
+}  // namespace
+
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
+                        BandGradients* out) {
+  const BandPlace place(BandGrid(input.options.width, input.options.height), task);
+  const auto channels = static_cast<std::size_t>(image.attributes.channels);
+  const bool staged = input.stage != nullptr, wanted = request.geometry || request.attributes;
+  out->faces.clear();
+  if (!IsSoundBand(input, image.mesh, channels, place)) return false;
+  if (!staged && (input.d_frame.attributes.empty() || !wanted)) return true;
+  ++worker->stats.interpolated;
+  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
+  if (image.mesh.was_clipped()) {
+    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
+    ids = out->pieces;
+  }
+  raster::PlanarView<const float> d_out{nullptr, static_cast<std::ptrdiff_t>(place.plane),
+                                        input.options.width};
+  if (staged) {
+    if (!BandCotangents(input, image, task, place, ids, worker)) return false;
+    if (channels == 0 || !wanted) return true;
+    d_out.data = worker->d_varyings.data();
+    d_out.plane = static_cast<std::ptrdiff_t>(place.count);
+  } else {
+    d_out.data = place.Of(input.d_frame.attributes, channels, 0).data();
+  }
+  SumBandFaces(input, image,
+               {{ids.data(), input.options.width, 0, place.row_begin, place.row_end}, d_out},
+               request, &worker->band, out);
   return true;
 }
 

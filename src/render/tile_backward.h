@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "render/image_scratch.h"
+#include "render/pixel_stage.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -28,6 +29,7 @@ struct BackwardInput {
   const RenderOptions& options;
   const Frame& frame;
   const FrameGradients& d_frame;
+  PixelStage* stage;  // null: cotangents of attributes are images themselves
 };
 
 // One band of one image of the batch.

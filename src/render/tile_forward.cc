@@ -66,28 +66,64 @@ struct ImageOfFrame {
   }
 };
 
-void InterpolateIntoFrame(const SceneView& scene, const RenderOptions& options,
-                          const ImageScratch& image, const TileTask& task, const ImageOfFrame& part,
-                          WorkerScratch* worker, Frame* frame) {
-  const auto row = static_cast<std::ptrdiff_t>(options.width);
-  const std::ptrdiff_t corner = task.rect.y0 * row + task.rect.x0;
-  const auto plane = static_cast<std::ptrdiff_t>(part.pixels);
+bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
+  std::int32_t all = raster::kNoFace;
+  for (std::size_t i = 0; i < pixels; ++i) all &= faces[i];
+  return all != raster::kNoFace;
+}
+
+// Where a bin's attributes go: into the frame, or to the stage.
+raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask& task,
+                                          const ImageOfFrame& part, WorkerScratch* worker,
+                                          Frame* frame) {
+  if (input.stage != nullptr) {
+    const auto plane = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
+    const std::size_t size = static_cast<std::size_t>(input.image.attributes.channels) * plane;
+    if (worker->varyings.size() < size) worker->varyings.resize(size);
+    return {worker->varyings.data(), static_cast<std::ptrdiff_t>(plane), raster::kBinSize};
+  }
+  const auto row = static_cast<std::ptrdiff_t>(input.options.width);
   float* attributes = part.plane(frame->attributes, part.channels);
-  float* barycentrics = part.plane(frame->barycentrics, 2);
-  raster::InterpolateInput input{&image.mesh, image.attributes, options.interpolation,
-                                 barycentrics != nullptr};
-  if (attributes == nullptr) input.attributes.channels = 0;
-  ++worker->stats.interpolated;
+  if (attributes != nullptr) attributes += task.rect.y0 * row + task.rect.x0;
+  return {attributes, static_cast<std::ptrdiff_t>(part.pixels), row};
+}
+
+void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFrame& part,
+                    WorkerScratch* worker, Frame* frame) {
+  const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
   const raster::TileRect& rect = task.rect;
+  const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker, frame);
+  float* barycentrics = part.plane(frame->barycentrics, 2);
+  raster::InterpolateInput input{&bin.image.mesh, bin.image.attributes, bin.options.interpolation,
+                                 barycentrics != nullptr};
+  if (target.data == nullptr) input.attributes.channels = 0;
+  ++worker->stats.interpolated;
   raster::Interpolate(input, {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
-                      {{attributes == nullptr ? nullptr : attributes + corner, plane, row},
-                       {barycentrics == nullptr ? nullptr : barycentrics + corner, plane, row},
+                      {target,
+                       {barycentrics == nullptr ? nullptr : barycentrics + rect.y0 * row + rect.x0,
+                        static_cast<std::ptrdiff_t>(part.pixels), row},
                        rect.x1 - rect.x0},
                       &worker->interpolate);
-  if (barycentrics != nullptr && image.mesh.was_clipped()) {
-    MixCutWeights(scene, image.mesh, rect, worker->bin.face, barycentrics,
+  if (barycentrics != nullptr && bin.image.mesh.was_clipped()) {
+    MixCutWeights(bin.scene, bin.image.mesh, rect, worker->bin.face, barycentrics,
                   barycentrics + part.pixels);
   }
+}
+
+void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerScratch* worker) {
+  const raster::TileRect& rect = task.rect;
+  bin.stage->Forward(
+      {.image = task.image,
+       .band = 0,
+       .worker = worker->index,
+       .mesh = &bin.image.mesh,
+       .attributes = bin.image.attributes,
+       .rows = {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
+       .columns = rect.x1 - rect.x0,
+       .first = static_cast<std::size_t>(rect.y0) * static_cast<std::size_t>(bin.options.width) +
+                static_cast<std::size_t>(rect.x0),
+       .varyings = worker->varyings.data(),
+       .any_face = any_face});
 }
 
 // Alpha of the tiles of a bin. Returns the error spent.
@@ -110,22 +146,28 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
 
 }  // namespace
 
-double RenderBin(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                 const TileTask& task, WorkerScratch* worker, Frame* frame) {
+double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame) {
+  const raster::TileRect& rect = task.rect;
+  const ImageScratch& image = input.image;
   ++worker->stats.drawn;
-  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]},
-                            task.rect, &worker->bin);
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]}, rect,
+                            &worker->bin);
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
-  WriteFaceIds(image.mesh, task.rect, worker->bin.face, part.plane(frame->face_ids, 1));
+  WriteFaceIds(image.mesh, rect, worker->bin.face, part.plane(frame->face_ids, 1));
   if (float* depth = part.plane(frame->depth, 1)) {
-    WriteDepth(task.rect, options.width, worker->bin.inverse_depth, depth);
+    WriteDepth(rect, input.options.width, worker->bin.inverse_depth, depth);
   }
-  if (!frame->attributes.empty() || !frame->barycentrics.empty()) {
-    InterpolateIntoFrame(scene, options, image, task, part, worker, frame);
+  const auto pixels = static_cast<std::size_t>(raster::kBinSize * (rect.y1 - rect.y0));
+  const bool to_stage = input.stage != nullptr && AnyFace(worker->bin.face, pixels);
+  const bool to_frame = input.stage == nullptr && !frame->attributes.empty();
+  if (to_stage || to_frame || !frame->barycentrics.empty()) {
+    InterpolateBin(input, task, part, worker, frame);
   }
-  return frame->alpha.empty() ? 0 : SoftAlpha(options, image, task, part, worker, frame);
+  if (input.stage != nullptr) RunStage(input, task, to_stage, worker);
+  if (frame->alpha.empty()) return 0;
+  return SoftAlpha(input.options, image, task, part, worker, frame);
 }
 
 }  // namespace tilegrad

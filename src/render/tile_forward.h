@@ -3,13 +3,21 @@
 #pragma once
 
 #include "render/image_scratch.h"
+#include "render/pixel_stage.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
 
+// What the bins of an image have in common.
+struct BinInput {
+  const SceneView& scene;
+  const RenderOptions& options;
+  const ImageScratch& image;
+  PixelStage* stage;  // null: attributes are images themselves
+};
+
 // Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
 // task.tile and task.rect are those of raster::BinGrid.
-double RenderBin(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                 const TileTask& task, WorkerScratch* worker, Frame* frame);
+double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame);
 
 }  // namespace tilegrad

@@ -20,14 +20,6 @@ Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
   return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
 }
 
-Status CheckFinite(const char* array, std::span<const float> values) {
-  if (AllFinite(values)) return {};
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
-  }
-  return {};
-}
-
 Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
   for (std::size_t i = 0; i < faces.size(); ++i) {
     if (faces[i] < 0 || static_cast<std::size_t>(faces[i]) >= vertices) {
@@ -129,6 +121,14 @@ Status CheckFaceIds(const SceneView& scene, std::span<const std::int32_t> ids) {
 std::string SceneName(std::size_t index) { return fmt::format("scene {}", index); }
 
 }  // namespace
+
+Status CheckFinite(const char* array, std::span<const float> values) {
+  if (AllFinite(values)) return {};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
+  }
+  return {};
+}
 
 Status ValidateOptions(const RenderOptions& options) {
   TILEGRAD_TRY(CheckImageSize("width", options.width));

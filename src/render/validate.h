@@ -11,6 +11,9 @@
 
 namespace tilegrad {
 
+// OK if all values are finite, else an error that names the first one that is not.
+Status CheckFinite(const char* array, std::span<const float> values);
+
 // Errors name the scene, the array, the index and what was expected.
 Status ValidateOptions(const RenderOptions& options);
 Status ValidateSceneSizes(std::span<const SceneView> scenes);

@@ -1,23 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lambertian light (equation 7 without its specular term): I_l = ambient + sum over lights of
-// intensity * max(0, n . l); the shaded colour is I_l times the surface's own.
+// Lambertian light (equation 10; the first term of equation 8): sum over lights of
+// intensity * max(0, N . L). What surfaces make of it: combine.h.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
+
+#include "shade/pixel_run.h"
 
 namespace tilegrad::shade {
 
 template <class T>
 struct DirectionalLightT {
-  std::array<T, 3> direction;  // unit, from the surface towards the light
+  std::array<T, 3> direction;  // from the surface towards the light, world
   T intensity;
 };
+using DirectionalLight = DirectionalLightT<float>;
 
 template <class T>
 struct LambertLightT {
   T ambient = T(0);
-  std::span<const DirectionalLightT<T>> lights;
+  std::span<const DirectionalLightT<T>> lights;  // unit directions
 };
+
+// The lights of a run of pixels: the same for all, or one direction for each pixel, of intensity 1.
+struct RunLights {
+  std::span<const DirectionalLight> uniform;  // unit directions
+  const RunPlane* per_pixel = nullptr;        // [3] unit; then `uniform` is empty
+};
+
+// What light pulls back. Null or empty: not wanted.
+struct RunLightAdjoint {
+  RunPlane* d_normal = nullptr;                  // [3] adds
+  std::span<DirectionalLightT<double>> uniform;  // adds; as RunLights::uniform, or empty
+  RunPlane* per_pixel = nullptr;                 // [3] adds
+};
+
+// *light <- the sum above, for the unit normals [3] of a run. A normal of 0 gets no light.
+void Lambert(std::size_t count, const RunPlane* normal, const RunLights& lights, RunPlane* light);
+
+// d_light: cotangent of the sum. A light behind the surface pulls nothing; one exactly at the
+// horizon pulls as one in front does.
+void LambertAdjoint(std::size_t count, const RunPlane* normal, const RunLights& lights,
+                    const RunPlane& d_light, const RunLightAdjoint& out);
 
 }  // namespace tilegrad::shade

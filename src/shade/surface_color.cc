@@ -56,8 +56,8 @@ glm::vec3 SurfaceColor::At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_colo
   const Texels& texels = textures_[static_cast<std::size_t>(material.base_color_texture)];
   if (texels.rgb.empty()) return color;
   std::array<float, 3> texel;
-  SampleBilinearRef<float>({texels.rgb, texels.width, texels.height, 3, Wrap::kRepeat}, uv.x, uv.y,
-                           texel);
+  SampleLevelRef<float>({texels.rgb, texels.width, texels.height, 3, Wrap::kRepeat}, uv.x, uv.y,
+                        texel);
   return color * glm::vec3(texel[0], texel[1], texel[2]);
 }
 

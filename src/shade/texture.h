@@ -4,19 +4,31 @@
 // Texel (column j, row i) of a W x H texture has its centre at u = (j + 0.5) / W, v = 1 - (i + 0.5)
 // / H: row 0 is the top, v goes up (docs/conventions.md). The bilinear filter interpolates the four
 // nearest centres; its derivative is the one of the cell that holds the point, and at the border of
-// two cells that of the right (lower) one.
+// two cells that of the right (lower) one. The nearest texel is the one whose square holds the
+// point; it pulls nothing to the coordinates. The trilinear filter interpolates between two levels
+// of a pyramid (texture_levels.h); the level is held constant in derivatives, as the choice of
+// texels is.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "scene/image.h"
+#include "shade/pixel_run.h"
 
 namespace tilegrad::shade {
 
 enum class Wrap {
   kRepeat,  // the texture tiles the plane
   kClamp,   // outside [0, 1] the border texels go on
+  kMirror,  // tiles of the texture and its mirror image alternate
+  // As an older implementation (Kaolin 0.1 with PyTorch 1.2): repeats, but with the centres of the
+  // outer texels at 0 and 1, so that u = 1 jumps to the first. For models trained with it.
+  kRepeatCorners,
 };
+
+enum class Filter { kNearest, kBilinear, kTrilinear };
 
 // Texels of the caller: [height][width][channels], width and height >= 1.
 template <class T>
@@ -24,6 +36,44 @@ struct TextureViewT {
   std::span<const T> texels;
   int width = 0, height = 0, channels = 0;
   Wrap wrap = Wrap::kRepeat;
+  Filter filter = Filter::kBilinear;
 };
+using TextureView = TextureViewT<float>;
+
+inline constexpr int kMaxTextureSize = 16384;  // texels, each axis
+
+// Of a pyramid, ready for lookups: texels [height][width][4], the fourth unused.
+struct TextureLevel {
+  const float* texels;
+  int width, height;
+};
+
+struct TextureInput {
+  std::span<const TextureLevel> levels;  // at least one; the finest first
+  Wrap wrap;
+  Filter filter;
+  const RunPlane* uv;     // [2]
+  const RunPlane* level;  // if trilinear: log2 of texels for a pixel, 0 is the finest; any number
+};
+
+// What a pixel pulls on up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color
+// on (x0, y0), (x1, y0), (x0, y1), (x1, y1).
+struct TexelShare {
+  std::uint16_t x0, x1, y0, y1;
+  float a, b;
+  float d_color[3];
+  std::uint32_t level;
+};
+
+// Shares that a lookup makes.
+inline std::size_t SharesPerLookup(Filter filter) { return filter == Filter::kTrilinear ? 2 : 1; }
+
+// color[3] <- the texture at the coordinates of a run.
+void SampleTexture(std::size_t count, const TextureInput& input, RunPlane* color);
+
+// Overwrites d_uv[2] and shares [count * SharesPerLookup], in the order of pixels; null: not
+// wanted.
+void SampleTextureAdjoint(std::size_t count, const TextureInput& input, const RunPlane* d_color,
+                          RunPlane* d_uv, TexelShare* shares);
 
 }  // namespace tilegrad::shade

@@ -7,44 +7,63 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 
+#include "base/scalar.h"
 #include "shade/texture.h"
 
 namespace tilegrad::shade {
 namespace texture_ref {
 
-template <class T>
-T Real(T x) {
-  return x;
-}
-template <class T>
-T Real(std::complex<T> x) {
-  return x.real();
-}
-
-inline int WrapIndex(std::int64_t i, int n, Wrap wrap) {
-  if (wrap == Wrap::kClamp) return static_cast<int>(std::clamp<std::int64_t>(i, 0, n - 1));
-  const std::int64_t r = i % n;
-  return static_cast<int>(r < 0 ? r + n : r);
-}
-
-// One axis of the filter: texels `low` and `high`, weight of `high`.
+// One axis of the filter: texels `low` and `high`, weight of `high`, d(weight)/d(coordinate).
 template <class T>
 struct Axis {
   int low, high;
   T weight;
+  float slope;
 };
 
-// `x` in texels, 0 at the border of the first. Coordinates beyond 2^40 texels carry no fraction;
-// they are taken as 0, so that no conversion overflows.
+// A coordinate brought to where the texture is, and the derivative of that: [0, 1], or [-1, 2] if
+// clamped.
 template <class T>
-Axis<T> FilterAxis(T x, int n, Wrap wrap) {
-  const T at = std::abs(Real(x)) < 0x1p40 ? x - T(0.5) : T(0);
-  const auto cell = static_cast<std::int64_t>(std::floor(Real(at)));
-  return {WrapIndex(cell, n, wrap), WrapIndex(cell + 1, n, wrap),
-          at - T(static_cast<decltype(Real(at))>(cell))};
+struct Wrapped {
+  T at;
+  float slope;
+};
+
+template <class T>
+Wrapped<T> WrapCoordinate(const T& u, Wrap wrap) {
+  const auto real = RealPart(u);
+  using Real = std::decay_t<decltype(real)>;
+  if (!std::isfinite(real)) return {T(0), 0};
+  if (wrap == Wrap::kClamp) {
+    if (real < -1) return {T(-1), 0};
+    return real > 2 ? Wrapped<T>{T(2), 0} : Wrapped<T>{u, 1};
+  }
+  if (wrap != Wrap::kMirror) return {u - T(std::floor(real)), 1};
+  const T two = u - T(Real(2) * std::floor(real * Real(0.5)));
+  return RealPart(two) > 1 ? Wrapped<T>{T(2) - two, -1} : Wrapped<T>{two, 1};
+}
+
+inline int WrapIndex(int i, int n, Wrap wrap) {
+  if (wrap != Wrap::kRepeat) return std::clamp(i, 0, n - 1);
+  return i < 0 ? n - 1 : i < n ? i : 0;  // wrapped coordinates are at most one texel outside
+}
+
+// Along u; v is handed in as 1 - v.
+template <class T>
+Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap wrap, bool nearest) {
+  const bool corners = wrap == Wrap::kRepeatCorners;
+  const float scale = static_cast<float>(corners ? n - 1 : n);
+  const T x = corners || nearest ? u.at * T(scale) : u.at * T(scale) - T(0.5f);
+  if (nearest) {
+    const auto cell = corners ? std::nearbyint(RealPart(x)) : std::floor(RealPart(x));
+    const int i = WrapIndex(static_cast<int>(cell), n, wrap == Wrap::kRepeat ? Wrap::kClamp : wrap);
+    return {i, i, T(0), 0};
+  }
+  const auto cell = std::floor(RealPart(x));
+  const int i = static_cast<int>(cell);
+  return {WrapIndex(i, n, wrap), WrapIndex(i + 1, n, wrap), x - T(cell), u.slope * scale};
 }
 
 template <class T>
@@ -54,10 +73,12 @@ struct Footprint {
 };
 
 template <class T>
-Footprint<T> MakeFootprint(const TextureViewT<T>& texture, T u, T v) {
-  const auto w = static_cast<float>(texture.width), h = static_cast<float>(texture.height);
-  Footprint<T> out{FilterAxis(u * T(w), texture.width, texture.wrap),
-                   FilterAxis((T(1) - v) * T(h), texture.height, texture.wrap),
+Footprint<T> MakeFootprint(const TextureViewT<T>& texture, const T& u, const T& v) {
+  const bool nearest = texture.filter == Filter::kNearest;
+  Wrapped<T> down = WrapCoordinate(v, texture.wrap);
+  down = {T(1) - down.at, -down.slope};
+  Footprint<T> out{MakeAxis(WrapCoordinate(u, texture.wrap), texture.width, texture.wrap, nearest),
+                   MakeAxis(down, texture.height, texture.wrap, nearest),
                    {}};
   const int rows[2] = {out.row.low, out.row.high}, columns[2] = {out.column.low, out.column.high};
   for (int k = 0; k < 4; ++k) {
@@ -69,9 +90,9 @@ Footprint<T> MakeFootprint(const TextureViewT<T>& texture, T u, T v) {
 
 }  // namespace texture_ref
 
-// color[channels] <- the bilinear value at (u, v).
+// color[channels] <- the nearest texel or the bilinear value at (u, v), of this level alone.
 template <class T>
-void SampleBilinearRef(const TextureViewT<T>& texture, T u, T v, std::span<T> color) {
+void SampleLevelRef(const TextureViewT<T>& texture, const T& u, const T& v, std::span<T> color) {
   const auto at = texture_ref::MakeFootprint(texture, u, v);
   const T a = at.column.weight, b = at.row.weight;
   for (std::size_t c = 0; c < static_cast<std::size_t>(texture.channels); ++c) {
@@ -84,12 +105,12 @@ void SampleBilinearRef(const TextureViewT<T>& texture, T u, T v, std::span<T> co
 
 // Adds to d_uv[2] and d_texels (as texture.texels; may be empty) what d_color[channels] pulls back.
 template <class T>
-void SampleBilinearAdjointRef(const TextureViewT<T>& texture, T u, T v, std::span<const T> d_color,
-                              std::span<T> d_uv, std::span<T> d_texels) {
+void SampleLevelAdjointRef(const TextureViewT<T>& texture, const T& u, const T& v,
+                           std::span<const T> d_color, std::span<T> d_uv, std::span<T> d_texels) {
   const auto at = texture_ref::MakeFootprint(texture, u, v);
   const T a = at.column.weight, b = at.row.weight;
   const T weights[4] = {(T(1) - a) * (T(1) - b), a * (T(1) - b), (T(1) - a) * b, a * b};
-  T d_a = 0, d_b = 0;
+  T d_a = T(0), d_b = T(0);
   for (std::size_t c = 0; c < static_cast<std::size_t>(texture.channels); ++c) {
     const T* t = texture.texels.data() + c;
     const T t0 = t[at.texel[0]], t1 = t[at.texel[1]], t2 = t[at.texel[2]], t3 = t[at.texel[3]];
@@ -98,8 +119,8 @@ void SampleBilinearAdjointRef(const TextureViewT<T>& texture, T u, T v, std::spa
     if (d_texels.empty()) continue;
     for (int k = 0; k < 4; ++k) d_texels[at.texel[k] + c] += weights[k] * d_color[c];
   }
-  d_uv[0] += d_a * T(static_cast<float>(texture.width));
-  d_uv[1] -= d_b * T(static_cast<float>(texture.height));
+  d_uv[0] += d_a * T(at.column.slope);
+  d_uv[1] += d_b * T(at.row.slope);
 }
 
 }  // namespace tilegrad::shade

@@ -31,7 +31,7 @@ std::vector<double> RandomTexels() {
 template <class T>
 std::vector<T> Sample(const TextureViewT<T>& texture, T u, T v) {
   std::vector<T> color(static_cast<std::size_t>(texture.channels));
-  SampleBilinearRef<T>(texture, u, v, color);
+  SampleLevelRef<T>(texture, u, v, color);
   return color;
 }
 
@@ -82,7 +82,7 @@ struct Pulled {
 Pulled Adjoint(const std::vector<double>& texels, Wrap wrap, double u, double v,
                const std::vector<double>& d_color) {
   Pulled out;
-  SampleBilinearAdjointRef<double>(View(texels, wrap), u, v, d_color, out.uv, out.texels);
+  SampleLevelAdjointRef<double>(View(texels, wrap), u, v, d_color, out.uv, out.texels);
   return out;
 }
 

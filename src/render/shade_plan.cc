@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/shade_plan.h"
+
+#include <fmt/format.h>
+
+namespace tilegrad {
+namespace {
+
+AttributeRate RateOf(const SceneParts& parts, Varying v) {
+  switch (v) {
+    case Varying::kColor:
+      return parts.colors_rate;
+    case Varying::kUv:
+      return parts.uvs_rate;
+    case Varying::kUser:
+      return parts.user_rate;
+    case Varying::kNormal:
+      if (parts.model.normals == NormalKind::kFlat) return AttributeRate::kCorner;
+      return parts.model.normals == NormalKind::kGiven ? parts.normals_rate
+                                                       : AttributeRate::kVertex;
+    default:
+      return AttributeRate::kVertex;
+  }
+}
+
+// Corner rate as soon as one of them has it.
+void Finish(const SceneParts& parts, VaryingSet* set) {
+  set->user_channels = parts.user_channels;
+  for (std::size_t i = 0; i < kVaryings; ++i) {
+    const auto v = static_cast<Varying>(i);
+    if (set->width(v) == 0) set->has[i] = false;
+    if (set->has[i] && RateOf(parts, v) == AttributeRate::kCorner) {
+      set->rate = AttributeRate::kCorner;
+    }
+  }
+}
+
+// Whether an image of colour is nothing but the interpolated colours.
+bool IsPlainColor(const SceneParts& parts) {
+  return parts.colors && !parts.textures && !parts.surfaces && !parts.lit() && !parts.model.clamp;
+}
+
+bool IsOnly(const VaryingSet& set, Varying v) {
+  VaryingSet only = set;
+  only.has = {};
+  only[v] = true;
+  return set == only;
+}
+
+ShadeSteps ColorSteps(const SceneParts& parts) {
+  return {.color = true,
+          .texture = parts.textures,
+          .level = parts.textures && parts.trilinear,
+          .normal = parts.lit(),
+          .light = parts.lit(),
+          .highlight = parts.model.lighting == Lighting::kPhong};
+}
+
+}  // namespace
+
+int VaryingSet::width(Varying v) const {
+  if (!(*this)[v]) return 0;
+  return v == Varying::kUser ? user_channels : v == Varying::kUv ? 2 : 3;
+}
+
+int VaryingSet::first(Varying v) const {
+  int sum = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(v); ++i)
+    sum += width(static_cast<Varying>(i));
+  return sum;
+}
+
+int VaryingSet::channels() const { return first(Varying::kUser) + width(Varying::kUser); }
+
+ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request) {
+  ForwardPlan plan;
+  plan.parts = parts, plan.request = request;
+  if (request.color) plan.steps = ColorSteps(parts);
+  if (request.normals) plan.steps.normal = true;
+  VaryingSet& set = plan.varyings;
+  set[Varying::kColor] = plan.steps.color && parts.colors;
+  set[Varying::kUv] = plan.steps.texture || (request.uv && parts.uvs);
+  set[Varying::kNormal] = plan.steps.normal;
+  set[Varying::kPosition] = plan.steps.highlight;
+  set[Varying::kLightDirection] = plan.steps.light && parts.uses_lights() && parts.light_directions;
+  set[Varying::kUser] = request.attributes;
+  Finish(parts, &set);
+  plan.colors_only = IsPlainColor(parts) && IsOnly(set, Varying::kColor);
+  plan.user_only = IsOnly(set, Varying::kUser) && !request.color;
+  return plan;
+}
+
+bool BackwardPlan::staged() const {
+  if (colors_only || user_only) return false;
+  return pulled.channels() > 0 || to_texture || to_surfaces || to_light_vectors || wishes.sh ||
+         to_eye || (wishes.d_depth && geometry);
+}
+
+BackwardPlan PlanBackward(const SceneParts& parts, const GradientWishes& wishes) {
+  BackwardPlan plan;
+  plan.parts = parts, plan.wishes = wishes;
+  const bool geometry = wishes.positions || wishes.camera;
+  const bool derived = parts.model.normals != NormalKind::kGiven;
+  const bool normal_wanted = geometry || (derived ? wishes.positions : wishes.normals);
+  plan.geometry = geometry;
+  VaryingSet& pulled = plan.pulled;
+  const bool phong = parts.model.lighting == Lighting::kPhong;
+  if (wishes.d_color) {
+    plan.to_colors = parts.colors && (geometry || wishes.colors);
+    plan.to_uv = parts.textures && parts.bilinear && (geometry || wishes.uvs);
+    plan.to_texture = parts.textures && wishes.textures;
+    plan.to_normal = parts.lit() && normal_wanted;
+    plan.to_eye = phong && geometry;
+    plan.to_light_vectors =
+        parts.uses_lights() &&
+        (wishes.lights || (parts.light_directions && (geometry || wishes.light_directions)));
+    plan.to_light = plan.to_normal || plan.to_eye || plan.to_light_vectors ||
+                    (parts.model.lighting == Lighting::kSphericalHarmonics && wishes.sh);
+    plan.to_surfaces = wishes.surfaces;
+  }
+  pulled[Varying::kColor] = plan.to_colors;
+  pulled[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes.uvs));
+  pulled[Varying::kNormal] = plan.to_normal || (wishes.d_normals && normal_wanted);
+  pulled[Varying::kPosition] = plan.to_eye || (wishes.d_depth && geometry);
+  pulled[Varying::kLightDirection] =
+      plan.to_light_vectors && parts.light_directions && (geometry || wishes.light_directions);
+  pulled[Varying::kUser] = wishes.d_user && (geometry || wishes.user);
+  Finish(parts, &pulled);
+  const bool any_color =
+      plan.to_colors || plan.to_uv || plan.to_texture || plan.to_light || plan.to_surfaces;
+  if (any_color) plan.steps = ColorSteps(parts);
+  // The highlight is a sum of its own: colours and textures do not need its value.
+  plan.steps.highlight =
+      any_color && phong && (parts.model.clamp || plan.to_light || plan.to_surfaces);
+  if (wishes.d_normals && normal_wanted) plan.steps.normal = true;
+  VaryingSet& again = plan.recomputed;
+  again[Varying::kColor] =
+      any_color && parts.colors &&
+      (parts.model.clamp || plan.to_texture || plan.to_uv || plan.to_light || plan.to_surfaces);
+  again[Varying::kUv] = plan.steps.texture;
+  again[Varying::kNormal] = plan.steps.normal;
+  again[Varying::kPosition] = plan.steps.highlight || (wishes.d_depth && wishes.camera);
+  again[Varying::kLightDirection] =
+      plan.steps.light && parts.uses_lights() && parts.light_directions;
+  Finish(parts, &again);
+  plan.colors_only =
+      IsPlainColor(parts) && wishes.d_color && IsOnly(pulled, Varying::kColor) && !plan.to_surfaces;
+  plan.user_only = IsOnly(pulled, Varying::kUser) && again.channels() == 0 && !wishes.d_color;
+  return plan;
+}
+
+std::vector<std::string> ExplainLines(const PlanReport& report) {
+  std::vector<std::string> out;
+  for (const StageReport& s : report.stages) {
+    if (s.runs) {
+      out.push_back(fmt::format("{:<14} {:>12} {:<10} {:>9.3f} ms  {}", s.name, s.count, s.unit,
+                                s.milliseconds, s.what));
+    } else {
+      out.push_back(fmt::format("{:<14} {:>12} {:<10} {:>9}     {}", s.name, "-", "", "-", s.what));
+    }
+  }
+  return out;
+}
+
+}  // namespace tilegrad

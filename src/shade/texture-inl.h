@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of texture.h. Lanes are pixels.
+#if defined(TILEGRAD_SHADE_TEXTURE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_SHADE_TEXTURE_INL_H_
+#undef TILEGRAD_SHADE_TEXTURE_INL_H_
+#else
+#define TILEGRAD_SHADE_TEXTURE_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "shade/run_lanes-inl.h"
+#include "shade/texture.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::shade {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using RunIntTag = hn::RebindToSigned<RunTag>;
+using RunInt = hn::Vec<RunIntTag>;
+using TexelTag = hn::FixedTag<float, 4>;
+using Texel = hn::Vec<TexelTag>;
+
+// One axis of the filter for the pixels of a run: texels `low` and `high`, the weight of `high`,
+// and its derivative. texture_ref.h says the same in scalars.
+struct alignas(128) AxisRun {
+  std::int32_t low[kRunPixels], high[kRunPixels];
+  float weight[kRunPixels], slope[kRunPixels];
+};
+
+struct WrappedLanes {
+  RunVec at, slope;
+};
+
+HWY_INLINE WrappedLanes WrapLanes(RunVec u, Wrap wrap) {
+  const RunTag d;
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  // Beyond 2^23 a float has no fraction; so kept, it and its neighbours are whole numbers, as it
+  // is.
+  const auto finite = hn::Lt(hn::Abs(u), hn::Set(d, 0x1p126f));
+  if (wrap == Wrap::kClamp) {
+    const auto kept = hn::Min(hn::Max(u, hn::Set(d, -1.0f)), hn::Set(d, 2.0f));
+    return {hn::IfThenElseZero(finite, kept),
+            hn::IfThenElseZero(hn::And(finite, hn::Eq(kept, u)), one)};
+  }
+  if (wrap != Wrap::kMirror) {
+    return {hn::IfThenElseZero(finite, hn::Sub(u, hn::Floor(u))), hn::IfThenElseZero(finite, one)};
+  }
+  const auto half = hn::Floor(hn::Mul(u, hn::Set(d, 0.5f)));
+  const auto two = hn::IfThenElse(finite, hn::Sub(u, hn::Add(half, half)), zero);
+  const auto back = hn::Gt(two, one);
+  return {hn::IfThenElse(back, hn::Sub(hn::Set(d, 2.0f), two), two),
+          hn::IfThenElseZero(finite, hn::IfThenElse(back, hn::Set(d, -1.0f), one))};
+}
+
+HWY_INLINE RunInt ClampIndex(RunInt i, int n) {
+  const RunIntTag di;
+  return hn::Min(hn::Max(i, hn::Zero(di)), hn::Set(di, n - 1));
+}
+
+HWY_INLINE RunInt WrapLaneIndex(RunInt i, int n, Wrap wrap) {
+  const RunIntTag di;
+  if (wrap != Wrap::kRepeat) return ClampIndex(i, n);
+  const auto zero = hn::Zero(di), most = hn::Set(di, n - 1);
+  return hn::IfThenElse(hn::Lt(i, zero), most, hn::IfThenElse(hn::Gt(i, most), zero, i));
+}
+
+// `u`: wrapped.
+HWY_INLINE void SetAxis(const WrappedLanes& u, int n, const TextureInput& input, std::size_t i,
+                        AxisRun* out) {
+  const RunTag d;
+  const RunIntTag di;
+  const bool corners = input.wrap == Wrap::kRepeatCorners;
+  const bool nearest = input.filter == Filter::kNearest;
+  const auto scale = hn::Set(d, static_cast<float>(corners ? n - 1 : n));
+  auto x = hn::Mul(u.at, scale);
+  if (!corners && !nearest) x = hn::Sub(x, hn::Set(d, 0.5f));
+  const auto cell = corners && nearest ? hn::Round(x) : hn::Floor(x);
+  const auto low = hn::ConvertTo(di, cell);
+  if (nearest) {
+    hn::Store(ClampIndex(low, n), di, out->low + i),
+        hn::Store(ClampIndex(low, n), di, out->high + i);
+    hn::Store(hn::Zero(d), d, out->weight + i), hn::Store(hn::Zero(d), d, out->slope + i);
+    return;
+  }
+  hn::Store(WrapLaneIndex(low, n, input.wrap), di, out->low + i);
+  hn::Store(WrapLaneIndex(hn::Add(low, hn::Set(di, 1)), n, input.wrap), di, out->high + i);
+  hn::Store(hn::Sub(x, cell), d, out->weight + i);
+  hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
+}
+
+// Where a run meets one level.
+struct FootprintRun {
+  AxisRun column, row;
+};
+
+HWY_INLINE void SetFootprint(std::size_t i, const TextureInput& input, const TextureLevel& level,
+                             FootprintRun* out) {
+  const RunTag d;
+  SetAxis(WrapLanes(LoadRun(input.uv[0], i), input.wrap), level.width, input, i, &out->column);
+  WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), input.wrap);
+  v = {hn::Sub(hn::Set(d, 1.0f), v.at), hn::Neg(v.slope)};
+  SetAxis(v, level.height, input, i, &out->row);
+}
+
+// The four texels of a pixel.
+struct TexelQuad {
+  Texel t[4];
+
+  HWY_INLINE TexelQuad(const FootprintRun& at, const TextureLevel& level, std::size_t p) {
+    const TexelTag d;
+    const std::int32_t columns[2] = {at.column.low[p], at.column.high[p]};
+    const std::int32_t rows[2] = {at.row.low[p], at.row.high[p]};
+    for (int k = 0; k < 4; ++k) {
+      const auto texel =
+          static_cast<std::size_t>(rows[k / 2]) * static_cast<std::size_t>(level.width) +
+          static_cast<std::size_t>(columns[k % 2]);
+      t[k] = hn::Load(d, level.texels + 4 * texel);
+    }
+  }
+  HWY_INLINE Texel Bilinear(float a, float b) const {
+    const TexelTag d;
+    const auto wa = hn::Set(d, a), wb = hn::Set(d, b);
+    const auto top = hn::MulAdd(wa, hn::Sub(t[1], t[0]), t[0]);
+    const auto bottom = hn::MulAdd(wa, hn::Sub(t[3], t[2]), t[2]);
+    return hn::MulAdd(wb, hn::Sub(bottom, top), top);
+  }
+};
+
+// The levels that the pixels of a run mix, and the share of the coarser one: MixLevels of
+// texture_levels_ref.h.
+struct alignas(128) MixRun {
+  std::int32_t fine[kRunPixels];
+  float share[kRunPixels];
+};
+
+HWY_INLINE void MixLevelsRun(std::size_t count, const TextureInput& input, MixRun* out) {
+  const RunTag d;
+  const RunIntTag di;
+  const auto most = hn::Set(d, static_cast<float>(input.levels.size() - 1));
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto level = LoadRun(*input.level, i);
+    const auto kept = hn::IfThenElseZero(hn::Gt(level, hn::Zero(d)), hn::Min(level, most));
+    const auto fine = hn::Floor(kept);
+    hn::Store(hn::ConvertTo(di, fine), di, out->fine + i);
+    hn::Store(hn::Sub(kept, fine), d, out->share + i);
+  }
+}
+
+HWY_INLINE std::size_t CoarserLevel(const TextureInput& input, std::size_t fine) {
+  return fine + 1 < input.levels.size() ? fine + 1 : fine;
+}
+
+// Whole vectors of pixels that start at `first` and hold pixel p: footprints are made for vectors,
+// but levels differ by pixel.
+HWY_INLINE void SetPixelFootprint(std::size_t p, const TextureInput& input, std::size_t level,
+                                  FootprintRun* out) {
+  const std::size_t lanes = hn::Lanes(RunTag());
+  SetFootprint(p / lanes * lanes, input, input.levels[level], out);
+}
+
+HWY_INLINE Texel SampleMixed(const TextureInput& input, const MixRun& mix, std::size_t p,
+                             FootprintRun* at) {
+  const TexelTag d;
+  const auto fine = static_cast<std::size_t>(mix.fine[p]);
+  SetPixelFootprint(p, input, fine, at);
+  const Texel a =
+      TexelQuad(*at, input.levels[fine], p).Bilinear(at->column.weight[p], at->row.weight[p]);
+  if (mix.share[p] == 0) return a;
+  const std::size_t coarse = CoarserLevel(input, fine);
+  SetPixelFootprint(p, input, coarse, at);
+  const Texel b =
+      TexelQuad(*at, input.levels[coarse], p).Bilinear(at->column.weight[p], at->row.weight[p]);
+  return hn::MulAdd(hn::Set(d, mix.share[p]), hn::Sub(b, a), a);
+}
+
+// [pixel][4] to planes.
+HWY_INLINE void StorePlanes(const float* quads, std::size_t count, RunPlane* color) {
+  const RunTag d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    RunVec r, g, b, rest;
+    hn::LoadInterleaved4(d, quads + 4 * i, r, g, b, rest);
+    StoreRun3({r, g, b}, color, i);
+  }
+}
+
+HWY_INLINE std::size_t WholeVectors(std::size_t count) {
+  const std::size_t lanes = hn::Lanes(RunTag());
+  return (count + lanes - 1) / lanes * lanes;
+}
+
+void SampleRun(std::size_t count, const TextureInput& input, RunPlane* color) {
+  const TexelTag d;
+  FootprintRun at;
+  HWY_ALIGN float quads[4 * kRunPixels];
+  const std::size_t whole = WholeVectors(count);
+  if (input.filter == Filter::kTrilinear) {
+    MixRun mix;
+    MixLevelsRun(count, input, &mix);
+    for (std::size_t p = 0; p < whole; ++p) {
+      hn::Store(SampleMixed(input, mix, p, &at), d, quads + 4 * p);
+    }
+  } else {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(RunTag())) {
+      SetFootprint(i, input, input.levels[0], &at);
+    }
+    for (std::size_t p = 0; p < whole; ++p) {
+      const TexelQuad texels(at, input.levels[0], p);
+      hn::Store(texels.Bilinear(at.column.weight[p], at.row.weight[p]), d, quads + 4 * p);
+    }
+  }
+  StorePlanes(quads, count, color);
+}
+
+// What the pixels of a run pull on the weights of their footprint, [pixel][4] each.
+struct alignas(128) WeightPull {
+  float a[4 * kRunPixels], b[4 * kRunPixels];
+};
+
+// Adds the pull of pixel p at one level, times its slopes, to `pull`.
+HWY_INLINE void PullPixel(const FootprintRun& at, const TextureLevel& level, Texel d_color,
+                          std::size_t p, WeightPull* pull) {
+  const TexelTag d;
+  const TexelQuad q(at, level, p);
+  const auto a = hn::Set(d, at.column.weight[p]), b = hn::Set(d, at.row.weight[p]);
+  const auto top = hn::Sub(q.t[1], q.t[0]), bottom = hn::Sub(q.t[3], q.t[2]);
+  const auto left = hn::Sub(q.t[2], q.t[0]), right = hn::Sub(q.t[3], q.t[1]);
+  const auto along_a = hn::MulAdd(b, hn::Sub(bottom, top), top);
+  const auto along_b = hn::MulAdd(a, hn::Sub(right, left), left);
+  float *to_a = pull->a + 4 * p, *to_b = pull->b + 4 * p;
+  const auto slope_a = hn::Mul(d_color, hn::Set(d, at.column.slope[p]));
+  const auto slope_b = hn::Mul(d_color, hn::Set(d, at.row.slope[p]));
+  hn::Store(hn::MulAdd(slope_a, along_a, hn::Load(d, to_a)), d, to_a);
+  hn::Store(hn::MulAdd(slope_b, along_b, hn::Load(d, to_b)), d, to_b);
+}
+
+HWY_INLINE TexelShare MakeShare(const FootprintRun& at, std::size_t level, const RunPlane* d_color,
+                                float scale, std::size_t p) {
+  TexelShare out;
+  out.x0 = static_cast<std::uint16_t>(at.column.low[p]);
+  out.x1 = static_cast<std::uint16_t>(at.column.high[p]);
+  out.y0 = static_cast<std::uint16_t>(at.row.low[p]);
+  out.y1 = static_cast<std::uint16_t>(at.row.high[p]);
+  out.a = at.column.weight[p], out.b = at.row.weight[p];
+  for (std::size_t c = 0; c < 3; ++c) out.d_color[c] = scale * d_color[c].at[p];
+  out.level = static_cast<std::uint32_t>(level);
+  return out;
+}
+
+// What a run pulls, before sums over channels. Either may be null.
+struct PullTo {
+  WeightPull* weights;
+  TexelShare* shares;
+};
+
+// One pixel at one level of its footprint, which is set.
+HWY_INLINE void PullLevel(const TextureInput& input, const FootprintRun& at, std::size_t level,
+                          const RunPlane* d_color, float scale, std::size_t p, WeightPull* weights,
+                          TexelShare* share) {
+  const TexelTag d;
+  if (share != nullptr) *share = MakeShare(at, level, d_color, scale, p);
+  if (weights == nullptr) return;
+  HWY_ALIGN const float pull[4] = {scale * d_color[0].at[p], scale * d_color[1].at[p],
+                                   scale * d_color[2].at[p], 0};
+  PullPixel(at, input.levels[level], hn::Load(d, pull), p, weights);
+}
+
+HWY_INLINE void PullMixed(std::size_t count, const TextureInput& input, const RunPlane* d_color,
+                          const PullTo& to) {
+  FootprintRun at;
+  MixRun mix;
+  MixLevelsRun(count, input, &mix);
+  for (std::size_t p = 0; p < count; ++p) {
+    const auto fine = static_cast<std::size_t>(mix.fine[p]);
+    const std::size_t levels[2] = {fine, CoarserLevel(input, fine)};
+    const float scales[2] = {1 - mix.share[p], mix.share[p]};
+    for (std::size_t k = 0; k < 2; ++k) {
+      SetPixelFootprint(p, input, levels[k], &at);
+      PullLevel(input, at, levels[k], d_color, scales[k], p, to.weights,
+                to.shares == nullptr ? nullptr : to.shares + 2 * p + k);
+    }
+  }
+}
+
+HWY_INLINE void PullPlain(std::size_t count, const TextureInput& input, const RunPlane* d_color,
+                          const PullTo& to) {
+  FootprintRun at;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(RunTag())) {
+    SetFootprint(i, input, input.levels[0], &at);
+  }
+  for (std::size_t p = 0; p < count; ++p) {
+    PullLevel(input, at, 0, d_color, 1, p, to.weights,
+              to.shares == nullptr ? nullptr : to.shares + p);
+  }
+}
+
+HWY_INLINE void SumWeightPull(std::size_t count, const WeightPull& pull, RunPlane* d_uv) {
+  const RunTag d;
+  const float* const from[2] = {pull.a, pull.b};
+  for (int k = 0; k < 2; ++k) {
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      RunVec r, g, b, rest;
+      hn::LoadInterleaved4(d, from[k] + 4 * i, r, g, b, rest);
+      StoreRun(hn::Add(r, hn::Add(g, b)), &d_uv[k], i);
+    }
+  }
+}
+
+void SampleRunAdjoint(std::size_t count, const TextureInput& input, const RunPlane* d_color,
+                      RunPlane* d_uv, TexelShare* shares) {
+  WeightPull pull;
+  if (d_uv != nullptr) {
+    const RunTag d;
+    for (std::size_t i = 0; i < 4 * WholeVectors(count); i += hn::Lanes(d)) {
+      hn::Store(hn::Zero(d), d, pull.a + i), hn::Store(hn::Zero(d), d, pull.b + i);
+    }
+  }
+  const PullTo to{d_uv == nullptr ? nullptr : &pull, shares};
+  if (input.filter == Filter::kTrilinear) {
+    PullMixed(count, input, d_color, to);
+  } else {
+    PullPlain(count, input, d_color, to);
+  }
+  if (d_uv != nullptr) SumWeightPull(count, pull, d_uv);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::shade
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pyramid of a texture. Each level halves the one before (rounded down, at least 1) and is its
+// mean over areas: of an odd side, a texel covers a little more than two.
+//
+// A level along one axis: texel j of n' covers [j n / n', (j + 1) n / n') of n.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "shade/texture.h"
+
+namespace tilegrad::shade {
+
+// Where the texels of a pyramid stand in one array, finest first.
+struct LevelSize {
+  int width, height;
+  std::size_t first;  // texel
+  std::size_t texels() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
+};
+
+inline LevelSize NextLevel(const LevelSize& l) {
+  return {std::max(1, l.width / 2), std::max(1, l.height / 2), l.first + l.texels()};
+}
+
+// Levels that a filter needs: one, or all down to one texel.
+inline int LevelCount(int width, int height, Filter filter) {
+  int count = 1;
+  if (filter != Filter::kTrilinear) return count;
+  for (; width > 1 || height > 1; ++count) width /= 2, height /= 2;
+  return count;
+}
+
+// The texels of the finer level that a texel covers, along one axis: at most three.
+struct Coverage {
+  int first, count;
+  float weight[3];  // sum to 1
+};
+
+inline Coverage CoverageOf(int j, int coarse, int fine) {
+  if (fine % coarse == 0) {
+    const int ratio = fine / coarse;  // 1 or 2
+    return {j * ratio, ratio, {1.0f / static_cast<float>(ratio), 1.0f / 2, 0}};
+  }
+  const auto m = static_cast<float>(coarse), x = static_cast<float>(j);
+  const float all = static_cast<float>(fine) / m;
+  return {2 * j, 3, {(1 - x / m) / all, 1 / all, (x + 1) / m / all}};
+}
+
+// Texels of all levels in one array, [texel][kChannels]; level 0 is given. One loop for the way
+// there and back: calls visit(coarse texel, fine texel, weight).
+template <class Visit>
+void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit& visit) {
+  for (int y = 0; y < coarse.height; ++y) {
+    const Coverage rows = CoverageOf(y, coarse.height, fine.height);
+    for (int x = 0; x < coarse.width; ++x) {
+      const Coverage columns = CoverageOf(x, coarse.width, fine.width);
+      const auto to = coarse.first + static_cast<std::size_t>(y * coarse.width + x);
+      for (int r = 0; r < rows.count; ++r) {
+        for (int c = 0; c < columns.count; ++c) {
+          const auto from = fine.first + static_cast<std::size_t>((rows.first + r) * fine.width +
+                                                                  columns.first + c);
+          visit(to, from, rows.weight[r] * columns.weight[c]);
+        }
+      }
+    }
+  }
+}
+
+// A texture made ready for SampleTexture. Scratch that is reused.
+class TexturePyramid {
+ public:
+  // Copies the texels and builds the levels that the filter needs.
+  void Build(const TextureView& texture);
+  std::span<const TextureLevel> levels() const { return levels_; }
+  std::span<const LevelSize> sizes() const { return sizes_; }
+  const TextureView& view() const { return view_; }
+
+ private:
+  TextureView view_;
+  std::vector<LevelSize> sizes_;
+  std::vector<TextureLevel> levels_;
+  AlignedVector<float> texels_;  // [texel][4]
+};
+
+// Part `index` of `count` parts of the rows of every level.
+struct RowShare {
+  int index, count;
+};
+
+// The gradient that a texture gets. Scratch that is reused.
+class TextureGradient {
+ public:
+  void Clear(const TexturePyramid& pyramid);
+  // Adds shares to the texels of some rows: different parts may run side by side.
+  void Scatter(std::span<const TexelShare> shares, const RowShare& rows);
+  // out [height][width][3] <- the gradient of all levels, brought to the finest.
+  void Finish(std::span<float> out);
+
+ private:
+  std::vector<LevelSize> sizes_;
+  AlignedVector<float> d_texels_;  // [texel][4]
+};
+
+}  // namespace tilegrad::shade

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene looks like, by values that are known without a renderer.
+#include "render/shaded_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace tilegrad {
+namespace {
+
+constexpr int kSize = 16;
+constexpr std::size_t kPixels = kSize * kSize;
+
+// A square in z = 0, one unit to each side, that fills the image of a camera in front of it; the
+// lower left triangle is face 0.
+struct Square {
+  std::vector<float> positions = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+  std::vector<std::int32_t> faces = {0, 1, 3, 1, 2, 3};
+  std::vector<float> uvs = {0, 0, 1, 0, 1, 1, 0, 1};
+  std::vector<float> colors = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+
+  ShadedScene Scene() const {
+    ShadedScene scene;
+    scene.positions = positions, scene.faces = faces;
+    const float eye[3] = {0, 0, 2}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
+    scene.camera = LookAtCamera({2 * std::atan(0.5) * 180 / M_PI, kSize, kSize}, eye, target, up);
+    return scene;
+  }
+};
+
+RenderOptions Options() {
+  RenderOptions options;
+  options.width = options.height = kSize;
+  return options;
+}
+
+ShadedFrame Draw(const ShadedScene& scene, const ShadedRequest& request = {}) {
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const Status status = renderer.Render({&scene, 1}, Options(), request, &frame);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return frame;
+}
+
+std::array<float, 3> ColorAt(const ShadedFrame& frame, int x, int y) {
+  const auto pixel = static_cast<std::size_t>(y * kSize + x);
+  return {frame.color[pixel], frame.color[kPixels + pixel], frame.color[2 * kPixels + pixel]};
+}
+
+// A few roundings of numbers of the size of 1.
+constexpr float kTolerance = 1e-5f;
+
+void ExpectColor(const ShadedFrame& frame, int x, int y, std::array<float, 3> expected) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(ColorAt(frame, x, y)[c], expected[c], kTolerance) << x << " " << y << " " << c;
+  }
+}
+
+TEST(ShadedRenderer, VertexColoursAreInterpolated) {
+  const Square square;
+  ShadedScene scene = square.Scene();
+  scene.colors = {square.colors, AttributeRate::kVertex};
+  const ShadedFrame frame = Draw(scene);
+  // Pixel (0, 15) has its centre at (1/32, 1/32) of the square, from its lower left corner.
+  ExpectColor(frame, 0, 15, {15.0f / 16, 1.0f / 32, 0});
+}
+
+// Texels are as large as pixels, so pixel centres are texel centres; row 0 is the top, v = 1.
+TEST(ShadedRenderer, TexelCentresAreWhereTheConventionSays) {
+  const Square square;
+  std::vector<float> texels;
+  for (std::size_t i = 0; i < 3 * kPixels; ++i) texels.push_back(static_cast<float>(i % 97) / 97);
+  for (const auto filter :
+       {shade::Filter::kNearest, shade::Filter::kBilinear, shade::Filter::kTrilinear}) {
+    const shade::TextureView texture{texels, kSize, kSize, 3, shade::Wrap::kRepeat, filter};
+    ShadedScene scene = square.Scene();
+    scene.uvs = {square.uvs, AttributeRate::kVertex};
+    scene.textures = {&texture, 1};
+    const ShadedFrame frame = Draw(scene);
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        const float* t = &texels[static_cast<std::size_t>(3 * (y * kSize + x))];
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_NEAR(ColorAt(frame, x, y)[c], t[c], 1e-4f) << x << " " << y;  // 16 texels of 1
+        }
+      }
+    }
+  }
+}
+
+TEST(ShadedRenderer, LightFromTheSideGivesItsCosine) {
+  const Square square;
+  ShadedScene scene = square.Scene();
+  const shade::DirectionalLight light{{3, 0, 4}, 1};  // of length 5: cosine 0.8
+  scene.lights = {&light, 1};
+  scene.model.lighting = Lighting::kLambert;
+  ExpectColor(Draw(scene), 8, 8, {0.8f, 0.8f, 0.8f});
+  scene.model.normals = NormalKind::kFlat;
+  ExpectColor(Draw(scene), 3, 12, {0.8f, 0.8f, 0.8f});
+}
+
+TEST(ShadedRenderer, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
+  Square square;
+  for (float& p : square.positions) p *= 0.5f;
+  std::swap(square.faces[0], square.faces[1]), std::swap(square.faces[3], square.faces[4]);
+  ShadedScene scene = square.Scene();
+  const shade::DirectionalLight light{{0, 0, 1}, 1};
+  scene.lights = {&light, 1};
+  scene.model.lighting = Lighting::kLambert;
+  ExpectColor(Draw(scene), 8, 8, {0, 0, 0});
+  scene.model.two_sided = true;
+  const ShadedFrame frame = Draw(scene, {});
+  ExpectColor(frame, 8, 8, {1, 1, 1});
+  ExpectColor(frame, 1, 1, {0, 0, 0});
+}
+
+}  // namespace
+}  // namespace tilegrad
