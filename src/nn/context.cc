@@ -21,7 +21,7 @@ Tensor Converted(Tensor tensor, std::span<const From> values) {
 }  // namespace
 
 Context::Context(const Workers& workers, DType dtype)
-    : workers_(workers), dtype_(dtype), pool_(MemoryPool::Make()) {
+    : workers_(workers), dtype_(dtype), pool_(MemoryPool::Make()), step_memory_(MakeStepMemory()) {
   assert(dtype == DType::kF32 || dtype == DType::kF64);
 }
 

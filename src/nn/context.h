@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "nn/kernels/kernel_context.h"
 #include "nn/memory.h"
+#include "nn/step_memory.h"
 #include "nn/tensor.h"
 #include "tilegrad/status.h"
 
@@ -45,6 +46,11 @@ class Context {
   Tensor Copy(const Tensor& tensor) const;                     // storage of its own
 
   MemoryPool& memory() const { return *pool_; }
+  // For the small things of a step (step_memory.h).
+  template <class T>
+  StepAllocator<T> allocator() const {
+    return StepAllocator<T>(step_memory_);
+  }
 
   const Status& status() const { return status_; }
   void Fail(Status status);  // the first error is kept
@@ -58,6 +64,7 @@ class Context {
   const Workers& workers_;
   DType dtype_;
   std::shared_ptr<MemoryPool> pool_;
+  std::shared_ptr<std::pmr::memory_resource> step_memory_;
   KernelScratch scratch_;
   Status status_;
   bool recording_ = true;

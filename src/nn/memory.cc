@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/aligned.h"
+#include "nn/step_memory.h"
 
 namespace tilegrad::nn {
 
@@ -143,6 +144,13 @@ void MemoryPool::ResetPeak() {
 MemoryStats MemoryPool::stats() const {
   const std::lock_guard lock(state_->mutex);
   return state_->stats;
+}
+
+std::shared_ptr<std::pmr::memory_resource> MakeStepMemory() {
+  // Larger blocks, of which a step has none, would go to the heap each time.
+  constexpr std::size_t kLargestBlock = std::size_t{1} << 20;
+  return std::make_shared<std::pmr::unsynchronized_pool_resource>(std::pmr::pool_options{
+      .max_blocks_per_chunk = 0, .largest_required_pool_block = kLargestBlock});
 }
 
 }  // namespace tilegrad::nn

@@ -37,6 +37,7 @@ Optimizer::Optimizer(Context& context, std::string name, std::vector<std::string
       slot.moments.push_back(ZerosLike(context, p.value.value()));
     }
     slots_.push_back(std::move(slot));
+    parameters_.push_back(p.value);
   }
 }
 
@@ -53,12 +54,6 @@ Status Optimizer::Step(std::span<const Var> gradients, double gradient_scale) {
   BeginStep(gradient_scale);
   for (std::size_t i = 0; i < slots_.size(); ++i) Update(slots_[i], gradients[i].value());
   return {};
-}
-
-std::vector<Var> Optimizer::parameters() const {
-  std::vector<Var> result;
-  for (const Slot& slot : slots_) result.push_back(slot.parameter.value);
-  return result;
 }
 
 std::vector<NamedTensor> Optimizer::State() const {

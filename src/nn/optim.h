@@ -24,7 +24,7 @@ class Optimizer {
   // refused before anything is changed.
   Status Step(std::span<const Var> gradients, double gradient_scale = 1.0);
 
-  std::vector<Var> parameters() const;  // in the order given
+  std::span<const Var> parameters() const { return parameters_; }  // in the order given
   std::int64_t steps() const { return steps_; }
 
   // "<name>.<moment>.<parameter>" for each moment, and "<name>.steps" ([1] of kI64); name: "adam"
@@ -49,6 +49,7 @@ class Optimizer {
   std::string name_;
   std::vector<std::string> moments_;
   std::vector<Slot> slots_;
+  std::vector<Var> parameters_;  // of the slots
   std::int64_t steps_ = 0;
 };
 

@@ -19,9 +19,9 @@ struct Node : std::enable_shared_from_this<Node> {
     int slot = 0;
   };
   OpInfo info;
-  std::uint64_t order = 0;  // greater than that of every node it depends on
-  std::vector<Edge> edges;  // one for each input; none: a leaf
-  int slots = 1;            // outputs
+  std::uint64_t order = 0;      // greater than that of every node it depends on
+  InlineVector<Edge, 3> edges;  // one for each input; none: a leaf
+  int slots = 1;                // outputs
   Rule rule;
   Tensor saved;  // the output, where the rule wants it
   bool released = false;
@@ -30,10 +30,9 @@ struct Node : std::enable_shared_from_this<Node> {
 namespace {
 
 std::shared_ptr<Node> MakeNode(Context& context, const OpInfo& info, std::span<const Var> inputs) {
-  auto node = std::make_shared<Node>();
+  auto node = std::allocate_shared<Node>(context.allocator<Node>());
   node->info = info;
   node->order = context.NextOrder();
-  node->edges.reserve(inputs.size());
   for (const Var& input : inputs) node->edges.push_back({input.node(), input.slot()});
   return node;
 }
@@ -47,7 +46,11 @@ bool WantsNode(const Context& context, std::span<const Var> inputs) {
 class Backward {
  public:
   Backward(const Var& output, std::span<const Var> inputs, const GradOptions& options)
-      : context_(output.context()), output_(output), options_(options) {
+      : context_(output.context()),
+        output_(output),
+        options_(options),
+        order_(context_.allocator<Node*>()),
+        visits_(context_.allocator<std::pair<Node* const, Visit>>()) {
     if (output.requires_grad()) Collect(output.node().get());
     for (const Var& input : inputs) MarkUseful(input.node().get());
     std::sort(order_.begin(), order_.end(),
@@ -80,13 +83,13 @@ class Backward {
 
  private:
   struct Visit {
-    bool useful = false;  // leads to something that was asked for
-    bool wanted = false;  // was asked for: its adjoint must survive
-    std::vector<Var> d;   // adjoint of each output, summed over the uses met so far
+    bool useful = false;     // leads to something that was asked for
+    bool wanted = false;     // was asked for: its adjoint must survive
+    InlineVector<Var, 1> d;  // adjoint of each output, summed over the uses met so far
   };
 
   void Collect(Node* root) {
-    std::vector<Node*> open = {root};
+    StepVector<Node*> open({root}, context_.allocator<Node*>());
     visits_.try_emplace(root);
     while (!open.empty()) {
       Node* node = open.back();
@@ -114,10 +117,10 @@ class Backward {
           node.info.name));
       return;
     }
-    const std::vector<bool> needs = Needs(node);
+    const auto needs = Needs(node);
     // The output as a Var of this very node, so that a rule that uses it can be differentiated.
     const Var y = node.saved.empty() ? Var() : Var(context_, node.saved, node.shared_from_this());
-    const std::vector<Var> d_inputs = node.rule(Adjoint(y, visit.d, needs));
+    const Vars d_inputs = node.rule(Adjoint(y, visit.d, needs));
     if (!visit.wanted) visit.d.clear();
     for (std::size_t i = 0; i < d_inputs.size(); ++i) {
       if (needs[i] && d_inputs[i].valid()) {
@@ -127,8 +130,8 @@ class Backward {
     if (!options_.create_graph && !options_.keep_graph) Release(node);
   }
 
-  std::vector<bool> Needs(const Node& node) {
-    std::vector<bool> needs;
+  InlineVector<std::uint8_t, 8> Needs(const Node& node) {
+    InlineVector<std::uint8_t, 8> needs;
     for (const auto& edge : node.edges) {
       needs.push_back(edge.node && visits_[edge.node.get()].useful);
     }
@@ -151,8 +154,10 @@ class Backward {
   Context& context_;
   const Var& output_;
   const GradOptions& options_;
-  std::vector<Node*> order_;
-  std::unordered_map<Node*, Visit> visits_;
+  StepVector<Node*> order_;
+  std::unordered_map<Node*, Visit, std::hash<Node*>, std::equal_to<>,
+                     StepAllocator<std::pair<Node* const, Visit>>>
+      visits_;
 };
 
 }  // namespace
@@ -238,8 +243,10 @@ Var Ones(const Var& like) {
 
 }  // namespace
 
-std::vector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradOptions& options) {
-  std::vector<Var> result(inputs.size(), Invalid({&output}));
+StepVector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradOptions& options) {
+  StepAllocator<Var> allocator;
+  if (output.has_context()) allocator = output.context().allocator<Var>();
+  StepVector<Var> result(inputs.size(), Invalid({&output}), allocator);
   if (!output.valid()) return result;
   Context& context = output.context();
   if (const Status status = CheckGrad(output, options.d_output); !status.ok()) {
@@ -259,8 +266,8 @@ std::vector<Var> Grad(const Var& output, std::span<const Var> inputs, const Grad
   return result;
 }
 
-std::vector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
-                      const GradOptions& options) {
+StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
+                     const GradOptions& options) {
   return Grad(output, std::span<const Var>(inputs.begin(), inputs.size()), options);
 }
 
@@ -268,8 +275,7 @@ namespace {
 
 // The adjoints of an external operation's inputs. Where a graph of them is wanted they are marked,
 // so that asking for a second derivative is an error rather than a silent zero.
-std::vector<Var> ExternalBackward(const ExternalOp& op, Context& context,
-                                  std::span<const Var> d_outputs) {
+Vars ExternalBackward(const ExternalOp& op, Context& context, std::span<const Var> d_outputs) {
   std::vector<Tensor> tensors;
   for (const Var& d : d_outputs) tensors.push_back(d.value());
   std::vector<Tensor> d_inputs = op.backward(tensors);
@@ -282,11 +288,11 @@ std::vector<Var> ExternalBackward(const ExternalOp& op, Context& context,
   for (const Var& d : d_outputs) {
     if (d.valid()) parents.push_back(d);
   }
-  const Rule refuse = [&context, name = op.name](const Adjoint&) {
+  const auto refuse = [&context, name = op.name](const Adjoint&) {
     context.Fail(InvalidArgument("{} has a first derivative only", name));
-    return std::vector<Var>();
+    return Vars();
   };
-  std::vector<Var> result;
+  Vars result;
   for (std::size_t i = 0; i < d_inputs.size(); ++i) {
     if (!d_inputs[i].empty() && !(d_inputs[i].shape() == op.inputs[i].shape())) {
       context.Fail(InternalError("{}: adjoint {} has shape {}, its input {}", op.name, i,

@@ -9,12 +9,15 @@
 // Read first: Record in this file, then any file of ops/.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "base/inline_function.h"
+#include "base/inline_vector.h"
 #include "nn/context.h"
 #include "nn/tensor.h"
 
@@ -64,10 +67,10 @@ struct GradOptions {
 // errors (output has more than one element and no d_output, a graph that was released, an operand
 // of a first-order operation in a second derivative) the context notes it and every entry is
 // invalid.
-std::vector<Var> Grad(const Var& output, std::span<const Var> inputs,
-                      const GradOptions& options = {});
-std::vector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
-                      const GradOptions& options = {});
+StepVector<Var> Grad(const Var& output, std::span<const Var> inputs,
+                     const GradOptions& options = {});
+StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
+                     const GradOptions& options = {});
 
 // An operation that is computed elsewhere (a renderer, a loss) and has a first derivative only.
 // `backward` receives one adjoint for each output (empty Tensor: zero) and returns one for each
@@ -86,21 +89,23 @@ std::vector<Var> External(Context& context, ExternalOp op);
 // What a rule is given: the adjoints that arrived, and what is asked for.
 class Adjoint {
  public:
-  Adjoint(const Var& y, std::span<const Var> d_outputs, const std::vector<bool>& needs)
+  Adjoint(const Var& y, std::span<const Var> d_outputs, std::span<const std::uint8_t> needs)
       : y_(y), d_outputs_(d_outputs), needs_(needs) {}
   const Var& dy() const { return d_outputs_[0]; }
   std::span<const Var> d_outputs() const { return d_outputs_; }
   const Var& y() const { return y_; }  // the output, if the operation saved it
-  bool needs(std::size_t input) const { return needs_[input]; }
+  bool needs(std::size_t input) const { return needs_[input] != 0; }
 
  private:
   const Var& y_;
   std::span<const Var> d_outputs_;
-  const std::vector<bool>& needs_;
+  std::span<const std::uint8_t> needs_;
 };
 
 // Returns the adjoint of each input; an invalid Var where none flows or none is needed.
-using Rule = std::function<std::vector<Var>(const Adjoint&)>;
+// It may hold half a kilobyte: a few Vars.
+using Vars = InlineVector<Var, 4>;
+using Rule = InlineFunction<Vars(const Adjoint&), 512>;
 
 struct OpInfo {
   const char* name;          // for messages

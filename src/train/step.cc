@@ -122,7 +122,7 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
 Result<LossValues> TrainStep::Run(const BatchTensors& batch, std::int64_t step) {
   LossValues values;
   const nn::Var loss = Loss(batch, step, &values);
-  const std::vector<nn::Var> gradients = nn::Grad(loss, adam_.parameters());
+  const auto gradients = nn::Grad(loss, adam_.parameters());
   TILEGRAD_TRY(context_.TakeStatus());
   const double norm = nn::GlobalNorm(context_, gradients);
   if (!std::isfinite(values.total) || !std::isfinite(norm)) {

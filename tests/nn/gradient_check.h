@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "base/rng.h"
@@ -55,7 +56,7 @@ inline double Slope(const std::function<double(const Inputs&)>& f, const Inputs&
   return (8.0 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12.0 * h);
 }
 
-inline double Dot(const std::vector<Var>& a, const std::vector<Var>& b) {
+inline double Dot(std::span<const Var> a, std::span<const Var> b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const auto x = a[i].value().span<double>(), y = b[i].value().span<double>();
@@ -79,7 +80,7 @@ struct Leaves {
   }
 };
 
-inline Var WeightedSum(const Inputs& a, const Inputs& b) {
+inline Var WeightedSum(std::span<const Var> a, std::span<const Var> b) {
   Var sum = Sum(Mul(a[0], b[0]));
   for (std::size_t i = 1; i < a.size(); ++i) sum = sum + Sum(Mul(a[i], b[i]));
   return sum;
@@ -94,8 +95,8 @@ struct Derivatives {
 };
 inline Derivatives Differentiate(const Function& f, const Leaves& at) {
   Derivatives d;
-  d.s = WeightedSum(at.weights, {f(at.x)});
-  const Inputs g = Grad(d.s, at.x, {.create_graph = true});
+  d.s = WeightedSum(at.weights, Inputs{f(at.x)});
+  const auto g = Grad(d.s, at.x, {.create_graph = true});
   d.first = WeightedSum(at.direction, g);
   d.t = WeightedSum(at.probe, g) + 0.5 * WeightedSum(g, g);
   d.second = WeightedSum(at.direction, Grad(d.t, at.x, {.create_graph = true}));
@@ -140,7 +141,7 @@ inline void ExpectSlopes(const Function& f, const Leaves& at, const Derivatives&
 // sum |d q / d leaf| |leaf|.
 inline double Condition(const Var& q, const Leaves& at) {
   const Inputs all = at.All();
-  const Inputs d = Grad(q, all, {.keep_graph = true});
+  const auto d = Grad(q, all, {.keep_graph = true});
   double sum = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const auto x = all[i].value().span<double>(), dx = d[i].value().span<double>();

@@ -87,7 +87,7 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
   LossValues values;
   std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
-  const std::vector<nn::Var> gradients =
+  const auto gradients =
       nn::Grad(step.Loss(batch, 0, &values), step.adam().parameters());
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   EXPECT_LT(values.iou, 0.95);  // the scene is not empty: silhouettes overlap

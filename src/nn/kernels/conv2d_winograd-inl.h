@@ -20,7 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kValuesAtATime = std::size_t{2} << 20;  // transformed, of both sides, about
+constexpr std::size_t kValuesAtATime = std::size_t{1} << 21;
 
 // Rows of tiles in portions that hold about kValuesAtATime.
 struct Portions {

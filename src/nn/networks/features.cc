@@ -52,7 +52,7 @@ constexpr Step kVgg16[] = {Conv(0, 1, 1, false),
                            Conv(28, 1, 1, true)};
 constexpr Step kSqueezeNet[] = {
     Conv(0, 2, 0, true), Pool(3), Fire(3, false), Fire(4, true),  Pool(3),        Fire(6, false),
-    Fire(7, true),       Pool(3), Fire(9, true), Fire(10, true), Fire(11, true), Fire(12, true)};
+    Fire(7, true),       Pool(3), Fire(9, true),  Fire(10, true), Fire(11, true), Fire(12, true)};
 
 std::span<const Step> StepsOf(FeatureKind kind) {
   switch (kind) {

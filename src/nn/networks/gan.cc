@@ -71,6 +71,12 @@ Critic::Critic(Context& context, const CriticShape& shape, Rng& rng) {
                rng);
 }
 
+Var Critic::Forward(const Var& x, Mode mode) {
+  Var y = x;
+  for (Sequential& level : levels_) y = level.Forward(y, mode);
+  return y;
+}
+
 std::vector<Var> Critic::Features(const Var& x, Mode mode) {
   std::vector<Var> features;
   for (Sequential& level : levels_) {

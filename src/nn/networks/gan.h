@@ -44,7 +44,7 @@ class Critic : public Module {
   Critic(Context& context, const CriticShape& shape, Rng& rng);
   // The output of every level, for feature matching; the last is the map of scores [n, 1, h, w].
   std::vector<Var> Features(const Var& x, Mode mode);
-  Var Forward(const Var& x, Mode mode) override { return Features(x, mode).back(); }
+  Var Forward(const Var& x, Mode mode) override;  // the map of scores
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
  private:

@@ -67,7 +67,7 @@ UNet::Result UNet::Run(const Var& x, Mode mode) {
     const Var failed = Fail(x, s);
     return {failed, failed};
   }
-  std::vector<Var> levels = {x};
+  StepVector<Var> levels({x}, x.context().allocator<Var>());
   for (Sequential& down : down_) levels.push_back(down.Forward(levels.back(), mode));
   Var y = levels.back();
   for (std::size_t i = up_.size(); i-- > 0;) {
@@ -115,7 +115,7 @@ ConvUNet::ConvUNet(Context& context, const ConvUNetShape& shape, Rng& rng) {
 Var ConvUNet::Forward(const Var& x, Mode mode) {
   if (!x.valid()) return x;
   if (const Status s = CheckImage(x, up_.size()); !s.ok()) return Fail(x, s);
-  std::vector<Var> levels = {down_[0].Forward(x, mode)};
+  StepVector<Var> levels({down_[0].Forward(x, mode)}, x.context().allocator<Var>());
   for (std::size_t i = 1; i < down_.size(); ++i) {
     levels.push_back(down_[i].Forward(MaxPool2d(levels.back(), {}), mode));
   }

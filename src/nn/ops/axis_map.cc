@@ -23,7 +23,7 @@ AxisMap Transposed(Context& context, const AxisMap& map) {
   const auto columns = std::as_const(map.index).span<std::int32_t>();
   for (const std::int32_t column : columns) ++begin[static_cast<std::size_t>(column) + 1];
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
-  std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
+  StepVector<std::int32_t> next(begin.begin(), begin.end() - 1, context.allocator<std::int32_t>());
   const auto* rows = map.begin.data<std::int32_t>();
   WithFloatType(dtype, [&]<class T>(T) {
     for (std::int32_t i = 0; i < map.out; ++i) {
@@ -42,14 +42,14 @@ AxisMap Transposed(Context& context, const AxisMap& map) {
 
 AxisMap MakeAxisMap(const Var& like, const AxisExtents& extents,
                     FunctionRef<void(std::int64_t i, AxisTerms& terms)> row) {
-  AxisTerms terms;
-  std::vector<std::int32_t> ends = {0};
+  Context& context = like.context();
+  AxisTerms terms(context.allocator<AxisTerm>());
+  StepVector<std::int32_t> ends({0}, context.allocator<std::int32_t>());
   for (std::int64_t i = 0; i < extents.out; ++i) {
     row(i, terms);
     ends.push_back(static_cast<std::int32_t>(terms.size()));
   }
-  AxisMap map =
-      Allocate(like.context(), like.dtype(), extents, static_cast<std::int64_t>(terms.size()));
+  AxisMap map = Allocate(context, like.dtype(), extents, static_cast<std::int64_t>(terms.size()));
   std::copy(ends.begin(), ends.end(), map.begin.data<std::int32_t>());
   WithFloatType(like.dtype(), [&]<class T>(T) {
     for (std::size_t t = 0; t < terms.size(); ++t) {
@@ -79,7 +79,7 @@ Var MapAxis(const Var& x, int axis, const AxisMap& map) {
             x.context().workers());
   });
   return Record({"map axis"}, std::move(y), {x}, [axis, map](const Adjoint& adj) {
-    return std::vector<Var>{MapAxis(adj.dy(), axis, Transposed(adj.dy().context(), map))};
+    return Vars{MapAxis(adj.dy(), axis, Transposed(adj.dy().context(), map))};
   });
 }
 

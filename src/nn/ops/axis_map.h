@@ -3,8 +3,6 @@
 // adjoint of a map is that of the transposed matrix, so one operation is closed.
 #pragma once
 
-#include <vector>
-
 #include "base/function_ref.h"
 #include "nn/tape.h"
 
@@ -22,7 +20,7 @@ struct AxisTerm {
   std::int64_t index;
   double weight;
 };
-using AxisTerms = std::vector<AxisTerm>;
+using AxisTerms = StepVector<AxisTerm>;
 
 // `row(i, terms)` appends the terms of row i.
 struct AxisExtents {

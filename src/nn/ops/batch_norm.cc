@@ -41,7 +41,7 @@ BatchNormParameters<T> ParametersOf(const Operands& o) {
 }
 
 // The gradient in one pass; it cannot be differentiated.
-std::vector<Var> FusedGrad(const Operands& o, const BatchStatistics& statistics, const Var& dy) {
+Vars FusedGrad(const Operands& o, const BatchStatistics& statistics, const Var& dy) {
   Context& context = o.x.context();
   Tensor dx = context.Empty(o.x.shape(), o.x.dtype());
   Tensor d_gamma = context.Empty(o.gamma.shape(), o.x.dtype());
@@ -61,7 +61,7 @@ std::vector<Var> FusedGrad(const Operands& o, const BatchStatistics& statistics,
 }
 
 // The same formulas (kernels/batch_norm.h) in operations, for when they will be differentiated.
-std::vector<Var> ComposedGrad(const Operands& o, const Var& y, const Var& d) {
+Vars ComposedGrad(const Operands& o, const Var& y, const Var& d) {
   const Shape& shape = o.x.shape();
   const Var dy = o.options.relu ? ReluGrad(y, d) : d;
   const Var centred = Sub(o.x, MeanChannels(o.x));
@@ -106,7 +106,7 @@ BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
         context.workers());
   });
   // The output is saved only for the sign that relu's derivative needs in a graph of gradients.
-  const Rule rule = [operands, statistics](const Adjoint& adj) {
+  const auto rule = [operands, statistics](const Adjoint& adj) {
     return operands.x.context().recording() ? ComposedGrad(operands, adj.y(), adj.dy())
                                             : FusedGrad(operands, statistics, adj.dy());
   };

@@ -99,11 +99,11 @@ Var Conv2d(const Var& x, const Var& weight, const Var& bias, const ConvOptions& 
                                                bias.valid() ? bias.value().data<T>() : nullptr,
                                                y.data<T>());
   });
-  const Rule rule = [x, weight, options](const Adjoint& adj) {
+  const auto rule = [x, weight, options](const Adjoint& adj) {
     const Var& dy = adj.dy();
-    return std::vector<Var>{adj.needs(0) ? Conv2dInputGrad(dy, weight, SizeOf(x), options) : Var(),
-                            adj.needs(1) ? Conv2dWeightGrad(x, dy, SizeOf(weight), options) : Var(),
-                            adj.needs(2) ? Sum(dy, {0, 2, 3}) : Var()};
+    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, weight, SizeOf(x), options) : Var(),
+                adj.needs(1) ? Conv2dWeightGrad(x, dy, SizeOf(weight), options) : Var(),
+                adj.needs(2) ? Sum(dy, {0, 2, 3}) : Var()};
   };
   return Record({"conv2d"}, std::move(y), {x, weight, bias}, rule);
 }
@@ -145,11 +145,10 @@ Var Conv2dInputGrad(const Var& dy, const Var& weight, ImageSize size, const Conv
                                                   dx.data<T>());
   });
   // Linear in dy and in the weight; `d` is the adjoint of dx.
-  const Rule rule = [dy, weight, options](const Adjoint& adj) {
+  const auto rule = [dy, weight, options](const Adjoint& adj) {
     const Var& d = adj.dy();
-    return std::vector<Var>{
-        adj.needs(0) ? Conv2d(d, weight, Var(), options) : Var(),
-        adj.needs(1) ? Conv2dWeightGrad(d, dy, SizeOf(weight), options) : Var()};
+    return Vars{adj.needs(0) ? Conv2d(d, weight, Var(), options) : Var(),
+                adj.needs(1) ? Conv2dWeightGrad(d, dy, SizeOf(weight), options) : Var()};
   };
   return Record({"conv2d input gradient"}, std::move(dx), {dy, weight}, rule);
 }
@@ -169,10 +168,10 @@ Var Conv2dWeightGrad(const Var& x, const Var& dy, ImageSize kernel, const ConvOp
                                                   dw.data<T>());
   });
   // Linear in x and in dy; `d` is the adjoint of dw.
-  const Rule rule = [x, dy, options](const Adjoint& adj) {
+  const auto rule = [x, dy, options](const Adjoint& adj) {
     const Var& d = adj.dy();
-    return std::vector<Var>{adj.needs(0) ? Conv2dInputGrad(dy, d, SizeOf(x), options) : Var(),
-                            adj.needs(1) ? Conv2d(x, d, Var(), options) : Var()};
+    return Vars{adj.needs(0) ? Conv2dInputGrad(dy, d, SizeOf(x), options) : Var(),
+                adj.needs(1) ? Conv2d(x, d, Var(), options) : Var()};
   };
   return Record({"conv2d weight gradient"}, std::move(dw), {x, dy}, rule);
 }

@@ -55,7 +55,7 @@ Var Gather(const Var& x, int axis, const Tensor& indices) {
                x.context().workers());
   });
   return Record({"gather"}, std::move(y), {x}, [axis, indices, extent](const Adjoint& adj) {
-    return std::vector<Var>{ScatterAdd(adj.dy(), axis, indices, extent)};
+    return Vars{ScatterAdd(adj.dy(), axis, indices, extent)};
   });
 }
 
@@ -74,7 +74,7 @@ Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t exten
                 x.context().workers());
   });
   return Record({"scatter"}, std::move(y), {x}, [axis, indices](const Adjoint& adj) {
-    return std::vector<Var>{Gather(adj.dy(), axis, indices)};
+    return Vars{Gather(adj.dy(), axis, indices)};
   });
 }
 
@@ -112,7 +112,7 @@ Var TakeAlong(const Var& x, const Tensor& indices) {
                  x.context().workers());
   });
   return Record({"take along"}, std::move(y), {x}, [indices, extent](const Adjoint& adj) {
-    return std::vector<Var>{PlaceAlong(adj.dy(), indices, extent)};
+    return Vars{PlaceAlong(adj.dy(), indices, extent)};
   });
 }
 
@@ -129,9 +129,8 @@ Var PlaceAlong(const Var& x, const Tensor& indices, std::int64_t extent) {
     PlaceElements(PickedOf(indices, extent), x.value().data<T>(), y.data<T>(),
                   x.context().workers());
   });
-  return Record({"place along"}, std::move(y), {x}, [indices](const Adjoint& adj) {
-    return std::vector<Var>{TakeAlong(adj.dy(), indices)};
-  });
+  return Record({"place along"}, std::move(y), {x},
+                [indices](const Adjoint& adj) { return Vars{TakeAlong(adj.dy(), indices)}; });
 }
 
 }  // namespace tilegrad::nn

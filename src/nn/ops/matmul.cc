@@ -59,7 +59,7 @@ Var Matmul(const Var& a, const Var& b, const MatmulOptions& options) {
   return Record({"matmul"}, Product(a, b, Var(), options), {a, b},
                 [a, b, ta, tb](const Adjoint& adj) {
                   const Var& dc = adj.dy();
-                  std::vector<Var> d(2);
+                  Vars d(2);
                   if (adj.needs(0))
                     d[0] = ta ? Matmul(b, dc, {tb, true}) : Matmul(dc, b, {false, !tb});
                   if (adj.needs(1))
@@ -76,11 +76,11 @@ Var Linear(const Var& x, const Var& w, const Var& b) {
     return Fail(x, InvalidArgument("linear: input {}, weight {}, bias {}", x.shape().ToString(),
                                    w.shape().ToString(), b.shape().ToString()));
   }
-  const Rule rule = [x, w](const Adjoint& adj) {
+  const auto rule = [x, w](const Adjoint& adj) {
     const Var& dy = adj.dy();
-    return std::vector<Var>{adj.needs(0) ? Matmul(dy, w) : Var(),
-                            adj.needs(1) ? Matmul(dy, x, {true, false}) : Var(),
-                            adj.needs(2) ? Sum(dy, {0}) : Var()};
+    return Vars{adj.needs(0) ? Matmul(dy, w) : Var(),
+                adj.needs(1) ? Matmul(dy, x, {true, false}) : Var(),
+                adj.needs(2) ? Sum(dy, {0}) : Var()};
   };
   return Record({"linear"}, Product(x, w, b, options), {x, w, b}, rule);
 }

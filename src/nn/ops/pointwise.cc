@@ -92,22 +92,22 @@ Var Mask(const char* name, BinaryOp op, const Var& a, const Var& b) {
 
 Var Add(const Var& a, const Var& b) {
   return BinaryVar({"add"}, {BinaryOp::kAdd}, a, b, [sa = a.shape(), sb = b.shape()](auto& adj) {
-    return std::vector<Var>{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
-                            adj.needs(1) ? SumTo(adj.dy(), sb) : Var()};
+    return Vars{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
+                adj.needs(1) ? SumTo(adj.dy(), sb) : Var()};
   });
 }
 
 Var Sub(const Var& a, const Var& b) {
   return BinaryVar({"sub"}, {BinaryOp::kSub}, a, b, [sa = a.shape(), sb = b.shape()](auto& adj) {
-    return std::vector<Var>{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
-                            adj.needs(1) ? Neg(SumTo(adj.dy(), sb)) : Var()};
+    return Vars{adj.needs(0) ? SumTo(adj.dy(), sa) : Var(),
+                adj.needs(1) ? Neg(SumTo(adj.dy(), sb)) : Var()};
   });
 }
 
 Var Mul(const Var& a, const Var& b) {
   return BinaryVar({"mul"}, {BinaryOp::kMul}, a, b, [a, b](const Adjoint& adj) {
-    return std::vector<Var>{adj.needs(0) ? SumTo(Mul(adj.dy(), b), a.shape()) : Var(),
-                            adj.needs(1) ? SumTo(Mul(adj.dy(), a), b.shape()) : Var()};
+    return Vars{adj.needs(0) ? SumTo(Mul(adj.dy(), b), a.shape()) : Var(),
+                adj.needs(1) ? SumTo(Mul(adj.dy(), a), b.shape()) : Var()};
   });
 }
 
@@ -116,22 +116,22 @@ Var Div(const Var& a, const Var& b) {
   const OpInfo info{"div", /*save_output=*/true};
   return BinaryVar(info, {BinaryOp::kDiv}, a, b, [sa = a.shape(), b](const Adjoint& adj) {
     const Var scaled = Div(adj.dy(), b);
-    return std::vector<Var>{adj.needs(0) ? SumTo(scaled, sa) : Var(),
-                            adj.needs(1) ? Neg(SumTo(Mul(scaled, adj.y()), b.shape())) : Var()};
+    return Vars{adj.needs(0) ? SumTo(scaled, sa) : Var(),
+                adj.needs(1) ? Neg(SumTo(Mul(scaled, adj.y()), b.shape())) : Var()};
   });
 }
 
 Var Max(const Var& a, const Var& b) {
   return BinaryVar({"max"}, {BinaryOp::kMax}, a, b, [a, b](const Adjoint& adj) {
-    return std::vector<Var>{SumTo(Mul(adj.dy(), GreaterEqual(a, b)), a.shape()),
-                            SumTo(Mul(adj.dy(), Greater(b, a)), b.shape())};
+    return Vars{SumTo(Mul(adj.dy(), GreaterEqual(a, b)), a.shape()),
+                SumTo(Mul(adj.dy(), Greater(b, a)), b.shape())};
   });
 }
 
 Var Min(const Var& a, const Var& b) {
   return BinaryVar({"min"}, {BinaryOp::kMin}, a, b, [a, b](const Adjoint& adj) {
-    return std::vector<Var>{SumTo(Mul(adj.dy(), GreaterEqual(b, a)), a.shape()),
-                            SumTo(Mul(adj.dy(), Greater(a, b)), b.shape())};
+    return Vars{SumTo(Mul(adj.dy(), GreaterEqual(b, a)), a.shape()),
+                SumTo(Mul(adj.dy(), Greater(a, b)), b.shape())};
   });
 }
 
@@ -143,52 +143,48 @@ Var GreaterEqual(const Var& a, const Var& b) {
 
 Var Neg(const Var& x) {
   return UnaryVar({"neg"}, UnaryOp::kNeg, x, {},
-                  [](const Adjoint& adj) { return std::vector<Var>{Neg(adj.dy())}; });
+                  [](const Adjoint& adj) { return Vars{Neg(adj.dy())}; });
 }
 
 Var Scale(const Var& x, double factor) {
-  return UnaryVar({"scale"}, UnaryOp::kScale, x, {factor}, [factor](const Adjoint& adj) {
-    return std::vector<Var>{Scale(adj.dy(), factor)};
-  });
+  return UnaryVar({"scale"}, UnaryOp::kScale, x, {factor},
+                  [factor](const Adjoint& adj) { return Vars{Scale(adj.dy(), factor)}; });
 }
 
 Var AddScalar(const Var& x, double term) {
   return UnaryVar({"add scalar"}, UnaryOp::kAddScalar, x, {term},
-                  [](const Adjoint& adj) { return std::vector<Var>{adj.dy()}; });
+                  [](const Adjoint& adj) { return Vars{adj.dy()}; });
 }
 
 Var Exp(const Var& x) {
   return UnaryVar({"exp", true}, UnaryOp::kExp, x, {},
-                  [](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), adj.y())}; });
+                  [](const Adjoint& adj) { return Vars{Mul(adj.dy(), adj.y())}; });
 }
 
 Var Expm1(const Var& x) {
-  return UnaryVar({"expm1", true}, UnaryOp::kExpm1, x, {}, [](const Adjoint& adj) {
-    return std::vector<Var>{Mul(adj.dy(), AddScalar(adj.y(), 1.0))};
-  });
+  return UnaryVar({"expm1", true}, UnaryOp::kExpm1, x, {},
+                  [](const Adjoint& adj) { return Vars{Mul(adj.dy(), AddScalar(adj.y(), 1.0))}; });
 }
 
 Var Log(const Var& x) {
   return UnaryVar({"log"}, UnaryOp::kLog, x, {},
-                  [x](const Adjoint& adj) { return std::vector<Var>{Div(adj.dy(), x)}; });
+                  [x](const Adjoint& adj) { return Vars{Div(adj.dy(), x)}; });
 }
 
 Var Sqrt(const Var& x) {
-  return UnaryVar({"sqrt", true}, UnaryOp::kSqrt, x, {}, [](const Adjoint& adj) {
-    return std::vector<Var>{Scale(Div(adj.dy(), adj.y()), 0.5)};
-  });
+  return UnaryVar({"sqrt", true}, UnaryOp::kSqrt, x, {},
+                  [](const Adjoint& adj) { return Vars{Scale(Div(adj.dy(), adj.y()), 0.5)}; });
 }
 
 Var Square(const Var& x) {
-  return UnaryVar({"square"}, UnaryOp::kSquare, x, {}, [x](const Adjoint& adj) {
-    return std::vector<Var>{Scale(Mul(adj.dy(), x), 2.0)};
-  });
+  return UnaryVar({"square"}, UnaryOp::kSquare, x, {},
+                  [x](const Adjoint& adj) { return Vars{Scale(Mul(adj.dy(), x), 2.0)}; });
 }
 
 // The derivative of a constant is nothing, rather than 0 x^-1.
 Var Pow(const Var& x, double p) {
   return UnaryVar({"pow"}, UnaryOp::kPow, x, {p}, [x, p](const Adjoint& adj) {
-    return std::vector<Var>{p == 0 ? Var() : Mul(adj.dy(), Scale(Pow(x, p - 1.0), p))};
+    return Vars{p == 0 ? Var() : Mul(adj.dy(), Scale(Pow(x, p - 1.0), p))};
   });
 }
 
@@ -196,7 +192,7 @@ Var Pow(const Var& x, const Var& p) { return Exp(Mul(p, Log(x))); }
 
 Var Abs(const Var& x) {
   return UnaryVar({"abs"}, UnaryOp::kAbs, x, {},
-                  [x](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), Sign(x))}; });
+                  [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sign(x))}; });
 }
 
 namespace {
@@ -205,7 +201,7 @@ namespace {
 // second derivative with respect to y is zero, and with respect to d_y it is the same operation.
 Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
   return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
-    return std::vector<Var>{Var(), RectifierGrad(call, y, adj.dy())};
+    return Vars{Var(), RectifierGrad(call, y, adj.dy())};
   });
 }
 
@@ -213,7 +209,7 @@ Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
 
 Var Relu(const Var& x) {
   return UnaryVar({"relu", true}, UnaryOp::kRelu, x, {}, [](const Adjoint& adj) {
-    return std::vector<Var>{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.dy())};
+    return Vars{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.dy())};
   });
 }
 
@@ -223,7 +219,7 @@ Var LeakyRelu(const Var& x, double slope) {
   return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, {slope},
                   [slope](const Adjoint& adj) {
                     const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
-                    return std::vector<Var>{RectifierGrad(call, adj.y(), adj.dy())};
+                    return Vars{RectifierGrad(call, adj.y(), adj.dy())};
                   });
 }
 
@@ -231,19 +227,19 @@ Var ReluGrad(const Var& y, const Var& dy) { return RectifierGrad({BinaryOp::kRel
 
 Var Tanh(const Var& x) {  // 1 - y^2
   return UnaryVar({"tanh", true}, UnaryOp::kTanh, x, {}, [](const Adjoint& adj) {
-    return std::vector<Var>{Sub(adj.dy(), Mul(adj.dy(), Square(adj.y())))};
+    return Vars{Sub(adj.dy(), Mul(adj.dy(), Square(adj.y())))};
   });
 }
 
 Var Sigmoid(const Var& x) {  // y (1 - y)
   return UnaryVar({"sigmoid", true}, UnaryOp::kSigmoid, x, {}, [](const Adjoint& adj) {
-    return std::vector<Var>{Mul(adj.dy(), Sub(adj.y(), Square(adj.y())))};
+    return Vars{Mul(adj.dy(), Sub(adj.y(), Square(adj.y())))};
   });
 }
 
 Var Softplus(const Var& x) {
   return UnaryVar({"softplus"}, UnaryOp::kSoftplus, x, {},
-                  [x](const Adjoint& adj) { return std::vector<Var>{Mul(adj.dy(), Sigmoid(x))}; });
+                  [x](const Adjoint& adj) { return Vars{Mul(adj.dy(), Sigmoid(x))}; });
 }
 
 Var Silu(const Var& x) { return Mul(x, Sigmoid(x)); }
@@ -258,7 +254,7 @@ Var Clamp(const Var& x, double low, double high) {
   if (!Usable("clamp", {&x})) return Invalid({&x});
   if (!(low <= high)) return Fail(x, InvalidArgument("clamp: [{}, {}] is empty", low, high));
   return UnaryVar({"clamp"}, UnaryOp::kClamp, x, {low, high}, [x, low, high](const Adjoint& adj) {
-    return std::vector<Var>{Mul(adj.dy(), InRange(x, low, high))};
+    return Vars{Mul(adj.dy(), InRange(x, low, high))};
   });
 }
 

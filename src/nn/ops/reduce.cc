@@ -65,8 +65,8 @@ Var SumOver(const Var& x, const AxisSet& axes, Keep keep) {
   WithFloatType(x.dtype(), [&]<class T>(T) {
     ReduceSum(plan.layout, x.value().data<T>(), y.data<T>(), x.context().workers());
   });
-  const Rule rule = [shape = x.shape(), kept = plan.kept_as_one](const Adjoint& adj) {
-    return std::vector<Var>{BroadcastTo(Reshape(adj.dy(), kept), shape)};
+  const auto rule = [shape = x.shape(), kept = plan.kept_as_one](const Adjoint& adj) {
+    return Vars{BroadcastTo(Reshape(adj.dy(), kept), shape)};
   };
   return Record({"sum"}, std::move(y), {x}, rule);
 }
@@ -96,9 +96,9 @@ Var Extremum(const ExtremumCall& call, const Var& x, const AxisSet& axes, Keep k
     ReduceExtremum(plan.layout, x.value().data<T>(), y.data<T>(),
                    {call.sign, first.data<std::int32_t>()}, context.workers());
   });
-  const Rule rule = [shape = x.shape(), first](const Adjoint& adj) {
+  const auto rule = [shape = x.shape(), first](const Adjoint& adj) {
     const Var flat = Reshape(adj.dy(), {adj.dy().shape().elements()});
-    return std::vector<Var>{Reshape(ScatterAdd(flat, 0, first, shape.elements()), shape)};
+    return Vars{Reshape(ScatterAdd(flat, 0, first, shape.elements()), shape)};
   };
   return Record({call.name}, std::move(y), {x}, rule);
 }

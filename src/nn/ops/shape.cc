@@ -93,10 +93,9 @@ Var Reshape(const Var& x, Shape shape) {
   if (shape.elements() != x.shape().elements()) {
     return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
   }
-  return Record({"reshape"}, x.value().Reshaped(shape), {x},
-                [before = x.shape()](const Adjoint& adj) {
-                  return std::vector<Var>{Reshape(adj.dy(), before)};
-                });
+  return Record(
+      {"reshape"}, x.value().Reshaped(shape), {x},
+      [before = x.shape()](const Adjoint& adj) { return Vars{Reshape(adj.dy(), before)}; });
 }
 
 Var BroadcastTo(const Var& x, const Shape& shape) {
@@ -108,9 +107,8 @@ Var BroadcastTo(const Var& x, const Shape& shape) {
   const Broadcast plan = PlanBroadcast(shape, x.shape(), shape);
   Tensor y = x.context().Empty(shape, x.dtype());
   Copy({plan.extents, plan.strides[0], plan.strides[1]}, x, 0, y, 0);
-  return Record({"broadcast"}, std::move(y), {x}, [before = x.shape()](const Adjoint& adj) {
-    return std::vector<Var>{SumTo(adj.dy(), before)};
-  });
+  return Record({"broadcast"}, std::move(y), {x},
+                [before = x.shape()](const Adjoint& adj) { return Vars{SumTo(adj.dy(), before)}; });
 }
 
 Var Permute(const Var& x, std::span<const int> axes) {
@@ -139,7 +137,7 @@ Var Permute(const Var& x, std::span<const int> axes) {
   Copy(box, x, 0, y, 0);
   return Record({"permute"}, std::move(y), {x}, [inverse, rank](const Adjoint& adj) {
     const std::span<const int> back(inverse.data(), static_cast<std::size_t>(rank));
-    return std::vector<Var>{Permute(adj.dy(), back)};
+    return Vars{Permute(adj.dy(), back)};
   });
 }
 
@@ -160,7 +158,7 @@ Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
   MoveRows({axis, first, 0, count}, x, y);
   const std::int64_t after = x.shape()[axis] - end;
   return Record({"slice"}, std::move(y), {x}, [axis, begin, after](const Adjoint& adj) {
-    return std::vector<Var>{Pad(adj.dy(), axis, begin, after)};
+    return Vars{Pad(adj.dy(), axis, begin, after)};
   });
 }
 
@@ -174,7 +172,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
   Tensor y = Zeros(x, WithExtent(x.shape(), axis, before + extent + after));
   MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
   return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
-    return std::vector<Var>{Slice(adj.dy(), axis, before, before + extent)};
+    return Vars{Slice(adj.dy(), axis, before, before + extent)};
   });
 }
 
@@ -184,15 +182,15 @@ namespace {
 Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
   Context& context = parts[0].context();
   Tensor y = context.Empty(WithExtent(parts[0].shape(), axis, extent), parts[0].dtype());
-  std::vector<std::int64_t> ends = {0};
+  InlineVector<std::int64_t, 8> ends = {0};
   for (const Var& part : parts) {
     const std::int64_t count = part.shape()[axis];
     MoveRows({axis, 0, static_cast<std::size_t>(ends.back()), static_cast<std::size_t>(count)},
              part, y);
     ends.push_back(ends.back() + count);
   }
-  const Rule rule = [axis, ends](const Adjoint& adj) {
-    std::vector<Var> d(ends.size() - 1);
+  const auto rule = [axis, ends](const Adjoint& adj) {
+    Vars d(ends.size() - 1);
     for (std::size_t i = 0; i < d.size(); ++i) {
       if (adj.needs(i)) d[i] = Slice(adj.dy(), axis, ends[i], ends[i + 1]);
     }

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// A training step that repeats the one before allocates nothing: tensors come from the context's
+// pool, nodes of the graph and lists from its step memory, scratch is kept.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "nn/game.h"
+
+// Counts heap allocations of the whole program.
+static std::atomic<long> g_allocations{0};
+
+static void* CountedAllocate(std::size_t size, std::size_t alignment) {
+  ++g_allocations;
+  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (p == nullptr) std::abort();
+  return p;
+}
+void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return CountedAllocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace tilegrad::nn {
+namespace {
+
+// How often steps 3 to 8 allocate; the first two may take memory.
+template <class Step>
+long AllocationsLater(const Step& step) {
+  const long first = g_allocations;
+  step(0);
+  EXPECT_GT(g_allocations, first);  // the counter counts
+  step(1);
+  const long before = g_allocations;
+  for (std::uint64_t i = 2; i < 8; ++i) step(i);
+  return g_allocations - before;
+}
+
+template <class Network>
+long AllocationsOfTraining(Context& context, Network& net, const Shape& input) {
+  Adam adam(context, Parameters(net), {.learning_rate = 1e-3});
+  Rng rng(5);
+  Tensor image = context.Empty(input);
+  FillUniform(image, rng, 0, 1);
+  const Var x = Constant(context, image);
+  return AllocationsLater([&](std::uint64_t) {
+    const Var loss = Mean(Square(net.Forward(x, Mode::kTrain)));
+    const Status status = adam.Step(Grad(loss, adam.parameters()));
+    EXPECT_TRUE(status.ok()) << status.message();
+  });
+}
+
+class Allocation : public testing::TestWithParam<int> {};
+
+TEST_P(Allocation, NoneInTheGame) {
+  const Workers workers(GetParam());
+  Game game(workers);
+  EXPECT_EQ(AllocationsLater([&](std::uint64_t i) { game.Step(i); }), 0);
+}
+
+TEST_P(Allocation, NoneInConvUNet) {
+  const Workers workers(GetParam());
+  Context context(workers);
+  Rng rng(1);
+  ConvUNet net(context, {.base = 16, .depth = 3}, rng);
+  EXPECT_EQ(AllocationsOfTraining(context, net, {2, 3, 16, 16}), 0);
+}
+
+TEST_P(Allocation, NoneInAnEncoder) {
+  const Workers workers(GetParam());
+  Context context(workers);
+  Rng rng(1);
+  Sequential net;
+  const ConvOptions halve{.stride = 2, .padding = 2};
+  net.Add<Conv2dLayer>("conv1", context, ConvShape{4, 16, 5, halve}, rng);
+  net.Add<BatchNorm>("bn1", context, 16, BatchNormOptions{.relu = true});
+  net.Add<Conv2dLayer>("conv2", context, ConvShape{16, 32, 5, halve}, rng);
+  net.Add<Flatten>("flatten");
+  net.Add<LinearLayer>("fc1", context, LinearShape{.in = 512, .out = 40}, rng);
+  net.Add<BatchNorm>("bn2", context, 40, BatchNormOptions{.relu = true});
+  net.Add<LinearLayer>("fc2", context, LinearShape{.in = 40, .out = 9}, rng);
+  EXPECT_EQ(AllocationsOfTraining(context, net, {3, 4, 16, 16}), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Workers, Allocation, testing::Values(1, 2));
+
+}  // namespace
+}  // namespace tilegrad::nn

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// An adversarial game and a U-Net, small, for tests of whole training steps.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "nn/nn.h"
+
+namespace tilegrad::nn {
+
+// Every operation that a network of this library uses is in its step.
+class Game {
+ public:
+  explicit Game(const Workers& workers)
+      : context_(workers),
+        generator_(context_, {.noise = 9, .base = 6, .doublings = 2}, rng_),
+        critic_(
+            context_,
+            {.base = 5, .halvings = 2, .norm = Norm::kLayer, .padding_mode = PadMode::kCircular},
+            rng_),
+        judge_(context_, {.base = 4, .halvings = 2, .spectral = true}, rng_),
+        net_(context_, {.base = 5, .most = 11, .levels = 3, .resize = true, .output = &Sigmoid},
+             rng_),
+        adam_(context_, All(), {.learning_rate = 1e-3, .weight_decay = 1e-2}) {}
+
+  double Step(std::uint64_t step) {
+    Rng rng(3, step);
+    const Var noise = Random({3, 9}, rng), real = Random({3, 3, 16, 16}, rng);
+    const Var fake = generator_.Forward(noise, Mode::kTrain);
+    const Var painted = net_.Forward(real, Mode::kTrain);
+    const Var pooled = AvgPool2d(MaxPool2d(painted, {3, 2, 1}), {2, 2});
+    const Var larger = Resize(pooled, {7, 5}, ResizeMode::kBilinear);
+    const Var labels = Reshape(Softmax(Reshape(larger, {3, -1}), 1), larger.shape());
+    const Var loss = Mean(critic_.Forward(fake, Mode::kTrain)) + GradientPenalty(critic_, real) +
+                     Mean(Softplus(judge_.Forward(painted, Mode::kTrain))) + Mean(Square(labels)) +
+                     Mean(Elu(painted - real));
+    const auto gradients = Grad(loss, adam_.parameters());
+    const double scale = ClipFactor(GlobalNorm(context_, gradients), 1.0);
+    const Status status = adam_.Step(gradients, scale);
+    EXPECT_TRUE(status.ok()) << status.message();
+    return loss.item();
+  }
+
+  Bytes Encoded() { return EncodeSafetensors({adam_.State(), {}}).value(); }
+  MemoryStats memory() const { return context_.memory().stats(); }
+
+ private:
+  Var Random(const Shape& shape, Rng& rng) {
+    Tensor t = context_.Empty(shape);
+    FillUniform(t, rng, 0, 1);
+    return Constant(context_, t);
+  }
+  std::vector<NamedVar> All() {
+    std::vector<NamedVar> all;
+    int number = 0;
+    for (Module* module : std::initializer_list<Module*>{&generator_, &critic_, &judge_, &net_}) {
+      const std::string prefix = std::to_string(++number) + ".";
+      for (const NamedVar& p : Parameters(*module)) all.push_back({prefix + p.name, p.value});
+    }
+    return all;
+  }
+
+  Context context_;
+  Rng rng_{4};
+  Generator generator_;
+  Critic critic_, judge_;
+  UNet net_;
+  Adam adam_;
+};
+
+}  // namespace tilegrad::nn
