@@ -120,8 +120,11 @@ class Backward {
     const auto needs = Needs(node);
     // The output as a Var of this very node, so that a rule that uses it can be differentiated.
     const Var y = node.saved.empty() ? Var() : Var(context_, node.saved, node.shared_from_this());
-    const Vars d_inputs = node.rule(Adjoint(y, visit.d, needs));
+    // What was asked for must survive the rule, which may take its adjoint.
+    InlineVector<Var, 1> d = visit.wanted ? visit.d : std::move(visit.d);
     if (!visit.wanted) visit.d.clear();
+    const Vars d_inputs = node.rule(Adjoint(y, d, needs));
+    d.clear();
     for (std::size_t i = 0; i < d_inputs.size(); ++i) {
       if (needs[i] && d_inputs[i].valid()) {
         Deposit(node.edges[i].node.get(), node.edges[i].slot, d_inputs[i]);
@@ -148,7 +151,7 @@ class Backward {
     auto& sums = visits_[node].d;
     sums.resize(static_cast<std::size_t>(node->slots));
     Var& sum = sums[static_cast<std::size_t>(slot)];
-    sum = sum.valid() ? Add(sum, d) : d;
+    sum = sum.valid() ? Accumulated(std::move(sum), d) : d;
   }
 
   Context& context_;

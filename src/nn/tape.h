@@ -89,16 +89,18 @@ std::vector<Var> External(Context& context, ExternalOp op);
 // What a rule is given: the adjoints that arrived, and what is asked for.
 class Adjoint {
  public:
-  Adjoint(const Var& y, std::span<const Var> d_outputs, std::span<const std::uint8_t> needs)
+  Adjoint(const Var& y, std::span<Var> d_outputs, std::span<const std::uint8_t> needs)
       : y_(y), d_outputs_(d_outputs), needs_(needs) {}
   const Var& dy() const { return d_outputs_[0]; }
+  // dy() for an operation that may work in its memory: once, and dy() no more.
+  Var TakeDy() const { return std::move(d_outputs_[0]); }
   std::span<const Var> d_outputs() const { return d_outputs_; }
   const Var& y() const { return y_; }  // the output, if the operation saved it
   bool needs(std::size_t input) const { return needs_[input] != 0; }
 
  private:
   const Var& y_;
-  std::span<const Var> d_outputs_;
+  std::span<Var> d_outputs_;
   std::span<const std::uint8_t> needs_;
 };
 

@@ -54,6 +54,33 @@ TEST_F(Tape, IntermediateGradients) {
   EXPECT_EQ(d[1].item(), 32);
 }
 
+std::vector<double> Numbers(const Var& v) {
+  const auto numbers = v.value().span<double>();
+  return {numbers.begin(), numbers.end()};
+}
+
+// Rules may work in the memory of an adjoint, but not in one that somebody else still looks at.
+TEST_F(Tape, AdjointsThatOthersSeeAreLeftAlone) {
+  const Var x = Vector({-1, 2}), u = Vector({-4, 8});
+  const Var y = LeakyRelu(x, 0.5);
+  const auto asked = Grad(Sum(Square(y)), {y, x});
+  EXPECT_EQ(Numbers(asked[0]), (std::vector<double>{-1, 4}));
+  EXPECT_EQ(Numbers(asked[1]), (std::vector<double>{-0.5, 4}));
+
+  const auto shared = Grad(Sum(LeakyRelu(x, 0.5) + LeakyRelu(u, 0.25)), {x, u});
+  EXPECT_EQ(Numbers(shared[0]), (std::vector<double>{0.5, 1}));
+  EXPECT_EQ(Numbers(shared[1]), (std::vector<double>{0.25, 1}));
+
+  const Var d = Constant(context_, context_.From({2}, std::vector<double>{10, 100}));
+  const auto given = Grad(LeakyRelu(x, 0.5), {x}, {.d_output = d});
+  EXPECT_EQ(Numbers(given[0]), (std::vector<double>{5, 100}));
+  EXPECT_EQ(Numbers(d), (std::vector<double>{10, 100}));
+
+  const auto summed = Grad(LeakyRelu(x, 0.5) + x, {x}, {.d_output = d});
+  EXPECT_EQ(Numbers(summed[0]), (std::vector<double>{15, 200}));
+  EXPECT_EQ(Numbers(d), (std::vector<double>{10, 100}));
+}
+
 TEST_F(Tape, GivenAdjoint) {
   const Var x = Vector({1, 2});
   const Var d = Constant(context_, context_.From({2}, std::vector<double>{10, 100}));

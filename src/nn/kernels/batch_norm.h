@@ -48,7 +48,7 @@ struct BatchNormBackwardProblem {
   const T* mean = nullptr;
   const T* variance = nullptr;
   const T* d_y = nullptr;
-  T* d_x = nullptr;
+  T* d_x = nullptr;  // may be d_y
   T* d_gamma = nullptr;
   T* d_beta = nullptr;
 };

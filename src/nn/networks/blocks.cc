@@ -33,6 +33,10 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
   } else {
     net.Add<Conv2dLayer>(name + ".conv", context, shape, rng);
   }
+  if (block.norm == Norm::kBatch && block.activation == &Relu) {
+    net.Add<BatchNorm>(name + ".norm", context, shape.out, BatchNormOptions{.relu = true});
+    return;
+  }
   AddNorm(net, name + ".norm", context, block.norm, shape.out);
   if (block.activation != nullptr) net.Add<Activation>(name + ".act", block.activation);
 }

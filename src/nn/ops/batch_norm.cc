@@ -40,10 +40,10 @@ BatchNormParameters<T> ParametersOf(const Operands& o) {
   return {o.gamma.value().data<T>(), o.beta.value().data<T>(), o.options.epsilon, o.options.relu};
 }
 
-// The gradient in one pass; it cannot be differentiated.
+// The gradient in one pass, in dy's memory where nobody else sees it; it cannot be differentiated.
 Vars FusedGrad(const Operands& o, const BatchStatistics& statistics, const Var& dy) {
   Context& context = o.x.context();
-  Tensor dx = context.Empty(o.x.shape(), o.x.dtype());
+  Tensor dx = dy.value().unique() ? dy.value() : context.Empty(o.x.shape(), o.x.dtype());
   Tensor d_gamma = context.Empty(o.gamma.shape(), o.x.dtype());
   Tensor d_beta = context.Empty(o.gamma.shape(), o.x.dtype());
   WithFloatType(o.x.dtype(), [&]<class T>(T) {
@@ -108,7 +108,7 @@ BatchNormResult BatchNormTrain(const Var& x, const Var& gamma, const Var& beta,
   // The output is saved only for the sign that relu's derivative needs in a graph of gradients.
   const auto rule = [operands, statistics](const Adjoint& adj) {
     return operands.x.context().recording() ? ComposedGrad(operands, adj.y(), adj.dy())
-                                            : FusedGrad(operands, statistics, adj.dy());
+                                            : FusedGrad(operands, statistics, adj.TakeDy());
   };
   const OpInfo info{"batch norm", /*save_output=*/options.relu};
   return {Record(info, std::move(y), {x, gamma, beta}, rule), statistics.mean, statistics.variance};

@@ -57,9 +57,9 @@ void FillProblem(const Broadcast& broadcast, BinaryProblem<T>& problem) {
   problem.strides_b = broadcast.strides[1];
 }
 
-Tensor ComputeBinary(const BinaryCall& call, const Var& a, const Var& b, const Shape& shape) {
-  Tensor y = a.context().Empty(shape, a.dtype());
-  const Broadcast broadcast = PlanBroadcast(shape, a.shape(), b.shape());
+// Into y, which may be the memory of an operand of its shape.
+Tensor ComputeBinary(const BinaryCall& call, const Var& a, const Var& b, Tensor y) {
+  const Broadcast broadcast = PlanBroadcast(y.shape(), a.shape(), b.shape());
   WithFloatType(a.dtype(), [&]<class T>(T) {
     BinaryProblem<T> problem;
     problem.op = call.op;
@@ -80,8 +80,12 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
     return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
                                    a.shape().ToString(), b.shape().ToString()));
   }
-  return Record(info, ComputeBinary(call, a, b, shape), {a, b}, std::move(rule));
+  Tensor y = a.context().Empty(shape, a.dtype());
+  return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
 }
+
+// Whether an operation that is given `v` for good may write its result there.
+bool IsExpendable(const Var& v) { return v.value().unique() && !v.context().recording(); }
 
 // No gradient flows out of a mask.
 Var Mask(const char* name, BinaryOp op, const Var& a, const Var& b) {
@@ -199,9 +203,12 @@ namespace {
 
 // d_x of Relu and LeakyRelu from their output, whose sign is that of x. Piecewise linear: the
 // second derivative with respect to y is zero, and with respect to d_y it is the same operation.
-Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
+Var RectifierGrad(const BinaryCall& call, const Var& y, Var dy) {
+  if (Usable("rectifier gradient", {&y, &dy}) && IsExpendable(dy) && y.shape() == dy.shape()) {
+    return Constant(y.context(), ComputeBinary(call, y, dy, dy.value()));
+  }
   return BinaryVar({"rectifier gradient"}, call, Detach(y), dy, [call, y](const Adjoint& adj) {
-    return Vars{Var(), RectifierGrad(call, y, adj.dy())};
+    return Vars{Var(), RectifierGrad(call, y, adj.TakeDy())};
   });
 }
 
@@ -209,7 +216,7 @@ Var RectifierGrad(const BinaryCall& call, const Var& y, const Var& dy) {
 
 Var Relu(const Var& x) {
   return UnaryVar({"relu", true}, UnaryOp::kRelu, x, {}, [](const Adjoint& adj) {
-    return Vars{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.dy())};
+    return Vars{RectifierGrad({BinaryOp::kReluGrad}, adj.y(), adj.TakeDy())};
   });
 }
 
@@ -219,11 +226,21 @@ Var LeakyRelu(const Var& x, double slope) {
   return UnaryVar({"leaky relu", true}, UnaryOp::kLeakyRelu, x, {slope},
                   [slope](const Adjoint& adj) {
                     const BinaryCall call{BinaryOp::kLeakyReluGrad, slope};
-                    return Vars{RectifierGrad(call, adj.y(), adj.dy())};
+                    return Vars{RectifierGrad(call, adj.y(), adj.TakeDy())};
                   });
 }
 
-Var ReluGrad(const Var& y, const Var& dy) { return RectifierGrad({BinaryOp::kReluGrad}, y, dy); }
+Var ReluGrad(const Var& y, Var dy) {
+  return RectifierGrad({BinaryOp::kReluGrad}, y, std::move(dy));
+}
+
+Var Accumulated(Var sum, const Var& term) {
+  if (!Usable("accumulated", {&sum, &term}) || !IsExpendable(sum) ||
+      !(sum.shape() == term.shape())) {
+    return Add(sum, term);
+  }
+  return Constant(sum.context(), ComputeBinary({BinaryOp::kAdd}, sum, term, sum.value()));
+}
 
 Var Tanh(const Var& x) {  // 1 - y^2
   return UnaryVar({"tanh", true}, UnaryOp::kTanh, x, {}, [](const Adjoint& adj) {

@@ -48,8 +48,12 @@ inline Var operator-(const Var& x, double s) { return AddScalar(x, -s); }
 inline Var operator+(double s, const Var& x) { return AddScalar(x, s); }
 inline Var operator-(double s, const Var& x) { return AddScalar(Neg(x), s); }
 
-// The adjoint of Relu from its output y: y > 0 ? dy : 0.
-Var ReluGrad(const Var& y, const Var& dy);
+// The adjoint of Relu from its output y: y > 0 ? dy : 0. In dy's memory where nobody else sees it
+// and nothing is recorded.
+Var ReluGrad(const Var& y, Var dy);
+
+// sum + term, equal shapes, in sum's memory where nobody else sees it and nothing is recorded.
+Var Accumulated(Var sum, const Var& term);
 
 // Masks, without gradient: 1 where the relation holds, else 0. Broadcast like the others.
 Var Greater(const Var& a, const Var& b);

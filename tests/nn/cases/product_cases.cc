@@ -4,24 +4,21 @@
 namespace tilegrad::nn {
 namespace {
 
-void AddConvolutions(CaseList& list) {
-  const std::int64_t n = list.Extent(), in = list.Extent(), out = list.Extent();
-  const ImageSize kernel{list.Extent(), list.Extent()};
-  const ConvOptions options{static_cast<int>(list.Extent(3)), static_cast<int>(list.rng.Below(3))};
-  const ImageSize size{kernel.height + list.Extent(), kernel.width + list.Extent(9)};
+void AddConvolutions(CaseList& list, const Shape& x, const Shape& w, const ConvOptions& options) {
+  const ImageSize size{x[2], x[3]}, kernel{w[2], w[3]};
   const auto extent = [&](std::int64_t from, std::int64_t window) {
     return (from + 2 * options.padding - window) / options.stride + 1;
   };
-  const Shape x = {n, in, size.height, size.width}, w = {out, in, kernel.height, kernel.width},
-              y = {n, out, extent(size.height, kernel.height), extent(size.width, kernel.width)};
-  const auto terms = std::max(w.Product(1, 4), std::max(n * y[2] * y[3], out * w.Product(2, 4)));
+  const Shape y = {x[0], w[0], extent(x[2], w[2]), extent(x[3], w[3])};
+  const auto terms =
+      std::max(w.Product(1, 4), std::max(y[0] * y[2] * y[3], w[0] * w.Product(2, 4)));
   const int roundings = 16 + 3 * static_cast<int>(terms);
   const std::string what = " " + x.ToString() + w.ToString() + " stride " +
                            std::to_string(options.stride) + " padding " +
                            std::to_string(options.padding);
   list.Add({"conv2d" + what,
             [=](const Inputs& v) { return Conv2d(v[0], v[1], v[2], options); },
-            {{x}, {w}, {{out}}},
+            {{x}, {w}, {{w[0]}}},
             roundings});
   list.Add({"conv2d input gradient" + what,
             [=](const Inputs& v) { return Conv2dInputGrad(v[0], v[1], size, options); },
@@ -31,6 +28,20 @@ void AddConvolutions(CaseList& list) {
             [=](const Inputs& v) { return Conv2dWeightGrad(v[0], v[1], kernel, options); },
             {{x}, {y}},
             roundings});
+}
+
+void AddRandomConvolutions(CaseList& list) {
+  const std::int64_t n = list.Extent(), in = list.Extent(), out = list.Extent();
+  const Shape w = {out, in, list.Extent(), list.Extent()};
+  const ConvOptions options{static_cast<int>(list.Extent(3)), static_cast<int>(list.rng.Below(3))};
+  AddConvolutions(list, {n, in, w[2] + list.Extent(), w[3] + list.Extent(9)}, w, options);
+}
+
+// Channels enough for kernels/conv2d_winograd.h.
+void AddWinogradConvolutions(CaseList& list) {
+  AddConvolutions(list, {1, 16, 5, 6}, {16, 16, 3, 3}, {.stride = 1, .padding = 1});
+  AddConvolutions(list, {1, 17, 7, 8}, {16, 17, 4, 4}, {.stride = 2, .padding = 1});
+  AddConvolutions(list, {1, 16, 6, 7}, {18, 16, 5, 5}, {.stride = 2, .padding = 2});
 }
 
 const char* NameOf(PadMode mode) {
@@ -83,7 +94,8 @@ void AddProductCases(CaseList& list) {
             [](const Inputs& v) { return Linear(v[0], v[1], Var()); },
             {{{3, 4}}, {{5, 4}}},
             64});
-  for (int trial = 0; trial < 8; ++trial) AddConvolutions(list);
+  for (int trial = 0; trial < 8; ++trial) AddRandomConvolutions(list);
+  AddWinogradConvolutions(list);
   for (const PadMode mode :
        {PadMode::kZero, PadMode::kCircular, PadMode::kReflect, PadMode::kReplicate}) {
     AddPaddedConvolution(list, mode);
