@@ -96,8 +96,9 @@ bool BackwardPlan::staged() const {
          to_eye || (wishes.d_depth && geometry);
 }
 
-BackwardPlan PlanBackward(const SceneParts& parts, const GradientWishes& wishes) {
+BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
   BackwardPlan plan;
+  wishes.d_uv = wishes.d_uv && parts.uvs;
   plan.parts = parts, plan.wishes = wishes;
   const bool geometry = wishes.positions || wishes.camera;
   const bool derived = parts.model.normals != NormalKind::kGiven;

@@ -97,7 +97,7 @@ struct BackwardPlan {
 };
 
 ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request);
-BackwardPlan PlanBackward(const SceneParts& parts, const GradientWishes& wishes);
+BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes);
 
 // One stage of a call, as it was run.
 struct StageReport {

@@ -96,15 +96,14 @@ template <class T>
 void SampleAdjointRef(const PyramidRef<T>& pyramid, const T& u, const T& v, float level,
                       const std::array<T, 3>& d_color, std::span<T> d_uv, std::span<T> d_texels) {
   const LevelMix mix = MixLevels(level, pyramid.sizes.size());
-  const auto add = [&](std::size_t l, float share) {
-    if (share == 0) return;
-    const std::array<T, 3> d = {T(share) * d_color[0], T(share) * d_color[1],
-                                T(share) * d_color[2]};
+  const auto add = [&](std::size_t l, const T& share) {
+    if (share == T(0)) return;
+    const std::array<T, 3> d = {share * d_color[0], share * d_color[1], share * d_color[2]};
     SampleLevelAdjointRef<T>(
         pyramid.Level(l), u, v, d, d_uv,
         d_texels.empty() ? d_texels : d_texels.subspan(pyramid.First(l), pyramid.Size(l)));
   };
-  add(mix.fine, 1 - mix.share), add(mix.coarse, mix.share);
+  add(mix.fine, T(1) - T(mix.share)), add(mix.coarse, T(mix.share));
 }
 
 }  // namespace tilegrad::shade

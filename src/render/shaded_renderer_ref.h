@@ -1,0 +1,422 @@
+// SPDX-License-Identifier: Apache-2.0
+// The naive shaded renderer: renderer_ref.h with every attribute interpolated at every corner, and
+// shade_pixel_ref.h at every pixel. It is the truth that tests hold the ShadedRenderer to, with T =
+// double or std::complex<double> (complex step). One scene at a time; inputs are not checked.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/renderer_ref.h"
+#include "render/shade_pixel_ref.h"
+#include "render/shade_plan.h"
+#include "render/uv_level.h"
+#include "shade/mesh_normals_ref.h"
+
+namespace tilegrad {
+
+// A scene ready for its pixels.
+template <class T>
+struct ShadedRefScene {
+  const ShadedSceneT<T>* scene;
+  VaryingSet set;                             // of `packed`, at corners
+  std::vector<shade::UnitVector<T>> normals;  // derived: [V] or [F]
+  std::vector<T> packed;                      // [F,3,C]
+  SceneViewT<T> view;                         // of the packed attributes
+  PreparedScene<T> prepared;
+  std::vector<shade::PyramidRef<T>> pyramids;
+  ShadeUniforms<T> uniforms;
+  std::vector<T> inverse_lengths;  // of the lights' directions
+};
+
+// Rows of a stream that the corner `i` of the faces has: the scene's arrays, or their gradients.
+template <class T>
+std::size_t StreamRow(const ShadedSceneT<T>& scene, AttributeRate rate, std::size_t i) {
+  return rate == AttributeRate::kCorner ? i : static_cast<std::size_t>(scene.faces[i]);
+}
+
+// Calls visit(varying, rate, stream [rows][width]) for the streams of a scene, given as the scene's
+// arrays or as gradients of them. Normals that are derived are left out.
+template <class T, class Streams, class Visit>
+void ForEachRefStream(const ShadedSceneT<T>& scene, const Streams& streams, const Visit& visit) {
+  visit(Varying::kColor, scene.colors.rate, streams.colors);
+  visit(Varying::kUv, scene.uvs.rate, streams.uvs);
+  visit(Varying::kPosition, AttributeRate::kVertex, streams.positions);
+  visit(Varying::kLightDirection, AttributeRate::kVertex, streams.light_directions);
+  visit(Varying::kUser, scene.rate, streams.attributes);
+  if (scene.model.normals == NormalKind::kGiven) {
+    visit(Varying::kNormal, scene.normals.rate, streams.normals);
+  }
+}
+
+template <class T>
+struct RefStreams {
+  std::span<T> positions, colors, uvs, normals, light_directions, attributes;
+};
+
+template <class T>
+RefStreams<const T> StreamsOf(const ShadedSceneT<T>& s) {
+  return {s.positions,      s.colors.values,    s.uvs.values,
+          s.normals.values, s.light_directions, s.attributes};
+}
+
+template <class T>
+std::size_t RefNormalRow(const ShadedSceneT<T>& scene, std::size_t corner) {
+  return scene.model.normals == NormalKind::kFlat ? corner / 3
+                                                  : static_cast<std::size_t>(scene.faces[corner]);
+}
+
+template <class T>
+void PackRef(ShadedRefScene<T>* s) {
+  const ShadedSceneT<T>& scene = *s->scene;
+  s->set.rate = AttributeRate::kCorner, s->set.user_channels = scene.channels;
+  s->set.has = {!scene.colors.values.empty(),
+                !scene.uvs.values.empty(),
+                true,
+                true,
+                !scene.light_directions.empty(),
+                true};
+  const auto channels = static_cast<std::size_t>(s->set.channels());
+  s->packed.assign(scene.faces.size() * channels, T(0));
+  ForEachRefStream(scene, StreamsOf(scene), [&](Varying v, AttributeRate rate, auto stream) {
+    const auto width = static_cast<std::size_t>(s->set.width(v));
+    for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+      for (std::size_t c = 0; c < width && !stream.empty(); ++c) {
+        s->packed[i * channels + static_cast<std::size_t>(s->set.first(v)) + c] =
+            stream[StreamRow(scene, rate, i) * width + c];
+      }
+    }
+  });
+  if (scene.model.normals == NormalKind::kGiven) return;
+  const auto first = static_cast<std::size_t>(s->set.first(Varying::kNormal));
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const auto& unit = s->normals[RefNormalRow(scene, i)].unit;
+    std::copy(unit.begin(), unit.end(),
+              s->packed.begin() + static_cast<std::ptrdiff_t>(i * channels + first));
+  }
+}
+
+template <class T>
+void SetUniformsRef(ShadedRefScene<T>* s) {
+  const ShadedSceneT<T>& scene = *s->scene;
+  ShadeUniforms<T>& u = s->uniforms;
+  u.surfaces.assign(scene.surfaces.begin(), scene.surfaces.end());
+  if (u.surfaces.empty()) u.surfaces.resize(1);
+  if (scene.surfaces.empty()) u.surfaces[0].texture = scene.textures.empty() ? -1 : 0;
+  for (const auto& light : scene.lights) {
+    const auto unit = shade::NormalizeScaledRef(light.direction);
+    u.lights.push_back({unit.unit, light.intensity});
+    s->inverse_lengths.push_back(unit.inverse_length);
+  }
+  if (scene.model.lighting == Lighting::kSphericalHarmonics) {
+    u.sh = shade::ShPolynomialOf<T>(scene.model.sh_basis, scene.sh);
+  }
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      u.eye[c] -= scene.camera.rotation[3 * r + c] * scene.camera.translation[r];
+    }
+  }
+  for (const auto& texture : scene.textures) s->pyramids.emplace_back(texture);
+}
+
+template <class T>
+void PrepareShadedRef(const ShadedSceneT<T>& scene, const RenderOptions& options,
+                      ShadedRefScene<T>* s) {
+  s->scene = &scene;
+  const shade::TriangleMeshT<T> mesh{scene.positions, scene.faces};
+  if (scene.model.normals == NormalKind::kSmooth) {
+    s->normals.resize(scene.positions.size() / 3);
+    shade::SmoothNormalsRef<T>(mesh, s->normals);
+  } else if (scene.model.normals == NormalKind::kFlat) {
+    s->normals.resize(scene.faces.size() / 3);
+    shade::FlatNormalsRef<T>(mesh, s->normals);
+  }
+  PackRef(s);
+  SetUniformsRef(s);
+  s->view = {scene.positions,        scene.faces, s->packed, s->set.channels(),
+             AttributeRate::kCorner, scene.camera};
+  PrepareRef(s->view, options, &s->prepared);
+}
+
+// A foreground pixel: where it is, and what is interpolated there.
+template <class T>
+struct RefPixel {
+  std::size_t face, index;  // face of the prepared mesh; pixel of the image
+  T px, py;
+  raster::FacePlane<T> plane;
+  raster::PixelWeights<T> weights;
+  std::vector<T> values;
+};
+
+template <class T>
+RefPixel<T> InterpolatePixelRef(const ShadedRefScene<T>& s, const RenderOptions& options, int j,
+                                int i, std::int32_t face) {
+  RefPixel<T> out;
+  out.face = static_cast<std::size_t>(face);
+  out.index = static_cast<std::size_t>(i) * static_cast<std::size_t>(options.width) +
+              static_cast<std::size_t>(j);
+  out.px = T(j) + T(0.5), out.py = T(i) + T(0.5);
+  out.plane = raster::MakeFacePlane(s.prepared.mesh, out.face);
+  out.weights = raster::PixelWeightsRef(s.prepared.mesh, out.plane, out.face, options.interpolation,
+                                        out.px, out.py);
+  out.values.resize(static_cast<std::size_t>(s.set.channels()));
+  raster::InterpolateRef<T>(s.prepared.mesh, s.prepared.attributes, out.face, out.weights,
+                            out.values);
+  return out;
+}
+
+// Calls visit(varying's first channel, its numbers) for the parts of a ShadePixel.
+template <class T, class Visit>
+void ForEachPixelPart(const VaryingSet& set, ShadePixel<T>* p, const Visit& visit) {
+  if (set[Varying::kColor]) visit(set.first(Varying::kColor), std::span<T>(p->color));
+  if (set[Varying::kUv]) visit(set.first(Varying::kUv), std::span<T>(p->uv));
+  visit(set.first(Varying::kNormal), std::span<T>(p->normal));
+  visit(set.first(Varying::kPosition), std::span<T>(p->position));
+  if (set[Varying::kLightDirection]) {
+    visit(set.first(Varying::kLightDirection), std::span<T>(p->light_direction));
+  }
+}
+
+template <class T>
+ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& options,
+                           const RefPixel<T>& at) {
+  ShadePixel<T> p;
+  ForEachPixelPart(s.set, &p, [&](int first, std::span<T> part) {
+    std::copy_n(at.values.begin() + first, part.size(), part.begin());
+  });
+  const auto& mesh = s.prepared.mesh;
+  const auto source = static_cast<std::size_t>(mesh.source_face[at.face]);
+  const auto& surfaces = s.scene->face_surfaces;
+  p.surface = surfaces.empty() ? 0 : static_cast<std::size_t>(surfaces[source]);
+  if (s.scene->model.two_sided) {
+    const auto c = raster::CornersOf(mesh, at.face);
+    const T area = (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]);
+    p.side = RealPart(area) <= 0 ? 1.0f : -1.0f;
+  }
+  const int texture = s.uniforms.surfaces[p.surface].texture;
+  if (texture < 0) return p;
+  const auto& view = s.pyramids[static_cast<std::size_t>(texture)].texture;
+  const double uv[2] = {static_cast<double>(RealPart(p.uv[0])),
+                        static_cast<double>(RealPart(p.uv[1]))};
+  const int size[2] = {view.width, view.height};
+  p.level = UvLevel(UvPlanesOf(mesh, s.prepared.attributes, s.set.first(Varying::kUv), at.face,
+                               options.interpolation),
+                    RealPart(at.px), RealPart(at.py), uv, size);
+  return p;
+}
+
+// Calls visit(pixel) for each foreground pixel.
+template <class T, class Visit>
+void ForEachPixelRef(const ShadedRefScene<T>& s, const RenderOptions& options,
+                     std::span<const std::int32_t> face_ids, const Visit& visit) {
+  for (int i = 0; i < options.height; ++i) {
+    for (int j = 0; j < options.width; ++j) {
+      const std::int32_t id = face_ids[static_cast<std::size_t>(i * options.width + j)];
+      const std::int32_t face = raster::PieceAt(s.prepared.mesh, id, j, i);
+      if (face != raster::kNoFace) visit(InterpolatePixelRef(s, options, j, i, face));
+    }
+  }
+}
+
+template <class T>
+void ShadePixelIntoFrame(const ShadedRefScene<T>& s, const RenderOptions& options,
+                         const RefPixel<T>& at, ShadedFrameT<T>* frame) {
+  const ShadePixel<T> p = ShadePixelOf(s, options, at);
+  const PixelValues<T> v = PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids).Forward(p);
+  const std::size_t plane = frame->face_ids.size();
+  const auto write = [&](AlignedVector<T>& image, std::span<const T> values) {
+    for (std::size_t c = 0; c < values.size() && !image.empty(); ++c) {
+      image[c * plane + at.index] = values[c];
+    }
+  };
+  write(frame->color, v.color), write(frame->normals, v.normal.unit), write(frame->uv, p.uv);
+  const auto user = static_cast<std::size_t>(s.set.first(Varying::kUser));
+  write(frame->attributes, std::span<const T>(at.values).subspan(user));
+  if (!frame->depth.empty()) {
+    frame->depth[at.index] =
+        T(1) / raster::MakeDepthPlane(s.prepared.mesh, at.face).At(at.px, at.py);
+  }
+}
+
+// All images that `request` asks for, with visibility given as ids of the scene's faces [H,W].
+template <class T>
+void ShadedRenderRef(const ShadedSceneT<T>& scene, const RenderOptions& options,
+                     const ShadedRequest& request, std::span<const std::int32_t> face_ids,
+                     ShadedFrameT<T>* frame) {
+  ShadedRefScene<T> s;
+  PrepareShadedRef(scene, options, &s);
+  SizeFrame(1, scene.channels, options, request, frame);
+  frame->face_ids.assign(face_ids.begin(), face_ids.end());
+  const std::size_t plane = face_ids.size();
+  frame->color.assign(request.color ? 3 * plane : 0, T(0));
+  frame->normals.assign(request.normals ? 3 * plane : 0, T(0));
+  frame->uv.assign(request.uv ? 2 * plane : 0, T(0));
+  std::fill(frame->attributes.begin(), frame->attributes.end(), T(0));
+  std::fill(frame->depth.begin(), frame->depth.end(), T(std::numeric_limits<double>::infinity()));
+  ForEachPixelRef(s, options, face_ids,
+                  [&](const RefPixel<T>& at) { ShadePixelIntoFrame(s, options, at, frame); });
+  for (std::size_t k = 0; k < plane && !frame->alpha.empty(); ++k) {
+    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
+    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
+    frame->alpha[k] = face_ids[k] >= 0 ? T(1) : BackgroundAlphaRef(s.prepared, options, px, py);
+  }
+}
+
+// Gradients of a scene before they are brought back to its arrays.
+template <class T>
+struct ShadedRefGradients {
+  PreparedGradients<T> prepared;
+  ShadeUniforms<T> uniforms;
+  shade::Vec3<T> depth_axis = {};
+  T depth_shift = T(0);
+
+  explicit ShadedRefGradients(const ShadedRefScene<T>& s) : prepared(s.view, s.prepared) {
+    uniforms.surfaces.resize(s.uniforms.surfaces.size());
+    for (auto& surface : uniforms.surfaces) {
+      surface.base_color = surface.ambient = surface.diffuse = surface.specular = {};
+      surface.shininess = T(0);
+    }
+    uniforms.lights.resize(s.uniforms.lights.size());
+    for (const auto& pyramid : s.pyramids) {
+      uniforms.texels.emplace_back(pyramid.texels.size(), T(0));
+    }
+  }
+};
+
+// Adds the adjoint of one foreground pixel.
+template <class T>
+void ShadePixelBackward(const ShadedRefScene<T>& s, const RenderOptions& options,
+                        const ShadedFrameGradientsT<T>& d_frame, const RefPixel<T>& at,
+                        ShadedRefGradients<T>* d) {
+  const std::size_t plane =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  const auto read = [&](std::span<const T> image, std::span<T> out) {
+    for (std::size_t c = 0; c < out.size(); ++c) {
+      out[c] = image.empty() ? T(0) : image[c * plane + at.index];
+    }
+  };
+  std::vector<T> d_values(at.values.size(), T(0));
+  read(d_frame.attributes,
+       std::span(d_values).subspan(static_cast<std::size_t>(s.set.first(Varying::kUser))));
+  shade::Vec3<T> d_color, d_normal;
+  std::array<T, 2> d_uv;
+  std::array<T, 1> d_depth;
+  read(d_frame.color, d_color), read(d_frame.normals, d_normal), read(d_frame.uv, d_uv);
+  read(d_frame.depth, d_depth);
+  const ShadePixel<T> p = ShadePixelOf(s, options, at);
+  ShadePixel<T> d_p;
+  d_p.color = {}, d_p.uv = d_uv;
+  PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids)
+      .Backward(p, d_color, d_normal, &d_p, &d->uniforms);
+  for (std::size_t c = 0; c < 3; ++c) {
+    d_p.position[c] -= s.scene->camera.rotation[6 + c] * d_depth[0];
+    d->depth_axis[c] -= p.position[c] * d_depth[0];
+  }
+  d->depth_shift -= d_depth[0];
+  ForEachPixelPart(s.set, &d_p, [&](int first, std::span<T> part) {
+    for (std::size_t c = 0; c < part.size(); ++c) {
+      d_values[static_cast<std::size_t>(first) + c] += part[c];
+    }
+  });
+  raster::InterpolateRefBackward<T>(s.prepared.mesh, s.prepared.attributes, at.plane, at.face,
+                                    options.interpolation, at.weights, d_values, d->prepared.screen,
+                                    d->prepared.attributes);
+}
+
+// From packed attributes to the scene's arrays; d_positions is complete.
+template <class T>
+void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::span<T> d_positions,
+               ShadedGradientsT<T>* d_scene) {
+  const ShadedSceneT<T>& scene = *s.scene;
+  const auto channels = static_cast<std::size_t>(s.set.channels());
+  for (const auto stream : {d_scene->colors, d_scene->uvs, d_scene->normals,
+                            d_scene->light_directions, d_scene->attributes}) {
+    std::fill(stream.begin(), stream.end(), T(0));
+  }
+  const RefStreams<T> streams{d_positions,      d_scene->colors,           d_scene->uvs,
+                              d_scene->normals, d_scene->light_directions, d_scene->attributes};
+  ForEachRefStream(scene, streams, [&](Varying v, AttributeRate rate, std::span<T> stream) {
+    const auto width = static_cast<std::size_t>(s.set.width(v));
+    for (std::size_t i = 0; i < scene.faces.size() && !stream.empty(); ++i) {
+      for (std::size_t c = 0; c < width; ++c) {
+        stream[StreamRow(scene, rate, i) * width + c] +=
+            d_packed[i * channels + static_cast<std::size_t>(s.set.first(v)) + c];
+      }
+    }
+  });
+  if (scene.model.normals == NormalKind::kGiven) return;
+  std::vector<shade::Vec3<T>> d_units(s.normals.size());
+  const auto first = static_cast<std::size_t>(s.set.first(Varying::kNormal));
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      d_units[RefNormalRow(scene, i)][c] += d_packed[i * channels + first + c];
+    }
+  }
+  const shade::TriangleMeshT<T> mesh{scene.positions, scene.faces};
+  if (scene.model.normals == NormalKind::kSmooth) {
+    shade::SmoothNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
+  } else {
+    shade::FlatNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
+  }
+}
+
+template <class T>
+void UniformsBackRef(const ShadedRefScene<T>& s, const ShadedRefGradients<T>& d,
+                     ShadedGradientsT<T>* d_scene) {
+  const ShadeUniforms<T>& u = d.uniforms;
+  std::copy_n(u.surfaces.begin(), d_scene->surfaces.size(), d_scene->surfaces.begin());
+  for (std::size_t k = 0; k < d_scene->lights.size(); ++k) {
+    d_scene->lights[k] = {{}, u.lights[k].intensity};
+    shade::NormalizeAdjointRef<T>({s.uniforms.lights[k].direction, s.inverse_lengths[k]},
+                                  u.lights[k].direction, d_scene->lights[k].direction);
+  }
+  std::fill(d_scene->sh.begin(), d_scene->sh.end(), T(0));
+  if (!d_scene->sh.empty()) {
+    shade::ShPolynomialAdjoint<T>(s.scene->model.sh_basis, u.sh, d_scene->sh);
+  }
+  for (std::size_t t = 0; t < d_scene->textures.size(); ++t) {
+    std::vector<T> texels = u.texels[t];
+    s.pyramids[t].Fold(texels);
+    std::copy_n(texels.begin(), d_scene->textures[t].size(), d_scene->textures[t].begin());
+  }
+  const CameraT<T>& camera = s.scene->camera;
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      d_scene->d_camera.rotation[3 * r + c] -= camera.translation[r] * u.eye[c];
+      d_scene->d_camera.translation[r] -= camera.rotation[3 * r + c] * u.eye[c];
+    }
+    d_scene->d_camera.rotation[6 + r] += d.depth_axis[r];
+  }
+  d_scene->d_camera.translation[2] += d.depth_shift;
+}
+
+// As ShadedRenderer::Backward, for one image. d_scene->d_camera is always filled.
+template <class T>
+void ShadedRenderRefBackward(const ShadedSceneT<T>& scene, const RenderOptions& options,
+                             std::span<const std::int32_t> face_ids,
+                             const ShadedFrameGradientsT<T>& d_frame,
+                             ShadedGradientsT<T>* d_scene) {
+  ShadedRefScene<T> s;
+  PrepareShadedRef(scene, options, &s);
+  ShadedRefGradients<T> d(s);
+  ForEachPixelRef(s, options, face_ids,
+                  [&](const RefPixel<T>& at) { ShadePixelBackward(s, options, d_frame, at, &d); });
+  for (std::size_t k = 0; k < face_ids.size() && !d_frame.alpha.empty(); ++k) {
+    if (face_ids[k] >= 0) continue;
+    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
+    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
+    BackgroundAlphaRefBackward(s.prepared, options, px, py, d_frame.alpha[k], &d.prepared);
+  }
+  std::vector<T> d_positions(scene.positions.size(), T(0)), d_packed(s.packed.size(), T(0));
+  SceneGradientsT<T> d_view{d_positions, d_packed, true, {}};
+  PrepareRefBackward(s.view, options, s.prepared, d.prepared, &d_view);
+  d_scene->d_camera = d_view.d_camera;
+  UnpackRef<T>(s, d_packed, d_positions, d_scene);
+  std::copy_n(d_positions.begin(), d_scene->positions.size(), d_scene->positions.begin());
+  UniformsBackRef(s, d, d_scene);
+}
+
+}  // namespace tilegrad
