@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shading against numbers that other programs have made (the independent test data; skipped where
+// it is absent): texture lookups, spherical harmonics, Phong and Lambert.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "shade/combine_ref.h"
+#include "shade/lambert_ref.h"
+#include "shade/phong_ref.h"
+#include "shade/spherical_harmonics_ref.h"
+#include "shade/texture_ref.h"
+#include "support/shared_data.h"
+
+namespace tilegrad::shade {
+namespace {
+
+using Json = nlohmann::json;
+using Vector = std::vector<double>;
+
+std::optional<Json> Load(const std::string& name) {
+  const auto path = SharedFile("vectors/" + name);
+  if (!path) return std::nullopt;
+  std::ifstream in(*path);
+  return Json::parse(in);
+}
+
+#define LOAD_OR_SKIP(json, name)                              \
+  const auto loaded = Load(name);                             \
+  if (!loaded) GTEST_SKIP() << name << " is not to be found"; \
+  const Json& json = *loaded
+
+// Both sides are in double; the data has 17 digits.
+constexpr double kTolerance = 1e-12;
+
+// [channel][row][column] to ours.
+Vector Interleave(const Json& planes) {
+  Vector out;
+  for (std::size_t y = 0; y < planes[0].size(); ++y) {
+    for (std::size_t x = 0; x < planes[0][0].size(); ++x) {
+      for (const Json& plane : planes) out.push_back(plane[y][x]);
+    }
+  }
+  return out;
+}
+
+struct OwnedTexture {
+  Vector texels;
+  TextureViewT<double> view;
+
+  OwnedTexture(const Json& planes, Wrap wrap, Filter filter) : texels(Interleave(planes)) {
+    view = {texels,
+            static_cast<int>(planes[0][0].size()),
+            static_cast<int>(planes[0].size()),
+            static_cast<int>(planes.size()),
+            wrap,
+            filter};
+  }
+};
+
+Vector Sample(const OwnedTexture& texture, const Json& uv) {
+  Vector out(static_cast<std::size_t>(texture.view.channels));
+  SampleLevelRef<double>(texture.view, uv[0], uv[1], out);
+  return out;
+}
+
+void ExpectNear(const Vector& got, const Json& expected, const std::string& what,
+                double tolerance = kTolerance) {
+  ASSERT_EQ(got.size(), expected.size()) << what;
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    EXPECT_NEAR(got[i], expected[i].get<double>(), tolerance) << what << " " << i;
+  }
+}
+
+// The expected numbers are whole or quarters by construction.
+TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
+  LOAD_OR_SKIP(json, "05_texture_mapping.json");
+  const Json& textures = json.at("kaolin_test_texture");
+  for (const auto& [filter, name] :
+       {std::pair{Filter::kNearest, "nearest"}, std::pair{Filter::kBilinear, "bilinear"}}) {
+    for (std::size_t b = 0; b < textures.size(); ++b) {
+      const OwnedTexture texture(Json::array({textures[b]}), Wrap::kClamp, filter);
+      const auto check = [&](const Json& uvs, const Json& expected, const char* what) {
+        for (std::size_t i = 0; i < uvs.size(); ++i) {
+          EXPECT_NEAR(Sample(texture, uvs[i])[0], expected[i].get<double>(), 1e-10)
+              << what << " " << name << " " << b << " " << i;
+        }
+      };
+      check(json.at("kaolin_test_sparse_uv")[b],
+            json.at(std::string("kaolin_test_sparse_") + name)[b], "sparse");
+      for (const Json& row : json.at("kaolin_test_dense_uv")[b]) {
+        check(row, json.at(std::string("kaolin_test_dense_") + name + "_both_rows")[b], "dense");
+      }
+    }
+  }
+}
+
+// Returns at how many points the gradient of v is no number to compare: a whole v jumps between the
+// last row and the first, and the other program differentiates from the last row into the zeros
+// that it sees beyond, whose own weight is 0. We take the texel itself there: 0.
+int CheckTextureBlock(const Json& json, const char* block, Wrap wrap) {
+  int jumps = 0;
+  const Json &expected = json.at(block), &uvs = json.at("random_uv");
+  const OwnedTexture nearest(json.at("random_texture"), wrap, Filter::kNearest);
+  const OwnedTexture bilinear(json.at("random_texture"), wrap, Filter::kBilinear);
+  Vector d_texels(bilinear.texels.size());
+  for (std::size_t i = 0; i < uvs.size(); ++i) {
+    ExpectNear(Sample(nearest, uvs[i]), expected.at("nearest")[i], "nearest");
+    ExpectNear(Sample(bilinear, uvs[i]), expected.at("bilinear")[i], "bilinear");
+    Vector d_uv(2);
+    const Vector d_color = json.at("random_grad_out")[i];
+    SampleLevelAdjointRef<double>(bilinear.view, uvs[i][0], uvs[i][1], d_color, d_uv, d_texels);
+    const Json& d_expected = expected.at("bilinear_grad_uv")[i];
+    EXPECT_NEAR(d_uv[0], d_expected[0].get<double>(), kTolerance);
+    const double v = uvs[i][1];
+    if (wrap == Wrap::kRepeatCorners && v == std::floor(v)) {
+      EXPECT_EQ(d_uv[1], 0);
+      ++jumps;
+    } else {
+      EXPECT_NEAR(d_uv[1], d_expected[1].get<double>(), kTolerance);
+    }
+  }
+  ExpectNear(d_texels, Interleave(expected.at("bilinear_grad_texture")), "d_texels");
+  return jumps;
+}
+
+TEST(VectorsTexture, ClampedWithCentresInside) {
+  LOAD_OR_SKIP(json, "05_texture_mapping.json");
+  EXPECT_EQ(CheckTextureBlock(json, "clamp_align_false_border", Wrap::kClamp), 0);
+}
+
+TEST(VectorsTexture, RepeatedWithCentresAtCorners) {
+  LOAD_OR_SKIP(json, "05_texture_mapping.json");
+  EXPECT_EQ(CheckTextureBlock(json, "wrap_align_true_zeros", Wrap::kRepeatCorners), 4);
+}
+
+Vec3<double> Vec(const Json& v) { return {v[0], v[1], v[2]}; }
+
+// Values of the nine functions at n.
+Vector BasisAt(ShBasis basis, const Vec3<double>& n) {
+  Vector out;
+  for (std::size_t i = 0; i < 9; ++i) {
+    Vector one(9);
+    one[i] = 1;
+    out.push_back(ShLightRef(ShPolynomialOf<double>(basis, one), n));
+  }
+  return out;
+}
+
+double LightAt(ShBasis basis, const Json& coefficients, const Vec3<double>& n) {
+  const Vector w = coefficients;
+  return ShLightRef(ShPolynomialOf<double>(basis, w), n);
+}
+
+// Its constants have eleven digits.
+constexpr double kPrinted = 1e-9;
+
+TEST(VectorsHarmonics, BasisAndIrradiance) {
+  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  const Json &normals = json.at("normals"), &w = json.at("lights9");
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const Vec3<double> n = Vec(normals[i]);
+    ExpectNear(BasisAt(ShBasis::kOrthonormal, n), json.at("kaolin_sh9_basis")[i], "basis",
+               kPrinted);
+    EXPECT_NEAR(LightAt(ShBasis::kIrradiance, w, n),
+                json.at("kaolin_sh9_irradiance")[i].get<double>(), kPrinted);
+  }
+}
+
+TEST(VectorsHarmonics, GradientsOfIrradiance) {
+  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  const Json& normals = json.at("normals");
+  const Vector w = json.at("lights9");
+  const auto p = ShPolynomialOf<double>(ShBasis::kIrradiance, w);
+  ShPolynomialT<double> d_p = {};
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    Vec3<double> d_n = {};
+    ShLightAdjointRef(p, Vec(normals[i]), json.at("grad_weight")[i].get<double>(), d_p, d_n);
+    ExpectNear({d_n.begin(), d_n.end()},
+               json.at("kaolin_sh9_irradiance_grad_normals_of_sum_w_irr")[i], "d_normal", kPrinted);
+  }
+  Vector d_w(9);
+  ShPolynomialAdjoint<double>(ShBasis::kIrradiance, d_p, d_w);
+  ExpectNear(d_w, json.at("kaolin_sh9_irradiance_grad_lights_of_sum_w_irr"), "d_w", kPrinted);
+}
+
+// Light from one direction: its coefficients are the basis there.
+TEST(VectorsHarmonics, DiffuseFromADirection) {
+  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  const Vector w = BasisAt(ShBasis::kOrthonormal, Vec(json.at("direction")));
+  for (std::size_t i = 0; i < json.at("normals").size(); ++i) {
+    const double light = LightAt(ShBasis::kIrradiance, w, Vec(json.at("normals")[i]));
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(json.at("albedo")[i][c].get<double>() * light,
+                  json.at("kaolin_sh9_diffuse_from_direction")[i][c].get<double>(), kPrinted);
+    }
+  }
+}
+
+TEST(VectorsHarmonics, OlderVariants) {
+  LOAD_OR_SKIP(json, "06_spherical_harmonics.json");
+  const Json &normals = json.at("normals"), &w = json.at("lights9");
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const Vec3<double> n = Vec(normals[i]);
+    EXPECT_NEAR(LightAt(ShBasis::kKaolinLegacy, w, n),
+                json.at("kaolin_deprecated_lighting")[i].get<double>(), kTolerance);
+    ExpectNear(BasisAt(ShBasis::kKaolin01, n), json.at("kaolin01_frag_shtex_basis")[i], "basis");
+    const double clamped = std::clamp(LightAt(ShBasis::kKaolin01, w, n), 0.0, 1.0);
+    EXPECT_NEAR(clamped, json.at("kaolin01_frag_shtex_clamped")[i].get<double>(), kTolerance);
+  }
+}
+
+// The pixels of 07, under one light.
+struct PhongVectorsFile {
+  ColorFactorsT<double> factors;
+  Vec3<double> light, texture;
+  double shininess;
+
+  explicit PhongVectorsFile(const Json& json)
+      : factors{{1, 1, 1},
+                Vec(json.at("material_rows_ambient_diffuse_specular")[0]),
+                Vec(json.at("material_rows_ambient_diffuse_specular")[1]),
+                Vec(json.at("material_rows_ambient_diffuse_specular")[2])},
+        light(Vec(json.at("light"))),
+        texture(Vec(json.at("texture_colour"))),
+        shininess(json.at("shininess")) {}
+
+  ColorParts<double> Parts(const PhongVectors<double>& v) const {
+    const DirectionalLightT<double> one{v.light, 1};
+    return {
+        texture, {1, 1, 1}, LambertRef<double>({0, {&one, 1}}, v.normal), PhongRef(v, shininess)};
+  }
+};
+
+TEST(VectorsPhong, ColoursAndGradients) {
+  LOAD_OR_SKIP(json, "07_phong_lambert.json");
+  const PhongVectorsFile file(json);
+  ColorFactorsT<double> d_factors = {};
+  Vec3<double> d_light = {}, d_texture = {};
+  double d_shininess = 0;
+  for (std::size_t i = 0; i < json.at("normal").size(); ++i) {
+    const PhongVectors<double> v{Vec(json.at("normal")[i]), file.light, Vec(json.at("eye")[i])};
+    const auto parts = file.Parts(v);
+    const Vec3<double> color = CombineRef(file.factors, parts, true, true);
+    ExpectNear({color.begin(), color.end()}, json.at("colour")[i], "colour");
+    ColorParts<double> d_parts{{}, {}, 0, 0};
+    CombineAdjointRef(file.factors, parts, true, true, Vec(json.at("grad_out")[i]), d_factors,
+                      d_parts);
+    PhongVectors<double> d_v{};
+    PhongAdjointRef(v, file.shininess, d_parts.highlight, d_v, &d_shininess);
+    const DirectionalLightT<double> one{v.light, 1};
+    DirectionalLightT<double> d_one{};
+    LambertAdjointRef<double>({0, {&one, 1}}, v.normal, d_parts.light, d_v.normal, {&d_one, 1});
+    ExpectNear({d_v.normal.begin(), d_v.normal.end()}, json.at("grad_normal")[i], "d_normal");
+    ExpectNear({d_v.eye.begin(), d_v.eye.end()}, json.at("grad_eye")[i], "d_eye");
+    AddScaled(1.0, d_v.light, d_light), AddScaled(1.0, d_one.direction, d_light);
+    AddScaled(1.0, d_parts.texture, d_texture);
+  }
+  ExpectNear({d_light.begin(), d_light.end()}, json.at("grad_light"), "d_light");
+  ExpectNear({d_texture.begin(), d_texture.end()}, json.at("grad_texture_colour"), "d_texture");
+  const Json& d_material = json.at("grad_material");
+  ExpectNear({d_factors.ambient.begin(), d_factors.ambient.end()}, d_material[0], "d_ambient");
+  ExpectNear({d_factors.diffuse.begin(), d_factors.diffuse.end()}, d_material[1], "d_diffuse");
+  ExpectNear({d_factors.specular.begin(), d_factors.specular.end()}, d_material[2], "d_specular");
+  EXPECT_NEAR(d_shininess, json.at("grad_shininess").get<double>(), kTolerance);
+}
+
+TEST(VectorsPhong, Lambert) {
+  LOAD_OR_SKIP(json, "07_phong_lambert.json");
+  const PhongVectorsFile file(json);
+  for (std::size_t i = 0; i < json.at("normal").size(); ++i) {
+    const DirectionalLightT<double> one{file.light, 1};
+    const double light = LambertRef<double>({0, {&one, 1}}, Vec(json.at("normal")[i]));
+    ExpectNear({light * file.texture[0], light * file.texture[1], light * file.texture[2]},
+               json.at("lambert")[i], "lambert");
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::shade
