@@ -7,10 +7,10 @@ namespace tilegrad {
 
 // Pinhole camera: world to camera, then camera to pixels.
 //
-//   p_cam = rotation * p_world + translation      (rows of `rotation`: the camera's x, y, z axes in
-//   world coordinates) x = cx + fx * p_cam.x / -p_cam.z              (pixels from the left edge of
-//   the image) y = cy - fy * p_cam.y / -p_cam.z              (pixels from the top edge of the
-//   image)
+//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's x, y, z axes in
+//                                               world coordinates)
+//   x = cx + fx * p_cam.x / -p_cam.z            (pixels from the left edge of the image)
+//   y = cy - fy * p_cam.y / -p_cam.z            (pixels from the top edge of the image)
 //
 // Camera axes as OpenGL: x right, y up, the camera looks along -z, so visible points have p_cam.z <
 // 0 and depth = -p_cam.z. Pixel (column j, row i) has its centre at (j + 0.5, i + 0.5); row 0 is
@@ -24,6 +24,11 @@ struct CameraT {
   T near_plane = T(1e-2);                       // > 0, world units; what is nearer is clipped away
 };
 using Camera = CameraT<float>;
+using Camera64 = CameraT<double>;  // what converters and camera files speak (camera_conventions.h)
+
+struct ImageSize {
+  int width = 0, height = 0;  // pixels
+};
 
 // Degrees; `fov_y` is the full vertical field of view; the principal point is the image centre,
 // pixels are square.

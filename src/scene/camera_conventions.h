@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras as other programs write them, from and to the one camera of the project (camera.h).
+// docs/cameras.md has a picture and a number for each.
+//
+// All matrices are row-major and act on column vectors unless said otherwise; all lengths are world
+// units. From... fails on what is not a pinhole camera: a number that is not finite, a matrix that
+// is no rotation (rows off by more than kRotationTolerance, or a mirror), a focal length that is
+// not positive, skew. To... fails where the other convention cannot say what the camera is. A
+// camera that goes there and back keeps its numbers to a few roundings; its near plane is kept
+// only by those conventions that have one, and is the default of camera.h otherwise.
+#pragma once
+
+#include <array>
+
+#include "scene/camera.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+using Vec2Array = std::array<double, 2>;
+using Vec3Array = std::array<double, 3>;
+using Mat3Array = std::array<double, 9>;
+using Mat4Array = std::array<double, 16>;
+
+// Largest entry of |R R^T - 1| that still counts as a rotation printed with few digits.
+inline constexpr double kRotationTolerance = 1e-3;
+
+// Where the centre of the first pixel is.
+enum class PixelCentre {
+  kInteger,  // (0, 0): OpenCV's calibration and projectPoints
+  kHalf      // (0.5, 0.5): COLMAP, OpenGL, and this project
+};
+
+// OpenCV: p = rotation * world + translation, x right, y down, z forward; pixel = K p / p.z.
+struct OpenCvCamera {
+  Mat3Array k = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // fx 0 cx; 0 fy cy; 0 0 1
+  Mat3Array rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vec3Array translation = {};
+  PixelCentre centre = PixelCentre::kInteger;
+};
+Result<Camera64> FromOpenCv(const OpenCvCamera& from);
+OpenCvCamera ToOpenCv(const Camera64& camera, PixelCentre centre = PixelCentre::kInteger);
+
+// A rotation vector (axis times angle in radians; Rodrigues) as OpenCV's solvePnP returns it.
+Mat3Array RotationFromVector(const Vec3Array& rvec);
+
+// COLMAP's PINHOLE model and a line of images.txt: OpenCV's axes, pixel centres at +0.5.
+struct ColmapCamera {
+  std::array<double, 4> quaternion = {1, 0, 0, 0};  // w, x, y, z; world to camera; any length > 0
+  Vec3Array translation = {};
+  double fx = 1, fy = 1, cx = 0, cy = 0;
+};
+Result<Camera64> FromColmap(const ColmapCamera& from);
+ColmapCamera ToColmap(const Camera64& camera);
+
+// OpenGL: x right, y up, looking along -z; clip = projection * model_view * world. A matrix that
+// glGetFloatv fills is the transpose of what stands here.
+struct OpenGlCamera {
+  Mat4Array projection = {};
+  Mat4Array model_view = {};
+};
+Result<Camera64> FromOpenGl(const OpenGlCamera& from, ImageSize size);
+// far_plane > camera.near_plane; rendering here has no far plane.
+Result<OpenGlCamera> ToOpenGl(const Camera64& camera, ImageSize size, double far_plane);
+
+// Kaolin's and DIB-R's: p = rotation * (world - position), OpenGL's axes; image in [-1, 1] =
+// (projection.x * p.x, projection.y * p.y) / (projection.z * p.z), projection.z = -1. The principal
+// point is the middle of the image.
+struct KaolinCamera {
+  Mat3Array rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vec3Array position = {};
+  Vec3Array projection = {1, 1, -1};
+};
+Result<Camera64> FromKaolin(const KaolinCamera& from, ImageSize size);
+Result<KaolinCamera> ToKaolin(const Camera64& camera, ImageSize size);
+
+// PyTorch3D's PerspectiveCameras with in_ndc = True: row vectors p = world * r + t; x left, y up, z
+// forward; NDC +x left, +y up, [-1, 1] over the shorter side of the image.
+struct PyTorch3dCamera {
+  Mat3Array r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vec3Array t = {};
+  Vec2Array focal_length = {1, 1}, principal_point = {};
+};
+Result<Camera64> FromPyTorch3d(const PyTorch3dCamera& from, ImageSize size);
+Result<PyTorch3dCamera> ToPyTorch3d(const Camera64& camera, ImageSize size);
+
+// A frame of NeRF's transforms.json: camera to world, OpenGL's axes, pixel centres at +0.5.
+struct NerfCamera {
+  Mat4Array camera_to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  double fl_x = 1, fl_y = 1, cx = 0, cy = 0;  // pixels
+};
+Result<Camera64> FromNerf(const NerfCamera& from);
+NerfCamera ToNerf(const Camera64& camera);
+
+// glTF's perspective camera at a node: OpenGL's axes. The scale of the node does not count.
+struct GltfCamera {
+  Mat4Array node_to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  double yfov = 0.8;        // radians, the whole vertical field of view, (0, pi)
+  double aspect_ratio = 0;  // of the field of view; 0: that of the image, so that pixels are square
+  double znear = 1e-2;
+};
+Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size);
+Result<GltfCamera> ToGltf(const Camera64& camera, ImageSize size);
+
+// The same view on an image of another size: everything scales, the field of view stays.
+Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to);
+
+// What every From... ends with: finite, a rotation, positive focal lengths and near plane.
+Status Validate(const Camera64& camera);
+
+}  // namespace tilegrad
