@@ -20,7 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kValuesAtATime = std::size_t{1} << 21;
+constexpr std::size_t kValuesAtATime = std::size_t{1} << 21;  // transformed, of both sides, about
 
 // Rows of tiles in portions that hold about kValuesAtATime.
 struct Portions {
@@ -141,6 +141,7 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
   for (std::size_t portion = 0; portion < portions.cut.count(); ++portion) {
     const TileRows rows = portions.rows(portion);
     const SlotLayout in = RowLayout(portions.input, rows);
+    const bool last = portion + 1 == portions.cut.count();
     const WinogradCorrelation product{portions.input, in,   memory.inputs, memory.outputs,
                                       memory.weights, rows, panels,        portion > 0};
     context.workers.For(s.in_channels, [&](std::size_t c, std::size_t worker) {
@@ -150,10 +151,11 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
       TransformOutputPanel(product, d_y, panel, memory.worker(worker));
     });
     product.Multiply(context.workers);
+    if (!last) continue;
+    context.workers.For(panels, [&](std::size_t panel, std::size_t) {
+      FinishWeightGrad(product, panel, d_weight);
+    });
   }
-  context.workers.For(panels, [&](std::size_t panel, std::size_t) {
-    FinishWinogradWeightGrad(portions.input, panel, panels, memory.weights, d_weight);
-  });
 }
 
 }  // namespace tilegrad::nn::HWY_NAMESPACE

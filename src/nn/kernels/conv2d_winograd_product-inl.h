@@ -211,7 +211,7 @@ struct WinogradCorrelation {
   const SlotLayout& in_layout;  // RowLayout
   const float* inputs;
   float* outputs;  // [slot][panel of output channels][tile][kTileColumns]
-  float* sums;     // [slot][index of the input's side][panels * kTileColumns]
+  float* sums;     // [slot][panel of output channels][index of the input's side][kTileColumns]
   const TileRows& rows;
   std::size_t panels;  // of output channels
   bool accumulate;
@@ -219,8 +219,8 @@ struct WinogradCorrelation {
   std::size_t OutputAt(std::size_t slot, std::size_t panel) const {
     return (slot * panels + panel) * rows.pitch * kTileColumns;
   }
-  std::size_t SumAt(std::size_t slot, std::size_t index) const {
-    return (input.before(slot) + index) * panels * kTileColumns;
+  std::size_t SumAt(std::size_t slot, std::size_t panel, std::size_t index) const {
+    return (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
   }
 
   void Multiply(const Workers& workers) const {
@@ -246,8 +246,8 @@ struct WinogradCorrelation {
           const std::size_t row = begin + row_panels.begin(i);
           PlainRowsTile(inputs + in_layout.At(slot, row, 0) + t, in_layout.index_stride,
                         row_panels.size(i), columns, steps,
-                        {.c = sums + SumAt(slot, row) + panel * kTileColumns,
-                         .ldc = panels * kTileColumns,
+                        {.c = sums + SumAt(slot, panel, row),
+                         .ldc = kTileColumns,
                          .offset = {0, kLanes},
                          .count = {kLanes, kLanes},
                          .accumulate = accumulate || t > 0});
@@ -281,11 +281,13 @@ struct WeightSums {
 template <std::size_t Ra, std::size_t Rb>
 struct TransformWeightsBack {
   // taps: tap (i, j) of the phase, kTileColumns lanes each, lies at (i * kernel + j) * stride.
-  static HWY_INLINE void Run(const WeightSums& sums, const WinogradPlan& plan, float* taps) {
+  static HWY_INLINE void Run(const WeightSums& sums, std::size_t channel, const WinogradPlan& plan,
+                             float* taps) {
     for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
+      const std::size_t at = channel * kTileColumns + v;
       Square in, out;
       for (std::size_t i = 0; i <= Ra; ++i) {
-        for (std::size_t j = 0; j <= Rb; ++j) in[i][j] = hn::LoadU(Tag(), sums.data[i][j] + v);
+        for (std::size_t j = 0; j <= Rb; ++j) in[i][j] = hn::LoadU(Tag(), sums.data[i][j] + at);
       }
       Transform<WeightAdjoint<Ra>, WeightAdjoint<Rb>>(in, out);
       for (std::size_t i = 0; i < Ra; ++i) {
@@ -298,36 +300,43 @@ struct TransformWeightsBack {
   }
 };
 
-// The kernels between input channel c and one panel of output channels.
-inline void FinishKernels(const WinogradSide& input, std::size_t c, std::size_t panel,
-                          std::size_t row_stride, const float* sums, float* taps) {
-  const WinogradPlan& plan = input.plan;
-  for (std::size_t a = 0; a < plan.stride; ++a) {
-    for (std::size_t b = 0; b < plan.stride; ++b) {
-      WeightSums from;
-      for (std::size_t i = 0; i <= plan.taps(a); ++i) {
-        for (std::size_t j = 0; j <= plan.taps(b); ++j) {
-          const std::size_t slot = i * plan.axis_slots + j;
-          const std::size_t index = plan.phase_index(slot, a, b) * input.channels() + c;
-          from.data[i][j] = sums + (input.before(slot) + index) * row_stride + panel * kTileColumns;
-        }
-      }
-      ForTaps<TransformWeightsBack>(plan.taps(a), plan.taps(b), from, plan,
-                                    taps + (a * plan.kernel + b) * kTileColumns);
+// The sums of phase (a, b) between input channel 0 and one panel of output channels.
+inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t panel, std::size_t a,
+                              std::size_t b) {
+  const WinogradPlan& plan = product.input.plan;
+  WeightSums from;
+  for (std::size_t i = 0; i <= plan.taps(a); ++i) {
+    for (std::size_t j = 0; j <= plan.taps(b); ++j) {
+      const std::size_t slot = i * plan.axis_slots + j;
+      const std::size_t index = plan.phase_index(slot, a, b) * product.input.channels();
+      from.data[i][j] = product.sums + product.SumAt(slot, panel, index);
     }
   }
+  return from;
 }
 
-inline void FinishWinogradWeightGrad(const WinogradSide& input, std::size_t panel,
-                                     std::size_t panels, const float* sums, float* d_weight) {
-  const WinogradPlan& plan = input.plan;
+inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t panel,
+                             float* d_weight) {
+  const WinogradPlan& plan = product.input.plan;
   const std::size_t area = plan.kernel * plan.kernel, first = panel * kTileColumns;
+  const std::size_t in_channels = plan.s.in_channels;
   const std::size_t channels = std::min(kTileColumns, plan.s.out_channels - first);
+  WeightSums sums[4];  // stride <= 2
+  for (std::size_t a = 0; a < plan.stride; ++a) {
+    for (std::size_t b = 0; b < plan.stride; ++b) {
+      sums[a * plan.stride + b] = SumsOfPhase(product, panel, a, b);
+    }
+  }
   float taps[25 * kTileColumns];
-  for (std::size_t c = 0; c < input.channels(); ++c) {
-    FinishKernels(input, c, panel, panels * kTileColumns, sums, taps);
+  for (std::size_t c = 0; c < in_channels; ++c) {
+    for (std::size_t a = 0; a < plan.stride; ++a) {
+      for (std::size_t b = 0; b < plan.stride; ++b) {
+        ForTaps<TransformWeightsBack>(plan.taps(a), plan.taps(b), sums[a * plan.stride + b], c,
+                                      plan, taps + (a * plan.kernel + b) * kTileColumns);
+      }
+    }
     for (std::size_t o = 0; o < channels; ++o) {
-      float* to = d_weight + ((first + o) * input.channels() + c) * area;
+      float* to = d_weight + ((first + o) * in_channels + c) * area;
       for (std::size_t tap = 0; tap < area; ++tap) to[tap] = taps[tap * kTileColumns + o];
     }
   }
