@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An adversarial game and a U-Net, small, for tests of whole training steps.
+// An adversarial game and U-Nets, small, for tests of whole training steps.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,8 @@
 
 namespace tilegrad::nn {
 
-// Every operation that a network of this library uses is in its step.
+// Every operation that a network of this library uses is in its step, and every kernel: the wide
+// networks have channels enough for kernels/conv2d_winograd.h.
 class Game {
  public:
   explicit Game(const Workers& workers)
@@ -24,6 +25,8 @@ class Game {
         judge_(context_, {.base = 4, .halvings = 2, .spectral = true}, rng_),
         net_(context_, {.base = 5, .most = 11, .levels = 3, .resize = true, .output = &Sigmoid},
              rng_),
+        wide_critic_(context_, {.base = 16, .halvings = 2}, rng_),
+        wide_net_(context_, {.base = 16, .depth = 2}, rng_),
         adam_(context_, All(), {.learning_rate = 1e-3, .weight_decay = 1e-2}) {}
 
   double Step(std::uint64_t step) {
@@ -36,7 +39,8 @@ class Game {
     const Var labels = Reshape(Softmax(Reshape(larger, {3, -1}), 1), larger.shape());
     const Var loss = Mean(critic_.Forward(fake, Mode::kTrain)) + GradientPenalty(critic_, real) +
                      Mean(Softplus(judge_.Forward(painted, Mode::kTrain))) + Mean(Square(labels)) +
-                     Mean(Elu(painted - real));
+                     Mean(Elu(painted - real)) + GradientPenalty(wide_critic_, real) +
+                     Mean(Abs(wide_net_.Forward(real, Mode::kTrain) - real));
     const auto gradients = Grad(loss, adam_.parameters());
     const double scale = ClipFactor(GlobalNorm(context_, gradients), 1.0);
     const Status status = adam_.Step(gradients, scale);
@@ -56,7 +60,8 @@ class Game {
   std::vector<NamedVar> All() {
     std::vector<NamedVar> all;
     int number = 0;
-    for (Module* module : std::initializer_list<Module*>{&generator_, &critic_, &judge_, &net_}) {
+    for (Module* module : std::initializer_list<Module*>{&generator_, &critic_, &judge_, &net_,
+                                                         &wide_critic_, &wide_net_}) {
       const std::string prefix = std::to_string(++number) + ".";
       for (const NamedVar& p : Parameters(*module)) all.push_back({prefix + p.name, p.value});
     }
@@ -68,6 +73,8 @@ class Game {
   Generator generator_;
   Critic critic_, judge_;
   UNet net_;
+  Critic wide_critic_;
+  ConvUNet wide_net_;
   Adam adam_;
 };
 
