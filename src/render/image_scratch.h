@@ -76,6 +76,7 @@ struct WorkerScratch {
   raster::BandSums band;
   MergeScratch merge;
   RenderStats stats;
+  RenderTimes times;
   // Of a PixelStage: attributes of a block, the faces of a block on the way back, cotangents of a
   // band.
   AlignedVector<float> varyings, d_varyings;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/stage_clock.h"
 #include "render/frame_layout.h"
 #include "render/merge_gradients.h"
 #include "render/paper_alpha.h"
@@ -82,7 +83,7 @@ struct Renderer::Impl {
 
   void Begin(std::size_t count) {
     if (images.size() < count) images.resize(count);
-    for (WorkerScratch& worker : worker_scratch) worker.stats = {};
+    for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};
     sound = true;
   }
   void Require(bool holds) {
@@ -101,9 +102,11 @@ struct Renderer::Impl {
 // Projects and bins every scene of the batch.
 bool Renderer::Impl::Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
                              const PrepareRequest& request) {
-  workers->For(scenes.size(), [&](std::size_t n, std::size_t worker) {
-    Require(PrepareImage(scenes[n], options, request, *workers, &images[n],
-                         &worker_scratch[worker].stats));
+  workers->For(scenes.size(), [&](std::size_t n, std::size_t w) {
+    WorkerScratch& worker = worker_scratch[w];
+    StageClock clock;
+    Require(PrepareImage(scenes[n], options, request, *workers, &images[n], &worker.stats));
+    clock.Lap(&worker.times.prepare);
   });
   return sound;
 }
@@ -121,7 +124,11 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
-  if (PrepareImage(call.scenes[n], call.options, call.request, *workers, &image, &worker->stats)) {
+  StageClock clock;
+  const bool done =
+      PrepareImage(call.scenes[n], call.options, call.request, *workers, &image, &worker->stats);
+  clock.Lap(&worker->times.prepare);
+  if (done) {
     RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
   } else {
     sound = false;
@@ -162,26 +169,32 @@ void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task
 void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
                                  WorkerScratch* worker, BinGradients* out) {
   if (!call.wants_geometry(n)) return;
+  StageClock clock;
   RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, worker, out);
+  clock.Lap(&worker->times.alpha);
 }
 
 void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
   const SceneView& scene = call.scenes[n];
+  StageClock clock;
   if (!PrepareImage(scene, call.input.options, call.request, *workers, &image, &worker->stats)) {
     sound = false;
     return;
   }
   PrepareRecomputed(call.input.stage, scene, n, &image);
+  clock.Lap(&worker->times.prepare);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
   if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
   const ImageGradients gradients{{&worker->band_gradients, 1},
                                  {&worker->bin_gradients, call.bins},
                                  call.request_of(n, image.mesh)};
   SceneGradients* d_scene = &call.d_scenes[n];
+  clock = {};
   Require(MergeGeometry(scene, call.input.options, image, gradients, worker, d_scene));
   Require(MergeAttributes(image, gradients, worker, d_scene));
+  clock.Lap(&worker->times.merge);
 }
 
 // Bands and bins of all images together.
@@ -212,12 +225,14 @@ bool Renderer::Impl::Merge(const BackwardCall& call) {
                                    std::span(bin_gradients).subspan(n * call.bins, call.bins),
                                    call.request_of(n, images[n].mesh)};
     WorkerScratch* worker = &worker_scratch[w];
+    StageClock clock;
     if (task % 2 == 0) {
       Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, worker,
                             &call.d_scenes[n]));
     } else {
       Require(MergeAttributes(images[n], gradients, worker, &call.d_scenes[n]));
     }
+    clock.Lap(&worker->times.merge);
   });
   return sound;
 }
@@ -286,6 +301,17 @@ RenderStats Renderer::stats() const {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
     sum.interpolated += worker.stats.interpolated, sum.softened += worker.stats.softened;
     sum.merged += worker.stats.merged;
+  }
+  return sum;
+}
+
+RenderTimes Renderer::times() const {
+  RenderTimes sum;
+  for (const WorkerScratch& worker : impl_->worker_scratch) {
+    const RenderTimes& t = worker.times;
+    sum.prepare += t.prepare, sum.visibility += t.visibility, sum.interpolate += t.interpolate;
+    sum.stage += t.stage, sum.gradients += t.gradients, sum.alpha += t.alpha;
+    sum.merge += t.merge;
   }
   return sum;
 }

@@ -116,6 +116,17 @@ struct RenderStats {
   std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
 };
 
+// Milliseconds in the stages of a call, summed over workers.
+struct RenderTimes {
+  double prepare = 0;      // project, bin, and the hierarchy of the soft mask
+  double visibility = 0;   // which face a pixel shows, and depth
+  double interpolate = 0;  // attributes of pixels, forward or backward
+  double stage = 0;        // a PixelStage
+  double gradients = 0;    // from attributes of pixels to faces
+  double alpha = 0;        // the soft mask, forward or backward
+  double merge = 0;        // from faces to the scene
+};
+
 class PixelStage;  // pixel_stage.h
 
 // Owns scratch memory, which is reused: rendering the same sizes again allocates nothing. One call
@@ -145,6 +156,7 @@ class Renderer {
                   std::span<SceneGradients> d_scenes, PixelStage* stage = nullptr);
 
   RenderStats stats() const;  // of the last call
+  RenderTimes times() const;
 
  private:
   struct Impl;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/shade_plan.h"
 
-#include <fmt/format.h>
-
 namespace tilegrad {
 namespace {
 
@@ -148,19 +146,6 @@ BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
       IsPlainColor(parts) && wishes.d_color && IsOnly(pulled, Varying::kColor) && !plan.to_surfaces;
   plan.user_only = IsOnly(pulled, Varying::kUser) && again.channels() == 0 && !wishes.d_color;
   return plan;
-}
-
-std::vector<std::string> ExplainLines(const PlanReport& report) {
-  std::vector<std::string> out;
-  for (const StageReport& s : report.stages) {
-    if (s.runs) {
-      out.push_back(fmt::format("{:<14} {:>12} {:<10} {:>9.3f} ms  {}", s.name, s.count, s.unit,
-                                s.milliseconds, s.what));
-    } else {
-      out.push_back(fmt::format("{:<14} {:>12} {:<10} {:>9}     {}", s.name, "-", "", "-", s.what));
-    }
-  }
-  return out;
 }
 
 }  // namespace tilegrad

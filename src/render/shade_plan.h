@@ -102,19 +102,21 @@ BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes);
 // One stage of a call, as it was run.
 struct StageReport {
   std::string_view name;
-  std::string what;  // in words: why it runs, or what spares it
-  bool runs = false;
-  std::int64_t count = 0;  // of `unit`
+  std::int64_t count = 0;  // of `unit`; 0: it did not run
   std::string_view unit;
-  double milliseconds = 0;  // processor time, of all workers
+  double milliseconds = 0;  // summed over workers
+  std::string what;         // on what, or what spares it
 };
 
-// A call of ShadedRenderer: stages in their order.
+// A call of ShadedRenderer: its stages in their order, those too that did not run.
 struct PlanReport {
+  bool backward = false;
   std::vector<StageReport> stages;
+
+  std::int64_t count(std::string_view name) const;  // of the stage of that name
 };
 
-// One line for each stage: name, count, time, why.
+// A heading, and one line for each stage: name, count, time, on what.
 std::vector<std::string> ExplainLines(const PlanReport& report);
 
 }  // namespace tilegrad

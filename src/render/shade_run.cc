@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/stage_clock.h"
 #include "shade/normalize.h"
 #include "shade/phong.h"
 
@@ -158,15 +159,32 @@ void SceneSums::Clear(std::size_t surface_count, std::size_t light_count) {
   depth_shift = 0;
 }
 
-void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v) {
+void ShadeWork::Add(const ShadeWork& other) {
+  pixels += other.pixels, lookups += other.lookups, normals += other.normals, lit += other.lit;
+  highlights += other.highlights;
+  gather += other.gather, normal += other.normal, texture += other.texture, light += other.light;
+  color += other.color, adjoint += other.adjoint, scatter += other.scatter;
+}
+
+void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v,
+              ShadeWork* work) {
+  StageClock clock;
+  const auto pixels = static_cast<std::int64_t>(count);
   if (steps.normal) {
     if (scene.model->two_sided) Multiply(count, v->side, v->normal);
     shade::Normalize(count, v->normal, shade::kLeastUnitSquare, v->unit, &v->inverse_length);
+    work->normals += pixels;
+    clock.Lap(&work->normal);
   }
   if (steps.texture && scene.texture != nullptr) {
     shade::SampleTexture(count, TextureInputOf(scene, *v), v->texture);
+    work->lookups += pixels;
+    clock.Lap(&work->texture);
   }
-  if (steps.light) LightRun(count, steps, scene, v);
+  if (!steps.light) return;
+  LightRun(count, steps, scene, v);
+  work->lit += pixels, work->highlights += steps.highlight ? pixels : 0;
+  clock.Lap(&work->light);
 }
 
 void ShadeRunAdjoint(std::size_t count, const BackwardPlan& plan, const RunScene& scene,

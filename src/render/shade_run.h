@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -64,8 +65,17 @@ struct SceneSums {
   void Clear(std::size_t surface_count, std::size_t light_count);
 };
 
+// What was done to pixels in a call, and the milliseconds it took.
+struct ShadeWork {
+  std::int64_t pixels = 0, lookups = 0, normals = 0, lit = 0, highlights = 0;
+  double gather = 0, normal = 0, texture = 0, light = 0, color = 0, adjoint = 0, scatter = 0;
+
+  void Add(const ShadeWork& other);
+};
+
 // Fills what `steps` ask for, but colour.
-void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v);
+void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v,
+              ShadeWork* work);
 // Colour, after ShadeRun.
 void ColorRun(std::size_t count, const ForwardPlan& plan, const RunScene& scene, RunValues* v);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/stage_clock.h"
 #include "raster/conventions.h"
 #include "raster/fragments.h"
 #include "render/quick_checks.h"
@@ -82,25 +83,31 @@ ShadeStage::ShadeStage(std::size_t workers) {
   for (std::size_t i = 0; i < workers; ++i) workers_.push_back(std::make_unique<StageWorker>());
 }
 
+void ShadeStage::Begin(std::span<const StageScene> scenes, const RenderOptions& options) {
+  scenes_ = scenes, options_ = &options;
+  pixels_ = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  for (auto& worker : workers_) worker->work = {};
+}
+
 void ShadeStage::BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
                               const RenderOptions& options, ShadedFrame* frame) {
-  forward_ = &plan, scenes_ = scenes, options_ = &options, frame_ = frame;
-  for (auto& worker : workers_) worker->pixels = 0;
+  forward_ = &plan, frame_ = frame;
+  Begin(scenes, options);
 }
 
 void ShadeStage::BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
                                const RenderOptions& options, const ShadedFrameGradients& d_frame) {
-  backward_ = &plan, scenes_ = scenes, options_ = &options, d_frame_ = &d_frame;
+  backward_ = &plan, d_frame_ = &d_frame;
+  Begin(scenes, options);
   bands_of_image_ = BandGrid(options.width, options.height).count();
   if (bands_.size() < scenes.size() * bands_of_image_) {
     bands_.resize(scenes.size() * bands_of_image_);
   }
-  for (auto& worker : workers_) worker->pixels = 0;
 }
 
-std::int64_t ShadeStage::pixels() const {
-  std::int64_t sum = 0;
-  for (const auto& worker : workers_) sum += worker->pixels;
+ShadeWork ShadeStage::work() const {
+  ShadeWork sum;
+  for (const auto& worker : workers_) sum.Add(worker->work);
   return sum;
 }
 
@@ -137,17 +144,21 @@ void ShadeStage::ForwardRun(const PixelBlock& block, const PixelRun& run, StageW
   const ForwardPlan& plan = *forward_;
   const RunScene scene = RunSceneOf(scenes_[block.image], run.surface());
   RunValues* const v = &worker->values;
+  ShadeWork* const work = &worker->work;
+  StageClock clock;
   GatherInputs(block, run, plan.varyings, plan.steps, worker);
-  ShadeRun(run.count, plan.steps, scene, v);
-  const std::size_t pixels = frame_->face_ids.size() / scenes_.size();
+  clock.Lap(&work->gather);
+  ShadeRun(run.count, plan.steps, scene, v, work);
+  clock = {};
   const BlockRows rows{frame_->width};
   const auto scatter = [&](AlignedVector<float>& images, std::span<const RunPlane> from) {
     for (std::size_t c = 0; c < from.size(); ++c) {
-      ScatterRun(run, from[c], rows, PlaneOf(images.data(), from.size(), c, pixels, block));
+      ScatterRun(run, from[c], rows, PlaneOf(images.data(), from.size(), c, pixels_, block));
     }
   };
   if (plan.steps.color) {
     ColorRun(run.count, plan, scene, v);
+    clock.Lap(&work->color);
     scatter(frame_->color, v->color);
   }
   if (plan.request.normals) scatter(frame_->normals, v->unit);
@@ -157,17 +168,17 @@ void ShadeStage::ForwardRun(const PixelBlock& block, const PixelRun& run, StageW
   for (std::size_t c = 0; c < user; ++c) {
     RunPlane plane;
     GatherRun(run, block.varyings + (first + c) * block.plane(), {raster::kBinSize}, &plane);
-    ScatterRun(run, plane, rows, PlaneOf(frame_->attributes.data(), user, c, pixels, block));
+    ScatterRun(run, plane, rows, PlaneOf(frame_->attributes.data(), user, c, pixels_, block));
   }
+  clock.Lap(&work->scatter);
 }
 
 void ShadeStage::Forward(const PixelBlock& block) {
-  const std::size_t pixels = frame_->face_ids.size() / scenes_.size();
   const auto width = static_cast<std::size_t>(frame_->width);
   const auto clear = [&](AlignedVector<float>& images) {
     const std::size_t planes = images.size() / frame_->face_ids.size();
     for (std::size_t c = 0; c < planes; ++c) {
-      ClearRows(block, width, PlaneOf(images.data(), planes, c, pixels, block));
+      ClearRows(block, width, PlaneOf(images.data(), planes, c, pixels_, block));
     }
   };
   clear(frame_->color), clear(frame_->normals), clear(frame_->uv), clear(frame_->attributes);
@@ -176,7 +187,7 @@ void ShadeStage::Forward(const PixelBlock& block) {
   FindSegments(block.rows, block.columns, block.mesh->source_face,
                scenes_[block.image].scene->face_surfaces, &worker->segments);
   ForEachRun(worker->segments, [&](const PixelRun& run) {
-    worker->pixels += static_cast<std::int64_t>(run.count);
+    worker->work.pixels += static_cast<std::int64_t>(run.count);
     ForwardRun(block, run, worker);
   });
 }
@@ -192,11 +203,9 @@ bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t firs
   out.sums.Clear(scene.surfaces.size(), scene.lights.size());
   out.shares.resize(scene.textures.size());
   for (auto& shares : out.shares) shares.clear();
-  const std::size_t plane =
-      static_cast<std::size_t>(options_->width) * static_cast<std::size_t>(options_->height);
   const auto sound = [&](std::span<const float> images, std::size_t planes) {
     for (std::size_t c = 0; c < planes && !images.empty(); ++c) {
-      if (!AllFinite(images.subspan((image * planes + c) * plane + first, pixels))) return false;
+      if (!AllFinite(images.subspan((image * planes + c) * pixels_ + first, pixels))) return false;
     }
     return true;
   };
@@ -207,11 +216,9 @@ bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t firs
 
 void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run,
                                     RunCotangents* d) const {
-  const std::size_t pixels =
-      static_cast<std::size_t>(options_->width) * static_cast<std::size_t>(options_->height);
   const auto gather = [&](std::span<const float> images, std::span<RunPlane> to) {
     for (std::size_t c = 0; c < to.size(); ++c) {
-      GatherCotangents(run, PlaneOf(images.data(), to.size(), c, pixels, block), {options_->width},
+      GatherCotangents(run, PlaneOf(images.data(), to.size(), c, pixels_, block), {options_->width},
                        &to[c]);
     }
   };
@@ -222,11 +229,9 @@ void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run
 // depth = -(z . p + t_z), z the third row of the rotation.
 void ShadeStage::DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
                               SceneSums* sums) const {
-  const std::size_t pixels =
-      static_cast<std::size_t>(options_->width) * static_cast<std::size_t>(options_->height);
   const Camera& camera = scenes_[block.image].scene->camera;
   RunPlane d_depth;
-  GatherCotangents(run, PlaneOf(d_frame_->depth.data(), 1, 0, pixels, block), {options_->width},
+  GatherCotangents(run, PlaneOf(d_frame_->depth.data(), 1, 0, pixels_, block), {options_->width},
                    &d_depth);
   const bool position = backward_->recomputed[Varying::kPosition];
   for (std::size_t i = 0; i < run.count; ++i) {
@@ -255,16 +260,37 @@ void ShadeStage::ScatterCotangents(const PixelBlock& block, const PixelRun& run,
   scatter(Varying::kColor, d.vertex_color), scatter(Varying::kUv, d.uv);
   scatter(Varying::kNormal, d.normal), scatter(Varying::kPosition, d.position);
   scatter(Varying::kLightDirection, d.light_direction);
-  const std::size_t pixels =
-      static_cast<std::size_t>(options_->width) * static_cast<std::size_t>(options_->height);
   const auto user = static_cast<std::size_t>(set.width(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {
     RunPlane plane;
-    GatherCotangents(run, PlaneOf(d_frame_->attributes.data(), user, c, pixels, block),
+    GatherCotangents(run, PlaneOf(d_frame_->attributes.data(), user, c, pixels_, block),
                      {options_->width}, &plane);
     const std::ptrdiff_t to = set.first(Varying::kUser) + static_cast<std::ptrdiff_t>(c);
     ScatterRun(run, plane, rows, d_varyings.data + to * d_varyings.plane);
   }
+}
+
+// Adds what the image of coordinates pulls on them.
+void ShadeStage::AddUvCotangents(const PixelBlock& block, const PixelRun& run,
+                                 RunCotangents* d) const {
+  for (std::size_t c = 0; c < 2; ++c) {
+    RunPlane plane;
+    GatherCotangents(run, PlaneOf(d_frame_->uv.data(), 2, c, pixels_, block), {options_->width},
+                     &plane);
+    for (std::size_t i = 0; i < run.count; ++i) {
+      d->uv[c].at[i] = plane.at[i] + (backward_->to_uv ? d->uv[c].at[i] : 0.0f);
+    }
+  }
+}
+
+// Room for the shares of a run's lookups; null where the texture has no gradient.
+shade::TexelShare* ShadeStage::NewShares(const RunScene& scene, std::size_t count,
+                                         StageBand* band) const {
+  if (!backward_->to_texture || scene.texture == nullptr) return nullptr;
+  auto& shares = band->shares[static_cast<std::size_t>(scene.surface->texture)];
+  const std::size_t had = shares.size();
+  shares.resize(had + count * shade::SharesPerLookup(scene.texture->view().filter));
+  return shares.data() + had;
 }
 
 void ShadeStage::BackwardRun(const PixelBlock& block, const PixelRun& run,
@@ -273,33 +299,21 @@ void ShadeStage::BackwardRun(const PixelBlock& block, const PixelRun& run,
   StageBand& band = bands_[block.image * bands_of_image_ + block.band];
   const RunScene scene = RunSceneOf(scenes_[block.image], run.surface());
   RunCotangents* const d = &worker->d;
+  ShadeWork* const work = &worker->work;
+  StageClock clock;
   GatherInputs(block, run, plan.recomputed, plan.steps, worker);
-  ShadeRun(run.count, plan.steps, scene, &worker->values);
   GatherCotangentsOf(block, run, d);
-  shade::TexelShare* shares = nullptr;
-  if (plan.to_texture && scene.texture != nullptr) {
-    auto& all = band.shares[static_cast<std::size_t>(scene.surface->texture)];
-    const std::size_t had = all.size();
-    all.resize(had + run.count * shade::SharesPerLookup(scene.texture->view().filter));
-    shares = all.data() + had;
-  }
-  ShadeRunAdjoint(
-      run.count, plan, scene, worker->values,
-      {d, &band.sums.surfaces[static_cast<std::size_t>(run.surface())], &band.sums, shares});
-  if (plan.wishes.d_uv && plan.pulled[Varying::kUv]) {
-    const std::size_t pixels =
-        static_cast<std::size_t>(options_->width) * static_cast<std::size_t>(options_->height);
-    for (std::size_t c = 0; c < 2; ++c) {
-      RunPlane plane;
-      GatherCotangents(run, PlaneOf(d_frame_->uv.data(), 2, c, pixels, block), {options_->width},
-                       &plane);
-      for (std::size_t i = 0; i < run.count; ++i) {
-        d->uv[c].at[i] = plane.at[i] + (plan.to_uv ? d->uv[c].at[i] : 0.0f);
-      }
-    }
-  }
+  clock.Lap(&work->gather);
+  ShadeRun(run.count, plan.steps, scene, &worker->values, work);
+  clock = {};
+  ShadeRunAdjoint(run.count, plan, scene, worker->values,
+                  {d, &band.sums.surfaces[static_cast<std::size_t>(run.surface())], &band.sums,
+                   NewShares(scene, run.count, &band)});
+  if (plan.wishes.d_uv && plan.pulled[Varying::kUv]) AddUvCotangents(block, run, d);
   if (plan.wishes.d_depth && plan.geometry) DepthAdjoint(block, run, worker, &band.sums);
+  clock.Lap(&work->adjoint);
   ScatterCotangents(block, run, d_varyings, *d);
+  clock.Lap(&work->scatter);
 }
 
 void ShadeStage::Backward(const PixelBlock& block, const raster::PlanarView<float>& d_varyings) {
@@ -307,7 +321,7 @@ void ShadeStage::Backward(const PixelBlock& block, const raster::PlanarView<floa
   FindSegments(block.rows, block.columns, block.mesh->source_face,
                scenes_[block.image].scene->face_surfaces, &worker->segments);
   ForEachRun(worker->segments, [&](const PixelRun& run) {
-    worker->pixels += static_cast<std::int64_t>(run.count);
+    worker->work.pixels += static_cast<std::int64_t>(run.count);
     BackwardRun(block, run, d_varyings, worker);
   });
 }

@@ -42,7 +42,7 @@ struct StageWorker {
   std::vector<PixelSegment> segments;
   RunValues values;
   RunCotangents d;
-  std::int64_t pixels = 0;
+  ShadeWork work;
 };
 
 class ShadeStage : public PixelStage {
@@ -64,10 +64,10 @@ class ShadeStage : public PixelStage {
   std::span<const StageBand> bands(std::size_t image) const {
     return std::span(bands_).subspan(image * bands_of_image_, bands_of_image_);
   }
-  std::int64_t pixels() const;  // shaded in this call
+  ShadeWork work() const;  // of this call
 
  private:
-  struct RunOf;  // a run with what it belongs to
+  void Begin(std::span<const StageScene> scenes, const RenderOptions& options);
   void ForwardRun(const PixelBlock& block, const PixelRun& run, StageWorker* worker);
   void BackwardRun(const PixelBlock& block, const PixelRun& run,
                    const raster::PlanarView<float>& d_varyings, StageWorker* worker);
@@ -75,6 +75,8 @@ class ShadeStage : public PixelStage {
   void GatherInputs(const PixelBlock& block, const PixelRun& run, const VaryingSet& set,
                     const ShadeSteps& steps, StageWorker* worker) const;
   void GatherCotangentsOf(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
+  void AddUvCotangents(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
+  shade::TexelShare* NewShares(const RunScene& scene, std::size_t count, StageBand* band) const;
   void DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
                     SceneSums* sums) const;
   void ScatterCotangents(const PixelBlock& block, const PixelRun& run,
@@ -84,6 +86,7 @@ class ShadeStage : public PixelStage {
   const BackwardPlan* backward_ = nullptr;
   std::span<const StageScene> scenes_;
   const RenderOptions* options_ = nullptr;
+  std::size_t pixels_ = 0;  // of an image
   ShadedFrame* frame_ = nullptr;
   const ShadedFrameGradients* d_frame_ = nullptr;
   std::vector<std::unique_ptr<StageWorker>> workers_;

@@ -6,8 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/stage_clock.h"
 #include "render/shade_merge.h"
 #include "render/shade_pack.h"
+#include "render/shade_report.h"
 #include "render/shade_stage.h"
 #include "render/shade_validate.h"
 #include "render/validate.h"
@@ -121,6 +123,7 @@ struct ShadedRenderer::Impl {
 
   void PrepareScenes(std::span<const ShadedScene> scenes, bool textures);
   void PrepareTextures(std::span<const ShadedScene> scenes);
+  void FindPacks(std::span<const ShadedScene> scenes);
   void Pack(std::span<const ShadedScene> scenes, bool normals, const VaryingSet& set,
             const VaryingSet* recomputed);
   void UsePlain(std::span<const ShadedScene> scenes, bool colors, bool user);
@@ -140,15 +143,19 @@ struct ShadedRenderer::Impl {
                   const ShadedFrame& frame, const ShadedFrameGradients& d_frame,
                   std::span<ShadedGradients> d_scenes);
 
+  PlanReport Explain() const;
+
   const Workers* workers;
   Renderer renderer;
   ShadeStage stage;
+  bool staged = false, was_backward = false;  // of the last call
+  SceneWork work;
   ForwardPlan forward;
   BackwardPlan backward;
   std::vector<StageScene> scenes_;
   std::vector<SceneView> views;
   std::vector<ScenePack> packs;
-  std::vector<std::size_t> pack_of_scene;
+  std::vector<std::size_t> pack_of_scene, first_of_pack;
   std::vector<std::unique_ptr<shade::TexturePyramid>> pyramids;
   std::vector<shade::TextureView> pyramid_views;
   std::vector<SceneScratch> scratch;
@@ -168,8 +175,14 @@ void ShadedRenderer::Impl::PrepareTextures(std::span<const ShadedScene> scenes) 
       scenes_[n].textures.push_back(pyramids[i].get());
     }
   }
+  StageClock clock;
   workers->For(pyramid_views.size(),
                [&](std::size_t i, std::size_t) { pyramids[i]->Build(pyramid_views[i]); });
+  clock.Lap(&work.textures_ms);
+  for (std::size_t i = 0; i < pyramid_views.size(); ++i) {
+    const shade::LevelSize& last = pyramids[i]->sizes().back();
+    work.texels += static_cast<std::int64_t>(last.first + last.texels());
+  }
 }
 
 void ShadedRenderer::Impl::PrepareScenes(std::span<const ShadedScene> scenes, bool textures) {
@@ -184,23 +197,33 @@ void ShadedRenderer::Impl::PrepareScenes(std::span<const ShadedScene> scenes, bo
   if (textures) PrepareTextures(scenes);
 }
 
+void ShadedRenderer::Impl::FindPacks(std::span<const ShadedScene> scenes) {
+  first_of_pack.clear(), pack_of_scene.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack.push_back(n);
+    pack_of_scene.push_back(first_of_pack.size() - 1);
+  }
+  if (packs.size() < first_of_pack.size()) packs.resize(first_of_pack.size());
+}
+
 void ShadedRenderer::Impl::Pack(std::span<const ShadedScene> scenes, bool normals,
                                 const VaryingSet& set, const VaryingSet* recomputed) {
-  pack_of_scene.clear();
-  std::size_t count = 0;
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    count += n == 0 || !SameSources(scenes[n - 1], scenes[n]);
-    pack_of_scene.push_back(count - 1);
-  }
-  if (packs.size() < count) packs.resize(count);
-  workers->For(scenes.size(), [&](std::size_t n, std::size_t) {
-    if (n > 0 && pack_of_scene[n - 1] == pack_of_scene[n]) return;
-    ScenePack& pack = packs[pack_of_scene[n]];
-    if (normals) DeriveNormals(scenes[n], &pack.normals);
-    PackVaryings(scenes[n], set, pack.normals, &pack.varyings);
-    if (recomputed != nullptr) {
-      PackVaryings(scenes[n], *recomputed, pack.normals, &pack.recomputed);
+  FindPacks(scenes);
+  StageClock clock;
+  if (normals && scenes[0].model.normals != NormalKind::kGiven) {
+    workers->For(first_of_pack.size(), [&](std::size_t i, std::size_t) {
+      DeriveNormals(scenes[first_of_pack[i]], &packs[i].normals);
+    });
+    for (const std::size_t n : first_of_pack) {
+      work.normals += static_cast<std::int64_t>(scenes[n].faces.size() / 3);
     }
+    clock.Lap(&work.normals_ms);
+  }
+  workers->For(first_of_pack.size(), [&](std::size_t i, std::size_t) {
+    ScenePack& pack = packs[i];
+    const ShadedScene& scene = scenes[first_of_pack[i]];
+    PackVaryings(scene, set, pack.normals, &pack.varyings);
+    if (recomputed != nullptr) PackVaryings(scene, *recomputed, pack.normals, &pack.recomputed);
   });
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     const ScenePack& pack = packs[pack_of_scene[n]];
@@ -211,6 +234,11 @@ void ShadedRenderer::Impl::Pack(std::span<const ShadedScene> scenes, bool normal
       out.recomputed = {pack.recomputed, recomputed->channels(), recomputed->rate};
     }
   }
+  for (std::size_t i = 0; i < first_of_pack.size(); ++i) {
+    work.packed += static_cast<std::int64_t>(packs[i].varyings.size());
+    if (recomputed != nullptr) work.packed += static_cast<std::int64_t>(packs[i].recomputed.size());
+  }
+  clock.Lap(&work.pack_ms);
 }
 
 // Streams as they are.
@@ -268,7 +296,7 @@ Status ShadedRenderer::Impl::Render(std::span<const ShadedScene> scenes,
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_ASSIGN(const SceneParts parts, ValidateShadedScenes(scenes));
   forward = PlanForward(parts, request);
-  const bool staged = forward.staged() && !scenes.empty();
+  staged = forward.staged() && !scenes.empty(), was_backward = false, work = {};
   PrepareScenes(scenes, staged && forward.steps.texture);
   if (staged) {
     Pack(scenes, forward.varyings[Varying::kNormal], forward.varyings, nullptr);
@@ -342,6 +370,12 @@ void ShadedRenderer::Impl::FillSink(std::span<const ShadedScene> scenes,
   }
 }
 
+PlanReport ShadedRenderer::Impl::Explain() const {
+  const CallWork call{renderer.stats(), renderer.times(), staged ? stage.work() : ShadeWork(),
+                      work};
+  return was_backward ? ReportBackward(backward, call) : ReportForward(forward, call);
+}
+
 Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
                                       const RenderOptions& options, const ShadedFrame& frame,
                                       const ShadedFrameGradients& d_frame,
@@ -350,7 +384,7 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   TILEGRAD_ASSIGN(const SceneParts parts, ValidateShadedScenes(scenes));
   TILEGRAD_TRY(ValidateShadedBackward(scenes, options, d_frame, d_scenes));
   backward = PlanBackward(parts, WishesOf(d_frame, d_scenes));
-  const bool staged = backward.staged() && !scenes.empty();
+  staged = backward.staged() && !scenes.empty(), was_backward = true, work = {};
   PrepareScenes(scenes, staged && backward.steps.texture);
   if (staged) {
     const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
@@ -372,6 +406,7 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;
   }
+  StageClock clock;
   ClearUniforms(d_scenes);
   if (staged) {
     NormalsBack(scenes);
@@ -381,6 +416,7 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   FindSinks(d_scenes);
   workers->For(sinks.size(),
                [&](std::size_t i, std::size_t) { FillSink(scenes, d_scenes, sinks[i]); });
+  clock.Lap(&work.merge_ms);
   return ValidateShadedResult(d_scenes);
 }
 
@@ -400,6 +436,6 @@ Status ShadedRenderer::Backward(std::span<const ShadedScene> scenes, const Rende
   return impl_->Backward(scenes, options, frame, d_frame, d_scenes);
 }
 
-PlanReport ShadedRenderer::Explain() const { return {}; }
+PlanReport ShadedRenderer::Explain() const { return impl_->Explain(); }
 
 }  // namespace tilegrad

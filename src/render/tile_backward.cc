@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "base/stage_clock.h"
 #include "raster/fragments.h"
 #include "raster/visibility_ref.h"
 #include "render/frame_layout.h"
@@ -95,6 +96,7 @@ void RunStageBackward(const BackwardInput& input, const ImageScratch& image, con
                          .first = place.band.first + static_cast<std::size_t>(place.x0),
                          .varyings = worker->varyings.data(),
                          .any_face = true};
+  StageClock clock;
   if (image.recomputed.channels > 0) {
     raster::Interpolate(
         {&image.mesh, image.recomputed, input.options.interpolation, false}, block.rows,
@@ -103,8 +105,10 @@ void RunStageBackward(const BackwardInput& input, const ImageScratch& image, con
          block.columns},
         &worker->interpolate);
   }
+  clock.Lap(&worker->times.interpolate);
   input.stage->Backward(block, {worker->d_varyings.data() + place.x0,
                                 static_cast<std::ptrdiff_t>(place.band.count), place.width});
+  clock.Lap(&worker->times.stage);
 }
 
 // The cotangents of the attributes of a band, from the stage. False: it met a number that is not
@@ -169,9 +173,11 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
   } else {
     d_out.data = place.Of(input.d_frame.attributes, channels, 0).data();
   }
+  StageClock clock;
   SumBandFaces(input, image,
                {{ids.data(), input.options.width, 0, place.row_begin, place.row_end}, d_out},
                request, &worker->band, out);
+  clock.Lap(&worker->times.gradients);
   return true;
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/stage_clock.h"
 #include "raster/fragments.h"
 #include "render/frame_layout.h"
 
@@ -149,6 +150,8 @@ double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const 
 double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame) {
   const raster::TileRect& rect = task.rect;
   const ImageScratch& image = input.image;
+  RenderTimes* const times = &worker->times;
+  StageClock clock;
   ++worker->stats.drawn;
   raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]}, rect,
                             &worker->bin);
@@ -159,15 +162,20 @@ double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* wor
   if (float* depth = part.plane(frame->depth, 1)) {
     WriteDepth(rect, input.options.width, worker->bin.inverse_depth, depth);
   }
+  clock.Lap(&times->visibility);
   const auto pixels = static_cast<std::size_t>(raster::kBinSize * (rect.y1 - rect.y0));
   const bool to_stage = input.stage != nullptr && AnyFace(worker->bin.face, pixels);
   const bool to_frame = input.stage == nullptr && !frame->attributes.empty();
   if (to_stage || to_frame || !frame->barycentrics.empty()) {
     InterpolateBin(input, task, part, worker, frame);
   }
+  clock.Lap(&times->interpolate);
   if (input.stage != nullptr) RunStage(input, task, to_stage, worker);
+  clock.Lap(&times->stage);
   if (frame->alpha.empty()) return 0;
-  return SoftAlpha(input.options, image, task, part, worker, frame);
+  const double spent = SoftAlpha(input.options, image, task, part, worker, frame);
+  clock.Lap(&times->alpha);
+  return spent;
 }
 
 }  // namespace tilegrad
