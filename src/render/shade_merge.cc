@@ -107,8 +107,8 @@ void ClearUniforms(std::span<ShadedGradients> d_scenes) {
 }
 
 void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
-                   std::span<ShadedGradients> d_scenes) {
-  SceneSums sums;
+                   std::span<ShadedGradients> d_scenes, SceneSums* scratch) {
+  SceneSums& sums = *scratch;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     sums.Clear(scenes[n].surfaces.size(), scenes[n].lights.size());
     for (const StageBand& band : stage.bands(n)) AddBand(band.sums, sums);

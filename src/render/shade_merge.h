@@ -3,7 +3,6 @@
 // coefficients, surfaces, cameras and textures. Sums are made in the order of scenes and bands.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -17,7 +16,7 @@ namespace tilegrad {
 
 // Overwrites lights, sh and surfaces of d_scenes where they are wanted, and adds to d_camera.
 void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
-                   std::span<ShadedGradients> d_scenes);
+                   std::span<ShadedGradients> d_scenes, SceneSums* scratch);
 
 // Sets them, and textures, to 0.
 void ClearUniforms(std::span<ShadedGradients> d_scenes);

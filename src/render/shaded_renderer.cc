@@ -162,6 +162,7 @@ struct ShadedRenderer::Impl {
   std::vector<SceneGradients> d_views;
   std::vector<Sink> sinks;
   TextureMerge texture_merge;
+  SceneSums scene_sums;
 };
 
 void ShadedRenderer::Impl::PrepareTextures(std::span<const ShadedScene> scenes) {
@@ -410,7 +411,7 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   ClearUniforms(d_scenes);
   if (staged) {
     NormalsBack(scenes);
-    MergeUniforms(stage, scenes_, d_scenes);
+    MergeUniforms(stage, scenes_, d_scenes, &scene_sums);
     if (backward.to_texture) texture_merge.Run(stage, scenes_, *workers, d_scenes);
   }
   FindSinks(d_scenes);

@@ -1,0 +1,404 @@
+// SPDX-License-Identifier: Apache-2.0
+// What shaded_renderer.h promises besides numbers: only what is asked for, same bits, no
+// allocation, sums over scenes that share an array, errors.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <new>
+#include <string>
+
+#include "render/shaded_renderer.h"
+#include "render/shaded_trial.h"
+
+// Counts heap allocations of the whole program.
+static std::atomic<long> g_allocations{0};
+
+void* CountedAllocate(std::size_t size, std::size_t alignment) {
+  ++g_allocations;
+  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (p == nullptr) std::abort();
+  return p;
+}
+void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return CountedAllocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace tilegrad {
+namespace {
+
+using test::OwnedCotangents;
+using test::OwnedGradients;
+using test::OwnedScene;
+using test::SceneRecipe;
+
+constexpr int kWidth = 150, kHeight = 100;  // several bins and bands
+constexpr std::size_t kPixels = kWidth * kHeight;
+
+RenderOptions Options() {
+  RenderOptions options;
+  options.width = kWidth, options.height = kHeight;
+  return options;
+}
+
+// A textured sphere with colours, under `lighting`.
+OwnedScene<float> Sphere(Lighting lighting, std::uint64_t seed = 3) {
+  Rng rng(seed, 1);
+  OwnedScene<float> s;
+  s.mesh = test::BumpySphere(12, 16, kWidth, kHeight, &rng);
+  test::RandomAttributes(2, AttributeRate::kVertex, &rng, &s.mesh);
+  test::RandomVectors(s.mesh.vertex_count(), 0, 1, 3, &rng, &s.colors);
+  test::RandomVectors(s.mesh.faces.size(), 0, 1, 2, &rng, &s.uvs);
+  s.textures.resize(1);
+  auto& t = s.textures[0];
+  t.width = 16, t.height = 8, t.filter = shade::Filter::kTrilinear;
+  test::RandomVectors(128, 0, 1, 3, &rng, &t.texels);
+  s.surfaces.push_back({{1, 1, 1}, 0, {0.1f, 0.1f, 0.1f}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
+  s.model.lighting = lighting;
+  if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
+  if (lighting == Lighting::kPhong || lighting == Lighting::kLambert) {
+    s.lights = {{{1, 1, 1}, 0.7f}, {{-1, 0.5f, 1}, 0.3f}};
+  }
+  return s;
+}
+
+// Nothing but geometry.
+OwnedScene<float> Bare() {
+  OwnedScene<float> s = Sphere(Lighting::kNone);
+  s.colors.clear(), s.uvs.clear(), s.textures.clear(), s.surfaces.clear();
+  return s;
+}
+
+ShadedRequest Request(bool color, bool alpha) {
+  ShadedRequest request;
+  request.color = color, request.alpha = alpha, request.attributes = false;
+  return request;
+}
+
+std::int64_t Foreground(const Frame& frame) {
+  std::int64_t seen = 0;
+  for (const std::int32_t id : frame.face_ids) seen += id >= 0;
+  return seen;
+}
+
+// A renderer with one scene.
+struct Session {
+  Workers workers{2};
+  ShadedRenderer renderer{workers};
+  OwnedScene<float> scene;
+  ShadedScene view;
+  ShadedFrame frame;
+
+  explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
+  PlanReport Render(const ShadedRequest& request) {
+    const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
+    EXPECT_TRUE(status.ok()) << status.message();
+    return renderer.Explain();
+  }
+  // With the cotangents and gradients that are left after `choose`.
+  PlanReport Backward(const std::function<void(ShadedFrameGradients&, ShadedGradients&)>& choose) {
+    Rng rng(4, 4);
+    const OwnedCotangents<float> all(kPixels, 2, &rng);
+    OwnedGradients<float> gradients(scene);
+    auto d_frame = all.View();
+    d_frame.uv = {}, d_frame.normals = {}, d_frame.depth = {}, d_frame.attributes = {};
+    d_frame.alpha = {};
+    auto d_scene = gradients.View();
+    ShadedGradients nothing;
+    std::swap(nothing, d_scene);
+    chosen = &nothing;
+    choose(d_frame, d_scene);
+    const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+    EXPECT_TRUE(status.ok()) << status.message();
+    return renderer.Explain();
+  }
+  const ShadedGradients* chosen = nullptr;  // all gradients there are, to choose from
+};
+
+TEST(ShadedPlan, SilhouetteTouchesNoAttribute) {
+  Session session(Sphere(Lighting::kPhong));
+  const PlanReport report = session.Render(Request(false, true));
+  for (const char* stage : {"normals", "textures", "pack", "interpolate", "gather", "normalise",
+                            "texture", "light", "combine", "scatter"}) {
+    EXPECT_EQ(report.count(stage), 0) << stage;
+  }
+  EXPECT_EQ(report.count("visibility"), 6);
+  EXPECT_EQ(report.count("alpha"), 6);
+  EXPECT_TRUE(session.frame.color.empty());
+}
+
+TEST(ShadedPlan, ColoursAloneAreInterpolatedAndNothingElse) {
+  Session session(Bare());
+  session.scene.colors = Sphere(Lighting::kNone).colors;
+  session.view = session.scene.View();
+  const PlanReport report = session.Render(Request(true, false));
+  for (const char* stage : {"normals", "textures", "pack", "gather", "light", "alpha"}) {
+    EXPECT_EQ(report.count(stage), 0) << stage;
+  }
+  EXPECT_EQ(report.count("interpolate"), 6);
+  EXPECT_EQ(session.frame.color.size(), 3 * kPixels);
+}
+
+TEST(ShadedPlan, UnlitSceneComputesNoNormal) {
+  Session session(Sphere(Lighting::kNone));
+  const PlanReport report = session.Render(Request(true, true));
+  const std::int64_t seen = Foreground(session.frame);
+  EXPECT_GT(seen, 1000);
+  EXPECT_EQ(report.count("normals"), 0);
+  EXPECT_EQ(report.count("normalise"), 0);
+  EXPECT_EQ(report.count("light"), 0);
+  EXPECT_EQ(report.count("texture"), seen);
+  EXPECT_EQ(report.count("combine"), seen);
+}
+
+TEST(ShadedPlan, EveryForegroundPixelIsShadedOnce) {
+  for (const auto lighting :
+       {Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    Session session(Sphere(lighting));
+    const PlanReport report = session.Render(Request(true, false));
+    const std::int64_t seen = Foreground(session.frame);
+    for (const char* stage : {"gather", "normalise", "texture", "light", "combine", "scatter"}) {
+      EXPECT_EQ(report.count(stage), seen) << stage;
+    }
+    EXPECT_EQ(report.count("normals"), static_cast<std::int64_t>(session.scene.mesh.face_count()));
+    EXPECT_EQ(report.count("textures"), 128 + 32 + 8 + 2 + 1);
+  }
+}
+
+TEST(ShadedPlan, NothingIsPulledThatDoesNotRequireIt) {
+  Session session(Sphere(Lighting::kPhong));
+  session.Render(Request(true, true));
+  const std::int64_t seen = Foreground(session.frame);
+  const auto& chosen = session.chosen;
+  // A texture pulls on no attribute, and needs all of them again, and the light.
+  PlanReport report = session.Backward([&](auto&, auto& d) { d.textures = chosen->textures; });
+  EXPECT_EQ(report.count("scatter"), 0);
+  EXPECT_EQ(report.count("gradients"), 0);
+  EXPECT_EQ(report.count("merge"), 0);
+  EXPECT_EQ(report.count("texture"), seen);
+  EXPECT_EQ(report.count("recompute"), seen * 8);  // colour, uv, normal; no highlight
+  // Colours pull on themselves alone.
+  report = session.Backward([&](auto&, auto& d) { d.colors = chosen->colors; });
+  EXPECT_EQ(report.count("scatter"), seen * 3);
+  EXPECT_EQ(report.count("recompute"), seen * 5);
+  // Positions pull on all that is interpolated.
+  report = session.Backward([&](auto&, auto& d) { d.positions = chosen->positions; });
+  EXPECT_EQ(report.count("scatter"), seen * 11);
+  EXPECT_EQ(report.count("recompute"), seen * 11);
+  // Alpha alone visits no foreground pixel.
+  report = session.Backward([&](auto& d_frame, auto& d) {
+    d_frame.color = {}, d.positions = chosen->positions;
+    static const std::vector<float> d_alpha(kPixels, 1.0f);
+    d_frame.alpha = d_alpha;
+  });
+  EXPECT_EQ(report.count("gather"), 0);
+  EXPECT_EQ(report.count("recompute"), 0);
+  EXPECT_EQ(report.count("alpha"), 6);
+  // No gradient at all.
+  report = session.Backward([](auto&, auto&) {});
+  EXPECT_EQ(report.count("gather"), 0);
+  EXPECT_EQ(report.count("merge"), 0);
+}
+
+TEST(ShadedPlan, LinesNameEveryStageWithItsCount) {
+  Session session(Sphere(Lighting::kPhong));
+  const PlanReport report = session.Render(Request(true, true));
+  const auto lines = ExplainLines(report);
+  ASSERT_EQ(lines.size(), report.stages.size() + 1);
+  EXPECT_EQ(lines[0], "forward");
+  for (std::size_t i = 0; i < report.stages.size(); ++i) {
+    const auto& stage = report.stages[i];
+    EXPECT_NE(lines[i + 1].find(stage.name), std::string::npos);
+    EXPECT_NE(lines[i + 1].find(std::to_string(stage.count)), std::string::npos);
+    EXPECT_GE(stage.milliseconds, 0);
+    EXPECT_FALSE(stage.what.empty());
+  }
+}
+
+// Two scenes, all images, all gradients; each with its own arrays, or sharing those of the first.
+struct Pair {
+  OwnedScene<float> scenes[2];
+  OwnedCotangents<float> d_frame;
+
+  explicit Pair(Lighting lighting) {
+    scenes[0] = Sphere(lighting);
+    scenes[1] = scenes[0];
+    scenes[1].mesh.camera = OrbitCamera({45.0, kWidth, kHeight}, 200, 10, 2.2);
+    Rng rng(8, 8);
+    d_frame = OwnedCotangents<float>(2 * kPixels, 2, &rng);
+  }
+
+  // All numbers of the gradients, of scene 0 then 1; `shared`: all go to those of scene 0.
+  std::vector<float> Run(ShadedRenderer* renderer, bool shared, ShadedFrame* frame) {
+    ShadedScene views[2] = {scenes[0].View(), scenes[shared ? 0 : 1].View()};
+    views[1].camera = scenes[1].mesh.camera;
+    EXPECT_TRUE(renderer->Render(views, Options(), test::EveryImage(), frame).ok());
+    OwnedGradients<float> gradients[2] = {OwnedGradients<float>(scenes[0]),
+                                          OwnedGradients<float>(scenes[1])};
+    ShadedGradients d[2] = {gradients[0].View(), gradients[shared ? 0 : 1].View()};
+    EXPECT_TRUE(renderer->Backward(views, Options(), *frame, d_frame.View(), d).ok());
+    std::vector<float> out;
+    for (int n = 0; n < 2; ++n) {
+      gradients[n].TakeCamera(d[n]);
+      test::ForEachNumber(gradients[n].d, [&](const char*, float v) { out.push_back(v); });
+    }
+    return out;
+  }
+};
+
+template <class T>
+bool SameBits(const T& a, const T& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+}
+
+TEST(ShadedBits, SameForAnyWorkerCountAndRun) {
+  for (const auto lighting : {Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    Pair pair(lighting);
+    ShadedFrame first;
+    std::vector<float> first_gradients;
+    for (const int count : {1, 2, 7}) {
+      const Workers workers(count);
+      ShadedRenderer renderer(workers);
+      for (int run = 0; run < 2; ++run) {
+        ShadedFrame frame;
+        const auto gradients = pair.Run(&renderer, true, &frame);
+        if (first.color.empty()) first = frame, first_gradients = gradients;
+        EXPECT_TRUE(SameBits(frame.color, first.color)) << count;
+        EXPECT_TRUE(SameBits(frame.normals, first.normals)) << count;
+        EXPECT_TRUE(SameBits(gradients, first_gradients)) << count;
+      }
+    }
+  }
+}
+
+TEST(ShadedGradientArrays, ScenesThatShareAnArrayGetTheSum) {
+  Pair pair(Lighting::kPhong);
+  const Workers workers(2);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const auto apart = pair.Run(&renderer, false, &frame);
+  const auto together = pair.Run(&renderer, true, &frame);
+  const std::size_t count = apart.size() / 2, camera = 16;  // cameras are never shared
+  double largest = 0;
+  for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, std::abs(1.0 * apart[i]));
+  ASSERT_GT(largest, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool own = i >= count - camera;
+    const float expected = own ? apart[i] : apart[i] + apart[count + i];
+    // Texels are summed over both scenes without a stop between them.
+    EXPECT_NEAR(together[i], expected, 1e-5 * (std::abs(expected) + 1)) << i;
+  }
+}
+
+TEST(ShadedMemory, SteadyStateAllocatesNothing) {
+  for (const auto lighting :
+       {Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    OwnedScene<float> scene = Sphere(lighting);
+    const ShadedScene view = scene.View();
+    Rng rng(1, 2);
+    const OwnedCotangents<float> d_frame(kPixels, 2, &rng);
+    OwnedGradients<float> gradients(scene);
+    ShadedGradients d_scene = gradients.View();
+    const Workers workers(1);
+    ShadedRenderer renderer(workers);
+    ShadedFrame frame;
+    const auto step = [&] {
+      ASSERT_TRUE(renderer.Render({&view, 1}, Options(), test::EveryImage(), &frame).ok());
+      ASSERT_TRUE(
+          renderer.Backward({&view, 1}, Options(), frame, d_frame.View(), {&d_scene, 1}).ok());
+    };
+    const long before_first = g_allocations;
+    step();
+    EXPECT_GT(g_allocations, before_first);  // the counter counts
+    const long before = g_allocations;
+    for (int i = 0; i < 3; ++i) step();
+    EXPECT_EQ(g_allocations - before, 0);
+  }
+}
+
+struct BadScene {
+  const char* name;
+  std::function<void(OwnedScene<float>&)> spoil;
+  const char* says;
+};
+
+const BadScene kBadScenes[] = {
+    {"short_colors", [](auto& s) { s.colors.pop_back(); }, "colors has"},
+    {"nan_color", [](auto& s) { s.colors[4] = NAN; }, "colors[4] is nan"},
+    {"short_uvs", [](auto& s) { s.uvs.pop_back(); }, "uvs has"},
+    {"no_uvs", [](auto& s) { s.uvs.clear(); }, "no uvs"},
+    {"short_texture", [](auto& s) { s.textures[0].texels.pop_back(); }, "textures[0]: texels"},
+    {"no_texels", [](auto& s) { s.textures[0].width = 0; }, "textures[0]: is 0 x 8"},
+    {"texture_index", [](auto& s) { s.surfaces[0].texture = 3; }, "surfaces[0]: texture is 3"},
+    {"shininess", [](auto& s) { s.surfaces[0].shininess = -1; }, "shininess is -1"},
+    {"face_surfaces", [](auto& s) { s.face_surfaces.assign(s.mesh.face_count(), 1); },
+     "face_surfaces[0] is 1"},
+    {"no_lights", [](auto& s) { s.lights.clear(); }, "neither"},
+    {"inf_light", [](auto& s) { s.lights[1].direction[2] = INFINITY; }, "lights[1]"},
+    {"face", [](auto& s) { s.mesh.faces[7] = 100000; }, "faces[7] is 100000"},
+    {"no_normals", [](auto& s) { s.model.normals = NormalKind::kGiven; }, "no normals"},
+    {"sh",
+     [](auto& s) {
+       s.model.lighting = Lighting::kSphericalHarmonics;
+       s.sh.assign(4, 1.0f);
+     },
+     "sh has 4"},
+};
+
+TEST(ShadedErrors, NameWhatIsWrong) {
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  for (const BadScene& bad : kBadScenes) {
+    OwnedScene<float> scene = Sphere(Lighting::kPhong);
+    bad.spoil(scene);
+    const ShadedScene view = scene.View();
+    ShadedFrame frame;
+    const Status status = renderer.Render({&view, 1}, Options(), {}, &frame);
+    ASSERT_FALSE(status.ok()) << bad.name;
+    EXPECT_NE(status.message().find(bad.says), std::string::npos)
+        << bad.name << ": " << status.message();
+    EXPECT_NE(status.message().find("scene 0"), std::string::npos) << status.message();
+  }
+}
+
+TEST(ShadedErrors, ScenesOfABatchMustAgree) {
+  OwnedScene<float> a = Sphere(Lighting::kPhong), b = Sphere(Lighting::kLambert);
+  const ShadedScene views[] = {a.View(), b.View()};
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const Status status = renderer.Render(views, Options(), {}, &frame);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("scene 1"), std::string::npos) << status.message();
+}
+
+TEST(ShadedErrors, CotangentsAreChecked) {
+  OwnedScene<float> scene = Sphere(Lighting::kPhong);
+  const ShadedScene view = scene.View();
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), {}, &frame).ok());
+  OwnedGradients<float> gradients(scene);
+  ShadedGradients d_scene = gradients.View();
+  std::vector<float> d_color(3 * kPixels, 1.0f);
+  d_color[70] = NAN;
+  ShadedFrameGradients d_frame;
+  d_frame.color = d_color;
+  Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  EXPECT_NE(status.message().find("d_frame.color[70]"), std::string::npos) << status.message();
+  d_frame.color = std::span(d_color).first(5);
+  status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  EXPECT_NE(status.message().find("d_frame.color has 5"), std::string::npos) << status.message();
+}
+
+}  // namespace
+}  // namespace tilegrad
