@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raster/soft_mask.h"
 
+#include "raster/chunks.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "raster/soft_mask.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
@@ -13,13 +15,23 @@
 
 namespace tilegrad::raster {
 namespace {
-HWY_EXPORT(BuildSoftTreeTarget);
+HWY_EXPORT(BuildSoftGroupsTarget);
 HWY_EXPORT(SoftMaskForwardTarget);
 HWY_EXPORT(SoftMaskBackwardTarget);
 }  // namespace
 
-void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree) {
-  HWY_DYNAMIC_DISPATCH(BuildSoftTreeTarget)(mesh, tree);
+void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* workers) {
+  constexpr std::size_t kChunkGroups = 16;  // that a worker takes at a time
+  const std::size_t groups = (mesh.faces() + kGroupFaces - 1) / kGroupFaces;
+  tree->stride = groups * kGroupFaces;
+  tree->corners.resize(6 * tree->stride);
+  tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
+  ForChunks(workers, groups, kChunkGroups, [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(BuildSoftGroupsTarget)(mesh, begin, end, tree);
+  });
+  const float* faces = tree->groups.array(SoftBoxes::kFaces);
+  tree->faces = 0;
+  for (std::size_t g = 0; g < groups; ++g) tree->faces += static_cast<std::size_t>(faces[g]);
 }
 
 double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,

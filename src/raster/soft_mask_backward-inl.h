@@ -75,11 +75,13 @@ class TileBackward {
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (scratch_->blocks[b].bits != 0) TakeLightPixels(b);
     }
-    if (AnyLive(scratch_->blocks)) FindProducts();
-    for (std::size_t b = 0; b < kTileBlocks; ++b) {
-      if (dark_[b] != 0) DarkGradients(b);
+    std::size_t next = 0;
+    FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+    if (next == Order().size()) {
+      OneChunk();
+    } else {
+      ManyChunks();
     }
-    WeakGradients();
   }
 
  private:
@@ -105,35 +107,70 @@ class TileBackward {
     weak_[b] = block.bits, block.live = dark_[b];
   }
 
+  // All faces are in the chunk: the members of a block are listed once.
+  void OneChunk() {
+    ClearSums();
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (weak_[b] == 0) continue;
+      FindMembers(b);
+      if (dark_[b] != 0) StartProducts(b), MultiplyProducts(b), DarkGradients(b);
+      AddWeakGradients(b);
+    }
+    EmitSums();
+  }
+
+  void ManyChunks() {
+    if (AnyLive(scratch_->blocks)) FindProducts();
+    for (std::size_t b = 0; b < kTileBlocks; ++b) {
+      if (dark_[b] != 0) DarkGradients(b);
+    }
+    for (std::size_t next = 0; next < Order().size();) {
+      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+      ClearSums();
+      for (std::size_t b = 0; b < kTileBlocks; ++b) {
+        if (weak_[b] != 0) FindMembers(b), AddWeakGradients(b);
+      }
+      EmitSums();
+    }
+  }
+
+  void FindMembers(std::size_t b) {
+    FindFeatures(scratch_->chunk, plan_, box_, scratch_->blocks[b], reach_, dark_[b] != 0,
+                 &scratch_->lists);
+  }
+
   // The products over all faces in dark pixels: near ones by and by, far ones in block.alpha.
   void FindProducts() {
     SoftBlock* blocks = scratch_->blocks;
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
-      if (dark_[b] == 0) continue;
-      ClearAlpha(&blocks[b]);
-      scratch_->near[b].clear();
-      std::fill_n(near_product_[b], kBlockPixels, 1.0f);
+      if (dark_[b] != 0) StartProducts(b);
     }
     for (std::size_t next = 0; next < Order().size() && AnyLive(blocks);) {
-      const bool first = next == 0;
       FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
-      only_chunk_ = first && next == Order().size();
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
-        if (blocks[b].live == 0) continue;
-        SoftLists& lists = scratch_->lists;
-        FindFeatures(scratch_->chunk, plan_, box_, blocks[b], reach_, true, &lists);
-        PartialAlpha far(&blocks[b], scratch_->partial);
-        far.AddVertices(lists.vertices), far.AddSegments(lists.segments), far.Merge();
-        AppendNear(blocks[b], lists.boundaries, scratch_->chunk, near_product_[b],
-                   &scratch_->near[b]);
-        // The square: a face's gradient may be as large as the root of the product
-        // (docs/numerics.md).
-        const double stop = plan_.stop_error * plan_.stop_error;
-        ForPixels(blocks[b].live, [&](std::size_t i) {
-          if (ProductAt(b, i) <= stop) blocks[b].live &= ~(std::uint64_t{1} << i);
-        });
+        if (blocks[b].live != 0) FindMembers(b), MultiplyProducts(b);
       }
     }
+  }
+
+  void StartProducts(std::size_t b) {
+    ClearAlpha(&scratch_->blocks[b]);
+    scratch_->near[b].clear();
+    std::fill_n(near_product_[b], kBlockPixels, 1.0f);
+  }
+
+  void MultiplyProducts(std::size_t b) {
+    SoftBlock& block = scratch_->blocks[b];
+    const SoftLists& lists = scratch_->lists;
+    PartialAlpha far(&block, scratch_->partial);
+    far.AddVertices(lists.vertices), far.AddSegments(lists.segments), far.Merge();
+    AppendNear(block, lists.boundaries, scratch_->chunk, near_product_[b], &scratch_->near[b]);
+    // The square: a face's gradient may be as large as the root of the product
+    // (docs/numerics.md).
+    const double stop = plan_.stop_error * plan_.stop_error;
+    ForPixels(block.live, [&](std::size_t i) {
+      if (ProductAt(b, i) <= stop) block.live &= ~(std::uint64_t{1} << i);
+    });
   }
 
   double ProductAt(std::size_t b, std::size_t i) const {
@@ -156,23 +193,20 @@ class TileBackward {
     });
   }
 
-  void WeakGradients() {
-    for (std::size_t next = 0; next < Order().size();) {
-      if (!only_chunk_) FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
-      if (only_chunk_) next = Order().size();
-      for (auto& array : scratch_->sums) std::fill(std::begin(array), std::end(array), 0.0f);
-      for (std::size_t b = 0; b < kTileBlocks; ++b) {
-        if (weak_[b] == 0) continue;
-        const SoftBlock& block = scratch_->blocks[b];
-        SoftLists& lists = scratch_->lists;
-        FindFeatures(scratch_->chunk, plan_, box_, block, reach_, dark_[b] != 0, &lists);
-        const WeakFaces faces{block, push_[b], {scratch_->sums}};
-        faces.Vertices(lists.vertices, weak_[b]), faces.Segments(lists.segments, weak_[b]);
-        faces.Boundaries(lists.boundaries, weak_[b] & ~dark_[b]);
-      }
-      Emit(scratch_->chunk.shorts, 0);
-      Emit(scratch_->chunk.longs, kChunkRoom);
-    }
+  void AddWeakGradients(std::size_t b) {
+    const SoftLists& lists = scratch_->lists;
+    const WeakFaces faces{scratch_->blocks[b], push_[b], {scratch_->sums}};
+    faces.Vertices(lists.vertices, weak_[b]), faces.Segments(lists.segments, weak_[b]);
+    faces.Boundaries(lists.boundaries, weak_[b] & ~dark_[b]);
+  }
+
+  // Gradients of the faces of the chunk.
+  void ClearSums() {
+    for (auto& array : scratch_->sums) std::fill(std::begin(array), std::end(array), 0.0f);
+  }
+  void EmitSums() {
+    Emit(scratch_->chunk.shorts, 0);
+    Emit(scratch_->chunk.longs, kChunkRoom);
   }
 
   void Emit(const SoftFaceArrays& faces, std::size_t slot) {
@@ -193,7 +227,6 @@ class TileBackward {
   SoftNodes nodes_;
   SoftReach reach_;
   PixelScale scale_;
-  bool only_chunk_ = false;  // all faces are in the chunk of the scratch
   std::uint64_t dark_[kTileBlocks] = {};
   std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter
   alignas(64) float push_[kTileBlocks][kBlockPixels];

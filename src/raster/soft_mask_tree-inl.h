@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <span>
 
+#include "raster/face_lanes-inl.h"
 #include "raster/soft_mask_plan.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -59,28 +60,26 @@ HWY_INLINE SoftVec BoxDistance(SoftTag d, const SoftBoxes& boxes, std::size_t i,
 HWY_INLINE void StoreCorners(SoftTag d, const ScreenMesh& mesh, std::size_t f, SoftTree* tree) {
   const SoftIntTag di;
   const std::size_t lanes = hn::Lanes(d);
-  const std::int32_t* corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
+  const std::int32_t* corners[3] = {mesh.v0.data() + f, mesh.v1.data() + f, mesh.v2.data() + f};
   HWY_ALIGN std::int32_t out_of_it[kSoftLanes];
-  HWY_ALIGN std::int32_t last[kSoftLanes];
+  std::int32_t vertex[3][kSoftLanes];
   for (std::size_t i = 0; i < lanes; ++i) {
-    const bool in = f + i < mesh.faces() && (mesh.reject[f + i] & kFaceNotInSoftMask) == 0;
-    out_of_it[i] = in ? 0 : -1;
-    tree->faces += in;
+    const bool exists = f + i < mesh.faces();
+    out_of_it[i] = exists && (mesh.reject[f + i] & kFaceNotInSoftMask) == 0 ? 0 : -1;
+    for (std::size_t k = 0; k < 3; ++k) vertex[k][i] = exists ? corners[k][i] : 0;
   }
   const SoftMask nowhere = hn::RebindMask(d, hn::Lt(hn::Load(di, out_of_it), hn::Zero(di)));
   for (std::size_t k = 0; k < 3; ++k) {
-    const std::int32_t* from = corners[k] + f;
-    if (f + lanes > mesh.faces()) {
-      for (std::size_t i = 0; i < lanes; ++i) last[i] = f + i < mesh.faces() ? from[i] : 0;
-      from = last;
+    SoftVec numbers[4];  // x, y, 1 / depth, depth
+    LoadQuads(
+        d,
+        [&](std::size_t i)
+            HWY_ATTR { return &mesh.packed[static_cast<std::size_t>(vertex[k][i])].x; },
+        0, numbers);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), numbers[axis]), d,
+                tree->corners.data() + (3 * axis + k) * tree->stride + f);
     }
-    const SoftInt vertex = hn::LoadU(di, from);
-    const auto store = [&](const float* coordinate, std::size_t a) HWY_ATTR {
-      const SoftVec at = hn::GatherIndex(d, coordinate, vertex);
-      hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), at), d,
-                tree->corners.data() + a * tree->stride + f);
-    };
-    store(mesh.x.data(), k), store(mesh.y.data(), 3 + k);
   }
 }
 
@@ -134,15 +133,15 @@ HWY_INLINE void StoreGroup(SoftTag d, std::size_t group, SoftTree* tree) {
       group, &tree->groups);
 }
 
-inline void BuildSoftTreeTarget(const ScreenMesh& mesh, SoftTree* tree) {
+// Groups [begin, end) with all that is in them.
+inline void BuildSoftGroupsTarget(const ScreenMesh& mesh, std::size_t begin, std::size_t end,
+                                  SoftTree* tree) {
   const SoftTag d;
-  const std::size_t groups = (mesh.faces() + kGroupFaces - 1) / kGroupFaces;
-  tree->faces = 0, tree->stride = groups * kGroupFaces;
-  tree->corners.resize(6 * tree->stride);
-  tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
-  for (std::size_t f = 0; f < tree->stride; f += hn::Lanes(d)) StoreCorners(d, mesh, f, tree);
-  for (std::size_t n = 0; n < tree->nodes.count; ++n) StoreNode(d, n, tree);
-  for (std::size_t g = 0; g < groups; ++g) StoreGroup(d, g, tree);
+  for (std::size_t f = begin * kGroupFaces; f < end * kGroupFaces; f += hn::Lanes(d)) {
+    StoreCorners(d, mesh, f, tree);
+  }
+  for (std::size_t n = begin * kGroupNodes; n < end * kGroupNodes; ++n) StoreNode(d, n, tree);
+  for (std::size_t g = begin; g < end; ++g) StoreGroup(d, g, tree);
 }
 
 // The nodes that a tile looks at.
@@ -190,29 +189,34 @@ HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPla
   return count;
 }
 
-// Nodes by the whole part of their z.
+// Nodes by the whole part of their z; those from `end` on together.
 struct SoftHistogram {
-  float faces[kEndZ + 1] = {};
-  std::int32_t nodes[kEndZ + 1] = {};
+  int end;
+  float faces[kEndZ + 1];
+  std::int32_t nodes[kEndZ + 1];
 
-  HWY_INLINE SoftHistogram(const SoftBoxes& boxes, std::span<const SoftNodeAt> found) {
+  HWY_INLINE SoftHistogram(const SoftBoxes& boxes, std::span<const SoftNodeAt> found, int end_z)
+      : end(end_z) {
+    std::fill_n(faces, end + 1, 0.0f), std::fill_n(nodes, end + 1, 0);
     const float* in = boxes.array(SoftBoxes::kFaces);
-    for (const SoftNodeAt& at : found) faces[at.z] += in[at.node], ++nodes[at.z];
+    for (const SoftNodeAt& at : found) {
+      const int z = std::min(at.z, end);
+      faces[z] += in[at.node], ++nodes[z];
+    }
   }
   // Drops the farthest as long as `budget` lasts; returns the first whole z that is dropped, and
   // adds what that costs to `dropped`.
   int DropFar(double budget, double* dropped) const {
-    int end = kEndZ;
-    double influence = 0x1p-126, cost = static_cast<double>(faces[kEndZ]) * influence;
-    static_assert(kEndZ == 126);
-    while (end > 0) {
+    int from = end;
+    double influence = std::ldexp(1.0, -end), cost = static_cast<double>(faces[end]) * influence;
+    while (from > 0) {
       influence *= 2;
-      const double more = static_cast<double>(faces[end - 1]) * influence;
+      const double more = static_cast<double>(faces[from - 1]) * influence;
       if (cost + more > budget) break;
-      cost += more, --end;
+      cost += more, --from;
     }
     *dropped += cost;
-    return end;
+    return from;
   }
 };
 
@@ -223,7 +227,8 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
   const std::size_t count = FindNodesOfGroups(tree, plan, box, &scratch->found, &out.dropped);
   if (count == 0) return out;
   const auto found = std::span<const SoftNodeAt>(scratch->found).first(count);
-  const SoftHistogram histogram(tree.nodes, found);
+  // All faces at group_z together are within the budget.
+  const SoftHistogram histogram(tree.nodes, found, static_cast<int>(std::ceil(plan.group_z)));
   const int end = histogram.DropFar(plan.node_error / 2, &out.dropped);
   std::size_t begin[kEndZ];
   for (int z = 0; z < end; ++z) {

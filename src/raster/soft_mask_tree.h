@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "base/aligned.h"
+#include "base/parallel.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {
@@ -42,7 +43,7 @@ struct SoftTree {
   const float* corner(std::size_t a) const { return corners.data() + a * stride; }
 };
 
-// Reuses the memory of `tree`.
-void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree);
+// Reuses the memory of `tree`. `workers` null: the calling thread.
+void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

@@ -87,7 +87,7 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
                               &image->drawn_buffers, &workers);
   }
   if (request.soft_tree) {
-    raster::BuildSoftTree(image->mesh, &image->soft);
+    raster::BuildSoftTree(image->mesh, &image->soft, &workers);
     image->soft_plan = raster::PlanSoftMask(
         {options.width, options.height, options.delta, options.max_alpha_error, image->soft.faces});
   }

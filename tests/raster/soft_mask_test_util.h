@@ -30,6 +30,7 @@ struct SoftScene {
       auto& index = k == 0 ? mesh.v0 : k == 1 ? mesh.v1 : mesh.v2;
       index.push_back(static_cast<std::int32_t>(mesh.x.size()));
       mesh.x.push_back(x[k]), mesh.y.push_back(y[k]);
+      mesh.packed.push_back({x[k], y[k], 1, 1});
     }
     mesh.source_face.push_back(static_cast<std::int32_t>(mesh.reject.size()));
     mesh.reject.push_back(kFaceDrawn);
