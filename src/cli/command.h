@@ -18,6 +18,7 @@ using Action = std::function<Status()>;
 void AddDataset(CLI::App& app, Action* action);
 void AddDatasetView(CLI::App& app, Action* action);
 void AddEval(CLI::App& app, Action* action);
+void AddFigure2(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);

@@ -53,6 +53,7 @@ int Run(int argc, char** argv) {
   AddPredict(app, &action);
   AddReport(app, &action);
   AddDatasetView(app, &action);
+  AddFigure2(app, &action);
   AddInfo(app, &action);
   if (argc > 1 && argv[1][0] != '-' && !IsCommand(app, argv[1])) {
     return Report({StatusCode::kInvalidArgument,

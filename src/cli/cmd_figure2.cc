@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad figure2: the paper's sanity check of all gradients.
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "base/file.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "train/fit/figure2.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct Options {
+  std::string out = "figure2.svg";
+  int workers = 0;
+  train::Figure2Options figure;
+};
+
+Status Run(const Options& options) {
+  const Workers workers(options.workers);
+  ProgressLine line;
+  TILEGRAD_ASSIGN(const auto results,
+                  train::RunFigure2(options.figure, workers, line.Sink(), StopOnSignals()));
+  line.Finish();
+  TILEGRAD_ASSIGN(const std::string svg, train::Figure2Svg(results));
+  TILEGRAD_TRY(WriteTextAtomic(options.out, svg));
+  fmt::print("{}look at {}\n", train::Figure2Table(results), options.out);
+  return {};
+}
+
+}  // namespace
+
+void AddFigure2(CLI::App& app, Action* action) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand(
+      "figure2",
+      "The paper's Figure 2: optimise positions, colours, texture, uv, camera, light and material\n"
+      "in eight small scenes, and draw start, target, result and error curve of each");
+  command->add_option("--out", options->out, "the picture, SVG")->capture_default_str();
+  command->add_option("--size", options->figure.size, "pixels a side of each image")
+      ->check(CLI::Range(8, 2048))
+      ->capture_default_str();
+  command->add_option("--steps", options->figure.steps, "of each optimisation")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  AddWorkersOption(command, &options->workers);
+  command->callback([options, action] { *action = [options] { return Run(*options); }; });
+}
+
+}  // namespace tilegrad::cli
