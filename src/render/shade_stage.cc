@@ -87,6 +87,7 @@ void ShadeStage::Begin(std::span<const StageScene> scenes, const RenderOptions& 
   scenes_ = scenes, options_ = &options;
   pixels_ = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   for (auto& worker : workers_) worker->work = {};
+  sound_ = true;
 }
 
 void ShadeStage::BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
@@ -209,9 +210,13 @@ bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t firs
     }
     return true;
   };
-  return sound(d_frame_->color, 3) && sound(d_frame_->normals, 3) && sound(d_frame_->uv, 2) &&
-         sound(d_frame_->attributes, static_cast<std::size_t>(scene.scene->channels)) &&
-         sound(d_frame_->depth, 1);
+  const auto channels = static_cast<std::size_t>(scene.scene->channels);
+  if (sound(d_frame_->color, 3) && sound(d_frame_->normals, 3) && sound(d_frame_->uv, 2) &&
+      sound(d_frame_->attributes, channels) && sound(d_frame_->depth, 1)) {
+    return true;
+  }
+  sound_ = false;
+  return false;
 }
 
 void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run,

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -64,7 +65,8 @@ class ShadeStage : public PixelStage {
   std::span<const StageBand> bands(std::size_t image) const {
     return std::span(bands_).subspan(image * bands_of_image_, bands_of_image_);
   }
-  ShadeWork work() const;  // of this call
+  ShadeWork work() const;                // of this call
+  bool sound() const { return sound_; }  // false: a cotangent was not finite
 
  private:
   void Begin(std::span<const StageScene> scenes, const RenderOptions& options);
@@ -92,6 +94,7 @@ class ShadeStage : public PixelStage {
   std::vector<std::unique_ptr<StageWorker>> workers_;
   std::vector<StageBand> bands_;  // [image][band]
   std::size_t bands_of_image_ = 0;
+  std::atomic<bool> sound_ = true;
 };
 
 }  // namespace tilegrad

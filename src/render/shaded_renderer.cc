@@ -400,10 +400,10 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   FrameGradients d_images{{}, d_frame.alpha};
   if (backward.colors_only) d_images.attributes = d_frame.color;
   if (backward.user_only) d_images.attributes = d_frame.attributes;
-  Status status =
+  const Status status =
       renderer.Backward(views, options, frame, d_images, d_views, staged ? &stage : nullptr);
-  if (status.ok()) status = ValidateShadedCotangents(d_frame);
-  TILEGRAD_TRY(std::move(status));
+  if (!status.ok() || (staged && !stage.sound())) TILEGRAD_TRY(ValidateShadedCotangents(d_frame));
+  TILEGRAD_TRY(status);
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;
   }

@@ -56,7 +56,8 @@ inline float UvLevel(const UvPlanes& p, double px, double py, const double (&uv)
     const double y = (p.n_y[i] - uv[i] * p.q_y) / q * size[i];
     across += x * x, down += y * y;
   }
-  return static_cast<float>(0.5 * std::log2(std::max({across, down, 1e-30})));
+  const double most = std::clamp(std::max(across, down), 1e-30, 1e30);
+  return 0.5f * std::log2(static_cast<float>(most));
 }
 
 }  // namespace tilegrad

@@ -57,54 +57,68 @@ HWY_INLINE WrappedLanes WrapLanes(RunVec u, Wrap wrap) {
           hn::IfThenElseZero(finite, hn::IfThenElse(back, hn::Set(d, -1.0f), one))};
 }
 
-HWY_INLINE RunInt ClampIndex(RunInt i, int n) {
-  const RunIntTag di;
-  return hn::Min(hn::Max(i, hn::Zero(di)), hn::Set(di, n - 1));
+HWY_INLINE RunInt ClampIndex(RunInt i, RunInt most) {
+  return hn::Min(hn::Max(i, hn::Zero(RunIntTag())), most);
 }
 
-HWY_INLINE RunInt WrapLaneIndex(RunInt i, int n, Wrap wrap) {
-  const RunIntTag di;
-  if (wrap != Wrap::kRepeat) return ClampIndex(i, n);
-  const auto zero = hn::Zero(di), most = hn::Set(di, n - 1);
+// `most`: the last index.
+HWY_INLINE RunInt WrapLaneIndex(RunInt i, RunInt most, Wrap wrap) {
+  if (wrap != Wrap::kRepeat) return ClampIndex(i, most);
+  const auto zero = hn::Zero(RunIntTag());
   return hn::IfThenElse(hn::Lt(i, zero), most, hn::IfThenElse(hn::Gt(i, most), zero, i));
 }
 
-// `u`: wrapped.
-HWY_INLINE void SetAxis(const WrappedLanes& u, int n, const TextureInput& input, std::size_t i,
+// `u`: wrapped; `n`: texels of the axis, at the level of each pixel.
+HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, const TextureInput& input, std::size_t i,
                         AxisRun* out) {
   const RunTag d;
   const RunIntTag di;
   const bool corners = input.wrap == Wrap::kRepeatCorners;
   const bool nearest = input.filter == Filter::kNearest;
-  const auto scale = hn::Set(d, static_cast<float>(corners ? n - 1 : n));
+  const auto most = hn::Sub(n, hn::Set(di, 1));
+  const auto scale = hn::ConvertTo(d, corners ? most : n);
   auto x = hn::Mul(u.at, scale);
   if (!corners && !nearest) x = hn::Sub(x, hn::Set(d, 0.5f));
   const auto cell = corners && nearest ? hn::Round(x) : hn::Floor(x);
   const auto low = hn::ConvertTo(di, cell);
   if (nearest) {
-    hn::Store(ClampIndex(low, n), di, out->low + i),
-        hn::Store(ClampIndex(low, n), di, out->high + i);
+    const auto index = ClampIndex(low, most);
+    hn::Store(index, di, out->low + i), hn::Store(index, di, out->high + i);
     hn::Store(hn::Zero(d), d, out->weight + i), hn::Store(hn::Zero(d), d, out->slope + i);
     return;
   }
-  hn::Store(WrapLaneIndex(low, n, input.wrap), di, out->low + i);
-  hn::Store(WrapLaneIndex(hn::Add(low, hn::Set(di, 1)), n, input.wrap), di, out->high + i);
+  hn::Store(WrapLaneIndex(low, most, input.wrap), di, out->low + i);
+  const auto high = hn::Add(low, hn::Set(di, 1));
+  hn::Store(WrapLaneIndex(high, most, input.wrap), di, out->high + i);
   hn::Store(hn::Sub(x, cell), d, out->weight + i);
   hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
 }
 
-// Where a run meets one level.
+// Where a run meets one level, of its own for each pixel.
 struct FootprintRun {
   AxisRun column, row;
 };
 
-HWY_INLINE void SetFootprint(std::size_t i, const TextureInput& input, const TextureLevel& level,
-                             FootprintRun* out) {
+// Texels of a side of the finest level that has `n`, at the levels of a vector of pixels: halved
+// and rounded down, at least 1.
+HWY_INLINE RunInt SizeAt(int n, RunInt level) {
+  const RunIntTag di;
+  return hn::Max(hn::Shr(hn::Set(di, n), level), hn::Set(di, 1));
+}
+
+// `levels`: of the pixels of the run.
+HWY_INLINE void SetFootprints(std::size_t count, const TextureInput& input,
+                              const std::int32_t* levels, FootprintRun* out) {
   const RunTag d;
-  SetAxis(WrapLanes(LoadRun(input.uv[0], i), input.wrap), level.width, input, i, &out->column);
-  WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), input.wrap);
-  v = {hn::Sub(hn::Set(d, 1.0f), v.at), hn::Neg(v.slope)};
-  SetAxis(v, level.height, input, i, &out->row);
+  const TextureLevel& finest = input.levels[0];
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto level = hn::Load(RunIntTag(), levels + i);
+    const WrappedLanes u = WrapLanes(LoadRun(input.uv[0], i), input.wrap);
+    SetAxis(u, SizeAt(finest.width, level), input, i, &out->column);
+    WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), input.wrap);
+    v = {hn::Sub(hn::Set(d, 1.0f), v.at), hn::Neg(v.slope)};
+    SetAxis(v, SizeAt(finest.height, level), input, i, &out->row);
+  }
 }
 
 // The four texels of a pixel.
@@ -134,48 +148,31 @@ struct TexelQuad {
 // The levels that the pixels of a run mix, and the share of the coarser one: MixLevels of
 // texture_levels_ref.h.
 struct alignas(128) MixRun {
-  std::int32_t fine[kRunPixels];
+  std::int32_t fine[kRunPixels], coarse[kRunPixels];
   float share[kRunPixels];
 };
 
 HWY_INLINE void MixLevelsRun(std::size_t count, const TextureInput& input, MixRun* out) {
   const RunTag d;
   const RunIntTag di;
-  const auto most = hn::Set(d, static_cast<float>(input.levels.size() - 1));
+  const bool trilinear = input.filter == Filter::kTrilinear;
+  const auto last = hn::Set(di, static_cast<std::int32_t>(input.levels.size()) - 1);
+  const auto most = hn::ConvertTo(d, last);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto level = LoadRun(*input.level, i);
+    const auto level = trilinear ? LoadRun(*input.level, i) : hn::Zero(d);
     const auto kept = hn::IfThenElseZero(hn::Gt(level, hn::Zero(d)), hn::Min(level, most));
-    const auto fine = hn::Floor(kept);
-    hn::Store(hn::ConvertTo(di, fine), di, out->fine + i);
-    hn::Store(hn::Sub(kept, fine), d, out->share + i);
+    const auto fine = hn::ConvertTo(di, hn::Floor(kept));
+    hn::Store(fine, di, out->fine + i);
+    hn::Store(hn::Min(hn::Add(fine, hn::Set(di, 1)), last), di, out->coarse + i);
+    hn::Store(hn::Sub(kept, hn::Floor(kept)), d, out->share + i);
   }
 }
 
-HWY_INLINE std::size_t CoarserLevel(const TextureInput& input, std::size_t fine) {
-  return fine + 1 < input.levels.size() ? fine + 1 : fine;
-}
-
-// Whole vectors of pixels that start at `first` and hold pixel p: footprints are made for vectors,
-// but levels differ by pixel.
-HWY_INLINE void SetPixelFootprint(std::size_t p, const TextureInput& input, std::size_t level,
-                                  FootprintRun* out) {
-  const std::size_t lanes = hn::Lanes(RunTag());
-  SetFootprint(p / lanes * lanes, input, input.levels[level], out);
-}
-
-HWY_INLINE Texel SampleMixed(const TextureInput& input, const MixRun& mix, std::size_t p,
-                             FootprintRun* at) {
-  const TexelTag d;
-  const auto fine = static_cast<std::size_t>(mix.fine[p]);
-  SetPixelFootprint(p, input, fine, at);
-  const Texel a =
-      TexelQuad(*at, input.levels[fine], p).Bilinear(at->column.weight[p], at->row.weight[p]);
-  if (mix.share[p] == 0) return a;
-  const std::size_t coarse = CoarserLevel(input, fine);
-  SetPixelFootprint(p, input, coarse, at);
-  const Texel b =
-      TexelQuad(*at, input.levels[coarse], p).Bilinear(at->column.weight[p], at->row.weight[p]);
-  return hn::MulAdd(hn::Set(d, mix.share[p]), hn::Sub(b, a), a);
+// The bilinear value of pixel p at the level of its footprint.
+HWY_INLINE Texel SampleAt(const TextureInput& input, const FootprintRun& at, std::int32_t level,
+                          std::size_t p) {
+  const TexelQuad texels(at, input.levels[static_cast<std::size_t>(level)], p);
+  return texels.Bilinear(at.column.weight[p], at.row.weight[p]);
 }
 
 // [pixel][4] to planes.
@@ -196,21 +193,21 @@ HWY_INLINE std::size_t WholeVectors(std::size_t count) {
 void SampleRun(std::size_t count, const TextureInput& input, RunPlane* color) {
   const TexelTag d;
   FootprintRun at;
+  MixRun mix;
   HWY_ALIGN float quads[4 * kRunPixels];
   const std::size_t whole = WholeVectors(count);
+  MixLevelsRun(count, input, &mix);
+  SetFootprints(count, input, mix.fine, &at);
+  for (std::size_t p = 0; p < whole; ++p) {
+    hn::Store(SampleAt(input, at, mix.fine[p], p), d, quads + 4 * p);
+  }
   if (input.filter == Filter::kTrilinear) {
-    MixRun mix;
-    MixLevelsRun(count, input, &mix);
+    SetFootprints(count, input, mix.coarse, &at);
     for (std::size_t p = 0; p < whole; ++p) {
-      hn::Store(SampleMixed(input, mix, p, &at), d, quads + 4 * p);
-    }
-  } else {
-    for (std::size_t i = 0; i < count; i += hn::Lanes(RunTag())) {
-      SetFootprint(i, input, input.levels[0], &at);
-    }
-    for (std::size_t p = 0; p < whole; ++p) {
-      const TexelQuad texels(at, input.levels[0], p);
-      hn::Store(texels.Bilinear(at.column.weight[p], at.row.weight[p]), d, quads + 4 * p);
+      if (mix.share[p] == 0) continue;
+      const auto fine = hn::Load(d, quads + 4 * p);
+      const auto change = hn::Sub(SampleAt(input, at, mix.coarse[p], p), fine);
+      hn::Store(hn::MulAdd(hn::Set(d, mix.share[p]), change, fine), d, quads + 4 * p);
     }
   }
   StorePlanes(quads, count, color);
@@ -257,45 +254,48 @@ struct PullTo {
   TexelShare* shares;
 };
 
-// One pixel at one level of its footprint, which is set.
-HWY_INLINE void PullLevel(const TextureInput& input, const FootprintRun& at, std::size_t level,
-                          const RunPlane* d_color, float scale, std::size_t p, WeightPull* weights,
-                          TexelShare* share) {
+// The pixels of a run at one of their levels. scale: of all pixels, or null: 1. Shares are `step`
+// apart.
+struct PullLevels {
+  const std::int32_t* level;
+  const float* scale;
+  std::size_t step;
+};
+
+HWY_INLINE void PullRun(std::size_t count, const TextureInput& input, const RunPlane* d_color,
+                        const PullLevels& levels, const PullTo& to) {
   const TexelTag d;
-  if (share != nullptr) *share = MakeShare(at, level, d_color, scale, p);
-  if (weights == nullptr) return;
-  HWY_ALIGN const float pull[4] = {scale * d_color[0].at[p], scale * d_color[1].at[p],
-                                   scale * d_color[2].at[p], 0};
-  PullPixel(at, input.levels[level], hn::Load(d, pull), p, weights);
+  FootprintRun at;
+  SetFootprints(count, input, levels.level, &at);
+  for (std::size_t p = 0; p < count; ++p) {
+    const float scale = levels.scale == nullptr ? 1.0f : levels.scale[p];
+    const auto level = static_cast<std::size_t>(levels.level[p]);
+    if (to.shares != nullptr) {
+      to.shares[levels.step * p] = MakeShare(at, level, d_color, scale, p);
+    }
+    if (to.weights == nullptr) continue;
+    HWY_ALIGN const float pull[4] = {scale * d_color[0].at[p], scale * d_color[1].at[p],
+                                     scale * d_color[2].at[p], 0};
+    PullPixel(at, input.levels[level], hn::Load(d, pull), p, to.weights);
+  }
 }
 
 HWY_INLINE void PullMixed(std::size_t count, const TextureInput& input, const RunPlane* d_color,
                           const PullTo& to) {
-  FootprintRun at;
+  const RunTag d;
   MixRun mix;
   MixLevelsRun(count, input, &mix);
-  for (std::size_t p = 0; p < count; ++p) {
-    const auto fine = static_cast<std::size_t>(mix.fine[p]);
-    const std::size_t levels[2] = {fine, CoarserLevel(input, fine)};
-    const float scales[2] = {1 - mix.share[p], mix.share[p]};
-    for (std::size_t k = 0; k < 2; ++k) {
-      SetPixelFootprint(p, input, levels[k], &at);
-      PullLevel(input, at, levels[k], d_color, scales[k], p, to.weights,
-                to.shares == nullptr ? nullptr : to.shares + 2 * p + k);
-    }
+  if (input.filter != Filter::kTrilinear) {
+    PullRun(count, input, d_color, {mix.fine, nullptr, 1}, to);
+    return;
   }
-}
-
-HWY_INLINE void PullPlain(std::size_t count, const TextureInput& input, const RunPlane* d_color,
-                          const PullTo& to) {
-  FootprintRun at;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(RunTag())) {
-    SetFootprint(i, input, input.levels[0], &at);
+  RunPlane rest;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    StoreRun(hn::Sub(hn::Set(d, 1.0f), hn::Load(d, mix.share + i)), &rest, i);
   }
-  for (std::size_t p = 0; p < count; ++p) {
-    PullLevel(input, at, 0, d_color, 1, p, to.weights,
-              to.shares == nullptr ? nullptr : to.shares + p);
-  }
+  PullRun(count, input, d_color, {mix.fine, rest.at, 2}, to);
+  PullRun(count, input, d_color, {mix.coarse, mix.share, 2},
+          {to.weights, to.shares == nullptr ? nullptr : to.shares + 1});
 }
 
 HWY_INLINE void SumWeightPull(std::size_t count, const WeightPull& pull, RunPlane* d_uv) {
@@ -319,12 +319,7 @@ void SampleRunAdjoint(std::size_t count, const TextureInput& input, const RunPla
       hn::Store(hn::Zero(d), d, pull.a + i), hn::Store(hn::Zero(d), d, pull.b + i);
     }
   }
-  const PullTo to{d_uv == nullptr ? nullptr : &pull, shares};
-  if (input.filter == Filter::kTrilinear) {
-    PullMixed(count, input, d_color, to);
-  } else {
-    PullPlain(count, input, d_color, to);
-  }
+  PullMixed(count, input, d_color, {d_uv == nullptr ? nullptr : &pull, shares});
   if (d_uv != nullptr) SumWeightPull(count, pull, d_uv);
 }
 
