@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bench_report RENDER.json FOLDER: prints the tables of docs/benchmarks.md, and writes
-// FOLDER/render.csv, FOLDER/render.md and FOLDER/growth_{faces,pixels,delta}.svg.
+// FOLDER/render.csv, FOLDER/render.md and FOLDER/growth_{faces,pixels,delta}.svg; of the JSON of
+// shade_bench, FOLDER/shade.csv and FOLDER/shade.md.
 #include <cstdio>
 
 #include "base/error.h"
@@ -15,6 +16,12 @@ Status Report(const Path& json, const Path& folder) {
   const auto parsed = ParseMeasurements(text);
   if (!parsed.ok()) return parsed.status().Within(json.string());
   const std::vector<Measurement>& all = parsed.value();
+  if (const std::string requests = RequestTable(all); !requests.empty()) {
+    TILEGRAD_TRY(WriteTextAtomic(folder / "shade.csv", MeasurementsCsv(all)));
+    TILEGRAD_TRY(WriteTextAtomic(folder / "shade.md", requests));
+    std::printf("%s\n", requests.c_str());
+    return {};
+  }
   std::string tables = SpeedTable(all);
   TILEGRAD_TRY(WriteTextAtomic(folder / "render.csv", MeasurementsCsv(all)));
   for (const char* axis : {"faces", "pixels", "delta"}) {

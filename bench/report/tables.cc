@@ -71,6 +71,16 @@ LogSeries SeriesOf(const std::vector<Measurement>& all, const std::string& axis,
   return series;
 }
 
+const Measurement* FindRequest(const std::vector<Measurement>& all, const std::string& scene,
+                               const std::string& direction, const std::string& what) {
+  for (const Measurement& m : all) {
+    if (m.who == "shaded" && m.scene == scene && m.direction == direction && m.what == what) {
+      return &m;
+    }
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::string MeasurementsCsv(const std::vector<Measurement>& all) {
@@ -94,6 +104,24 @@ std::string SpeedTable(const std::vector<Measurement>& all) {
     if (m.who == "1" && !IsGrowth(m)) out += SpeedRow(all, m);
   }
   return out;
+}
+
+std::string RequestTable(const std::vector<Measurement>& all) {
+  std::string out;
+  for (const Measurement& m : all) {
+    if (m.who != "shaded" || m.direction != "forward") continue;
+    const Measurement* back = FindRequest(all, m.scene, "backward", m.what);
+    const Measurement* plain = FindRequest(all, m.scene, "forward", "silhouette");
+    const Measurement* plain_back = FindRequest(all, m.scene, "backward", "silhouette");
+    if (back == nullptr || plain == nullptr || plain_back == nullptr) continue;
+    out +=
+        fmt::format("| {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", m.scene, m.what, m.cpu_ms,
+                    m.cpu_ms / plain->cpu_ms, back->cpu_ms, back->cpu_ms / plain_back->cpu_ms);
+  }
+  if (out.empty()) return out;
+  return "| scene | request | forward, ms | x silhouette | backward, ms | x silhouette |\n"
+         "|---|---|--:|--:|--:|--:|\n" +
+         out;
 }
 
 LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis) {

@@ -17,6 +17,10 @@ std::string MeasurementsCsv(const std::vector<Measurement>& all);
 // A row for each scene, direction and what; growth series are left out.
 std::string SpeedTable(const std::vector<Measurement>& all);
 
+// Markdown: what requests cost beside the silhouette alone of the same scene and direction; empty
+// where shade_bench was not run.
+std::string RequestTable(const std::vector<Measurement>& all);
+
 // Growth series `axis` ("faces", "pixels" or "delta"): CPU time against it. Empty series where it
 // was not measured.
 LogPlot GrowthPlot(const std::vector<Measurement>& all, const std::string& axis);

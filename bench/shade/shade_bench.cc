@@ -28,7 +28,7 @@ constexpr RequestSpec kRequests[] = {
     {"silhouette", false},
     {"color"},
     {"texture", true, true},
-    {"texture, trilinear", true, true, shade::Filter::kTrilinear},
+    {"trilinear texture", true, true, shade::Filter::kTrilinear},
     {"Lambert", true, false, shade::Filter::kBilinear, Lighting::kLambert},
     {"Phong", true, false, shade::Filter::kBilinear, Lighting::kPhong},
     {"harmonics", true, false, shade::Filter::kBilinear, Lighting::kSphericalHarmonics},

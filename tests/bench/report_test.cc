@@ -60,6 +60,19 @@ TEST(BenchReport, SpeedTableHasRatiosAndLimits) {
       << table;
 }
 
+TEST(BenchReport, RequestTableHasRatiosToTheSilhouette) {
+  const auto all = Parse(Sample("S2/forward/silhouette/shaded", 4, 4, "") + "," +
+                         Sample("S2/backward/silhouette/shaded", 5, 5, "") + "," +
+                         Sample("S2/forward/trilinear texture/shaded", 10, 9, "") + "," +
+                         Sample("S2/backward/trilinear texture/shaded", 15, 9, ""));
+  const std::string table = RequestTable(all);
+  EXPECT_NE(table.find("| S2 | silhouette | 4.00 | 1.00 | 5.00 | 1.00 |"), std::string::npos);
+  EXPECT_NE(table.find("| S2 | trilinear texture | 10.00 | 2.50 | 15.00 | 3.00 |"),
+            std::string::npos)
+      << table;
+  EXPECT_TRUE(RequestTable(Parse(kSamples)).empty());
+}
+
 TEST(BenchReport, CsvHasAllMeasurements) {
   const std::string csv = MeasurementsCsv(Parse(kSamples));
   EXPECT_EQ(csv.rfind("scene,direction,what,who,repetitions,cpu_ms,wall_ms,share,images,pixels,"
