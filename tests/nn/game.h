@@ -32,6 +32,7 @@ class Game {
   double Step(std::uint64_t step) {
     Rng rng(3, step);
     const Var noise = Random({3, 9}, rng), real = Random({3, 3, 16, 16}, rng);
+    const Var one = Slice(real, 0, 0, 1);
     const Var fake = generator_.Forward(noise, Mode::kTrain);
     const Var painted = net_.Forward(real, Mode::kTrain);
     const Var pooled = AvgPool2d(MaxPool2d(painted, {3, 2, 1}), {2, 2});
@@ -39,8 +40,8 @@ class Game {
     const Var labels = Reshape(Softmax(Reshape(larger, {3, -1}), 1), larger.shape());
     const Var loss = Mean(critic_.Forward(fake, Mode::kTrain)) + GradientPenalty(critic_, real) +
                      Mean(Softplus(judge_.Forward(painted, Mode::kTrain))) + Mean(Square(labels)) +
-                     Mean(Elu(painted - real)) + GradientPenalty(wide_critic_, real) +
-                     Mean(Abs(wide_net_.Forward(real, Mode::kTrain) - real));
+                     Mean(Elu(painted - real)) + GradientPenalty(wide_critic_, one) +
+                     Mean(Abs(wide_net_.Forward(one, Mode::kTrain) - one));
     const auto gradients = Grad(loss, adam_.parameters());
     const double scale = ClipFactor(GlobalNorm(context_, gradients), 1.0);
     const Status status = adam_.Step(gradients, scale);
