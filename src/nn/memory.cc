@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/memory.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <bit>
 #include <mutex>
-#include <new>
 #include <utility>
 
-#include "base/aligned.h"
+#include "nn/address_arena.h"
 #include "nn/step_memory.h"
 
 namespace tilegrad::nn {
@@ -19,57 +14,21 @@ namespace tilegrad::nn {
 struct Block {
   std::byte* data = nullptr;
   std::size_t bytes = 0;
-  std::size_t size_class = 0;
   std::atomic<std::size_t> owners{0};
   std::shared_ptr<MemoryPool> pool;  // set while the block is live: keeps the pool for its return
 };
 
-namespace {
-
-constexpr std::size_t kSteps = 8;  // classes to each doubling
-constexpr std::size_t kClasses = 64 * kSteps;
-constexpr std::size_t kSmallest = 1024;  // bytes; whatever is smaller shares one class
-
-struct SizeClass {
-  std::size_t index, bytes;
-};
-
-SizeClass ClassOf(std::size_t bytes) {
-  bytes = std::max(bytes, kSmallest);
-  const int log2 = std::bit_width(bytes) - 1;
-  const std::size_t step = (std::size_t{1} << log2) / kSteps;
-  const std::size_t rounded = (bytes + step - 1) / step * step;
-  return {static_cast<std::size_t>(log2) * kSteps + rounded / step - kSteps, rounded};
-}
-
-// Large blocks ask for huge pages: fewer page faults at the start, fewer TLB misses in every pass
-// over weights and activations.
-constexpr std::size_t kHugePage = std::size_t{2} << 20;
-
-std::align_val_t AlignmentOf(std::size_t bytes) {
-  return std::align_val_t(bytes >= 2 * kHugePage ? kHugePage : kAlignment);
-}
-
-Block* New(const SizeClass& size) {
-  auto* block = new Block;
-  block->data = static_cast<std::byte*>(::operator new(size.bytes, AlignmentOf(size.bytes)));
-  block->bytes = size.bytes;
-  block->size_class = size.index;
-  // Advice only: where the system does not follow it, nothing changes but speed.
-  if (size.bytes >= 2 * kHugePage) madvise(block->data, size.bytes, MADV_HUGEPAGE);
-  return block;
-}
-
-void Delete(Block* block) {
-  ::operator delete(block->data, AlignmentOf(block->bytes));
-  delete block;
-}
-
-}  // namespace
-
 struct MemoryPool::State {
+  // Small tensors live apart, so that they do not lie between large ones.
+  AddressArena& ArenaOf(std::size_t bytes) {
+    constexpr std::size_t kLarge = std::size_t{256} << 10;
+    return bytes < kLarge ? small : large;
+  }
+
   mutable std::mutex mutex;
-  std::array<std::vector<Block*>, kClasses> free;
+  AddressArena small, large;
+  std::vector<std::unique_ptr<Block>> blocks;  // all that were made
+  std::vector<Block*> unused;
   MemoryStats stats;
 };
 
@@ -91,28 +50,25 @@ bool BlockRef::unique() const {
 
 MemoryPool::MemoryPool() : state_(std::make_unique<State>()) {}
 
-MemoryPool::~MemoryPool() { Trim(); }
+MemoryPool::~MemoryPool() = default;
 
 std::shared_ptr<MemoryPool> MemoryPool::Make() {
   return std::shared_ptr<MemoryPool>(new MemoryPool());
 }
 
 BlockRef MemoryPool::Allocate(std::size_t bytes) {
-  const SizeClass wanted = ClassOf(bytes);
   const std::lock_guard lock(state_->mutex);
-  auto& free = state_->free[wanted.index];
   MemoryStats& stats = state_->stats;
   ++stats.requests;
-  Block* block = nullptr;
-  if (free.empty()) {
-    ++stats.misses;
-    stats.held_bytes += wanted.bytes;
-    block = New(wanted);
-  } else {
-    block = free.back();
-    free.pop_back();
+  if (state_->unused.empty()) {
+    state_->unused.push_back(state_->blocks.emplace_back(std::make_unique<Block>()).get());
+    state_->unused.reserve(state_->blocks.size());
   }
-  stats.live_bytes += block->bytes;
+  Block* block = state_->unused.back();
+  state_->unused.pop_back();
+  block->data = state_->ArenaOf(bytes).Take(bytes);
+  block->bytes = bytes;
+  stats.live_bytes += AddressArena::Rounded(bytes);
   stats.peak_bytes = std::max(stats.peak_bytes, stats.live_bytes);
   block->pool = shared_from_this();
   block->owners.store(1, std::memory_order_relaxed);
@@ -121,19 +77,15 @@ BlockRef MemoryPool::Allocate(std::size_t bytes) {
 
 void MemoryPool::Release(Block* block) {
   const std::lock_guard lock(state_->mutex);
-  state_->stats.live_bytes -= block->bytes;
-  state_->free[block->size_class].push_back(block);
+  state_->stats.live_bytes -= AddressArena::Rounded(block->bytes);
+  state_->ArenaOf(block->bytes).Give(block->data, block->bytes);
+  state_->unused.push_back(block);
 }
 
 void MemoryPool::Trim() {
   const std::lock_guard lock(state_->mutex);
-  for (auto& free : state_->free) {
-    for (Block* block : free) {
-      state_->stats.held_bytes -= block->bytes;
-      Delete(block);
-    }
-    free.clear();
-  }
+  state_->small.Trim();
+  state_->large.Trim();
 }
 
 void MemoryPool::ResetPeak() {
@@ -143,7 +95,10 @@ void MemoryPool::ResetPeak() {
 
 MemoryStats MemoryPool::stats() const {
   const std::lock_guard lock(state_->mutex);
-  return state_->stats;
+  MemoryStats stats = state_->stats;
+  stats.held_bytes = state_->small.held() + state_->large.held();
+  stats.misses = state_->small.growths() + state_->large.growths();
+  return stats;
 }
 
 std::shared_ptr<std::pmr::memory_resource> MakeStepMemory() {

@@ -13,8 +13,8 @@ namespace tilegrad::nn {
 struct MemoryStats {
   std::size_t live_bytes = 0;  // in blocks that some tensor holds now
   std::size_t peak_bytes = 0;  // the largest live_bytes since the start or ResetPeak()
-  std::size_t held_bytes = 0;  // taken from the heap: live blocks and free ones
-  std::size_t misses = 0;      // requests that had to go to the heap
+  std::size_t held_bytes = 0;  // that live blocks lay in at some time: what the system had to give
+  std::size_t misses = 0;      // requests for which held_bytes had to grow
   std::size_t requests = 0;
 };
 
@@ -41,9 +41,8 @@ class BlockRef {
   Block* block_ = nullptr;
 };
 
-// Free blocks are kept by size class (eight to each doubling, so at most 1/8 of a block is unused):
-// a fixed class for each size makes the second round of an equal sequence of requests free of
-// misses. Thread-safe. Blocks may outlive every other owner of the pool.
+// Blocks are ranges of one arena (address_arena.h): the second or third round of an equal sequence
+// of requests is free of misses. Thread-safe. Blocks may outlive every other owner of the pool.
 class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
  public:
   static std::shared_ptr<MemoryPool> Make();
@@ -53,7 +52,7 @@ class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
 
   // Uninitialised, aligned to kAlignment, at least `bytes` long.
   BlockRef Allocate(std::size_t bytes);
-  void Trim();  // gives the free blocks back to the heap
+  void Trim();  // lets the system have the memory of what is free
   void ResetPeak();
   MemoryStats stats() const;
 

@@ -203,7 +203,7 @@ TEST(Memory, BlocksAreReused) {
     EXPECT_FALSE(a.unique());
   }
   EXPECT_EQ(context.memory().stats().live_bytes, 0u);
-  const Tensor again = context.Empty({99999});  // of the same size class
+  const Tensor again = context.Empty({99999});  // fits where the first one was
   EXPECT_EQ(again.raw(), first);
   EXPECT_EQ(context.memory().stats().misses, 1u);
   EXPECT_EQ(context.memory().stats().requests, 2u);

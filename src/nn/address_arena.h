@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ranges of memory out of one long range of addresses: the smallest free range that fits is taken,
+// and neighbours that are free join again. So the memory of activations serves gradients of other
+// sizes next, which blocks of fixed sizes cannot.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory_resource>
+#include <vector>
+
+namespace tilegrad::nn {
+
+// Not thread-safe. Equal sequences of calls from equal states do the same: a training step that
+// begins where the one before began needs no more memory.
+class AddressArena {
+ public:
+  AddressArena() = default;
+  ~AddressArena();
+  AddressArena(const AddressArena&) = delete;
+  AddressArena& operator=(const AddressArena&) = delete;
+
+  static std::size_t Rounded(std::size_t bytes);  // what Take really takes
+  // Uninitialised, aligned to kAlignment. Ends the program where the system has no memory, as
+  // operator new does.
+  std::byte* Take(std::size_t bytes);
+  void Give(std::byte* data, std::size_t bytes);  // of Take(bytes)
+  void Trim();                                    // lets the system have what is free
+
+  std::size_t held() const { return held_; }        // memory that was taken once, or is
+  std::size_t growths() const { return growths_; }  // how often held() had to grow
+
+ private:
+  using FreeRanges = std::pmr::map<std::byte*, std::size_t>;
+  struct Region {
+    std::byte* begin;
+    std::size_t reserved, used, usable;  // addresses; given out once; with memory behind them
+  };
+  FreeRanges::iterator BestFit(std::size_t size);
+  std::byte* Grow(std::size_t size);
+  void AddRegion(std::size_t bytes);
+
+  std::pmr::unsynchronized_pool_resource nodes_;  // of the map: no allocation in the steady state
+  FreeRanges free_{&nodes_};
+  std::vector<Region> regions_;  // the last one grows
+  std::size_t held_ = 0, growths_ = 0;
+};
+
+}  // namespace tilegrad::nn
