@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <new>
 #include <span>
 #include <vector>
 
@@ -14,6 +13,11 @@ namespace tilegrad {
 inline constexpr std::size_t kAlignment =
     128;  // two cache lines: the widest vector of any target, and no false sharing
 
+// Memory aligned to kAlignment. Large blocks begin on a huge page and ask the system for such pages:
+// fewer page faults at the start, fewer TLB misses in every pass.
+void* AllocateAligned(std::size_t bytes);
+void FreeAligned(void* data, std::size_t bytes);  // `bytes` as it was allocated
+
 template <class T>
 struct AlignedAllocator {
   using value_type = T;
@@ -21,9 +25,9 @@ struct AlignedAllocator {
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT: rebinding is implicit by design
   T* allocate(std::size_t n) {
-    return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(kAlignment)));
+    return static_cast<T*>(AllocateAligned(n * sizeof(T)));
   }
-  void deallocate(T* p, std::size_t) { ::operator delete(p, std::align_val_t(kAlignment)); }
+  void deallocate(T* p, std::size_t n) { FreeAligned(p, n * sizeof(T)); }
   bool operator==(const AlignedAllocator&) const { return true; }
 };
 

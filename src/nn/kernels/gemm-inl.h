@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matrix product, blocked after Goto and van de Geijn: Anatomy of high-performance matrix
 // multiplication, ACM TOMS 34(3), 2008. A is packed once for all; every work item packs the slice
-// of B that it needs and keeps a panel of it in L1 while panels of A stream past from L2. With few
-// rows of A (a training batch) waiting for B would cost as much as multiplying: the next block of B
-// is asked for between the tiles of the present one.
+// of B that it needs and keeps a panel of it in L1 while panels of A stream past from L2.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_INL_H_
@@ -16,8 +14,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 
 #include "nn/kernels/gemm.h"
+#include "nn/kernels/gemm_columns-inl.h"
 #include "nn/kernels/micro_kernel-inl.h"
 #include "nn/kernels/pack-inl.h"
 
@@ -27,9 +27,8 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel takes half of L1
 constexpr std::size_t kItemRows = 256;     // kItemRows x kDepth of packed A take half of L2
 constexpr std::size_t kItemColumns = 128;  // of C in one work item
+constexpr std::size_t kFewRows = 96;       // up to which the next columns are packed meanwhile
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
-
-constexpr std::size_t kLineFloats = 16;  // in a cache line
 
 struct GemmPlan {
   explicit GemmPlan(const GemmProblem<float>& problem)
@@ -37,77 +36,35 @@ struct GemmPlan {
         rows(p.m, kTileRows),
         row_blocks(rows.count(), kItemRows / kTileRows),
         column_blocks(DivideUp(p.n, kTileColumns), kItemColumns / kTileColumns),
-        super_depth(std::max<std::size_t>(1, kPackedFloats / p.m / kDepth) * kDepth) {}
+        depths(p.k, kDepth),
+        passes(depths.count(), std::max<std::size_t>(1, kPackedFloats / p.m / kDepth)) {}
 
-  std::size_t packed_a_size() const { return p.m * std::min(p.k, super_depth); }
-  std::size_t packed_b_size() const { return kItemColumns * std::min(p.k, kDepth); }
+  std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
+  std::size_t packed_b_size() const {
+    return column_blocks.largest() * PackedPanelStride(depths.largest());
+  }
+  // Of a worker: the columns in use and the next ones.
+  std::size_t worker_size() const { return RoundUp(2 * packed_b_size(), kAlignment); }
 
   GemmProblem<float> p;
   Panels rows;           // panels of A
   Panels row_blocks;     // of those panels
   Panels column_blocks;  // of column panels
-  std::size_t super_depth;
+  Panels depths;         // blocks of steps
+  Panels passes;         // of those blocks: A is packed for one pass at a time
 };
 
-// Packs row panel `panel` of A for steps [k0, k1): depth blocks one after the other, each of all
+// Packs row panel `panel` of A for depth blocks [depth, end), one after the other, each of all
 // panels.
-inline void PackRowPanel(const GemmPlan& plan, std::size_t panel, std::size_t k0, std::size_t k1,
-                         float* packed) {
+inline void PackRowPanel(const GemmPlan& plan, std::size_t panel, std::size_t depth,
+                         std::size_t end, float* packed) {
   const GemmProblem<float>& p = plan.p;
   const std::size_t row = plan.rows.begin(panel), rows = plan.rows.size(panel);
-  for (std::size_t k = k0; k < k1; k += kDepth) {
-    const std::size_t steps = std::min(kDepth, k1 - k);
+  const std::size_t k0 = plan.depths.begin(depth);
+  for (std::size_t d = depth; d < end; ++d) {
+    const std::size_t k = plan.depths.begin(d), steps = plan.depths.size(d);
     PackStrip({p.a, p.lda, p.transpose_a}, row, rows, k, steps,
               packed + p.m * (k - k0) + row * steps, rows);
-  }
-}
-
-// One work item's columns and steps, packed: panels of kTileColumns, zeros behind column n.
-struct ColumnBlock {
-  std::size_t begin, end;  // columns of C
-  std::size_t k, steps;
-};
-
-// Whole panels of a B that is not transposed, row by row: memory is read in long runs.
-inline void PackWholePanels(const GemmProblem<float>& p, const ColumnBlock& block,
-                            std::size_t panels, float* packed) {
-  for (std::size_t k = 0; k < block.steps; ++k) {
-    const float* row = p.b + (block.k + k) * p.ldb + block.begin;
-    float* out = packed + k * kTileColumns;
-    for (std::size_t panel = 0; panel < panels; ++panel) {
-      CopyStrip(row + panel * kTileColumns, 0, kTileColumns, 1,
-                out + panel * kTileColumns * block.steps, 0);
-    }
-  }
-}
-
-inline void PackColumns(const GemmProblem<float>& p, const ColumnBlock& block, float* packed) {
-  std::size_t j = block.begin;
-  if (!p.transpose_b) {
-    const std::size_t whole = (block.end - block.begin) / kTileColumns;
-    PackWholePanels(p, block, whole, packed);
-    j += whole * kTileColumns;
-  }
-  for (; j < block.end; j += kTileColumns) {
-    const std::size_t columns = std::min(kTileColumns, block.end - j);
-    float* panel = packed + (j - block.begin) * block.steps;
-    if (columns < kTileColumns) std::fill_n(panel, kTileColumns * block.steps, 0.0f);
-    PackStrip({p.b, p.ldb, !p.transpose_b}, j, columns, block.k, block.steps, panel, kTileColumns);
-  }
-}
-
-// Asks for share `part` of `parts` of the memory that PackColumns(block) will read.
-inline void PrefetchColumns(const GemmProblem<float>& p, const ColumnBlock& block, std::size_t part,
-                            std::size_t parts) {
-  const std::size_t columns = block.end - block.begin;
-  const std::size_t count = p.transpose_b ? columns : block.steps;
-  const std::size_t length = p.transpose_b ? block.steps : columns;
-  const float* data =
-      p.transpose_b ? p.b + block.begin * p.ldb + block.k : p.b + block.k * p.ldb + block.begin;
-  for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-    for (std::size_t j = 0; j < length; j += kLineFloats) {
-      __builtin_prefetch(data + i * p.ldb + j, 0, 2);  // read, into L2
-    }
   }
 }
 
@@ -123,58 +80,85 @@ inline TileTarget TargetOf(const GemmProblem<float>& p, std::size_t row, std::si
   return t;
 }
 
-// The tiles of row panels [panel_begin, panel_end) and the columns of `block`. Meanwhile `next` is
-// fetched.
-inline void MultiplyBlock(const GemmPlan& plan, std::size_t panel_begin, std::size_t panel_end,
-                          const ColumnBlock& block, const ColumnBlock& next, const float* packed_a,
-                          const float* packed_b) {
-  const std::size_t panels = panel_end - panel_begin;
-  const std::size_t tiles = panels * DivideUp(block.end - block.begin, kTileColumns);
-  std::size_t tile = 0;
-  for (std::size_t j = block.begin; j < block.end; j += kTileColumns) {
-    const PackedColumns columns{packed_b + (j - block.begin) * block.steps};
-    for (std::size_t panel = panel_begin; panel < panel_end; ++panel, ++tile) {
-      const std::size_t row = plan.rows.begin(panel);
-      PrefetchColumns(plan.p, next, tile, tiles);
-      PackedRowsTile(packed_a + row * block.steps, plan.rows.size(panel), columns, block.steps,
-                     TargetOf(plan.p, row, j, block.k == 0));
+// A tile of C: row panel `panel`, column panel `j` of the block.
+template <class Columns>
+HWY_INLINE void MultiplyTile(const GemmPlan& plan, const float* packed_a, std::size_t panel,
+                             const ColumnBlock& block, std::size_t j, Columns columns) {
+  const std::size_t row = plan.rows.begin(panel);
+  PackedRowsTile(packed_a + row * block.steps, plan.rows.size(panel), columns, block.steps,
+                 TargetOf(plan.p, row, block.begin + j * kTileColumns, block.k == 0));
+}
+
+// The tiles of `rows` row panels from `first` on and of the packed columns.
+inline void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                          const float* packed_a, const ColumnPacker& columns) {
+  for (std::size_t j = 0; j < columns.block().panels(); ++j) {
+    for (std::size_t panel = first; panel < first + rows; ++panel) {
+      MultiplyTile(plan, packed_a, panel, columns.block(), j, PackedColumns{columns.panel(j)});
     }
   }
 }
 
-// Work item: one block of rows by one block of columns, steps [k0, k1).
-inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t k0, std::size_t k1,
+// The same; meanwhile `next` is packed, share by share: fetched during one tile, packed after it.
+inline void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                            const float* packed_a, const ColumnPacker& columns,
+                            const ColumnPacker& next) {
+  const std::size_t panels = columns.block().panels(), units = next.units();
+  const std::size_t share = DivideUp(units, rows * panels);
+  const float* lines[kDepth / kFetchSteps];  // of the next share
+  std::size_t packed = 0;
+  for (std::size_t j = 0; j < panels; ++j) {
+    for (std::size_t panel = first; panel < first + rows; ++panel) {
+      const std::size_t fetched = std::min(units, packed + share);
+      next.ListLines(packed, fetched, lines, std::size(lines));
+      MultiplyTile(plan, packed_a, panel, columns.block(), j,
+                   FetchingColumns(columns.panel(j), lines));
+      next.Pack(packed, fetched);
+      packed = fetched;
+    }
+  }
+}
+
+// Work item: one block of rows by one block of columns, the steps of depth blocks [depth, end).
+// packed_b: plan.worker_size() floats.
+inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t depth, std::size_t end,
                          const float* packed_a, float* packed_b) {
   const std::size_t rows = item % plan.row_blocks.count(), columns = item / plan.row_blocks.count();
-  const std::size_t panel = plan.row_blocks.begin(rows);
-  const std::size_t begin = plan.column_blocks.begin(columns) * kTileColumns;
-  const std::size_t end =
-      std::min(plan.p.n, begin + plan.column_blocks.size(columns) * kTileColumns);
-  for (std::size_t k = k0; k < k1; k += kDepth) {
-    const ColumnBlock block{begin, end, k, std::min(kDepth, k1 - k)};
-    const std::size_t next_k = std::min(k1, k + kDepth);
-    const ColumnBlock next{begin, end, next_k, std::min(kDepth, k1 - next_k)};
-    PackColumns(plan.p, block, packed_b);
-    MultiplyBlock(plan, panel, panel + plan.row_blocks.size(rows), block, next,
-                  packed_a + plan.p.m * (k - k0), packed_b);
+  const std::size_t panel = plan.row_blocks.begin(rows), panels = plan.row_blocks.size(rows);
+  const std::size_t first = plan.column_blocks.begin(columns) * kTileColumns;
+  const std::size_t last =
+      std::min(plan.p.n, first + plan.column_blocks.size(columns) * kTileColumns);
+  const auto packer = [&](std::size_t d) {
+    return ColumnPacker(plan.p, {first, last, plan.depths.begin(d), plan.depths.size(d)},
+                        packed_b + d % 2 * plan.packed_b_size());
+  };
+  const bool pack_ahead = !plan.p.transpose_b && plan.p.m <= kFewRows;
+  for (std::size_t d = depth; d < end; ++d) {
+    const ColumnPacker present = packer(d);
+    const float* a = packed_a + plan.p.m * (plan.depths.begin(d) - plan.depths.begin(depth));
+    if (d == depth || !pack_ahead) present.Pack(0, present.units());
+    if (pack_ahead && d + 1 < end) {
+      MultiplyAndPack(plan, panel, panels, a, present, packer(d + 1));
+    } else {
+      MultiplyBlock(plan, panel, panels, a, present);
+    }
   }
 }
 
 void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
   const GemmPlan plan(problem);
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
-  const std::size_t b_size = RoundUp(plan.packed_b_size(), kAlignment);
-  float* packed_a =
-      context.scratch.Floats(a_size + b_size * static_cast<std::size_t>(context.workers.count()));
-  for (std::size_t k0 = 0; k0 < problem.k; k0 += plan.super_depth) {
-    const std::size_t k1 = std::min(problem.k, k0 + plan.super_depth);
+  float* packed_a = context.scratch.Floats(
+      a_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  for (std::size_t pass = 0; pass < plan.passes.count(); ++pass) {
+    const std::size_t depth = plan.passes.begin(pass), end = depth + plan.passes.size(pass);
     context.workers.For(plan.rows.count(), [&](std::size_t panel, std::size_t) {
-      PackRowPanel(plan, panel, k0, k1, packed_a);
+      PackRowPanel(plan, panel, depth, end, packed_a);
     });
     context.workers.For(plan.row_blocks.count() * plan.column_blocks.count(),
                         [&](std::size_t item, std::size_t worker) {
-                          MultiplyItem(plan, item, k0, k1, packed_a,
-                                       packed_a + a_size + worker * b_size);
+                          MultiplyItem(plan, item, depth, end, packed_a,
+                                       packed_a + a_size + worker * plan.worker_size());
                         });
   }
 }
