@@ -27,7 +27,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel takes half of L1
 constexpr std::size_t kItemRows = 256;     // kItemRows x kDepth of packed A take half of L2
 constexpr std::size_t kItemColumns = 128;  // of C in one work item
-constexpr std::size_t kFewRows = 96;       // up to which the next columns are packed meanwhile
+constexpr std::size_t kFewRows = 300;      // up to which the next columns are packed meanwhile
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
 struct GemmPlan {
@@ -89,9 +89,10 @@ HWY_INLINE void MultiplyTile(const GemmPlan& plan, const float* packed_a, std::s
                  TargetOf(plan.p, row, block.begin + j * kTileColumns, block.k == 0));
 }
 
-// The tiles of `rows` row panels from `first` on and of the packed columns.
-inline void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                          const float* packed_a, const ColumnPacker& columns) {
+// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one a
+// function of its own: within a large caller GCC 12 does not keep a tile's sums in registers.
+HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                const float* packed_a, const ColumnPacker& columns) {
   for (std::size_t j = 0; j < columns.block().panels(); ++j) {
     for (std::size_t panel = first; panel < first + rows; ++panel) {
       MultiplyTile(plan, packed_a, panel, columns.block(), j, PackedColumns{columns.panel(j)});
@@ -100,9 +101,9 @@ inline void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t r
 }
 
 // The same; meanwhile `next` is packed, share by share: fetched during one tile, packed after it.
-inline void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                            const float* packed_a, const ColumnPacker& columns,
-                            const ColumnPacker& next) {
+HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                  const float* packed_a, const ColumnPacker& columns,
+                                  const ColumnPacker& next) {
   const std::size_t panels = columns.block().panels(), units = next.units();
   const std::size_t share = DivideUp(units, rows * panels);
   const float* lines[kDepth / kFetchSteps];  // of the next share

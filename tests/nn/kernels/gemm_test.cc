@@ -123,6 +123,21 @@ TEST(Gemm, AgreesWithReferenceOnSmallestExtents) {
   }
 }
 
+// Few rows and several depth blocks: columns are packed while others are multiplied. Fewer and more
+// tiles than rows to pack, columns with and without a tail, and a row count on both sides of the
+// limit (300) where this ends.
+TEST(Gemm, AgreesWithReferenceWhilePackingAhead) {
+  for (const std::string& target : RunnableTargets()) {
+    const OnTarget on(target);
+    for (std::size_t m : {1, 5, 64, 300, 301}) {
+      for (std::size_t n : {1, 16, 131}) {
+        CheckAgainstReference({.m = m, .n = n, .k = 521, .bias = true, .slack = 3}, m + n);
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
 TEST(Gemm, EmptySumIsBiasPlusOldC) {
   const GemmCase g{.m = 2, .n = 3, .k = 0, .bias = true, .accumulate = true};
   Operands<float> o{{}, {}, {1, 2, 3}, {10, 20, 30, 40, 50, 60}};
@@ -143,6 +158,7 @@ TEST(Gemm, EmptyResultTouchesNothing) {
 TEST(Gemm, BitsDoNotDependOnWorkers) {
   for (const GemmCase& g :
        {GemmCase{.m = 70, .n = 530, .k = 700, .transpose_b = true},
+        GemmCase{.m = 70, .n = 530, .k = 700},
         GemmCase{.m = 600, .n = 70, .k = 90, .transpose_a = true, .accumulate = true},
         GemmCase{.m = 9000, .n = 20, .k = 600}}) {
     SCOPED_TRACE(Describe(g));
