@@ -102,6 +102,11 @@ void ClearUniforms(std::span<ShadedGradients> d_scenes) {
       s.base_color = s.ambient = s.diffuse = s.specular = {0, 0, 0};
       s.shininess = 0;
     }
+  }
+}
+
+void ClearTextures(std::span<ShadedGradients> d_scenes) {
+  for (ShadedGradients& d : d_scenes) {
     for (const auto& texture : d.textures) std::fill(texture.begin(), texture.end(), 0.0f);
   }
 }

@@ -18,8 +18,10 @@ namespace tilegrad {
 void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
                    std::span<ShadedGradients> d_scenes, SceneSums* scratch);
 
-// Sets them, and textures, to 0.
+// Sets them to 0.
 void ClearUniforms(std::span<ShadedGradients> d_scenes);
+// Where no texture is pulled on.
+void ClearTextures(std::span<ShadedGradients> d_scenes);
 
 // Gradients of textures, each in an array of its own. Scratch that is reused.
 class TextureMerge {

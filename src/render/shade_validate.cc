@@ -19,16 +19,23 @@ Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
   return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
 }
 
+// Many views of one mesh share its arrays: what was checked for the scene before is not looked
+// through again.
+template <class T>
+bool SameArray(std::span<T> a, std::span<T> b) {
+  return a.data() == b.data() && a.size() == b.size();
+}
+
 Status CheckStream(const char* array, const AttributeStreamT<float>& stream, std::size_t width,
-                   const ShadedScene& scene) {
+                   const ShadedScene& scene, const AttributeStreamT<float>& known) {
   if (stream.values.empty()) return {};
   const std::size_t rows =
       stream.rate == AttributeRate::kVertex ? scene.positions.size() / 3 : scene.faces.size();
   TILEGRAD_TRY(CheckSize(array, stream.values.size(), rows * width));
-  return CheckFinite(array, stream.values);
+  return SameArray(stream.values, known.values) ? Status() : CheckFinite(array, stream.values);
 }
 
-Status CheckTexture(const shade::TextureView& texture) {
+Status CheckTexture(const shade::TextureView& texture, std::span<const float> known) {
   const auto in_range = [](int n) { return n >= 1 && n <= shade::kMaxTextureSize; };
   if (!in_range(texture.width) || !in_range(texture.height)) {
     return InvalidArgument("is {} x {} texels; each side must be in 1..{}", texture.width,
@@ -40,12 +47,15 @@ Status CheckTexture(const shade::TextureView& texture) {
   TILEGRAD_TRY(CheckSize(
       "texels", texture.texels.size(),
       3 * static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height)));
-  return CheckFinite("texels", texture.texels);
+  return SameArray(texture.texels, known) ? Status() : CheckFinite("texels", texture.texels);
 }
 
-Status CheckTextures(const ShadedScene& scene) {
+Status CheckTextures(const ShadedScene& scene, const ShadedScene& known) {
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
-    TILEGRAD_TRY(CheckTexture(scene.textures[i]).Within(fmt::format("textures[{}]", i)));
+    const auto texels =
+        i < known.textures.size() ? known.textures[i].texels : std::span<const float>();
+    const Status status = CheckTexture(scene.textures[i], texels);
+    if (!status.ok()) return status.Within(fmt::format("textures[{}]", i));
   }
   if (!scene.textures.empty() && scene.uvs.values.empty()) {
     return InvalidArgument("the scene has textures, but no uvs to look them up by");
@@ -81,7 +91,7 @@ Status CheckSurfaces(const ShadedScene& scene) {
   return {};
 }
 
-Status CheckLights(const ShadedScene& scene) {
+Status CheckLights(const ShadedScene& scene, const ShadedScene& known) {
   if (scene.model.lighting == Lighting::kSphericalHarmonics) {
     TILEGRAD_TRY(CheckSize("sh", scene.sh.size(), 9));
     return CheckFinite("sh", scene.sh);
@@ -95,30 +105,38 @@ Status CheckLights(const ShadedScene& scene) {
     const auto& light = scene.lights[i];
     const float numbers[4] = {light.direction[0], light.direction[1], light.direction[2],
                               light.intensity};
-    TILEGRAD_TRY(CheckFinite("direction, intensity", numbers).Within(fmt::format("lights[{}]", i)));
+    const Status status = CheckFinite("direction, intensity", numbers);
+    if (!status.ok()) return status.Within(fmt::format("lights[{}]", i));
   }
-  return CheckStream("light_directions", {scene.light_directions, AttributeRate::kVertex}, 3,
-                     scene);
+  return CheckStream("light_directions", {scene.light_directions, AttributeRate::kVertex}, 3, scene,
+                     {known.light_directions, AttributeRate::kVertex});
 }
 
-Status CheckScene(const ShadedScene& scene) {
+Status CheckMesh(const ShadedScene& scene, const ShadedScene& known) {
   const SceneView& view = scene;
   TILEGRAD_TRY(ValidateSceneSizes({&view, 1}));
-  if (!AllWithin(scene.faces, 0, static_cast<std::int32_t>(scene.positions.size() / 3)) ||
-      !AllFinite(scene.positions)) {
-    TILEGRAD_TRY(ValidateSceneNumbers({&view, 1}));
+  if (SameArray(scene.positions, known.positions) && SameArray(scene.faces, known.faces)) return {};
+  if (AllWithin(scene.faces, 0, static_cast<std::int32_t>(scene.positions.size() / 3)) &&
+      AllFinite(scene.positions)) {
+    return {};
   }
-  TILEGRAD_TRY(CheckStream("colors", scene.colors, 3, scene));
-  TILEGRAD_TRY(CheckStream("uvs", scene.uvs, 2, scene));
+  return ValidateSceneNumbers({&view, 1});
+}
+
+// `known`: the scene before, or an empty one.
+Status CheckScene(const ShadedScene& scene, const ShadedScene& known) {
+  TILEGRAD_TRY(CheckMesh(scene, known));
+  TILEGRAD_TRY(CheckStream("colors", scene.colors, 3, scene, known.colors));
+  TILEGRAD_TRY(CheckStream("uvs", scene.uvs, 2, scene, known.uvs));
   if (scene.model.normals == NormalKind::kGiven) {
     if (scene.normals.values.empty() && !scene.faces.empty()) {
       return InvalidArgument("model.normals is kGiven, but the scene has no normals");
     }
-    TILEGRAD_TRY(CheckStream("normals", scene.normals, 3, scene));
+    TILEGRAD_TRY(CheckStream("normals", scene.normals, 3, scene, known.normals));
   }
-  TILEGRAD_TRY(CheckTextures(scene));
+  TILEGRAD_TRY(CheckTextures(scene, known));
   TILEGRAD_TRY(CheckSurfaces(scene));
-  return CheckLights(scene);
+  return CheckLights(scene, known);
 }
 
 bool SameModel(const ShadingModel& a, const ShadingModel& b) {
@@ -181,13 +199,16 @@ Status CheckGradients(const ShadedScene& scene, const ShadedGradients& d) {
   return {};
 }
 
-Status CheckGradientNumbers(const ShadedGradients& d) {
+Status CheckGradientNumbers(const ShadedGradients& d, const ShadedGradients& known) {
   TILEGRAD_TRY(CheckFinite("d_scene.colors", d.colors));
   TILEGRAD_TRY(CheckFinite("d_scene.uvs", d.uvs));
   TILEGRAD_TRY(CheckFinite("d_scene.normals", d.normals));
   TILEGRAD_TRY(CheckFinite("d_scene.light_directions", d.light_directions));
   TILEGRAD_TRY(CheckFinite("d_scene.sh", d.sh));
-  for (const auto& texture : d.textures) TILEGRAD_TRY(CheckFinite("d_scene.textures", texture));
+  for (std::size_t i = 0; i < d.textures.size(); ++i) {
+    if (i < known.textures.size() && SameArray(d.textures[i], known.textures[i])) continue;
+    TILEGRAD_TRY(CheckFinite("d_scene.textures", d.textures[i]));
+  }
   for (const Surface& s : d.surfaces) {
     TILEGRAD_TRY(CheckFinite("d_scene.surfaces.base_color", s.base_color));
     TILEGRAD_TRY(CheckFinite("d_scene.surfaces.ambient", s.ambient));
@@ -206,10 +227,10 @@ Status CheckGradientNumbers(const ShadedGradients& d) {
 
 Result<SceneParts> ValidateShadedScenes(std::span<const ShadedScene> scenes) {
   SceneParts parts;
+  const ShadedScene nothing;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (const Status status = CheckScene(scenes[n]); !status.ok()) {
-      return status.Within(SceneName(n));
-    }
+    const Status sound = CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing);
+    if (!sound.ok()) return sound.Within(SceneName(n));
     const SceneParts own = PartsOf(scenes[n]);
     if (n == 0) parts = own;
     if (const Status status = CheckAgreement(parts, own); !status.ok()) {
@@ -257,11 +278,13 @@ Status ValidateShadedCotangents(const ShadedFrameGradients& d_frame) {
 }
 
 Status ValidateShadedResult(std::span<const ShadedGradients> d_scenes) {
+  const ShadedGradients nothing;
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
     const ShadedGradients& d = d_scenes[n];
     const SceneGradients& geometry = d;
     TILEGRAD_TRY(ValidateResult({&geometry, 1}).Within(SceneName(n)));
-    if (const Status status = CheckGradientNumbers(d); !status.ok()) {
+    if (const Status status = CheckGradientNumbers(d, n > 0 ? d_scenes[n - 1] : nothing);
+        !status.ok()) {
       return status.Within(SceneName(n) + ": the gradient overflows");
     }
   }

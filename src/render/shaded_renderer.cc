@@ -412,7 +412,11 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   if (staged) {
     NormalsBack(scenes);
     MergeUniforms(stage, scenes_, d_scenes, &scene_sums);
-    if (backward.to_texture) texture_merge.Run(stage, scenes_, *workers, d_scenes);
+  }
+  if (staged && backward.to_texture) {
+    texture_merge.Run(stage, scenes_, *workers, d_scenes);
+  } else {
+    ClearTextures(d_scenes);
   }
   FindSinks(d_scenes);
   workers->For(sinks.size(),
