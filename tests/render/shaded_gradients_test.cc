@@ -60,7 +60,9 @@ void CheckComplexStep(const SceneRecipe& recipe, std::uint64_t seed, SeenKinds* 
 
   std::map<std::string, std::vector<double>> values;  // of the gradient
   test::ForEachNumber(gradients.d, [&](const char* name, double& d) { values[name].push_back(d); });
-  for (const auto& [name, d] : values) {
+  for (const auto& kind : values) {
+    const std::string& name = kind.first;
+    const std::vector<double>& d = kind.second;
     Rng rng(seed, std::hash<std::string>()(name));
     auto moved = test::OwnedCast<Complex>(trial.scene);
     double expected = 0, scale = 0;

@@ -78,8 +78,8 @@ void ExpectNear(const Vector& got, const Json& expected, const std::string& what
 TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
   LOAD_OR_SKIP(json, "05_texture_mapping.json");
   const Json& textures = json.at("kaolin_test_texture");
-  for (const auto& [filter, name] :
-       {std::pair{Filter::kNearest, "nearest"}, std::pair{Filter::kBilinear, "bilinear"}}) {
+  for (const Filter filter : {Filter::kNearest, Filter::kBilinear}) {
+    const std::string name = filter == Filter::kNearest ? "nearest" : "bilinear";
     for (std::size_t b = 0; b < textures.size(); ++b) {
       const OwnedTexture texture(Json::array({textures[b]}), Wrap::kClamp, filter);
       const auto check = [&](const Json& uvs, const Json& expected, const char* what) {
@@ -88,10 +88,10 @@ TEST(VectorsTexture, LookupsOfAnotherProgramsTest) {
               << what << " " << name << " " << b << " " << i;
         }
       };
-      check(json.at("kaolin_test_sparse_uv")[b],
-            json.at(std::string("kaolin_test_sparse_") + name)[b], "sparse");
+      check(json.at("kaolin_test_sparse_uv")[b], json.at("kaolin_test_sparse_" + name)[b],
+            "sparse");
       for (const Json& row : json.at("kaolin_test_dense_uv")[b]) {
-        check(row, json.at(std::string("kaolin_test_dense_") + name + "_both_rows")[b], "dense");
+        check(row, json.at("kaolin_test_dense_" + name + "_both_rows")[b], "dense");
       }
     }
   }
