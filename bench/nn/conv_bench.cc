@@ -74,16 +74,7 @@ void BM_Conv2d(benchmark::State& state) {
 
 void BM_Conv2dTwoWorkers(benchmark::State& state) {
   Setup setup(state);
-  const Workers one(1), two(2);
-  KernelScratch scratch;
-  MeasureSpeedup(
-      state,
-      [&] {
-        setup.Run({one, scratch});
-      },
-      [&] {
-        setup.Run({two, scratch});
-      });
+  MeasureSpeedup(state, [&](const KernelContext& context) { setup.Run(context); });
 }
 
 void Shapes(benchmark::internal::Benchmark* b) {

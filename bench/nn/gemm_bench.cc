@@ -53,16 +53,7 @@ void BM_Gemm(benchmark::State& state) {
 
 void BM_GemmTwoWorkers(benchmark::State& state) {
   const Setup setup(state);
-  const Workers one(1), two(2);
-  KernelScratch scratch;
-  MeasureSpeedup(
-      state,
-      [&] {
-        Gemm(setup.p, {one, scratch});
-      },
-      [&] {
-        Gemm(setup.p, {two, scratch});
-      });
+  MeasureSpeedup(state, [&](const KernelContext& context) { Gemm(setup.p, context); });
 }
 
 void Shapes(benchmark::internal::Benchmark* b) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fma_peak.h"
+#include "nn/kernels/kernel_context.h"
 
 namespace tilegrad::nn::bench {
 
@@ -37,16 +38,24 @@ inline void MeasureRates(benchmark::State& state, double flop,
   }
 }
 
-// Counter: wall time of `one` over that of `two`.
-inline void MeasureSpeedup(benchmark::State& state, const std::function<void()>& one,
-                           const std::function<void()>& two) {
-  Samples rate_one, rate_two;
-  two();
+// What a kernel gains by a second worker, in wall time. Counters: speedup: one worker over two;
+// pinned: one worker over two that stay on their cores.
+inline void MeasureSpeedup(benchmark::State& state,
+                           const std::function<void(const KernelContext&)>& run) {
+  const Workers one(1), two(2), pinned(2, Pinning::kOn);
+  KernelScratch scratch;
+  Samples rate_one, rate_two, rate_pinned;
+  run({two, scratch});
+  const auto rate = [&](const Workers& workers) {
+    return Rate(WallSeconds, 1, [&] { run({workers, scratch}); });
+  };
   for (auto _ : state) {
-    rate_one.Add(Rate(WallSeconds, 1, one));
-    rate_two.Add(Rate(WallSeconds, 1, two));
+    rate_one.Add(rate(one));
+    rate_two.Add(rate(two));
+    rate_pinned.Add(rate(pinned));
   }
   state.counters["speedup"] = rate_two.Median() / rate_one.Median();
+  state.counters["pinned"] = rate_pinned.Median() / rate_one.Median();
 }
 
 }  // namespace tilegrad::nn::bench

@@ -10,10 +10,15 @@
 
 namespace tilegrad {
 
+// Whether each worker stays on one core while it works. Off by default: where other programs run, a
+// worker that may not move waits for its core, and so does everybody who waits for the worker.
+enum class Pinning { kOff, kOn };
+
 // A fixed number of workers. Copies nothing, has no global state; two Workers are independent.
 class Workers {
  public:
-  explicit Workers(int count = 0);  // 0: one per core that this process may use
+  // count 0: one per core that this process may use.
+  explicit Workers(int count = 0, Pinning pinning = Pinning::kOff);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;

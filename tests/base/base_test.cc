@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -26,6 +27,25 @@ TEST(Workers, CallsEachIndexOnceAndNeverTwoAtATimePerWorker) {
     });
     for (const auto& c : calls) EXPECT_EQ(c, 1);
   }
+}
+
+int CoresOfThisThread() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  EXPECT_EQ(sched_getaffinity(0, sizeof(set), &set), 0);
+  return CPU_COUNT(&set);
+}
+
+TEST(Workers, PinnedOnesStayOnACoreWhileTheyWork) {
+  const int before = CoresOfThisThread();
+  const Workers workers(2, Pinning::kOn);
+  std::atomic<int> done = 0;
+  workers.For(50, [&](std::size_t, std::size_t) {
+    EXPECT_EQ(CoresOfThisThread(), 1);
+    ++done;
+  });
+  EXPECT_EQ(done, 50);
+  EXPECT_EQ(CoresOfThisThread(), before);  // the caller is free again
 }
 
 TEST(Workers, NestedLoopsKeepWorkersApart) {
