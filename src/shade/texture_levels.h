@@ -44,8 +44,9 @@ struct Coverage {
 
 inline Coverage CoverageOf(int j, int coarse, int fine) {
   if (fine % coarse == 0) {
-    const int ratio = fine / coarse;  // 1 or 2
-    return {j * ratio, ratio, {1.0f / static_cast<float>(ratio), 1.0f / 2, 0}};
+    const int ratio = fine / coarse;  // 1, 2, or 3 texels that become one
+    const float weight = 1.0f / static_cast<float>(ratio);
+    return {j * ratio, ratio, {weight, weight, weight}};
   }
   const auto m = static_cast<float>(coarse), x = static_cast<float>(j);
   const float all = static_cast<float>(fine) / m;

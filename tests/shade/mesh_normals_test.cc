@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Normals that are known without a formula, and the adjoint by complex step.
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <vector>
+
+#include "base/rng.h"
+#include "shade/mesh_normals_ref.h"
+
+namespace tilegrad::shade {
+namespace {
+
+using Complex = std::complex<double>;
+constexpr double kStep = 1e-40;
+
+// Three faces of a unit cube's corner, at the origin; the one in z = 0 has four times the area.
+const std::vector<float> kCorner = {0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 1, 5, 5, 5};
+const std::vector<std::int32_t> kFaces = {0, 1, 2, 0, 2, 3, 0, 3, 1};
+
+TEST(MeshNormals, FlatOnesPointOutOfTheCounterClockwiseSide) {
+  AlignedVector<UnitVector<float>> units;
+  FlatNormals({kCorner, kFaces}, &units);
+  ASSERT_EQ(units.size(), 3u);
+  EXPECT_EQ(units[0].unit, (Vec3<float>{0, 0, 1}));
+  EXPECT_EQ(units[1].unit, (Vec3<float>{1, 0, 0}));
+  EXPECT_EQ(units[2].unit, (Vec3<float>{0, 1, 0}));
+}
+
+TEST(MeshNormals, SmoothOnesAreWeightedByArea) {
+  AlignedVector<UnitVector<float>> units;
+  SmoothNormals({kCorner, kFaces}, &units);
+  ASSERT_EQ(units.size(), 5u);
+  // Twice the areas are 4, 2, 2.
+  const float length = std::sqrt(24.0f);
+  EXPECT_FLOAT_EQ(units[0].unit[0], 2 / length);
+  EXPECT_FLOAT_EQ(units[0].unit[1], 2 / length);
+  EXPECT_FLOAT_EQ(units[0].unit[2], 4 / length);
+  EXPECT_EQ(units[4].unit, (Vec3<float>{0, 0, 0}));  // no face
+}
+
+TEST(MeshNormals, FaceWithoutAreaHasNoNormalAndPullsNothing) {
+  const std::vector<std::int32_t> faces = {0, 1, 1};
+  AlignedVector<UnitVector<float>> units;
+  FlatNormals({kCorner, faces}, &units);
+  EXPECT_EQ(units[0].unit, (Vec3<float>{0, 0, 0}));
+  std::vector<Vec3<float>> d_units = {{1, 2, 3}};
+  std::vector<float> d_positions(kCorner.size());
+  FlatNormalsAdjoint({kCorner, faces}, units, d_units, d_positions);
+  for (const float d : d_positions) EXPECT_EQ(d, 0);
+}
+
+TEST(MeshNormals, TinyMeshesHaveTheNormalsOfLargeOnes) {
+  std::vector<float> tiny = kCorner;
+  for (float& p : tiny) p *= 0x1p-30f;
+  AlignedVector<UnitVector<float>> units, expected;
+  SmoothNormals({tiny, kFaces}, &units), SmoothNormals({kCorner, kFaces}, &expected);
+  for (std::size_t v = 0; v < units.size(); ++v) EXPECT_EQ(units[v].unit, expected[v].unit) << v;
+}
+
+// A derivative along a random direction of a random linear loss, against a complex step.
+template <class Normals, class Adjoint>
+void ExpectComplexStep(std::size_t rows, const Normals& normals, const Adjoint& adjoint) {
+  Rng rng(3, 1);
+  std::vector<double> positions(kCorner.size()), along(kCorner.size());
+  std::vector<Complex> moved(kCorner.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    positions[i] = rng.Uniform(-1, 1), along[i] = rng.Uniform(-1, 1);
+    moved[i] = Complex(positions[i], kStep * along[i]);
+  }
+  std::vector<Vec3<double>> d_units(rows);
+  for (auto& d : d_units) d = {rng.Uniform(-1, 1), rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
+  std::vector<UnitVector<Complex>> z(rows);
+  normals(TriangleMeshT<Complex>{moved, kFaces}, std::span(z));
+  double step = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) step += z[i].unit[c].imag() / kStep * d_units[i][c];
+  }
+  std::vector<UnitVector<double>> units(rows);
+  const TriangleMeshT<double> mesh{positions, kFaces};
+  normals(mesh, std::span(units));
+  std::vector<double> d_positions(positions.size());
+  adjoint(mesh, std::span<const UnitVector<double>>(units), std::span(d_units),
+          std::span(d_positions));
+  double expected = 0;
+  for (std::size_t i = 0; i < along.size(); ++i) expected += d_positions[i] * along[i];
+  EXPECT_NE(expected, 0);
+  EXPECT_NEAR(step, expected, 1e-12 * std::abs(expected));  // some fifty roundings
+}
+
+TEST(MeshNormals, AdjointsAreTheComplexStepDerivative) {
+  ExpectComplexStep(
+      5, [](auto mesh, auto units) { SmoothNormalsRef(mesh, units); },
+      [](auto... all) { SmoothNormalsAdjointRef(all...); });
+  ExpectComplexStep(
+      3, [](auto mesh, auto units) { FlatNormalsRef(mesh, units); },
+      [](auto... all) { FlatNormalsAdjointRef(all...); });
+}
+
+}  // namespace
+}  // namespace tilegrad::shade
