@@ -31,7 +31,7 @@ Status CheckStream(const char* array, const AttributeStreamT<float>& stream, std
   if (stream.values.empty()) return {};
   const std::size_t rows =
       stream.rate == AttributeRate::kVertex ? scene.positions.size() / 3 : scene.faces.size();
-  TILEGRAD_TRY(CheckSize(array, stream.values.size(), rows * width));
+  TILEGRAD_TRY(CheckShape(array, stream.values.size(), rows, width));
   return SameArray(stream.values, known.values) ? Status() : CheckFinite(array, stream.values);
 }
 

@@ -67,8 +67,8 @@ Status CheckSceneSizes(const SceneView& scene) {
   const std::size_t vertices = scene.positions.size() / 3;
   if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
   const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
-  return CheckSize("attributes", scene.attributes.size(),
-                   rows * static_cast<std::size_t>(scene.channels));
+  return CheckShape("attributes", scene.attributes.size(), rows,
+                    static_cast<std::size_t>(scene.channels));
 }
 
 Status CheckSceneNumbers(const SceneView& scene) {
@@ -121,6 +121,11 @@ Status CheckFaceIds(const SceneView& scene, std::span<const std::int32_t> ids) {
 std::string SceneName(std::size_t index) { return fmt::format("scene {}", index); }
 
 }  // namespace
+
+Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::size_t width) {
+  if (got == rows * width) return {};
+  return InvalidArgument("{} must be [{},{}], got {} numbers", array, rows, width, got);
+}
 
 Status CheckFinite(const char* array, std::span<const float> values) {
   if (AllFinite(values)) return {};

@@ -4,6 +4,7 @@
 // parallel (quick_checks.h); only if that finds something, they are searched here.
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "render/renderer.h"
@@ -13,6 +14,9 @@ namespace tilegrad {
 
 // OK if all values are finite, else an error that names the first one that is not.
 Status CheckFinite(const char* array, std::span<const float> values);
+
+// An error that says the shape, [rows,width], unless there are that many numbers.
+Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::size_t width);
 
 // Errors name the scene, the array, the index and what was expected.
 Status ValidateOptions(const RenderOptions& options);

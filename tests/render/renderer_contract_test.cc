@@ -233,7 +233,7 @@ TEST(RendererErrors, NameSceneArrayAndIndex) {
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].positions.pop_back(); }),
             "scene 1: positions must be [V,3], got 359 numbers");
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].attributes.pop_back(); }),
-            "scene 1: attributes has 359 numbers, expected 360");
+            "scene 1: attributes must be [120,3], got 359 numbers");
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) {
               b->scenes[2].channels = 0, b->scenes[2].attributes.clear();
             }),

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Public names live in an inline namespace that carries the version of the binary interface: you
+// write tilegrad::Renderer, the linker sees tilegrad::v0::Renderer, and a program built against
+// another version fails to link instead of misbehaving.
+#pragma once
+
+namespace tilegrad {
+#ifdef TILEGRAD_BUILDS_LIBRARY  // whose engine has names of its own in tilegrad
+namespace v0 {}
+#else
+inline namespace v0 {}
+#endif
+}  // namespace tilegrad
+
+#define TILEGRAD_API [[gnu::visibility("default")]]  // what the shared library exports

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The camera. docs/conventions.md has a picture and a number for each rule below.
+#pragma once
+
+#include "tilegrad/abi.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::v0 {
+
+// Pinhole camera: world to camera, then camera to pixels.
+//
+//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's axes in the
+//   world) x = cx + fx * p_cam.x / -p_cam.z            (pixels from the left edge of the image)
+//   y = cy - fy * p_cam.y / -p_cam.z            (pixels from the top edge of the image)
+//
+// Axes as OpenGL: x right, y up, looking along -z; depth = -p_cam.z. Pixel (column j, row i) has
+// its centre at (j + 0.5, i + 0.5); row 0 is the top.
+template <class T>
+struct CameraT {
+  T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
+  T translation[3] = {0, 0, 0};                 // world units
+  T fx = 64, fy = 64;                           // focal lengths, pixels
+  T cx = 32, cy = 32;                           // principal point, pixels
+  T near_plane = T(1e-2);                       // > 0, world units; nearer geometry is cut away
+};
+using Camera = CameraT<float>;
+
+// The principal point is the middle of the image, pixels are square.
+struct Lens {
+  double fov_y = 49.13434207744484;  // degrees, the whole vertical field of view, (0, 180)
+  int width = 64, height = 64;       // pixels
+};
+
+// A camera at distance * (cos el cos az, sin el, cos el sin az) that looks at the origin, y up.
+struct Orbit {
+  double azimuth = 0, elevation = 0;  // degrees
+  double distance = 1;                // world units, > 0
+};
+
+// Errors: a number that is not finite or out of its range.
+TILEGRAD_API Result<Camera> MakeCamera(const Lens& lens, const Orbit& orbit);
+
+// Six numbers of rotation, the first two rows of a matrix before they are made orthonormal
+// (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019), and
+// the rest of a camera: what an optimiser may move freely.
+struct CameraParameters {
+  float rotation[6] = {1, 0, 0, 0, 1, 0};
+  float translation[3] = {0, 0, 0};
+  float fx = 64, fy = 64, cx = 32, cy = 32;
+};
+
+TILEGRAD_API CameraParameters ParametersOf(const Camera& camera);
+
+// Errors: a number that is not finite; rows so short or so nearly parallel that they give no
+// rotation; a focal length or near plane that is not positive.
+TILEGRAD_API Result<Camera> CameraFromParameters(const CameraParameters& parameters,
+                                                 float near_plane = 1e-2f);
+
+// dL/d(parameters) from dL/d(camera). `parameters` as CameraFromParameters accepts them.
+TILEGRAD_API CameraParameters PullBack(const CameraParameters& parameters, const Camera& d_camera);
+
+}  // namespace tilegrad::v0

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+// The differentiable renderer: scenes in, images out; gradients of images in, gradients of scenes
+// out.
+//
+//   tilegrad::Renderer renderer;
+//   tilegrad::Frame frame;
+//   Status status = renderer.Render({&scene, 1}, {.width = 256, .height = 256}, {}, &frame);
+//   frame.images().color, frame.images().alpha                       // views, of the frame
+//   status = renderer.Backward(frame, {.alpha = d_alpha}, {&d_scene, 1});
+//
+// Nothing here prints, aborts or throws: every error, memory that is not there included, is a
+// Status.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "tilegrad/abi.h"
+#include "tilegrad/scene.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::v0 {
+
+enum class Interpolation {
+  kPerspective,   // attributes are linear on the face in space: what a camera sees
+  kScreenLinear,  // linear on the screen: the implementation of the DIB-R paper
+};
+enum class FaceCulling {
+  kNone,
+  kBack,  // clockwise faces are not drawn, but take part in alpha
+};
+enum class AlphaRule {
+  kAllFaces,  // equation 6 of the paper over all faces, within max_alpha_error
+  // As the paper's implementations: faces whose box, grown by paper_box, holds the pixel, and of
+  // these the first paper_faces in the order of the mesh. No bound, slow: for comparisons.
+  kPaper,
+};
+
+struct RenderOptions {
+  int width = 64, height = 64;  // pixels, 1..16384; of all images of a call
+  // alpha = 1 - prod over faces (1 - exp(-d^2 / delta)), with d the distance to the face in NDC,
+  // in which the image spans [-1, 1] in each axis. > 0; larger is softer.
+  double delta = 1.0 / 7000;
+  double max_alpha_error = 1e-6;  // of alpha, absolute, [0, 1]; larger is faster, 0 drops nothing
+  Interpolation interpolation = Interpolation::kPerspective;
+  FaceCulling culling = FaceCulling::kNone;
+  AlphaRule alpha_rule = AlphaRule::kAllFaces;
+  double paper_box = 0.02;  // NDC, >= 0
+  int paper_faces = 30;     // >= 0
+};
+
+// Which images are wanted. What is not wanted is not computed and takes no memory.
+struct Outputs {
+  bool color = true;  // white where the scene has nothing that gives colour
+  bool alpha = true;
+  bool attributes = true;  // where the scene has them
+  bool depth = false;
+  bool normals = false;
+  bool uv = false;
+  bool barycentrics = false;
+};
+
+// The images of N scenes: planar, row 0 on top. Empty where not wanted.
+template <class T>
+struct ImagesT {
+  int count = 0, height = 0, width = 0;
+  int channels = 0;                        // of attributes
+  std::span<const std::int32_t> face_ids;  // [N,H,W] index of the scene's face, -1: background
+  std::span<const T> color;                // [N,3,H,W]; 0 at background pixels
+  std::span<const T> alpha;                // [N,H,W]; 1 where there is a face
+  std::span<const T> attributes;           // [N,C,H,W]; 0 at background pixels
+  std::span<const T> depth;                // [N,H,W] world units; +infinity at background pixels
+  std::span<const T> normals;              // [N,3,H,W] that shading uses: unit, world
+  std::span<const T> uv;                   // [N,2,H,W]
+  std::span<const T> barycentrics;         // [N,2,H,W] weights of corners 1 and 2 of the face
+  double alpha_error_bound = 0;  // no alpha is farther than this from equation 6; infinite with
+                                 // AlphaRule::kPaper
+};
+
+// dL/d(image), in the shapes of ImagesT; an empty span is zero. NaN and infinity are errors.
+template <class T>
+struct FrameGradientsT {
+  std::span<const T> color{}, alpha{}, attributes{}, normals{}, uv{};
+  std::span<const T> depth{};  // with Interpolation::kPerspective; background pixels are not read
+};
+
+template <class T>
+class TILEGRAD_API RendererT;
+
+// The record of a Render: its images, the scenes' views, and what the way back needs. Reused by
+// the next Render into it: the same sizes again allocate nothing.
+template <class T>
+class TILEGRAD_API FrameT {
+ public:
+  FrameT() noexcept;
+  ~FrameT();
+  FrameT(FrameT&&) noexcept;
+  FrameT& operator=(FrameT&&) noexcept;
+
+  // Views of this frame, until the next Render into it or its end. Empty before the first, and
+  // after one that failed.
+  const ImagesT<T>& images() const { return images_; }
+
+ private:
+  friend class RendererT<T>;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+  ImagesT<T> images_;
+};
+
+struct RendererOptions {
+  int threads = 0;  // 1..1024; 0: one for each core that the process may use; 1: only the caller's
+};
+
+enum class GradientMode {
+  kOverwrite,
+  kAdd,  // to what the arrays hold; after an error they are as before
+};
+
+// Owns threads, which start with the first call, and scratch memory, which is reused: rendering
+// the same sizes again allocates nothing. There is no global state: renderers are independent.
+// One call at a time for each renderer. The same input gives the same bits for any number of
+// threads.
+//
+// T = float is the engine. T = double is its scalar reference, for checks of gradients: every
+// face for every pixel, alpha of all faces whatever max_alpha_error allows, memory allocated by
+// every call; numbers must be in float's range.
+template <class T>
+class TILEGRAD_API RendererT {
+ public:
+  explicit RendererT(const RendererOptions& options = {}) noexcept;
+  ~RendererT();
+  RendererT(RendererT&&) noexcept;
+  RendererT& operator=(RendererT&&) noexcept;
+
+  // Images of a batch of scenes, each with its own mesh and camera, all of one size (images of
+  // several sizes are several calls). Errors: an array of the wrong size (names scene, array,
+  // expected and got), an index out of range, a number that is not finite (names scene, array,
+  // index), options out of range, scenes of different parts, no memory.
+  Status Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                const Outputs& outputs, FrameT<T>* frame);
+
+  // The gradients of sum(d_frame * images) with respect to the scenes of `frame`, whose arrays
+  // are as they were in Render. `d_scenes`: one for each scene. Any renderer may do it. Errors:
+  // those of Render, a gradient of the wrong size, alpha pulled on that was not rendered, a
+  // gradient that overflows.
+  Status Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
+                  std::span<const SceneGradientsT<T>> d_scenes,
+                  GradientMode mode = GradientMode::kOverwrite);
+
+ private:
+  struct Impl;
+  Status Start();
+  void DropAfter(const Status& status);
+
+  RendererOptions options_;
+  std::unique_ptr<Impl> impl_;  // null before the first call
+};
+
+using Images = ImagesT<float>;
+using FrameGradients = FrameGradientsT<float>;
+using Frame = FrameT<float>;
+using Renderer = RendererT<float>;
+
+extern template class FrameT<float>;
+extern template class FrameT<double>;
+extern template class RendererT<float>;
+extern template class RendererT<double>;
+
+}  // namespace tilegrad::v0

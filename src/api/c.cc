@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tilegrad/c.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "api/c_records.h"
+#include "api/guarded.h"
+
+using tilegrad::InvalidArgument;
+using tilegrad::Status;
+using tilegrad::StatusCode;
+namespace api = tilegrad::v0;
+
+struct tilegrad_renderer {
+  explicit tilegrad_renderer(int32_t threads) : renderer({threads}) {}
+
+  api::Renderer renderer;
+  std::string error;
+  std::vector<tilegrad_scene_gradients> wanted;
+  std::vector<api::CGradients> gradients;
+  std::vector<api::SceneGradients> views;
+};
+
+struct tilegrad_frame {
+  api::Frame frame;
+  std::vector<api::CScene> scenes;  // of the last render, and spare ones
+  std::size_t count = 0;
+  std::vector<api::Scene> views;
+};
+
+namespace {
+
+tilegrad_status CodeOf(const Status& status) {
+  switch (status.code()) {
+    case StatusCode::kOk:
+      return TILEGRAD_OK;
+    case StatusCode::kInvalidArgument:
+      return TILEGRAD_INVALID_ARGUMENT;
+    case StatusCode::kResourceExhausted:
+      return TILEGRAD_RESOURCE_EXHAUSTED;
+    default:
+      return TILEGRAD_INTERNAL;
+  }
+}
+
+// Runs a call and keeps its message.
+template <class Call>
+tilegrad_status Run(tilegrad_renderer* renderer, const Call& call) {
+  if (renderer == nullptr) return TILEGRAD_INVALID_ARGUMENT;
+  Status status = api::Guarded(call);
+  const Status kept = api::Guarded([&]() -> Status {
+    renderer->error = status.message();
+    return {};
+  });
+  return CodeOf(kept.ok() ? status : kept);
+}
+
+tilegrad_scene DefaultScene() {
+  tilegrad_scene scene = {};
+  scene.camera = api::CameraOf(api::Camera());
+  return scene;
+}
+
+tilegrad_options DefaultOptions() {
+  const api::RenderOptions from;
+  tilegrad_options to = {};
+  to.width = from.width, to.height = from.height, to.delta = from.delta;
+  to.max_alpha_error = from.max_alpha_error;
+  to.paper_box = from.paper_box, to.paper_faces = from.paper_faces;
+  to.color = to.alpha = to.attributes = 1;
+  return to;
+}
+
+// As much of `value` as the caller's struct holds.
+template <class S>
+void WriteSized(S value, std::size_t size, S* to) {
+  value.struct_size = size;
+  std::memset(to, 0, size);
+  std::memcpy(to, &value, std::min(size, sizeof(S)));
+}
+
+Status ReadScenes(const tilegrad_scene* scenes, std::size_t count, tilegrad_frame* frame) {
+  frame->count = 0;
+  if (frame->scenes.size() < count) frame->scenes.resize(count);
+  frame->views.clear();
+  for (std::size_t n = 0; n < count; ++n) {
+    tilegrad_scene scene = DefaultScene();
+    const Status status = api::ReadSized("scene", api::EntryOf(scenes, n), &scene);
+    if (!status.ok()) return status.Within(fmt::format("scene {}", n));
+    frame->scenes[n].Set(scene);
+    frame->views.push_back(frame->scenes[n].scene);
+  }
+  frame->count = count;
+  return {};
+}
+
+Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
+                const tilegrad_frame_gradients* d_frame, const tilegrad_scene_gradients* d_scenes,
+                std::size_t count, bool add) {
+  if (frame == nullptr) return InvalidArgument("frame is NULL");
+  if (count != frame->count) {
+    return InvalidArgument("{} scenes, but {} d_scenes", frame->count, count);
+  }
+  tilegrad_frame_gradients d_images = {};
+  TILEGRAD_TRY(api::ReadSized("d_frame", d_frame, &d_images));
+  r->wanted.assign(count, {});
+  if (r->gradients.size() < count) r->gradients.resize(count);
+  r->views.clear();
+  for (std::size_t n = 0; n < count; ++n) {
+    TILEGRAD_TRY(api::ReadSized("d_scene", api::EntryOf(d_scenes, n), &r->wanted[n]));
+    r->gradients[n].Set(r->wanted[n], frame->views[n]);
+    r->views.push_back(r->gradients[n].gradients);
+  }
+  TILEGRAD_TRY(r->renderer.Backward(frame->frame, FrameGradientsOf(d_images, frame->frame.images()),
+                                    r->views,
+                                    add ? api::GradientMode::kAdd : api::GradientMode::kOverwrite));
+  for (std::size_t n = 0; n < count && !add; ++n) {
+    api::CGradients::Clear(r->wanted[n], frame->views[n]);
+  }
+  for (std::size_t n = 0; n < count; ++n) r->gradients[n].AddTo(r->wanted[n]);
+  return {};
+}
+
+}  // namespace
+
+extern "C" {
+
+const char* tilegrad_version(void) { return TILEGRAD_VERSION; }
+
+tilegrad_renderer* tilegrad_renderer_create(int32_t threads) {
+  return new (std::nothrow) tilegrad_renderer(threads);
+}
+void tilegrad_renderer_destroy(tilegrad_renderer* renderer) { delete renderer; }
+tilegrad_frame* tilegrad_frame_create(void) { return new (std::nothrow) tilegrad_frame; }
+void tilegrad_frame_destroy(tilegrad_frame* frame) { delete frame; }
+
+const char* tilegrad_last_error(const tilegrad_renderer* renderer) {
+  return renderer == nullptr ? "renderer is NULL" : renderer->error.c_str();
+}
+
+void tilegrad_scene_init_sized(tilegrad_scene* scene, size_t size) {
+  WriteSized(DefaultScene(), size, scene);
+}
+void tilegrad_options_init_sized(tilegrad_options* options, size_t size) {
+  WriteSized(DefaultOptions(), size, options);
+}
+void tilegrad_images_init_sized(tilegrad_images* images, size_t size) {
+  WriteSized({}, size, images);
+}
+void tilegrad_frame_gradients_init_sized(tilegrad_frame_gradients* d, size_t size) {
+  WriteSized({}, size, d);
+}
+void tilegrad_scene_gradients_init_sized(tilegrad_scene_gradients* d, size_t size) {
+  WriteSized({}, size, d);
+}
+
+tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scene* scenes,
+                                size_t count, const tilegrad_options* options,
+                                tilegrad_frame* frame) {
+  return Run(renderer, [&]() -> Status {
+    if (frame == nullptr) return InvalidArgument("frame is NULL");
+    tilegrad_options known = DefaultOptions();
+    TILEGRAD_TRY(api::ReadSized("options", options, &known));
+    Status status = ReadScenes(scenes, count, frame);
+    if (!status.ok()) {
+      frame->frame = {};
+      return status;
+    }
+    return renderer->renderer.Render(frame->views, api::OptionsOf(known), api::OutputsOf(known),
+                                     &frame->frame);
+  });
+}
+
+tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame, tilegrad_images* images) {
+  if (frame == nullptr || images == nullptr || images->struct_size < sizeof(size_t)) {
+    return TILEGRAD_INVALID_ARGUMENT;
+  }
+  WriteSized(ImagesOf(frame->frame.images()), images->struct_size, images);
+  return TILEGRAD_OK;
+}
+
+tilegrad_status tilegrad_backward(tilegrad_renderer* renderer, const tilegrad_frame* frame,
+                                  const tilegrad_frame_gradients* d_frame,
+                                  const tilegrad_scene_gradients* d_scenes, size_t count,
+                                  int32_t add) {
+  return Run(renderer,
+             [&] { return Backward(renderer, frame, d_frame, d_scenes, count, add != 0); });
+}
+
+}  // extern "C"

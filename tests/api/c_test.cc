@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// The C interface: the same bits as the C++ one, struct sizes of other versions, and errors.
+#include <gtest/gtest.h>
+#include <tilegrad/c.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "api/test_scene.h"
+
+namespace tilegrad {
+namespace {
+
+using test::kAll;
+using test::kTestOptions;
+using test::TestCotangents;
+using test::TestGradients;
+using test::TestScene;
+
+// The scene of a TestScene in C.
+struct CScene {
+  tilegrad_texture texture;
+  tilegrad_surface surface;
+  tilegrad_light light;
+  tilegrad_scene scene;
+
+  explicit CScene(const TestScene<float>& s) {
+    tilegrad_scene_init(&scene);
+    scene.positions = s.positions.data(), scene.vertices = 16;
+    scene.faces = s.faces.data(), scene.face_count = s.faces.size() / 3;
+    const Camera& c = s.scene.camera;
+    scene.camera.fx = c.fx, scene.camera.fy = c.fy, scene.camera.cx = c.cx, scene.camera.cy = c.cy;
+    scene.colors = {s.colors.data(), 0}, scene.uvs = {s.uvs.data(), 1};
+    scene.attributes = {s.attributes.data(), 0}, scene.channels = 2;
+    texture = {s.texels.data(), 5, 4, 1, 1};
+    const Surface& f = s.surfaces[0];
+    surface = {{f.base_color[0], f.base_color[1], f.base_color[2]},
+               {f.ambient[0], f.ambient[1], f.ambient[2]},
+               {f.diffuse[0], f.diffuse[1], f.diffuse[2]},
+               {f.specular[0], f.specular[1], f.specular[2]},
+               f.shininess,
+               f.texture};
+    const Light& l = s.lights[0];
+    light = {{l.direction[0], l.direction[1], l.direction[2]}, l.intensity};
+    scene.textures = &texture, scene.texture_count = 1;
+    scene.surfaces = &surface, scene.surface_count = 1;
+    scene.lights = &light, scene.light_count = 1, scene.lighting = 2;
+  }
+};
+
+class CApi : public testing::Test {
+ protected:
+  CApi() : s(Lighting::kPhong), c(s) {
+    tilegrad_options_init(&options);
+    options.width = 34, options.height = 29, options.delta = 1e-3;
+    options.depth = options.normals = options.uv = options.barycentrics = 1;
+  }
+  ~CApi() override {
+    tilegrad_frame_destroy(frame);
+    tilegrad_renderer_destroy(renderer);
+  }
+
+  std::string ErrorOf(tilegrad_status status) {
+    EXPECT_EQ(status, TILEGRAD_INVALID_ARGUMENT);
+    return tilegrad_last_error(renderer);
+  }
+  tilegrad_status Render() { return tilegrad_render(renderer, &c.scene, 1, &options, frame); }
+
+  TestScene<float> s;
+  CScene c;
+  tilegrad_options options;
+  tilegrad_renderer* renderer = tilegrad_renderer_create(1);
+  tilegrad_frame* frame = tilegrad_frame_create();
+};
+
+TEST_F(CApi, GivesTheBitsOfTheCppInterface) {
+  ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
+  EXPECT_STREQ(tilegrad_last_error(renderer), "");
+  tilegrad_images images;
+  tilegrad_images_init(&images);
+  ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+  Renderer cpp;
+  Frame expected;
+  ASSERT_TRUE(cpp.Render({&s.scene, 1}, kTestOptions, kAll, &expected).ok());
+  const Images& e = expected.images();
+  EXPECT_TRUE(std::equal(e.color.begin(), e.color.end(), images.color));
+  EXPECT_TRUE(std::equal(e.alpha.begin(), e.alpha.end(), images.alpha));
+  EXPECT_TRUE(std::equal(e.uv.begin(), e.uv.end(), images.uv));
+  EXPECT_TRUE(std::equal(e.depth.begin(), e.depth.end(), images.depth));
+  EXPECT_TRUE(std::equal(e.face_ids.begin(), e.face_ids.end(), images.face_ids));
+
+  const TestCotangents<float> d(e);
+  tilegrad_frame_gradients d_frame;
+  tilegrad_frame_gradients_init(&d_frame);
+  d_frame.color = d.color.data(), d_frame.alpha = d.alpha.data(), d_frame.depth = d.depth.data();
+  TestGradients<float> g(s), h(s);
+  float* textures[1] = {h.texels.data()};
+  tilegrad_camera d_camera = {};
+  tilegrad_surface d_surface = {};
+  tilegrad_light d_light = {};
+  tilegrad_scene_gradients d_scene;
+  tilegrad_scene_gradients_init(&d_scene);
+  d_scene.positions = h.positions.data(), d_scene.colors = h.colors.data();
+  d_scene.uvs = h.uvs.data(), d_scene.textures = textures, d_scene.camera = &d_camera;
+  d_scene.surfaces = &d_surface, d_scene.lights = &d_light;
+  ASSERT_TRUE(
+      cpp.Backward(expected, {.color = d.color, .alpha = d.alpha, .depth = d.depth}, {&g.d, 1})
+          .ok());
+  ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0), TILEGRAD_OK)
+      << tilegrad_last_error(renderer);
+  EXPECT_EQ(g.positions, h.positions);
+  EXPECT_EQ(g.colors, h.colors);
+  EXPECT_EQ(g.uvs, h.uvs);
+  EXPECT_EQ(g.texels, h.texels);
+  EXPECT_EQ(d_camera.rotation[5], g.camera.rotation[5]);
+  EXPECT_EQ(d_camera.fx, g.camera.fx);
+  EXPECT_EQ(d_surface.shininess, g.surfaces[0].shininess);
+  EXPECT_EQ(d_light.direction[1], g.lights[0].direction[1]);
+  ASSERT_EQ(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 1), TILEGRAD_OK);
+  EXPECT_EQ(d_camera.fx, 2 * g.camera.fx);
+  EXPECT_EQ(h.colors[9], 2 * g.colors[9]);
+}
+
+// A caller of an older version has shorter structs: what it does not know has its default. Here
+// options end behind `delta`, and scenes behind `camera`.
+TEST_F(CApi, ShorterStructsHaveDefaultsForTheRest) {
+  options.struct_size = offsetof(tilegrad_options, max_alpha_error);
+  options.interpolation = 77;  // is not read
+  c.scene.struct_size = offsetof(tilegrad_scene, colors);
+  ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
+  tilegrad_images images;
+  tilegrad_images_init(&images);
+  images.struct_size = offsetof(tilegrad_images, uv);
+  images.uv = reinterpret_cast<const float*>(this);
+  ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+  EXPECT_NE(images.alpha, nullptr);
+  EXPECT_EQ(images.uv, reinterpret_cast<const float*>(this));  // is not written
+  tilegrad_options small;
+  std::memset(&small, 0x55, sizeof small);
+  tilegrad_options_init_sized(&small, offsetof(tilegrad_options, delta));
+  EXPECT_EQ(small.width, 64);
+  EXPECT_NE(small.delta, 1.0 / 7000);
+}
+
+TEST_F(CApi, LongerStructsMustNotSayWhatIsNotKnown) {
+  struct {
+    tilegrad_options known;
+    int future;
+  } newer = {options, 0};
+  newer.known.struct_size = sizeof newer;
+  EXPECT_EQ(tilegrad_render(renderer, &c.scene, 1, &newer.known, frame), TILEGRAD_OK);
+  newer.future = 1;
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, &newer.known, frame)),
+            "options has members that this library (" TILEGRAD_VERSION ") does not know");
+}
+
+TEST_F(CApi, SaysWhatIsWrong) {
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, nullptr, frame)), "options is NULL");
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 1, &options, frame)),
+            "scene 0: scene is NULL");
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, &options, nullptr)), "frame is NULL");
+  EXPECT_EQ(tilegrad_render(nullptr, &c.scene, 1, &options, frame), TILEGRAD_INVALID_ARGUMENT);
+  c.scene.lighting = 4;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: shading.lighting is 4, must be in 0..3");
+  c.scene.lighting = 2, c.texture.width = -5;
+  EXPECT_EQ(ErrorOf(Render()),
+            "scene 0: textures[0]: is -5 x 4 texels; each side must be in 1..16384");
+  c.texture.width = 5, c.scene.struct_size = 0;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: scene.struct_size is 0: tilegrad_..._init comes first");
+  tilegrad_images images;
+  tilegrad_images_init(&images);
+  ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+  EXPECT_EQ(images.alpha, nullptr);
+  tilegrad_frame_gradients d_frame;
+  tilegrad_frame_gradients_init(&d_frame);
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, nullptr, 0, 0)),
+            "the frame holds nothing: Render into it first");
+}
+
+}  // namespace
+}  // namespace tilegrad

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Memory: none is allocated in the steady state, and none that is refused gets past a Status.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <new>
+
+#include "api/test_scene.h"
+
+// Counts heap allocations of the whole program, the library's included; refuses those from number
+// g_refused on.
+static std::atomic<long> g_allocations{0};
+static std::atomic<long> g_refused{std::numeric_limits<long>::max()};
+
+void* CountedAllocate(std::size_t size, std::size_t alignment) {
+  if (++g_allocations > g_refused) throw std::bad_alloc();
+  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (p == nullptr) std::abort();
+  return p;
+}
+void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return CountedAllocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace tilegrad {
+namespace {
+
+using test::kAll;
+using test::kTestOptions;
+using test::TestCotangents;
+using test::TestGradients;
+using test::TestScene;
+
+// A step of a training loop over two scenes.
+class Step {
+ public:
+  explicit Step(Lighting lighting, const RenderOptions& options)
+      : test_(lighting), options_(options), scenes_(2, test_.scene), g_(test_), d_scenes_(2, g_.d) {
+    Renderer renderer;
+    EXPECT_TRUE(renderer.Render(scenes_, options_, kAll, &frame_).ok());
+    cotangents_ = std::make_unique<TestCotangents<float>>(frame_.images());
+  }
+
+  Status Run(Renderer* renderer, Frame* frame) {
+    TILEGRAD_TRY(renderer->Render(scenes_, options_, kAll, frame));
+    TILEGRAD_TRY(renderer->Backward(*frame, cotangents_->d, d_scenes_));
+    return renderer->Backward(*frame, cotangents_->d, d_scenes_, GradientMode::kAdd);
+  }
+
+ private:
+  TestScene<float> test_;
+  RenderOptions options_;
+  std::vector<Scene> scenes_;
+  TestGradients<float> g_;
+  std::vector<SceneGradients> d_scenes_;
+  Frame frame_;
+  std::unique_ptr<TestCotangents<float>> cotangents_;
+};
+
+TEST(ApiMemory, SteadyStateAllocatesNothing) {
+  for (const Lighting lighting :
+       {Lighting::kNone, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    for (const int size : {34, 150}) {
+      RenderOptions options = kTestOptions;
+      options.width = options.height = size;
+      Step step(lighting, options);
+      Renderer renderer{{.threads = 1}};
+      Frame frame;
+      const long before_first = g_allocations;
+      ASSERT_TRUE(step.Run(&renderer, &frame).ok());
+      EXPECT_GT(g_allocations, before_first);  // the counter counts
+      const long before = g_allocations;
+      for (int i = 0; i < 3; ++i) ASSERT_TRUE(step.Run(&renderer, &frame).ok());
+      EXPECT_EQ(g_allocations - before, 0) << static_cast<int>(lighting) << ", " << size;
+    }
+  }
+}
+
+// Wherever memory ends, the call says so, and the same renderer goes on when there is some again.
+TEST(ApiMemory, NoMemoryIsAnErrorLikeOthers) {
+  Step step(Lighting::kPhong, kTestOptions);
+  long refused = 0;
+  for (long at = 0;; ++at) {
+    Renderer renderer{{.threads = 1}};
+    Frame frame;
+    g_refused = g_allocations + at;
+    const Status status = step.Run(&renderer, &frame);
+    g_refused = std::numeric_limits<long>::max();
+    if (status.ok()) break;
+    ++refused;
+    ASSERT_EQ(status.code(), StatusCode::kResourceExhausted) << at;
+    ASSERT_TRUE(step.Run(&renderer, &frame).ok()) << at;
+  }
+  EXPECT_GT(refused, 50);
+}
+
+}  // namespace
+}  // namespace tilegrad

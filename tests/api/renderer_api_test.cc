@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+// The public renderer beside its promises: images and their shapes, batches, gradients that are
+// added, shared or refused, errors, threads.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "api/test_scene.h"
+
+namespace tilegrad {
+namespace {
+
+using test::kAll;
+using test::kTestOptions;
+using test::TestCotangents;
+using test::TestGradients;
+using test::TestScene;
+
+template <class T>
+std::vector<T> Copy(std::span<const T> values) {
+  return {values.begin(), values.end()};
+}
+
+// All images of a frame behind each other.
+template <class T>
+std::vector<T> Flat(const ImagesT<T>& i) {
+  std::vector<T> out;
+  for (const auto image :
+       {i.color, i.alpha, i.attributes, i.depth, i.normals, i.uv, i.barycentrics})
+    out.insert(out.end(), image.begin(), image.end());
+  return out;
+}
+
+TEST(ApiImages, HaveTheShapesThatTheHeaderSays) {
+  const TestScene<float> s(Lighting::kPhong);
+  const std::vector<Scene> scenes = {s.scene, s.scene, s.scene};
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, kAll, &frame).ok());
+  const Images& i = frame.images();
+  const std::size_t pixels = 3 * 29 * 34;
+  EXPECT_EQ(i.count, 3);
+  EXPECT_EQ(i.height, 29);
+  EXPECT_EQ(i.width, 34);
+  EXPECT_EQ(i.channels, 2);
+  EXPECT_EQ(i.face_ids.size(), pixels);
+  EXPECT_EQ(i.alpha.size(), pixels);
+  EXPECT_EQ(i.depth.size(), pixels);
+  EXPECT_EQ(i.color.size(), 3 * pixels);
+  EXPECT_EQ(i.attributes.size(), 2 * pixels);
+  EXPECT_EQ(i.normals.size(), 3 * pixels);
+  EXPECT_EQ(i.uv.size(), 2 * pixels);
+  EXPECT_EQ(i.barycentrics.size(), 2 * pixels);
+  EXPECT_LE(i.alpha_error_bound, kTestOptions.max_alpha_error);
+  int faces = 0;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    faces += i.face_ids[p] >= 0;
+    EXPECT_EQ(i.face_ids[p] >= 0, std::isfinite(i.depth[p]));
+    EXPECT_EQ(i.face_ids[p] >= 0, i.alpha[p] == 1);
+  }
+  EXPECT_GT(faces, 300);  // there is something to see
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {false, false, false}, &frame).ok());
+  EXPECT_TRUE(frame.images().alpha.empty() && frame.images().color.empty());
+  EXPECT_EQ(frame.images().face_ids.size(), pixels);
+}
+
+// The engine is held to the reference elsewhere; here each image has to be the right one. Colours,
+// alpha and attributes are below 2, depth is about 2: 1e-4 is 400 roundings of them.
+TEST(ApiImages, FloatAndDoubleAgree) {
+  for (const Lighting lighting :
+       {Lighting::kNone, Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    const TestScene<float> s(lighting);
+    const TestScene<double> t(lighting);
+    Renderer renderer;
+    RendererT<double> reference;
+    Frame frame;
+    FrameT<double> truth;
+    ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &frame).ok());
+    const Status status = reference.Render({&t.scene, 1}, kTestOptions, kAll, &truth);
+    ASSERT_TRUE(status.ok()) << status.message();
+    ASSERT_EQ(Copy(frame.images().face_ids), Copy(truth.images().face_ids));
+    const auto a = Flat(frame.images());
+    const auto b = Flat(truth.images());
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      if (!std::isfinite(b[i])) continue;
+      EXPECT_NEAR(static_cast<double>(a[i]), b[i], 1e-4) << i;
+    }
+  }
+}
+
+TEST(ApiImages, ScenesOfABatchAreRenderedAsAlone) {
+  const TestScene<float> s(Lighting::kLambert);
+  std::vector<Scene> scenes(5, s.scene);
+  for (std::size_t n = 0; n < 5; ++n) scenes[n].camera.cx += static_cast<float>(n);
+  Renderer renderer;
+  Frame batch, alone;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &batch).ok());
+  const std::size_t pixels = 29 * 34;
+  for (std::size_t n = 0; n < 5; ++n) {
+    ASSERT_TRUE(renderer.Render({&scenes[n], 1}, kTestOptions, {}, &alone).ok());
+    EXPECT_EQ(Copy(batch.images().color.subspan(n * 3 * pixels, 3 * pixels)),
+              Copy(alone.images().color));
+  }
+  EXPECT_TRUE(renderer.Render({}, kTestOptions, {}, &batch).ok());  // none is a batch too
+  EXPECT_EQ(batch.images().count, 0);
+}
+
+// One step of a batch of three on some number of threads: all images, all gradients.
+std::vector<float> Step(int threads) {
+  const TestScene<float> s(Lighting::kPhong);
+  const std::vector<Scene> scenes(3, s.scene);
+  Renderer renderer{{.threads = threads}};
+  Frame frame;
+  EXPECT_TRUE(renderer.Render(scenes, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> g(s);
+  const std::vector<SceneGradients> d_scenes(3, g.d);
+  EXPECT_TRUE(renderer.Backward(frame, cotangents.d, d_scenes).ok());
+  std::vector<float> out = Flat(frame.images());
+  for (const auto* array : {&g.positions, &g.colors, &g.uvs, &g.attributes, &g.texels}) {
+    out.insert(out.end(), array->begin(), array->end());
+  }
+  out.insert(out.end(), g.camera.rotation, g.camera.rotation + 9);
+  out.push_back(g.lights[0].intensity), out.push_back(g.surfaces[0].shininess);
+  return out;
+}
+
+TEST(ApiThreads, AnyNumberGivesTheSameBits) {
+  const std::vector<float> one = Step(1);
+  for (const int threads : {0, 2, 7}) EXPECT_EQ(Step(threads), one) << threads;
+}
+
+TEST(ApiThreads, RenderersOnTwoThreadsDoNotMeet) {
+  const std::vector<float> one = Step(1);
+  std::vector<float> a, b;
+  std::thread first([&] { a = Step(2); }), second([&] { b = Step(2); });
+  first.join(), second.join();
+  EXPECT_EQ(a, one);
+  EXPECT_EQ(b, one);
+}
+
+TEST(ApiBackward, AddsToWhatIsThere) {
+  const TestScene<float> s(Lighting::kPhong);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> plain(s), added(s, 3.0f);
+  added.camera.fx = 3, added.lights[0].intensity = 3, added.surfaces[0].shininess = 3;
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&plain.d, 1}).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&added.d, 1}, GradientMode::kAdd).ok());
+  const auto expect = [](const std::vector<float>& a, const std::vector<float>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(b[i], a[i] + 3) << i;
+  };
+  expect(plain.positions, added.positions), expect(plain.colors, added.colors);
+  expect(plain.uvs, added.uvs), expect(plain.texels, added.texels);
+  expect(plain.attributes, added.attributes);
+  EXPECT_EQ(added.camera.fx, plain.camera.fx + 3);
+  EXPECT_EQ(added.lights[0].intensity, plain.lights[0].intensity + 3);
+  EXPECT_EQ(plain.surfaces[0].texture, -1);  // is no number that has a gradient
+}
+
+// Scenes that share an array get their sum; those that do not, their own. T = double exists for its
+// own loop over scenes.
+template <class T>
+void ExpectSharedArraysGetTheSum() {
+  const TestScene<T> s(Lighting::kLambert);
+  std::vector<SceneT<T>> scenes(2, s.scene);
+  scenes[1].camera.cx += 2;
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const TestCotangents<T> cotangents(frame.images());
+  TestGradients<T> first(s), second(s), both(s);
+  const std::vector<SceneGradientsT<T>> apart = {first.d, second.d}, shared = {both.d, both.d};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, apart).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, shared).ok());
+  const auto expect = [](const std::vector<T>& a, const std::vector<T>& b,
+                         const std::vector<T>& sum) {
+    T most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i]));
+    EXPECT_GT(most, 0);
+    // Sums of about a hundred pixels' shares in another order: their roundings.
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(sum[i], a[i] + b[i], 1e-5 * most) << i;
+  };
+  expect(first.positions, second.positions, both.positions);
+  expect(first.texels, second.texels, both.texels);
+  expect(first.colors, second.colors, both.colors);
+  EXPECT_EQ(both.camera.fx, first.camera.fx + second.camera.fx);
+  EXPECT_EQ(both.lights[0].intensity, first.lights[0].intensity + second.lights[0].intensity);
+}
+
+TEST(ApiBackward, ScenesThatShareAnArrayGetTheSum) {
+  ExpectSharedArraysGetTheSum<float>();
+  ExpectSharedArraysGetTheSum<double>();
+}
+
+TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
+  const TestScene<float> s(Lighting::kNone);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {}, &frame).ok());
+  std::vector<float> d_color(frame.images().color.size(), 1.0f);
+  TestGradients<float> g(s, 2.0f);
+  const std::vector<float> before = g.positions;
+  d_color[7] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(renderer.Backward(frame, {.color = d_color}, {&g.d, 1}, GradientMode::kAdd).ok());
+  EXPECT_EQ(g.positions, before);
+  d_color[7] = 1;
+  g.colors.assign(g.colors.size(), std::numeric_limits<float>::max());  // + about 1e2: rounds off
+  g.texels.assign(g.texels.size(), std::numeric_limits<float>::max());
+  d_color.assign(d_color.size(), 1e36f);
+  const Status status = renderer.Backward(frame, {.color = d_color}, {&g.d, 1}, GradientMode::kAdd);
+  EXPECT_EQ(status.message(), "a sum of gradients overflows");
+  EXPECT_EQ(g.positions, before);
+}
+
+TEST(ApiFrame, MovesAndOutlivesItsRenderer) {
+  const TestScene<float> s(Lighting::kNone);
+  Frame frame;
+  {
+    Renderer renderer;
+    ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {}, &frame).ok());
+  }
+  Frame moved = std::move(frame);
+  EXPECT_EQ(frame.images().width, 0);  // NOLINT: what a moved frame holds is promised
+  EXPECT_EQ(moved.images().width, 34);
+  const TestCotangents<float> cotangents(moved.images());
+  TestGradients<float> g(s);
+  Renderer other;
+  EXPECT_TRUE(other.Backward(moved, cotangents.d, {&g.d, 1}).ok());
+  const Status nothing = other.Backward(frame, {}, {});
+  EXPECT_EQ(nothing.code(), StatusCode::kInvalidArgument);
+}
+
+struct BadCall {
+  const char* expected;  // part of the message
+  std::function<void(Scene&, RenderOptions&)> spoil;
+};
+
+TEST(ApiErrors, SayWhatIsWrongAndWhere) {
+  static const std::vector<float> seven(7), two(2);
+  static const std::vector<int> bad_faces = {0, 1, 16};
+  static std::vector<float> with_nan(48, 0.0f);
+  with_nan[5] = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<BadCall> calls = {
+      {"scene 1: positions must be [V,3], got 7 numbers",
+       [](Scene& s, RenderOptions&) { s.positions = seven; }},
+      {"scene 1: faces[2] is 16, outside of [0, 16)",
+       [](Scene& s, RenderOptions&) {
+         s.faces = bad_faces;
+         s.uvs = {};
+         s.textures = {};
+         s.surfaces = {};
+       }},
+      {"scene 1: positions[5] is nan", [](Scene& s, RenderOptions&) { s.positions = with_nan; }},
+      {"scene 1: colors must be [16,3], got 2 numbers",
+       [](Scene& s, RenderOptions&) { s.colors.values = two; }},
+      {"scene 1: uvs must be [54,2], got 7 numbers",
+       [](Scene& s, RenderOptions&) { s.uvs.values = seven; }},
+      {"scene 1: colors.rate is 9, must be in 0..1",
+       [](Scene& s, RenderOptions&) { s.colors.rate = static_cast<Rate>(9); }},
+      {"scene 1: the scene has 1 channels, scene 0 has 2",
+       [](Scene& s, RenderOptions&) {
+         s.channels = 1;
+         s.attributes.values = {};
+       }},
+      {"scene 1: attributes must be [16,3], got 32 numbers",
+       [](Scene& s, RenderOptions&) { s.channels = 3; }},
+      {"scene 1: camera.near_plane", [](Scene& s, RenderOptions&) { s.camera.near_plane = 0; }},
+      {"scene 1: sh",
+       [](Scene& s, RenderOptions&) { s.shading.lighting = Lighting::kSphericalHarmonics; }},
+      {"options.width is 0", [](Scene&, RenderOptions& o) { o.width = 0; }},
+      {"options.delta is -1", [](Scene&, RenderOptions& o) { o.delta = -1; }},
+      {"options.max_alpha_error is 2", [](Scene&, RenderOptions& o) { o.max_alpha_error = 2; }},
+      {"options.culling is 2",
+       [](Scene&, RenderOptions& o) { o.culling = static_cast<FaceCulling>(2); }},
+  };
+  const TestScene<float> s(Lighting::kNone);
+  Renderer renderer;
+  Frame frame;
+  for (const BadCall& call : calls) {
+    std::vector<Scene> scenes = {s.scene, s.scene};
+    RenderOptions options = kTestOptions;
+    call.spoil(scenes[1], options);
+    const Status status = renderer.Render(scenes, options, {}, &frame);
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << call.expected;
+    EXPECT_NE(status.message().find(call.expected), std::string::npos)
+        << "got: " << status.message() << "\nexpected: " << call.expected;
+    EXPECT_EQ(frame.images().width, 0);
+  }
+}
+
+TEST(ApiErrors, OfTheWayBackAndOfRenderers) {
+  const TestScene<float> s(Lighting::kNone);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {.alpha = false}, &frame).ok());
+  std::vector<float> wrong(5), d_alpha(34 * 29), d_positions(5);
+  const SceneGradients none, bad{.positions = d_positions};
+  const auto message = [&](const FrameGradients& d_frame, std::span<const SceneGradients> d) {
+    return renderer.Backward(frame, d_frame, d).message();
+  };
+  EXPECT_EQ(message({.color = wrong}, {&none, 1}), "d_frame.color has 5 numbers, expected 2958");
+  EXPECT_EQ(message({}, {&bad, 1}), "scene 0: d_scene.positions has 5 numbers, expected 48");
+  EXPECT_EQ(message({}, {}), "1 scenes, but 0 d_scenes");
+  EXPECT_EQ(message({.alpha = d_alpha}, {&none, 1}), "frame.alpha has 0 numbers, expected 986");
+  Renderer many{{.threads = 5000}};
+  EXPECT_EQ(many.Render({}, {}, {}, &frame).message(),
+            "options.threads is 5000, must be in 0..1024");
+  EXPECT_FALSE(renderer.Render({}, {}, {}, nullptr).ok());
+}
+
+TEST(ApiCamera, ParametersGoThereAndBack) {
+  const Result<Camera> camera =
+      MakeCamera({.width = 48, .height = 32}, {.azimuth = 30, .elevation = 20, .distance = 2});
+  ASSERT_TRUE(camera.ok());
+  const Result<Camera> again = CameraFromParameters(ParametersOf(*camera), camera->near_plane);
+  ASSERT_TRUE(again.ok());
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(again->rotation[i], camera->rotation[i], 1e-6) << i;
+  EXPECT_EQ(again->translation[2], -2);
+  EXPECT_EQ(again->cx, 24);
+  EXPECT_EQ(again->fx, camera->fx);
+  Camera d_camera = {};
+  d_camera.fx = 5;
+  EXPECT_EQ(PullBack(ParametersOf(*camera), d_camera).fx, 5);
+  EXPECT_FALSE(MakeCamera({.fov_y = 180}, {}).ok());
+  EXPECT_FALSE(MakeCamera({}, {.distance = 0}).ok());
+  EXPECT_FALSE(CameraFromParameters({.rotation = {0, 0, 0, 0, 1, 0}}).ok());
+}
+
+}  // namespace
+}  // namespace tilegrad

@@ -1,0 +1,40 @@
+# cmake -P: installs the build BUILD under WORK, then builds and runs programs that find it there, by find_package and by
+# pkg-config. Nothing of the source tree but the examples' own files is visible to them.
+set(PREFIX ${WORK}/prefix)
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    string(REPLACE ";" " " command "${ARGN}")
+    message(FATAL_ERROR "${command}\n${output}\nended with ${result}")
+  endif()
+endfunction()
+
+function(build_consumer source)
+  get_filename_component(name ${source} NAME)
+  run(${CMAKE_COMMAND} -S ${source} -B ${WORK}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${PREFIX} -DTILEGRAD_EXAMPLES=${SOURCE}/examples
+      -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_C_FLAGS=${FLAGS} -DCMAKE_CXX_FLAGS=${FLAGS}
+      -DCMAKE_BUILD_TYPE=Release)
+  run(${CMAKE_COMMAND} --build ${WORK}/${name})
+endfunction()
+
+file(REMOVE_RECURSE ${WORK})
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
+
+build_consumer(${SOURCE}/tests/install)
+run(${WORK}/install/hello_triangle)
+run(${WORK}/install/hello_c)
+build_consumer(${SOURCE}/examples/embed)
+run(${WORK}/embed/embed)
+
+file(GLOB_RECURSE pc ${PREFIX}/tilegrad.pc)
+get_filename_component(pc_folder ${pc} DIRECTORY)
+set(ENV{PKG_CONFIG_PATH} ${pc_folder})
+execute_process(COMMAND pkg-config --define-prefix --cflags --libs tilegrad OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE
+                COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(flags)
+file(GLOB_RECURSE library ${PREFIX}/libtilegrad.so)
+get_filename_component(library_folder ${library} DIRECTORY)
+separate_arguments(FLAGS)
+run(${CXX} -std=c++20 ${FLAGS} ${SOURCE}/examples/hello_triangle.cc -o ${WORK}/by_pkg_config ${flags} -Wl,-rpath,${library_folder})
+run(${WORK}/by_pkg_config)
