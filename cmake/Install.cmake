@@ -13,6 +13,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/tilegradConfigVersion.cma
 install(FILES ${PROJECT_BINARY_DIR}/tilegradConfig.cmake ${PROJECT_BINARY_DIR}/tilegradConfigVersion.cmake
   DESTINATION ${TILEGRAD_PACKAGE})
 
-# The prefix of the file is that of the build; pkg-config --define-prefix moves it.
+# Wherever the tree is installed or moved to, the file finds it from its own place.
+file(RELATIVE_PATH TILEGRAD_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(cmake/tilegrad.pc.in ${PROJECT_BINARY_DIR}/tilegrad.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/tilegrad.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

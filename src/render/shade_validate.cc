@@ -114,13 +114,13 @@ Status CheckLights(const ShadedScene& scene, const ShadedScene& known) {
 
 Status CheckMesh(const ShadedScene& scene, const ShadedScene& known) {
   const SceneView& view = scene;
-  TILEGRAD_TRY(ValidateSceneSizes({&view, 1}));
+  TILEGRAD_TRY(ValidateSceneSizes(view));
   if (SameArray(scene.positions, known.positions) && SameArray(scene.faces, known.faces)) return {};
   if (AllWithin(scene.faces, 0, static_cast<std::int32_t>(scene.positions.size() / 3)) &&
       AllFinite(scene.positions)) {
     return {};
   }
-  return ValidateSceneNumbers({&view, 1});
+  return ValidateSceneNumbers(view);
 }
 
 // `known`: the scene before, or an empty one.
@@ -282,7 +282,7 @@ Status ValidateShadedResult(std::span<const ShadedGradients> d_scenes) {
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
     const ShadedGradients& d = d_scenes[n];
     const SceneGradients& geometry = d;
-    TILEGRAD_TRY(ValidateResult({&geometry, 1}).Within(SceneName(n)));
+    TILEGRAD_TRY(ValidateResult(geometry).Within(SceneName(n)));
     if (const Status status = CheckGradientNumbers(d, n > 0 ? d_scenes[n - 1] : nothing);
         !status.ok()) {
       return status.Within(SceneName(n) + ": the gradient overflows");

@@ -51,33 +51,6 @@ Status CheckCamera(const Camera& camera) {
   return {};
 }
 
-Status CheckSceneSizes(const SceneView& scene) {
-  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
-  if (scene.positions.size() % 3 != 0) {
-    return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
-  }
-  if (scene.faces.size() % 3 != 0) {
-    return InvalidArgument("faces must be [F,3], got {} indices", scene.faces.size());
-  }
-  if (std::max({scene.positions.size(), scene.faces.size(), scene.attributes.size()}) > kMost) {
-    return ResourceExhausted(
-        "{} numbers of positions, {} of faces, {} of attributes: the limit is {} each",
-        scene.positions.size(), scene.faces.size(), scene.attributes.size(), kMost);
-  }
-  const std::size_t vertices = scene.positions.size() / 3;
-  if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
-  const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
-  return CheckShape("attributes", scene.attributes.size(), rows,
-                    static_cast<std::size_t>(scene.channels));
-}
-
-Status CheckSceneNumbers(const SceneView& scene) {
-  TILEGRAD_TRY(CheckFaces(scene.faces, scene.positions.size() / 3));
-  TILEGRAD_TRY(CheckFinite("positions", scene.positions));
-  TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
-  return CheckCamera(scene.camera);
-}
-
 Status CheckGradients(const SceneView& scene, const SceneGradients& d_scene) {
   if (!d_scene.positions.empty()) {
     TILEGRAD_TRY(CheckSize("d_scene.positions", d_scene.positions.size(), scene.positions.size()));
@@ -153,9 +126,36 @@ Status ValidateOptions(const RenderOptions& options) {
   return {};
 }
 
+Status ValidateSceneSizes(const SceneView& scene) {
+  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
+  if (scene.positions.size() % 3 != 0) {
+    return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
+  }
+  if (scene.faces.size() % 3 != 0) {
+    return InvalidArgument("faces must be [F,3], got {} indices", scene.faces.size());
+  }
+  if (std::max({scene.positions.size(), scene.faces.size(), scene.attributes.size()}) > kMost) {
+    return ResourceExhausted(
+        "{} numbers of positions, {} of faces, {} of attributes: the limit is {} each",
+        scene.positions.size(), scene.faces.size(), scene.attributes.size(), kMost);
+  }
+  const std::size_t vertices = scene.positions.size() / 3;
+  if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
+  const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
+  return CheckShape("attributes", scene.attributes.size(), rows,
+                    static_cast<std::size_t>(scene.channels));
+}
+
+Status ValidateSceneNumbers(const SceneView& scene) {
+  TILEGRAD_TRY(CheckFaces(scene.faces, scene.positions.size() / 3));
+  TILEGRAD_TRY(CheckFinite("positions", scene.positions));
+  TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
+  return CheckCamera(scene.camera);
+}
+
 Status ValidateSceneSizes(std::span<const SceneView> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (const Status status = CheckSceneSizes(scenes[n]); !status.ok()) {
+    if (const Status status = ValidateSceneSizes(scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
     }
     if (scenes[n].channels != scenes[0].channels) {
@@ -168,7 +168,7 @@ Status ValidateSceneSizes(std::span<const SceneView> scenes) {
 
 Status ValidateSceneNumbers(std::span<const SceneView> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (const Status status = CheckSceneNumbers(scenes[n]); !status.ok()) {
+    if (const Status status = ValidateSceneNumbers(scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
     }
   }
@@ -209,12 +209,17 @@ Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& f
   return {};
 }
 
+Status ValidateResult(const SceneGradients& d_scene) {
+  Status status = CheckFinite("d_scene.positions", d_scene.positions);
+  if (status.ok()) status = CheckFinite("d_scene.attributes", d_scene.attributes);
+  if (status.ok() && d_scene.camera) status = CheckCameraGradient(d_scene.d_camera);
+  return status.ok() ? status : status.Within("the gradient overflows");  // no string if not needed
+}
+
 Status ValidateResult(std::span<const SceneGradients> d_scenes) {
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    Status status = CheckFinite("d_scene.positions", d_scenes[n].positions);
-    if (status.ok()) status = CheckFinite("d_scene.attributes", d_scenes[n].attributes);
-    if (status.ok() && d_scenes[n].camera) status = CheckCameraGradient(d_scenes[n].d_camera);
-    if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
+    const Status status = ValidateResult(d_scenes[n]);
+    if (!status.ok()) return status.Within(SceneName(n));
   }
   return {};
 }

@@ -22,6 +22,9 @@ Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::siz
 Status ValidateOptions(const RenderOptions& options);
 Status ValidateSceneSizes(std::span<const SceneView> scenes);
 Status ValidateSceneNumbers(std::span<const SceneView> scenes);
+// Of one scene, whom the errors do not name.
+Status ValidateSceneSizes(const SceneView& scene);
+Status ValidateSceneNumbers(const SceneView& scene);
 Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOptions& options,
                              const Frame& frame, const FrameGradients& d_frame,
                              std::span<const SceneGradients> d_scenes);
@@ -29,5 +32,6 @@ Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& f
                                const FrameGradients& d_frame);
 // Gradients that overflow float are an error, not an Inf that spreads.
 Status ValidateResult(std::span<const SceneGradients> d_scenes);
+Status ValidateResult(const SceneGradients& d_scene);  // of one scene, whom the error does not name
 
 }  // namespace tilegrad

@@ -266,10 +266,9 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
        [](Scene& s, RenderOptions&) { s.uvs.values = seven; }},
       {"scene 1: colors.rate is 9, must be in 0..1",
        [](Scene& s, RenderOptions&) { s.colors.rate = static_cast<Rate>(9); }},
-      {"scene 1: the scene has 1 channels, scene 0 has 2",
+      {"scene 1: attributes differ from those of scene 0: a batch must agree",
        [](Scene& s, RenderOptions&) {
-         s.channels = 1;
-         s.attributes.values = {};
+         s.channels = 1, s.attributes.values = s.attributes.values.first(16);
        }},
       {"scene 1: attributes must be [16,3], got 32 numbers",
        [](Scene& s, RenderOptions&) { s.channels = 3; }},

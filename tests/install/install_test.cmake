@@ -30,7 +30,7 @@ run(${WORK}/embed/embed)
 file(GLOB_RECURSE pc ${PREFIX}/tilegrad.pc)
 get_filename_component(pc_folder ${pc} DIRECTORY)
 set(ENV{PKG_CONFIG_PATH} ${pc_folder})
-execute_process(COMMAND pkg-config --define-prefix --cflags --libs tilegrad OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE
+execute_process(COMMAND pkg-config --cflags --libs tilegrad OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE
                 COMMAND_ERROR_IS_FATAL ANY)
 separate_arguments(flags)
 file(GLOB_RECURSE library ${PREFIX}/libtilegrad.so)

@@ -331,9 +331,9 @@ struct BadScene {
 };
 
 const BadScene kBadScenes[] = {
-    {"short_colors", [](auto& s) { s.colors.pop_back(); }, "colors has"},
+    {"short_colors", [](auto& s) { s.colors.pop_back(); }, "colors must be"},
     {"nan_color", [](auto& s) { s.colors[4] = NAN; }, "colors[4] is nan"},
-    {"short_uvs", [](auto& s) { s.uvs.pop_back(); }, "uvs has"},
+    {"short_uvs", [](auto& s) { s.uvs.pop_back(); }, "uvs must be"},
     {"no_uvs", [](auto& s) { s.uvs.clear(); }, "no uvs"},
     {"short_texture", [](auto& s) { s.textures[0].texels.pop_back(); }, "textures[0]: texels"},
     {"no_texels", [](auto& s) { s.textures[0].width = 0; }, "textures[0]: is 0 x 8"},
