@@ -4,12 +4,10 @@
 // another version fails to link instead of misbehaving.
 #pragma once
 
-namespace tilegrad {
 #ifdef TILEGRAD_BUILDS_LIBRARY  // whose engine has names of its own in tilegrad
-namespace v0 {}
+#define TILEGRAD_ABI v0
 #else
-inline namespace v0 {}
+#define TILEGRAD_ABI inline v0
 #endif
-}  // namespace tilegrad
 
 #define TILEGRAD_API [[gnu::visibility("default")]]  // what the shared library exports

@@ -5,7 +5,7 @@
 #include "tilegrad/abi.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad::TILEGRAD_ABI {
 
 // Pinhole camera: world to camera, then camera to pixels.
 //
@@ -59,4 +59,4 @@ TILEGRAD_API Result<Camera> CameraFromParameters(const CameraParameters& paramet
 // dL/d(parameters) from dL/d(camera). `parameters` as CameraFromParameters accepts them.
 TILEGRAD_API CameraParameters PullBack(const CameraParameters& parameters, const Camera& d_camera);
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad::TILEGRAD_ABI

@@ -20,7 +20,7 @@
 #include "tilegrad/scene.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad::TILEGRAD_ABI {
 
 enum class Interpolation {
   kPerspective,   // attributes are linear on the face in space: what a camera sees
@@ -168,4 +168,4 @@ extern template class FrameT<double>;
 extern template class RendererT<float>;
 extern template class RendererT<double>;
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad::TILEGRAD_ABI

@@ -14,7 +14,7 @@
 #include "tilegrad/abi.h"
 #include "tilegrad/camera.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad::TILEGRAD_ABI {
 
 enum class Rate { kVertex, kCorner };
 
@@ -128,4 +128,4 @@ struct SceneGradientsT {
 };
 using SceneGradients = SceneGradientsT<float>;
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad::TILEGRAD_ABI
