@@ -12,6 +12,7 @@ if(TILEGRAD_PROGRAM)
   pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
   pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)          # libstb-dev
   find_package(ZLIB REQUIRED)               # zlib1g-dev, by libzip-dev
+  pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)    # libopenexr-dev
   find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
 endif()
 if(TILEGRAD_TESTS)

@@ -21,6 +21,7 @@ void AddEval(CLI::App& app, Action* action);
 void AddFigure2(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
+void AddRender(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);
 void AddTradeoff(CLI::App& app, Action* action);
 void AddTrain(CLI::App& app, Action* action);

@@ -51,6 +51,7 @@ int Run(int argc, char** argv) {
   AddTrain(app, &action);
   AddEval(app, &action);
   AddPredict(app, &action);
+  AddRender(app, &action);
   AddReport(app, &action);
   AddDatasetView(app, &action);
   AddFigure2(app, &action);

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
-#include "io/srgb.h"
+#include "scene/srgb.h"
 
 namespace tilegrad::io {
 namespace {

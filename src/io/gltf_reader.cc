@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -11,8 +13,8 @@
 #include "io/gltf_model.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
-#include "io/srgb.h"
 #include "scene/shapes.h"
+#include "scene/srgb.h"
 
 namespace tilegrad::io {
 namespace {
@@ -65,6 +67,8 @@ struct GltfWalk {
   Result<Mesh> Convert(const tinygltf::Primitive& p, const std::string& what);
   Status AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m, const std::string& what);
   Material ConvertMaterial(int index);
+  void AddCamera(const tinygltf::Node& node, const glm::mat4& m);
+  void SetSampler(int texture, Material* material);
   int ImageTexture(int texture);
   int AddImage(const tinygltf::Image& image, int index);
   Status Visit(int node, const glm::mat4& parent, int depth);
@@ -160,17 +164,48 @@ Result<std::vector<glm::vec4>> ReadColors(const tinygltf::Model& model,
   return out;
 }
 
-// The uv set that the material's texture names.
-std::string UvKey(const tinygltf::Model& model, int material) {
-  const bool known = material >= 0 && material < static_cast<int>(model.materials.size());
-  const int set =
-      known ? model.materials[material].pbrMetallicRoughness.baseColorTexture.texCoord : 0;
-  return fmt::format("TEXCOORD_{}", set);
+double NumberOf(const tinygltf::Value& object, const char* key, std::size_t index,
+                double fallback) {
+  if (!object.IsObject() || !object.Has(key)) return fallback;
+  const tinygltf::Value& value = object.Get(key);
+  const tinygltf::Value& number = value.IsArray() ? value.Get(index) : value;
+  return number.IsNumber() ? number.GetNumberAsDouble() : fallback;
+}
+
+// Where the material's texture is looked up: the uv set, and KHR_texture_transform on it, in
+// glTF's own coordinates (v down).
+struct UvUse {
+  int set = 0;
+  glm::dvec2 offset{0}, scale{1};
+  double rotation = 0;  // radians
+
+  std::string Key() const { return fmt::format("TEXCOORD_{}", set); }
+  glm::vec2 operator()(glm::vec2 uv) const {
+    const double c = std::cos(rotation), s = std::sin(rotation);
+    const glm::dvec2 p = scale * glm::dvec2(uv);
+    return offset + glm::dvec2(c * p.x + s * p.y, c * p.y - s * p.x);
+  }
+};
+
+UvUse UvUseOf(const tinygltf::Model& model, int material) {
+  UvUse use;
+  if (material < 0 || material >= static_cast<int>(model.materials.size())) return use;
+  const auto& texture = model.materials[material].pbrMetallicRoughness.baseColorTexture;
+  use.set = texture.texCoord;
+  const auto found = texture.extensions.find("KHR_texture_transform");
+  if (found == texture.extensions.end()) return use;
+  const tinygltf::Value& t = found->second;
+  use.set = static_cast<int>(NumberOf(t, "texCoord", 0, use.set));
+  use.offset = {NumberOf(t, "offset", 0, 0), NumberOf(t, "offset", 1, 0)};
+  use.scale = {NumberOf(t, "scale", 0, 1), NumberOf(t, "scale", 1, 1)};
+  use.rotation = NumberOf(t, "rotation", 0, 0);
+  return use;
 }
 
 Result<Mesh> GltfWalk::Convert(const tinygltf::Primitive& p, const std::string& what) {
   Mesh mesh;
-  const std::string uv_key = UvKey(model, p.material);
+  const UvUse uv_use = UvUseOf(model, p.material);
+  const std::string uv_key = uv_use.Key();
   if (AttributeIndex(p, "POSITION") < 0) return DataLoss("{}: no POSITION attribute", what);
   TILEGRAD_ASSIGN(mesh.positions, ReadAttribute<glm::vec3>(model, p, "POSITION", what));
   TILEGRAD_ASSIGN(mesh.normals, ReadAttribute<glm::vec3>(model, p, "NORMAL", what));
@@ -187,7 +222,10 @@ Result<Mesh> GltfWalk::Convert(const tinygltf::Primitive& p, const std::string& 
   mesh.faces = Triangles(p.mode, indices);
   if (uvs.empty()) return mesh;
   for (const Face& face : mesh.faces) {  // glTF's v points down
-    for (const std::int32_t v : face) mesh.corner_uvs.emplace_back(uvs[v].x, 1.0f - uvs[v].y);
+    for (const std::int32_t v : face) {
+      const glm::vec2 uv = uv_use(uvs[v]);
+      mesh.corner_uvs.emplace_back(uv.x, 1.0f - uv.y);
+    }
   }
   return mesh;
 }
@@ -210,6 +248,23 @@ int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
   return AddTexture(source, name, DecodePercent(image.uri), out);
 }
 
+void GltfWalk::SetSampler(int texture, Material* material) {
+  if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
+  const int index = model.textures[texture].sampler;
+  if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
+  const tinygltf::Sampler& sampler = model.samplers[index];
+  const int wrap = sampler.wrapS;
+  if (wrap != sampler.wrapT) {
+    out.warnings.push_back(fmt::format(
+        "material \"{}\": its texture wraps differently in u and v; u's way is taken for both",
+        material->name));
+  }
+  material->wrap = wrap == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
+                   : wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
+                                                                   : TextureWrap::kRepeat;
+  material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+}
+
 Material GltfWalk::ConvertMaterial(int index) {
   Material material;
   material.base_color = glm::vec4(1);  // glTF's default
@@ -220,12 +275,15 @@ Material GltfWalk::ConvertMaterial(int index) {
   for (std::size_t c = 0; c < 4 && c < factor.size(); ++c)
     material.base_color[static_cast<int>(c)] = static_cast<float>(factor[c]);
   material.base_color = LinearToSrgb(material.base_color);
-  if (from.alphaMode.empty() || from.alphaMode == "OPAQUE") material.base_color.a = 1;
+  material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
+                        : from.alphaMode == "BLEND" ? AlphaMode::kBlend
+                                                    : AlphaMode::kOpaque;
+  if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
+  material.double_sided = from.doubleSided;
+  material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
   const tinygltf::TextureInfo& texture = from.pbrMetallicRoughness.baseColorTexture;
   material.base_color_texture = ImageTexture(texture.index);
-  if (texture.extensions.count("KHR_texture_transform") > 0)
-    out.warnings.push_back(
-        fmt::format("material \"{}\": KHR_texture_transform is not applied", from.name));
+  SetSampler(texture.index, &material);
   return material;
 }
 
@@ -259,6 +317,23 @@ glm::mat4 LocalMatrix(const tinygltf::Node& node) {
   return glm::mat4(m);
 }
 
+void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::mat4& m) {
+  if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
+  const tinygltf::Camera& from = model.cameras[node.camera];
+  const std::string label = from.name.empty() ? node.name : from.name;
+  if (from.type != "perspective") {
+    out.warnings.push_back(fmt::format("camera \"{}\" is orthographic: left out", label));
+    return;
+  }
+  MeshFileCamera camera;
+  camera.name = label;
+  for (int i = 0; i < 16; ++i) camera.camera.node_to_world[i] = m[i % 4][i / 4];
+  camera.camera.yfov = from.perspective.yfov;
+  camera.camera.aspect_ratio = from.perspective.aspectRatio;
+  camera.camera.znear = from.perspective.znear;
+  out.cameras.push_back(std::move(camera));
+}
+
 Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
   if (depth > kMaxNodeDepth)
     return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
@@ -271,6 +346,7 @@ Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
   visited[index] = true;
   const tinygltf::Node& node = model.nodes[index];
   const glm::mat4 m = parent * LocalMatrix(node);
+  AddCamera(node, m);
   if (node.mesh >= 0) {
     if (node.mesh >= static_cast<int>(model.meshes.size()))
       return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
@@ -314,6 +390,8 @@ std::string_view JsonPart(const Bytes& bytes) {
   return text.substr(kGlbHeader, length);
 }
 
+constexpr std::array<std::string_view, 3> kRead = {"KHR_mesh_quantization", "KHR_texture_transform",
+                                                   "KHR_materials_unlit"};
 constexpr std::array<std::string_view, 2> kCompressions = {"KHR_draco_mesh_compression",
                                                            "EXT_meshopt_compression"};
 
@@ -371,7 +449,7 @@ Status CheckVersion(const tinygltf::Model& model, const std::string& place, Load
     return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
   for (const std::string& name : model.extensionsRequired) {
     if (name == kCompressions[0] || name == kCompressions[1]) return Compressed(place, name);
-    if (name != "KHR_mesh_quantization")
+    if (std::find(kRead.begin(), kRead.end(), name) == kRead.end())
       out.warnings.push_back(fmt::format("the extension {} is not read", name));
   }
   return {};

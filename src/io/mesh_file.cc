@@ -73,11 +73,7 @@ ImageU8 ToColor(ImageU8 image) {
 // Files have many parts of few materials: the last one is dropped if it equals one before it.
 void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   const Material& last = mesh.materials.back();
-  const auto same = [&](const Material& m) {
-    return m.name == last.name && m.base_color == last.base_color &&
-           m.base_color_texture == last.base_color_texture;
-  };
-  const auto found = std::find_if(mesh.materials.begin(), mesh.materials.end() - 1, same);
+  const auto found = std::find(mesh.materials.begin(), mesh.materials.end() - 1, last);
   if (found == mesh.materials.end() - 1) return;
   const auto index = static_cast<std::int32_t>(found - mesh.materials.begin());
   std::fill(mesh.face_materials.begin() + static_cast<std::ptrdiff_t>(first_face),

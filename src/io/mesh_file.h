@@ -7,14 +7,22 @@
 #include <vector>
 
 #include "io/archive.h"
+#include "scene/camera_conventions.h"
 #include "scene/mesh.h"
 
 namespace tilegrad::io {
 
+// A perspective camera that the file holds (glTF only).
+struct MeshFileCamera {
+  std::string name;  // of the camera, else of its node, else empty
+  GltfCamera camera;
+};
+
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
               // transforms applied, polygons split, normals unit, colours in [0, 1]
-  std::vector<std::string> warnings;  // what was missing or left out and what stands in for it
+  std::vector<std::string> warnings;    // what was missing or left out and what stands in for it
+  std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
 };
 
 // The format follows the file name's ending. Errors name the file and, where the format has places,

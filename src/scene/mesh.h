@@ -19,11 +19,21 @@ struct Texture {
   ImageU8 image;     // 3 or 4 channels; row 0 on top is v = 1
 };
 
+enum class TextureWrap { kRepeat, kMirror, kClamp };
+enum class AlphaMode { kOpaque, kMask, kBlend };
+
 // Colours are sRGB-encoded, like the pixels of images.
 struct Material {
   std::string name;
   glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies the texture; alpha < 1 is glass
   int base_color_texture = -1;                      // index into Mesh::textures, -1 for none
+  TextureWrap wrap = TextureWrap::kRepeat;
+  bool nearest = false;                       // texels as squares, not filtered
+  AlphaMode alpha_mode = AlphaMode::kOpaque;  // what the file asks of viewers
+  bool double_sided = true;                   // false: viewers do not draw its back faces
+  bool unlit = false;                         // the colour is shown as it is, whatever the light
+
+  bool operator==(const Material&) const = default;
 };
 
 using Face = std::array<std::int32_t, 3>;

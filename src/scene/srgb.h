@@ -6,7 +6,7 @@
 #include <cmath>
 #include <glm/vec4.hpp>
 
-namespace tilegrad::io {
+namespace tilegrad {
 
 // In double, so that 0 and 1 are kept exactly.
 inline float SrgbToLinear(float c) {
@@ -24,4 +24,4 @@ inline glm::vec4 LinearToSrgb(glm::vec4 c) {
   return {LinearToSrgb(c.r), LinearToSrgb(c.g), LinearToSrgb(c.b), c.a};
 }
 
-}  // namespace tilegrad::io
+}  // namespace tilegrad

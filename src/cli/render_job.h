@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to cli: what `tilegrad render` was asked for, and its parts: which cameras, which files.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/camera_file.h"
+#include "io/mesh_file.h"
+#include "render/picture.h"
+
+namespace tilegrad::cli {
+
+struct ViewSettings {
+  std::string size;         // "W" or "WxH"; empty: what the cameras say, else 512
+  std::string camera_file;  // COLMAP folder, transforms.json, OpenCV's numbers
+  std::string gltf_camera;  // name, index or "all"
+  std::string opencv_centre = "integer";
+  std::vector<float> eye, target = {0, 0, 0}, up = {0, 1, 0};
+  double fov = 40, azimuth = 60, elevation = 20, distance = 0, margin = 0.05;
+  int turntable = 0;  // views around; 0: none
+};
+
+// Cameras of a mesh in the order of their pictures; names serve for files, empty for a single view.
+// Errors name the option or the file.
+Result<std::vector<io::CameraView>> ChooseViews(const ViewSettings& settings,
+                                                const io::LoadedMesh& mesh);
+
+struct FileSettings {
+  std::string out;     // a file for one picture, a folder for several; empty: beside where one is
+  std::string format;  // png, exr, npy; empty: the ending of `out`, else png
+  std::vector<std::string> outputs = {"color"};
+  std::vector<float> background;  // RGB 0..1 sRGB; empty: transparent
+};
+
+// Fails for an unknown output or format. Sets what the outputs need.
+Status RequestOutputs(const FileSettings& settings, PictureRequest* request);
+
+// The place of a picture without ending: for one picture `out` itself, else NAME in the folder.
+struct PictureName {
+  Path stem;
+  std::string format;
+};
+Result<PictureName> NamePicture(const FileSettings& settings, const std::string& name, bool single);
+
+// Writes the files of a picture; returns their names. PNG: straight alpha, sRGB. NPY: the same
+// numbers as floats, [H,W,4]. EXR: linear, colour times alpha, all outputs as layers of one file.
+Result<std::vector<Path>> WritePicture(const Picture& picture, ColorSpace space,
+                                       const FileSettings& settings, const PictureName& name);
+
+}  // namespace tilegrad::cli

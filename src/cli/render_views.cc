@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <charconv>
+#include <set>
+
+#include "base/error.h"
+#include "cli/render_job.h"
+#include "scene/framing.h"
+
+namespace tilegrad::cli {
+namespace {
+
+using io::CameraView;
+
+constexpr int kDefaultSize = 512;
+
+// "512" or "640x480"; nothing gives 0 x 0.
+Result<ImageSize> ParseSize(const std::string& text) {
+  if (text.empty()) return ImageSize{};
+  ImageSize size;
+  const char* const end = text.data() + text.size();
+  std::from_chars_result parsed = std::from_chars(text.data(), end, size.width);
+  size.height = size.width;
+  if (parsed.ec == std::errc() && parsed.ptr != end && (*parsed.ptr == 'x' || *parsed.ptr == 'X'))
+    parsed = std::from_chars(parsed.ptr + 1, end, size.height);
+  if (parsed.ec != std::errc() || parsed.ptr != end || size.width < 1 || size.height < 1) {
+    return InvalidArgument("--size \"{}\": expected pixels, as 512 or 640x480", text);
+  }
+  return size;
+}
+
+ImageSize OrDefault(ImageSize size) {
+  return size.width > 0 ? size : ImageSize{kDefaultSize, kDefaultSize};
+}
+
+// Letters that every file system takes; the ending is dropped.
+std::string FileStem(const std::string& name) {
+  std::string stem = Path(name).replace_extension().generic_string();
+  while (stem.starts_with("./") || stem.starts_with("/")) stem.erase(0, stem.find('/') + 1);
+  std::replace_if(
+      stem.begin(), stem.end(),
+      [](unsigned char c) { return !(std::isalnum(c) || c == '-' || c == '_' || c == '.'); }, '_');
+  return stem;
+}
+
+// Names become names of files, each once.
+void NameFiles(std::vector<CameraView>* views) {
+  std::set<std::string> taken;
+  for (std::size_t i = 0; i < views->size(); ++i) {
+    std::string name = FileStem((*views)[i].name);
+    if (name.empty() || taken.count(name) > 0)
+      name += fmt::format("{}{}", name.empty() ? "" : "_", i);
+    taken.insert(name);
+    (*views)[i].name = name;
+  }
+}
+
+Result<std::vector<CameraView>> FileViews(const ViewSettings& settings, ImageSize size) {
+  const auto centre = settings.opencv_centre == "half" ? PixelCentre::kHalf : PixelCentre::kInteger;
+  TILEGRAD_ASSIGN(auto views, io::LoadCameras(settings.camera_file, {size, centre}));
+  for (CameraView& view : views) {
+    if (size.width == 0) continue;
+    view.camera = ResizeCamera(view.camera, view.size, size);
+    view.size = size;
+  }
+  return views;
+}
+
+Result<std::vector<CameraView>> GltfViews(const ViewSettings& settings, const io::LoadedMesh& mesh,
+                                          ImageSize size) {
+  if (mesh.cameras.empty())
+    return InvalidArgument("--gltf-camera: there is no perspective camera in the file");
+  std::vector<CameraView> views;
+  std::string known;
+  for (std::size_t i = 0; i < mesh.cameras.size(); ++i) {
+    io::MeshFileCamera from = mesh.cameras[i];
+    known += fmt::format("{}{} \"{}\"", i > 0 ? ", " : "", i, from.name);
+    const bool wanted = settings.gltf_camera == "all" || settings.gltf_camera == from.name ||
+                        settings.gltf_camera == std::to_string(i);
+    if (!wanted) continue;
+    from.camera.aspect_ratio = 0;  // pixels are square, as viewers do it
+    const auto camera = FromGltf(from.camera, size);
+    if (!camera.ok())
+      return DataLoss("camera {} \"{}\": {}", i, from.name, camera.status().message());
+    views.push_back({from.name.empty() ? fmt::format("camera{}", i) : from.name, *camera, size});
+  }
+  if (views.empty()) {
+    return InvalidArgument("--gltf-camera \"{}\": the file has {}", settings.gltf_camera, known);
+  }
+  return views;
+}
+
+Result<std::vector<CameraView>> LookAtView(const ViewSettings& s, ImageSize size) {
+  const Lens lens{s.fov, size.width, size.height};
+  if (std::equal(s.eye.begin(), s.eye.end(), s.target.begin()))
+    return InvalidArgument("--eye and --target are the same point");
+  const auto camera =
+      CameraCast<double>(LookAtCamera(lens, s.eye.data(), s.target.data(), s.up.data()));
+  TILEGRAD_TRY(Validate(camera).Within("--eye, --target, --up"));
+  return std::vector<CameraView>{{"", camera, size}};
+}
+
+Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& mesh,
+                                            ImageSize size) {
+  const int count = std::max(1, s.turntable);
+  std::vector<ViewAngle> angles;
+  for (int i = 0; i < count; ++i) angles.push_back({s.azimuth - 360.0 * i / count, s.elevation});
+  const Framing framing{{s.fov, size.width, size.height}, s.margin, s.distance};
+  TILEGRAD_ASSIGN(const auto cameras, FrameMesh(mesh, framing, angles));
+  std::vector<CameraView> views;
+  for (int i = 0; i < count; ++i) {
+    views.push_back({fmt::format("{:04}", i), CameraCast<double>(cameras[i]), size});
+  }
+  return views;
+}
+
+}  // namespace
+
+Result<std::vector<CameraView>> ChooseViews(const ViewSettings& settings,
+                                            const io::LoadedMesh& mesh) {
+  TILEGRAD_ASSIGN(const ImageSize size, ParseSize(settings.size));
+  if (!(settings.fov > 0 && settings.fov < 180))
+    return InvalidArgument("--fov {}: must be between 0 and 180 degrees", settings.fov);
+  const ImageSize shown = OrDefault(size);
+  auto views = !settings.camera_file.empty()   ? FileViews(settings, size)
+               : !settings.gltf_camera.empty() ? GltfViews(settings, mesh, shown)
+               : !settings.eye.empty()         ? LookAtView(settings, shown)
+                                               : FramedViews(settings, mesh.mesh, shown);
+  if (views.ok()) NameFiles(&*views);
+  return views;
+}
+
+}  // namespace tilegrad::cli

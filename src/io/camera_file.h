@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files of cameras: COLMAP's models (a folder with cameras and images, .txt or .bin), NeRF's
+// transforms.json, and OpenCV's numbers in a JSON file:
+//
+//   {"width": 640, "height": 480,
+//    "K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]],
+//    "dist": [0, 0, 0, 0, 0],                            (optional; anything but zeros is refused)
+//    "frames": [{"name": "0001", "world_to_camera": [[...4 numbers], ...3 or 4 rows]},
+//               {"name": "0002", "R": [[...]], "t": [...]},
+//               {"name": "0003", "rvec": [...], "tvec": [...], "K": ..., "width": ...}]}
+//
+// What a frame does not say is taken from the top; a file without "frames" is one camera. Lens
+// distortion is refused with a word on how to get rid of it: rays here are straight.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "scene/camera_conventions.h"
+
+namespace tilegrad::io {
+
+struct CameraView {
+  std::string name;  // as the file says, or its number
+  Camera64 camera;
+  ImageSize size;  // of the image
+};
+
+struct CameraFileOptions {
+  ImageSize size = {};  // where the file does not say; 0 x 0: then it must
+  PixelCentre opencv_centre = PixelCentre::kInteger;  // of K in OpenCV's JSON
+};
+
+// By what is there: a folder is COLMAP's, a JSON file with K is OpenCV's, else NeRF's. Errors name
+// the file and the line or frame. At least one camera.
+Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options);
+
+Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder);
+Result<std::vector<CameraView>> LoadNerfCameras(const Path& file, const CameraFileOptions& options);
+Result<std::vector<CameraView>> LoadOpenCvCameras(const Path& file,
+                                                  const CameraFileOptions& options);
+
+// Writers for what the loaders read; numbers come back as they were.
+Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text
+Status SaveNerfCameras(const Path& file, std::span<const CameraView> views);
+Status SaveOpenCvCameras(const Path& file, std::span<const CameraView> views);
+
+}  // namespace tilegrad::io

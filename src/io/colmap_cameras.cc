@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// COLMAP's sparse models: cameras.txt and images.txt, or the same as .bin (little-endian).
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+
+#include "base/error.h"
+#include "io/camera_file.h"
+#include "io/text_scan.h"
+
+namespace tilegrad::io {
+namespace {
+
+// COLMAP's models of up to eight numbers that begin with one or two focal lengths, then the
+// principal point; what follows is distortion.
+struct Model {
+  std::string_view name;
+  int id;
+  std::size_t focals, params;
+};
+constexpr std::array<Model, 7> kModels = {{{"SIMPLE_PINHOLE", 0, 1, 3},
+                                           {"PINHOLE", 1, 2, 4},
+                                           {"SIMPLE_RADIAL", 2, 1, 4},
+                                           {"RADIAL", 3, 1, 5},
+                                           {"OPENCV", 4, 2, 8},
+                                           {"OPENCV_FISHEYE", 5, 2, 8},
+                                           {"FULL_OPENCV", 6, 2, 12}}};
+constexpr std::string_view kFisheye = "OPENCV_FISHEYE";  // bent even without distortion
+constexpr std::size_t kMaxParams = 12;
+
+struct Intrinsics {
+  ColmapCamera camera;
+  ImageSize size;
+};
+using Cameras = std::map<std::uint32_t, Intrinsics>;
+
+struct RawCamera {
+  std::uint32_t id = 0;
+  std::uint64_t width = 0, height = 0;
+  std::array<double, kMaxParams> params = {};
+};
+
+Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
+                                  const std::string& place) {
+  const auto distortion = std::span(raw.params).first(model.params).subspan(model.focals + 2);
+  if (model.name == kFisheye ||
+      std::any_of(distortion.begin(), distortion.end(), [](double x) { return x != 0; })) {
+    return InvalidArgument(
+        "{}: camera {} ({}) has lens distortion; undistort the images first (colmap "
+        "image_undistorter) and take the model that this writes",
+        place, raw.id, model.name);
+  }
+  constexpr std::uint64_t kMaxSide = 1 << 20;
+  if (raw.width < 1 || raw.height < 1 || raw.width > kMaxSide || raw.height > kMaxSide) {
+    return DataLoss("{}: camera {} has an image of {} x {} pixels", place, raw.id, raw.width,
+                    raw.height);
+  }
+  const auto& p = raw.params;
+  Intrinsics out;
+  out.camera.fx = p[0], out.camera.fy = p[model.focals - 1];
+  out.camera.cx = p[model.focals], out.camera.cy = p[model.focals + 1];
+  out.size = {static_cast<int>(raw.width), static_cast<int>(raw.height)};
+  return out;
+}
+
+std::string KnownModels() {
+  std::string list;
+  for (const Model& m : kModels) list += (list.empty() ? "" : ", ") + std::string(m.name);
+  return list;
+}
+
+// `camera` has the pose, the rest comes from the camera that the image names.
+Status AddView(const std::string& place, const Cameras& cameras, std::uint32_t camera_id,
+               ColmapCamera camera, const std::string& name, std::vector<CameraView>* views) {
+  const auto found = cameras.find(camera_id);
+  if (found == cameras.end())
+    return DataLoss("{}: image \"{}\" names camera {}, which is not there", place, name, camera_id);
+  const ColmapCamera& k = found->second.camera;
+  camera.fx = k.fx, camera.fy = k.fy, camera.cx = k.cx, camera.cy = k.cy;
+  const auto converted = FromColmap(camera);
+  if (!converted.ok())
+    return DataLoss("{}: image \"{}\": {}", place, name, converted.status().message());
+  views->push_back({name, *converted, found->second.size});
+  return {};
+}
+
+// Text ----------------------------------------------------------------------------------------
+
+bool IsComment(std::string_view line) { return NextToken(line).starts_with('#'); }
+
+template <class... T>
+bool ParseTokens(std::string_view& line, T&... values) {
+  return (ParseNumber(NextToken(line), values) && ...);
+}
+
+Result<Cameras> ReadCamerasText(const Path& file) {
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  Cameras cameras;
+  Lines lines(text);
+  for (std::string_view line; lines.Next(line);) {
+    if (IsComment(line) || line.find_first_not_of(" \t") == line.npos) continue;
+    const std::string place = fmt::format("{}: line {}", file.string(), lines.Number());
+    RawCamera raw;
+    if (!ParseTokens(line, raw.id)) return DataLoss("{}: no camera number", place);
+    const std::string_view name = NextToken(line);
+    const auto model = std::find_if(kModels.begin(), kModels.end(),
+                                    [&](const Model& m) { return m.name == name; });
+    if (model == kModels.end()) {
+      return DataLoss("{}: camera model \"{}\" is not one of {}", place, name, KnownModels());
+    }
+    bool good = ParseTokens(line, raw.width, raw.height);
+    for (std::size_t i = 0; i < model->params; ++i) good = good && ParseTokens(line, raw.params[i]);
+    if (!good || !NextToken(line).empty()) {
+      return DataLoss("{}: expected CAMERA_ID {} WIDTH HEIGHT and {} numbers", place, name,
+                      model->params);
+    }
+    TILEGRAD_ASSIGN(cameras[raw.id], MakeIntrinsics(raw, *model, place));
+  }
+  return cameras;
+}
+
+Result<std::vector<CameraView>> ReadImagesText(const Path& file, const Cameras& cameras) {
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  std::vector<CameraView> views;
+  Lines lines(text);
+  for (std::string_view line; lines.Next(line);) {
+    if (IsComment(line) || line.find_first_not_of(" \t") == line.npos) continue;
+    const std::string place = fmt::format("{}: line {}", file.string(), lines.Number());
+    std::uint32_t id = 0, camera_id = 0;
+    ColmapCamera c;
+    auto& [w, x, y, z] = c.quaternion;
+    auto& t = c.translation;
+    if (!ParseTokens(line, id, w, x, y, z, t[0], t[1], t[2], camera_id)) {
+      return DataLoss("{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", place);
+    }
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    TILEGRAD_TRY(AddView(place, cameras, camera_id, c, std::string(line), &views));
+    lines.Next(line);  // the points that the image sees; may be empty
+  }
+  return views;
+}
+
+// Binary --------------------------------------------------------------------------------------
+
+class BinaryReader {
+ public:
+  explicit BinaryReader(std::span<const std::uint8_t> bytes) : left_(bytes) {}
+
+  template <class... T>
+  bool Read(T&... values) {
+    return (ReadOne(values) && ...);
+  }
+  bool ReadName(std::string* name) {
+    const auto end = std::find(left_.begin(), left_.end(), 0);
+    if (end == left_.end()) return false;
+    name->assign(left_.begin(), end);
+    left_ = left_.subspan(name->size() + 1);
+    return true;
+  }
+  bool Skip(std::uint64_t count, std::size_t size) {
+    if (count > left_.size() / size) return false;
+    left_ = left_.subspan(count * size);
+    return true;
+  }
+
+ private:
+  template <class T>
+  bool ReadOne(T& value) {
+    if (left_.size() < sizeof(T)) return false;
+    std::memcpy(&value, left_.data(), sizeof(T));
+    left_ = left_.subspan(sizeof(T));
+    return true;
+  }
+
+  std::span<const std::uint8_t> left_;
+};
+
+Status CutShort(const Path& file) {
+  return DataLoss("{}: the file ends in the middle", file.string());
+}
+
+Result<Cameras> ReadCamerasBinary(const Path& file) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(file));
+  BinaryReader in(bytes);
+  Cameras cameras;
+  std::uint64_t count = 0;
+  if (!in.Read(count)) return CutShort(file);
+  for (; count > 0; --count) {
+    RawCamera raw;
+    std::int32_t id = 0;
+    if (!in.Read(raw.id, id, raw.width, raw.height)) return CutShort(file);
+    const auto model =
+        std::find_if(kModels.begin(), kModels.end(), [&](const Model& m) { return m.id == id; });
+    if (model == kModels.end()) {
+      return DataLoss("{}: camera {} has model number {}; read are {}", file.string(), raw.id, id,
+                      KnownModels());
+    }
+    for (std::size_t i = 0; i < model->params; ++i) {
+      if (!in.Read(raw.params[i])) return CutShort(file);
+    }
+    TILEGRAD_ASSIGN(cameras[raw.id], MakeIntrinsics(raw, *model, file.string()));
+  }
+  return cameras;
+}
+
+Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras& cameras) {
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(file));
+  BinaryReader in(bytes);
+  std::vector<CameraView> views;
+  std::uint64_t count = 0, points = 0;
+  if (!in.Read(count)) return CutShort(file);
+  for (; count > 0; --count) {
+    std::uint32_t id = 0, camera_id = 0;
+    ColmapCamera camera;
+    std::string name;
+    constexpr std::size_t kPointBytes = 24;  // x, y, the number of the 3D point
+    if (!in.Read(id, camera.quaternion, camera.translation, camera_id) || !in.ReadName(&name) ||
+        !in.Read(points) || !in.Skip(points, kPointBytes)) {
+      return CutShort(file);
+    }
+    TILEGRAD_TRY(AddView(file.string(), cameras, camera_id, camera, name, &views));
+  }
+  return views;
+}
+
+}  // namespace
+
+Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
+  std::error_code error;
+  const bool text = std::filesystem::exists(folder / "cameras.txt", error);
+  if (!text && !std::filesystem::exists(folder / "cameras.bin", error)) {
+    return NotFound("{}: neither cameras.txt nor cameras.bin is in it: no model of COLMAP",
+                    folder.string());
+  }
+  TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(folder / "cameras.txt")
+                                              : ReadCamerasBinary(folder / "cameras.bin"));
+  TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(folder / "images.txt", cameras)
+                                   : ReadImagesBinary(folder / "images.bin", cameras));
+  if (views.empty()) return DataLoss("{}: no images in it", folder.string());
+  return views;
+}
+
+Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views) {
+  std::string cameras = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
+  std::string images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ColmapCamera c = ToColmap(views[i].camera);
+    const auto& [q, t, fx, fy, cx, cy] = c;
+    cameras += fmt::format("{} PINHOLE {} {} {} {} {} {}\n", i + 1, views[i].size.width,
+                           views[i].size.height, fx, fy, cx, cy);
+    images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n\n", i + 1, q[0], q[1], q[2], q[3], t[0],
+                          t[1], t[2], i + 1, views[i].name);
+  }
+  TILEGRAD_TRY(WriteTextAtomic(folder / "cameras.txt", cameras));
+  TILEGRAD_TRY(WriteTextAtomic(folder / "points3D.txt", "# none\n"));
+  return WriteTextAtomic(folder / "images.txt", images);
+}
+
+}  // namespace tilegrad::io

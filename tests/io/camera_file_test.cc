@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/camera_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+using io::CameraView;
+
+class CameraFiles : public TempFolderTest {
+ protected:
+  std::vector<CameraView> Views() {
+    std::vector<CameraView> views;
+    for (int i = 0; i < 3; ++i) {
+      Camera64 c = CameraCast<double>(OrbitCamera({}, 100.0 * i, 20, 2));
+      c.fx = 500.25 + i, c.fy = 400.5, c.cx = 300.75, c.cy = 200.125;
+      views.push_back({"image " + std::to_string(i) + ".png", c, {640, 480 + i}});
+    }
+    return views;
+  }
+  // Files hold the shortest decimals that give the same doubles. What is left: the conversion,
+  // through a quaternion for COLMAP, of a rotation that is one to a float's 1e-7.
+  void ExpectSame(const Result<std::vector<CameraView>>& got, double tolerance) {
+    ASSERT_TRUE(got.ok()) << got.status().message();
+    const auto expected = Views();
+    ASSERT_EQ(got->size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      const CameraView &a = (*got)[i], &b = expected[i];
+      EXPECT_EQ(a.name, b.name);
+      EXPECT_EQ(a.size.width, b.size.width);
+      EXPECT_EQ(a.size.height, b.size.height);
+      for (int k = 0; k < 9; ++k)
+        EXPECT_NEAR(a.camera.rotation[k], b.camera.rotation[k], tolerance);
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(a.camera.translation[k], b.camera.translation[k], 2 * tolerance);
+      EXPECT_EQ(a.camera.fx, b.camera.fx);
+      EXPECT_EQ(a.camera.cy, b.camera.cy);
+    }
+  }
+  void ExpectRefused(const std::string& name, const std::string& text, const std::string& part) {
+    const auto got = io::LoadCameras(Write(name, text), {});
+    ASSERT_FALSE(got.ok()) << text;
+    ExpectMessage(got.status(), name, part);
+  }
+};
+
+TEST_F(CameraFiles, RoundTrips) {
+  ASSERT_TRUE(io::SaveNerfCameras(folder_ / "transforms.json", Views()).ok());
+  ExpectSame(io::LoadCameras(folder_ / "transforms.json", {}), 1e-6);
+  ASSERT_TRUE(io::SaveOpenCvCameras(folder_ / "cv.json", Views()).ok());
+  ExpectSame(io::LoadCameras(folder_ / "cv.json", {}), 1e-15);
+  ASSERT_TRUE(io::SaveColmapCameras(folder_, Views()).ok());
+  ExpectSame(io::LoadCameras(folder_, {}), 1e-6);
+}
+
+template <class... T>
+void Put(std::string* out, const T&... values) {
+  const auto put = [&](const auto& v) {
+    out->append(reinterpret_cast<const char*>(&v), sizeof(v));
+  };
+  (put(values), ...);
+}
+
+std::string BinaryCameras() {
+  std::string out;
+  Put(&out, std::uint64_t{1}, std::uint32_t{7}, std::int32_t{1}, std::uint64_t{640},
+      std::uint64_t{480}, 500.0, 510.0, 320.0, 240.0);
+  return out;
+}
+std::string BinaryImages() {
+  std::string out;
+  Put(&out, std::uint64_t{1}, std::uint32_t{3}, 1.0, 0.0, 0.0, 0.0, 0.5, 0.25, 4.0,
+      std::uint32_t{7});
+  out += std::string("a.jpg", 6);
+  Put(&out, std::uint64_t{2}, std::array<double, 6>{});
+  return out;
+}
+
+TEST_F(CameraFiles, ColmapBinary) {
+  Write("cameras.bin", BinaryCameras());
+  Write("images.bin", BinaryImages());
+  const auto got = io::LoadColmapCameras(folder_);
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  ASSERT_EQ(got->size(), 1u);
+  const CameraView& view = got->front();
+  EXPECT_EQ(view.name, "a.jpg");
+  EXPECT_EQ(view.size.width, 640);
+  EXPECT_EQ(view.camera.fy, 510);
+  EXPECT_EQ(view.camera.cx, 320);  // centres at +0.5, as here
+  EXPECT_EQ(view.camera.translation[1], -0.25);
+  EXPECT_EQ(view.camera.rotation[8], -1);
+}
+
+TEST_F(CameraFiles, ColmapBinaryCutAnywhereIsRefused) {
+  const std::string cameras = BinaryCameras(), images = BinaryImages();
+  for (std::size_t n = 0; n < cameras.size(); ++n) {
+    Write("cameras.bin", cameras.substr(0, n));
+    EXPECT_FALSE(io::LoadColmapCameras(folder_).ok()) << n;
+  }
+  Write("cameras.bin", cameras);
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    Write("images.bin", images.substr(0, n));
+    EXPECT_FALSE(io::LoadColmapCameras(folder_).ok()) << n;
+  }
+}
+
+TEST_F(CameraFiles, BrokenColmapText) {
+  const auto refused = [&](const std::string& cameras, const std::string& images,
+                           const std::string& part) {
+    Write("cameras.txt", cameras);
+    Write("images.txt", images);
+    ExpectMessage(io::LoadColmapCameras(folder_).status(), part);
+  };
+  const std::string good = "1 PINHOLE 640 480 500 500 320 240\n", pose = "1 1 0 0 0 0 0 1 ";
+  refused("1 PINHOLE 640 480 500\n", "", "cameras.txt: line 1");
+  refused("# head\n1 THIN_PRISM_FISHEYE 4 4\n", "", "line 2");
+  refused("1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n", "", "undistort");
+  refused("1 PINHOLE 0 480 500 500 320 240\n", "", "0 x 480");
+  refused(good, "", "no images");
+  refused(good, pose + "2 a.png\n\n", "camera 2");
+  refused(good, "1 0 0 0 0 0 0 1 1 a.png\n\n", "quaternion");
+  refused(good, "1 1 0 0\n", "images.txt: line 1");
+  Write("images.txt", pose + "1 my image.png\n\n");
+  EXPECT_EQ(io::LoadColmapCameras(folder_).value()[0].name, "my image.png");
+  EXPECT_FALSE(io::LoadColmapCameras(folder_ / "none").ok());
+}
+
+TEST_F(CameraFiles, SyntheticNerfSaysOnlyTheAngle) {
+  const std::string text = R"({"camera_angle_x": 0.6911112, "frames": [{"file_path": "./r_0",
+    "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]})";
+  const Path file = Write("transforms.json", text);
+  ExpectMessage(io::LoadCameras(file, {}).status(), "size", "frame 0");
+  const auto got = io::LoadCameras(file, {.size = {800, 800}});
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  EXPECT_NEAR(got->front().camera.fx, 1111.111, 1e-3);  // the number that these datasets quote
+  EXPECT_EQ(got->front().camera.translation[2], -4);
+}
+
+TEST_F(CameraFiles, OpenCvPosesAndCentres) {
+  const std::string text = R"({"width": 640, "height": 480, "rvec": [0,0,0], "tvec": [1,2,3],
+    "K": [[500,0,319.5],[0,500,239.5],[0,0,1]], "dist": [0,0,0,0,0]})";
+  const Path file = Write("cv.json", text);
+  EXPECT_EQ(io::LoadCameras(file, {}).value()[0].camera.cx, 320);
+  EXPECT_EQ(io::LoadCameras(file, {.opencv_centre = PixelCentre::kHalf}).value()[0].camera.cx,
+            319.5);
+  Write("cv.json",
+        R"({"width": 4, "height": 4, "K": [[1,0,0],[0,1,0],[0,0,1]],
+            "world_to_camera": [[1,0,0,1],[0,1,0,2],[0,0,1,3]]})");
+  EXPECT_EQ(io::LoadCameras(file, {}).value()[0].camera.translation[2], -3);
+}
+
+TEST_F(CameraFiles, BrokenJson) {
+  ExpectRefused("a.json", "{", "JSON");
+  ExpectRefused("a.json", "[]", "object");
+  ExpectRefused("a.json", "{\"frames\": []}", "frames");
+  ExpectRefused("a.json", "{\"frames\": [3]}", "frame 0");
+  ExpectRefused("a.json", "{\"w\": 4, \"h\": 0.5, \"frames\": [{}]}", "pixels");
+  ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"frames\": [{}]}", "transform_matrix");
+  ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"k1\": 0.1, \"frames\": [{}]}", "undistort");
+  ExpectRefused("a.json", R"({"w": 4, "h": 4, "fl_x": "x", "transform_matrix":
+    [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})",
+                "fl_x");
+  ExpectRefused("a.json", R"({"w": 4, "h": 4, "fl_x": 3, "transform_matrix":
+    [[2,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})",
+                "rotation");
+  ExpectRefused("a.json", R"({"width": 4, "height": 4, "K": [[1,0],[0,1]]})", "9");
+  ExpectRefused("a.json", R"({"width": 4, "height": 4, "K": {}})", "K");
+  EXPECT_FALSE(io::LoadCameras(folder_ / "none.json", {}).ok());
+}
+
+}  // namespace
+}  // namespace tilegrad
