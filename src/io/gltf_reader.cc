@@ -195,7 +195,8 @@ UvUse UvUseOf(const tinygltf::Model& model, int material) {
   const auto found = texture.extensions.find("KHR_texture_transform");
   if (found == texture.extensions.end()) return use;
   const tinygltf::Value& t = found->second;
-  use.set = static_cast<int>(NumberOf(t, "texCoord", 0, use.set));
+  const double set = NumberOf(t, "texCoord", 0, use.set);
+  if (set >= 0 && set <= 255) use.set = static_cast<int>(set);
   use.offset = {NumberOf(t, "offset", 0, 0), NumberOf(t, "offset", 1, 0)};
   use.scale = {NumberOf(t, "scale", 0, 1), NumberOf(t, "scale", 1, 1)};
   use.rotation = NumberOf(t, "rotation", 0, 0);

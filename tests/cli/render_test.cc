@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// `tilegrad render` as a person starts it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "io/camera_file.h"
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "io/npz.h"
+#include "scene/shapes.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+class Render : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    Mesh sphere = Icosphere(2, 1);
+    SetColor(sphere, {1, 0, 0, 1});
+    ASSERT_TRUE(io::SaveGlb(folder_ / "ball.glb", sphere).ok());
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  Outcome Run(const std::string& arguments) const {
+    return RunProgram("render " + In("ball.glb") + " " + arguments);
+  }
+  void ExpectDone(const std::string& arguments) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+  }
+  void ExpectRefused(const std::string& arguments, int code, const std::string& part) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+  }
+  bool Exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
+  std::vector<float> Floats(const std::string& name) const {
+    return io::LoadNpy(folder_ / name).value().As<float>().value();
+  }
+};
+
+TEST_F(Render, FramesTheWholeMeshByItself) {
+  ExpectDone("--out " + In("a.png") + " --size 64x48");
+  const ImageU8 image = io::LoadImage(folder_ / "a.png").value();
+  ASSERT_EQ(image.width, 64);
+  ASSERT_EQ(image.height, 48);
+  ASSERT_EQ(image.channels, 4);
+  EXPECT_EQ(image.at(0, 0)[3], 0);
+  EXPECT_EQ(image.at(32, 24)[3], 255);
+  EXPECT_GT(image.at(32, 24)[0], 100);  // red
+  EXPECT_EQ(image.at(32, 24)[1], 0);
+  int top = 48, bottom = -1;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      if (image.at(x, y)[3] > 0) top = std::min(top, y), bottom = std::max(bottom, y);
+    }
+  }
+  // A margin of 5 % of half the image is 1.2 pixels on each side.
+  EXPECT_GE(top, 1);
+  EXPECT_LE(top, 3);
+  EXPECT_LE(bottom, 46);
+}
+
+// A sphere of radius 1 seen from 4 away: its nearest point is 3 away and faces the eye.
+TEST_F(Render, ExactImagesAsNumbers) {
+  ExpectDone("--out " + In("a.npy") +
+             " --size 65 --eye 0 0 4 --outputs color,alpha,depth,normals,uv,faces");
+  const auto depth = Floats("a_depth.npy"), alpha = Floats("a_alpha.npy"),
+             normals = Floats("a_normals.npy");
+  ASSERT_EQ(depth.size(), 65u * 65u);
+  const std::size_t middle = 32 * 65 + 32;
+  EXPECT_NEAR(depth[middle], 3, 0.05);  // the facets lie a little inside
+  EXPECT_GT(normals[3 * middle + 2], 0.95f);
+  EXPECT_EQ(alpha[middle], 1);
+  EXPECT_TRUE(std::isinf(depth[0]));
+  EXPECT_EQ(alpha[0], 0);
+  EXPECT_EQ(Floats("a.npy").size(), 65u * 65u * 4u);
+  EXPECT_EQ(Floats("a_uv.npy").size(), 65u * 65u * 2u);
+  const auto faces = io::LoadNpy(folder_ / "a_faces.npy").value().As<std::int32_t>().value();
+  EXPECT_EQ(faces[0], -1);
+  EXPECT_GE(faces[middle], 0);
+}
+
+TEST_F(Render, ExrIsOneFile) {
+  ExpectDone("--out " + In("a.exr") + " --size 16 --outputs color,depth,normals");
+  EXPECT_EQ(ReadFile(folder_ / "a.exr").value()[0], 0x76);  // OpenEXR's magic number
+  EXPECT_FALSE(Exists("a_depth.exr"));
+}
+
+TEST_F(Render, EveryShadingModel) {
+  for (const char* model : {"none", "lambert", "phong", "sh"}) {
+    const std::string file = std::string(model) + ".png";
+    ExpectDone("--out " + In(file) + " --size 32 --shading " + model);
+    const ImageU8 image = io::LoadImage(folder_ / file).value();
+    EXPECT_GT(image.at(16, 16)[0], 60) << model;
+  }
+  EXPECT_EQ(io::LoadImage(folder_ / "none.png").value().at(16, 16)[0], 255);
+}
+
+// The light of the world stays where it is; that side is brighter.
+TEST_F(Render, LightComesFromWhereItIsSaid) {
+  ExpectDone("--out " + In("a.png") + " --size 32 --eye 0 0 4 --light 1 0 0 1 --ambient 0");
+  const ImageU8 image = io::LoadImage(folder_ / "a.png").value();
+  EXPECT_GT(image.at(24, 16)[0], 150);
+  EXPECT_LT(image.at(8, 16)[0], 10);
+}
+
+TEST_F(Render, TurntableNumbersItsPicturesAndCamerasComeBack) {
+  ExpectDone("--out " + folder_.string() + " --size 24 --turntable 3 --write-cameras " +
+             In("transforms.json"));
+  for (const char* name : {"ball_0000.png", "ball_0001.png", "ball_0002.png"})
+    EXPECT_TRUE(Exists(name)) << name;
+  const auto views = io::LoadCameras(folder_ / "transforms.json", {});
+  ASSERT_TRUE(views.ok()) << views.status().message();
+  ASSERT_EQ(views->size(), 3u);
+  EXPECT_EQ((*views)[1].name, "ball_0001.png");
+  // The same pictures again from the file of cameras.
+  ExpectDone("--out " + In("again") + " --cameras " + In("transforms.json"));
+  const auto a = io::LoadImage(folder_ / "ball_0001.png").value();
+  const auto b = io::LoadImage(folder_ / "again/ball_ball_0001.png").value();
+  ASSERT_EQ(b.width, 24);
+  int differing = 0;  // float rounding of the pose may move an edge sample
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    differing += std::abs(a.pixels[i] - b.pixels[i]) > 32;
+  EXPECT_LE(differing, 4);
+}
+
+TEST_F(Render, ManyMeshesOneOfThemBroken) {
+  Write("bad.obj", "f 1 2 3\n");
+  ASSERT_TRUE(io::SaveGlb(folder_ / "box.glb", Box({0, 0, 0}, {1, 1, 1})).ok());
+  ExpectRefused(In("bad.obj") + " " + In("box.glb") + " --size 16 --out " + In("out"), 3,
+                "bad.obj");
+  EXPECT_TRUE(Exists("out/ball.png"));
+  EXPECT_TRUE(Exists("out/box.png"));
+}
+
+TEST_F(Render, ExplainSaysWhatWasDone) {
+  const Outcome outcome = Run("--out " + In("a.png") + " --size 16 --explain");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.output.find("ms"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Render, SoftAlphaReachesBeyondTheSilhouette) {
+  ExpectDone("--out " + In("a.npy") + " --size 32 --outputs alpha --soft-delta 0.1");
+  ExpectDone("--out " + In("b.npy") + " --size 32 --outputs alpha");
+  double soft = 0, hard = 0;
+  for (const float a : Floats("a_alpha.npy")) soft += a;
+  for (const float a : Floats("b_alpha.npy")) hard += a;
+  EXPECT_GT(soft, 1.1 * hard);
+}
+
+TEST_F(Render, WorkersDoNotChangeAByte) {
+  ExpectDone("--out " + In("a.png") + " --size 100 --workers 1");
+  ExpectDone("--out " + In("b.png") + " --size 100 --workers 3");
+  EXPECT_EQ(ReadFile(folder_ / "a.png").value(), ReadFile(folder_ / "b.png").value());
+}
+
+TEST_F(Render, WrongCommandLines) {
+  ExpectRefused("--size 0", 2, "--size");
+  ExpectRefused("--size 10x", 2, "--size");
+  ExpectRefused("--size 16000 --supersample 3", 2, "samples");
+  ExpectRefused("--eye 0 0 0", 2, "same point");
+  ExpectRefused("--eye 0 0", 2, "");
+  ExpectRefused("--eye 0 0 4 --turntable 3", 2, "");
+  ExpectRefused("--target 0 0 4", 2, "");
+  ExpectRefused("--fov 180", 2, "--fov");
+  ExpectRefused("--margin 1", 2, "margin");
+  ExpectRefused("--distance -1", 2, "distance");
+  ExpectRefused("--shading toon", 2, "toon");
+  ExpectRefused("--outputs colour", 2, "colour");
+  ExpectRefused("--gltf-camera 0", 2, "no perspective camera");
+  ExpectRefused("--turntable 2 --out " + In("a.png"), 2, "folder");
+  ExpectRefused("--format exr --out " + In("a.png"), 2, "disagree");
+  ExpectRefused("--light 1 0 0", 2, "");
+}
+
+TEST_F(Render, BrokenFiles) {
+  ExpectRefused("--cameras " + In("none"), 3, "none");
+  ExpectRefused("--cameras " + folder_.string(), 3, "cameras.txt");
+  ExpectRefused("--cameras " + Write("c.json", "{").string(), 3, "c.json");
+  const Outcome missing = RunProgram("render " + In("none.glb"));
+  EXPECT_EQ(missing.exit_code, 3) << missing.output;
+  Write("in_the_way", "x");
+  const Outcome blocked = Run("--size 16 --out " + In("in_the_way/a.png"));
+  EXPECT_GT(blocked.exit_code, 0);
+  EXPECT_NE(blocked.output.find("in_the_way"), std::string::npos) << blocked.output;
+}
+
+}  // namespace
+}  // namespace tilegrad
