@@ -4,6 +4,7 @@
 
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "base/error.h"
 #include "cli/command.h"
@@ -26,7 +27,7 @@ struct RenderSettings {
   FileSettings file;
   MeshSceneOptions scene;
   Lighting lighting = Lighting::kLambert;
-  std::vector<float> lights;  // x y z intensity, one after the other
+  std::vector<std::tuple<float, float, float, float>> lights;  // x y z intensity
   bool camera_light = false;
   std::vector<float> sh = {kSky.begin(), kSky.end()};
   float ambient = 0.2f, specular = 0.4f;
@@ -50,10 +51,9 @@ std::vector<shade::DirectionalLight> LightsOf(const RenderSettings& settings,
                                               const Camera& camera) {
   if (settings.lights.empty()) return {{ToWorld(camera, kKeyLight), kKeyIntensity}};
   std::vector<shade::DirectionalLight> lights;
-  for (std::size_t i = 0; i + 3 < settings.lights.size(); i += 4) {
-    const float* const l = &settings.lights[i];
-    const std::array<float, 3> direction = {l[0], l[1], l[2]};
-    lights.push_back({settings.camera_light ? ToWorld(camera, direction) : direction, l[3]});
+  for (const auto& [x, y, z, intensity] : settings.lights) {
+    const std::array<float, 3> direction = {x, y, z};
+    lights.push_back({settings.camera_light ? ToWorld(camera, direction) : direction, intensity});
   }
   return lights;
 }
@@ -177,8 +177,6 @@ Status RenderRun::Finish() {
 
 // One bad mesh does not keep the others from being rendered; the first error is the result.
 Status RunRender(const RenderSettings& settings) {
-  if (settings.lights.size() % 4 != 0)
-    return InvalidArgument("--light takes X Y Z INTENSITY, got {} numbers", settings.lights.size());
   RenderRun run(settings);
   Status first;
   for (const std::string& file : settings.meshes) {
@@ -252,13 +250,9 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
                        {"phong", Lighting::kPhong},
                        {"sh", Lighting::kSphericalHarmonics}},
                       "light: none, lambert (default), phong, or spherical harmonics");
-  command
-      ->add_option("--light", s->lights,
-                   "X Y Z INTENSITY: direction towards a light, world; may be repeated [one "
-                   "behind the camera, above on the left]")
-      ->expected(4)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_option("--light", s->lights,
+                      "X Y Z INTENSITY: direction towards a light, world; may be repeated [one "
+                      "behind the camera, above on the left]");
   command->add_flag("--light-at-camera", s->camera_light,
                     "directions of --light are in the camera's axes: x right, y up, z to the eye");
   command->add_option("--ambient", s->ambient, "light from everywhere")->capture_default_str();

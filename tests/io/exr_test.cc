@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <gtest/gtest.h>
 
