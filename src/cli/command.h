@@ -19,11 +19,13 @@ void AddDataset(CLI::App& app, Action* action);
 void AddDatasetView(CLI::App& app, Action* action);
 void AddEval(CLI::App& app, Action* action);
 void AddFigure2(CLI::App& app, Action* action);
+void AddFit(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
 void AddRender(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);
 void AddTradeoff(CLI::App& app, Action* action);
 void AddTrain(CLI::App& app, Action* action);
+void AddViews(CLI::App& app, Action* action);
 
 }  // namespace tilegrad::cli

@@ -54,6 +54,8 @@ int Run(int argc, char** argv) {
   AddRender(app, &action);
   AddReport(app, &action);
   AddDatasetView(app, &action);
+  AddFit(app, &action);
+  AddViews(app, &action);
   AddFigure2(app, &action);
   AddInfo(app, &action);
   if (argc > 1 && argv[1][0] != '-' && !IsCommand(app, argv[1])) {

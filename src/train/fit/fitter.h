@@ -19,7 +19,7 @@ namespace tilegrad::train {
 // Learning rates by parameter: world units, colours and texels in [0, 1], uv, radians and world
 // units of cameras, unit directions, coefficients, factors.
 struct LearningRates {
-  std::array<double, kParameters.size()> of = {0.01, 0.02, 0.02, 0.005, 0.005, 0.02, 0.02, 0.02};
+  std::array<double, kParameters.size()> of = {0.03, 0.02, 0.02, 0.005, 0.005, 0.02, 0.02, 0.02};
   double operator[](Parameter p) const { return of[static_cast<std::size_t>(p)]; }
   double& operator[](Parameter p) { return of[static_cast<std::size_t>(p)]; }
 };

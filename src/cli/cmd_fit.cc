@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad fit: images and cameras in, mesh, texture, light or better cameras out.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <memory>
+#include <sstream>
+
+#include "base/error.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "io/mesh_file.h"
+#include "train/fit/fit_run.h"
+
+namespace tilegrad::cli {
+namespace {
+
+using train::FitConfig;
+using train::Parameter;
+
+struct Options {
+  std::string input, dataset_model, out, mesh, truth, optimize, lighting = "none",
+                                                                filter = "bilinear";
+  std::vector<std::string> rates;
+  std::vector<float> light_direction;
+  int workers = 0, hold_out = 0;
+  bool resume = false, doctor = false;
+  FitConfig config;
+};
+
+Result<Parameter> ParameterNamed(const std::string& name) {
+  std::string known;
+  for (const Parameter p : train::kParameters) {
+    if (name == train::NameOf(p)) return p;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", train::NameOf(p));
+  }
+  return InvalidArgument("\"{}\" cannot be fitted; what can: {}", name, known);
+}
+
+// "positions,texture"
+Status ParseParameters(const std::string& text, train::ParameterSet* out) {
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(word));
+    (*out)[p] = true;
+  }
+  return {};
+}
+
+// "positions=0.01"
+Status ParseRate(const std::string& text, train::LearningRates* rates) {
+  const auto equals = text.find('=');
+  TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(text.substr(0, equals)));
+  const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
+  double rate = 0;
+  if (!CLI::detail::lexical_cast(number, rate) || !(rate >= 0 && rate < 1e6)) {
+    return InvalidArgument("--rate {}: expected NAME=NUMBER with a number of 0 or more", text);
+  }
+  (*rates)[p] = rate;
+  return {};
+}
+
+Result<Mesh> Load(const std::string& path) {
+  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
+  for (const auto& warning : loaded.warnings)
+    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  return std::move(loaded.mesh);
+}
+
+Status SetConfig(const Options& options, FitConfig* config) {
+  TILEGRAD_TRY(ParseParameters(options.optimize, &config->parameters));
+  for (const auto& rate : options.rates) TILEGRAD_TRY(ParseRate(rate, &config->rates));
+  static const std::vector<std::string> lightings = {"none", "lambert", "phong", "sh"};
+  const auto index = std::find(lightings.begin(), lightings.end(), options.lighting);
+  config->lighting = static_cast<Lighting>(index - lightings.begin());
+  config->filter =
+      options.filter == "trilinear" ? shade::Filter::kTrilinear : shade::Filter::kBilinear;
+  if (!options.light_direction.empty()) {
+    std::copy_n(options.light_direction.begin(), 3, config->light_direction.begin());
+  }
+  // Vertex colours are what a template gets if they, and no texture, are to be fitted.
+  const train::ParameterSet& set = config->parameters;
+  config->vertex_colors = set[Parameter::kColors];
+  return {};
+}
+
+Result<train::FitJob> MakeJob(const Options& options) {
+  train::FitJob job;
+  job.config = options.config;
+  TILEGRAD_TRY(SetConfig(options, &job.config));
+  TILEGRAD_ASSIGN(job.input, options.dataset_model.empty()
+                                 ? train::ReadFitFolder(options.input, options.hold_out)
+                                 : train::ReadFitDataset(options.input, options.dataset_model,
+                                                         options.hold_out));
+  if (!options.mesh.empty()) {
+    TILEGRAD_ASSIGN(job.start, Load(options.mesh));
+  }
+  if (!options.truth.empty()) {
+    TILEGRAD_ASSIGN(job.truth, Load(options.truth));
+  }
+  job.out = options.out, job.resume = options.resume;
+  return job;
+}
+
+void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
+  for (const auto& f : findings) {
+    if (f.blocked) {
+      fmt::print(stderr, "tilegrad: {} get no gradient at the start: {}\n",
+                 train::NameOf(f.parameter), f.sentence);
+    } else if (all) {
+      fmt::print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
+    }
+  }
+}
+
+void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) {
+  if (scores.empty()) return;
+  fmt::print("{}: PSNR {:.2f} dB, silhouette IoU {:.1f} %\n", name, train::MeanPsnr(scores),
+             100 * train::MeanIou(scores));
+}
+
+void PrintOutcome(const Options& options, const train::FitOutcome& o) {
+  for (const auto& warning : o.warnings) fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  fmt::print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
+  PrintScores("fitted views", o.training);
+  PrintScores("held-out views", o.held_out);
+  if (o.voxel_iou) fmt::print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
+  if (o.camera_error_before && o.camera_error_after) {
+    fmt::print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n",
+               *o.camera_error_before, *o.camera_error_after);
+  }
+  const Path out = options.out;
+  fmt::print("mesh {}\nlook at {}\n", (out / "mesh.glb").string(), (out / "report.html").string());
+}
+
+Status Run(const Options& options) {
+  TILEGRAD_ASSIGN(const train::FitJob job, MakeJob(options));
+  const Workers workers(options.workers);
+  if (options.doctor) {
+    TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));
+    PrintFindings(findings, true);
+    return {};
+  }
+  ProgressLine line;
+  auto outcome = train::RunFit(job, workers, line.Sink(), StopOnSignals());
+  line.Finish();
+  if (!outcome.ok()) return outcome.status();
+  PrintFindings(outcome->findings, false);
+  PrintOutcome(options, *outcome);
+  return {};
+}
+
+void AddWhat(CLI::App* command, Options* o) {
+  command
+      ->add_option("input", o->input,
+                   "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
+                   "dataset, with --model")
+      ->required();
+  command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a dataset of tilegrad");
+  command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
+      ->capture_default_str();
+  command->add_option("--mesh", o->mesh, "start from this file instead of a sphere");
+  command->add_option("--optimize", o->optimize,
+                      "comma list of positions, colors, texture, uv, camera, light, sh, material "
+                      "[positions and texture, or the colors that --mesh has]");
+  command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
+      ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))
+      ->capture_default_str();
+  command->add_option("--light-direction", o->light_direction, "x y z towards the light, world")
+      ->expected(3);
+  command->add_option("--filter", o->filter, "texture lookup: bilinear or trilinear")
+      ->check(CLI::IsMember({"bilinear", "trilinear"}))
+      ->capture_default_str();
+  command->add_option("--truth", o->truth, "a mesh to compare with (3D IoU)");
+  command
+      ->add_option("--hold-out", o->hold_out,
+                   "hold out every N-th image to judge by; 0: those of transforms_test.json")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+}
+
+void AddHow(CLI::App* command, FitConfig* c) {
+  const auto number = [&](const char* name, auto* value, const char* help) {
+    command->add_option(name, *value, help)->capture_default_str();
+  };
+  number("--steps", &c->steps, "gradient steps");
+  number("--views-per-step", &c->views_per_step, "images a step looks at");
+  number("--levels", &c->levels, "resolutions, coarse to fine, each twice the one before");
+  number("--delta-start", &c->delta_start, "softness of outlines at the start, squared NDC");
+  number("--delta", &c->delta, "and at the end; 0: 0.7 pixels");
+  number("--texture-size", &c->texture_size, "texels around a blank texture");
+  number("--template-level", &c->template_level, "of the sphere: 3 has 642 vertices, 4 has 2562");
+  number("--smoothing", &c->smoothing, "of vertex steps (lambda of Large Steps); 0: none");
+  number("--laplacian", &c->regularizers.laplacian, "weight of the movement's Laplacian");
+  number("--flatness", &c->regularizers.flatness, "weight of the angles between faces");
+  number("--edge-length", &c->regularizers.edge_length, "weight of unequal edges");
+  number("--color-weight", &c->loss.color_weight, "of the L1 loss of colours");
+  number("--silhouette-weight", &c->loss.silhouette_weight, "of the IoU loss of masks");
+  number("--perturb-cameras", &c->perturb_cameras, "turn each by DEG at random, to try refining");
+  number("--seed", &c->seed, "of the choice of images");
+  number("--checkpoint-every", &c->checkpoint_every, "steps");
+  number("--timelapse", &c->timelapse, "pictures of the run; 0: none");
+}
+
+}  // namespace
+
+void AddFit(CLI::App& app, Action* action) {
+  auto options = std::make_shared<Options>();
+  options->out = "fit";
+  auto* command = app.add_subcommand(
+      "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
+  AddWhat(command, options.get());
+  AddHow(command, &options->config);
+  command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)");
+  command->add_flag("--resume", options->resume, "go on with the fit in --out");
+  command->add_flag("--doctor", options->doctor,
+                    "only say what gets a gradient at the start, and why not");
+  AddWorkersOption(command, &options->workers);
+  command->callback([options, action] { *action = [options] { return Run(*options); }; });
+}
+
+}  // namespace tilegrad::cli

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad views: images of a mesh from all around, with their cameras.
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "cli/command.h"
+#include "cli/console.h"
+#include "io/mesh_file.h"
+#include "train/fit/make_views.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct Options {
+  std::string mesh, out;
+  train::ViewsOptions views;
+};
+
+Status Run(const Options& options) {
+  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(options.mesh));
+  for (const auto& warning : loaded.warnings)
+    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  ProgressLine line;
+  TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, line.Sink(),
+                                StopOnSignals()));
+  line.Finish();
+  fmt::print("{}: {} images to fit, {} held out, the mesh as truth.glb\n", options.out,
+             options.views.views, options.views.held_out);
+  return {};
+}
+
+}  // namespace
+
+void AddViews(CLI::App& app, Action* action) {
+  auto options = std::make_shared<Options>();
+  auto* command = app.add_subcommand(
+      "views",
+      "Render a mesh from all around into a folder of images and cameras for tilegrad fit");
+  command->add_option("mesh", options->mesh, "a file: " + io::MeshFileEndings())->required();
+  command->add_option("--out", options->out, "folder to fill")->required();
+  train::ViewsOptions& v = options->views;
+  command->add_option("--views", v.views, "images to fit")->capture_default_str();
+  command->add_option("--held-out", v.held_out, "more images, to judge a fit by")
+      ->capture_default_str();
+  command->add_option("--size", v.size, "pixels a side")->capture_default_str();
+  command->add_option("--distance", v.distance, "of the cameras; the mesh is scaled to 0.9 across")
+      ->capture_default_str();
+  command->add_option("--fov", v.fov_y, "vertical field of view, degrees")->capture_default_str();
+  command->add_option("--lowest", v.lowest, "elevation of the lowest camera, degrees")
+      ->capture_default_str();
+  command->add_option("--highest", v.highest, "elevation of the highest camera, degrees")
+      ->capture_default_str();
+  command->callback([options, action] { *action = [options] { return Run(*options); }; });
+}
+
+}  // namespace tilegrad::cli

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/fit/make_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "base/error.h"
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "render/lit_renderer.h"
+#include "train/data/glass.h"
+#include "train/fit/transforms.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr float kHalfExtent = 0.45f;
+
+Status Check(const ViewsOptions& o) {
+  if (o.views < 1 || o.held_out < 0 || o.views + o.held_out > 100000) {
+    return InvalidArgument("{} views and {} held out: needs 1 or more, and not over 100000 in all",
+                           o.views, o.held_out);
+  }
+  if (o.size < 8 || o.size > 4096) return InvalidArgument("size is {}, must be 8 to 4096", o.size);
+  if (!(o.distance > 0 && o.distance < 1e6)) {
+    return InvalidArgument("distance is {}, must be positive", o.distance);
+  }
+  if (!(o.fov_y > 0 && o.fov_y < 180)) {
+    return InvalidArgument("fov is {}, must be in (0, 180) degrees", o.fov_y);
+  }
+  if (!(o.lowest > -90 && o.lowest <= o.highest && o.highest < 90)) {
+    return InvalidArgument("elevations {} to {} must rise and be in (-90, 90) degrees", o.lowest,
+                           o.highest);
+  }
+  return {};
+}
+
+// Equal steps of height, golden angles around.
+Camera SpiralCamera(const ViewsOptions& o, int index) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const double low = std::sin(o.lowest / kDegrees), high = std::sin(o.highest / kDegrees);
+  const double height = low + (high - low) * (index + 0.5) / (o.views + o.held_out);
+  const double golden = 180 * (3 - std::sqrt(5.0));
+  return OrbitCamera({o.fov_y, o.size, o.size}, std::fmod(golden * index, 360),
+                     std::asin(height) * kDegrees, o.distance);
+}
+
+// Planar, colours times alpha -> interleaved, straight.
+ImageU8 Straight(const std::vector<std::uint8_t>& planar, int size) {
+  ImageU8 out(size, size, 4);
+  const std::size_t plane = planar.size() / 4;
+  for (std::size_t p = 0; p < plane; ++p) {
+    const int alpha = planar[3 * plane + p];
+    for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
+      out.pixels[4 * p + c] = static_cast<std::uint8_t>(
+          std::min(255, (255 * planar[c * plane + p] + alpha / 2) / alpha));
+    }
+    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
+  }
+  return out;
+}
+
+// Whether image `index` of all is held out: evenly spread.
+bool IsHeldOut(const ViewsOptions& o, int index) {
+  const int all = o.views + o.held_out;
+  return (index + 1) * o.held_out / all != index * o.held_out / all;
+}
+
+}  // namespace
+
+Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
+                 const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_TRY(Check(options));
+  RemoveGlass(&mesh);
+  TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
+  LitRenderer renderer;
+  std::vector<TransformsView> train, test;
+  const int all = options.views + options.held_out;
+  for (int i = 0; i < all; ++i) {
+    if (stop) return Cancelled("stopped; {} is not complete", folder.string());
+    const Camera camera = SpiralCamera(options, i);
+    TILEGRAD_ASSIGN(const auto planar, renderer.Render(mesh, {&camera, 1}, options.size));
+    const std::string name = fmt::format("images/{:03}.png", i);
+    TILEGRAD_TRY(io::SavePng(folder / name, Straight(planar, options.size)));
+    (IsHeldOut(options, i) ? test : train).push_back({name, camera});
+    if (progress) {
+      progress(
+          {"rendering", static_cast<std::uint64_t>(i + 1), static_cast<std::uint64_t>(all), ""});
+    }
+  }
+  const ImageSize size{options.size, options.size};
+  if (!test.empty()) {
+    TILEGRAD_TRY(WriteTextAtomic(folder / "transforms_test.json", WriteTransforms(test, size)));
+  }
+  TILEGRAD_TRY(io::SaveGlb(folder / "truth.glb", mesh));
+  return WriteTextAtomic(folder / "transforms_train.json", WriteTransforms(train, size));
+}
+
+}  // namespace tilegrad::train

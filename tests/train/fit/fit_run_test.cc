@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole fits on a few small images of a box.
+#include "train/fit/fit_run.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+#include "train/fit/make_views.h"
+#include "train/fit/transforms.h"
+
+namespace tilegrad::train {
+namespace {
+
+class Fit : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
+    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
+    const Status made =
+        MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", {}, stop_);
+    ASSERT_TRUE(made.ok()) << made.message();
+  }
+  FitJob Job(const std::string& out) {
+    FitJob job;
+    auto input = ReadFitFolder(folder_ / "views", 0);
+    EXPECT_TRUE(input.ok()) << input.status().message();
+    if (input.ok()) job.input = std::move(*input);
+    job.out = folder_ / out;
+    job.config.steps = 60, job.config.template_level = 2, job.config.texture_size = 32;
+    job.config.checkpoint_every = 20, job.config.timelapse = 3;
+    return job;
+  }
+  Result<FitOutcome> Run(const FitJob& job, int workers = 2) {
+    const Workers w(workers);
+    return RunFit(job, w, {}, stop_);
+  }
+  Bytes Read(const Path& path) {
+    auto bytes = ReadFile(path);
+    EXPECT_TRUE(bytes.ok()) << bytes.status().message();
+    return bytes.ok() ? *bytes : Bytes();
+  }
+
+  StopFlag stop_ = false;
+};
+
+TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  FitJob job = Job("run");
+  job.config.steps = 400, job.config.template_level = 3;
+  job.truth = truth->mesh;
+  const auto outcome = Run(job);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_EQ(outcome->held_out.size(), 2u);
+  // The sphere itself: 13.5 dB, 0.78 and 0.69.
+  EXPECT_GT(MeanPsnr(outcome->held_out), 16.5);
+  EXPECT_GT(MeanIou(outcome->held_out), 0.86);
+  EXPECT_GT(outcome->voxel_iou.value_or(0), 0.78);
+  const auto mesh = io::LoadMesh(job.out / "mesh.glb");
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(mesh->mesh.textures.size(), 1u);
+  for (const char* name : {"report.html", "timelapse.png", "transforms_fitted.json"}) {
+    EXPECT_TRUE(std::filesystem::exists(job.out / name)) << name;
+  }
+}
+
+TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
+  ASSERT_TRUE(Run(Job("whole"), 1).ok());
+  FitJob job = Job("parts");
+  const Workers workers(2);
+  const auto stop_late = [&](const Progress& p) { stop_ = p.done == 27; };
+  const auto stopped = RunFit(job, workers, stop_late, stop_);
+  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
+  EXPECT_NE(stopped.status().message().find("--resume"), std::string::npos);
+  stop_ = false;
+  EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
+  job.resume = true;
+  const auto resumed = Run(job, 7);
+  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  EXPECT_EQ(resumed->first_step, 27);
+  EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
+}
+
+TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
+  FitJob job = Job("run");
+  ASSERT_TRUE(Run(job).ok());
+  job.resume = true, job.config.smoothing = 3;
+  ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
+}
+
+TEST_F(Fit, RefinesCameras) {
+  FitJob job = Job("run");
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  job.start = truth->mesh;
+  job.config.parameters[Parameter::kCamera] = true;
+  job.config.perturb_cameras = 5, job.config.steps = 200;
+  const auto outcome = Run(job);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_NEAR(outcome->camera_error_before.value_or(0), 5, 1e-2);
+  EXPECT_LT(outcome->camera_error_after.value_or(90), 2.5);
+}
+
+// Every parameter moves, under the light that it needs.
+TEST_F(Fit, EveryParameterCanBeFitted) {
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  const std::pair<Parameter, Lighting> cases[] = {{Parameter::kColors, Lighting::kNone},
+                                                  {Parameter::kTexture, Lighting::kLambert},
+                                                  {Parameter::kUv, Lighting::kNone},
+                                                  {Parameter::kLight, Lighting::kLambert},
+                                                  {Parameter::kSh, Lighting::kSphericalHarmonics},
+                                                  {Parameter::kMaterial, Lighting::kPhong}};
+  for (const auto& [parameter, lighting] : cases) {
+    FitJob job = Job(NameOf(parameter));
+    job.config.parameters[parameter] = true;
+    job.config.parameters[Parameter::kPositions] = parameter == Parameter::kUv;
+    if (parameter == Parameter::kUv) job.config.parameters[Parameter::kTexture] = true;
+    job.config.lighting = lighting, job.config.steps = 30;
+    job.config.views_per_step = 8, job.config.levels = 1;  // every step sees the same
+    job.config.vertex_colors = parameter == Parameter::kColors;
+    const bool sphere = parameter == Parameter::kTexture || parameter == Parameter::kUv;
+    if (!sphere) job.start = truth->mesh;
+    const auto outcome = Run(job);
+    ASSERT_TRUE(outcome.ok()) << NameOf(parameter) << ": " << outcome.status().message();
+    const auto log = ReadText(job.out / "metrics.jsonl");
+    ASSERT_TRUE(log.ok());
+    const auto color_of = [&](std::size_t line) {
+      std::size_t at = 0;
+      for (std::size_t i = 0; i < line; ++i) at = log->find('\n', at) + 1;
+      return std::stod(log->substr(log->find("\"color\":", at) + 8));
+    };
+    EXPECT_LT(color_of(2), 1.001 * color_of(0)) << NameOf(parameter);
+  }
+}
+
+TEST_F(Fit, ErrorsSayWhatToDo) {
+  FitJob job = Job("run");
+  job.config.parameters[Parameter::kSh] = true;
+  ExpectMessage(Run(job).status(), "sh cannot be fitted", "spherical harmonics");
+  job = Job("run");
+  job.input.masked = false;
+  ExpectMessage(Run(job).status(), "mask");
+  job = Job("run");
+  job.config.steps = 0;
+  ExpectMessage(Run(job).status(), "steps is 0");
+  EXPECT_EQ(ReadFitFolder(folder_ / "none", 0).status().code(), StatusCode::kNotFound);
+  Write("broken/transforms.json", std::string("{\"frames\": [{\"file_path\": \"a.png\"}]}"));
+  ExpectMessage(ReadFitFolder(folder_ / "broken", 0).status(), "frame 0", "camera_angle_x");
+}
+
+TEST_F(Fit, TransformsRoundTrip) {
+  const Camera camera = OrbitCamera({50, 40, 30}, 20, 30, 2);
+  const Path file = folder_ / "cameras.json";
+  ASSERT_TRUE(WriteTextAtomic(file, WriteTransforms({{"a.png", camera}}, {40, 30})).ok());
+  const auto frames = ReadTransforms(file);
+  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  // Half the size: everything in pixels halves.
+  const auto half = CameraOfFrame(frames->at(0), {20, 15});
+  ASSERT_TRUE(half.ok());
+  EXPECT_NEAR(half->fx, camera.fx / 2, 1e-4);
+  EXPECT_NEAR(half->cy, camera.cy / 2, 1e-4);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(half->rotation[i], camera.rotation[i], 1e-5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(half->translation[i], camera.translation[i], 1e-5);
+}
+
+TEST(FitScore, AlignmentFindsASimilarity) {
+  Alignment truth;
+  const double angle = 0.4;
+  truth.scale = 1.3;
+  truth.rotation[0] = truth.rotation[4] = std::cos(angle);
+  truth.rotation[1] = -std::sin(angle), truth.rotation[3] = std::sin(angle);
+  truth.offset[0] = 0.2, truth.offset[2] = -0.5;
+  std::vector<Camera> from, to;
+  for (int i = 0; i < 5; ++i) {
+    from.push_back(OrbitCamera({50, 40, 30}, 70 * i, 10 * i, 2));
+    to.push_back(Moved(from.back(), truth));
+  }
+  const Alignment found = AlignCameras(from, to);
+  EXPECT_NEAR(found.scale, truth.scale, 1e-5);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(found.rotation[i], truth.rotation[i], 1e-5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.offset[i], truth.offset[i], 1e-5);
+  EXPECT_NEAR(AngleBetween(from[0], to[0]), angle * 180 / M_PI, 1e-2);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
