@@ -106,7 +106,7 @@ Result<train::FitJob> MakeJob(const Options& options) {
 void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
   for (const auto& f : findings) {
     if (f.blocked) {
-      fmt::print(stderr, "tilegrad: {} get no gradient at the start: {}\n",
+      fmt::print(stderr, "tilegrad: no gradient for {} at the start: {}\n",
                  train::NameOf(f.parameter), f.sentence);
     } else if (all) {
       fmt::print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
