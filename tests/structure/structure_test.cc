@@ -88,8 +88,13 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^Imf.*"), {"src/io/exr_file.cc"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/"}},
       {std::regex("^CLI/.*"), {"src/cli/"}},
+      {std::regex("^(pybind11/.*|Python\\.h)$"), {"python/bindings/"}},
   };
-  for (const auto& [file, target] : IncludesUnder("src")) {
+  auto includes = IncludesUnder("src");
+  const auto bindings = IncludesUnder("python/bindings");
+  ASSERT_FALSE(bindings.empty());
+  includes.insert(includes.end(), bindings.begin(), bindings.end());
+  for (const auto& [file, target] : includes) {
     for (const auto& [library, allowed] : homes) {
       if (!std::regex_match(target, library)) continue;
       bool home = false;

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad._core: the renderer of the public interface, and the kernels behind tilegrad.compat.
+#include <pybind11/pybind11.h>
+
+#include "base/simd_target.h"
+#include "bindings/arrays.h"
+#include "tilegrad/version.h"
+
+namespace tilegrad::python {
+
+void BindRenderer(py::module_& m);
+void BindKaolin(py::module_& m);
+void BindDeferred(py::module_& m);
+
+}  // namespace tilegrad::python
+
+PYBIND11_MODULE(_core, m) {
+  using namespace tilegrad;          // NOLINT: of this function only
+  using namespace tilegrad::python;  // NOLINT
+  m.doc() = "The renderer of tilegrad in C++; use it through the package tilegrad.";
+  m.attr("__version__") = TILEGRAD_VERSION;
+  ThrowIfError(ForceTargetFromEnvironment());
+  m.def("simd_target", &ActiveTarget,
+        "The instruction set that kernels use: AVX2, say. TILEGRAD_TARGET in the environment\n"
+        "forces one.");
+  BindRenderer(m);
+  BindKaolin(m);
+  BindDeferred(m);
+}

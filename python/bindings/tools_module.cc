@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad._tools: meshes, images, checkpoints, datasets.
+#include <pybind11/pybind11.h>
+
+#include "base/simd_target.h"
+#include "bindings/arrays.h"
+#include "tilegrad/version.h"
+
+PYBIND11_MODULE(_tools, m) {
+  using namespace tilegrad;          // NOLINT: of this function only
+  using namespace tilegrad::python;  // NOLINT
+  m.doc() =
+      "Files, datasets and networks of tilegrad in C++; use them through the package tilegrad.";
+  m.attr("__version__") = TILEGRAD_VERSION;
+  ThrowIfError(ForceTargetFromEnvironment());
+}

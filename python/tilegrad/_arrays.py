@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays of the caller as NumPy arrays: what may share memory does, what may not is copied once
+and counted, what is wrong is refused with the function's name, the argument, and what was expected
+and got. The one home of these checks in Python.
+
+Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
+the CPU) or `__array__`, numbers, and nested sequences of numbers.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, Optional, Sequence, Union
+
+import numpy as np
+
+Axis = Union[int, str]  # a length, or the name of one: "V"
+Sizes = dict  # name of a length -> length, as the arrays so far have it
+
+_NUMBERS = (list, tuple, int, float)  # what is no array yet: making one is no copy
+_CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
+_counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
+_lock = threading.Lock()
+
+
+def stats() -> dict[str, int]:
+    """How many arrays came in (`arrays`), how many of them had to be copied (`copies`) because of
+    their dtype or layout, and the sum of the copies' sizes (`bytes_copied`), in this process."""
+    return dict(_counts)
+
+
+def reset_stats() -> None:
+    """Sets the counters of `stats` to zero."""
+    with _lock:
+        _counts.update(dict.fromkeys(_counts, 0))
+
+
+def as_array(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
+             sizes: Optional[Sizes] = None) -> np.ndarray:
+    """`value` as a C-contiguous array of `dtype` and `shape`; of the same memory if it is that
+    already.
+
+    shape: a length for each axis; a name stands for a length that is looked up in `sizes`, or
+        noted there if it is new.
+    TypeError: not an array of numbers, or one that `dtype` cannot take (complex, or real for an
+        integer `dtype`). ValueError: another shape, or an integer out of range.
+    """
+    array = contiguous(function, argument, value, dtype)
+    check_shape(function, argument, array.shape, shape, sizes)
+    return array
+
+
+def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarray:
+    """`value` as a C-contiguous array of `dtype`, of any shape; see `as_array`."""
+    dtype = np.dtype(dtype)
+    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
+    _counts["arrays"] += 1
+    if array.dtype == dtype and array.flags.c_contiguous:
+        return array
+    _check_dtype(function, argument, array, dtype)
+    copy = np.ascontiguousarray(array, dtype)
+    if not isinstance(value, _NUMBERS):
+        _count_copy(copy)
+    return copy.reshape(array.shape)  # ascontiguousarray makes one axis of none
+
+
+def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
+    """The dtype that `value` asks to be computed in: float64 if it is an array of that, float32
+    for everything else, lists of numbers included."""
+    if isinstance(value, _NUMBERS):
+        return np.dtype(np.float32)
+    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
+    return array.dtype if array.dtype == np.float64 else np.dtype(np.float32)
+
+
+def check_shape(function: str, argument: str, got: Sequence[int], expected: Sequence[Axis],
+                sizes: Optional[Sizes] = None) -> None:
+    """ValueError unless `got` is `expected`; names of lengths as in `as_array`."""
+    sizes = {} if sizes is None else sizes
+    if len(got) == len(expected):
+        known = [sizes.get(axis, length) if isinstance(axis, str) else axis
+                 for axis, length in zip(expected, got)]
+        if known == list(got):
+            sizes.update((axis, length) for axis, length in zip(expected, got)
+                         if isinstance(axis, str))
+            return
+    raise ValueError(f"{function}: {argument} has shape {tuple(got)}, expected "
+                     f"{shape_text(expected, sizes)}")
+
+
+def shape_text(shape: Sequence[Axis], sizes: Optional[Sizes] = None) -> str:
+    """(V, 3) with V = 642"""
+    text = ", ".join(str(axis) for axis in shape)
+    text = f"({text},)" if len(shape) == 1 else f"({text})"
+    known = [f"{axis} = {sizes[axis]}" for axis in dict.fromkeys(shape)
+             if isinstance(axis, str) and sizes and axis in sizes]
+    return text + (" with " + ", ".join(known) if known else "")
+
+
+def check_choice(function: str, argument: str, value: Any, choices: Sequence[str]) -> int:
+    """The index of `value` in `choices`; ValueError if it is none of them."""
+    if isinstance(value, str) and value in choices:
+        return choices.index(value)
+    expected = ", ".join(repr(choice) for choice in choices)
+    raise ValueError(f"{function}: {argument} is {value!r}, expected one of {expected}")
+
+
+def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
+    """What is no plain NumPy array as one, without a copy where the protocol allows it."""
+    try:
+        if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
+            return _from_dlpack(function, argument, value)
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError, RuntimeError, BufferError) as error:
+        if str(error).startswith(function + ": "):
+            raise
+        raise TypeError(f"{function}: {argument} is no array of numbers but "
+                        f"{type(value).__name__}: {error}") from error
+    if array.dtype.kind not in "biufc":
+        raise TypeError(f"{function}: {argument} is no array of numbers but "
+                        f"{type(value).__name__}")
+    return array
+
+
+def _from_dlpack(function: str, argument: str, value: Any) -> np.ndarray:
+    device = value.__dlpack_device__()[0]
+    if device not in _CPU_DEVICES:
+        raise TypeError(f"{function}: {argument} is on another device than the CPU; copy it there "
+                        f"first (value.cpu(), for example)")
+    return np.from_dlpack(value)
+
+
+def _check_dtype(function: str, argument: str, array: np.ndarray, dtype: np.dtype) -> None:
+    """Real numbers may be made float32 or float64; integers another integer if they fit."""
+    kind = array.dtype.kind
+    if kind not in ("iuf" if dtype.kind == "f" else "b" if dtype.kind == "b" else "iu"):
+        raise TypeError(f"{function}: {argument} has dtype {array.dtype}, expected {dtype}")
+    if dtype.kind == "i" and array.size and array.dtype != dtype:
+        limits = np.iinfo(dtype)
+        if int(array.min()) < limits.min or int(array.max()) > limits.max:
+            raise ValueError(f"{function}: {argument} has values of {array.min()} to "
+                             f"{array.max()}, out of {dtype}'s range")
+
+
+def _count_copy(copy: np.ndarray) -> None:
+    with _lock:
+        _counts["copies"] += 1
+        _counts["bytes_copied"] += copy.nbytes
