@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenEXR images out: float channels by name, lossless ZIP compression.
+// OpenEXR images: float channels by name; written with lossless ZIP compression.
 #pragma once
 
 #include <span>
@@ -25,5 +25,17 @@ struct ExrImage {
 Result<Bytes> EncodeExr(const ExrImage& image);
 // Whole or not at all.
 Status SaveExr(const Path& path, const ExrImage& image);
+
+struct LoadedExr {
+  int width = 0, height = 0;
+  std::vector<std::string> names;  // of channels, sorted as the library sorts them
+  std::vector<float> values;       // [channels][height][width], row 0 on top
+};
+
+// The first part of a file, its data window; half and integer channels become float. The library
+// works in a process of its own (guarded_process.h). `name` stands in messages. Errors: not an EXR,
+// cut short or damaged, deep, a channel that is subsampled, more than kMaxImageSide pixels a side.
+Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::string& name);
+Result<LoadedExr> LoadExr(const Path& path);
 
 }  // namespace tilegrad::io

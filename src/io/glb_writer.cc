@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/glb_writer.h"
 
+#include <algorithm>
 #include <cstring>
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
@@ -122,27 +123,93 @@ Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
   return {{"attributes", attributes}, {"indices", glb.AddIndices(p.indices)}};
 }
 
-Json MaterialJson(const Material& m) {
+// A texture as glTF has them: an image, and how it is looked up.
+struct TextureUse {
+  int image = 0;
+  TextureWrap wrap = TextureWrap::kRepeat;
+  bool nearest = false;
+  bool operator==(const TextureUse&) const = default;
+};
+
+TextureUse UseOf(const Material& m) { return {m.base_color_texture, m.wrap, m.nearest}; }
+
+// One for each image, as its first material uses it, then those that use an image otherwise.
+std::vector<TextureUse> TextureUses(const Mesh& mesh) {
+  std::vector<TextureUse> uses;
+  for (int i = 0; i < static_cast<int>(mesh.textures.size()); ++i) {
+    const auto user = std::find_if(mesh.materials.begin(), mesh.materials.end(),
+                                   [i](const Material& m) { return m.base_color_texture == i; });
+    uses.push_back(user == mesh.materials.end() ? TextureUse{.image = i} : UseOf(*user));
+  }
+  for (const Material& m : mesh.materials) {
+    if (m.base_color_texture >= 0 && std::find(uses.begin(), uses.end(), UseOf(m)) == uses.end())
+      uses.push_back(UseOf(m));
+  }
+  return uses;
+}
+
+const char* AlphaModeName(const Material& m) {
+  if (m.alpha_mode == AlphaMode::kMask) return "MASK";
+  return m.alpha_mode == AlphaMode::kBlend || m.base_color.a < 1 ? "BLEND" : "OPAQUE";
+}
+
+Json MaterialJson(const Material& m, const std::vector<TextureUse>& uses) {
   const glm::vec4 factor = SrgbToLinear(m.base_color);
   Json pbr = {{"baseColorFactor", {factor.r, factor.g, factor.b, factor.a}},
               {"metallicFactor", 0.0},
               {"roughnessFactor", 1.0}};
-  if (m.base_color_texture >= 0) pbr["baseColorTexture"] = {{"index", m.base_color_texture}};
-  Json out = {{"name", m.name}, {"pbrMetallicRoughness", pbr}, {"doubleSided", true}};
-  if (m.base_color.a < 1) out["alphaMode"] = "BLEND";
+  if (m.base_color_texture >= 0) {
+    const auto use = std::find(uses.begin(), uses.end(), UseOf(m));
+    pbr["baseColorTexture"] = {{"index", use - uses.begin()}};
+  }
+  Json out = {{"name", m.name}, {"pbrMetallicRoughness", pbr}, {"doubleSided", m.double_sided}};
+  if (const std::string mode = AlphaModeName(m); mode != "OPAQUE") out["alphaMode"] = mode;
+  if (m.unlit) out["extensions"] = {{"KHR_materials_unlit", Json::object()}};
   return out;
 }
 
-Status AddTextures(GlbBuilder& glb, const Mesh& mesh) {
+Status AddImages(GlbBuilder& glb, const Mesh& mesh) {
   for (const Texture& texture : mesh.textures) {
     auto png = EncodePng(texture.image);
     if (!png.ok()) return png.status().Within("texture " + texture.name);
     const int view = glb.AddView(png->data(), png->size(), 0);
     glb.json["images"].push_back(
         {{"bufferView", view}, {"mimeType", "image/png"}, {"name", texture.name}});
-    glb.json["textures"].push_back({{"source", glb.json["images"].size() - 1}});
   }
   return {};
+}
+
+Json SamplerJson(const TextureUse& use) {
+  constexpr int kNearest = 9728, kLinear = 9729, kRepeat = 10497, kMirror = 33648, kClamp = 33071;
+  const int wrap = use.wrap == TextureWrap::kRepeat   ? kRepeat
+                   : use.wrap == TextureWrap::kMirror ? kMirror
+                                                      : kClamp;
+  return {{"magFilter", use.nearest ? kNearest : kLinear}, {"wrapS", wrap}, {"wrapT", wrap}};
+}
+
+void AddTextures(GlbBuilder& glb, const std::vector<TextureUse>& uses) {
+  for (const TextureUse& use : uses) {
+    Json texture = {{"source", use.image}};
+    if (use != TextureUse{.image = use.image}) {  // a viewer's own choice does otherwise
+      glb.json["samplers"].push_back(SamplerJson(use));
+      texture["sampler"] = glb.json["samplers"].size() - 1;
+    }
+    glb.json["textures"].push_back(std::move(texture));
+  }
+}
+
+void AddMaterials(GlbBuilder& glb, const Mesh& mesh) {
+  const std::vector<TextureUse> uses = TextureUses(mesh);
+  // Without a material viewers take glTF's default, which is metal: vertex colours would look
+  // black.
+  const Material plain{.name = "plain", .base_color = glm::vec4(1)};
+  bool unlit = false;
+  for (const Material& m : mesh.materials.empty() ? std::vector{plain} : mesh.materials) {
+    glb.json["materials"].push_back(MaterialJson(m, uses));
+    unlit |= m.unlit;
+  }
+  if (unlit) glb.json["extensionsUsed"] = {"KHR_materials_unlit"};
+  AddTextures(glb, uses);
 }
 
 void AppendChunk(Bytes& out, const char type[5], const std::uint8_t* data, std::size_t size,
@@ -178,11 +245,6 @@ Result<Bytes> Assemble(GlbBuilder& glb) {
 Result<Bytes> EncodeGlb(const Mesh& mesh) {
   TILEGRAD_TRY(Validate(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
-  // Without a material viewers take glTF's default, which is metal: vertex colours would look
-  // black.
-  const Material plain{.name = "plain", .base_color = glm::vec4(1)};
-  const std::vector<Material> materials =
-      mesh.materials.empty() ? std::vector{plain} : mesh.materials;
   GlbBuilder glb;
   glb.json["scene"] = 0;
   glb.json["scenes"] = Json::array({{{"nodes", {0}}}});
@@ -196,9 +258,8 @@ Result<Bytes> EncodeGlb(const Mesh& mesh) {
     primitives.push_back(std::move(primitive));
   }
   glb.json["meshes"] = Json::array({{{"primitives", primitives}}});
-  for (const Material& material : materials)
-    glb.json["materials"].push_back(MaterialJson(material));
-  TILEGRAD_TRY(AddTextures(glb, mesh));
+  AddMaterials(glb, mesh);
+  TILEGRAD_TRY(AddImages(glb, mesh));
   return Assemble(glb);
 }
 

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
@@ -109,6 +110,29 @@ TEST_F(GltfScene, NonsenseInATransformIsIgnoredOrRefusedButNeverRead) {
   EXPECT_EQ(Load().mesh.corner_uvs.size(), 3u);
   Texture()["extensions"]["KHR_texture_transform"] = {{"offset", {1e39, 0}}};
   EXPECT_FALSE(io::LoadMesh(Write("a.gltf", scene_.dump())).ok());
+}
+
+TEST_F(GltfScene, MaterialsComeBackAsTheyWere) {
+  Mesh mesh = Load().mesh;
+  mesh.faces.resize(4, mesh.faces[0]);
+  mesh.corner_uvs.resize(12, {0.5f, 0.5f});
+  mesh.face_materials = {0, 1, 2, 3};
+  mesh.textures.push_back({"second", ImageU8(2, 2, 4, 10)});
+  const Material plain{.name = "a", .base_color = glm::vec4(1), .base_color_texture = 0};
+  mesh.materials.assign(4, plain);
+  mesh.materials[0].wrap = TextureWrap::kMirror;
+  mesh.materials[1].nearest = true;  // the same image, looked up otherwise
+  mesh.materials[2] = {.name = "c", .base_color = {1, 1, 1, 0.5f}, .base_color_texture = 1};
+  mesh.materials[2].alpha_mode = AlphaMode::kMask;
+  mesh.materials[3] = {
+      .name = "d", .base_color = glm::vec4(1), .double_sided = false, .unlit = true};
+  const Path file = folder_ / "out.glb";
+  ASSERT_TRUE(io::SaveGlb(file, mesh).ok());
+  const auto loaded = io::LoadMesh(file);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.materials, mesh.materials);
+  EXPECT_EQ(loaded->mesh.textures.size(), 2u);  // each image once
+  EXPECT_TRUE(loaded->warnings.empty());
 }
 
 }  // namespace
