@@ -20,6 +20,7 @@ struct PaperSoftMask {
   double box = 0.02;            // NDC; "boxlen", "expand"
   int max_faces = 30;           // "knum"
   double eps = 1e-13;           // NDC^2, added to the squared length of an edge
+  double farthest = 4;          // NDC^2, the squared distance of what is farther away than that
 };
 
 // Corners in NDC, y up.
@@ -84,7 +85,7 @@ std::vector<PaperCandidate<T>> PaperCandidates(std::span<const NdcFace<T>> faces
     if (out.size() >= static_cast<std::size_t>(std::max(rule.max_faces, 0))) break;
     if (!InPaperBox(faces[f], px, py, rule.box)) continue;
     PaperCandidate<T> c;
-    c.face = f, c.squared_distance = T(4);  // larger than what a pixel in the box can have
+    c.face = f, c.squared_distance = T(rule.farthest);
     for (int k = 0; k < 3; ++k) TryPaperEdge(faces[f], k, px, py, rule.eps, &c);
     for (int k = 0; k < 3; ++k) TryPaperCorner(faces[f], k, px, py, &c);
     c.influence = exp(-c.squared_distance * T(rule.inverse_delta));

@@ -10,6 +10,7 @@
 #include "raster/project.h"
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask_paper_ref.h"
+#include "render/paper_tile.h"
 #include "render/renderer.h"
 
 namespace tilegrad {
@@ -18,16 +19,6 @@ inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
   return {.inverse_delta = 1 / options.delta,
           .box = options.paper.box,
           .max_faces = options.paper.max_faces};
-}
-
-// Pixels to NDC.
-template <class T>
-T NdcX(const T& x, int width) {
-  return T(2) * x / T(width) - T(1);
-}
-template <class T>
-T NdcY(const T& y, int height) {
-  return T(1) - T(2) * y / T(height);
 }
 
 template <class T>

@@ -7,17 +7,25 @@
 
 namespace tilegrad {
 
-bool AllFinite(std::span<const float> values) {
+namespace {
+
+template <class T>
+bool NoneIsInfiniteOrNan(std::span<const T> values) {
   // Sums of zeros, or of NaN where a value is not finite; several, so that they run side by side.
   constexpr std::size_t kSums = 16;
-  float sums[kSums] = {};
+  T sums[kSums] = {};
   const std::size_t whole = values.size() / kSums * kSums;
   for (std::size_t i = 0; i < whole; i += kSums) {
     for (std::size_t k = 0; k < kSums; ++k) sums[k] += values[i + k] - values[i + k];
   }
-  for (const float v : values.subspan(whole)) sums[0] += v - v;
-  return std::all_of(sums, sums + kSums, [](float sum) { return sum == 0; });
+  for (const T v : values.subspan(whole)) sums[0] += v - v;
+  return std::all_of(sums, sums + kSums, [](T sum) { return sum == 0; });
 }
+
+}  // namespace
+
+bool AllFinite(std::span<const float> values) { return NoneIsInfiniteOrNan(values); }
+bool AllFinite(std::span<const double> values) { return NoneIsInfiniteOrNan(values); }
 
 bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end) {
   std::int32_t outside = 0;

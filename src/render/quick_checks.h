@@ -10,6 +10,7 @@
 namespace tilegrad {
 
 bool AllFinite(std::span<const float> values);
+bool AllFinite(std::span<const double> values);
 
 // Whether every value is in [least, end).
 bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end);

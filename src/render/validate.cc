@@ -15,9 +15,13 @@
 namespace tilegrad {
 namespace {
 
-Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
-  if (got == expected) return {};
-  return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
+template <class T>
+Status FirstNotFinite(const char* array, std::span<const T> values) {
+  if (AllFinite(values)) return {};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
+  }
+  return {};
 }
 
 Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
@@ -62,12 +66,6 @@ Status CheckGradients(const SceneView& scene, const SceneGradients& d_scene) {
   return {};
 }
 
-Status CheckImageSize(const char* axis, int pixels) {
-  if (pixels >= 1 && pixels <= raster::kMaxImageSize) return {};
-  return InvalidArgument("options.{} is {}, must be in 1..{} pixels", axis, pixels,
-                         raster::kMaxImageSize);
-}
-
 Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const Frame& frame,
                        const FrameGradients& d_frame) {
   const std::size_t pixels =
@@ -100,12 +98,22 @@ Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::siz
   return InvalidArgument("{} must be [{},{}], got {} numbers", array, rows, width, got);
 }
 
+Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
+  if (got == expected) return {};
+  return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
+}
+
+Status CheckImageSize(const char* axis, int pixels) {
+  if (pixels >= 1 && pixels <= raster::kMaxImageSize) return {};
+  return InvalidArgument("options.{} is {}, must be in 1..{} pixels", axis, pixels,
+                         raster::kMaxImageSize);
+}
+
 Status CheckFinite(const char* array, std::span<const float> values) {
-  if (AllFinite(values)) return {};
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) return InvalidArgument("{}[{}] is {}", array, i, values[i]);
-  }
-  return {};
+  return FirstNotFinite(array, values);
+}
+Status CheckFinite(const char* array, std::span<const double> values) {
+  return FirstNotFinite(array, values);
 }
 
 Status ValidateOptions(const RenderOptions& options) {

@@ -14,9 +14,16 @@ namespace tilegrad {
 
 // OK if all values are finite, else an error that names the first one that is not.
 Status CheckFinite(const char* array, std::span<const float> values);
+Status CheckFinite(const char* array, std::span<const double> values);
 
 // An error that says the shape, [rows,width], unless there are that many numbers.
 Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::size_t width);
+
+// Unless there are that many numbers.
+Status CheckSize(const char* array, std::size_t got, std::size_t expected);
+
+// Of options.width or options.height.
+Status CheckImageSize(const char* axis, int pixels);
 
 // Errors name the scene, the array, the index and what was expected.
 Status ValidateOptions(const RenderOptions& options);
