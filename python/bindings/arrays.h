@@ -12,6 +12,8 @@
 #include <initializer_list>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tilegrad/status.h"
 
@@ -59,55 +61,81 @@ T ValueOrThrow(Result<T> result) {
 
 inline constexpr py::ssize_t kAny = -1;  // any length of an axis
 
-inline std::string ShapeText(const py::ssize_t* shape, std::size_t ndim) {
+inline std::string ShapeText(std::span<const py::ssize_t> shape) {
   std::string out = "(";
-  for (std::size_t i = 0; i < ndim; ++i) {
+  for (std::size_t i = 0; i < shape.size(); ++i) {
     if (i > 0) out += ", ";
     out += shape[i] == kAny ? "any" : std::to_string(shape[i]);
   }
-  return out + (ndim == 1 ? ",)" : ")");
+  return out + (shape.size() == 1 ? ",)" : ")");
 }
 
-// Throws unless `array` is C-contiguous, of T (TypeError) and of `shape` (ValueError).
-template <class T>
-void CheckArray(const py::array& array, const char* function, const char* argument,
-                std::initializer_list<py::ssize_t> shape) {
-  if (!py::isinstance<py::array_t<T, py::array::c_style>>(array)) {
-    throw py::type_error(fmt::format("{}: {} must be a C-contiguous array of {}, got {}", function,
-                                     argument,
-                                     py::str(py::dtype::of<T>()).template cast<std::string>(),
-                                     py::str(array.dtype()).template cast<std::string>()));
-  }
-  bool same = static_cast<std::size_t>(array.ndim()) == shape.size();
-  std::size_t axis = 0;
-  for (const py::ssize_t length : shape) {
-    same = same && (length == kAny || length == array.shape(static_cast<py::ssize_t>(axis++)));
-  }
-  if (same) return;
-  throw py::value_error(
-      fmt::format("{}: {} has shape {}, expected {}", function, argument,
-                  ShapeText(array.shape(), static_cast<std::size_t>(array.ndim())),
-                  ShapeText(shape.begin(), shape.size())));
+inline std::span<const py::ssize_t> ShapeOf(const py::array& array) {
+  return {array.shape(), static_cast<std::size_t>(array.ndim())};
 }
 
-// The numbers of `array`, row-major; valid while the array lives. kAny stands for any length of an
-// axis.
+inline bool HasShape(const py::array& array, std::span<const py::ssize_t> shape) {
+  const auto got = ShapeOf(array);
+  bool same = got.size() == shape.size();
+  for (std::size_t i = 0; same && i < shape.size(); ++i) {
+    same = shape[i] == kAny || shape[i] == got[i];
+  }
+  return same;
+}
+
+// `object` as an array that is C-contiguous, of T (TypeError otherwise) and of `shape`
+// (ValueError); kAny stands for any length of an axis.
 template <class T>
-std::span<const T> SpanOf(const py::array& array, const char* function, const char* argument,
-                          std::initializer_list<py::ssize_t> shape) {
-  CheckArray<T>(array, function, argument, shape);
-  return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
+py::array CheckedArray(const py::object& object, const char* function, const char* argument,
+                       std::span<const py::ssize_t> shape) {
+  if (!py::isinstance<py::array_t<T, py::array::c_style>>(object)) {
+    const auto text = [](const py::handle& h) { return py::str(h).template cast<std::string>(); };
+    const bool is_array = py::isinstance<py::array>(object);
+    throw py::type_error(
+        fmt::format("{}: {} must be a C-contiguous array of {}, got {}", function, argument,
+                    text(py::dtype::of<T>()),
+                    text(is_array ? object.attr("dtype") : py::type::of(object).attr("__name__"))));
+  }
+  auto array = py::reinterpret_borrow<py::array>(object);
+  if (HasShape(array, shape)) return array;
+  throw py::value_error(fmt::format("{}: {} has shape {}, expected {}", function, argument,
+                                    ShapeText(ShapeOf(array)), ShapeText(shape)));
+}
+
+// The numbers of `array`, row-major; valid while the array lives. Errors as of CheckedArray.
+template <class T>
+std::span<const T> SpanOf(const py::object& array, const char* function, const char* argument,
+                          const std::vector<py::ssize_t>& shape) {
+  const py::array checked = CheckedArray<T>(array, function, argument, shape);
+  return {static_cast<const T*>(checked.data()), static_cast<std::size_t>(checked.size())};
 }
 
 // The same, to be written to; ValueError if the array is read-only.
 template <class T>
-std::span<T> MutableSpanOf(const py::array& array, const char* function, const char* argument,
-                           std::initializer_list<py::ssize_t> shape) {
-  CheckArray<T>(array, function, argument, shape);
-  if (!array.writeable()) {
+std::span<T> MutableSpanOf(const py::object& array, const char* function, const char* argument,
+                           const std::vector<py::ssize_t>& shape) {
+  py::array checked = CheckedArray<T>(array, function, argument, shape);
+  if (!checked.writeable()) {
     throw py::value_error(fmt::format("{}: {} is read-only", function, argument));
   }
-  return {static_cast<T*>(const_cast<void*>(array.data())), static_cast<std::size_t>(array.size())};
+  return {static_cast<T*>(checked.mutable_data()), static_cast<std::size_t>(checked.size())};
+}
+
+// `data` of `owner` as an array that keeps the owner alive. Not to be written to, unless told.
+template <class T>
+py::array ViewOf(std::span<const T> data, const std::vector<py::ssize_t>& shape,
+                 const py::object& owner, bool writeable = false) {
+  py::array_t<T> view(shape, data.data(), owner);
+  if (!writeable) {
+    py::detail::array_proxy(view.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  }
+  return view;
+}
+
+// A new array with a copy of `values`.
+template <class T>
+py::array CopyOf(std::span<const T> values, const std::vector<py::ssize_t>& shape) {
+  return py::array_t<T>(shape, values.data());
 }
 
 }  // namespace tilegrad::python

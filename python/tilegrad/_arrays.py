@@ -9,6 +9,7 @@ the CPU) or `__array__`, numbers, and nested sequences of numbers.
 
 from __future__ import annotations
 
+import operator
 import threading
 from typing import Any, Optional, Sequence, Union
 
@@ -88,6 +89,26 @@ def check_shape(function: str, argument: str, got: Sequence[int], expected: Sequ
                      f"{shape_text(expected, sizes)}")
 
 
+def as_batched(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
+               sizes: Sizes) -> np.ndarray:
+    """As `as_array`, of `shape` or with a leading axis N more."""
+    array = contiguous(function, argument, value, dtype)
+    check_batched(function, argument, array.shape, shape, sizes)
+    return array
+
+
+def check_batched(function: str, argument: str, got: Sequence[int], shape: Sequence[Axis],
+                  sizes: Sizes) -> None:
+    """ValueError unless `got` is `shape`, or that with a leading axis N more."""
+    batched = ("N", *shape)
+    if len(got) == len(batched):
+        return check_shape(function, argument, got, batched, sizes)
+    if len(got) == len(shape):
+        return check_shape(function, argument, got, shape, sizes)
+    raise ValueError(f"{function}: {argument} has shape {tuple(got)}, expected "
+                     f"{shape_text(shape)} or {shape_text(batched, sizes)}")
+
+
 def shape_text(shape: Sequence[Axis], sizes: Optional[Sizes] = None) -> str:
     """(V, 3) with V = 642"""
     text = ", ".join(str(axis) for axis in shape)
@@ -103,6 +124,19 @@ def check_choice(function: str, argument: str, value: Any, choices: Sequence[str
         return choices.index(value)
     expected = ", ".join(repr(choice) for choice in choices)
     raise ValueError(f"{function}: {argument} is {value!r}, expected one of {expected}")
+
+
+def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
+    """`value` as an int of 32 bits or a float; TypeError if it is none, ValueError if it is out of
+    range."""
+    try:
+        number = operator.index(value) if kind is int else float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{function}: {argument} must be {kind.__name__}, got "
+                        f"{value!r} ({type(value).__name__})") from None
+    if kind is int and not -2**31 <= number < 2**31:
+        raise ValueError(f"{function}: {argument} is {number}, out of int32's range")
+    return number
 
 
 def _foreign(function: str, argument: str, value: Any) -> np.ndarray:

@@ -1,9 +1,112 @@
 # SPDX-License-Identifier: Apache-2.0
 """The renderer of tilegrad in C++; use it through the package tilegrad."""
 
-from typing import Any
+from typing import Any, Optional, Sequence, Union, overload
+
+import numpy as np
 
 __version__: str
-DEFAULTS: dict[str, Any]
+
+# Names of enumerators, in the order of C++'s enumerations.
+INTERPOLATIONS: tuple[str, ...]
+CULLINGS: tuple[str, ...]
+ALPHA_RULES: tuple[str, ...]
+WRAPS: tuple[str, ...]
+FILTERS: tuple[str, ...]
+LIGHTINGS: tuple[str, ...]
+NORMAL_KINDS: tuple[str, ...]
+IMAGES: tuple[str, ...]
+
+# Defaults of records, number by number.
+CAMERA: list[float]
+SURFACE: list[float]
+LIGHT: list[float]
+TEXTURE: tuple[int, int]
+FOV_Y: float
 
 def simd_target() -> str: ...
+
+class RenderOptions:
+    width: int
+    height: int
+    delta: float
+    max_alpha_error: float
+    interpolation: int
+    culling: int
+    alpha_rule: int
+    paper_box: float
+    paper_faces: int
+    def __init__(self) -> None: ...
+
+class SceneArrays:
+    positions: np.ndarray
+    faces: np.ndarray
+    cameras: np.ndarray
+    colors: Optional[np.ndarray]
+    uvs: Optional[np.ndarray]
+    normals: Optional[np.ndarray]
+    attributes: Optional[np.ndarray]
+    per_corner: list[bool]
+    textures: list[np.ndarray]
+    wraps: list[int]
+    filters: list[int]
+    surfaces: Optional[np.ndarray]
+    surface_textures: list[int]
+    face_surfaces: Optional[np.ndarray]
+    lights: Optional[np.ndarray]
+    light_directions: Optional[np.ndarray]
+    sh: Optional[np.ndarray]
+    lighting: int
+    normal_kind: int
+    two_sided: bool
+    clamp: bool
+    def __init__(self) -> None: ...
+
+class Scene32:
+    def __init__(self, count: int, arrays: SceneArrays) -> None: ...
+    @property
+    def count(self) -> int: ...
+
+class Scene64:
+    def __init__(self, count: int, arrays: SceneArrays) -> None: ...
+    @property
+    def count(self) -> int: ...
+
+class Frame32:
+    @property
+    def count(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def alpha_error_bound(self) -> float: ...
+    @property
+    def face_ids(self) -> np.ndarray: ...
+    def view(self, name: str, writeable: bool = False) -> np.ndarray: ...
+
+class Frame64:
+    @property
+    def count(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def alpha_error_bound(self) -> float: ...
+    @property
+    def face_ids(self) -> np.ndarray: ...
+    def view(self, name: str, writeable: bool = False) -> np.ndarray: ...
+
+class Renderer:
+    def __init__(self, threads: int) -> None: ...
+    @property
+    def threads(self) -> int: ...
+    @overload
+    def render(self, scenes: Sequence[Scene32], options: RenderOptions,
+               outputs: Sequence[bool]) -> Frame32: ...
+    @overload
+    def render(self, scenes: Sequence[Scene64], options: RenderOptions,
+               outputs: Sequence[bool]) -> Frame64: ...
+    def backward(self, frame: Union[Frame32, Frame64], cotangents: dict[str, np.ndarray],
+                 gradients: Sequence[dict[str, Any]], add: bool = False) -> None: ...

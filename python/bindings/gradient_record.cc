@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bindings/gradient_record.h"
+
+#include <algorithm>
+
+namespace tilegrad::python {
+namespace {
+
+// The shape of what one image has of `array`.
+std::vector<py::ssize_t> ShapeOfOne(const py::object& array, std::size_t axes) {
+  if (array.is_none()) return {};
+  const auto shape = ShapeOf(py::reinterpret_borrow<py::array>(array));
+  return {shape.end() - static_cast<std::ptrdiff_t>(axes), shape.end()};
+}
+
+// Records of runs of `numbers` numbers.
+template <class T, class Record, class Read>
+void ReadAll(const Field<T>& from, std::size_t numbers, std::vector<Record>* to, Read read) {
+  const std::span<const T> all = from.all();
+  for (std::size_t i = 0; i < all.size(); i += numbers)
+    to->push_back(read(all.subspan(i, numbers)));
+}
+
+template <class T, class Record, class Put>
+void PutAll(const std::vector<Record>& from, std::size_t numbers, const Field<T>& to, Put put) {
+  for (std::size_t i = 0; i < from.size(); ++i)
+    put(from[i], to.all().subspan(i * numbers, numbers));
+}
+
+}  // namespace
+
+template <class T>
+GradientRecord<T>::GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays)
+    : arrays_(arrays), gradients_(scene.count()) {
+  SetStreams(scene), SetTextures(scene), SetRecords(scene);
+}
+
+template <class T>
+Field<T> GradientRecord<T>::Take(const char* name, const py::object& array,
+                                 const std::vector<py::ssize_t>& shape) {
+  return Field<T>("backward", name, array, shape, gradients_.size());
+}
+
+template <class T>
+Field<T> GradientRecord<T>::Take(const char* name, const std::vector<py::ssize_t>& shape) {
+  return arrays_.contains(name) ? Take(name, arrays_[name], shape) : Field<T>();
+}
+
+template <class T>
+void GradientRecord<T>::SetStreams(const SceneRecord<T>& scene) {
+  using Gradients = v0::SceneGradientsT<T>;
+  const SceneArrays& a = scene.arrays();
+  struct Stream {
+    const char* name;
+    const py::object& of;
+    bool corner;
+    std::span<T> Gradients::*member;
+  };
+  const Stream streams[] = {
+      {"positions", a.positions, false, &Gradients::positions},
+      {"colors", a.colors, a.per_corner[0], &Gradients::colors},
+      {"uvs", a.uvs, a.per_corner[1], &Gradients::uvs},
+      {"normals", a.normals, a.per_corner[2], &Gradients::normals},
+      {"attributes", a.attributes, a.per_corner[3], &Gradients::attributes},
+      {"light_directions", a.light_directions, false, &Gradients::light_directions},
+  };
+  for (const Stream& s : streams) {
+    const auto field = Take(s.name, ShapeOfOne(s.of, s.corner ? 3 : 2));
+    for (std::size_t n = 0; field.given() && n < gradients_.size(); ++n) {
+      gradients_[n].*s.member = field.Of(n);
+    }
+  }
+  const auto sh = Take("sh", ShapeOfOne(a.sh, 1));
+  for (std::size_t n = 0; sh.given() && n < gradients_.size(); ++n) gradients_[n].sh = sh.Of(n);
+}
+
+template <class T>
+void GradientRecord<T>::SetTextures(const SceneRecord<T>& scene) {
+  if (!arrays_.contains("textures")) return;
+  const py::sequence given = arrays_["textures"];
+  const std::size_t each = scene.arrays().textures.size();
+  if (py::len(given) != each) {
+    throw py::value_error(fmt::format("backward: textures has {} gradients, the scene {} textures",
+                                      py::len(given), each));
+  }
+  textures_.resize(each * gradients_.size());
+  for (std::size_t i = 0; i < each; ++i) {
+    const auto field = Take("textures", given[i], ShapeOfOne(scene.arrays().textures[i], 3));
+    for (std::size_t n = 0; field.given() && n < gradients_.size(); ++n) {
+      textures_[n * each + i] = field.Of(n);
+    }
+  }
+  for (std::size_t n = 0; n < gradients_.size(); ++n) {
+    gradients_[n].textures = std::span<const std::span<T>>(textures_).subspan(n * each, each);
+  }
+}
+
+template <class T>
+void GradientRecord<T>::SetRecords(const SceneRecord<T>& scene) {
+  const SceneArrays& a = scene.arrays();
+  const auto surfaces = std::max<py::ssize_t>(static_cast<py::ssize_t>(a.surface_textures.size()),
+                                              1);  // none: the default
+  camera_ = Take("camera", {kCameraNumbers});
+  surface_ = Take("surfaces", {surfaces, kSurfaceNumbers});
+  light_ = Take("lights", ShapeOfOne(a.lights, 2));
+  ReadAll(camera_, kCameraNumbers, &cameras_, CameraOf<T>);
+  ReadAll(surface_, kSurfaceNumbers, &surfaces_, SurfaceOf<T>);
+  ReadAll(light_, kLightNumbers, &lights_, LightOf<T>);
+  const auto of = [](auto& all, const Field<T>& field, std::size_t n) {
+    const std::size_t each = all.size() / field.arrays();
+    return std::span(all).subspan(field.own() ? n * each : 0, each);
+  };
+  for (std::size_t n = 0; n < gradients_.size(); ++n) {
+    if (!cameras_.empty()) gradients_[n].camera = of(cameras_, camera_, n).data();
+    gradients_[n].surfaces = of(surfaces_, surface_, n);
+    gradients_[n].lights = of(lights_, light_, n);
+  }
+}
+
+template <class T>
+void GradientRecord<T>::Store() const {
+  PutAll(cameras_, kCameraNumbers, camera_, PutCamera<T>);
+  PutAll(surfaces_, kSurfaceNumbers, surface_, PutSurface<T>);
+  PutAll(lights_, kLightNumbers, light_, PutLight<T>);
+}
+
+template class GradientRecord<float>;
+template class GradientRecord<double>;
+
+}  // namespace tilegrad::python

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bindings/renderer_object.h"
+
+#include <type_traits>
+#include <utility>
+
+namespace tilegrad::python {
+
+// What another process left in the copy of its memory is neither used nor ended: a lock of it may
+// be held by a thread that does not exist here.
+void RendererObject::DropForeignSession() {
+  if (session_ != nullptr && session_->process != getpid()) static_cast<void>(session_.release());
+}
+
+RendererObject::Session& RendererObject::session() {
+  DropForeignSession();
+  if (session_ == nullptr) session_ = std::make_unique<Session>(threads_);
+  return *session_;
+}
+
+template <class T>
+v0::RendererT<T>& RendererObject::EngineOf(Session& session) {
+  if constexpr (std::is_same_v<T, float>) {
+    return session.floats;
+  } else {
+    return session.doubles;
+  }
+}
+
+template <class T>
+std::shared_ptr<FramePool<T>>& RendererObject::pool() {
+  if constexpr (std::is_same_v<T, float>) {
+    return float_frames_;
+  } else {
+    return double_frames_;
+  }
+}
+
+template <class T, class Call>
+Status RendererObject::Run(const Call& call) {
+  Session& mine = session();
+  const py::gil_scoped_release released;  // first: who waits for the lock must not hold the GIL
+  const std::lock_guard lock(mine.mutex);
+  return call(EngineOf<T>(mine));
+}
+
+template <class T>
+std::unique_ptr<FrameObject<T>> RendererObject::Render(
+    std::vector<std::shared_ptr<SceneRecord<T>>> scenes, const v0::RenderOptions& options,
+    const v0::Outputs& outputs) {
+  std::vector<v0::SceneT<T>> views;
+  for (const auto& scene : scenes) {
+    views.insert(views.end(), scene->scenes().begin(), scene->scenes().end());
+  }
+  auto out = std::make_unique<FrameObject<T>>(std::move(scenes), pool<T>());
+  ThrowIfError(Run<T>([&](v0::RendererT<T>& engine) {
+                 return engine.Render(views, options, outputs, &out->frame());
+               }).Within("render"));
+  return out;
+}
+
+template <class T>
+void RendererObject::Backward(const FrameObject<T>& frame, const v0::FrameGradientsT<T>& d_frame,
+                              const std::vector<py::dict>& gradients, v0::GradientMode mode) {
+  if (gradients.size() != frame.scenes().size()) {
+    throw py::value_error(fmt::format("backward: {} gradients, the frame has {} scenes",
+                                      gradients.size(), frame.scenes().size()));
+  }
+  std::vector<GradientRecord<T>> records;
+  std::vector<v0::SceneGradientsT<T>> views;
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    records.emplace_back(*frame.scenes()[i], gradients[i]);
+    const auto& own = records.back().gradients();
+    views.insert(views.end(), own.begin(), own.end());
+  }
+  ThrowIfError(Run<T>([&](v0::RendererT<T>& engine) {
+                 return engine.Backward(frame.frame(), d_frame, views, mode);
+               }).Within("backward"));
+  for (const GradientRecord<T>& record : records) record.Store();
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                                    \
+  template std::unique_ptr<FrameObject<T>> RendererObject::Render(                                 \
+      std::vector<std::shared_ptr<SceneRecord<T>>>, const v0::RenderOptions&, const v0::Outputs&); \
+  template void RendererObject::Backward(const FrameObject<T>&, const v0::FrameGradientsT<T>&,     \
+                                         const std::vector<py::dict>&, v0::GradientMode);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad::python

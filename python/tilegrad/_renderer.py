@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes in, images out; gradients of images in, gradients of scenes out."""
+
+from __future__ import annotations
+
+from typing import Any, Iterator, Optional, Sequence, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _core
+from tilegrad._camera import Camera
+from tilegrad._packed import Packed
+from tilegrad._scene import Light, Scene, Surface
+from tilegrad._threads import thread_count
+
+_D = _core.RenderOptions()
+_RECORDS = {"camera": Camera, "surfaces": Surface, "lights": Light}  # what is no plain array
+_NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
+          "light_directions", "sh", "attributes")
+
+
+class Frame:
+    """The images of N scenes, row 0 on top, and what backward needs.
+
+    Images are read-only views of the renderer's memory, which they keep alive: copy what you want
+    to change, or to keep for long while the frame may go.
+    """
+
+    __slots__ = ("_frame", "_scenes", "_single", "_outputs", "_views")
+
+    def __init__(self, frame: Union[_core.Frame32, _core.Frame64], scenes: tuple[Scene, ...],
+                 single: bool, outputs: tuple[str, ...]) -> None:
+        self._frame, self._scenes, self._single, self._outputs = frame, scenes, single, outputs
+        self._views: dict[str, np.ndarray] = {}
+
+    @property
+    def color(self) -> np.ndarray:
+        """(N, 3, H, W); 0 at background pixels."""
+        return self._view("color")
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """(N, H, W), 0 to 1; 1 where there is a face."""
+        return self._view("alpha")
+
+    @property
+    def attributes(self) -> np.ndarray:
+        """(N, C, H, W); 0 at background pixels."""
+        return self._view("attributes")
+
+    @property
+    def depth(self) -> np.ndarray:
+        """(N, H, W), world units; +infinity at background pixels."""
+        return self._view("depth")
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(N, 3, H, W), unit, world, as shading uses them; 0 at background pixels."""
+        return self._view("normals")
+
+    @property
+    def uv(self) -> np.ndarray:
+        """(N, 2, H, W); 0 at background pixels."""
+        return self._view("uv")
+
+    @property
+    def barycentrics(self) -> np.ndarray:
+        """(N, 2, H, W), weights of corners 1 and 2 of the face; 0 at background pixels."""
+        return self._view("barycentrics")
+
+    @property
+    def face_ids(self) -> np.ndarray:
+        """(N, H, W) int32, index into the scene's faces; -1: background."""
+        if "face_ids" not in self._views:
+            self._views["face_ids"] = self._frame.face_ids
+        return self._views["face_ids"]
+
+    @property
+    def alpha_error_bound(self) -> float:
+        """No alpha is farther than this from equation 6 of the DIB-R paper; infinite with
+        alpha_rule="paper"."""
+        return self._frame.alpha_error_bound
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """What was rendered."""
+        return self._scenes
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of the images that it has, beside face_ids."""
+        return self._outputs
+
+    @property
+    def dtype(self) -> np.dtype:
+        """float32 or float64, as the scenes."""
+        return np.dtype(np.float64 if isinstance(self._frame, _core.Frame64) else np.float32)
+
+    def shared(self, name: str) -> np.ndarray:
+        """The image of that name as an array that numpy allows to be written to, for libraries that
+        take no other (torch.from_numpy). What is written changes what backward computes."""
+        self._view(name)
+        return self._frame.view(name, True)
+
+    def __len__(self) -> int:
+        """N, the number of images."""
+        return self._frame.count
+
+    def __repr__(self) -> str:
+        f = self._frame
+        return (f"<tilegrad.Frame: {f.count} images of {f.width} x {f.height}, "
+                f"{', '.join(self._outputs)}>")
+
+    def _view(self, name: str) -> np.ndarray:
+        if name not in self._views:
+            if name not in self._outputs:
+                raise AttributeError(f"{name} was not rendered: outputs={self._outputs!r}")
+            self._views[name] = self._frame.view(name)
+        return self._views[name]
+
+
+class Gradients:
+    """dL/d(scene): for each name that was asked for, an array of the shape of the scene's own, or
+    for camera, surfaces and lights a Camera, Surface and Light of such arrays; for textures a list.
+    What images share got the sum over images.
+    """
+
+    __slots__ = ("_arrays",)
+
+    def __init__(self, arrays: dict[str, Any]) -> None:
+        self._arrays = arrays
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in _NAMES:
+            raise AttributeError(f"Gradients have no {name!r}")
+        if name not in self._arrays:
+            raise AttributeError(f"{name} was not asked for: wrt={tuple(self._arrays)!r}")
+        value = self._arrays[name]
+        return _RECORDS[name].of_numbers(value) if name in _RECORDS else value
+
+    def __iter__(self) -> Iterator[str]:
+        """The names that were asked for."""
+        return iter(self._arrays)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._arrays]
+
+    def __repr__(self) -> str:
+        return f"<tilegrad.Gradients of {', '.join(self._arrays)}>"
+
+
+class Renderer:
+    """Renders scenes, and their gradients.
+
+    Owns threads, which start with the first call, and memory, which is reused: keep a renderer. The
+    same input gives the same bits for any number of threads. Calls from several Python threads wait
+    for each other; renderers do not. After a fork a renderer goes on in both processes.
+
+    threads: 1 to 1024; 1: only the caller's; 0: as many as TILEGRAD_NUM_THREADS in the environment
+        says, or one for each core that the process may use.
+    """
+
+    __slots__ = ("_renderer", "__weakref__")
+
+    def __init__(self, threads: int = 0) -> None:
+        self._renderer = _core.Renderer(thread_count("Renderer", threads))
+
+    @property
+    def threads(self) -> int:
+        """How many threads were asked for; 0: one for each core."""
+        return self._renderer.threads
+
+    def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: int = _D.width,
+               height: int = _D.height, outputs: Sequence[str] = ("color", "alpha"),
+               delta: float = _D.delta, max_alpha_error: float = _D.max_alpha_error,
+               interpolation: str = _core.INTERPOLATIONS[_D.interpolation],
+               culling: str = _core.CULLINGS[_D.culling],
+               alpha_rule: str = _core.ALPHA_RULES[_D.alpha_rule],
+               paper_box: float = _D.paper_box, paper_faces: int = _D.paper_faces) -> Frame:
+        """The images of a scene, or of a list of scenes one behind the other.
+
+        width, height: pixels, 1 to 16384, of all images.
+        outputs: which images are wanted, of "color", "alpha", "attributes", "depth", "normals",
+            "uv", "barycentrics"; what is not wanted is not computed. face_ids are always there.
+        delta: > 0, how soft silhouettes are: alpha = 1 - prod over faces (1 - exp(-d^2 / delta))
+            with d the distance to the face in NDC, in which the image spans [-1, 1] in each axis.
+        max_alpha_error: [0, 1], of alpha, absolute: larger is faster, 0 drops nothing.
+        interpolation: "perspective", or "screen_linear" as in the paper's implementation.
+        culling: "none", or "back": clockwise faces are not drawn, but take part in alpha.
+        alpha_rule: "all_faces", or "paper": faces whose box, grown by paper_box (NDC, >= 0), holds
+            the pixel, and of these the first paper_faces; slow, for comparisons.
+
+        Errors: TypeError, ValueError; MemoryError. The scenes of a list must be alike: the same
+        dtype, and what is None in one is None in all.
+        """
+        single = isinstance(scenes, Scene)
+        scenes = (scenes,) if single else self._checked(scenes)
+        options = _core.RenderOptions()
+        options.width = _arrays.as_number("render", "width", width, int)
+        options.height = _arrays.as_number("render", "height", height, int)
+        options.delta = _arrays.as_number("render", "delta", delta, float)
+        options.max_alpha_error = _arrays.as_number("render", "max_alpha_error", max_alpha_error,
+                                                    float)
+        options.interpolation = _arrays.check_choice("render", "interpolation", interpolation,
+                                                     _core.INTERPOLATIONS)
+        options.culling = _arrays.check_choice("render", "culling", culling, _core.CULLINGS)
+        options.alpha_rule = _arrays.check_choice("render", "alpha_rule", alpha_rule,
+                                                  _core.ALPHA_RULES)
+        options.paper_box = _arrays.as_number("render", "paper_box", paper_box, float)
+        options.paper_faces = _arrays.as_number("render", "paper_faces", paper_faces, int)
+        outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        for name in outputs:
+            _arrays.check_choice("render", "outputs", name, _core.IMAGES)
+        if "attributes" in outputs and any(scene["attributes"] is None for scene in scenes):
+            raise ValueError("render: outputs has 'attributes', but a scene has none")
+        frame = self._renderer.render([scene._record for scene in scenes], options,
+                                      [name in outputs for name in _core.IMAGES])
+        return Frame(frame, scenes, single, outputs)
+
+    def backward(self, frame: Frame, *, color: Any = None, alpha: Any = None,
+                 attributes: Any = None, depth: Any = None, normals: Any = None, uv: Any = None,
+                 wrt: Optional[Sequence[str]] = None,
+                 out: Union[Gradients, Sequence[Gradients], None] = None,
+                 accumulate: bool = False) -> Union[Gradients, list[Gradients]]:
+        """The gradients of sum(given * images) with respect to the frame's scenes.
+
+        color, alpha, attributes, depth, normals, uv: dL/d(image), in the image's shape and dtype;
+            None is zero. The image must have been rendered. depth: background pixels are not read.
+        wrt: which gradients are wanted, of "positions", "camera", "colors", "uvs", "normals",
+            "textures", "surfaces", "lights", "light_directions", "sh", "attributes"; what is not
+            wanted is not computed. Default: those of `out`, or positions.
+        out: what an earlier backward of such scenes returned, to be overwritten.
+        accumulate: add to `out` instead.
+
+        Returns Gradients for a scene, a list of them for a list of scenes. The scenes' arrays must
+        be as they were in render. Errors: TypeError, ValueError; then `out` holds anything, or with
+        `accumulate` what it held.
+        """
+        if not isinstance(frame, Frame):
+            raise TypeError(f"backward: frame must be a Frame, got {type(frame).__name__}")
+        given = {"color": color, "alpha": alpha, "attributes": attributes, "depth": depth,
+                 "normals": normals, "uv": uv}
+        cotangents = {name: self._cotangent(frame, name, value)
+                      for name, value in given.items() if value is not None}
+        gradients = self._outputs(frame, wrt, out, accumulate)
+        self._renderer.backward(frame._frame, cotangents, [g._arrays for g in gradients],
+                                bool(accumulate))
+        return gradients[0] if frame._single else gradients
+
+    @staticmethod
+    def _checked(scenes: Sequence[Scene]) -> tuple[Scene, ...]:
+        if not isinstance(scenes, (list, tuple)):
+            raise TypeError(f"render: scenes must be a Scene or a list of them, got "
+                            f"{type(scenes).__name__}")
+        for i, scene in enumerate(scenes):
+            if not isinstance(scene, Scene):
+                raise TypeError(f"render: scenes[{i}] must be a Scene, got {type(scene).__name__}")
+            if scene.dtype != scenes[0].dtype:
+                raise TypeError(f"render: scenes[{i}] is {scene.dtype}, expected "
+                                f"{scenes[0].dtype} as scenes[0]")
+        return tuple(scenes)
+
+    @staticmethod
+    def _cotangent(frame: Frame, name: str, value: Any) -> np.ndarray:
+        if name not in frame.outputs:
+            raise ValueError(f"backward: {name} was not rendered: outputs={frame.outputs!r}")
+        image = frame._view(name)
+        return _arrays.as_array("backward", name, value, image.dtype, image.shape)
+
+    def _outputs(self, frame: Frame, wrt: Optional[Sequence[str]], out: Any,
+                 accumulate: bool) -> list[Gradients]:
+        if out is None and accumulate:
+            raise ValueError("backward: accumulate=True needs out")
+        if out is None:
+            names = ("positions",) if wrt is None else (wrt,) if isinstance(wrt, str) else wrt
+            for name in names:
+                _arrays.check_choice("backward", "wrt", name, _NAMES)
+            return [Gradients({name: _empty_like(scene, name) for name in names})
+                    for scene in frame.scenes]
+        gradients = [out] if isinstance(out, Gradients) else list(out)
+        for i, gradient in enumerate(gradients):
+            if not isinstance(gradient, Gradients):
+                raise TypeError(f"backward: out[{i}] must be Gradients, got "
+                                f"{type(gradient).__name__}")
+            if wrt is not None and set(wrt) != set(gradient):
+                raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is "
+                                 f"{tuple(wrt)!r}")
+        return gradients
+
+
+def _empty_like(scene: Scene, name: str) -> Any:
+    """An array for the gradient of that name."""
+    if name == "textures":
+        if not scene._textures:
+            raise ValueError("backward: wrt has 'textures', but a scene has none")
+        return [np.empty_like(texels) for texels, _, _ in scene._textures]
+    if name == "surfaces":
+        numbers = scene._surface[0]
+        return np.empty((1, Surface._SIZE), scene.dtype) if numbers is None else \
+            np.empty_like(numbers)
+    if scene[name] is None:
+        raise ValueError(f"backward: wrt has {name!r}, but a scene has none")
+    return np.empty_like(scene[name])

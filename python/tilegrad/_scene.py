@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is rendered: a mesh, what gives it colour, and a camera; one image or a batch."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _core
+from tilegrad._camera import Camera
+from tilegrad._packed import Packed, Part, stacked
+
+_STREAMS = {"colors": 3, "uvs": 2, "normals": 3, "attributes": "C"}  # values that faces interpolate
+_S, _L = _core.SURFACE, _core.LIGHT
+
+
+class Surface(Packed):
+    """What light does at a surface, or at S of them::
+
+        colour = base_color * texture * vertex colour * (ambient + diffuse * light)
+                 + specular * highlight
+
+    base_color, ambient, diffuse, specular: (3,) or (S, 3). Spherical harmonics use base_color only;
+        specular and shininess are of Phong lighting.
+    shininess: number or (S,), 0 to 1e6.
+    texture: index into the scene's textures, or S of them; -1: none.
+    """
+
+    __slots__ = ("texture",)
+    _SIZE = len(_S)
+
+    base_color = Part(0, (3,), "(..., 3)")
+    ambient = Part(3, (3,), "(..., 3)")
+    diffuse = Part(6, (3,), "(..., 3)")
+    specular = Part(9, (3,), "(..., 3)")
+    shininess = Part(12, (), "(...) exponent of the highlight.")
+
+    def __init__(self, base_color=_S[:3], ambient=_S[3:6], diffuse=_S[6:9], specular=_S[9:12],
+                 shininess=_S[12], texture: Union[int, Sequence[int]] = -1) -> None:
+        self._pack(base_color=base_color, ambient=ambient, diffuse=diffuse, specular=specular,
+                   shininess=shininess)
+        self.texture = _arrays.contiguous("Surface", "texture", texture, np.int32)
+
+    def textures(self) -> list[int]:
+        """The texture of each surface."""
+        count = self.numbers.shape[:-1]
+        return np.broadcast_to(self.texture, count or (1,)).ravel().tolist()
+
+
+class Light(Packed):
+    """A directional light, or L of them, or L for each of N images.
+
+    direction: (3,) or (L, 3) or (N, L, 3), from the surface to the light, world, not 0.
+    intensity: number or (L,) or (N, L).
+    """
+
+    __slots__ = ()
+    _SIZE = len(_L)
+
+    direction = Part(0, (3,), "(..., 3) from the surface to the light.")
+    intensity = Part(3, (), "(...)")
+
+    def __init__(self, direction=_L[:3], intensity=_L[3]) -> None:
+        self._pack(direction=direction, intensity=intensity)
+
+
+class Texture:
+    """Texels with the rules by which they are looked up.
+
+    texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image; row 0 on top;
+        (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
+    wrap: "repeat", "clamp" (the border goes on) or "mirror".
+    filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid).
+    """
+
+    __slots__ = ("texels", "wrap", "filter")
+
+    def __init__(self, texels: Any, wrap: str = _core.WRAPS[_core.TEXTURE[0]],
+                 filter: str = _core.FILTERS[_core.TEXTURE[1]]) -> None:
+        _arrays.check_choice("Texture", "wrap", wrap, _core.WRAPS)
+        _arrays.check_choice("Texture", "filter", filter, _core.FILTERS)
+        self.texels, self.wrap, self.filter = texels, wrap, filter
+
+
+class Scene:
+    """A mesh with a camera: one image, or a batch of N images that share faces.
+
+    Shapes: V vertices, F faces, C channels. Any array but `faces` and `face_surfaces` may have a
+    leading axis N more, which holds each image's own; without it all images share the array. A
+    batch of different meshes is a list of scenes.
+
+    Arrays that are C-contiguous and of the scene's dtype are used where they are, not copied: they
+    must stay as they are from a render to its last backward. Everything else is copied once, here
+    (`tilegrad.stats` counts that).
+
+    positions: (V, 3), world. Their dtype is the scene's: an array of float64 makes a scene for the
+        scalar reference in double precision, which is for checks and slow; everything else is
+        float32, for the engine.
+    faces: (F, 3) int32, indices of vertices; counter-clockwise is the front.
+    camera: Camera, of one view or of N.
+    colors: (V, 3), 0 to 1.
+    uvs: (V, 2); (0, 0) is the lower left corner of a texture.
+    textures: Texture or an array (Ht, Wt, 3), or a list of them.
+    surfaces: Surface or a list of them; without any, one of C++'s defaults that has texture 0.
+    face_surfaces: (F,) int32, the surface of each face; all 0 if None.
+    lighting: "none" (colours as they are), "lambert", "phong" or "spherical_harmonics".
+    normals: "smooth" (of vertices, from positions), "flat" (of faces), or an array (V, 3) of any
+        length.
+    two_sided: whether normals of faces that are seen from behind are turned.
+    clamp: whether colours are cut to [0, 1]; what is beyond has no gradient.
+    lights: Light or a list of them, for Lambert and Phong lighting.
+    light_directions: (V, 3), one light of intensity 1 for each vertex, instead of `lights`.
+    sh: (9,), orthonormal real spherical harmonics 1, -y, z, -x, xy, -yz, 3z^2-1, -xz, x^2-y^2.
+    attributes: (V, C), anything else to interpolate.
+    per_corner: names of those of colors, uvs, normals, attributes that are given for the corners of
+        faces, (F, 3, C), so that seams need no doubled vertices.
+
+    Errors: TypeError and ValueError with the argument's name, what was expected and got. Numbers
+    that are not finite and indices out of range are found by render.
+    """
+
+    __slots__ = ("_arguments", "_fields", "_textures", "_surface", "_record", "_dtype", "_count",
+                 "__weakref__")
+
+    def __init__(self, positions: Any, faces: Any, camera: Camera, *, colors: Any = None,
+                 uvs: Any = None, textures: Any = None, surfaces: Any = None,
+                 face_surfaces: Any = None, lighting: str = "none", normals: Any = "smooth",
+                 two_sided: bool = False, clamp: bool = False, lights: Any = None,
+                 light_directions: Any = None, sh: Any = None, attributes: Any = None,
+                 per_corner: Sequence[str] = ()) -> None:
+        self._arguments = {name: value for name, value in locals().items() if name != "self"}
+        self._dtype = _arrays.float_dtype("Scene", "positions", positions)
+        sizes: dict[str, int] = {}
+        given_normals = None if isinstance(normals, str) else normals
+        streams = {"colors": colors, "uvs": uvs, "normals": given_normals, "attributes": attributes}
+        fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
+                  "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes)}
+        fields["camera"] = self._camera(camera, sizes)
+        fields.update(self._streams(streams, per_corner, sizes))
+        fields["face_surfaces"] = None if face_surfaces is None else _arrays.as_array(
+            "Scene", "face_surfaces", face_surfaces, np.int32, ("F",), sizes)
+        fields["lights"] = self._lights(lights, sizes)
+        fields["light_directions"] = self._take("light_directions", light_directions, ("V", 3),
+                                                sizes)
+        fields["sh"] = self._take("sh", sh, (9,), sizes)
+        self._fields = fields
+        self._textures = self._take_textures(textures, sizes)
+        self._surface = self._surfaces(surfaces)
+        self._count = sizes.get("N", 1)
+        arrays = self._core_arrays(per_corner)
+        arrays.lighting = _arrays.check_choice("Scene", "lighting", lighting, _core.LIGHTINGS)
+        arrays.normal_kind = self._normal_kind(normals)
+        arrays.two_sided, arrays.clamp = bool(two_sided), bool(clamp)
+        kind = _core.Scene64 if self._dtype == np.float64 else _core.Scene32
+        self._record = kind(self._count, arrays)
+
+    # What the constructor consists of.
+
+    def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> Optional[np.ndarray]:
+        if value is None:
+            return None
+        return _arrays.as_batched("Scene", name, value, self._dtype, shape, sizes)
+
+    def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:
+        if not isinstance(camera, Camera):
+            raise TypeError(f"Scene: camera must be a Camera, got {type(camera).__name__}")
+        numbers = camera.numbers.astype(self._dtype)
+        _arrays.check_batched("Scene", "camera", numbers.shape, (Camera._SIZE,), sizes)
+        return numbers
+
+    def _streams(self, values: dict, per_corner: Sequence[str], sizes: dict) -> dict:
+        names = (per_corner,) if isinstance(per_corner, str) else per_corner
+        for name in names:
+            _arrays.check_choice("Scene", "per_corner", name, tuple(_STREAMS))
+        out = {}
+        for name, width in _STREAMS.items():
+            shape = ("F", 3, width) if name in names else ("V", width)
+            out[name] = self._take(name, values[name], shape, sizes)
+        return out
+
+    def _lights(self, lights: Any, sizes: dict) -> Optional[np.ndarray]:
+        if lights is None:
+            return None
+        numbers = stacked("Scene", "lights", lights, Light).astype(self._dtype)
+        _arrays.check_batched("Scene", "lights", numbers.shape, ("L", Light._SIZE), sizes)
+        return numbers
+
+    def _take_textures(self, textures: Any, sizes: dict) -> list[tuple[np.ndarray, str, str]]:
+        if textures is None:
+            return []
+        out = []
+        for i, value in enumerate(textures if isinstance(textures, (list, tuple)) else [textures]):
+            texture = value if isinstance(value, Texture) else Texture(value)
+            own = {name: sizes[name] for name in sizes if name == "N"}
+            texels = self._take(f"textures[{i}]", texture.texels, ("Ht", "Wt", 3), own)
+            sizes.update({name: own[name] for name in own if name == "N"})
+            out.append((texels, texture.wrap, texture.filter))
+        return out
+
+    def _surfaces(self, surfaces: Any) -> tuple[Optional[np.ndarray], list[int]]:
+        if surfaces is None:
+            return None, []
+        numbers = stacked("Scene", "surfaces", surfaces, Surface).astype(self._dtype)
+        _arrays.check_shape("Scene", "surfaces", numbers.shape, ("S", Surface._SIZE))
+        each = [surfaces] if isinstance(surfaces, Surface) else surfaces
+        return numbers, [texture for surface in each for texture in surface.textures()]
+
+    def _core_arrays(self, per_corner: Sequence[str]) -> _core.SceneArrays:
+        f = self._fields
+        a = _core.SceneArrays()
+        a.positions, a.faces, a.cameras = f["positions"], f["faces"], f["camera"]
+        a.colors, a.uvs = f["colors"], f["uvs"]
+        a.normals, a.attributes = f["normals"], f["attributes"]
+        if per_corner:
+            a.per_corner = [name in per_corner for name in _STREAMS]
+        if self._textures:
+            a.textures = [texels for texels, _, _ in self._textures]
+            a.wraps = [_core.WRAPS.index(wrap) for _, wrap, _ in self._textures]
+            a.filters = [_core.FILTERS.index(filter) for _, _, filter in self._textures]
+        a.surfaces, a.surface_textures = self._surface
+        a.face_surfaces, a.lights = f["face_surfaces"], f["lights"]
+        a.light_directions, a.sh = f["light_directions"], f["sh"]
+        return a
+
+    @staticmethod
+    def _normal_kind(normals: Any) -> int:
+        given = len(_core.NORMAL_KINDS) - 1
+        if not isinstance(normals, str):
+            return given
+        return _arrays.check_choice("Scene", "normals", normals, _core.NORMAL_KINDS[:given])
+
+    # What it holds.
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(V, 3) or (N, V, 3), world: the array that was given, or its copy."""
+        return self._fields["positions"]
+
+    @property
+    def faces(self) -> np.ndarray:
+        """(F, 3) int32."""
+        return self._fields["faces"]
+
+    @property
+    def camera(self) -> Camera:
+        """Of one view, or of N; in the scene's dtype."""
+        return Camera.of_numbers(self._fields["camera"])
+
+    @property
+    def dtype(self) -> np.dtype:
+        """float32 (the engine) or float64 (the scalar reference)."""
+        return self._dtype
+
+    def __len__(self) -> int:
+        """N, the number of images."""
+        return self._count
+
+    def __getitem__(self, name: str) -> Optional[np.ndarray]:
+        """The array of that name, as the renderer sees it; None if the scene has none."""
+        return self._fields[name]
+
+    def replace(self, **changes: Any) -> "Scene":
+        """The same scene with some arguments changed: scene.replace(positions=moved)."""
+        unknown = sorted(set(changes) - set(self._arguments))
+        if unknown:
+            raise TypeError(f"Scene.replace: no argument is called {unknown[0]!r}")
+        return Scene(**{**self._arguments, **changes})
+
+    def __reduce__(self) -> tuple:
+        return _scene_of, (self._arguments,)
+
+    def __repr__(self) -> str:
+        v, f = self.positions.shape[-2], len(self.faces)
+        return f"<tilegrad.Scene: {len(self)} images, {v} vertices, {f} faces, {self.dtype}>"
+
+
+def _scene_of(arguments: dict) -> Scene:
+    return Scene(**arguments)

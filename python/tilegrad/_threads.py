@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many threads work."""
+
+from __future__ import annotations
+
+import os
+
+from tilegrad import _arrays
+
+_MOST = 1024
+_VARIABLE = "TILEGRAD_NUM_THREADS"
+
+
+def thread_count(function: str, threads: int) -> int:
+    """`threads` checked; 0 becomes what TILEGRAD_NUM_THREADS says, or stays 0 (one thread for each
+    core that the process may use) where that is not set."""
+    threads = _arrays.as_number(function, "threads", threads, int)
+    if not 0 <= threads <= _MOST:
+        raise ValueError(f"{function}: threads is {threads}, must be in 0..{_MOST}")
+    text = os.environ.get(_VARIABLE, "")
+    if threads or not text:
+        return threads
+    if not text.isdecimal() or not 1 <= int(text) <= _MOST:
+        raise ValueError(f"{function}: {_VARIABLE}={text!r} in the environment, must be a number "
+                         f"in 1..{_MOST}")
+    return int(text)
