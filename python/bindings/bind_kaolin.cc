@@ -1,11 +1,261 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tilegrad.compat.kaolin needs of the engine.
+// What tilegrad.compat.kaolin needs of the engine: faces that come projected. Arrays are float32 or
+// float64, all of a call the same; the Python side has named and converted what the caller gave.
+#include <pybind11/stl.h>
+
+#include <optional>
+#include <utility>
+
 #include "bindings/arrays.h"
+#include "bindings/shared_workers.h"
+#include "render/projected_raster.h"
+#include "render/projected_soft_mask.h"
 
 namespace tilegrad::python {
 
 void BindKaolin(py::module_& m);
 
-void BindKaolin(py::module_&) {}
+namespace {
+
+using py::ssize_t;
+
+// Lengths of the axes that arrays share.
+struct Lengths {
+  ssize_t images, faces;
+
+  explicit Lengths(const py::array& xy)
+      : images(xy.ndim() == 4 ? xy.shape(0) : 0), faces(xy.ndim() == 4 ? xy.shape(1) : 0) {}
+  std::size_t n() const { return static_cast<std::size_t>(images); }
+  std::size_t f() const { return static_cast<std::size_t>(faces); }
+};
+
+template <class T>
+bool IsOf(const py::array& array) {
+  return py::isinstance<py::array_t<T>>(array);
+}
+
+// call(float()) or call(double()), by the numbers of `xy`.
+template <class Call>
+auto Dispatch(const py::array& xy, const char* function, const Call& call) {
+  if (IsOf<float>(xy)) return call(float());
+  if (IsOf<double>(xy)) return call(double());
+  throw py::type_error(
+      fmt::format("{}: face_vertices_image has dtype {}, expected float32 or float64", function,
+                  py::str(xy.dtype()).cast<std::string>()));
+}
+
+template <class T>
+py::array_t<T> NewArray(std::initializer_list<ssize_t> shape) {
+  return py::array_t<T>(std::vector<ssize_t>(shape));
+}
+
+template <class T>
+std::span<T> NumbersOf(py::array_t<T>& array) {
+  return {array.mutable_data(), static_cast<std::size_t>(array.size())};
+}
+
+// Engine work, other Python threads running.
+template <class Work>
+void Run(const char* function, const Work& work) {
+  Status status;
+  {
+    const py::gil_scoped_release released;
+    status = work();
+  }
+  ThrowIfError(status.Within(function));
+}
+
+struct RasterCall {
+  py::array z, features;
+  std::optional<py::array> valid;
+  int height, width;
+  double eps;
+  int threads;
+};
+
+template <class T>
+py::tuple Rasterize(const py::array& xy, const RasterCall& call) {
+  constexpr char kName[] = "rasterize";
+  const Lengths of(xy);
+  ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
+  batch.xy = SpanOf<T>(xy, kName, "face_vertices_image", {of.images, of.faces, 3, 2});
+  batch.z = SpanOf<T>(call.z, kName, "face_vertices_z", {of.images, of.faces, 3});
+  if (call.valid) {
+    batch.valid = SpanOf<std::uint8_t>(*call.valid, kName, "valid_faces", {of.images, of.faces});
+  }
+  const auto features =
+      SpanOf<T>(call.features, kName, "face_features", {of.images, of.faces, 3, kAny});
+  const ssize_t channels = call.features.shape(3);
+  auto image = NewArray<T>({of.images, call.height, call.width, channels});
+  auto ids = NewArray<std::int32_t>({of.images, call.height, call.width});
+  const auto to_image = NumbersOf(image);
+  const auto to_ids = NumbersOf(ids);
+  const Workers& workers = SharedWorkers(call.threads);
+  Run(kName, [&] {
+    return RasterizeProjected<T>(batch, {{call.width, call.height}, call.eps}, features,
+                                 static_cast<std::size_t>(channels), workers, to_ids, to_image);
+  });
+  return py::make_tuple(image, ids);
+}
+
+struct RasterBackwardCall {
+  py::array features, ids, d_image;
+  double eps;
+  bool wants_xy, wants_features;
+  int threads;
+};
+
+template <class T>
+py::tuple RasterizeBackward(const py::array& xy, const RasterBackwardCall& call) {
+  constexpr char kName[] = "rasterize's backward pass";
+  const Lengths of(xy);
+  ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
+  batch.xy = SpanOf<T>(xy, kName, "face_vertices_image", {of.images, of.faces, 3, 2});
+  const auto features =
+      SpanOf<T>(call.features, kName, "face_features", {of.images, of.faces, 3, kAny});
+  const ssize_t channels = call.features.shape(3);
+  ProjectedRasterAdjoint<T> adjoint;
+  adjoint.face_ids = SpanOf<std::int32_t>(call.ids, kName, "face_idx", {of.images, kAny, kAny});
+  const ssize_t height = call.ids.shape(1), width = call.ids.shape(2);
+  adjoint.d_image =
+      SpanOf<T>(call.d_image, kName, "the gradient", {of.images, height, width, channels});
+  auto d_xy = NewArray<T>({call.wants_xy ? of.images : 0, of.faces, 3, 2});
+  auto d_features = NewArray<T>({call.wants_features ? of.images : 0, of.faces, 3, channels});
+  adjoint.d_xy = NumbersOf(d_xy), adjoint.d_features = NumbersOf(d_features);
+  const Workers& workers = SharedWorkers(call.threads);
+  Run(kName, [&] {
+    return RasterizeProjectedBackward<T>(
+        batch, {{static_cast<int>(width), static_cast<int>(height)}, call.eps}, features,
+        static_cast<std::size_t>(channels), workers, adjoint);
+  });
+  return py::make_tuple(d_xy, d_features);
+}
+
+// Faces, and the images that their mask is for.
+template <class T>
+struct MaskInput {
+  Lengths of;
+  ProjectedBatchT<T> batch;
+  std::span<const std::int32_t> ids;
+  ssize_t height, width;
+  ProjectedMaskOptions options;
+
+  MaskInput(const char* name, const py::array& xy, const py::array& face_ids,
+            const ProjectedMaskOptions& rule)
+      : of(xy), batch{of.n(), of.f(), {}, {}, {}}, options(rule) {
+    batch.xy = SpanOf<T>(xy, name, "face_vertices_image", {of.images, of.faces, 3, 2});
+    ids = SpanOf<std::int32_t>(face_ids, name, "selected_face_idx", {of.images, kAny, kAny});
+    height = face_ids.shape(1), width = face_ids.shape(2);
+    options.size = {static_cast<int>(width), static_cast<int>(height)};
+  }
+};
+
+template <class T>
+py::tuple SoftMask(const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
+                   int threads) {
+  constexpr char kName[] = "dibr_soft_mask";
+  const MaskInput<T> in(kName, xy, ids, options);
+  auto mask = NewArray<T>({in.of.images, in.height, in.width});
+  const auto to = NumbersOf(mask);
+  double bound = 0;
+  const Workers& workers = SharedWorkers(threads);
+  Run(kName, [&]() -> Status {
+    TILEGRAD_ASSIGN(bound, ProjectedSoftMask<T>(in.batch, in.options, in.ids, workers, to));
+    return {};
+  });
+  return py::make_tuple(mask, bound);
+}
+
+struct MaskBackwardCall {
+  py::array ids, mask, d_mask;
+  const ProjectedMaskOptions& options;
+  int threads;
+};
+
+template <class T>
+py::array_t<T> SoftMaskBackward(const py::array& xy, const MaskBackwardCall& call) {
+  constexpr char kName[] = "dibr_soft_mask's backward pass";
+  const MaskInput<T> in(kName, xy, call.ids, call.options);
+  const auto mask = SpanOf<T>(call.mask, kName, "the mask", {in.of.images, in.height, in.width});
+  const auto d_mask =
+      SpanOf<T>(call.d_mask, kName, "the gradient", {in.of.images, in.height, in.width});
+  auto d_xy = NewArray<T>({in.of.images, in.of.faces, 3, 2});
+  const auto to = NumbersOf(d_xy);
+  const Workers& workers = SharedWorkers(call.threads);
+  Run(kName, [&] {
+    return ProjectedSoftMaskBackward<T>(in.batch, in.options, workers, {in.ids, mask, d_mask, to});
+  });
+  return d_xy;
+}
+
+void BindMaskOptions(py::module_& m) {
+  py::class_<ProjectedMaskOptions>(m, "ProjectedMaskOptions")
+      .def(py::init([](double delta, double max_alpha_error) {
+             ProjectedMaskOptions options;
+             options.delta = delta, options.max_alpha_error = max_alpha_error;
+             return options;
+           }),
+           py::kw_only(), py::arg("delta"), py::arg("max_alpha_error"))
+      .def_static(
+          "paper",
+          [](double delta, double boxlen, int knum, double edge_eps) {
+            ProjectedMaskOptions options;
+            options.delta = delta, options.rule = SoftRule::kPaper;
+            options.paper = {boxlen, knum}, options.paper_eps = edge_eps;
+            return options;
+          },
+          py::kw_only(), py::arg("delta"), py::arg("boxlen"), py::arg("knum"), py::arg("edge_eps"));
+}
+
+}  // namespace
+
+void BindKaolin(py::module_& m) {
+  BindMaskOptions(m);
+  m.def(
+      "rasterize_projected",
+      [](const py::array& xy, py::array z, py::array features, std::optional<py::array> valid,
+         int height, int width, double eps, int threads) {
+        const RasterCall call{
+            std::move(z), std::move(features), std::move(valid), height, width, eps, threads};
+        return Dispatch(xy, "rasterize", [&](auto t) { return Rasterize<decltype(t)>(xy, call); });
+      },
+      py::arg("face_vertices_image"), py::arg("face_vertices_z"), py::arg("face_features"),
+      py::arg("valid_faces"), py::arg("height"), py::arg("width"), py::arg("eps"),
+      py::arg("threads"));
+  m.def(
+      "rasterize_projected_backward",
+      [](const py::array& xy, py::array features, py::array ids, py::array d_image, double eps,
+         bool wants_xy, bool wants_features, int threads) {
+        const RasterBackwardCall call{
+            std::move(features), std::move(ids), std::move(d_image), eps, wants_xy,
+            wants_features,      threads};
+        return Dispatch(xy, "rasterize's backward pass",
+                        [&](auto t) { return RasterizeBackward<decltype(t)>(xy, call); });
+      },
+      py::arg("face_vertices_image"), py::arg("face_features"), py::arg("face_idx"),
+      py::arg("gradient"), py::arg("eps"), py::arg("wants_face_vertices_image"),
+      py::arg("wants_face_features"), py::arg("threads"));
+  m.def(
+      "projected_soft_mask",
+      [](const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
+         int threads) {
+        return Dispatch(xy, "dibr_soft_mask",
+                        [&](auto t) { return SoftMask<decltype(t)>(xy, ids, options, threads); });
+      },
+      py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("options"),
+      py::arg("threads"));
+  m.def(
+      "projected_soft_mask_backward",
+      [](const py::array& xy, py::array ids, py::array mask, py::array d_mask,
+         const ProjectedMaskOptions& options, int threads) {
+        const MaskBackwardCall call{std::move(ids), std::move(mask), std::move(d_mask), options,
+                                    threads};
+        return Dispatch(xy, "dibr_soft_mask's backward pass", [&](auto t) -> py::array {
+          return SoftMaskBackward<decltype(t)>(xy, call);
+        });
+      },
+      py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("soft_mask"),
+      py::arg("gradient"), py::arg("options"), py::arg("threads"));
+}
 
 }  // namespace tilegrad::python

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tensors of the caller, checked: on the CPU, of one floating type, of the right shape."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence
+
+import numpy as np
+import torch
+
+from tilegrad._arrays import Axis, Sizes, check_shape
+
+_FLOATS = (torch.float32, torch.float64)
+
+
+def check_tensor(function: str, argument: str, value: Any, shape: Sequence[Axis],
+                 sizes: Optional[Sizes] = None) -> None:
+    """TypeError unless `value` is a tensor on the CPU, ValueError unless it is of `shape`: see
+    tilegrad._arrays.check_shape."""
+    if not isinstance(value, torch.Tensor):
+        raise TypeError(f"{function}: {argument} is {type(value).__name__}, expected torch.Tensor")
+    if value.device.type != "cpu":
+        raise TypeError(f"{function}: {argument} is on {value.device}; tilegrad renders on the "
+                        f"CPU, call .cpu() first")
+    check_shape(function, argument, tuple(value.shape), shape, sizes)
+
+
+def check_floats(function: str, argument: str, value: Any, shape: Sequence[Axis],
+                 sizes: Optional[Sizes] = None, like: Optional[torch.Tensor] = None) -> None:
+    """As check_tensor, and TypeError unless `value` is float32 or float64, and of the dtype of
+    `like` where that is given."""
+    check_tensor(function, argument, value, shape, sizes)
+    if value.dtype not in _FLOATS:
+        raise TypeError(f"{function}: {argument} has dtype {value.dtype}, expected torch.float32 "
+                        f"or torch.float64 (.float() makes it one)")
+    if like is not None and value.dtype != like.dtype:
+        raise TypeError(f"{function}: {argument} has dtype {value.dtype}, the tensors before it "
+                        f"{like.dtype}")
+
+
+def to_numpy(tensor: torch.Tensor) -> np.ndarray:
+    """The tensor's memory as an array; of a copy if it is not contiguous."""
+    return tensor.detach().contiguous().numpy()
+
+
+def threads() -> int:
+    """As many as torch uses: one in a worker of a DataLoader."""
+    return torch.get_num_threads()

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kaolin.ops: mesh, pointcloud."""
+
+from tilegrad.compat.kaolin.ops import mesh, pointcloud
+
+__all__ = ["mesh", "pointcloud"]

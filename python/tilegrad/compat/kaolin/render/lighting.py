@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kaolin.render.lighting: spherical harmonics of degree up to 2, orthonormal, with the
+Condon-Shortley sign, in the order 1 | y, z, x | xy, yz, 3z^2-1, xz, x^2-y^2."""
+
+from __future__ import annotations
+
+import math
+from typing import Sequence, Union
+
+import torch
+
+from tilegrad.compat.kaolin._tensors import check_floats
+
+# Clamped cosine, as factors of bands 0, 1, 2.
+_COSINE = [math.pi] + 3 * [2 * math.pi / 3] + 5 * [math.pi / 4]
+
+
+def project_onto_sh9(directions: Union[torch.Tensor, Sequence[float]]) -> torch.Tensor:
+    """The nine basis functions. directions: [...,3], unit; or a list of 3 numbers. Returns [...,9].
+    """
+    if not isinstance(directions, torch.Tensor):
+        directions = torch.tensor(directions, dtype=torch.get_default_dtype())
+    check_floats("project_onto_sh9", "directions", directions,
+                 (*directions.shape[:-1], 3))
+    x, y, z = directions.unbind(dim=-1)
+    return torch.stack([
+        torch.full_like(x, 0.28209479177), -0.4886025119 * y, 0.4886025119 * z,
+        -0.4886025119 * x, 1.0925484305920792 * x * y, -1.0925484305920792 * y * z,
+        0.94617469575 * z * z - 0.31539156525, -1.0925484305920792 * x * z,
+        0.5462742152960396 * (x * x - y * y)], dim=-1)
+
+
+def sh9_irradiance(lights: torch.Tensor, normals: torch.Tensor) -> torch.Tensor:
+    """Irradiance from radiance with the coefficients lights [9], at points with normals [N,3].
+    Returns [N]."""
+    name = "sh9_irradiance"
+    check_floats(name, "lights", lights, (9,))
+    check_floats(name, "normals", normals, ("N", 3), like=lights)
+    return project_onto_sh9(normals) @ (lights * lights.new_tensor(_COSINE))
+
+
+def sh9_diffuse(directions: torch.Tensor, normals: torch.Tensor,
+                albedo: torch.Tensor) -> torch.Tensor:
+    """Light from directions [3] that a diffuse surface with normals [N,3] and albedo [N,3] reflects.
+    Returns [N,3]."""
+    check_floats("sh9_diffuse", "directions", directions, (3,))
+    sizes: dict = {}
+    check_floats("sh9_diffuse", "normals", normals, ("N", 3), sizes, directions)
+    check_floats("sh9_diffuse", "albedo", albedo, ("N", 3), sizes, directions)
+    return albedo * sh9_irradiance(project_onto_sh9(directions), normals).unsqueeze(-1)
