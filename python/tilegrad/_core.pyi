@@ -110,3 +110,26 @@ class Renderer:
                outputs: Sequence[bool]) -> Frame64: ...
     def backward(self, frame: Union[Frame32, Frame64], cotangents: dict[str, np.ndarray],
                  gradients: Sequence[dict[str, Any]], add: bool = False) -> None: ...
+
+# Of tilegrad.compat.kaolin. Arrays are C-contiguous, float32 or float64, all of a call the same.
+
+class ProjectedMaskOptions:
+    def __init__(self, *, delta: float, max_alpha_error: float) -> None: ...
+    @staticmethod
+    def paper(*, delta: float, boxlen: float, knum: int,
+              edge_eps: float) -> ProjectedMaskOptions: ...
+
+def rasterize_projected(
+    face_vertices_image: np.ndarray, face_vertices_z: np.ndarray, face_features: np.ndarray,
+    valid_faces: Optional[np.ndarray], height: int, width: int, eps: float,
+    threads: int) -> tuple[np.ndarray, np.ndarray]: ...
+def rasterize_projected_backward(
+    face_vertices_image: np.ndarray, face_features: np.ndarray, face_idx: np.ndarray,
+    gradient: np.ndarray, eps: float, wants_face_vertices_image: bool, wants_face_features: bool,
+    threads: int) -> tuple[np.ndarray, np.ndarray]: ...
+def projected_soft_mask(
+    face_vertices_image: np.ndarray, selected_face_idx: np.ndarray, options: ProjectedMaskOptions,
+    threads: int) -> tuple[np.ndarray, float]: ...
+def projected_soft_mask_backward(
+    face_vertices_image: np.ndarray, selected_face_idx: np.ndarray, soft_mask: np.ndarray,
+    gradient: np.ndarray, options: ProjectedMaskOptions, threads: int) -> np.ndarray: ...
