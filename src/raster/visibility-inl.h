@@ -85,6 +85,17 @@ struct DrawnRows {
   int x0, y0;
   std::int32_t* face;
   float* inverse_depth;
+  const float* behind;  // of kPeel
+};
+
+// Which of the faces that cover a pixel count: all, or those behind a depth that each pixel has.
+enum class Layer { kFirst, kPeel };
+
+// Where a bin is drawn: the arrays of a VisibilityBin, and of kPeel what the pixels lie behind.
+struct BinTarget {
+  std::int32_t* face;
+  float* inverse_depth;
+  const float* behind;
 };
 
 // Where the edge functions are known: in a record of `Face`, at a pixel (column, row) before.
@@ -95,7 +106,7 @@ struct EdgesAt {
 };
 
 // Mul and Add are kept apart (no fused MulAdd): the same bits on every instruction set.
-template <class Layout, class Face>
+template <Layer kLayer, class Layout, class Face>
 HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, const DrawnRows& rows) {
   const typename Layout::Tag d;
   const typename Layout::IntTag di;
@@ -129,7 +140,11 @@ HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, cons
     float* nearest = rows.inverse_depth + i * kBinSize + rows.column;
     std::int32_t* ids = rows.face + i * kBinSize + rows.column;
     const auto old = Layout::Load(nearest);
-    const auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
+    auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
+    if constexpr (kLayer == Layer::kPeel) {
+      const float* behind = rows.behind + i * kBinSize + rows.column;
+      seen = hn::And(seen, hn::Lt(z, Layout::Load(behind)));
+    }
     Layout::Store(hn::IfThenElse(seen, z, old), nearest);
     Layout::Store(hn::IfThenElse(hn::RebindMask(di, seen), id, Layout::Load(ids)), ids);
   }
@@ -141,34 +156,37 @@ HWY_INLINE TileRect BoxIn(const TileRect& rect, const DrawnFace& face) {
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
 
+template <Layer kLayer>
 HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& box, const TileRect& rect,
-                          VisibilityBin* out) {
+                          const BinTarget& out) {
   const int column = HWY_MIN(box.x0, kBinSize - kStamp), row = HWY_MIN(box.y0, kBinSize - kStamp);
-  DrawRows<StampLayout>(
+  DrawRows<kLayer, StampLayout>(
       EdgesAt<DrawnFace>{face, rect.x0 + column - face.column_begin,
                          rect.y0 + row - face.row_begin},
-      face, {column, row, row + kStamp, rect.x0, rect.y0, out->face, out->inverse_depth});
+      face, {column, row, row + kStamp, rect.x0, rect.y0, out.face, out.inverse_depth, out.behind});
 }
 
 // No overflow in the edge functions: they are below 2^21 in a small face's box, and steps are up to
 // 2^15.
-HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, VisibilityBin* out) {
+template <Layer kLayer>
+HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
   const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
   const TileRect box = BoxIn(rect, face);
   if (box.x1 - box.x0 <= kStamp && box.y1 - box.y0 <= kStamp) {
-    DrawStamp(face, box, rect, out);
+    DrawStamp<kLayer>(face, box, rect, out);
     return;
   }
   for (int at = HWY_MIN(box.x0, kBinSize - lanes); at < box.x1; at += lanes) {
     const int column = HWY_MIN(at, kBinSize - lanes);
-    DrawRows<OneRow<VisibilityTag>>(
+    DrawRows<kLayer, OneRow<VisibilityTag>>(
         EdgesAt<DrawnFace>{face, rect.x0 + column - face.column_begin,
                            rect.y0 + box.y0 - face.row_begin},
-        face, {column, box.y0, box.y1, rect.x0, rect.y0, out->face, out->inverse_depth});
+        face, {column, box.y0, box.y1, rect.x0, rect.y0, out.face, out.inverse_depth, out.behind});
   }
 }
 
 // The slow way, in 128 bits, for faces that leave the guard band.
+template <Layer kLayer>
 HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
                               const TileFaceSetup& tile, const DrawnRows& at) {
   for (int i = tile.row_begin; i < tile.row_end; ++i) {
@@ -178,6 +196,7 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
       const float z =
           face.depth.At(static_cast<float>(column) + 0.5f, static_cast<float>(row) + 0.5f);
       if (!(z > at.inverse_depth[pixel])) continue;
+      if (kLayer == Layer::kPeel && !(z < at.behind[pixel])) continue;
       at.inverse_depth[pixel] = z, at.face[pixel] = face.face;
     }
   }
@@ -185,12 +204,13 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
 
 // A large face in one tile of a bin, whose arrays `rows` begins. Returns whether it covers all of
 // it.
+template <Layer kLayer>
 HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const TileRect& tile,
                          DrawnRows rows) {
   TileFaceSetup setup;
   if (!SetUpTileFace(shape, tile, &setup)) return false;
   if (!setup.guarded) {
-    DrawUnguarded(shape, face, setup, rows);
+    DrawUnguarded<kLayer>(shape, face, setup, rows);
     return false;
   }
   const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
@@ -198,8 +218,8 @@ HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const 
   for (int at = HWY_MIN(setup.column_begin, kTileSize - lanes); at < setup.column_end;
        at += lanes) {
     rows.column = HWY_MIN(at, kTileSize - lanes);
-    DrawRows<OneRow<VisibilityTag>>(EdgesAt<TileFaceSetup>{setup, rows.column, rows.begin}, face,
-                                    rows);
+    DrawRows<kLayer, OneRow<VisibilityTag>>(EdgesAt<TileFaceSetup>{setup, rows.column, rows.begin},
+                                            face, rows);
   }
   return setup.CoversTile();
 }
@@ -219,8 +239,9 @@ struct DepthFloors {
 };
 
 // Large faces go tile by tile: their exact edge functions step through a tile in 32 bits.
+template <Layer kLayer>
 HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const TileRect& rect,
-                          DepthFloors* floors, VisibilityBin* out) {
+                          DepthFloors* floors, const BinTarget& out) {
   const SnappedFace shape = SnapFaceClockwise(mesh, static_cast<std::size_t>(face.face));
   const TileRect box = BoxIn(rect, face);
   for (int y = box.y0 >> kTileBits; y << kTileBits < box.y1; ++y) {
@@ -231,17 +252,19 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const T
       const TileRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
                           HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
-      if (DrawTile(shape, face, tile,
-                   {0, 0, 0, x0, y0, out->face + first, out->inverse_depth + first})) {
-        floor = HWY_MAX(floor, face.depth.low);
-      }
+      // Of a layer that is peeled, a face that covers a tile may lie before what is asked for.
+      const bool covered = DrawTile<kLayer>(
+          shape, face, tile,
+          {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, out.behind + first});
+      if (covered && kLayer == Layer::kFirst) floor = HWY_MAX(floor, face.depth.low);
     }
   }
   floors->Update();
 }
 
-void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
-               VisibilityBin* out) {
+template <Layer kLayer>
+HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                          const BinTarget& out) {
   constexpr std::size_t kAhead = 4;  // records lie in the order of the mesh, not of the bin
   DepthFloors floors;
   for (std::size_t i = 0; i < list.indices.size(); ++i) {
@@ -253,10 +276,21 @@ void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& 
     const DrawnFace& face = record(i);
     if (face.depth.high <= floors.bin) continue;
     if (face.small != 0) {
-      DrawSmall(face, rect, out);
+      DrawSmall<kLayer>(face, rect, out);
     } else {
-      DrawLarge(mesh, face, rect, &floors, out);
+      DrawLarge<kLayer>(mesh, face, rect, &floors, out);
     }
+  }
+}
+
+// `behind` null: Layer::kFirst.
+void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+               const float* behind, VisibilityBin* out) {
+  const BinTarget target{out->face, out->inverse_depth, behind};
+  if (behind == nullptr) {
+    DrawLayer<Layer::kFirst>(mesh, list, rect, target);
+  } else {
+    DrawLayer<Layer::kPeel>(mesh, list, rect, target);
   }
 }
 

@@ -52,18 +52,32 @@ bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup
   return true;
 }
 
-void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
-                       VisibilityBin* out) {
+namespace {
+
+void DrawBin(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+             const float* behind, VisibilityBin* out) {
   const int pixels = (rect.y1 - rect.y0) * kBinSize;
   std::fill(out->face, out->face + pixels, kNoFace);
   std::fill(out->inverse_depth, out->inverse_depth + pixels, 0.0f);
-  if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, out);
+  if (!list.indices.empty()) HWY_DYNAMIC_DISPATCH(DrawFaces)(mesh, list, rect, behind, out);
   // Vectors reach beyond the image where the bin is narrower; what they saw there is nothing.
   for (int i = 0; i < rect.y1 - rect.y0 && rect.x1 - rect.x0 < kBinSize; ++i) {
     const int from = i * kBinSize + rect.x1 - rect.x0, to = (i + 1) * kBinSize;
     std::fill(out->face + from, out->face + to, kNoFace);
     std::fill(out->inverse_depth + from, out->inverse_depth + to, 0.0f);
   }
+}
+
+}  // namespace
+
+void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                       VisibilityBin* out) {
+  DrawBin(mesh, list, rect, nullptr, out);
+}
+
+void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                    const float* behind, VisibilityBin* out) {
+  DrawBin(mesh, list, rect, behind, out);
 }
 
 }  // namespace tilegrad::raster

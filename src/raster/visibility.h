@@ -30,4 +30,10 @@ struct BinDrawList {
 void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
                        VisibilityBin* out);
 
+// The same of the faces that lie behind `behind` [kBinSize][kBinSize]: a pixel sees the nearest
+// whose 1/depth is less than what stands there. Infinity lets all be seen, 0 none; the 1/depth of
+// one layer asks for the next. At one depth only one face is ever seen.
+void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+                    const float* behind, VisibilityBin* out);
+
 }  // namespace tilegrad::raster

@@ -49,6 +49,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"io", {"scene", "nn", "base"}},
     {"raster", {"scene", "base"}},
     {"shade", {"raster", "scene", "base"}},
+    {"deferred", {"raster", "scene", "base"}},
     {"render", {"shade", "raster", "scene", "base"}},
     {"api", {"render", "shade", "raster", "scene", "base"}},
     {"train", {"render", "nn", "io", "scene", "base"}},

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums of what pixels pull on rows (of vertices, of texels): the same bits for any number of
+// workers. Every band sums the rows that it meets on its own, in double and in the order of its
+// pixels; the sums of bands are then added in the order of bands.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "base/parallel.h"
+
+namespace tilegrad::deferred {
+
+class BandSums {
+ public:
+  // Rows [0, rows) of `channels` numbers; at most 2^31 - 1 rows of a band are met.
+  BandSums(std::size_t rows, std::size_t channels, std::size_t bands, const Workers& workers);
+
+  // What one band adds. While it lives, no other of the same worker does.
+  class Adder {
+   public:
+    Adder(BandSums* sums, std::size_t band, std::size_t worker);
+    ~Adder();
+    Adder(const Adder&) = delete;
+    Adder& operator=(const Adder&) = delete;
+
+    // The sum of a row so far; valid until the next call.
+    double* Row(std::size_t row);
+
+   private:
+    std::vector<std::size_t>& rows_;
+    std::vector<double>& sums_;
+    std::int32_t* slots_;
+    std::size_t channels_;
+  };
+
+  // out [n,channels] += the sums of all bands, of rows first to first + n - 1.
+  template <class T>
+  void AddTo(std::span<T> out, const Workers& workers, std::size_t first = 0) const;
+
+ private:
+  struct OfBand {
+    std::vector<std::size_t> rows;  // in the order they were met
+    std::vector<double> sums;       // [rows][channels]
+  };
+
+  std::size_t rows_, channels_;
+  std::vector<OfBand> bands_;
+  // Of each worker: 1 + where a row stands in the band at work; 0 if it was not met.
+  std::vector<AlignedVector<std::int32_t>> slots_;
+};
+
+}  // namespace tilegrad::deferred

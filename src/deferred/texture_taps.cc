@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "deferred/texture_taps.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "deferred/texture_cube.h"
+
+namespace tilegrad::deferred {
+namespace {
+
+// One axis: texels `low` and `high`, the weight of `high`, and its derivative by the coordinate.
+// Texels may be -1 or n of a cube map, which lie on the next face; kOutside holds zeros.
+constexpr int kOutside = -2;
+struct AxisTaps {
+  int low, high;
+  double weight, slope;
+};
+
+AxisTaps NearestTap(double s, int n, TextureBoundary boundary) {
+  const double x = std::floor((boundary == TextureBoundary::kWrap ? s - std::floor(s) : s) * n);
+  if (boundary == TextureBoundary::kZero && !(x >= 0 && x < n)) return {kOutside, kOutside, 0, 0};
+  const int i = static_cast<int>(std::clamp(x, 0.0, n - 1.0));
+  return {i, i, 0, 0};
+}
+
+AxisTaps Between(double x, int n) {
+  const int low = static_cast<int>(std::floor(x));
+  return {low, low + 1, x - low, static_cast<double>(n)};
+}
+
+AxisTaps WrapTaps(double s, int n) {
+  AxisTaps out = Between((s - std::floor(s)) * n - 0.5, n);
+  if (out.low < 0) out.low = n - 1;
+  if (out.high >= n) out.high = 0;
+  return out;
+}
+
+AxisTaps ClampTaps(double s, int n) {
+  const double x = s * n - 0.5;
+  if (x <= 0) return {0, 0, 0, 0};
+  if (x >= n - 1) return {n - 1, n - 1, 0, 0};
+  return Between(x, n);
+}
+
+AxisTaps ZeroTaps(double s, int n) {
+  const double x = s * n - 0.5;
+  if (!(x > -1 && x < n)) return {kOutside, kOutside, 0, 0};
+  AxisTaps out = Between(x, n);
+  if (out.low < 0) out.low = kOutside;
+  if (out.high >= n) out.high = kOutside;
+  return out;
+}
+
+AxisTaps LinearTaps(double s, int n, TextureBoundary boundary) {
+  switch (boundary) {
+    case TextureBoundary::kWrap:
+      return WrapTaps(s, n);
+    case TextureBoundary::kClamp:
+      return ClampTaps(s, n);
+    case TextureBoundary::kZero:
+      return ZeroTaps(s, n);
+    case TextureBoundary::kCube:
+      break;
+  }
+  return Between(std::clamp(s * n - 0.5, -0.5, n - 0.5), n);
+}
+
+std::ptrdiff_t TexelAt(int x, int y, int face, const MipSize& size, TextureBoundary boundary) {
+  if (x == kOutside || y == kOutside) return Taps::kNothing;
+  CubeTexel texel{face, x, y};
+  if (boundary == TextureBoundary::kCube) {
+    const bool past_x = x < 0 || x >= size.width, past_y = y < 0 || y >= size.height;
+    if (past_x && past_y) return Taps::kMean;
+    texel = AcrossEdge(texel, size.width);
+  }
+  return (static_cast<std::ptrdiff_t>(texel.face) * size.height + texel.y) * size.width + texel.x;
+}
+
+}  // namespace
+
+Taps TapsOf(const TexturePoint& point, const MipSize& size, bool nearest,
+            TextureBoundary boundary) {
+  const auto axis = nearest ? NearestTap : LinearTaps;
+  const AxisTaps x = axis(point.st[0], size.width, boundary);
+  const AxisTaps y = axis(point.st[1], size.height, boundary);
+  Taps out{{}, nearest ? 1 : 4, x.weight, y.weight, x.slope, y.slope};
+  for (int k = 0; k < out.count; ++k) {
+    out.texel[k] = TexelAt(k % 2 == 0 ? x.low : x.high, k / 2 == 0 ? y.low : y.high, point.face,
+                           size, boundary);
+  }
+  return out;
+}
+
+}  // namespace tilegrad::deferred
