@@ -9,6 +9,8 @@
 namespace tilegrad::python {
 
 void BindRenderer(py::module_& m);
+void BindCamera(py::module_& m);
+void BindShapes(py::module_& m);
 void BindKaolin(py::module_& m);
 void BindDeferred(py::module_& m);
 
@@ -24,6 +26,8 @@ PYBIND11_MODULE(_core, m) {
         "The instruction set that kernels use: AVX2, say. TILEGRAD_TARGET in the environment\n"
         "forces one.");
   BindRenderer(m);
+  BindCamera(m);
+  BindShapes(m);
   BindKaolin(m);
   BindDeferred(m);
 }

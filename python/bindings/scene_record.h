@@ -30,15 +30,18 @@ void PutLight(const v0::LightT<T>& light, std::span<T> numbers);
 
 // What Python hands over; None: not there. A leading axis of `count` numbers is each image's own.
 struct SceneArrays {
-  py::object positions, faces, cameras;         // [V,3], [F,3] int32, [17]
-  py::object colors, uvs, normals, attributes;  // [V,C], or [F,3,C] if per corner
-  std::vector<bool> per_corner;                 // of the four above
-  std::vector<py::object> textures;             // [height,width,3]
-  std::vector<int> wraps, filters;              // of textures
-  py::object surfaces;                          // [S,13]
-  std::vector<int> surface_textures;            // [S]
-  py::object face_surfaces;                     // [F] int32
-  py::object lights, light_directions, sh;      // [L,4], [V,3], [9]
+  py::object positions = py::none(), faces = py::none();  // [V,3], [F,3] int32
+  py::object cameras = py::none();                        // [17]
+  // [V,C], or [F,3,C] if per corner.
+  py::object colors = py::none(), uvs = py::none(), normals = py::none(), attributes = py::none();
+  std::vector<bool> per_corner;           // of the four above
+  std::vector<py::object> textures;       // [height,width,3]
+  std::vector<int> wraps, filters;        // of textures
+  py::object surfaces = py::none();       // [S,13]
+  std::vector<int> surface_textures;      // [S]
+  py::object face_surfaces = py::none();  // [F] int32
+  // [L,4], [V,3], [9]
+  py::object lights = py::none(), light_directions = py::none(), sh = py::none();
   int lighting = 0, normal_kind = 0;
   bool two_sided = false, clamp = false;
 };

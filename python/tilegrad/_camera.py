@@ -3,12 +3,55 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
-from tilegrad import _core
+from tilegrad import _arrays, _core
 from tilegrad._packed import Packed, Part
 
 _D = _core.CAMERA
+Parts = dict[str, np.ndarray]
+
+
+class _Rows:
+    """Arguments of a constructor as rows for C++: their leading axes are broadcast, and given back
+    to what comes out."""
+
+    def __init__(self, function: str, **arguments: tuple[Any, tuple[int, ...]]) -> None:
+        arrays = {}
+        self.lead: tuple[int, ...] = ()
+        for name, (value, shape) in arguments.items():
+            array = _arrays.contiguous(function, name, value, np.float64)
+            split = array.ndim - len(shape)
+            if split not in (0, 1) or array.shape[split:] != shape:
+                raise ValueError(f"{function}: {name} has shape {array.shape}, expected "
+                                 f"{_arrays.shape_text(shape)} or "
+                                 f"{_arrays.shape_text(('N', *shape))}")
+            try:
+                self.lead = np.broadcast_shapes(self.lead, array.shape[:split])
+            except ValueError:
+                raise ValueError(f"{function}: {name} has {array.shape[0]} cameras, expected "
+                                 f"{self.lead[0]}") from None
+            arrays[name] = (array, shape)
+        self.arrays = [self._rows(array, shape) for array, shape in arrays.values()]
+
+    def _rows(self, array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        rows = np.broadcast_to(array, self.lead + shape)
+        return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
+
+    def camera(self, numbers: np.ndarray) -> "Camera":
+        return Camera.of_numbers(numbers.reshape(self.lead + (Camera._SIZE,)))
+
+
+def _size(function: str, width: int, height: int) -> tuple[int, int]:
+    return (_arrays.as_number(function, "width", width, int),
+            _arrays.as_number(function, "height", height, int))
+
+
+def _half(function: str, pixel_centre: str) -> bool:
+    return _arrays.check_choice(function, "pixel_centre", pixel_centre, ("integer", "half")) == 1
 
 
 class Camera(Packed):
@@ -47,3 +90,166 @@ class Camera(Packed):
                  fx=_D[12], fy=_D[13], cx=_D[14], cy=_D[15], near_plane=_D[16]) -> None:
         self._pack(rotation=rotation, translation=translation, fx=fx, fy=fy, cx=cx, cy=cy,
                    near_plane=near_plane)
+
+    # Constructors. Each argument may have a leading axis N, for N cameras.
+
+    @classmethod
+    def look_at(cls, eye, target=(0, 0, 0), up=(0, 1, 0), *, fov_y: float = _core.FOV_Y,
+                width: int, height: int) -> "Camera":
+        """At `eye`, looking at `target`, with `up` upwards; world units, (3,) or (N, 3).
+
+        fov_y: degrees, the whole vertical field of view, (0, 180). Pixels are square, the principal
+            point is the middle of an image of width x height pixels.
+        """
+        rows = _Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
+        size = _size("Camera.look_at", width, height)
+        fov_y = _arrays.as_number("Camera.look_at", "fov_y", fov_y, float)
+        return rows.camera(_core.camera_look_at(fov_y, size, *rows.arrays))
+
+    @classmethod
+    def orbit(cls, azimuth, elevation, distance, *, fov_y: float = _core.FOV_Y, width: int,
+              height: int) -> "Camera":
+        """At distance * (cos el cos az, sin el, cos el sin az), looking at the origin, y up.
+
+        azimuth, elevation: degrees; distance: world units, > 0; numbers or (N,). The rest as of
+        look_at.
+        """
+        function = "Camera.orbit"
+        rows = _Rows(function, azimuth=(azimuth, ()), elevation=(elevation, ()),
+                     distance=(distance, ()))
+        size = _size(function, width, height)
+        fov_y = _arrays.as_number(function, "fov_y", fov_y, float)
+        return rows.camera(_core.camera_orbit(fov_y, size, np.hstack(rows.arrays)))
+
+    @classmethod
+    def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer") -> "Camera":
+        """OpenCV's: x right, y down, z forward.
+
+        k: (3, 3) or (N, 3, 3) intrinsic matrix, pixels, without skew.
+        rotation, translation: (3, 3), (3,) or with N, world to camera.
+        pixel_centre: "integer": the centre of the first pixel is (0, 0), as OpenCV calibrates;
+            "half": it is (0.5, 0.5), of matrices whose principal point is just width / 2.
+        """
+        function = "Camera.from_opencv"
+        rows = _Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
+                     translation=(translation, (3,)))
+        return rows.camera(_core.camera_from_opencv(*rows.arrays, _half(function, pixel_centre)))
+
+    @classmethod
+    def from_colmap(cls, quaternion, translation, fx, fy, cx, cy) -> "Camera":
+        """COLMAP's PINHOLE model, and a line of images.txt.
+
+        quaternion: (4,) or (N, 4): w, x, y, z, world to camera, of any length > 0.
+        translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,).
+        """
+        rows = _Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
+                     translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
+                     cy=(cy, ()))
+        intrinsics = np.hstack(rows.arrays[2:])
+        return rows.camera(_core.camera_from_colmap(*rows.arrays[:2], intrinsics))
+
+    @classmethod
+    def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
+        """OpenGL's perspective camera: clip = projection @ model_view @ world.
+
+        projection, model_view: (4, 4) or (N, 4, 4), for column vectors; what glGetFloatv fills is
+        the transpose. width, height: pixels of the image.
+        """
+        function = "Camera.from_opengl"
+        rows = _Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
+        size = _size(function, width, height)
+        return rows.camera(_core.camera_from_opengl(*rows.arrays, size))
+
+    @classmethod
+    def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
+        """Kaolin's and DIB-R's.
+
+        rotation: (3, 3) or (N, 3, 3); position: (3,) or (N, 3), where the camera stands;
+        projection: (3,) or (N, 3), camera_proj, its last number -1. width, height: pixels.
+        """
+        function = "Camera.from_kaolin"
+        rows = _Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
+                     projection=(projection, (3,)))
+        size = _size(function, width, height)
+        return rows.camera(_core.camera_from_kaolin(*rows.arrays, size))
+
+    @classmethod
+    def from_pytorch3d(cls, r, t, focal_length, principal_point=(0, 0), *, width: int,
+                       height: int) -> "Camera":
+        """PyTorch3D's PerspectiveCameras(in_ndc=True).
+
+        r: (3, 3) or (N, 3, 3), for row vectors; t: (3,) or (N, 3);
+        focal_length, principal_point: (2,) or (N, 2), NDC. width, height: pixels of the image.
+        """
+        function = "Camera.from_pytorch3d"
+        rows = _Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
+                     principal_point=(principal_point, (2,)))
+        size = _size(function, width, height)
+        return rows.camera(_core.camera_from_pytorch3d(*rows.arrays, size))
+
+    @classmethod
+    def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy) -> "Camera":
+        """A frame of NeRF's transforms.json.
+
+        camera_to_world: (4, 4) or (N, 4, 4), transform_matrix. fl_x, fl_y, cx, cy: pixels.
+        """
+        rows = _Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
+                     fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
+        intrinsics = np.hstack(rows.arrays[1:])
+        return rows.camera(_core.camera_from_nerf(rows.arrays[0], intrinsics))
+
+    # And back: dictionaries of the arguments of the constructors above.
+
+    def to_opencv(self, *, pixel_centre: str = "integer") -> Parts:
+        """k, rotation, translation, as from_opencv takes them."""
+        half = _half("Camera.to_opencv", pixel_centre)
+        return self._parts(_core.camera_to_opencv(self._rows(), half), k=(3, 3), rotation=(3, 3),
+                           translation=(3,))
+
+    def to_colmap(self) -> Parts:
+        """quaternion, translation, fx, fy, cx, cy, as from_colmap takes them."""
+        return self._parts(_core.camera_to_colmap(self._rows()), quaternion=(4,), translation=(3,),
+                           fx=(), fy=(), cx=(), cy=())
+
+    def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
+        """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
+        near_plane; rendering here has none."""
+        size = _size("Camera.to_opengl", width, height)
+        far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
+        return self._parts(_core.camera_to_opengl(self._rows(), size, far_plane),
+                           projection=(4, 4), model_view=(4, 4))
+
+    def to_kaolin(self, *, width: int, height: int) -> Parts:
+        """rotation, position, projection, as from_kaolin takes them. ValueError if the principal
+        point is not the middle of the image."""
+        size = _size("Camera.to_kaolin", width, height)
+        return self._parts(_core.camera_to_kaolin(self._rows(), size), rotation=(3, 3),
+                           position=(3,), projection=(3,))
+
+    def to_pytorch3d(self, *, width: int, height: int) -> Parts:
+        """r, t, focal_length, principal_point, as from_pytorch3d takes them."""
+        size = _size("Camera.to_pytorch3d", width, height)
+        return self._parts(_core.camera_to_pytorch3d(self._rows(), size), r=(3, 3), t=(3,),
+                           focal_length=(2,), principal_point=(2,))
+
+    def to_nerf(self) -> Parts:
+        """camera_to_world, fl_x, fl_y, cx, cy, as from_nerf takes them."""
+        return self._parts(_core.camera_to_nerf(self._rows()), camera_to_world=(4, 4), fl_x=(),
+                           fl_y=(), cx=(), cy=())
+
+    def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
+        """The same view on an image of another size, pixels: everything scales."""
+        numbers = _core.camera_resize(self._rows(), _size("Camera.resize", width, height),
+                                      _size("Camera.resize", to_width, to_height))
+        return Camera.of_numbers(numbers.reshape(self.numbers.shape))
+
+    def _rows(self) -> np.ndarray:
+        return np.ascontiguousarray(self.numbers, np.float64).reshape(-1, self._SIZE)
+
+    def _parts(self, rows: np.ndarray, **shapes: tuple[int, ...]) -> Parts:
+        lead, first, parts = self.numbers.shape[:-1], 0, {}
+        for name, shape in shapes.items():
+            end = first + math.prod(shape)
+            parts[name] = rows[:, first:end].reshape(lead + shape)
+            first = end
+        return parts

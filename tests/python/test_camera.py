@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cameras: where a world point lands (docs/cameras.md), there and back, batches, errors."""
+
+import unittest
+
+import numpy as np
+
+from tilegrad import Camera
+
+# The camera and the point of docs/cameras.md.
+SIZE = {"width": 640, "height": 480}
+POINT = np.array([0.4, 0.3, 0.0])
+EXPECTED = Camera(translation=(-1, 0, -4), fx=500, fy=500, cx=320, cy=240)
+
+
+def pixel(camera, point):
+    p = camera.rotation @ point + camera.translation
+    return np.array([camera.cx + camera.fx * p[0] / -p[2], camera.cy - camera.fy * p[1] / -p[2]])
+
+
+def random_cameras(count):
+    numbers = np.random.default_rng(7)
+    rotation = np.linalg.qr(numbers.normal(size=(count, 3, 3)))[0]
+    rotation *= np.sign(np.linalg.det(rotation))[:, None, None]
+    focal = numbers.uniform(200, 700, (2, count))
+    centre = numbers.uniform(200, 300, (2, count))
+    return Camera(rotation, numbers.normal(size=(count, 3)), *focal, *centre)
+
+
+class Conventions(unittest.TestCase):
+    def expect(self, camera):
+        np.testing.assert_allclose(pixel(camera, POINT), (245, 202.5), rtol=0, atol=1e-4)
+
+    def test_the_point_of_the_page(self):
+        self.expect(EXPECTED)
+        flip = np.diag([1.0, -1, -1])
+        k = [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]
+        self.expect(Camera.from_opencv(k, flip, (-1, 0, 4)))
+        k = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]
+        self.expect(Camera.from_opencv(k, flip, (-1, 0, 4), pixel_centre="half"))
+        self.expect(Camera.from_colmap((0, 1, 0, 0), (-1, 0, 4), 500, 500, 320, 240))
+        view = np.eye(4)
+        view[:3, 3] = -1, 0, -4
+        projection = np.diag([1.5625, 500 / 240, 0, 0])
+        projection[2, 2:], projection[3, 2] = (-1.02, -0.202), -1
+        self.expect(Camera.from_opengl(projection, view, **SIZE))
+        self.expect(Camera.from_kaolin(np.eye(3), (1, 0, 4), (1.5625, 500 / 240, -1), **SIZE))
+        focal = 500 / 240
+        self.expect(Camera.from_pytorch3d(np.diag([-1.0, 1, -1]), (1, 0, 4), (focal, focal),
+                                          **SIZE))
+        to_world = np.eye(4)
+        to_world[:3, 3] = 1, 0, 4
+        self.expect(Camera.from_nerf(to_world, 500, 500, 320, 240))
+        fov = np.degrees(2 * np.arctan(240 / 500))
+        self.expect(Camera.look_at((1, 0, 4), (1, 0, 0), fov_y=fov, **SIZE))
+
+    def test_orbit(self):
+        camera = Camera.orbit(30, 20, 5, fov_y=40, **SIZE)
+        eye = -camera.rotation.T @ camera.translation
+        az, el = np.radians([30, 20])
+        expected = 5 * np.array([np.cos(el) * np.cos(az), np.sin(el), np.cos(el) * np.sin(az)])
+        np.testing.assert_allclose(eye, expected, atol=1e-5)
+        np.testing.assert_allclose(pixel(camera, np.zeros(3)), (320, 240), atol=1e-3)
+        self.assertAlmostEqual(camera.fy, 240 / np.tan(np.radians(20)), places=3)
+
+    def test_there_and_back(self):
+        cameras = random_cameras(5)
+        half = {"pixel_centre": "half"}
+        ways = [
+            (lambda c: Camera.from_opencv(**c.to_opencv())),
+            (lambda c: Camera.from_opencv(**c.to_opencv(**half), **half)),
+            (lambda c: Camera.from_colmap(**c.to_colmap())),
+            (lambda c: Camera.from_opengl(**c.to_opengl(**SIZE, far_plane=100), **SIZE)),
+            (lambda c: Camera.from_pytorch3d(**c.to_pytorch3d(**SIZE), **SIZE)),
+            (lambda c: Camera.from_nerf(**c.to_nerf())),
+        ]
+        for way in ways:
+            for one in (cameras, cameras[2]):
+                back = way(one)
+                self.assertEqual(back.numbers.shape, one.numbers.shape)
+                np.testing.assert_allclose(back.numbers, one.numbers, rtol=1e-10, atol=1e-10)
+        middle = cameras.replace(cx=320, cy=240)
+        back = Camera.from_kaolin(**middle.to_kaolin(**SIZE), **SIZE)
+        np.testing.assert_allclose(back.numbers, middle.numbers, rtol=1e-10, atol=1e-10)
+
+    def test_resize(self):
+        half = EXPECTED.resize(640, 480, 320, 240)
+        np.testing.assert_allclose(pixel(half, POINT), (122.5, 101.25), atol=1e-9)
+
+
+class Batches(unittest.TestCase):
+    def test_leading_axes_are_broadcast(self):
+        cameras = Camera(translation=np.zeros((4, 3)), fx=[1, 2, 3, 4], cy=7)
+        self.assertEqual(len(cameras), 4)
+        self.assertEqual(cameras.rotation.shape, (4, 3, 3))
+        self.assertEqual(cameras.fx.tolist(), [1, 2, 3, 4])
+        self.assertEqual(cameras[1:3].fx.tolist(), [2, 3])
+        self.assertEqual(cameras[3].fx, 4)
+        eyes = np.array([(1.0, 0, 4), (0, 0, 3)])
+        both = Camera.look_at(eyes, (0, 0, 0), **SIZE)
+        for i in range(2):
+            one = Camera.look_at(eyes[i], **SIZE)
+            self.assertEqual(both[i].numbers.tolist(), one.numbers.tolist())
+        orbits = Camera.orbit([0, 90, 180], 20, 3, **SIZE)
+        self.assertEqual(len(orbits), 3)
+
+    def test_replace_keeps_the_rest(self):
+        moved = EXPECTED.replace(translation=(0, 0, -3))
+        self.assertEqual(moved.translation.tolist(), [0, 0, -3])
+        self.assertEqual(moved.fx, 500)
+        self.assertEqual(EXPECTED.translation.tolist(), [-1, 0, -4])
+
+    def test_views_write_through(self):
+        cameras = random_cameras(3)
+        cameras.translation[1] += 1
+        cameras.fx[2] = 9
+        self.assertEqual(cameras.numbers[2, 12], 9)
+
+
+class Errors(unittest.TestCase):
+    def expect(self, error, text, call):
+        with self.assertRaises(error) as caught:
+            call()
+        self.assertRegex(str(caught.exception), text)
+
+    def test_they_name_function_and_argument(self):
+        k, eye = np.diag([500.0, 500, 1]), np.eye(3)
+        self.expect(ValueError, r"^Camera: rotation has shape \(2, 2\), expected \(3, 3\)",
+                    lambda: Camera(rotation=np.eye(2)))
+        self.expect(ValueError, r"^Camera: fx has shape \(3,\), expected \(2,\)",
+                    lambda: Camera(translation=np.zeros((2, 3)), fx=[1, 2, 3]))
+        self.expect(ValueError, r"^Camera.from_opencv: k has shape \(2, 2\), expected \(3, 3\) or "
+                    r"\(N, 3, 3\)", lambda: Camera.from_opencv(np.eye(2), eye, (0, 0, 0)))
+        self.expect(ValueError, "^Camera.from_opencv: translation has 3 cameras, expected 2",
+                    lambda: Camera.from_opencv(k, np.stack([eye] * 2), np.zeros((3, 3))))
+        self.expect(ValueError, "^Camera.from_opencv: .*rotation",
+                    lambda: Camera.from_opencv(k, np.ones((3, 3)), (0, 0, 0)))
+        self.expect(ValueError, "^Camera.look_at: ",
+                    lambda: Camera.look_at((np.nan, 0, 1), **SIZE))
+        self.expect(ValueError, "^Camera.look_at: .*fov_y",
+                    lambda: Camera.look_at((0, 0, 1), fov_y=200, **SIZE))
+        self.expect(ValueError, "^Camera.orbit: .*distance", lambda: Camera.orbit(0, 0, 0, **SIZE))
+        self.expect(ValueError, "^Camera.to_kaolin: ",
+                    lambda: EXPECTED.replace(cx=3).to_kaolin(**SIZE))
+        self.expect(TypeError, "^Camera.replace: no part is called 'focal'",
+                    lambda: EXPECTED.replace(focal=3))
+        self.expect(TypeError, "^Camera: a single one has no length", lambda: len(EXPECTED))
+        self.expect(TypeError, "^Camera.look_at: width must be int",
+                    lambda: Camera.look_at((0, 0, 1), width=3.5, height=2))
+
+
+if __name__ == "__main__":
+    unittest.main()
