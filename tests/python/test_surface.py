@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the package shows: every public name is documented, stubs say what the modules have."""
+
+import ast
+import importlib
+import inspect
+import pathlib
+import pkgutil
+import unittest
+
+import tilegrad
+
+PACKAGE = pathlib.Path(tilegrad.__file__).parent
+
+
+def public_modules():
+    """Modules that can be imported here; those that need torch only where it is."""
+    for info in pkgutil.walk_packages([str(PACKAGE)], "tilegrad."):
+        if info.name.rpartition(".")[2].startswith("_"):
+            continue
+        try:
+            yield importlib.import_module(info.name)
+        except ImportError as error:
+            if error.name != "torch":
+                raise
+
+
+def stub_names(path):
+    """Names that a stub defines, and for each class its members."""
+    names, members = set(), {}
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ClassDef):
+            members[node.name] = set(defined(node.body))
+    names = set(defined(ast.parse(path.read_text()).body))
+    return names, members
+
+
+def defined(body):
+    for node in body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            yield node.name
+        elif isinstance(node, ast.AnnAssign):
+            yield node.target.id
+
+
+class Stubs(unittest.TestCase):
+    def test_they_agree_with_the_modules(self):
+        stubs = sorted(PACKAGE.glob("*.pyi"))
+        self.assertIn("_core.pyi", [path.name for path in stubs])
+        for path in stubs:
+            module = importlib.import_module(f"tilegrad.{path.stem}")
+            names, members = stub_names(path)
+            real = {name for name in vars(module) if not name.startswith("_")}
+            self.assertEqual(names - {"__version__"}, real, path.name)
+            self.assertTrue(hasattr(module, "__version__"))
+            for name, expected in members.items():
+                got = {member for member in vars(getattr(module, name))
+                       if not member.startswith("_")}
+                self.assertEqual(expected - {"__init__"}, got, f"{path.name}: {name}")
+
+    def test_the_package_is_typed(self):
+        self.assertTrue((PACKAGE / "py.typed").exists())
+
+
+class Docstrings(unittest.TestCase):
+    def documented(self, value, name):
+        self.assertTrue(inspect.getdoc(value), f"{name} has no docstring")
+
+    def test_every_public_name_has_one(self):
+        seen = 0
+        for module in [tilegrad, *public_modules()]:
+            self.documented(module, module.__name__)
+            for name in getattr(module, "__all__", []):
+                value = getattr(module, name)
+                if not callable(value):
+                    continue
+                seen += 1
+                self.documented(value, f"{module.__name__}.{name}")
+                for member in self.members(value):
+                    self.documented(getattr(value, member), f"{name}.{member}")
+        self.assertGreater(seen, 10)
+
+    @staticmethod
+    def members(value):
+        """Methods, properties and parts that a class of the package has itself or inherits."""
+        if not inspect.isclass(value):
+            return []
+        own = [vars(base) for base in value.__mro__ if base.__module__.startswith("tilegrad")]
+        return sorted({name for names in own for name in names if not name.startswith("_")
+                       and not isinstance(names[name], type(Slotted.slot))})
+
+    def test_extension_modules(self):
+        for name in ("_core", "_tools"):
+            try:
+                module = importlib.import_module(f"tilegrad.{name}")
+            except ImportError:
+                self.assertEqual(name, "_tools")  # left out of builds without the program
+                continue
+            self.documented(module, name)
+            for key, value in vars(module).items():
+                if not key.startswith("_") and callable(value):
+                    self.documented(value, f"{name}.{key}")
+
+    def test_all_lists_what_there_is(self):
+        """Nothing public is imported into the package but left out of __all__."""
+        for name, value in vars(tilegrad).items():
+            if name.startswith("_") or inspect.ismodule(value):
+                continue
+            self.assertIn(name, tilegrad.__all__)
+
+
+class Slotted:
+    """Its slot is of the type of those that are no part of an interface."""
+
+    __slots__ = ("slot",)
+
+
+if __name__ == "__main__":
+    unittest.main()
