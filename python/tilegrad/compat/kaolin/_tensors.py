@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from tilegrad._arrays import Axis, Sizes, check_shape
+from tilegrad._threads import thread_count
 
 _FLOATS = (torch.float32, torch.float64)
 
@@ -44,5 +45,6 @@ def to_numpy(tensor: torch.Tensor) -> np.ndarray:
 
 
 def threads() -> int:
-    """As many as torch uses: one in a worker of a DataLoader."""
-    return torch.get_num_threads()
+    """As many as TILEGRAD_NUM_THREADS says; where it is not set as torch uses, which is one in a
+    worker of a DataLoader."""
+    return thread_count("tilegrad.compat.kaolin", 0) or torch.get_num_threads()
