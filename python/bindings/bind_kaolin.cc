@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "bindings/arrays.h"
+#include "bindings/calls.h"
 #include "bindings/shared_workers.h"
 #include "render/projected_raster.h"
 #include "render/projected_soft_mask.h"
@@ -19,6 +19,8 @@ namespace {
 
 using py::ssize_t;
 
+constexpr char kFaces[] = "face_vertices_image";  // the argument that all functions begin with
+
 // Lengths of the axes that arrays share.
 struct Lengths {
   ssize_t images, faces;
@@ -28,42 +30,6 @@ struct Lengths {
   std::size_t n() const { return static_cast<std::size_t>(images); }
   std::size_t f() const { return static_cast<std::size_t>(faces); }
 };
-
-template <class T>
-bool IsOf(const py::array& array) {
-  return py::isinstance<py::array_t<T>>(array);
-}
-
-// call(float()) or call(double()), by the numbers of `xy`.
-template <class Call>
-auto Dispatch(const py::array& xy, const char* function, const Call& call) {
-  if (IsOf<float>(xy)) return call(float());
-  if (IsOf<double>(xy)) return call(double());
-  throw py::type_error(
-      fmt::format("{}: face_vertices_image has dtype {}, expected float32 or float64", function,
-                  py::str(xy.dtype()).cast<std::string>()));
-}
-
-template <class T>
-py::array_t<T> NewArray(std::initializer_list<ssize_t> shape) {
-  return py::array_t<T>(std::vector<ssize_t>(shape));
-}
-
-template <class T>
-std::span<T> NumbersOf(py::array_t<T>& array) {
-  return {array.mutable_data(), static_cast<std::size_t>(array.size())};
-}
-
-// Engine work, other Python threads running.
-template <class Work>
-void Run(const char* function, const Work& work) {
-  Status status;
-  {
-    const py::gil_scoped_release released;
-    status = work();
-  }
-  ThrowIfError(status.Within(function));
-}
 
 struct RasterCall {
   py::array z, features;
@@ -217,7 +183,8 @@ void BindKaolin(py::module_& m) {
          int height, int width, double eps, int threads) {
         const RasterCall call{
             std::move(z), std::move(features), std::move(valid), height, width, eps, threads};
-        return Dispatch(xy, "rasterize", [&](auto t) { return Rasterize<decltype(t)>(xy, call); });
+        return Dispatch(xy, "rasterize", kFaces,
+                        [&](auto t) { return Rasterize<decltype(t)>(xy, call); });
       },
       py::arg("face_vertices_image"), py::arg("face_vertices_z"), py::arg("face_features"),
       py::arg("valid_faces"), py::arg("height"), py::arg("width"), py::arg("eps"),
@@ -229,7 +196,7 @@ void BindKaolin(py::module_& m) {
         const RasterBackwardCall call{
             std::move(features), std::move(ids), std::move(d_image), eps, wants_xy,
             wants_features,      threads};
-        return Dispatch(xy, "rasterize's backward pass",
+        return Dispatch(xy, "rasterize's backward pass", kFaces,
                         [&](auto t) { return RasterizeBackward<decltype(t)>(xy, call); });
       },
       py::arg("face_vertices_image"), py::arg("face_features"), py::arg("face_idx"),
@@ -239,7 +206,7 @@ void BindKaolin(py::module_& m) {
       "projected_soft_mask",
       [](const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
          int threads) {
-        return Dispatch(xy, "dibr_soft_mask",
+        return Dispatch(xy, "dibr_soft_mask", kFaces,
                         [&](auto t) { return SoftMask<decltype(t)>(xy, ids, options, threads); });
       },
       py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("options"),
@@ -250,7 +217,7 @@ void BindKaolin(py::module_& m) {
          const ProjectedMaskOptions& options, int threads) {
         const MaskBackwardCall call{std::move(ids), std::move(mask), std::move(d_mask), options,
                                     threads};
-        return Dispatch(xy, "dibr_soft_mask's backward pass", [&](auto t) -> py::array {
+        return Dispatch(xy, "dibr_soft_mask's backward pass", kFaces, [&](auto t) -> py::array {
           return SoftMaskBackward<decltype(t)>(xy, call);
         });
       },

@@ -157,3 +157,51 @@ def projected_soft_mask(
 def projected_soft_mask_backward(
     face_vertices_image: np.ndarray, selected_face_idx: np.ndarray, soft_mask: np.ndarray,
     gradient: np.ndarray, options: ProjectedMaskOptions, threads: int) -> np.ndarray: ...
+
+# Of tilegrad.compat.nvdiffrast. Arrays are C-contiguous, float32 or float64, all of a call the same.
+
+TEXTURE_FILTERS: tuple[str, ...]
+TEXTURE_BOUNDARIES: tuple[str, ...]
+
+class DeferredRasterizer:
+    def __init__(self) -> None: ...
+    def rasterize(
+        self, pos: np.ndarray, tri: np.ndarray, ranges: Optional[np.ndarray], height: int,
+        width: int, peeled: Optional[np.ndarray], threads: int
+    ) -> tuple[np.ndarray, np.ndarray]: ...
+
+class InterpolateCall:
+    def __init__(self, *, tri: np.ndarray, rast: np.ndarray, rast_db: Optional[np.ndarray],
+                 diff_attrs: np.ndarray, threads: int) -> None: ...
+
+class EdgeRings:
+    def __init__(self, tri: np.ndarray) -> None: ...
+
+class TextureCall:
+    def __init__(self, *, uv: np.ndarray, uv_da: Optional[np.ndarray],
+                 mip_level_bias: Optional[np.ndarray], filter: int, boundary: int,
+                 threads: int) -> None: ...
+
+def deferred_rasterize_backward(
+    pos: np.ndarray, tri: np.ndarray, rast: np.ndarray, d_rast: Optional[np.ndarray],
+    d_rast_db: Optional[np.ndarray], threads: int) -> np.ndarray: ...
+def deferred_interpolate(
+    attr: np.ndarray, call: InterpolateCall) -> tuple[np.ndarray, np.ndarray]: ...
+def deferred_interpolate_backward(
+    attr: np.ndarray, call: InterpolateCall, d_out: np.ndarray, d_out_da: Optional[np.ndarray],
+    wanted: Sequence[bool]
+) -> tuple[Optional[np.ndarray], Optional[np.ndarray], Optional[np.ndarray]]: ...
+def deferred_antialias(
+    color: np.ndarray, rast: np.ndarray, pos: np.ndarray, tri: np.ndarray, rings: EdgeRings,
+    threads: int) -> np.ndarray: ...
+def deferred_antialias_backward(
+    color: np.ndarray, rast: np.ndarray, pos: np.ndarray, tri: np.ndarray, rings: EdgeRings,
+    gradient: np.ndarray, wanted: Sequence[bool], threads: int
+) -> tuple[Optional[np.ndarray], Optional[np.ndarray]]: ...
+def deferred_texture(levels: Sequence[np.ndarray], call: TextureCall) -> np.ndarray: ...
+def deferred_texture_backward(
+    levels: Sequence[np.ndarray], call: TextureCall, gradient: np.ndarray, wanted: Sequence[bool]
+) -> tuple[list[np.ndarray], Optional[np.ndarray], Optional[np.ndarray],
+           Optional[np.ndarray]]: ...
+def deferred_mip(tex: np.ndarray, most: int, threads: int) -> list[np.ndarray]: ...
+def deferred_mip_backward(d_levels: Sequence[np.ndarray], threads: int) -> np.ndarray: ...

@@ -3,7 +3,7 @@
 
 import torch
 
-from tilegrad.compat.kaolin._tensors import check_floats
+from tilegrad.compat._tensors import check_floats
 
 _EPS = 1e-10
 

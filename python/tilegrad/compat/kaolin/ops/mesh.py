@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import torch
 
-from tilegrad.compat.kaolin._tensors import check_floats, check_tensor
+from tilegrad.compat._tensors import check_floats, check_tensor
 
 _EPS = 1e-10  # Kaolin's, added to lengths
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import torch
 
-from tilegrad.compat.kaolin._tensors import check_floats
+from tilegrad.compat._tensors import check_floats
 
 
 def center_points(points: torch.Tensor, normalize: bool = False,

@@ -9,7 +9,7 @@ from typing import Sequence, Union
 
 import torch
 
-from tilegrad.compat.kaolin._tensors import check_floats
+from tilegrad.compat._tensors import check_floats
 
 # Clamped cosine, as factors of bands 0, 1, 2.
 _COSINE = [math.pi] + 3 * [2 * math.pi / 3] + 5 * [math.pi / 4]

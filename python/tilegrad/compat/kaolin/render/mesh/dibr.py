@@ -16,7 +16,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
-from tilegrad.compat.kaolin._tensors import check_floats, check_tensor, threads, to_numpy
+from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 from tilegrad.compat.kaolin.render.mesh.rasterization import (
     DEFAULT_MULTIPLIER, Features, check_multiplier, rasterize)
 

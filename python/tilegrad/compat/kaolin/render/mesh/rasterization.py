@@ -9,7 +9,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
-from tilegrad.compat.kaolin._tensors import check_floats, check_tensor, threads, to_numpy
+from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Features = Union[torch.Tensor, Sequence[torch.Tensor]]
 

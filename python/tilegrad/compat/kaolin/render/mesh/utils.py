@@ -8,7 +8,7 @@ from typing import Optional
 import torch
 
 from tilegrad.compat.kaolin import ops
-from tilegrad.compat.kaolin._tensors import check_floats
+from tilegrad.compat._tensors import check_floats
 from tilegrad.compat.kaolin.render import camera
 
 _MODES = ("nearest", "bilinear", "bicubic")
