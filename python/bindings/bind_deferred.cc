@@ -54,7 +54,6 @@ std::span<const T> ImageOf(const OptionalArray& image, const char* function, con
                            {like.shape(0), like.shape(1), like.shape(2), channels});
 }
 
-
 // The engine's rasterizer for any thread: who finds it at work takes one of his own.
 class DeferredRasterizer {
  public:
@@ -231,7 +230,10 @@ py::tuple AntialiasBackward(const py::array& color, const AntialiasCall& call,
 }
 
 void BindRasterize(py::module_& m) {
-  py::class_<DeferredRasterizer>(m, "DeferredRasterizer")
+  py::class_<DeferredRasterizer>(
+      m, "DeferredRasterizer",
+      "Memory that rasterizing reuses. Several threads may share one: whoever finds it at work\n"
+      "takes memory of his own.")
       .def(py::init<>())
       .def(
           "rasterize",
@@ -243,7 +245,10 @@ void BindRasterize(py::module_& m) {
                             [&](auto t) { return self.Rasterize<decltype(t)>(pos, call); });
           },
           py::arg("pos"), py::arg("tri"), py::arg("ranges"), py::arg("height"), py::arg("width"),
-          py::arg("peeled"), py::arg("threads"));
+          py::arg("peeled"), py::arg("threads"),
+          "(rast, rast_db), each [N, height, width, 4]. pos [N, V, 4], or [V, 4] with ranges\n"
+          "[N, 2]; tri [F, 3]; peeled [N, height, width] float32: only what lies behind is seen,\n"
+          "and it moves there; infinity at first.");
   m.def(
       "deferred_rasterize_backward",
       [](const py::array& pos, py::array tri, py::array rast, OptionalArray d_rast,
@@ -254,11 +259,14 @@ void BindRasterize(py::module_& m) {
                         [&](auto t) { return RasterizeBackward<decltype(t)>(pos, call); });
       },
       py::arg("pos"), py::arg("tri"), py::arg("rast"), py::arg("d_rast"), py::arg("d_rast_db"),
-      py::arg("threads"));
+      py::arg("threads"),
+      "The gradient of pos from those of rast and rast_db, either of them None.");
 }
 
 void BindInterpolate(py::module_& m) {
-  py::class_<InterpolateCall>(m, "InterpolateCall")
+  py::class_<InterpolateCall>(
+      m, "InterpolateCall",
+      "What interpolates attributes: tri [F, 3], rast and rast_db [N, H, W, 4], diff_attrs [D].")
       .def(py::init([](py::array tri, py::array rast, OptionalArray rast_db, py::array diff_attrs,
                        int threads) {
              return InterpolateCall{std::move(tri), std::move(rast), std::move(rast_db),
@@ -272,7 +280,8 @@ void BindInterpolate(py::module_& m) {
         return Dispatch(attr, "interpolate", "attr",
                         [&](auto t) { return Interpolate<decltype(t)>(attr, call); });
       },
-      py::arg("attr"), py::arg("call"));
+      py::arg("attr"), py::arg("call"),
+      "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
   m.def(
       "deferred_interpolate_backward",
       [](const py::array& attr, const InterpolateCall& call, const OptionalArray& d_out,
@@ -281,11 +290,13 @@ void BindInterpolate(py::module_& m) {
           return InterpolateBackward<decltype(t)>(attr, call, d_out, d_out_da, wanted);
         });
       },
-      py::arg("attr"), py::arg("call"), py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"));
+      py::arg("attr"), py::arg("call"), py::arg("d_out"), py::arg("d_out_da"), py::arg("wanted"),
+      "The gradients of attr, rast and rast_db, None where not wanted.");
 }
 
 void BindAntialias(py::module_& m) {
-  py::class_<deferred::EdgeRings, std::shared_ptr<deferred::EdgeRings>>(m, "EdgeRings")
+  py::class_<deferred::EdgeRings, std::shared_ptr<deferred::EdgeRings>>(
+      m, "EdgeRings", "Which triangles of tri [F, 3] share an edge.")
       .def(py::init([](const py::array& tri) {
              return std::make_shared<deferred::EdgeRings>(
                  deferred::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
@@ -300,7 +311,7 @@ void BindAntialias(py::module_& m) {
                         [&](auto t) { return Antialias<decltype(t)>(color, call); });
       },
       py::arg("color"), py::arg("rast"), py::arg("pos"), py::arg("tri"), py::arg("rings"),
-      py::arg("threads"));
+      py::arg("threads"), "color [N, H, W, C] with smooth silhouettes.");
   m.def(
       "deferred_antialias_backward",
       [](const py::array& color, py::array rast, py::array pos, py::array tri,
@@ -312,7 +323,8 @@ void BindAntialias(py::module_& m) {
         });
       },
       py::arg("color"), py::arg("rast"), py::arg("pos"), py::arg("tri"), py::arg("rings"),
-      py::arg("gradient"), py::arg("wanted"), py::arg("threads"));
+      py::arg("gradient"), py::arg("wanted"), py::arg("threads"),
+      "The gradients of color and pos, None where not wanted.");
 }
 
 }  // namespace

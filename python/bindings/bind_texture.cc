@@ -185,7 +185,10 @@ void BindTexture(py::module_& m) {
   m.attr("TEXTURE_FILTERS") =
       py::make_tuple("nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear");
   m.attr("TEXTURE_BOUNDARIES") = py::make_tuple("wrap", "clamp", "zero", "cube");
-  py::class_<TextureCall>(m, "TextureCall")
+  py::class_<TextureCall>(
+      m, "TextureCall",
+      "Lookups: uv [N, H, W, 2 or 3], uv_da twice as long, mip_level_bias [N, H, W]; filter and\n"
+      "boundary as numbers in TEXTURE_FILTERS and TEXTURE_BOUNDARIES.")
       .def(py::init([](py::array uv, OptionalArray uv_da, OptionalArray mip_level_bias, int filter,
                        int boundary, int threads) {
              return TextureCall{std::move(uv), std::move(uv_da), std::move(mip_level_bias),
@@ -199,7 +202,8 @@ void BindTexture(py::module_& m) {
         return Dispatch(call.uv, "texture", "uv",
                         [&](auto t) { return Sample<decltype(t)>(levels, call); });
       },
-      py::arg("levels"), py::arg("call"));
+      py::arg("levels"), py::arg("call"),
+      "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
   m.def(
       "deferred_texture_backward",
       [](const Levels& levels, const TextureCall& call, const py::array& gradient,
@@ -208,14 +212,16 @@ void BindTexture(py::module_& m) {
           return SampleBackward<decltype(t)>(levels, call, gradient, wanted);
         });
       },
-      py::arg("levels"), py::arg("call"), py::arg("gradient"), py::arg("wanted"));
+      py::arg("levels"), py::arg("call"), py::arg("gradient"), py::arg("wanted"),
+      "The gradients of the levels (a list, empty if not wanted), uv, uv_da and mip_level_bias.");
   m.def(
       "deferred_mip",
       [](const py::array& tex, int most, int threads) {
         return Dispatch(tex, "texture_construct_mip", "tex",
                         [&](auto t) { return ConstructMip<decltype(t)>(tex, most, threads); });
       },
-      py::arg("tex"), py::arg("most"), py::arg("threads"));
+      py::arg("tex"), py::arg("most"), py::arg("threads"),
+      "The levels below tex, at most `most` of them, or all if that is negative.");
   m.def(
       "deferred_mip_backward",
       [](Levels d_levels, int threads) {
@@ -223,7 +229,8 @@ void BindTexture(py::module_& m) {
           return MipBackward<decltype(t)>(std::move(d_levels), threads);
         });
       },
-      py::arg("d_levels"), py::arg("threads"));
+      py::arg("d_levels"), py::arg("threads"),
+      "The gradient of a texture from those of all its levels, which are overwritten.");
 }
 
 }  // namespace tilegrad::python
