@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "bindings/kernel_call.h"
+#include "bindings/calls.h"
 #include "bindings/shared_workers.h"
 #include "render/layered_raster.h"
 
@@ -36,8 +36,7 @@ py::tuple Layers(const py::array& faces, const std::vector<FaceRange>& images,
   auto bary = NewArray<T>({n, height, width, layers, 3});
   const LayeredImages<T> out{NumbersOf(ids), NumbersOf(z), NumbersOf(bary), NumbersOf(dists)};
   const Workers& workers = SharedWorkers(threads);
-  RunWithoutGil(kForward,
-                [&] { return RasterizeLayers<T>(vertices, images, options, workers, out); });
+  Run(kForward, [&] { return RasterizeLayers<T>(vertices, images, options, workers, out); });
   return py::make_tuple(ids, z, bary, dists);
 }
 
@@ -60,13 +59,12 @@ py::array_t<T> LayersBackward(const py::array& faces, const Cotangents& given,
                 {kAny, height, width, layers, 3}),
       SpanOf<T>(given.d_dists, kBackward, "the gradient of dists", shape), NumbersOf(d_vertices)};
   const Workers& workers = SharedWorkers(threads);
-  RunWithoutGil(kBackward,
-                [&] { return RasterizeLayersBackward<T>(vertices, options, workers, adjoint); });
+  Run(kBackward, [&] { return RasterizeLayersBackward<T>(vertices, options, workers, adjoint); });
   return d_vertices;
 }
 
 void BindLayeredOptions(py::module_& m) {
-  py::class_<LayeredOptions>(m, "LayeredOptions")
+  py::class_<LayeredOptions>(m, "LayeredOptions", "What rasterize_layers draws.")
       .def(py::init([](int height, int width, int faces_per_pixel, double blur_radius,
                        bool perspective_correct, bool clip_barycentrics, bool cull_backfaces) {
              return LayeredOptions{{width, height},
@@ -88,23 +86,28 @@ void BindFragments(py::module_& m) {
       "rasterize_layers",
       [](const py::array& faces, const std::vector<std::pair<std::int64_t, std::int64_t>>& images,
          const LayeredOptions& options, int threads) {
-        return ByNumbers(faces, kForward, "face_vertices", [&](auto t) {
+        return Dispatch(faces, kForward, "face_vertices", [&](auto t) {
           return Layers<decltype(t)>(faces, RangesOf(images), options, threads);
         });
       },
-      py::arg("face_vertices"), py::arg("images"), py::arg("options"), py::arg("threads"));
+      py::arg("face_vertices"), py::arg("images"), py::arg("options"), py::arg("threads"),
+      "face_vertices (F, 3, 3), images: the first face and the number of faces of each ->\n"
+      "pix_to_face (N, H, W, K) int64, zbuf (N, H, W, K), bary_coords (N, H, W, K, 3), dists\n"
+      "(N, H, W, K)");
   m.def(
       "rasterize_layers_backward",
       [](const py::array& faces, py::array ids, py::array d_z, py::array d_bary, py::array d_dists,
          const LayeredOptions& options, int threads) {
         const Cotangents given{std::move(ids), std::move(d_z), std::move(d_bary),
                                std::move(d_dists)};
-        return ByNumbers(faces, kBackward, "face_vertices", [&](auto t) -> py::array {
+        return Dispatch(faces, kBackward, "face_vertices", [&](auto t) -> py::array {
           return LayersBackward<decltype(t)>(faces, given, options, threads);
         });
       },
       py::arg("face_vertices"), py::arg("pix_to_face"), py::arg("d_zbuf"), py::arg("d_bary_coords"),
-      py::arg("d_dists"), py::arg("options"), py::arg("threads"));
+      py::arg("d_dists"), py::arg("options"), py::arg("threads"),
+      "pix_to_face and gradients in the shapes of rasterize_layers -> the gradient of\n"
+      "face_vertices (F, 3, 3)");
 }
 
 }  // namespace tilegrad::python
