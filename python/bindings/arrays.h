@@ -21,11 +21,19 @@ namespace tilegrad::python {
 
 namespace py = pybind11;
 
+// Text that may hold names from files, which are of any bytes: what is no UTF-8 is replaced.
+inline py::str Text(const std::string& bytes) {
+  const auto size = static_cast<py::ssize_t>(bytes.size());
+  PyObject* text = PyUnicode_DecodeUTF8(bytes.data(), size, "replace");
+  if (text == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(text);
+}
+
 // ValueError, FileNotFoundError, OSError, MemoryError, KeyboardInterrupt or RuntimeError, by the
 // code. Only at the border to Python, with the GIL held.
 inline void ThrowIfError(const Status& status) {
   const auto raise = [&](PyObject* type) {
-    PyErr_SetString(type, status.message().c_str());
+    PyErr_SetObject(type, Text(status.message()).ptr());
     throw py::error_already_set();
   };
   switch (status.code()) {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "bindings/camera_numbers.h"
 #include "bindings/scene_record.h"
 #include "scene/camera_conventions.h"
 
@@ -34,23 +35,6 @@ class Rows {
  private:
   std::span<const double> all_;
 };
-
-std::array<double, kCameraNumbers> NumbersOf(const Camera64& c) {
-  std::array<double, kCameraNumbers> out;
-  std::copy_n(c.rotation, 9, out.begin()), std::copy_n(c.translation, 3, out.begin() + 9);
-  const double rest[] = {c.fx, c.fy, c.cx, c.cy, c.near_plane};
-  std::copy_n(rest, 5, out.begin() + 12);
-  return out;
-}
-
-Camera64 CameraOfNumbers(const std::array<double, kCameraNumbers>& numbers) {
-  Camera64 out;
-  std::copy_n(numbers.begin(), 9, out.rotation);
-  std::copy_n(numbers.begin() + 9, 3, out.translation);
-  out.fx = numbers[12], out.fy = numbers[13], out.cx = numbers[14], out.cy = numbers[15];
-  out.near_plane = numbers[16];
-  return out;
-}
 
 // [count, 17] of make(0), make(1), ..., Results.
 template <class Make>

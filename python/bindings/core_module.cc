@@ -13,7 +13,6 @@ void BindCamera(py::module_& m);
 void BindShapes(py::module_& m);
 void BindKaolin(py::module_& m);
 void BindDeferred(py::module_& m);
-void BindFragments(py::module_& m);
 
 }  // namespace tilegrad::python
 
@@ -31,5 +30,4 @@ PYBIND11_MODULE(_core, m) {
   BindShapes(m);
   BindKaolin(m);
   BindDeferred(m);
-  BindFragments(m);
 }

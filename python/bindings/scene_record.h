@@ -5,12 +5,12 @@
 
 #include <vector>
 
+#include "bindings/camera_numbers.h"
 #include "bindings/field.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad::python {
 
-inline constexpr std::size_t kCameraNumbers = 17;   // rotation, translation, fx, fy, cx, cy, near
 inline constexpr std::size_t kSurfaceNumbers = 13;  // base, ambient, diffuse, specular, shininess
 inline constexpr std::size_t kLightNumbers = 4;     // direction, intensity
 

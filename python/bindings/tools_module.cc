@@ -6,6 +6,17 @@
 #include "bindings/arrays.h"
 #include "tilegrad/version.h"
 
+namespace tilegrad::python {
+
+void BindMeshes(py::module_& m);
+void BindImages(py::module_& m);
+void BindCameraFiles(py::module_& m);
+void BindWeights(py::module_& m);
+void BindPredictor(py::module_& m);
+void BindDataset(py::module_& m);
+
+}  // namespace tilegrad::python
+
 PYBIND11_MODULE(_tools, m) {
   using namespace tilegrad;          // NOLINT: of this function only
   using namespace tilegrad::python;  // NOLINT
@@ -13,4 +24,10 @@ PYBIND11_MODULE(_tools, m) {
       "Files, datasets and networks of tilegrad in C++; use them through the package tilegrad.";
   m.attr("__version__") = TILEGRAD_VERSION;
   ThrowIfError(ForceTargetFromEnvironment());
+  BindMeshes(m);
+  BindImages(m);
+  BindCameraFiles(m);
+  BindWeights(m);
+  BindPredictor(m);
+  BindDataset(m);
 }

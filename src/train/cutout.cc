@@ -31,8 +31,7 @@ Result<Window> FitWindow(const ImageU8& rgba) {
   if (opaque == rgba.pixels.size() / 4) {
     return InvalidArgument(
         "every pixel is opaque, so the object is not cut out; give an image with a transparent "
-        "background, or a "
-        "mask with --mask");
+        "background, or a mask");
   }
   const double side = std::max(right - left + 1, bottom - top + 1) / kTrainingFill;
   return Window{0.5 * (left + right + 1) - 0.5 * side, 0.5 * (top + bottom + 1) - 0.5 * side, side};
@@ -68,7 +67,7 @@ Sum AverageArea(const ImageU8& rgba, double x0, double y0, double side) {
 Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, Framing framing) {
   if (rgba.channels != 4)
     return InvalidArgument(
-        "the image has no alpha channel; give a cut-out with transparency, or a mask with --mask");
+        "the image has no alpha channel; give a cut-out with transparency, or a mask");
   TILEGRAD_ASSIGN(Window window, FitWindow(rgba));
   if (framing == Framing::kKeep) {
     const double side = std::max(rgba.width, rgba.height);

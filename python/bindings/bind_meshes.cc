@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mesh files, and meshes made ready for the renderer.
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "bindings/mesh_dict.h"
+#include "bindings/to_python.h"
+#include "io/glb_writer.h"
+#include "io/mesh_file.h"
+#include "render/mesh_scene.h"
+
+namespace tilegrad::python {
+
+void BindMeshes(py::module_& m);
+
+namespace {
+
+py::dict CameraToDict(const io::MeshFileCamera& from) {
+  const auto& m = from.camera.node_to_world;
+  return py::dict(
+      py::arg("name") = Text(from.name), py::arg("node_to_world") = CopyOf<double>(m, {4, 4}),
+      py::arg("yfov") = from.camera.yfov, py::arg("aspect_ratio") = from.camera.aspect_ratio,
+      py::arg("znear") = from.camera.znear);
+}
+
+py::dict LoadMesh(const Path& path) {
+  auto loaded = ValueOrThrow(WithoutGil([&] { return io::LoadMesh(path); }));
+  py::dict out = MeshToDict(std::move(loaded.mesh));
+  py::list warnings, cameras;
+  for (const std::string& warning : loaded.warnings) warnings.append(Text(warning));
+  for (const io::MeshFileCamera& camera : loaded.cameras) cameras.append(CameraToDict(camera));
+  out["warnings"] = warnings;
+  out["cameras"] = cameras;
+  return out;
+}
+
+void SaveMesh(const Path& path, const py::dict& dict) {
+  const Mesh mesh = MeshFromDict("save_mesh", dict);
+  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh).Within(path.string()); }));
+}
+
+constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};
+constexpr const char* kWraps[] = {"repeat", "clamp", "mirror"};
+constexpr const char* kFilters[] = {"nearest", "bilinear", "trilinear"};
+
+py::object Stream(const AttributeStreamT<float>& stream, py::ssize_t channels) {
+  if (stream.values.empty()) return py::none();
+  const auto count = static_cast<py::ssize_t>(stream.values.size()) / channels;
+  if (stream.rate == AttributeRate::kVertex) return CopyOf(stream.values, {count, channels});
+  return CopyOf(stream.values, {count / 3, 3, channels});
+}
+
+py::list SurfaceList(std::span<const Surface> surfaces) {
+  py::list out;
+  for (const Surface& s : surfaces) {
+    out.append(py::dict(py::arg("base_color") = s.base_color, py::arg("texture") = s.texture,
+                        py::arg("ambient") = s.ambient, py::arg("diffuse") = s.diffuse,
+                        py::arg("specular") = s.specular, py::arg("shininess") = s.shininess));
+  }
+  return out;
+}
+
+py::list TextureList(std::span<const shade::TextureView> textures) {
+  py::list out;
+  for (const shade::TextureView& t : textures) {
+    out.append(py::dict(py::arg("texels") = CopyOf(t.texels, {t.height, t.width, t.channels}),
+                        py::arg("wrap") = kWraps[static_cast<std::size_t>(t.wrap)],
+                        py::arg("filter") = kFilters[static_cast<std::size_t>(t.filter)]));
+  }
+  return out;
+}
+
+// The parts of a scene that come from the mesh, in the words of include/tilegrad/scene.h.
+py::dict SceneOfMesh(const py::dict& dict, bool linear, const std::string& normals) {
+  const Mesh mesh = MeshFromDict("Mesh.scene", dict);
+  ThrowIfError(Validate(mesh).Within("Mesh.scene"));
+  if (mesh.faces.empty()) throw py::value_error("Mesh.scene: the mesh has no face");
+  MeshSceneOptions options;
+  options.color_space = linear ? ColorSpace::kLinear : ColorSpace::kSrgb;
+  options.normals = normals == "smooth" ? NormalSource::kSmooth
+                    : normals == "flat" ? NormalSource::kFlat
+                                        : NormalSource::kAuto;
+  const MeshScene made(mesh, options);
+  const ShadedScene& scene = made.scene();
+  py::dict out;
+  out["colors"] = Stream(scene.colors, 3);
+  out["uvs"] = Stream(scene.uvs, 2);
+  out["normals"] = Stream(scene.normals, 3);
+  out["textures"] = TextureList(scene.textures);
+  out["surfaces"] = SurfaceList(scene.surfaces);
+  out["normal_kind"] = kNormalKinds[static_cast<std::size_t>(scene.model.normals)];
+  out["single_sided"] = made.single_sided();
+  return out;
+}
+
+}  // namespace
+
+void BindMeshes(py::module_& m) {
+  m.def("load_mesh", &LoadMesh, py::arg("path"), "The arrays of a mesh file.");
+  m.def("save_mesh", &SaveMesh, py::arg("path"), py::arg("mesh"), "Writes a .glb file.");
+  m.def("mesh_endings", &io::MeshFileEndings, "Endings of files that load_mesh reads.");
+  m.def("scene_of_mesh", &SceneOfMesh, py::arg("mesh"), py::arg("linear"), py::arg("normals"),
+        "The parts of a scene that come from a mesh; normals: \"auto\", \"smooth\" or \"flat\".");
+}
+
+}  // namespace tilegrad::python

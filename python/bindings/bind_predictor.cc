@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// A trained network that predicts meshes from images.
+#include <pybind11/stl/filesystem.h>
+
+#include <memory>
+#include <mutex>
+
+#include "bindings/mesh_dict.h"
+#include "bindings/to_python.h"
+#include "train/cutout.h"
+#include "train/models/predictor.h"
+
+namespace tilegrad::python {
+
+void BindPredictor(py::module_& m);
+
+namespace {
+
+ImageU8 ImageFromPython(const char* argument, const py::object& pixels) {
+  const auto values = SpanOf<std::uint8_t>(pixels, "prepare", argument, {kAny, kAny, kAny});
+  const auto array = py::reinterpret_borrow<py::array>(pixels);
+  ImageU8 image(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
+                static_cast<int>(array.shape(2)));
+  std::copy(values.begin(), values.end(), image.pixels.begin());
+  return image;
+}
+
+// image: [height,width,4], or any number of channels with a mask [height,width,channels].
+py::array PrepareCutout(const py::object& image, const py::object& mask, int size,
+                        bool keep_framing) {
+  ImageU8 cutout = ImageFromPython("image", image);
+  if (!mask.is_none())
+    cutout = ValueOrThrow(train::WithMask(cutout, ImageFromPython("mask", mask)));
+  const auto framing = keep_framing ? train::Framing::kKeep : train::Framing::kFit;
+  auto planar =
+      ValueOrThrow(WithoutGil([&] { return train::PrepareCutout(cutout, size, framing); }));
+  return OwnedArray<std::uint8_t>(std::move(planar), {4, size, size});
+}
+
+// The predictor with the workers that it refers to; one call at a time.
+class Model {
+ public:
+  static std::unique_ptr<Model> Load(const Path& path, int threads) {
+    auto workers = std::make_unique<Workers>(threads);
+    auto predictor =
+        ValueOrThrow(WithoutGil([&] { return train::Predictor::Load(path, *workers); }));
+    return std::unique_ptr<Model>(new Model(std::move(workers), std::move(predictor)));
+  }
+
+  int image_size() const { return predictor_.image_size(); }
+  py::str description() const { return Text(predictor_.description()); }
+  py::dict TemplateMesh() const { return MeshToDict(predictor_.template_mesh()); }
+
+  // images: [N,4,size,size].
+  py::list Predict(const py::object& images) {
+    const int size = predictor_.image_size();
+    const auto bytes = SpanOf<std::uint8_t>(images, "predict", "images", {kAny, 4, size, size});
+    auto meshes = ValueOrThrow(WithoutGil([&] {
+      const std::scoped_lock lock(mutex_);
+      return predictor_.Predict(bytes);
+    }));
+    py::list out;
+    for (Mesh& mesh : meshes) out.append(MeshToDict(std::move(mesh)));
+    return out;
+  }
+
+ private:
+  Model(std::unique_ptr<Workers> workers, train::Predictor predictor)
+      : workers_(std::move(workers)), predictor_(std::move(predictor)) {}
+
+  std::unique_ptr<Workers> workers_;
+  train::Predictor predictor_;
+  std::mutex mutex_;
+};
+
+}  // namespace
+
+void BindPredictor(py::module_& m) {
+  m.def("prepare_cutout", &PrepareCutout, py::arg("image"), py::arg("mask"), py::arg("size"),
+        py::arg("keep_framing"), "(4, size, size) uint8 of a picture (H, W, C) uint8.");
+  py::class_<Model>(m, "Model", "A trained network.")
+      .def(py::init(&Model::Load), py::arg("path"), py::arg("threads"),
+           "path: of a run folder or a checkpoint.")
+      .def_property_readonly("image_size", &Model::image_size, "Pixels a side.")
+      .def_property_readonly("description", &Model::description, "For people.")
+      .def("template_mesh", &Model::TemplateMesh, "The sphere.")
+      .def("predict", &Model::Predict, py::arg("images"),
+           "Meshes of images (N, 4, size, size) uint8.");
+}
+
+}  // namespace tilegrad::python

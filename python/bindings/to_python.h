@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What C++ made, handed to Python; and long work without the GIL.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "bindings/arrays.h"
+
+namespace tilegrad::python {
+
+// The numbers of `values`, a vector of T or of records that hold nothing but T, as an array of
+// `shape`.
+template <class T, class Vector>
+py::array OwnedArray(Vector values, std::vector<py::ssize_t> shape) {
+  auto owner = std::make_unique<Vector>(std::move(values));
+  const void* data = owner->data();
+  const py::capsule base(owner.get(), [](void* p) { delete static_cast<Vector*>(p); });
+  owner.release();  // the capsule's from here on
+  return py::array(py::dtype::of<T>(), std::move(shape), data, base);
+}
+
+// What `work` returns; other threads of Python run meanwhile. `work` touches no Python object.
+template <class Work>
+auto WithoutGil(const Work& work) {
+  const py::gil_scoped_release release;
+  return work();
+}
+
+}  // namespace tilegrad::python

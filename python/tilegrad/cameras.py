@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of cameras: COLMAP, NeRF, OpenCV. Cameras of those programs in arrays, and of OpenGL,
+Kaolin and PyTorch3D, become a `tilegrad.Camera` by its own from_... and to_..."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any, Iterable, Optional, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _tools
+from tilegrad._camera import Camera
+
+Path = Union[str, "os.PathLike[str]"]
+
+_CENTRES = ("integer", "half")
+_FORMATS = ("opencv", "nerf", "colmap")
+
+
+@dataclasses.dataclass
+class View:
+    """A camera of a file: its name, and the size of its image in pixels."""
+
+    name: str
+    camera: Camera
+    width: int
+    height: int
+
+
+def load_cameras(path: Path, *, width: int = 0, height: int = 0,
+                 opencv_centre: str = "integer") -> list[View]:
+    """The cameras of a COLMAP folder (cameras and images, .txt or .bin), of NeRF's transforms.json,
+    or of a JSON file with OpenCV's K (docs/cameras.md).
+
+    width, height: of the images, pixels, where the file does not say. opencv_centre: "integer" or
+    "half", as pixel_centre of `Camera.from_opencv`.
+    OSError, ValueError: name the file, and the line or frame. Lens distortion is refused.
+    """
+    half = _arrays.check_choice("load_cameras", "opencv_centre", opencv_centre, _CENTRES) == 1
+    views = _tools.load_cameras(os.fspath(path), (width, height), half)
+    return [View(name, Camera.of_numbers(numbers), *size) for name, numbers, size in views]
+
+
+def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = None) -> None:
+    """Writes what `load_cameras` reads, whole or not at all.
+
+    format: "opencv" or "nerf", a JSON file, or "colmap", a folder of text files. Default: "opencv"
+    for a path that ends in .json, else "colmap".
+    """
+    if format is None:
+        format = "opencv" if os.fspath(path).endswith(".json") else "colmap"
+    _arrays.check_choice("save_cameras", "format", format, _FORMATS)
+    _tools.save_cameras(os.fspath(path), format,
+                        [(view.name, _numbers(view.camera), (view.width, view.height))
+                         for view in views])
+
+
+def rotation_from_vector(rvec: Any) -> np.ndarray:
+    """(3, 3) from OpenCV's rotation vector (3,), axis times angle in radians, as solvePnP has
+    it."""
+    return _tools.rotation_from_vector(
+        _arrays.as_array("rotation_from_vector", "rvec", rvec, np.float64, (3,)))
+
+
+def _numbers(camera: Camera) -> np.ndarray:
+    if not isinstance(camera, Camera) or camera.numbers.ndim != 1:
+        raise TypeError("save_cameras: each view's camera must be a single Camera")
+    return camera.numbers

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images from files and to files, as arrays (height, width, channels), row 0 on top."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _tools
+
+Path = Union[str, "os.PathLike[str]"]
+
+_CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}  # of EXR
+
+
+def load_image(path: Path) -> np.ndarray:
+    """Reads an image.
+
+    PNG, JPEG, BMP, TGA, PNM: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
+    float32, of its channels R, G, B, A or Y, A or the only one there is. NPY: the array as it is.
+    OSError, ValueError: name the file and what is wrong with it.
+    """
+    ending = _ending(path)
+    if ending == ".npy":
+        return _tools.load_npy(os.fspath(path))
+    if ending != ".exr":
+        return _tools.load_image(os.fspath(path))
+    layers = load_layers(path)
+    names = list(layers) if len(layers) == 1 else next(
+        (names for names in reversed(_CHANNELS.values()) if set(names) <= set(layers)), None)
+    if names is None:
+        raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} are no picture; "
+                         f"load_layers reads them")
+    return np.stack([layers[name] for name in names], axis=-1)
+
+
+def load_layers(path: Path) -> dict[str, np.ndarray]:
+    """Every channel of an EXR image by its name, (H, W) float32."""
+    names, planes = _tools.load_exr(os.fspath(path))
+    return dict(zip(names, planes))
+
+
+def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
+    """Writes an image, whole or not at all; its format follows the ending.
+
+    .png: 8 bits; real numbers 0 to 1 become 0 to 255, what is beyond is cut. .exr: float32, every
+    bit. .npy: the array as it is, of any shape.
+    image: (H, W) or (H, W, 1 to 4); with planar (1 to 4, H, W), as renders are.
+    ValueError: another ending, shape, or a number that is not finite (PNG). OSError: not written.
+    """
+    ending = _ending(path)
+    if ending == ".npy":
+        array = np.asarray(image)
+        return _tools.save_npy(os.fspath(path), np.ascontiguousarray(array).reshape(array.shape))
+    if ending not in (".png", ".exr"):
+        raise ValueError(f"save_image: {os.fspath(path)!r} must end in .png, .exr or .npy")
+    if ending == ".png":
+        return _tools.save_png(os.fspath(path), as_bytes("save_image", "image", image, planar))
+    pixels = _pixels("save_image", "image", image, planar)
+    planes = np.ascontiguousarray(np.moveaxis(pixels, -1, 0), np.float32)
+    return _tools.save_exr(os.fspath(path), _CHANNELS[pixels.shape[-1]], planes)
+
+
+def save_layers(path: Path, layers: dict[str, Any]) -> None:
+    """Writes an EXR image of channels by name, (H, W) each: R, G, B, A, Z and others."""
+    if not layers:
+        raise ValueError("save_layers: no layer")
+    sizes: dict[str, int] = {}
+    planes = [_arrays.as_array("save_layers", name, plane, np.float32, ("H", "W"), sizes)
+              for name, plane in layers.items()]
+    _tools.save_exr(os.fspath(path), list(layers), np.stack(planes))
+
+
+def _ending(path: Path) -> str:
+    return os.path.splitext(os.fspath(path))[1].lower()
+
+
+def _pixels(function: str, argument: str, image: Any, planar: bool = False) -> np.ndarray:
+    """(H, W, C) of numbers."""
+    array = np.asarray(image)
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{function}: {argument} has dtype {array.dtype}, expected numbers")
+    if array.ndim == 2:
+        return array[..., None]
+    if array.ndim == 3 and planar:
+        array = np.moveaxis(array, 0, -1)
+    if array.ndim != 3 or array.shape[-1] not in _CHANNELS:
+        expected = "(1 to 4, H, W)" if planar else "(H, W) or (H, W, 1 to 4)"
+        raise ValueError(f"{function}: {argument} has shape {np.shape(image)}, expected {expected}")
+    return array
+
+
+def as_bytes(function: str, argument: str, image: Any, planar: bool = False) -> np.ndarray:
+    """(H, W, C) uint8 from uint8, bool, or real numbers of which [0, 1] becomes [0, 255]."""
+    pixels = _pixels(function, argument, image, planar)
+    if pixels.dtype == bool:
+        pixels = pixels * np.uint8(255)
+    if pixels.dtype.kind == "f":
+        if not np.isfinite(pixels).all():
+            raise ValueError(f"{function}: {argument} has numbers that are not finite")
+        pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+    if pixels.dtype != np.uint8:
+        raise TypeError(f"{function}: {argument} has dtype {pixels.dtype}, expected uint8, bool or "
+                        f"floating point")
+    return np.ascontiguousarray(pixels)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes from files and to files, as arrays that go into a `tilegrad.Scene`.
+
+    mesh = load_mesh("chair.glb")
+    frame = tilegrad.Renderer().render(mesh.scene(camera), width=256, height=256)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _tools
+from tilegrad._camera import Camera
+from tilegrad._scene import Scene, Surface, Texture
+
+Path = Union[str, "os.PathLike[str]"]
+
+_COLOR_SPACES = ("srgb", "linear")
+_NORMALS = ("auto", "smooth", "flat")
+
+
+@dataclasses.dataclass
+class Material:
+    """How faces are drawn. Colours are encoded as in image files (sRGB).
+
+    base_color: r, g, b, a, 0 to 1; multiplies the texture. texture: index into Mesh.textures, -1:
+    none. wrap: "repeat", "mirror" or "clamp". nearest: texels as squares. alpha_mode: "opaque",
+    "mask" or "blend". double_sided: False: viewers do not draw back faces. unlit: the colour is
+    shown as it is, whatever the light.
+    """
+
+    name: str = ""
+    base_color: tuple[float, float, float, float] = (0.8, 0.8, 0.8, 1.0)
+    texture: int = -1
+    wrap: str = "repeat"
+    nearest: bool = False
+    alpha_mode: str = "opaque"
+    double_sided: bool = True
+    unlit: bool = False
+
+
+@dataclasses.dataclass(repr=False)
+class MeshTexture:
+    """An image on a mesh: (height, width, 3 or 4) uint8, row 0 on top is v = 1."""
+
+    name: str
+    image: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"<tilegrad MeshTexture {self.name!r}: {' x '.join(map(str, self.image.shape))}>"
+
+
+@dataclasses.dataclass
+class MeshCamera:
+    """A perspective camera that a glTF file holds: node_to_world (4, 4) float64, OpenGL's axes;
+    yfov: radians, the whole vertical field of view; aspect_ratio: of the field of view, 0: that of
+    the image; znear: world units."""
+
+    name: str
+    node_to_world: np.ndarray
+    yfov: float
+    aspect_ratio: float
+    znear: float
+
+    def camera(self, width: int, height: int) -> Camera:
+        """For an image of that size in pixels."""
+        return Camera.of_numbers(_tools.from_gltf(
+            np.ravel(self.node_to_world), (self.yfov, self.aspect_ratio, self.znear),
+            (width, height)))
+
+
+@dataclasses.dataclass(eq=False, repr=False)
+class Mesh:
+    """A triangle mesh: V vertices, F faces; None where there is nothing.
+
+    positions: (V, 3) float32. faces: (F, 3) int32; counter-clockwise seen from outside.
+    normals: (V, 3) float32, unit. colors: (V, 4) or (V, 3) float32, 0 to 1, sRGB.
+    corner_uvs: (F, 3, 2) float32, for the corners of faces; (0, 0) is the lower left corner of the
+        texture. corner_normals: (F, 3, 3) float32.
+    face_materials: (F,) int32, indices into materials; all 0 if None.
+    warnings: what a file lacked, and what stands in for it. cameras: those of a glTF file.
+    """
+
+    positions: np.ndarray
+    faces: np.ndarray
+    normals: Optional[np.ndarray] = None
+    colors: Optional[np.ndarray] = None
+    corner_uvs: Optional[np.ndarray] = None
+    corner_normals: Optional[np.ndarray] = None
+    face_materials: Optional[np.ndarray] = None
+    materials: list[Material] = dataclasses.field(default_factory=list)
+    textures: list[MeshTexture] = dataclasses.field(default_factory=list)
+    warnings: list[str] = dataclasses.field(default_factory=list)
+    cameras: list[MeshCamera] = dataclasses.field(default_factory=list)
+
+    def scene_arguments(self, *, color_space: str = "srgb", normals: str = "auto") -> dict[str, Any]:
+        """What a `Scene` has to be told beside positions, faces, camera and light, by argument:
+        colours, uvs, textures, surfaces, normals.
+
+        color_space: "srgb": colours are the numbers of the file, as training takes them; "linear":
+            they are decoded, as viewers do, so that the picture has to be encoded in the end.
+        normals: "auto" (the mesh's own; flat if it has none), "smooth" or "flat".
+        ValueError: what Mesh says of shapes does not hold, or an index is out of range.
+        """
+        linear = _arrays.check_choice("Mesh.scene", "color_space", color_space, _COLOR_SPACES) == 1
+        _arrays.check_choice("Mesh.scene", "normals", normals, _NORMALS)
+        made = _tools.scene_of_mesh(self._checked("Mesh.scene"), linear, normals)
+        kind = made["normal_kind"]
+        arguments = {"colors": made["colors"], "uvs": made["uvs"],
+                     "normals": made["normals"] if kind == "given" else kind,
+                     "textures": [Texture(**texture) for texture in made["textures"]] or None,
+                     "surfaces": [Surface(**surface) for surface in made["surfaces"]],
+                     "face_surfaces": self.face_materials, "two_sided": True}
+        per_corner = [name for name in ("uvs", "normals")
+                      if getattr(arguments[name], "ndim", 2) == 3]
+        return {**arguments, "per_corner": tuple(per_corner)}
+
+    def scene(self, camera: Camera, *, color_space: str = "srgb", normals: str = "auto",
+              **arguments: Any) -> Scene:
+        """A scene of this mesh. color_space, normals: as of `scene_arguments`; further arguments
+        are the Scene's own (lighting, lights, ...) and go before the mesh's."""
+        own = self.scene_arguments(color_space=color_space, normals=normals)
+        return Scene(self.positions, self.faces, camera, **{**own, **arguments})
+
+    def __repr__(self) -> str:
+        parts = [name for name in ("normals", "colors", "corner_uvs", "corner_normals")
+                 if getattr(self, name) is not None]
+        return (f"<tilegrad Mesh: {len(self.positions)} vertices, {len(self.faces)} faces, "
+                f"{len(self.materials)} materials, {len(self.textures)} textures"
+                f"{''.join(', ' + name for name in parts)}>")
+
+    def _checked(self, function: str) -> dict[str, Any]:
+        """As a dictionary for C++, all arrays of the right dtype."""
+        sizes: dict[str, int] = {}
+
+        def array(name: str, dtype: Any, *shape: Union[str, int]) -> Optional[np.ndarray]:
+            value = getattr(self, name)
+            return None if value is None else _arrays.as_array(function, name, value, dtype, shape,
+                                                               sizes)
+
+        out = {"positions": array("positions", np.float32, "V", 3),
+               "faces": array("faces", np.int32, "F", 3),
+               "normals": array("normals", np.float32, "V", 3),
+               "corner_uvs": array("corner_uvs", np.float32, "F", 3, 2),
+               "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
+               "face_materials": array("face_materials", np.int32, "F")}
+        out["colors"] = self._rgba(function, sizes)
+        out["materials"] = [dataclasses.asdict(material) for material in self.materials]
+        out["textures"] = [{"name": t.name, "image": _arrays.as_array(
+            function, f"textures[{i}].image", t.image, np.uint8, ("height", "width", "3 or 4")
+            if np.ndim(t.image) != 3 else np.shape(t.image))} for i, t in enumerate(self.textures)]
+        return out
+
+    def _rgba(self, function: str, sizes: dict[str, int]) -> Optional[np.ndarray]:
+        if self.colors is None:
+            return None
+        channels = 3 if np.shape(self.colors)[-1:] == (3,) else 4
+        colors = _arrays.as_array(function, "colors", self.colors, np.float32, ("V", channels),
+                                  sizes)
+        if channels == 4:
+            return colors
+        return np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
+
+
+def load_mesh(path: Path) -> Mesh:
+    """Reads a mesh: glTF and GLB with materials and textures, OBJ with MTL, PLY, OFF, STL, AC3D,
+    3DS, Collada, FBX and others (`mesh_endings`). All parts are merged, polygons split.
+
+    OSError, ValueError: name the file, the place in it and what to do. A missing texture is a
+    warning of the mesh.
+    """
+    return mesh_of_dict(_tools.load_mesh(os.fspath(path)))
+
+
+def save_mesh(path: Path, mesh: Mesh) -> None:
+    """Writes a binary glTF 2.0 file (.glb), which every viewer opens; whole or not at all."""
+    if not os.fspath(path).lower().endswith(".glb"):
+        raise ValueError(f"save_mesh: {os.fspath(path)!r} must end in .glb, the format that is "
+                         f"written")
+    _tools.save_mesh(os.fspath(path), mesh._checked("save_mesh"))
+
+
+def mesh_endings() -> list[str]:
+    """The endings of file names that `load_mesh` reads."""
+    return _tools.mesh_endings().split(", ")
+
+
+def mesh_of_dict(arrays: dict[str, Any]) -> Mesh:
+    """From the form in which C++ hands meshes over."""
+    parts = dict(arrays)
+    parts["materials"] = [Material(**material) for material in arrays["materials"]]
+    parts["textures"] = [MeshTexture(**texture) for texture in arrays["textures"]]
+    parts["cameras"] = [MeshCamera(**camera) for camera in arrays.get("cameras", ())]
+    return Mesh(**parts)

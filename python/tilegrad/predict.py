@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes from images, by a network that `tilegrad train` has trained.
+
+    predictor = Predictor("runs/demo")
+    mesh = predictor.predict(load_image("chair.png"))      # a cut-out: RGBA
+    save_mesh("chair.glb", mesh)
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Union
+
+import numpy as np
+
+from tilegrad import _arrays, _tools
+from tilegrad._threads import thread_count
+from tilegrad.images import as_bytes
+from tilegrad.meshes import Mesh, mesh_of_dict
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+class Predictor:
+    """A trained network. Does what `tilegrad predict` does, to the bit.
+
+    Calls from several Python threads wait for each other. Can be pickled (as its path); in a forked
+    process it is loaded again at the first call, with one thread.
+
+    path: a run folder, whose newest whole checkpoint is taken, or one checkpoint.
+    threads: as of `tilegrad.Renderer`; the result does not depend on it.
+    OSError, ValueError: name the file and what is wrong.
+    """
+
+    def __init__(self, path: Path, threads: int = 0) -> None:
+        self._path = os.fspath(path)
+        self._threads = thread_count("Predictor", threads)
+        self._load(self._threads)
+
+    def _load(self, threads: int) -> None:
+        self._loaded = _tools.Model(self._path, threads)
+        self._process = os.getpid()
+
+    def _model(self) -> "_tools.Model":
+        if self._process != os.getpid():  # the threads stayed in the other process
+            self._load(1)
+        return self._loaded
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Predictor, (self._path, self._threads)
+
+    @property
+    def image_size(self) -> int:
+        """Side of the square images that the network sees, pixels."""
+        return self._loaded.image_size
+
+    @property
+    def description(self) -> str:
+        """The network, its number of parameters, and the step that it was trained to."""
+        return self._loaded.description
+
+    def template(self) -> Mesh:
+        """The sphere that predictions are deformed from."""
+        return mesh_of_dict(self._loaded.template_mesh())
+
+    def prepare(self, image: Any, mask: Any = None, *, keep_framing: bool = False) -> np.ndarray:
+        """What the network sees of a picture: (4, size, size) uint8, RGB over black and alpha.
+
+        image: (H, W, 4), an object cut out by its alpha; or any picture with a mask. uint8, or real
+            numbers from 0 to 1. mask: (H, W), white is the object.
+        keep_framing: only resize: the picture is framed like a training image already. Otherwise
+            the object is moved to the middle and scaled as training images show theirs.
+        ValueError: no alpha and no mask, nothing or everything opaque, sizes that differ.
+        """
+        pixels = as_bytes("prepare", "image", image)
+        cutout = None if mask is None else as_bytes("prepare", "mask", mask)
+        return _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))
+
+    def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False) -> Mesh:
+        """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
+        half-extent is 0.45, its middle the origin."""
+        prepared = self.prepare(image, mask, keep_framing=keep_framing)
+        return self.predict_prepared(prepared[None])[0]
+
+    def predict_prepared(self, images: Any) -> list[Mesh]:
+        """The meshes of N pictures (N, 4, size, size) uint8, as `prepare` and datasets have them.
+        All have the faces of the template."""
+        size = self.image_size
+        array = _arrays.as_array("predict_prepared", "images", images, np.uint8,
+                                 ("N", 4, size, size))
+        return [mesh_of_dict(mesh) for mesh in self._model().predict(array)]
+
+    def __repr__(self) -> str:
+        return f"<tilegrad Predictor: {self.description}>"

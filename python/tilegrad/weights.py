@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Weights of networks, as arrays by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any, Mapping, Optional, Union
+
+import numpy as np
+
+from tilegrad import _tools
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+class Weights(dict[str, np.ndarray]):
+    """Arrays by name, and the texts that a safetensors file holds beside them."""
+
+    def __init__(self, arrays: Mapping[str, np.ndarray] = {},
+                 metadata: Optional[Mapping[str, str]] = None) -> None:
+        super().__init__(arrays)
+        self.metadata: dict[str, str] = dict(metadata or {})
+
+
+def load_weights(path: Path) -> Weights:
+    """Reads a .safetensors or .npz file. OSError, ValueError: name the file and what is wrong."""
+    ending = _ending("load_weights", path)
+    if ending == ".npz":
+        return Weights(_tools.load_npz(os.fspath(path)))
+    return Weights(*_tools.load_safetensors(os.fspath(path)))
+
+
+def save_weights(path: Path, weights: Mapping[str, Any],
+                 metadata: Optional[Mapping[str, str]] = None) -> None:
+    """Writes a .safetensors or .npz file, whole or not at all.
+
+    weights: arrays by name; safetensors: at most five axes of float32, float64, uint8, int32 or
+    int64. metadata: texts, safetensors only; by default those of `Weights`.
+    """
+    arrays = {name: _plain(value) for name, value in weights.items()}
+    if metadata is None:
+        metadata = getattr(weights, "metadata", {})
+    if _ending("save_weights", path) == ".npz":
+        if metadata:
+            raise ValueError("save_weights: an .npz file holds no metadata; save .safetensors")
+        return _tools.save_npz(os.fspath(path), arrays)
+    return _tools.save_safetensors(os.fspath(path), arrays, dict(metadata))
+
+
+@dataclasses.dataclass
+class Checkpoint:
+    """A state of a training run. step: steps done; image_size: pixels; config: TOML; seconds:
+    trained so far; weights: every weight, statistic and moment by name; warnings: newer files of
+    the run that could not be read."""
+
+    file: str
+    step: int
+    image_size: int
+    config: str
+    seconds: float
+    weights: Weights
+    warnings: list[str]
+
+
+def load_checkpoint(path: Path) -> Checkpoint:
+    """Reads a checkpoint of `tilegrad train`: one file, or the newest whole one of a run folder.
+    OSError, ValueError: name the file and what is wrong."""
+    found = _tools.load_checkpoint(os.fspath(path))
+    found["weights"] = Weights(found.pop("tensors"))
+    found["file"] = os.fspath(found["file"])
+    return Checkpoint(**found)
+
+
+def _ending(function: str, path: Path) -> str:
+    ending = os.path.splitext(os.fspath(path))[1].lower()
+    if ending not in (".safetensors", ".npz"):
+        raise ValueError(f"{function}: {os.fspath(path)!r} must end in .safetensors or .npz")
+    return ending
+
+
+def _plain(value: Any) -> np.ndarray:
+    array = np.asarray(value)
+    return np.ascontiguousarray(array).reshape(array.shape)  # keeps arrays without axes

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small files for tests: made here, or by the program where it was built."""
+
+import functools
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+from tilegrad import files
+
+_FOLDER = tempfile.TemporaryDirectory(prefix="tilegrad_python_")
+PROGRAM = pathlib.Path(os.environ.get("TILEGRAD_BUILD", "")) / "src/cli/tilegrad"
+
+_CONFIG = """name = "tiny"
+[network]
+channels = 4
+code = 16
+hidden1 = 16
+hidden2 = 16
+template_level = 1
+[schedule]
+batch = 4
+views = 2
+steps = 3
+"""
+
+
+def run_program(*arguments: object) -> None:
+    """Runs tilegrad; the test is skipped where it was not built."""
+    if not PROGRAM.exists():
+        raise unittest.SkipTest(f"no program {PROGRAM}: set TILEGRAD_BUILD to a build folder")
+    subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True)
+
+
+@functools.lru_cache(maxsize=None)
+def dataset() -> pathlib.Path:
+    """Fifteen procedural models in five classes, 4 views of 32 x 32 pixels."""
+    folder = pathlib.Path(_FOLDER.name) / "dataset"
+    run_program("dataset", "--source", "procedural", "--per-class", 3, "--size", 32, "--views", 4,
+                "--validation-share", 0.34, "--out", folder)
+    return folder
+
+
+@functools.lru_cache(maxsize=None)
+def run() -> pathlib.Path:
+    """A run of three steps of a small network."""
+    folder = pathlib.Path(_FOLDER.name) / "run"
+    config = pathlib.Path(_FOLDER.name) / "tiny.toml"
+    config.write_text(_CONFIG)
+    run_program("train", "--data", dataset(), "--config", config, "--out", folder)
+    return folder
+
+
+def textured_mesh() -> files.Mesh:
+    """A square of two faces: one red through a texture of 2 x 2 texels, one plain blue."""
+    texels = np.array([[[255, 0, 0], [200, 0, 0]], [[150, 0, 0], [100, 0, 0]]], np.uint8)
+    return files.Mesh(
+        positions=np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
+        faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        normals=np.tile(np.array([[0, 0, 1]], np.float32), (4, 1)),
+        corner_uvs=np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32),
+        face_materials=np.array([0, 1], np.int32),
+        materials=[files.Material("red", (1, 1, 1, 1), texture=0, wrap="clamp", nearest=True),
+                   files.Material("blue", (0, 0, 1, 1), double_sided=False, unlit=True)],
+        textures=[files.MeshTexture("texels", texels)])
+
+
+class FolderTest(unittest.TestCase):
+    """A test with a folder of its own that is gone afterwards."""
+
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory(prefix="tilegrad_python_")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def damaged(self, name: str, content: bytes, step: int):
+        """Files that are `content` cut short, and with bytes changed, one after the other."""
+        path = self.folder / name
+        for at in range(0, len(content), step):
+            path.write_bytes(content[:at])
+            yield path
+            path.write_bytes(content[:at] + bytes([content[at] ^ 0xff]) + content[at + 1:])
+            yield path

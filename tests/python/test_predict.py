@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Predictions from Python are those of `tilegrad predict`."""
+
+import os
+import pathlib
+import pickle
+import threading
+import unittest
+
+import numpy as np
+
+from file_samples import FolderTest, dataset, run, run_program
+from tilegrad import files
+
+
+class Predict(FolderTest):
+    def setUp(self) -> None:
+        super().setUp()
+        self.data = files.Dataset(dataset(), "test")
+        self.image = self.folder / "view.png"
+        run_program("dataset-view", "--data", dataset(), "--out", self.image)
+
+    def _program(self, *arguments: object) -> bytes:
+        run_program("predict", self.image, "--run", run(), "--out", self.folder, *arguments)
+        return (self.folder / "view.glb").read_bytes()
+
+    def _python(self, mesh: files.Mesh) -> bytes:
+        files.save_mesh(self.folder / "python.glb", mesh)
+        return (self.folder / "python.glb").read_bytes()
+
+    def test_same_bytes_as_the_program(self) -> None:
+        image = files.load_image(self.image)
+        for threads in (1, 2):
+            predictor = files.Predictor(run(), threads)
+            self.assertEqual(self._python(predictor.predict(image)), self._program())
+        kept = predictor.predict(image, keep_framing=True)
+        self.assertEqual(self._python(kept), self._program("--keep-framing"))
+        rgb, mask = self.folder / "rgb.png", self.folder / "mask.png"
+        files.save_image(rgb, image[..., :3])
+        files.save_image(mask, image[..., 3])
+        masked = predictor.predict(image[..., :3], image[..., 3])
+        self.image.write_bytes(rgb.read_bytes())
+        self.assertEqual(self._python(masked), self._program("--mask", mask))
+
+    def test_a_prediction_is_a_mesh_of_the_template(self) -> None:
+        predictor = files.Predictor(run())
+        self.assertEqual(predictor.image_size, 32)
+        self.assertIn("step 3", predictor.description)
+        mesh, template = predictor.predict(files.load_image(self.image)), predictor.template()
+        np.testing.assert_array_equal(mesh.faces, template.faces)
+        self.assertAlmostEqual(float(np.abs(mesh.positions).max()), 0.45, places=5)
+        self.assertTrue(((mesh.colors >= 0) & (mesh.colors <= 1)).all())
+
+    def test_many_at_once_are_each_alone(self) -> None:
+        predictor = files.Predictor(run())
+        images = np.random.default_rng(6).integers(0, 256, (40, 4, 32, 32), np.uint8)
+        many = predictor.predict_prepared(images)
+        for i in (0, 33, 39):
+            one = predictor.predict_prepared(images[i:i + 1])[0]
+            np.testing.assert_array_equal(one.positions, many[i].positions)
+            np.testing.assert_array_equal(one.colors, many[i].colors)
+
+    def test_threads_pickle_and_fork_give_the_same(self) -> None:
+        predictor = files.Predictor(run())
+        image = files.load_image(self.image)
+        expected = self._python(predictor.predict(image))
+        self.assertEqual(self._python(pickle.loads(pickle.dumps(predictor)).predict(image)),
+                         expected)
+        got: list[np.ndarray] = []
+        threads = [threading.Thread(target=lambda: got.append(predictor.predict(image).positions))
+                   for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        child = os.fork()
+        if child == 0:
+            mesh = predictor.predict(image)
+            same = len(got) == 4 and all(np.array_equal(mesh.positions, p) for p in got)
+            os._exit(0 if same else 1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+
+    def test_checkpoint_as_arrays(self) -> None:
+        checkpoint = files.load_checkpoint(run())
+        self.assertEqual((checkpoint.step, checkpoint.image_size), (3, 32))
+        self.assertIn("template_level = 1", checkpoint.config)
+        again = files.load_weights(checkpoint.file)
+        self.assertEqual(set(again), set(checkpoint.weights))
+        for name, array in checkpoint.weights.items():
+            np.testing.assert_array_equal(array, again[name])
+        one = files.load_checkpoint(checkpoint.file)
+        self.assertEqual(one.step, 3)
+
+    def test_errors(self) -> None:
+        predictor = files.Predictor(run())
+        image = files.load_image(self.image)
+        opaque = image.copy()
+        opaque[..., 3] = 255
+        for wrong, mask, message in (
+                (opaque, None, "not cut out"), (image[..., :3], None, "no alpha channel"),
+                (image * np.uint8(0), None, "mask is empty"),
+                (image, image[:9, :9, 3], "mask is 9 x 9"), (image[0, 0], None, "image has shape")):
+            with self.assertRaisesRegex(ValueError, message):
+                predictor.predict(wrong, mask)
+        with self.assertRaisesRegex(ValueError, r"predict_prepared: images has shape \(4, 8, 8\)"):
+            predictor.predict_prepared(np.zeros((4, 8, 8), np.uint8))
+        with self.assertRaisesRegex(FileNotFoundError, "none"):
+            files.Predictor(self.folder / "none")
+        checkpoint = self.folder / "c.safetensors"
+        content = pathlib.Path(files.load_checkpoint(run()).file).read_bytes()
+        for at in (0, 5, 200, len(content) // 2, len(content) - 1):
+            checkpoint.write_bytes(content[:at])
+            with self.assertRaisesRegex(ValueError, "c.safetensors"):
+                files.Predictor(checkpoint)
+
+
+if __name__ == "__main__":
+    unittest.main()
