@@ -155,7 +155,7 @@ py::array_t<T> SoftMaskBackward(const py::array& xy, const MaskBackwardCall& cal
 }
 
 void BindMaskOptions(py::module_& m) {
-  py::class_<ProjectedMaskOptions>(m, "ProjectedMaskOptions")
+  py::class_<ProjectedMaskOptions>(m, "ProjectedMaskOptions", "How projected_soft_mask works.")
       .def(py::init([](double delta, double max_alpha_error) {
              ProjectedMaskOptions options;
              options.delta = delta, options.max_alpha_error = max_alpha_error;
@@ -170,7 +170,9 @@ void BindMaskOptions(py::module_& m) {
             options.paper = {boxlen, knum}, options.paper_eps = edge_eps;
             return options;
           },
-          py::kw_only(), py::arg("delta"), py::arg("boxlen"), py::arg("knum"), py::arg("edge_eps"));
+          py::kw_only(), py::arg("delta"), py::arg("boxlen"), py::arg("knum"), py::arg("edge_eps"),
+          "The rule of the paper's implementations: boxes grown by boxlen (NDC), the first knum\n"
+          "faces, edge_eps (NDC^2) added to squared lengths.");
 }
 
 }  // namespace
@@ -188,7 +190,10 @@ void BindKaolin(py::module_& m) {
       },
       py::arg("face_vertices_image"), py::arg("face_vertices_z"), py::arg("face_features"),
       py::arg("valid_faces"), py::arg("height"), py::arg("width"), py::arg("eps"),
-      py::arg("threads"));
+      py::arg("threads"),
+      "face_vertices_image (N, F, 3, 2), face_vertices_z (N, F, 3), face_features (N, F, 3, C),\n"
+      "valid_faces (N, F) uint8 or None, eps in NDC^2 -> the image (N, H, W, C), face_idx\n"
+      "(N, H, W) int32");
   m.def(
       "rasterize_projected_backward",
       [](const py::array& xy, py::array features, py::array ids, py::array d_image, double eps,
@@ -201,7 +206,9 @@ void BindKaolin(py::module_& m) {
       },
       py::arg("face_vertices_image"), py::arg("face_features"), py::arg("face_idx"),
       py::arg("gradient"), py::arg("eps"), py::arg("wants_face_vertices_image"),
-      py::arg("wants_face_features"), py::arg("threads"));
+      py::arg("wants_face_features"), py::arg("threads"),
+      "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and face_features\n"
+      "(N, F, 3, C); empty where not wanted");
   m.def(
       "projected_soft_mask",
       [](const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
@@ -210,7 +217,9 @@ void BindKaolin(py::module_& m) {
                         [&](auto t) { return SoftMask<decltype(t)>(xy, ids, options, threads); });
       },
       py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("options"),
-      py::arg("threads"));
+      py::arg("threads"),
+      "face_vertices_image (N, F, 3, 2), selected_face_idx (N, H, W) int32 -> the mask (N, H, W),\n"
+      "and how far it may be from equation 6");
   m.def(
       "projected_soft_mask_backward",
       [](const py::array& xy, py::array ids, py::array mask, py::array d_mask,
@@ -222,7 +231,8 @@ void BindKaolin(py::module_& m) {
         });
       },
       py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("soft_mask"),
-      py::arg("gradient"), py::arg("options"), py::arg("threads"));
+      py::arg("gradient"), py::arg("options"), py::arg("threads"),
+      "soft_mask and its gradient (N, H, W) -> the gradient of face_vertices_image (N, F, 3, 2)");
 }
 
 }  // namespace tilegrad::python

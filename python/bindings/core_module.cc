@@ -13,6 +13,7 @@ void BindCamera(py::module_& m);
 void BindShapes(py::module_& m);
 void BindKaolin(py::module_& m);
 void BindDeferred(py::module_& m);
+void BindFragments(py::module_& m);
 
 }  // namespace tilegrad::python
 
@@ -30,4 +31,5 @@ PYBIND11_MODULE(_core, m) {
   BindShapes(m);
   BindKaolin(m);
   BindDeferred(m);
+  BindFragments(m);
 }

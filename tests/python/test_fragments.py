@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tilegrad.fragments and tilegrad.compat.pytorch3d: PyTorch3D's lists of faces, against its rules
+written down once more in NumPy, and against the renderer."""
+
+import unittest
+import warnings
+
+import numpy as np
+
+import tilegrad
+from tilegrad import fragments
+
+try:
+    import torch
+except ImportError:
+    torch = None
+else:
+    from tilegrad.compat import pytorch3d
+
+
+def boundary_distance(corners, point):
+    """Squared, to the nearest of three segments."""
+    distances = []
+    for k in range(3):
+        a, edge = corners[k, :2], corners[(k + 1) % 3, :2] - corners[k, :2]
+        along = np.clip((point - a) @ edge / (edge @ edge), 0, 1)
+        distances.append(np.sum((point - a - along * edge)**2))
+    return min(distances)
+
+
+def weights_at(corners, point, perspective, clip):
+    """Barycentrics, those that are given out, and whether the point is inside."""
+    lifted = np.column_stack([corners[:, :2], np.ones(3)])
+    weights = np.linalg.solve(lifted.T, np.append(point, 1))
+    if perspective:
+        weights = weights / corners[:, 2]
+        weights = weights / max(weights.sum(), 1e-8)
+    inside = (weights > 0).all()
+    if clip:
+        weights = np.maximum(weights, 0)
+        weights = weights / max(weights.sum(), 1e-5)
+    return weights, inside
+
+
+def naive(faces, first, height, width, layers, blur, perspective, clip):
+    """For one image: every face for every pixel."""
+    shape = (height, width, layers)
+    out = fragments.Fragments(np.full(shape, -1), np.full(shape, -1.), np.full((*shape, 3), -1.),
+                              np.full(shape, -1.))
+    shorter = min(height, width)
+    for i in range(height):
+        for j in range(width):
+            point = np.array([width - 2 * j - 1, height - 2 * i - 1]) / shorter
+            found = []
+            for f, corners in enumerate(faces):
+                if corners[:, 2].min() < 1e-8:
+                    continue
+                weights, inside = weights_at(corners, point, perspective, clip)
+                distance, z = boundary_distance(corners, point), weights @ corners[:, 2]
+                if z >= 0 and (inside or distance < blur):
+                    found.append((z, first + f, weights, -distance if inside else distance))
+            for k, (z, f, weights, distance) in enumerate(sorted(found, key=lambda e: e[:2])):
+                if k < layers:
+                    out.pix_to_face[i, j, k], out.zbuf[i, j, k] = f, z
+                    out.bary_coords[i, j, k], out.dists[i, j, k] = weights, distance
+    return out
+
+
+def random_faces(count=20, seed=0, dtype=np.float64):
+    rng = np.random.default_rng(seed)
+    centres = rng.uniform(-1, 1, (count, 1, 2))
+    xy = centres + rng.uniform(-0.5, 0.5, (count, 3, 2))
+    z = rng.uniform(0.5, 2, (count, 3, 1))
+    z[::7, 0] = -1  # some reach behind the camera
+    return np.concatenate([xy, z], axis=2).astype(dtype)
+
+
+def blob(count=2, size=(40, 24), dtype=np.float32):
+    """A scene of `count` views of a bumpy ball in a wide image."""
+    positions, faces = tilegrad.icosphere(3)
+    positions = np.asarray(positions, dtype) * (1 + 0.2 * np.sin(3 * positions[:, :1]))
+    camera = tilegrad.Camera.orbit(np.arange(count) * 50., np.full(count, 20.),
+                                   np.full(count, 3.), width=size[0], height=size[1])
+    return tilegrad.Scene(positions.astype(dtype), faces, camera)
+
+
+class ToFragments(unittest.TestCase):
+    def test_first_layer_is_what_the_renderer_draws(self):
+        scene = blob()
+        renderer = tilegrad.Renderer()
+        frame = renderer.render(scene, width=40, height=24, outputs=("depth", "barycentrics"))
+        got = fragments.to_fragments(frame)
+        self.assertEqual(got.pix_to_face.shape, (2, 24, 40, 1))
+        self.assertEqual(got.pix_to_face.dtype, np.int64)
+        ids = got.pix_to_face[..., 0]
+        packed = np.where(frame.face_ids < 0, -1,
+                          frame.face_ids + np.array([0, len(scene.faces)])[:, None, None])
+        same = ids == packed
+        self.assertGreater(int((ids >= 0).sum()), 300)
+        self.assertLess(int((~same).sum()), 8)  # centres on edges: the rules differ there
+        seen = same & (ids >= 0)
+        np.testing.assert_allclose(got.zbuf[..., 0][seen], frame.depth[seen], rtol=2e-5)
+        np.testing.assert_allclose(got.bary_coords[..., 0, 1][seen],
+                                   frame.barycentrics[:, 0][seen], atol=2e-3)
+        self.assertTrue((got.dists[ids[..., None] >= 0] <= 0).all())
+        self.assertTrue((got.zbuf[ids < 0] == -1).all())
+
+    def test_layers_and_batches(self):
+        one, both = blob(1), blob(2)
+        got = fragments.to_fragments([one, both], 4, width=40, height=24, blur_radius=1e-3)
+        self.assertEqual(got.bary_coords.shape, (3, 24, 40, 4, 3))
+        alone = fragments.to_fragments(one, 4, width=40, height=24, blur_radius=1e-3)
+        np.testing.assert_array_equal(got.zbuf[:1], alone.zbuf)
+        np.testing.assert_array_equal(got.pix_to_face[0], got.pix_to_face[1] - len(one.faces)
+                                      * (got.pix_to_face[1] >= 0))
+        depth = np.where(got.pix_to_face < 0, np.inf, got.zbuf)
+        self.assertTrue((depth[..., 1:] >= depth[..., :-1]).all())
+        self.assertGreater(int((got.dists > 0).sum()), 50)  # through the blur
+        sums = got.bary_coords[got.pix_to_face >= 0].sum(axis=-1)
+        np.testing.assert_allclose(sums, 1, atol=1e-4)
+
+    def test_x_is_to_the_left_and_faces_are_culled(self):
+        # The viewer's right half, counter-clockwise.
+        scene = tilegrad.Scene(np.float32([[0, -1, 0], [1, -1, 0], [1, 1, 0], [0, 1, 0]]),
+                               [[0, 1, 2], [0, 2, 3]],
+                               tilegrad.Camera.look_at((0, 0, 3), width=8, height=8))
+        got = fragments.to_fragments(scene, width=8, height=8, cull_backfaces=True)
+        self.assertTrue((got.pix_to_face[0, :, :4] == -1).all())
+        self.assertTrue((got.pix_to_face[0, 3:5, 4:6] >= 0).all())
+        turned = scene.replace(faces=[[0, 2, 1], [0, 3, 2]])
+        got = fragments.to_fragments(turned, width=8, height=8, cull_backfaces=True)
+        self.assertTrue((got.pix_to_face == -1).all())
+
+    def test_behind_the_camera(self):
+        scene = tilegrad.Scene(np.float32([[-9, 0, 9], [9, 0, 9], [0, 0, -9]]), [[0, 1, 2]],
+                               tilegrad.Camera.look_at((0, 1, 3), width=8, height=8))
+        got = fragments.to_fragments(scene, width=8, height=8)
+        self.assertTrue((got.pix_to_face == -1).all())
+
+    def test_errors(self):
+        scene = blob()
+
+        def fails(error, message, *arguments, **options):
+            with self.assertRaisesRegex(error, message):
+                fragments.to_fragments(*arguments, **options)
+
+        fails(TypeError, "to_fragments: source must be a Frame, a Scene or a list", 3)
+        fails(ValueError, "to_fragments: source has no scene", [])
+        fails(ValueError, "to_fragments: scenes need width and height", scene)
+        fails(ValueError, "to_fragments: faces_per_pixel is 0, expected 1..1024", scene, 0,
+              width=8, height=8)
+        fails(ValueError, "to_fragments: height is 0, expected 1..16384", scene, width=8, height=0)
+        fails(ValueError, "blur_radius is -1", scene, width=8, height=8, blur_radius=-1)
+        frame = tilegrad.Renderer().render(scene, width=8, height=8)
+        fails(ValueError, "to_fragments: a Frame has its own width and height", frame, width=8)
+
+
+class Meshes:
+    """What rasterize_meshes asks of PyTorch3D's class: N images of the same number of faces."""
+
+    def __init__(self, corners, images=1):
+        self.corners, self.images = corners, images
+
+    def verts_packed(self):
+        return self.corners.reshape(-1, 3)
+
+    def faces_packed(self):
+        return torch.arange(3 * len(self.corners)).reshape(-1, 3)
+
+    def num_faces_per_mesh(self):
+        return torch.full((self.images,), len(self.corners) // self.images)
+
+    def mesh_to_faces_packed_first_idx(self):
+        return torch.arange(self.images) * (len(self.corners) // self.images)
+
+
+@unittest.skipIf(torch is None, "torch is absent (Debian: python3-torch)")
+class RasterizeMeshes(unittest.TestCase):
+    def test_is_the_naive_one(self):
+        corners = random_faces(24)
+        for size in ((9, 14), (14, 9)):
+            for blur, perspective, clip in ((0, True, False), (0.03, True, True),
+                                            (0.03, False, False), (0.03, False, True)):
+                got = pytorch3d.rasterize_meshes(
+                    Meshes(torch.from_numpy(corners), 2), size, blur, 5,
+                    perspective_correct=perspective, clip_barycentric_coords=clip)
+                for n in range(2):
+                    expected = naive(corners[12 * n:12 * n + 12], 12 * n, *size, 5, blur,
+                                     perspective, clip)
+                    np.testing.assert_array_equal(got[0][n], expected.pix_to_face)
+                    for a, b in zip(got[1:], expected[1:]):
+                        np.testing.assert_allclose(a[n], b, rtol=1e-5, atol=1e-6)
+
+    def test_gradcheck(self):
+        corners = torch.from_numpy(random_faces(8, seed=2)).requires_grad_()
+        for perspective, clip in ((True, True), (False, False)):
+            def render(c):
+                return pytorch3d.rasterize_meshes(Meshes(c), (7, 9), 0.01, 3,
+                                                  perspective_correct=perspective,
+                                                  clip_barycentric_coords=clip)[1:]
+            self.assertTrue(torch.autograd.gradcheck(render, (corners,)))
+
+    def test_float32_and_defaults(self):
+        corners = torch.from_numpy(random_faces(dtype=np.float32)).requires_grad_()
+        ids, z, bary, dists = pytorch3d.rasterize_meshes(Meshes(corners), 16)
+        self.assertEqual(tuple(bary.shape), (1, 16, 16, 8, 3))
+        self.assertEqual((ids.dtype, z.dtype), (torch.int64, torch.float32))
+        dists[ids >= 0].sum().backward()
+        self.assertGreater(float(corners.grad.abs().sum()), 0)
+
+    def test_faces_that_cross_z_clip_value_are_left_out(self):
+        corners = torch.from_numpy(random_faces())
+        corners[..., 2].clamp_(min=0.5)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            ids = pytorch3d.rasterize_meshes(Meshes(corners), 16, z_clip_value=0.1)[0]
+            self.assertEqual(len(caught), 0)
+            cut = pytorch3d.rasterize_meshes(Meshes(corners), 16, z_clip_value=1.0)[0]
+            self.assertEqual(len(caught), 1)
+        near = (corners[..., 2] < 1).any(dim=1)
+        self.assertTrue(near[ids[ids >= 0]].any())
+        self.assertFalse(near[cut[cut >= 0]].any())
+
+    def test_to_fragments(self):
+        scene = blob()
+        got = pytorch3d.to_fragments(scene, 2, width=16, height=16)
+        self.assertIsInstance(got.zbuf, torch.Tensor)
+        np.testing.assert_array_equal(
+            got.zbuf, fragments.to_fragments(scene, 2, width=16, height=16).zbuf)
+
+    def test_errors(self):
+        corners = torch.from_numpy(random_faces())
+        with self.assertRaisesRegex(TypeError, "rasterize_meshes: meshes.verts_packed.. has dtype "
+                                               "torch.float16"):
+            pytorch3d.rasterize_meshes(Meshes(corners.half()))
+        with self.assertRaisesRegex(ValueError, "rasterize_meshes: width is 0"):
+            pytorch3d.rasterize_meshes(Meshes(corners), (4, 0))
+        corners[3, 1, 0] = float("nan")
+        with self.assertRaisesRegex(ValueError, r"face_vertices\[30\] is nan"):
+            pytorch3d.rasterize_meshes(Meshes(corners))
+
+
+if __name__ == "__main__":
+    unittest.main()
