@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
 
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_columns-inl.h"
@@ -25,17 +24,31 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
 constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel takes half of L1
-constexpr std::size_t kItemRows = 256;     // kItemRows x kDepth of packed A take half of L2
-constexpr std::size_t kItemColumns = 128;  // of C in one work item
-constexpr std::size_t kFewRows = 300;      // up to which the next columns are packed meanwhile
+constexpr std::size_t kItemColumns = 256;  // of C in one work item, at most
+constexpr std::size_t kItemRows = 4096;    // at most: B is packed once for each item of a column
+constexpr std::size_t kPackedRows = 4;     // of B between two tiles: L1 holds what waits for it
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
+// How C is cut into work items. The sum of an element does not depend on it, so it may depend on
+// the number of workers: with several, some four items for each, narrower first, then shorter.
+struct GemmItems {
+  GemmItems(std::size_t m, std::size_t n, std::size_t workers) {
+    const std::size_t wanted = workers > 1 ? 4 * workers : 1;
+    columns = std::clamp(RoundUp(DivideUp(n, wanted), kTileColumns), 4 * kTileColumns,
+                         std::max(kItemColumns, 4 * kTileColumns));
+    const std::size_t parts = DivideUp(wanted, DivideUp(n, columns));
+    rows = std::clamp(DivideUp(m, parts), std::min(m, kLeastRows), kItemRows);
+  }
+  static constexpr std::size_t kLeastRows = 128;  // or packing B would weigh too much
+  std::size_t rows, columns;
+};
+
 struct GemmPlan {
-  explicit GemmPlan(const GemmProblem<float>& problem)
+  GemmPlan(const GemmProblem<float>& problem, const GemmItems& items)
       : p(problem),
         rows(p.m, kTileRows),
-        row_blocks(rows.count(), kItemRows / kTileRows),
-        column_blocks(DivideUp(p.n, kTileColumns), kItemColumns / kTileColumns),
+        row_blocks(rows.count(), DivideUp(items.rows, kTileRows)),
+        column_blocks(DivideUp(p.n, kTileColumns), items.columns / kTileColumns),
         depths(p.k, kDepth),
         passes(depths.count(), std::max<std::size_t>(1, kPackedFloats / p.m / kDepth)) {}
 
@@ -100,24 +113,26 @@ HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::si
   }
 }
 
-// The same; meanwhile `next` is packed, share by share: fetched during one tile, packed after it.
+// The same; meanwhile `next` is packed: fetched by the tiles, and copied as soon as a few of its
+// rows are there.
 HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                   const float* packed_a, const ColumnPacker& columns,
                                   const ColumnPacker& next) {
-  const std::size_t panels = columns.block().panels(), units = next.units();
-  const std::size_t share = DivideUp(units, rows * panels);
-  const float* lines[kDepth / kFetchSteps];  // of the next share
+  const std::size_t panels = columns.block().panels();
+  const std::size_t fetches = rows * panels * DivideUp(columns.block().steps, kFetchSteps);
+  LineFetcher fetcher = next.Fetcher(DivideUp(next.lines(), fetches));
   std::size_t packed = 0;
   for (std::size_t j = 0; j < panels; ++j) {
     for (std::size_t panel = first; panel < first + rows; ++panel) {
-      const std::size_t fetched = std::min(units, packed + share);
-      next.ListLines(packed, fetched, lines, std::size(lines));
       MultiplyTile(plan, packed_a, panel, columns.block(), j,
-                   FetchingColumns(columns.panel(j), lines));
+                   FetchingColumns(columns.panel(j), fetcher));
+      const std::size_t fetched = next.units() - fetcher.rows_left();
+      if (fetched < packed + kPackedRows) continue;
       next.Pack(packed, fetched);
       packed = fetched;
     }
   }
+  next.Pack(packed, next.units());
 }
 
 // Work item: one block of rows by one block of columns, the steps of depth blocks [depth, end).
@@ -133,7 +148,7 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
     return ColumnPacker(plan.p, {first, last, plan.depths.begin(d), plan.depths.size(d)},
                         packed_b + d % 2 * plan.packed_b_size());
   };
-  const bool pack_ahead = !plan.p.transpose_b && plan.p.m <= kFewRows;
+  const bool pack_ahead = !plan.p.transpose_b;
   for (std::size_t d = depth; d < end; ++d) {
     const ColumnPacker present = packer(d);
     const float* a = packed_a + plan.p.m * (plan.depths.begin(d) - plan.depths.begin(depth));
@@ -147,10 +162,10 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
 }
 
 void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
-  const GemmPlan plan(problem);
+  const auto workers = static_cast<std::size_t>(context.workers.count());
+  const GemmPlan plan(problem, GemmItems(problem.m, problem.n, workers));
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
-  float* packed_a = context.scratch.Floats(
-      a_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
   for (std::size_t pass = 0; pass < plan.passes.count(); ++pass) {
     const std::size_t depth = plan.passes.begin(pass), end = depth + plan.passes.size(pass);
     context.workers.For(plan.rows.count(), [&](std::size_t panel, std::size_t) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The large operand of a matrix product, packed a block of columns and steps at a time. With few
 // rows on the other side (a training batch) waiting for it would cost as much as multiplying: rows
-// of a B that is not transposed are packed between the tiles of the block before them, after those
+// of a B that is not transposed are packed between the tiles of the block before them, when those
 // tiles have fetched them into L1. (Fetching whole blocks into L2 fails: rows that lie a power of
 // two apart share a few sets of that cache.) A transposed B is packed a block at a time, which
 // reads it in runs as long as the block is deep.
@@ -24,8 +24,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
-
-constexpr std::size_t kLineFloats = 16;  // in a cache line
 
 // From one packed panel to the next. The line between them keeps the panels out of each other's
 // cache sets while a row is written to all of them.
@@ -59,17 +57,12 @@ class ColumnPacker {
     }
   }
 
-  // The first `count` cache lines of rows [begin, end), B not transposed; then any, if they are
-  // fewer.
-  HWY_NOINLINE void ListLines(std::size_t begin, std::size_t end, const float** lines,
-                              std::size_t count) const {
-    const float** const last = lines + count;
-    const std::size_t columns = block_.end - block_.begin;
-    for (std::size_t k = begin; k < end; ++k) {
-      const float* row = RowOf(k);
-      for (std::size_t j = 0; j < columns && lines < last; j += kLineFloats) *lines++ = row + j;
-    }
-    std::fill(lines, last, p_.b);
+  // Fetches the block, `share` lines at a time; B not transposed.
+  LineFetcher Fetcher(std::size_t share) const {
+    return LineFetcher(RowOf(0), p_.ldb, block_.steps, block_.end - block_.begin, share);
+  }
+  std::size_t lines() const {
+    return block_.steps * DivideUp(block_.end - block_.begin, kLineFloats);
   }
 
  private:

@@ -13,6 +13,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <utility>
@@ -70,14 +71,36 @@ HWY_INLINE void PrefetchLine(const float* data) {
   asm volatile("");
 }
 
-constexpr std::size_t kFetchSteps = 8;
+constexpr std::size_t kLineFloats = 16;  // in a cache line
+constexpr std::size_t kFetchSteps = 32;  // between two shares of lines
 
-// A packed panel that meanwhile asks for one cache line every kFetchSteps steps.
+// Asks for the cache lines of a block of a matrix, row after row, a share at a time.
+class LineFetcher {
+ public:
+  // Rows of `columns` floats, `ld` apart; columns > 0.
+  LineFetcher(const float* block, std::size_t ld, std::size_t rows, std::size_t columns,
+              std::size_t share)
+      : row_(block), ld_(ld), rows_left_(rows), last_(columns - 1), share_(share) {}
+
+  HWY_INLINE void Fetch() {
+    for (std::size_t i = 0; i < share_ && rows_left_ > 0; ++i) {
+      PrefetchLine(row_ + column_);
+      column_ += kLineFloats;
+      if (column_ > last_) column_ = 0, row_ += ld_, --rows_left_;
+    }
+  }
+  // That are not asked for to their end.
+  std::size_t rows_left() const { return rows_left_; }
+
+ private:
+  const float* row_;
+  std::size_t ld_, rows_left_, last_, share_, column_ = 0;
+};
+
+// A packed panel. Meanwhile a share of lines is asked for every kFetchSteps steps.
 struct FetchingColumns : PackedColumns {
-  FetchingColumns(const float* panel, const float* const* lines)
-      : PackedColumns{panel}, line(lines) {}
-  const float* const* line;
-  HWY_INLINE void Fetch() { PrefetchLine(*line++); }
+  FetchingColumns(const float* panel, LineFetcher& lines) : PackedColumns{panel}, fetcher(lines) {}
+  LineFetcher& fetcher;
 };
 
 // The column factor of step k at base[vector] + *offset.
@@ -142,11 +165,12 @@ struct Tile<R, std::index_sequence<row...>> {
   }
   template <class Rows>
   HWY_INLINE void Multiply(Rows& rows, FetchingColumns& columns, std::size_t steps) {
-    for (std::size_t k = steps / kFetchSteps; k > 0; --k) {
-      for (std::size_t i = 0; i < kFetchSteps; ++i) MultiplyStep(rows, columns);
-      columns.Fetch();
+    while (steps > 0) {
+      columns.fetcher.Fetch();
+      const std::size_t now = std::min(steps, kFetchSteps);
+      for (std::size_t k = 0; k < now; ++k) MultiplyStep(rows, columns);
+      steps -= now;
     }
-    for (std::size_t k = steps % kFetchSteps; k > 0; --k) MultiplyStep(rows, columns);
   }
   template <class Rows, class Columns>
   HWY_INLINE void MultiplyStep(Rows& rows, Columns& columns) {
@@ -160,15 +184,43 @@ struct Tile<R, std::index_sequence<row...>> {
     sum[r][0] = hn::MulAdd(a, b0, sum[r][0]);
     sum[r][1] = hn::MulAdd(a, b1, sum[r][1]);
   }
-  HWY_INLINE void Store(const TileTarget& target) const {
+  HWY_INLINE void Store(const TileTarget& t) const {
+    const bool plain = t.row_bias == nullptr && t.column_bias == nullptr &&
+                       t.count[0] + t.count[1] == kTileColumns;
+    plain ? StoreWhole(t) : StoreAny(t);
+  }
+
+ private:
+  // The common case without a question for every vector.
+  HWY_INLINE void StoreWhole(const TileTarget& t) const {
+    float *c0 = t.c + t.offset[0], *c1 = t.c + t.offset[1];
+    if (t.accumulate) {
+      ((hn::StoreU(hn::Add(hn::LoadU(Tag(), c0 + row * t.ldc), sum[row][0]), Tag(),
+                   c0 + row * t.ldc),
+        hn::StoreU(hn::Add(hn::LoadU(Tag(), c1 + row * t.ldc), sum[row][1]), Tag(),
+                   c1 + row * t.ldc)),
+       ...);
+    } else {
+      ((hn::StoreU(sum[row][0], Tag(), c0 + row * t.ldc),
+        hn::StoreU(sum[row][1], Tag(), c1 + row * t.ldc)),
+       ...);
+    }
+  }
+  HWY_INLINE void StoreAny(const TileTarget& target) const {
     ((StoreVector(sum[row][0], target, row, 0), StoreVector(sum[row][1], target, row, 1)), ...);
   }
 };
+
+// Asks for the lines that Store will read and write.
+HWY_INLINE void FetchTarget(const TileTarget& t, std::size_t rows) {
+  for (std::size_t r = 0; r < rows; ++r) PrefetchLine(t.c + r * t.ldc + t.offset[0]);
+}
 
 template <class Rows, class Columns>
 HWY_INLINE void RunTile(Rows rows, Columns columns, std::size_t steps, const TileTarget& target) {
   Tile<Rows::kRows> tile;
   tile.Clear();
+  if (target.accumulate) FetchTarget(target, Rows::kRows);
   tile.Multiply(rows, columns, steps);
   tile.Store(target);
 }
