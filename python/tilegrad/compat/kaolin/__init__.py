@@ -9,6 +9,18 @@ the screen. Tensors are torch's, on the CPU, float32 or float64, and gradients f
 Kaolin's do. docs/porting.md says what is the same and what differs.
 """
 
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
 from tilegrad.compat.kaolin import metrics, ops, render
 
-__all__ = ["metrics", "ops", "render"]
+__all__ = ["io", "metrics", "ops", "render"]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """`io` is loaded where it is used first: it brings readers of files along."""
+    if name == "io":
+        return importlib.import_module("tilegrad.compat.kaolin.io")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kaolin.io: obj, render: what its DIB-R examples read."""
+
+from tilegrad.compat.kaolin.io import obj, render
+
+__all__ = ["obj", "render"]
