@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The renderer as a differentiable function of PyTorch tensors, over shared memory.
+
+    positions = torch.tensor(mesh.positions, requires_grad=True)
+    images = tilegrad.torch.render(positions, mesh.faces, camera, width=64, height=64)
+    (images.alpha - target).square().mean().backward()          # positions.grad
+
+float32 tensors are rendered by the engine, float64 ones by the scalar reference in double
+precision, which is for `torch.autograd.gradcheck`. Tensors are of the CPU. Any tensor of a scene
+may ask for a gradient; what does not is not computed. The first derivative only.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple, Optional, Sequence, Union
+
+import numpy as np
+import torch
+from torch.autograd.function import once_differentiable
+
+from tilegrad import _arrays, _core
+from tilegrad._camera import Camera
+from tilegrad._packed import Packed
+from tilegrad._renderer import Frame, Gradients
+from tilegrad._renderer import Renderer as _Engine
+from tilegrad._scene import Light, Scene, Surface, Texture
+from tilegrad._threads import thread_count
+
+Array = Any  # whatever tilegrad takes as an array
+Value = Any  # a tensor, a number, or a nested sequence of numbers
+
+_RECORDS = {"camera": Camera, "lights": Light, "surfaces": Surface}  # of several numbers each
+_CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
+
+
+class Images(NamedTuple):
+    """What a render gives, as `tilegrad.Frame` has it; None for what was not asked for. Their
+    memory is the renderer's: a change in place before backward is an error that torch finds."""
+
+    color: Optional[torch.Tensor] = None
+    alpha: Optional[torch.Tensor] = None
+    attributes: Optional[torch.Tensor] = None
+    depth: Optional[torch.Tensor] = None
+    normals: Optional[torch.Tensor] = None
+    uv: Optional[torch.Tensor] = None
+    barycentrics: Optional[torch.Tensor] = None
+    face_ids: Optional[torch.Tensor] = None
+
+
+def render(positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Tensor], *,
+           width: int, height: int, outputs: Sequence[str] = ("color", "alpha"),
+           threads: int = 0, surface_textures: Sequence[int] = (), **arguments: Any) -> Images:
+    """Images (N, ...) of a scene or of a batch of N.
+
+    positions: (V, 3) or (N, V, 3); its dtype is that of the images. faces: (F, 3) whole numbers.
+    camera: a Camera, or a tensor ([N,] 17) of `camera`.
+    width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always there.
+    threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_NUM_THREADS says, or as many as torch uses:
+        one in a worker of a DataLoader.
+    surface_textures: the texture of each surface, -1: none, where `surfaces` is a tensor.
+    arguments: those of `tilegrad.Scene` (colors, uvs, textures, surfaces, lights, lighting, sh,
+        attributes, ...), each array also as a tensor, Texture with texels in a tensor, lights a
+        tensor ([N,] L, 4) of `lights`, surfaces a tensor (S, 13) of `surfaces`; and options of
+        `tilegrad.Renderer.render` (delta, max_alpha_error, culling, ...).
+
+    Errors: TypeError for tensors that are not on the CPU; what Scene and Renderer raise.
+    """
+    outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    scene = {"positions": positions, "faces": faces, "camera": camera}
+    options = {"width": width, "height": height, "outputs": outputs}
+    for name, value in arguments.items():
+        (options if name in _OPTIONS else scene)[name] = value
+    call = _Call(scene, options, threads, surface_textures)
+    images = _Render.apply(call, *call.tensors)
+    return Images(**dict(zip((*outputs, "face_ids"), images)))
+
+
+class Renderer(torch.nn.Module):
+    """`render` with options that stay the same, to put into a model.
+
+    width, height: pixels. Further arguments: those of `render` that hold for every call.
+    """
+
+    def __init__(self, width: int, height: int, **arguments: Any) -> None:
+        super().__init__()
+        self.arguments = {"width": width, "height": height, **arguments}
+
+    def forward(self, positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Tensor],
+                **arguments: Any) -> Images:
+        """Images of a scene; further arguments as of `render`, before those of the renderer."""
+        return render(positions, faces, camera, **{**self.arguments, **arguments})
+
+    def extra_repr(self) -> str:
+        return ", ".join(f"{name}={value!r}" for name, value in self.arguments.items())
+
+
+def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+           translation: Value = (0.0, 0.0, 0.0), fx: Value = _core.CAMERA[12],
+           fy: Value = _core.CAMERA[13], cx: Value = _core.CAMERA[14],
+           cy: Value = _core.CAMERA[15], near_plane: Value = _core.CAMERA[16]) -> torch.Tensor:
+    """A camera of tensors, ([N,] 17), through which gradients go back to each of them.
+
+    rotation: ([N,] 3, 3), for example of `rotation_6d`; translation: ([N,] 3); fx, fy, cx, cy:
+    numbers or (N,). Meanings as of `tilegrad.Camera`. Numbers may stand for tensors.
+    """
+    return _packed(rotation=(rotation, (3, 3)), translation=(translation, (3,)), fx=(fx, ()),
+                   fy=(fy, ()), cx=(cx, ()), cy=(cy, ()), near_plane=(near_plane, ()))
+
+
+def lights(direction: Value, intensity: Value = 1.0) -> torch.Tensor:
+    """Directional lights of tensors, ([N,] L, 4): direction ([N,] L, 3), from the surface to the
+    light, world, not 0; intensity ([N,] L) or a number."""
+    return _packed(direction=(direction, (3,)), intensity=(intensity, ()))
+
+
+def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.0),
+             diffuse: Value = (1.0, 1.0, 1.0), specular: Value = (0.4, 0.4, 0.4),
+             shininess: Value = 10.0) -> torch.Tensor:
+    """Surfaces of tensors, (S, 13): (S, 3) each and shininess (S,), as of `tilegrad.Surface`;
+    numbers and arrays without the axis S are shared by all."""
+    numbers = _packed(base_color=(base_color, (3,)), ambient=(ambient, (3,)),
+                      diffuse=(diffuse, (3,)), specular=(specular, (3,)),
+                      shininess=(shininess, ()))
+    return numbers if numbers.ndim == 2 else numbers[None]
+
+
+def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
+    """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
+    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019)."""
+    first, second = numbers[..., :3], numbers[..., 3:]
+    x = torch.nn.functional.normalize(first, dim=-1)
+    y = torch.nn.functional.normalize(second - (x * second).sum(-1, keepdim=True) * x, dim=-1)
+    return torch.stack([x, y, torch.cross(x, y, dim=-1)], dim=-2)
+
+
+_OPTIONS = frozenset(("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule",
+                      "paper_box", "paper_faces"))
+
+
+class _Call:
+    """A render: its tensors, and all the rest with places for them.
+
+    A place is the name of an argument of Scene, or "textures" with an index.
+    """
+
+    def __init__(self, arguments: dict[str, Any], options: dict[str, Any], threads: int,
+                 surface_textures: Sequence[int]) -> None:
+        self.options, self.threads, self.surface_textures = options, threads, surface_textures
+        self.arguments = dict(arguments)
+        self.places: list[tuple[str, int]] = []
+        self.tensors: list[torch.Tensor] = []
+        textures = self.arguments.get("textures")
+        if textures is not None:
+            each = textures if isinstance(textures, (list, tuple)) else [textures]
+            self.arguments["textures"] = [t if isinstance(t, Texture) else Texture(t)
+                                          for t in each]
+            for i, texture in enumerate(self.arguments["textures"]):
+                self._note("textures", i, texture.texels)
+        for name, value in self.arguments.items():
+            self._note(name, 0, value)
+
+    def _note(self, name: str, index: int, value: Any) -> None:
+        if not isinstance(value, torch.Tensor):
+            return
+        if value.device.type != "cpu":
+            raise TypeError(f"render: {name} is on {value.device}; tilegrad renders on the CPU: "
+                            f"give {name}.cpu()")
+        self.places.append((name, index))
+        self.tensors.append(value)
+
+    def frame(self, tensors: Sequence[torch.Tensor]) -> Frame:
+        """Renders, with the memory of the tensors where the renderer can take it as it is."""
+        arguments = dict(self.arguments)
+        if "textures" in arguments:
+            arguments["textures"] = list(arguments["textures"])
+        for (name, index), tensor in zip(self.places, tensors):
+            array = tensor.detach().numpy()
+            if name == "textures":
+                old = arguments["textures"][index]
+                arguments["textures"][index] = Texture(array, old.wrap, old.filter)
+            else:
+                arguments[name] = self._record(name, array) if name in _RECORDS else array
+        return self._engine().render(Scene(**arguments), **self.options)
+
+    def _record(self, name: str, array: np.ndarray) -> Packed:
+        """The numbers of a camera, of lights or of surfaces as those."""
+        kind = _RECORDS[name]
+        if array.ndim < 1 or array.shape[-1] != kind._SIZE:
+            raise ValueError(f"render: {name} has shape {array.shape}, expected "
+                             f"{_arrays.shape_text(('...', kind._SIZE))}")
+        record = kind.of_numbers(array)
+        if isinstance(record, Surface):
+            count = array.shape[0] if array.ndim > 1 else 1
+            record.texture = np.asarray(self.surface_textures or [-1] * count, np.int32)
+        return record
+
+    def gradients(self, frame: Frame, wanted: Sequence[bool],
+                  cotangents: dict[str, np.ndarray]) -> list[Optional[torch.Tensor]]:
+        """dL/d(tensor) in the order of the tensors; None for those that are not wanted."""
+        names = tuple(dict.fromkeys(name for (name, _), want in zip(self.places, wanted) if want))
+        found = self._engine().backward(frame, wrt=names, **cotangents)
+        return [self._gradient(found, *place) if want else None
+                for place, want in zip(self.places, wanted)]
+
+    @staticmethod
+    def _gradient(found: Gradients, name: str, index: int) -> torch.Tensor:
+        value = getattr(found, name)
+        if name == "textures":
+            value = value[index]
+        return torch.from_numpy(value.numbers if name in _RECORDS else value)
+
+    def _engine(self) -> _Engine:
+        return _engine(self.threads or thread_count("render", 0) or torch.get_num_threads())
+
+
+class _Render(torch.autograd.Function):
+    """Each call has its own frame, so that renders may follow each other before backward."""
+
+    @staticmethod
+    def forward(ctx: Any, call: _Call, *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        frame = call.frame(tensors)
+        images = tuple(torch.from_numpy(frame.shared(name)) for name in frame.outputs)
+        face_ids = torch.from_numpy(frame.face_ids.copy())
+        ctx.mark_non_differentiable(face_ids, *(image for name, image in zip(frame.outputs, images)
+                                                if name in _CONSTANT))
+        ctx.set_materialize_grads(False)
+        # Backward reads all of them: torch sees to it that nobody has changed one.
+        ctx.save_for_backward(*tensors, *images)
+        ctx.call, ctx.frame = call, frame
+        return (*images, face_ids)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *d_images: Optional[torch.Tensor]) -> tuple[Any, ...]:
+        tensors = ctx.saved_tensors
+        wanted = ctx.needs_input_grad[1:]
+        cotangents = {name: d_image.numpy() for name, d_image in zip(ctx.frame.outputs, d_images)
+                      if d_image is not None and name not in _CONSTANT}
+        if not cotangents or not any(wanted):
+            return (None,) * len(ctx.needs_input_grad)
+        gradients = ctx.call.gradients(ctx.frame, wanted, cotangents)
+        return (None, *(None if gradient is None else gradient.reshape_as(tensor).to(tensor.dtype)
+                        for gradient, tensor in zip(gradients, tensors)))
+
+
+@functools.lru_cache(maxsize=None)
+def _engine(threads: int) -> _Engine:
+    """One for each number of threads; a renderer serves any thread and any process."""
+    return _Engine(threads)
+
+
+def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
+    """The parts of records behind each other, their leading axes broadcast."""
+    given = [value for value, _ in parts.values() if isinstance(value, torch.Tensor)]
+    dtype = functools.reduce(torch.promote_types, (tensor.dtype for tensor in given),
+                             torch.float32)
+    flat = []
+    for name, (value, shape) in parts.items():
+        tensor = torch.as_tensor(value, dtype=dtype)
+        split = tensor.ndim - len(shape)
+        if split < 0 or tensor.shape[split:] != shape:
+            raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected "
+                             f"{_arrays.shape_text(('...', *shape))}")
+        flat.append(tensor.reshape(*tensor.shape[:split], -1))
+    lead = torch.broadcast_shapes(*(tensor.shape[:-1] for tensor in flat))
+    return torch.cat([tensor.expand(*lead, -1) for tensor in flat], dim=-1)
