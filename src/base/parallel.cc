@@ -6,9 +6,16 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_scheduler_observer.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <mutex>
 #include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
 
 namespace tilegrad {
 namespace {
@@ -54,6 +61,50 @@ class PinningObserver : public tbb::task_scheduler_observer {
   const cpu_set_t cores_ = CoresOfThread();
 };
 
+// The process that uses oneTBB, 0 before anybody does. A child that forks from it inherits oneTBB's
+// books but not its threads, and maybe locks that those held: there oneTBB must not be touched.
+std::atomic<pid_t> tbb_process{0};
+
+bool TbbIsOfThisProcess() {
+  const pid_t mine = getpid();
+  pid_t owner = 0;
+  return tbb_process.compare_exchange_strong(owner, mine) || owner == mine;
+}
+
+// The loop on threads of its own that the calling thread takes part in.
+struct OwnLoop {
+  const Workers* workers = nullptr;
+  std::size_t worker = 0;
+};
+thread_local OwnLoop own_loop;
+
+// In place of oneTBB: threads that live for one loop. `one_loop`: of the workers, for loops that
+// several threads of the caller begin.
+void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n,
+                     FunctionRef<void(std::size_t, std::size_t)> task) {
+  if (own_loop.workers == workers) {  // nested: on the thread that meets it
+    for (std::size_t i = 0; i < n; ++i) task(i, own_loop.worker);
+    return;
+  }
+  const std::lock_guard lock(*one_loop);
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&](std::size_t worker) {
+    const OwnLoop outer = std::exchange(own_loop, {workers, worker});
+    for (std::size_t i = next++; i < n; i = next++) task(i, worker);
+    own_loop = outer;
+  };
+  std::vector<std::thread> threads;
+  const std::size_t count = std::min(n, static_cast<std::size_t>(workers->count()));
+  try {
+    threads.reserve(count);
+    for (std::size_t w = 1; w < count; ++w) threads.emplace_back(work, w);
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those that are there do it.
+  }
+  work(0);
+  for (std::thread& thread : threads) thread.join();
+}
+
 }  // namespace
 
 struct Workers::Impl {
@@ -74,15 +125,21 @@ int AvailableCores() {
   return std::max(1, CPU_COUNT(&cores));
 }
 
-Workers::Workers(int count, Pinning pinning)
-    : count_(count > 0 ? count : AvailableCores()),
-      impl_(std::make_unique<Impl>(count_, pinning)) {}
+Workers::Workers(int count, Pinning pinning) : count_(count > 0 ? count : AvailableCores()) {
+  if (count_ > 1 && TbbIsOfThisProcess()) impl_ = std::make_unique<Impl>(count_, pinning);
+}
 
-Workers::~Workers() = default;
+Workers::~Workers() {
+  if (impl_ != nullptr && !TbbIsOfThisProcess()) static_cast<void>(impl_.release());
+}
 
 void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) const {
   if (count_ == 1 || n <= 1) {
     for (std::size_t i = 0; i < n; ++i) task(i, 0);
+    return;
+  }
+  if (impl_ == nullptr || !TbbIsOfThisProcess()) {
+    ForOnOwnThreads(this, &own_loop_, n, task);
     return;
   }
   impl_->arena.execute([&] {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <mutex>
 
 #include "base/function_ref.h"
 
@@ -14,7 +15,11 @@ namespace tilegrad {
 // worker that may not move waits for its core, and so does everybody who waits for the worker.
 enum class Pinning { kOff, kOn };
 
-// A fixed number of workers. Copies nothing, has no global state; two Workers are independent.
+// A fixed number of workers. Copies nothing; two Workers are independent.
+//
+// They survive a fork: in a child of a process that used oneTBB, whose threads are not there, loops
+// start threads of their own, which costs some 20 microseconds for each thread and loop. Workers
+// that are in the middle of a loop when another thread forks are of no use to the child.
 class Workers {
  public:
   // count 0: one per core that this process may use.
@@ -41,7 +46,8 @@ class Workers {
  private:
   struct Impl;
   int count_;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Impl> impl_;  // null where oneTBB is not used
+  mutable std::mutex own_loop_;
 };
 
 // The cores this process may run on (its affinity mask), at least 1.

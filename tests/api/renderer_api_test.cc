@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "api/test_scene.h"
+#include "support/forked.h"
 
 namespace tilegrad {
 namespace {
@@ -143,6 +144,30 @@ TEST(ApiThreads, RenderersOnTwoThreadsDoNotMeet) {
   first.join(), second.join();
   EXPECT_EQ(a, one);
   EXPECT_EQ(b, one);
+}
+
+// A renderer that has rendered before the fork, whose frame is used after it, and a new one.
+TEST(ApiThreads, AForkedChildGetsTheSameBits) {
+  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  const TestScene<float> s(Lighting::kPhong);
+  const std::vector<Scene> scenes(3, s.scene);
+  Renderer renderer{{.threads = 3}};
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  const auto backward = [&](TestGradients<float>* g) {
+    const std::vector<SceneGradients> d_scenes(3, g->d);
+    return renderer.Backward(frame, cotangents.d, d_scenes).ok();
+  };
+  TestGradients<float> here(s), there(s);
+  ASSERT_TRUE(backward(&here));
+  const std::vector<float> images = Flat(frame.images()), one = Step(1);
+  EXPECT_TRUE(test::TrueInChild([&] {
+    if (!backward(&there) || there.positions != here.positions) return false;
+    return renderer.Render(scenes, kTestOptions, kAll, &frame).ok() &&
+           Flat(frame.images()) == images && Step(2) == one;
+  }));
+  EXPECT_EQ(Step(2), one);
 }
 
 TEST(ApiBackward, AddsToWhatIsThere) {

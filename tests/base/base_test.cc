@@ -4,13 +4,18 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdlib>
+#include <memory>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include "base/aligned.h"
 #include "base/file.h"
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/simd_target.h"
+#include "support/forked.h"
 
 namespace tilegrad {
 namespace {
@@ -58,6 +63,55 @@ TEST(Workers, NestedLoopsKeepWorkersApart) {
     --busy[w];
   });
   EXPECT_EQ(total, 400);
+}
+
+// Sums of a nested loop by index, on `workers`; each worker's scratch is used by one task at a
+// time.
+std::vector<std::size_t> NestedSums(const Workers& workers) {
+  std::vector<std::size_t> sums(50);
+  std::vector<std::atomic<int>> busy(static_cast<std::size_t>(workers.count()));
+  workers.For(sums.size(), [&](std::size_t i, std::size_t worker) {
+    if (++busy.at(worker) != 1) std::abort();
+    std::atomic<std::size_t> sum = 0;
+    workers.For(i + 1, [&](std::size_t j, std::size_t) { sum += j; });
+    sums[i] = sum;
+    --busy[worker];
+  });
+  return sums;
+}
+
+// Workers whose threads are those of the parent, and new ones, in a child and in a child of that.
+TEST(Workers, SurviveAFork) {
+  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  const auto before = std::make_unique<Workers>(4);
+  const std::vector<std::size_t> expected = NestedSums(*before);
+  const auto same = [&] {
+    const Workers fresh(3);
+    return NestedSums(fresh) == expected && NestedSums(*before) == expected &&
+           NestedSums(fresh) == expected;
+  };
+  for (int round = 0; round < 20; ++round) {
+    // The fork comes while oneTBB's threads are on their way to sleep.
+    EXPECT_EQ(NestedSums(*before), expected);
+    EXPECT_TRUE(test::TrueInChild([&] { return same() && test::TrueInChild(same); }));
+  }
+  EXPECT_EQ(NestedSums(*before), expected);
+}
+
+// A child has several workers at once, too, and ends Workers of its parent.
+TEST(Workers, AChildHasThreadsOfItsOwn) {
+  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  auto before = std::make_unique<Workers>(4);
+  NestedSums(*before);
+  EXPECT_TRUE(test::TrueInChild([&] {
+    std::atomic<int> here = 0;
+    before->For(4, [&](std::size_t, std::size_t) {
+      ++here;
+      while (here < 4) std::this_thread::yield();
+    });
+    before.reset();
+    return true;
+  }));
 }
 
 TEST(Workers, RangesDependOnSizeAndGrainOnly) {

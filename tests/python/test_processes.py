@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Threads and processes: whoever renders, and however many at a time, the bits are the same."""
+
+import concurrent.futures
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+import unittest
+
+import numpy as np
+
+import tilegrad
+from scenes import ALL, IMAGE, cotangents, patch
+from tilegrad import Camera, Renderer, Scene
+
+NAMES = ("positions", "camera", "colors", "uvs", "textures", "lights")
+
+
+def step(renderer, seed=7, dtype=np.float32, count=6):
+    """All bits of a render and its gradients."""
+    frame = renderer.render(patch(dtype, count=count, seed=seed), outputs=ALL, **IMAGE)
+    got = renderer.backward(frame, wrt=NAMES, **cotangents(frame, ALL[:-1]))
+    arrays = [getattr(frame, name) for name in ALL]
+    arrays += [value[0] if name == "textures" else value for name, value in got._arrays.items()]
+    return b"".join(array.tobytes() for array in arrays)
+
+
+def in_child(call):
+    """Whether `call` returns true in a forked child, within a minute."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        try:
+            code = 0 if call() else 1
+        except BaseException:
+            traceback.print_exc()
+            code = 2
+        os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def run_python(code, **variables):
+    return subprocess.run([sys.executable, "-c", code], env={**os.environ, **variables},
+                          capture_output=True, text=True, timeout=60)
+
+
+def rendered_by_pool(seed):
+    """What a worker of a pool does: it has no renderer but the one of its module."""
+    return step(POOLED, seed)
+
+
+POOLED = Renderer(threads=2)
+
+
+class Threads(unittest.TestCase):
+    def test_any_number_gives_the_same_bits(self):
+        for dtype in (np.float32, np.float64):
+            one = step(Renderer(threads=1), dtype=dtype, count=3)
+            for threads in (0, 2, 7):
+                self.assertEqual(step(Renderer(threads=threads), dtype=dtype, count=3), one)
+
+    def run_at_once(self, renderers, rounds=12):
+        """Each renderer on a Python thread of its own, all starting together."""
+        expected = [step(Renderer(threads=1), seed) for seed in range(len(renderers))]
+        start = threading.Barrier(len(renderers))
+
+        def work(seed):
+            start.wait()
+            return all(step(renderers[seed], seed) == expected[seed] for _ in range(rounds))
+
+        with concurrent.futures.ThreadPoolExecutor(len(renderers)) as pool:
+            self.assertEqual(list(pool.map(work, range(len(renderers)))), [True] * len(renderers))
+
+    def test_renderers_of_their_own(self):
+        self.run_at_once([Renderer(threads=2), Renderer(threads=2)])
+
+    def test_one_renderer_for_all(self):
+        """Calls wait for each other."""
+        self.run_at_once([Renderer(threads=2)] * 3)
+
+    def test_python_goes_on_meanwhile(self):
+        """The GIL is released: another thread counts while this one renders."""
+        positions, faces = tilegrad.icosphere(5)
+        camera = Camera.orbit(30, 20, 3, width=512, height=512)
+        scene = Scene(positions, faces, camera)
+        counts, stop = [0], threading.Event()
+
+        def count():
+            while not stop.is_set():
+                counts[0] += 1
+                time.sleep(0)  # lets the GIL go
+
+        switch = sys.getswitchinterval()
+        counter = threading.Thread(target=count)
+        try:
+            counter.start()
+            sys.setswitchinterval(1000)  # nobody is made to give the GIL up: only who lets it go
+            before = counts[0]
+            Renderer(threads=1).render([scene] * 4, width=512, height=512)
+            self.assertGreater(counts[0], before)
+        finally:
+            stop.set()
+            sys.setswitchinterval(switch)
+            counter.join()
+
+
+class Forks(unittest.TestCase):
+    """After the parent has rendered, so that its threads exist and are gone in the child."""
+
+    def test_children_get_the_same_bits(self):
+        renderer = Renderer(threads=3)
+        expected = step(renderer)
+        frame = renderer.render(patch(), **IMAGE)
+        pulled = cotangents(frame)
+        gradient = renderer.backward(frame, **pulled).positions
+
+        def same():
+            """The parent's renderer and frame, and new ones."""
+            again = renderer.backward(frame, **pulled).positions
+            return (np.array_equal(again, gradient) and step(renderer) == expected
+                    and step(Renderer(threads=2)) == expected)
+
+        for _ in range(5):
+            self.assertTrue(in_child(same))
+            self.assertTrue(same())
+
+    def test_children_of_children(self):
+        renderer = Renderer(threads=2)
+        expected = step(renderer)
+        self.assertTrue(in_child(lambda: in_child(lambda: step(renderer) == expected)))
+
+    def test_children_that_leave_as_programs_do(self):
+        """By the end of the script, with everything that Python and the libraries do then."""
+        code = """
+import os, signal
+from test_processes import Renderer, step
+renderer = Renderer(threads=3)
+expected = step(renderer)
+child = os.fork()
+signal.alarm(60)
+assert step(renderer) == expected
+if child:
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+        done = run_python(code)
+        self.assertEqual((done.stdout, done.stderr), ("0\n", ""))
+
+    def test_a_fork_while_another_thread_renders(self):
+        renderer = Renderer(threads=2)
+        expected = step(renderer)
+        stop = threading.Event()
+
+        def work():
+            while not stop.is_set():
+                step(renderer)
+
+        busy = threading.Thread(target=work)
+        busy.start()
+        try:
+            for _ in range(10):
+                self.assertTrue(in_child(lambda: step(renderer) == expected))
+        finally:
+            stop.set()
+            busy.join()
+
+    def test_two_workers_at_once(self):
+        """A multiprocessing pool of forked workers, as DataLoaders have it."""
+        expected = [step(POOLED, seed) for seed in range(8)]  # the parent's threads exist now
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            got = pool.map_async(rendered_by_pool, range(8), chunksize=1).get(timeout=120)
+        self.assertEqual(got, expected)
+
+    def test_deleting_the_parents_renderer(self):
+        renderer = Renderer(threads=2)
+        step(renderer)
+        frames = [renderer.render(patch(), **IMAGE)]
+
+        def delete():
+            nonlocal renderer
+            frames.clear()
+            renderer = None
+            return True
+
+        self.assertTrue(in_child(delete))
+
+
+class Environment(unittest.TestCase):
+    def test_number_of_threads(self):
+        code = """
+import tilegrad, os
+scene = tilegrad.Scene([[0, 0, -1], [1, 0, -1], [0, 1, -1]], [[0, 1, 2]], tilegrad.Camera())
+renderer = tilegrad.Renderer()
+before = len(os.listdir("/proc/self/task"))
+renderer.render([scene] * 64)
+print(renderer.threads, len(os.listdir("/proc/self/task")) - before)
+"""
+        self.assertEqual(run_python(code, TILEGRAD_NUM_THREADS="1").stdout, "1 0\n")
+        self.assertIn(run_python(code, TILEGRAD_NUM_THREADS="3").stdout, ("3 1\n", "3 2\n"))
+        wrong = run_python(code, TILEGRAD_NUM_THREADS="many")
+        self.assertIn("ValueError: Renderer: TILEGRAD_NUM_THREADS='many' in the environment, must "
+                      "be a number in 1..1024", wrong.stderr)
+
+    def test_instruction_set(self):
+        code = "import tilegrad; print(tilegrad.simd_target())"
+        self.assertEqual(run_python(code, TILEGRAD_TARGET="EMU128").stdout, "EMU128\n")
+        wrong = run_python(code, TILEGRAD_TARGET="MMX")
+        self.assertIn("MMX", wrong.stderr)
+        self.assertNotEqual(wrong.returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
