@@ -38,8 +38,8 @@ std::optional<PixelPair> PairAt(const AntialiasInput<T>& input, std::size_t pixe
   const std::size_t next = pixel + (axis == 0 ? 1 : input.grid.row());
   const T* here = &input.rast[4 * pixel];
   const T* there = &input.rast[4 * next];
+  if (here[3] == there[3]) return std::nullopt;
   const std::int32_t face = FaceOf(here), other = FaceOf(there);
-  if (face == other) return std::nullopt;
   const bool forwards = other < 0 || (face >= 0 && here[2] <= there[2]);
   const double scale[2] = {0.5 * input.grid.width, 0.5 * input.grid.height};
   const int past = forwards ? 0 : 1;

@@ -83,12 +83,11 @@ bool IsSolid(const Barycentrics<S>& b) {
 
 }  // namespace barycentrics_ref
 
-// Not yet kept within [0, 1]: coverage is decided at 1/1024 pixel, so a centre may lie a hair
-// outside of its face.
+namespace barycentrics_ref {
+
+// Weights of corners 0 and 1 and their derivatives, whatever the face.
 template <class S>
-Barycentrics<S> BarycentricsAt(const ClipCorners<S>& c, const PixelCentre& at,
-                               const PixelSize& size) {
-  const auto p = barycentrics_ref::MakeProducts(c, at);
+Barycentrics<S> Quotients(const Products<S>& p, const PixelSize& size) {
   const S inverse = S(1) / p.sum;
   Barycentrics<S> out;
   out.u = p.a[0] * inverse, out.v = p.a[1] * inverse;
@@ -96,7 +95,18 @@ Barycentrics<S> BarycentricsAt(const ClipCorners<S>& c, const PixelCentre& at,
   out.du_dy = (p.ay[0] - out.u * p.sum_y) * inverse * size.y;
   out.dv_dx = (p.ax[1] - out.v * p.sum_x) * inverse * size.x;
   out.dv_dy = (p.ay[1] - out.v * p.sum_y) * inverse * size.y;
-  out.solid = barycentrics_ref::IsSolid(out);
+  out.solid = IsSolid(out);
+  return out;
+}
+
+}  // namespace barycentrics_ref
+
+// Not yet kept within [0, 1]: coverage is decided at 1/1024 pixel, so a centre may lie a hair
+// outside of its face.
+template <class S>
+Barycentrics<S> BarycentricsAt(const ClipCorners<S>& c, const PixelCentre& at,
+                               const PixelSize& size) {
+  auto out = barycentrics_ref::Quotients(barycentrics_ref::MakeProducts(c, at), size);
   if (!out.solid) {
     out.u = out.v = S(1) / S(3);
     out.du_dx = out.du_dy = out.dv_dx = out.dv_dy = S(0);
@@ -113,25 +123,27 @@ struct BarycentricsCotangent {
   S d_u, d_v, d_slopes[4];
 };
 
-// d_corners.x, y, w += ...; z/w is held constant, as is the choice of the face. `b` is what
-// BarycentricsAt said; nothing comes from a face that is not solid.
+// d_corners.x, y, w += ...; z/w is held constant, as is the choice of the face. Nothing comes from
+// a face that is not solid.
 template <class S>
 void BarycentricsAdjoint(const ClipCorners<S>& c, const PixelCentre& at, const PixelSize& size,
                          const BarycentricsCotangent<S>& d, ClipCorners<S>* d_corners) {
   const auto p = barycentrics_ref::MakeProducts(c, at);
+  const auto b = barycentrics_ref::Quotients(p, size);
+  if (!b.solid) return;
   const S inverse = S(1) / p.sum;
-  const S weight[2] = {p.a[0] * inverse, p.a[1] * inverse}, d_weight[2] = {d.d_u, d.d_v};
+  const S weight[2] = {b.u, b.v}, d_weight[2] = {d.d_u, d.d_v};
+  const S slopes[4] = {b.du_dx, b.du_dy, b.dv_dx, b.dv_dy};
   S d_a[3] = {}, d_ax[3] = {}, d_ay[3] = {}, d_sum = S(0), d_sum_x = S(0), d_sum_y = S(0);
   for (int k = 0; k < 2; ++k) {
-    const S gx = d.d_slopes[2 * k] * size.x * inverse,
-            gy = d.d_slopes[2 * k + 1] * size.y * inverse;
-    const S slope_x = (p.ax[k] - weight[k] * p.sum_x) * inverse;
-    const S slope_y = (p.ay[k] - weight[k] * p.sum_y) * inverse;
-    const S g = (d_weight[k] - gx * p.sum_x - gy * p.sum_y);
-    d_ax[k] += gx, d_ay[k] += gy;
+    const S gx = d.d_slopes[2 * k] * size.x * inverse;
+    const S gy = d.d_slopes[2 * k + 1] * size.y * inverse;
+    const S g = (d_weight[k] - gx * p.sum_x - gy * p.sum_y) * inverse;
+    d_a[k] += g, d_ax[k] += gx, d_ay[k] += gy;
     d_sum_x -= gx * weight[k], d_sum_y -= gy * weight[k];
-    d_a[k] += g * inverse;
-    d_sum -= g * inverse * weight[k] + gx * slope_x + gy * slope_y;
+    d_sum -=
+        g * weight[k] +
+        (d.d_slopes[2 * k] * slopes[2 * k] + d.d_slopes[2 * k + 1] * slopes[2 * k + 1]) * inverse;
   }
   for (int k = 0; k < 3; ++k) d_a[k] += d_sum, d_ax[k] += d_sum_x, d_ay[k] += d_sum_y;
   S d_px[3] = {}, d_py[3] = {}, d_w[3] = {};

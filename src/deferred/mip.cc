@@ -6,38 +6,30 @@
 namespace tilegrad::deferred {
 namespace {
 
-// How a level follows from the finer one: ratio 2, or 1 where a side is one texel.
+// How a level follows from the finer one: steps of 2, or 1 where a side is one texel.
 struct Halving {
-  std::size_t fine_width, fine_rows, coarse_width, step_x, step_y, channels;
+  std::size_t fine_row, fine_rows, coarse_row;  // numbers of a row; rows of a texture
+  std::size_t step_x, step_y, channels;
 
   Halving(const MipSize& fine, std::size_t c)
-      : fine_width(static_cast<std::size_t>(fine.width)),
+      : fine_row(static_cast<std::size_t>(fine.width) * c),
         fine_rows(static_cast<std::size_t>(fine.height)),
         step_x(fine.width > 1 ? 2 : 1),
         step_y(fine.height > 1 ? 2 : 1),
         channels(c) {
-    coarse_width = fine_width / step_x;
+    coarse_row = fine_row / step_x;
   }
-  std::size_t coarse_rows() const { return fine_rows / step_y; }
-
-  // Calls visit(coarse number, fine number) for the pairs that belong together, of one row of the
-  // coarse level; rows are counted over all textures.
+  // Calls visit(coarse number, fine number, its neighbour to the right) for the numbers that belong
+  // together of one row of the coarse level, counted over all textures, and one of the fine rows
+  // that it is made of. Both fine numbers are the same where there is no neighbour.
   template <class Visit>
-  void ForRow(std::size_t row, const Visit& visit) const {
-    const std::size_t texture = row / coarse_rows(), y = row % coarse_rows();
-    for (std::size_t dy = 0; dy < step_y; ++dy) {
-      const std::size_t from = (texture * fine_rows + y * step_y + dy) * fine_width * channels;
-      const std::size_t to = row * coarse_width * channels;
-      for (std::size_t x = 0; x < coarse_width * step_x; ++x) {
-        for (std::size_t c = 0; c < channels; ++c) {
-          visit(to + x / step_x * channels + c, from + x * channels + c);
-        }
-      }
+  void ForRow(std::size_t row, std::size_t fine, const Visit& visit) const {
+    const std::size_t rows = fine_rows / step_y;
+    std::size_t from = (row / rows * fine_rows + row % rows * step_y + fine) * fine_row;
+    const std::size_t beside = (step_x - 1) * channels, end = (row + 1) * coarse_row;
+    for (std::size_t to = row * coarse_row; to < end; from += beside) {
+      for (std::size_t c = 0; c < channels; ++c, ++to, ++from) visit(to, from, from + beside);
     }
-  }
-  template <class T>
-  T share() const {
-    return T(1) / static_cast<T>(step_x * step_y);
   }
 };
 
@@ -65,14 +57,18 @@ template <class T>
 void HalveTexture(const TextureLevel<T>& fine, std::size_t channels, const Workers& workers,
                   std::span<T> coarse) {
   const Halving halving(fine.size, channels);
-  const std::size_t row = halving.coarse_width * channels;
-  workers.ForRanges(coarse.size() / row, kRowGrain,
+  const T share = T(0.5) / static_cast<T>(halving.step_y);
+  const T* from = fine.texels.data();
+  T* to = coarse.data();
+  workers.ForRanges(coarse.size() / halving.coarse_row, kRowGrain,
                     [&](std::size_t begin, std::size_t end, std::size_t) {
-                      const T share = halving.share<T>();
-                      for (std::size_t i = begin * row; i < end * row; ++i) coarse[i] = T(0);
-                      for (std::size_t r = begin; r < end; ++r) {
-                        halving.ForRow(r, [&](std::size_t to, std::size_t from) {
-                          coarse[to] += share * fine.texels[from];
+                      for (std::size_t row = begin; row < end; ++row) {
+                        halving.ForRow(row, 0, [&](std::size_t c, std::size_t a, std::size_t b) {
+                          to[c] = share * (from[a] + from[b]);
+                        });
+                        if (halving.step_y == 1) continue;
+                        halving.ForRow(row, 1, [&](std::size_t c, std::size_t a, std::size_t b) {
+                          to[c] += share * (from[a] + from[b]);
                         });
                       }
                     });
@@ -82,14 +78,18 @@ template <class T>
 void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
                           std::size_t channels, const Workers& workers, std::span<T> d_fine) {
   const Halving halving(fine, channels);
-  const std::size_t row = halving.coarse_width * channels;
-  workers.ForRanges(d_coarse.texels.size() / row, kRowGrain,
+  const T share = T(0.5) / static_cast<T>(halving.step_y);
+  const T* from = d_coarse.texels.data();
+  T* to = d_fine.data();
+  const auto pull = [&](std::size_t c, std::size_t a, std::size_t b) {
+    to[a] += share * from[c], to[b] += share * from[c];
+  };
+  workers.ForRanges(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
                     [&](std::size_t begin, std::size_t end, std::size_t) {
-                      const T share = halving.share<T>();
-                      for (std::size_t r = begin; r < end; ++r) {
-                        halving.ForRow(r, [&](std::size_t from, std::size_t to) {
-                          d_fine[to] += share * d_coarse.texels[from];
-                        });
+                      for (std::size_t row = begin; row < end; ++row) {
+                        for (std::size_t y = 0; y < halving.step_y; ++y) {
+                          halving.ForRow(row, y, pull);
+                        }
                       }
                     });
 }

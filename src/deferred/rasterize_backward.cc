@@ -8,9 +8,6 @@
 namespace tilegrad::deferred {
 namespace {
 
-// Channels of d_positions that rasterize pulls: x, y and w.
-constexpr int kPulled[3] = {0, 1, 3};
-
 template <class T>
 BarycentricsCotangent<double> CotangentAt(const RasterizeCotangents<T>& all, std::size_t pixel) {
   BarycentricsCotangent<double> out{};
@@ -24,36 +21,50 @@ BarycentricsCotangent<double> CotangentAt(const RasterizeCotangents<T>& all, std
   return out;
 }
 
-void AddCorners(const ClipCorners<double>& d, const std::size_t (&rows)[3],
-                BandSums::Adder* adder) {
-  for (int k = 0; k < 3; ++k) {
-    double* to = adder->Row(rows[k]);
-    const double values[3] = {d.x[k], d.y[k], d.w[k]};
-    for (int i = 0; i < 3; ++i) to[kPulled[i]] += values[i];
+// Sums what pixels pull on the face at hand, before it goes on to the face's vertices.
+template <class T>
+class FacePull {
+ public:
+  FacePull(const RasterizeInput<T>& input, std::size_t image, BandSums::Adder* adder)
+      : input_(input), image_(image), adder_(adder) {}
+  ~FacePull() { Flush(); }
+
+  ClipCorners<double>* Of(std::int32_t face) {
+    if (face != face_) Flush(), face_ = face;
+    return &sum_;
   }
-}
+
+ private:
+  void Flush() {
+    if (face_ == raster::kNoFace) return;
+    const std::int32_t* v = &input_.faces[3 * static_cast<std::size_t>(face_)];
+    for (int k = 0; k < 3; ++k) {
+      double* to = adder_->Row(input_.positions.row(image_, v[k]));
+      to[0] += sum_.x[k], to[1] += sum_.y[k], to[3] += sum_.w[k];  // z pulls nothing
+    }
+    sum_ = {};
+  }
+
+  const RasterizeInput<T>& input_;
+  std::size_t image_;
+  BandSums::Adder* adder_;
+  std::int32_t face_ = raster::kNoFace;
+  ClipCorners<double> sum_{};
+};
 
 template <class T>
 void PullBand(const RasterizeInput<T>& input, const RasterizeCotangents<T>& cotangents,
               const Band& band, BandSums::Adder* adder) {
   const PixelSize size = SizeOf(input.grid);
   LastFace<T> corners(input, band.image);
+  FacePull<T> pull(input, band.image, adder);
   for (int y = band.row_begin; y < band.row_end; ++y) {
     for (int x = 0; x < input.grid.width; ++x) {
       const std::size_t pixel = input.grid.first(band.image, y) + static_cast<std::size_t>(x);
       const std::int32_t face = FaceOf(&cotangents.rast[4 * pixel]);
       if (face < 0) continue;
-      const ClipCorners<double>& c = corners(face);
-      const PixelCentre at = CentreOf(input.grid, x, y);
-      if (!BarycentricsAt(c, at, size).solid) continue;
-      ClipCorners<double> d{};
-      BarycentricsAdjoint(c, at, size, CotangentAt(cotangents, pixel), &d);
-      std::size_t rows[3];
-      for (int k = 0; k < 3; ++k) {
-        rows[k] =
-            input.positions.row(band.image, input.faces[3 * static_cast<std::size_t>(face) + k]);
-      }
-      AddCorners(d, rows, adder);
+      BarycentricsAdjoint(corners(face), CentreOf(input.grid, x, y), size,
+                          CotangentAt(cotangents, pixel), pull.Of(face));
     }
   }
 }

@@ -39,7 +39,6 @@ bool UsesLevels(const TextureInput<T>& input) {
 struct PixelLookup {
   TextureCoordinates at;
   TexturePoint point;
-  FootprintLevel footprint;
   LevelChoice choice;
   int levels;  // 1 or 2
   Taps taps[2];
@@ -48,96 +47,130 @@ struct PixelLookup {
 };
 
 template <class T>
-TextureCoordinates CoordinatesOf(const TextureInput<T>& input, std::size_t pixel) {
+void SetCoordinates(const TextureInput<T>& input, std::size_t pixel, TextureCoordinates* out) {
   const std::size_t n = input.coordinates();
-  TextureCoordinates out{};
-  for (std::size_t i = 0; i < n; ++i) out.uv[i] = static_cast<double>(input.uv[n * pixel + i]);
-  for (std::size_t i = 0; i < 2 * n && !input.uv_da.empty(); ++i) {
-    out.uv_da[i] = static_cast<double>(input.uv_da[2 * n * pixel + i]);
+  for (std::size_t i = 0; i < n; ++i) out->uv[i] = static_cast<double>(input.uv[n * pixel + i]);
+  for (std::size_t i = 0; i < 2 * n; ++i) {
+    out->uv_da[i] = input.uv_da.empty() ? 0 : static_cast<double>(input.uv_da[2 * n * pixel + i]);
   }
-  return out;
 }
 
 template <class T>
-void SetLevel(const TextureInput<T>& input, std::size_t pixel, PixelLookup* lookup) {
-  double level = 0;
-  if (!input.uv_da.empty()) {
-    lookup->footprint = LevelOf(lookup->point.slopes, input.levels[0].size);
-    level = lookup->footprint.level;
-  }
+LevelChoice LevelAt(const TextureInput<T>& input, std::size_t pixel, const TexturePoint& point) {
+  if (!UsesLevels(input)) return {0, 0, false};
+  double level = input.uv_da.empty() ? 0 : LevelOf(point.slopes, input.levels[0].size);
   if (!input.mip_level_bias.empty()) level += static_cast<double>(input.mip_level_bias[pixel]);
-  lookup->choice = ChooseLevel(input, level);
+  return ChooseLevel(input, level);
 }
 
 template <class T>
-PixelLookup LookupOf(const TextureInput<T>& input, std::size_t pixel) {
-  PixelLookup out{};
-  out.at = CoordinatesOf(input, pixel);
-  out.point = PointOf(out.at, input.boundary == TextureBoundary::kCube);
-  if (!out.point.valid) return out;
-  if (UsesLevels(input)) SetLevel(input, pixel, &out);
-  out.levels = out.choice.mix > 0 || out.choice.moves ? 2 : 1;
-  for (int i = 0; i < out.levels; ++i) {
-    out.taps[i] = TapsOf(out.point, input.levels[out.choice.low + static_cast<std::size_t>(i)].size,
-                         input.filter == TextureFilter::kNearest, input.boundary);
+void LookUp(const TextureInput<T>& input, std::size_t pixel, PixelLookup* out) {
+  SetCoordinates(input, pixel, &out->at);
+  FindPoint(out->at, input.boundary == TextureBoundary::kCube, &out->point);
+  out->levels = 0;
+  if (!out->point.valid) return;
+  out->choice = LevelAt(input, pixel, out->point);
+  out->levels = out->choice.moves ? 2 : 1;
+  for (int i = 0; i < out->levels; ++i) {
+    FindTaps(out->point, input.levels[out->choice.low + static_cast<std::size_t>(i)].size,
+             input.filter == TextureFilter::kNearest, input.boundary, &out->taps[i]);
   }
-  return out;
 }
 
 std::size_t TexelsOf(const MipSize& size, std::size_t faces) {
   return faces * static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
 }
 
-// The texels of one level of the texture that an image has.
+// The first texel of the texture that an image has, in a level.
 template <class T>
-const T* TexelsFor(const TextureInput<T>& input, std::size_t level, std::size_t image) {
-  const TextureLevel<T>& l = input.levels[level];
-  const std::size_t texture = input.textures == 1 ? 0 : image;
-  return l.texels.data() + texture * TexelsOf(l.size, input.faces()) * input.channels;
+std::size_t FirstTexel(const TextureInput<T>& input, std::size_t level, std::size_t image) {
+  return (input.textures == 1 ? 0 : image) * TexelsOf(input.levels[level].size, input.faces());
 }
 
-// One channel of what stands at the taps.
+// The texels that a lookup mixes, of one level. What is missing at the corner of a cube is shared
+// by the others; what lies outside is left out.
+struct WeightedTexels {
+  int count;
+  std::size_t texel[4];  // of the level
+  double weight[4];
+};
+
 template <class T>
-void ReadTaps(const Taps& taps, const T* texels, std::size_t channels, std::size_t channel,
-              double (&values)[4]) {
-  double sum = 0;
-  int mean = -1;
+void FindTexels(const TextureInput<T>& input, const PixelLookup& lookup, int i, std::size_t image,
+                WeightedTexels* out) {
+  const Taps& taps = lookup.taps[i];
+  const std::size_t first =
+      FirstTexel(input, lookup.choice.low + static_cast<std::size_t>(i), image);
+  out->count = 0;
+  double shared = 0;
   for (int k = 0; k < taps.count; ++k) {
-    const std::ptrdiff_t texel = taps.texel[k];
-    values[k] =
-        texel < 0
-            ? 0
-            : static_cast<double>(texels[static_cast<std::size_t>(texel) * channels + channel]);
-    sum += values[k];
-    if (texel == Taps::kMean) mean = k;
+    if (taps.texel[k] == Taps::kMean) shared = taps.weight(k) / 3;
   }
-  if (mean >= 0) values[mean] = sum / 3;
+  for (int k = 0; k < taps.count; ++k) {
+    if (taps.texel[k] < 0) continue;
+    out->texel[out->count] = first + static_cast<std::size_t>(taps.texel[k]);
+    out->weight[out->count++] = lookup.share(i) * (taps.weight(k) + shared);
+  }
 }
 
-double MixTaps(const Taps& taps, const double (&v)[4]) {
-  if (taps.count == 1) return v[0];
-  const double lower = v[0] + taps.a * (v[1] - v[0]), upper = v[2] + taps.a * (v[3] - v[2]);
-  return lower + taps.b * (upper - lower);
+template <class T>
+const T* LevelTexels(const TextureInput<T>& input, const PixelLookup& lookup, int i) {
+  return input.levels[lookup.choice.low + static_cast<std::size_t>(i)].texels.data();
+}
+
+constexpr std::size_t kSumChannels = 8;  // that are summed side by side
+
+// out[c] <- the texels' mixture in channels first to first + n - 1, n at most kSumChannels.
+template <class T>
+void MixChannels(const TextureInput<T>& input, const PixelLookup& lookup,
+                 const WeightedTexels (&texels)[2], std::size_t first, std::size_t n, T* out) {
+  double sums[kSumChannels] = {};
+  for (int i = 0; i < lookup.levels; ++i) {
+    const T* from = LevelTexels(input, lookup, i) + first;
+    for (int k = 0; k < texels[i].count; ++k) {
+      const T* texel = from + texels[i].texel[k] * input.channels;
+      for (std::size_t c = 0; c < n; ++c) {
+        sums[c] += texels[i].weight[k] * static_cast<double>(texel[c]);
+      }
+    }
+  }
+  for (std::size_t c = 0; c < n; ++c) out[c] = static_cast<T>(sums[c]);
 }
 
 template <class T>
 void SamplePixel(const TextureInput<T>& input, const PixelLookup& lookup, std::size_t image,
                  T* out) {
-  for (std::size_t c = 0; c < input.channels; ++c) {
-    double sum = 0, values[4];
-    for (int i = 0; i < lookup.levels; ++i) {
-      const T* texels = TexelsFor(input, lookup.choice.low + static_cast<std::size_t>(i), image);
-      ReadTaps(lookup.taps[i], texels, input.channels, c, values);
-      sum += lookup.share(i) * MixTaps(lookup.taps[i], values);
-    }
-    out[c] = static_cast<T>(sum);
+  WeightedTexels texels[2];
+  for (int i = 0; i < lookup.levels; ++i) FindTexels(input, lookup, i, image, &texels[i]);
+  for (std::size_t c = 0; c < input.channels; c += kSumChannels) {
+    const std::size_t n = std::min(kSumChannels, input.channels - c);
+    MixChannels(input, lookup, texels, c, n, out + c);
   }
 }
 
-// What the cotangent of a pixel pulls on a, b and on the mixture of levels.
+// What the cotangent of a pixel pulls on s and t, and on the mixture of levels.
 struct PixelPull {
   double d_st[2] = {}, d_mix = 0;
 };
+
+// The product of each tap's texel with the cotangent.
+template <class T>
+void DotTaps(const TextureInput<T>& input, const Taps& taps, const T* texels, const T* d_out,
+             double (&dots)[4]) {
+  double sum = 0;
+  int mean = -1;
+  for (int k = 0; k < taps.count; ++k) {
+    dots[k] = 0;
+    if (taps.texel[k] == Taps::kMean) mean = k;
+    if (taps.texel[k] < 0) continue;
+    const T* texel = texels + static_cast<std::size_t>(taps.texel[k]) * input.channels;
+    for (std::size_t c = 0; c < input.channels; ++c) {
+      dots[k] += static_cast<double>(texel[c]) * static_cast<double>(d_out[c]);
+    }
+    sum += dots[k];
+  }
+  if (mean >= 0) dots[mean] = sum / 3;
+}
 
 template <class T>
 PixelPull PullPoint(const TextureInput<T>& input, const PixelLookup& lookup, std::size_t image,
@@ -145,49 +178,35 @@ PixelPull PullPoint(const TextureInput<T>& input, const PixelLookup& lookup, std
   PixelPull pull;
   for (int i = 0; i < lookup.levels; ++i) {
     const Taps& taps = lookup.taps[i];
-    const T* texels = TexelsFor(input, lookup.choice.low + static_cast<std::size_t>(i), image);
-    double d_a = 0, d_b = 0, d_share = 0, v[4];
-    for (std::size_t c = 0; c < input.channels; ++c) {
-      const auto d = static_cast<double>(d_out[c]);
-      ReadTaps(taps, texels, input.channels, c, v);
-      d_share += d * MixTaps(taps, v);
-      if (taps.count == 1) continue;
-      d_a += d * ((1 - taps.b) * (v[1] - v[0]) + taps.b * (v[3] - v[2]));
-      d_b += d * ((1 - taps.a) * (v[2] - v[0]) + taps.a * (v[3] - v[1]));
-    }
+    const std::size_t level = lookup.choice.low + static_cast<std::size_t>(i);
+    const T* texels =
+        input.levels[level].texels.data() + FirstTexel(input, level, image) * input.channels;
+    double dots[4], d_share = 0;
+    DotTaps(input, taps, texels, d_out, dots);
+    for (int k = 0; k < taps.count; ++k) d_share += taps.weight(k) * dots[k];
+    pull.d_mix += i == 0 ? -d_share : d_share;
+    if (taps.count == 1) continue;
+    const double d_a = (1 - taps.b) * (dots[1] - dots[0]) + taps.b * (dots[3] - dots[2]);
+    const double d_b = (1 - taps.a) * (dots[2] - dots[0]) + taps.a * (dots[3] - dots[1]);
     pull.d_st[0] += lookup.share(i) * d_a * taps.slope_a;
     pull.d_st[1] += lookup.share(i) * d_b * taps.slope_b;
-    pull.d_mix += i == 0 ? -d_share : d_share;
   }
   return pull;
 }
 
-// Adds what one tap pulls to its texel.
-template <class T>
-void PullTexel(const TextureInput<T>& input, std::size_t row, double weight, const T* d_out,
-               BandSums::Adder* adder) {
-  if (weight == 0) return;
-  double* to = adder->Row(row);
-  for (std::size_t c = 0; c < input.channels; ++c) to[c] += weight * static_cast<double>(d_out[c]);
-}
-
+// `first`: where the levels begin among all texels.
 template <class T>
 void PullTexels(const TextureInput<T>& input, const PixelLookup& lookup, std::size_t image,
                 std::span<const std::size_t> first, const T* d_out, BandSums::Adder* adder) {
   for (int i = 0; i < lookup.levels; ++i) {
-    const std::size_t level = lookup.choice.low + static_cast<std::size_t>(i);
-    const std::size_t texture = input.textures == 1 ? 0 : image;
-    const std::size_t base =
-        first[level] + texture * TexelsOf(input.levels[level].size, input.faces());
-    const Taps& taps = lookup.taps[i];
-    double shared = 0;  // by the three texels at a corner of a cube
-    for (int k = 0; k < taps.count; ++k) {
-      if (taps.texel[k] == Taps::kMean) shared = taps.weight(k) / 3;
-    }
-    for (int k = 0; k < taps.count; ++k) {
-      if (taps.texel[k] < 0) continue;
-      PullTexel(input, base + static_cast<std::size_t>(taps.texel[k]),
-                lookup.share(i) * (taps.weight(k) + shared), d_out, adder);
+    WeightedTexels texels;
+    FindTexels(input, lookup, i, image, &texels);
+    const std::size_t begin = first[lookup.choice.low + static_cast<std::size_t>(i)];
+    for (int k = 0; k < texels.count; ++k) {
+      double* to = adder->Row(begin + texels.texel[k]);
+      for (std::size_t c = 0; c < input.channels; ++c) {
+        to[c] += texels.weight[k] * static_cast<double>(d_out[c]);
+      }
     }
   }
 }
@@ -198,7 +217,9 @@ void WriteCoordinates(const TextureInput<T>& input, const PixelLookup& lookup,
   const double d_level = lookup.choice.moves ? pull.d_mix : 0;
   if (!out.d_mip_level_bias.empty()) out.d_mip_level_bias[pixel] = static_cast<T>(d_level);
   PointCotangent d{{pull.d_st[0], pull.d_st[1]}, {}};
-  for (int i = 0; i < 4; ++i) d.d_slopes[i] = d_level * lookup.footprint.d_slopes[i];
+  if (!input.uv_da.empty() && d_level != 0) {
+    LevelAdjoint(lookup.point.slopes, input.levels[0].size, d_level, d.d_slopes);
+  }
   TextureCoordinates to;
   PointAdjoint(lookup.at, lookup.point, input.boundary == TextureBoundary::kCube, d, &to);
   const std::size_t n = input.coordinates();
@@ -226,8 +247,10 @@ template <class T>
 void SampleTexture(const TextureInput<T>& input, const Workers& workers, std::span<T> out) {
   workers.For(input.grid.bands(), [&](std::size_t index, std::size_t) {
     const Band band = input.grid.band(index);
+    PixelLookup lookup;
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
-      SamplePixel(input, LookupOf(input, pixel), band.image, out.data() + pixel * input.channels);
+      LookUp(input, pixel, &lookup);
+      SamplePixel(input, lookup, band.image, out.data() + pixel * input.channels);
     });
   });
 }
@@ -246,8 +269,9 @@ void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_ou
   workers.For(input.grid.bands(), [&](std::size_t index, std::size_t worker) {
     BandSums::Adder adder(&sums, index, worker);
     const Band band = input.grid.band(index);
+    PixelLookup lookup;
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
-      const PixelLookup lookup = LookupOf(input, pixel);
+      LookUp(input, pixel, &lookup);
       if (!lookup.point.valid) return;
       const T* d = &d_out[pixel * input.channels];
       if (texels) PullTexels(input, lookup, band.image, first, d, &adder);

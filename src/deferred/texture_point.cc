@@ -4,17 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "deferred/texture_cube.h"
 
 namespace tilegrad::deferred {
 namespace {
 
-TexturePoint PlainPoint(const TextureCoordinates& at) {
-  TexturePoint out{true, 0, {at.uv[0], at.uv[1]}, {}};
-  out.valid = std::isfinite(at.uv[0]) && std::isfinite(at.uv[1]);
-  std::copy(at.uv_da, at.uv_da + 4, out.slopes);
-  return out;
+void FindPlainPoint(const TextureCoordinates& at, TexturePoint* out) {
+  out->valid = std::isfinite(at.uv[0]) && std::isfinite(at.uv[1]);
+  out->face = 0;
+  for (int i = 0; i < 2; ++i) out->st[i] = at.uv[i];
+  for (int i = 0; i < 4; ++i) out->slopes[i] = at.uv_da[i];
 }
 
 // p = component / major of one axis of a face, and d(p)/d(X, Y) / 2, which is that of s or t.
@@ -33,19 +34,17 @@ CubeRatio RatioOf(const TextureCoordinates& at, const CubeAxis& axis, const Cube
   return out;
 }
 
-TexturePoint CubePoint(const TextureCoordinates& at) {
-  TexturePoint out{};
-  out.face = CubeFaceOf({at.uv[0], at.uv[1], at.uv[2]});
-  out.valid = out.face >= 0;
-  if (!out.valid) return out;
-  const CubeFace& face = kCubeFaces[out.face];
+void FindCubePoint(const TextureCoordinates& at, TexturePoint* out) {
+  out->face = CubeFaceOf({at.uv[0], at.uv[1], at.uv[2]});
+  out->valid = out->face >= 0;
+  if (!out->valid) return;
+  const CubeFace& face = kCubeFaces[out->face];
   const CubeAxis axes[2] = {face.s, face.t};
   for (int k = 0; k < 2; ++k) {
     const CubeRatio ratio = RatioOf(at, axes[k], face.major);
-    out.st[k] = 0.5 * (ratio.p + 1);
-    for (int i = 0; i < 2; ++i) out.slopes[2 * k + i] = ratio.slopes[i];
+    out->st[k] = 0.5 * (ratio.p + 1);
+    for (int i = 0; i < 2; ++i) out->slopes[2 * k + i] = ratio.slopes[i];
   }
-  return out;
 }
 
 void CubeAdjoint(const TextureCoordinates& at, int face, const PointCotangent& d,
@@ -67,10 +66,25 @@ void CubeAdjoint(const TextureCoordinates& at, int face, const PointCotangent& d
   }
 }
 
+// J = d(s W, t H)/d(X, Y). The squared length of its longer axis is the larger eigenvalue of
+// J^T J = (a c; c b).
+struct Footprint {
+  double scale[2], j[4];
+  double half, c, root, square;  // (a - b) / 2, c, hypot(half, c)
+
+  Footprint(const double (&slopes)[4], const MipSize& size)
+      : scale{static_cast<double>(size.width), static_cast<double>(size.height)} {
+    for (int i = 0; i < 4; ++i) j[i] = slopes[i] * scale[i / 2];
+    const double a = j[0] * j[0] + j[2] * j[2], b = j[1] * j[1] + j[3] * j[3];
+    half = 0.5 * (a - b), c = j[0] * j[1] + j[2] * j[3];
+    root = std::sqrt(half * half + c * c), square = 0.5 * (a + b) + root;
+  }
+};
+
 }  // namespace
 
-TexturePoint PointOf(const TextureCoordinates& at, bool cube) {
-  return cube ? CubePoint(at) : PlainPoint(at);
+void FindPoint(const TextureCoordinates& at, bool cube, TexturePoint* out) {
+  return cube ? FindCubePoint(at, out) : FindPlainPoint(at, out);
 }
 
 void PointAdjoint(const TextureCoordinates& at, const TexturePoint& point, bool cube,
@@ -81,27 +95,23 @@ void PointAdjoint(const TextureCoordinates& at, const TexturePoint& point, bool 
   std::copy(d.d_slopes, d.d_slopes + 4, out->uv_da);
 }
 
-// The squared length is the larger eigenvalue of J^T J = (a c; c b).
-FootprintLevel LevelOf(const double (&slopes)[4], const MipSize& size) {
-  const double scale[4] = {static_cast<double>(size.width), static_cast<double>(size.width),
-                           static_cast<double>(size.height), static_cast<double>(size.height)};
-  double j[4];
-  for (int i = 0; i < 4; ++i) j[i] = slopes[i] * scale[i];
-  const double a = j[0] * j[0] + j[2] * j[2], b = j[1] * j[1] + j[3] * j[3];
-  const double c = j[0] * j[1] + j[2] * j[3], half = 0.5 * (a - b);
-  const double root = std::hypot(half, c), square = 0.5 * (a + b) + root;
-  FootprintLevel out{-std::numeric_limits<double>::infinity(), {}};
-  if (!(square > 0) || !std::isfinite(square)) return out;
-  out.level = 0.5 * std::log2(square);
+double LevelOf(const double (&slopes)[4], const MipSize& size) {
+  const Footprint f(slopes, size);
+  return f.square > 0 ? 0.5 * std::log2(f.square) : -std::numeric_limits<double>::infinity();
+}
+
+void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
+                  double (&d_slopes)[4]) {
+  const Footprint f(slopes, size);
   // Of a round footprint both axes are the longer one; the derivative taken is that of their mean.
-  const double cosine = root > 0 ? half / root : 0, sine = root > 0 ? c / root : 0;
-  const double d_square = 0.5 / (square * std::log(2.0));
+  const double cosine = f.root > 0 ? f.half / f.root : 0, sine = f.root > 0 ? f.c / f.root : 0;
+  const double d_square = 0.5 * d_level / (f.square * std::numbers::ln2);
   const double d_a = 0.5 * (1 + cosine) * d_square, d_b = 0.5 * (1 - cosine) * d_square;
   const double d_c = sine * d_square;
-  const double d_j[4] = {2 * j[0] * d_a + j[1] * d_c, 2 * j[1] * d_b + j[0] * d_c,
-                         2 * j[2] * d_a + j[3] * d_c, 2 * j[3] * d_b + j[2] * d_c};
-  for (int i = 0; i < 4; ++i) out.d_slopes[i] = d_j[i] * scale[i];
-  return out;
+  for (int i = 0; i < 4; i += 2) {
+    d_slopes[i] = (2 * f.j[i] * d_a + f.j[i + 1] * d_c) * f.scale[i / 2];
+    d_slopes[i + 1] = (2 * f.j[i + 1] * d_b + f.j[i] * d_c) * f.scale[i / 2];
+  }
 }
 
 }  // namespace tilegrad::deferred

@@ -24,7 +24,8 @@ struct TextureCoordinates {
   double uv_da[6];
 };
 
-TexturePoint PointOf(const TextureCoordinates& at, bool cube);
+// Overwrites *out. (Not returned: a copy would wait for what has just been written.)
+void FindPoint(const TextureCoordinates& at, bool cube, TexturePoint* out);
 
 // Cotangents of st and slopes, to those of the coordinates: overwrites *out.
 struct PointCotangent {
@@ -33,11 +34,11 @@ struct PointCotangent {
 void PointAdjoint(const TextureCoordinates& at, const TexturePoint& point, bool cube,
                   const PointCotangent& d, TextureCoordinates* out);
 
-// log2 of the length of the longer axis of a footprint, in texels, and its derivative by slopes.
-struct FootprintLevel {
-  double level;        // minus infinity where the footprint is a point
-  double d_slopes[4];  // 0 there
-};
-FootprintLevel LevelOf(const double (&slopes)[4], const MipSize& size);
+// log2 of the length of the longer axis of a footprint, in texels: minus infinity where it is a
+// point, or not a number.
+double LevelOf(const double (&slopes)[4], const MipSize& size);
+// d_slopes <- d_level times the derivative of a level that is finite.
+void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
+                  double (&d_slopes)[4]);
 
 }  // namespace tilegrad::deferred

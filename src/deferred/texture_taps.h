@@ -25,7 +25,8 @@ struct Taps {
   }
 };
 
-// `point` is valid.
-Taps TapsOf(const TexturePoint& point, const MipSize& size, bool nearest, TextureBoundary boundary);
+// Overwrites *out; `point` is valid.
+void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
+              TextureBoundary boundary, Taps* out);
 
 }  // namespace tilegrad::deferred

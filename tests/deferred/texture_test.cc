@@ -246,10 +246,11 @@ TEST(TexturePoint, DerivativesOfLevelAndCubeByDifferences) {
       const double values[4] = {slopes[0], slopes[1], slopes[2], slopes[3]};
       return LevelOf(values, {32, 8});
     };
-    const FootprintLevel at = level();
+    const double at[4] = {slopes[0], slopes[1], slopes[2], slopes[3]};
+    double d_slopes[4];
+    LevelAdjoint(at, {32, 8}, 1.0, d_slopes);
     ExpectGradient(
-        "slope", &slopes, Numbers<double>(at.d_slopes, at.d_slopes + 4),
-        [&] { return level().level; }, 1e-5);
+        "slope", &slopes, Numbers<double>(d_slopes, d_slopes + 4), [&] { return level(); }, 1e-5);
     Numbers<double> numbers(9);
     for (double& v : numbers) v = rng.Uniform(-1, 1);
     numbers[rng.Below(3)] = rng.Uniform() < 0.5 ? 1.3 : -1.3;
@@ -263,11 +264,14 @@ TEST(TexturePoint, DerivativesOfLevelAndCubeByDifferences) {
     for (double& v : d.d_st) v = rng.Uniform(-1, 1);
     for (double& v : d.d_slopes) v = rng.Uniform(-1, 1);
     TextureCoordinates gradient;
-    PointAdjoint(coordinates(), PointOf(coordinates(), true), true, d, &gradient);
+    TexturePoint point;
+    FindPoint(coordinates(), true, &point);
+    PointAdjoint(coordinates(), point, true, d, &gradient);
     Numbers<double> all(gradient.uv, gradient.uv + 3);
     all.insert(all.end(), gradient.uv_da, gradient.uv_da + 6);
     ExpectGradient("direction", &numbers, all, [&] {
-      const TexturePoint p = PointOf(coordinates(), true);
+      TexturePoint p;
+      FindPoint(coordinates(), true, &p);
       double sum = 0;
       for (int i = 0; i < 2; ++i) sum += d.d_st[i] * p.st[i];
       for (int i = 0; i < 4; ++i) sum += d.d_slopes[i] * p.slopes[i];
