@@ -52,13 +52,48 @@ struct PlaneRowSpan {
   }
 };
 
+// out[x] = in[x] for x < count. Rows are short: a call of memmove for each costs more than they do.
+inline void CopyFloats(const float* in, std::size_t count, float* out) {
+  const Tag d;
+  if (count < kLanes) {
+    for (std::size_t x = 0; x < count; ++x) out[x] = in[x];
+    return;
+  }
+  for (std::size_t x = 0; x < count - kLanes; x += kLanes) {
+    hn::StoreU(hn::LoadU(d, in + x), d, out + x);
+  }
+  const std::size_t last = count - kLanes;  // may overlap the one before
+  hn::StoreU(hn::LoadU(d, in + last), d, out + last);
+}
+
+// out[x] = in[2 x] for x < count; reads nothing behind in[2 count - 2].
+inline void CopyEverySecond(const float* in, std::size_t count, float* out) {
+  const Tag d;
+  if (count <= kLanes) {
+    for (std::size_t x = 0; x < count; ++x) out[x] = in[2 * x];
+    return;
+  }
+  Vec even, odd;
+  for (std::size_t x = 0; x < count - kLanes; x += kLanes) {
+    hn::LoadInterleaved2(d, in + 2 * x, even, odd);
+    hn::StoreU(even, d, out + x);
+  }
+  const std::size_t last = count - kLanes;
+  hn::LoadInterleaved2(d, in + 2 * last - 1, odd, even);
+  hn::StoreU(even, d, out + last);
+}
+
 // One row of one plane from a source row.
 inline void CopyPlaneRow(const PlaneGrid& g, const PlaneRowSpan& span, const float* row,
                          float* out) {
   const auto step = static_cast<std::ptrdiff_t>(g.step);
   std::fill(out, out + span.begin, 0.0f);
   if (step == 1) {
-    std::copy(row + (span.first + span.begin), row + (span.first + span.end), out + span.begin);
+    CopyFloats(row + (span.first + span.begin), static_cast<std::size_t>(span.end - span.begin),
+               out + span.begin);
+  } else if (step == 2 && span.end > span.begin) {
+    CopyEverySecond(row + (2 * span.begin + span.first),
+                    static_cast<std::size_t>(span.end - span.begin), out + span.begin);
   } else {
     for (std::ptrdiff_t x = span.begin; x < span.end; ++x) out[x] = row[x * step + span.first];
   }

@@ -150,11 +150,12 @@ inline void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPa
   for (std::size_t vector = 0; vector < vectors; vector += kTileVectors) {
     ConvColumns columns(p, pass, vector);
     columns.source.offset = offsets;
-    columns.target.accumulate = pass.block > 0;
+    // Changed in place: a copy, read in wider words than it was written in, waits for the writing.
+    TileTarget& target = columns.target;
+    target.accumulate = pass.block > 0;
     for (std::size_t panel = 0; panel < work.panels.count(); ++panel) {
       const std::size_t row = work.panels.begin(panel);
-      TileTarget target = columns.target;
-      target.c += row * pass.ldc;
+      target.c = pass.c + row * pass.ldc;
       if (pass.block == 0 && p.bias != nullptr) target.row_bias = p.bias + row;
       PackedRowsTile(PackedConvWeights(p, work, panel, pass.block, pass.phase),
                      work.panels.size(panel), columns.source, steps, target);
