@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small files for tests: made here, or by the program where it was built."""
 
+import atexit
 import functools
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -12,7 +14,8 @@ import numpy as np
 
 from tilegrad import files
 
-_FOLDER = tempfile.TemporaryDirectory(prefix="tilegrad_python_")
+_FOLDER = pathlib.Path(tempfile.mkdtemp(prefix="tilegrad_python_"))
+atexit.register(shutil.rmtree, _FOLDER)
 PROGRAM = pathlib.Path(os.environ.get("TILEGRAD_BUILD", "")) / "src/cli/tilegrad"
 
 _CONFIG = """name = "tiny"
@@ -39,7 +42,7 @@ def run_program(*arguments: object) -> None:
 @functools.lru_cache(maxsize=None)
 def dataset() -> pathlib.Path:
     """Fifteen procedural models in five classes, 4 views of 32 x 32 pixels."""
-    folder = pathlib.Path(_FOLDER.name) / "dataset"
+    folder = _FOLDER / "dataset"
     run_program("dataset", "--source", "procedural", "--per-class", 3, "--size", 32, "--views", 4,
                 "--validation-share", 0.34, "--out", folder)
     return folder
@@ -48,8 +51,8 @@ def dataset() -> pathlib.Path:
 @functools.lru_cache(maxsize=None)
 def run() -> pathlib.Path:
     """A run of three steps of a small network."""
-    folder = pathlib.Path(_FOLDER.name) / "run"
-    config = pathlib.Path(_FOLDER.name) / "tiny.toml"
+    folder = _FOLDER / "run"
+    config = _FOLDER / "tiny.toml"
     config.write_text(_CONFIG)
     run_program("train", "--data", dataset(), "--config", config, "--out", folder)
     return folder
