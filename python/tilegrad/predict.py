@@ -42,7 +42,7 @@ class Predictor:
         self._process = os.getpid()
 
     def _model(self) -> "_tools.Model":
-        if self._process != os.getpid():  # the threads stayed in the other process
+        if self._process != os.getpid():  # a fork may meet a call of another thread
             self._load(1)
         return self._loaded
 
