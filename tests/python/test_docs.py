@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python of the pages in docs/ runs as it stands there."""
+
+import os
+import re
+import unittest
+
+import numpy as np
+
+from file_samples import FolderTest, dataset, run, run_program, textured_mesh
+from support import SOURCE
+from tilegrad import files
+
+try:
+    import torch
+except ImportError:
+    torch = None
+
+
+def code_of(page: str) -> str:
+    """All blocks of a page behind each other."""
+    text = (SOURCE / "docs" / page).read_text(encoding="utf-8")
+    return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+
+
+class Docs(FolderTest):
+    def setUp(self) -> None:
+        super().setUp()
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(self.folder)
+
+    @unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+    def test_torch(self) -> None:
+        names: dict = {}
+        exec(code_of("torch.md"), names)  # pylint: disable=exec-used
+        self.assertGreater(float(names["positions"].grad.abs().max()), 0)
+
+    def test_files(self) -> None:
+        for name, target in (("runs/demo", run()), ("datasets/furniture", dataset())):
+            path = self.folder / name
+            path.parent.mkdir()
+            path.symlink_to(target)
+        run_program("dataset-view", "--data", dataset(), "--out", "photo.png")
+        with open("chair.obj", "w", encoding="utf-8") as file:
+            for p in textured_mesh().positions:
+                file.write("v {} {} {}\n".format(*p))
+            file.write("f 1 2 3 4\n")
+        names: dict = {}
+        exec(code_of("files.md"), names)  # pylint: disable=exec-used
+        self.assertEqual(files.load_image("view.png").shape, (256, 256, 3))
+        self.assertEqual(names["item"]["images"].shape, (2, 3, 32, 32))
+        self.assertEqual(len(files.load_mesh("chair.glb").faces), 2)
+        np.testing.assert_array_equal(names["batch"]["model"].shape, (64,))
+
+
+if __name__ == "__main__":
+    unittest.main()
