@@ -46,13 +46,14 @@ struct PixelLookup {
   double share(int i) const { return i == 0 ? 1 - choice.mix : choice.mix; }
 };
 
+// Leaves derivatives alone where none are given.
 template <class T>
 void SetCoordinates(const TextureInput<T>& input, std::size_t pixel, TextureCoordinates* out) {
   const std::size_t n = input.coordinates();
   for (std::size_t i = 0; i < n; ++i) out->uv[i] = static_cast<double>(input.uv[n * pixel + i]);
-  for (std::size_t i = 0; i < 2 * n; ++i) {
-    out->uv_da[i] = input.uv_da.empty() ? 0 : static_cast<double>(input.uv_da[2 * n * pixel + i]);
-  }
+  if (input.uv_da.empty()) return;
+  const T* da = &input.uv_da[2 * n * pixel];
+  for (std::size_t i = 0; i < 2 * n; ++i) out->uv_da[i] = static_cast<double>(da[i]);
 }
 
 template <class T>
@@ -63,6 +64,7 @@ LevelChoice LevelAt(const TextureInput<T>& input, std::size_t pixel, const Textu
   return ChooseLevel(input, level);
 }
 
+// *out is that of another pixel of this input, or empty.
 template <class T>
 void LookUp(const TextureInput<T>& input, std::size_t pixel, PixelLookup* out) {
   SetCoordinates(input, pixel, &out->at);
@@ -247,7 +249,7 @@ template <class T>
 void SampleTexture(const TextureInput<T>& input, const Workers& workers, std::span<T> out) {
   workers.For(input.grid.bands(), [&](std::size_t index, std::size_t) {
     const Band band = input.grid.band(index);
-    PixelLookup lookup;
+    PixelLookup lookup{};
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
       LookUp(input, pixel, &lookup);
       SamplePixel(input, lookup, band.image, out.data() + pixel * input.channels);
@@ -269,7 +271,7 @@ void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_ou
   workers.For(input.grid.bands(), [&](std::size_t index, std::size_t worker) {
     BandSums::Adder adder(&sums, index, worker);
     const Band band = input.grid.band(index);
-    PixelLookup lookup;
+    PixelLookup lookup{};
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
       LookUp(input, pixel, &lookup);
       if (!lookup.point.valid) return;

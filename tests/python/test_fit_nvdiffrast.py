@@ -21,15 +21,15 @@ else:
 class FitNvdiffrast(unittest.TestCase):
     def test_converges(self):
         with contextlib.redirect_stdout(io.StringIO()) as output:
-            fitted = fit_nvdiffrast.fit(sizes=(8, 16), steps=150)
+            fitted = fit_nvdiffrast.fit(sizes=(8, 16), steps=300)
         self.assertEqual(len(output.getvalue().splitlines()), 2)
         distances = fitted.losses["distance of corners"]
         self.assertGreater(distances[0], 0.1)
-        self.assertLess(distances[-1], 0.02)
+        self.assertLess(distances[-1], 0.04)
         losses = fitted.losses["image loss"]
         self.assertLess(max(losses[-10:]), losses[0] / 10)
         error = (fitted.colors - fitted.cube.colors).abs().mean()
-        self.assertLess(error, 0.1)
+        self.assertLess(error, 0.15)
 
 
 if __name__ == "__main__":

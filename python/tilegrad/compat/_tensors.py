@@ -47,4 +47,4 @@ def to_numpy(tensor: torch.Tensor) -> np.ndarray:
 def threads() -> int:
     """As many as TILEGRAD_NUM_THREADS says; where it is not set as torch uses, which is one in a
     worker of a DataLoader."""
-    return thread_count("tilegrad.compat.kaolin", 0) or torch.get_num_threads()
+    return thread_count("tilegrad.compat", 0) or torch.get_num_threads()
