@@ -124,7 +124,7 @@ void BindSceneArrays(py::module_& m) {
       .def(py::init<>())
       .def_readwrite("positions", &SceneArrays::positions, "([N,] V, 3)")
       .def_readwrite("faces", &SceneArrays::faces, "(F, 3) int32")
-      .def_readwrite("cameras", &SceneArrays::cameras, "([N,] 17)")
+      .def_readwrite("camera", &SceneArrays::camera, "([N,] 17)")
       .def_readwrite("colors", &SceneArrays::colors, "([N,] V, 3), or corners: ([N,] F, 3, 3)")
       .def_readwrite("uvs", &SceneArrays::uvs, "([N,] V, 2), or corners: ([N,] F, 3, 2)")
       .def_readwrite("normals", &SceneArrays::normals, "([N,] V, 3), or corners: ([N,] F, 3, 3)")

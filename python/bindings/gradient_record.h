@@ -11,7 +11,7 @@ namespace tilegrad::python {
 template <class T>
 class GradientRecord {
  public:
-  // `arrays`: from the names of SceneArrays' members (cameras: "camera"; textures: a list with None
+  // `arrays`: from the names of SceneArrays' members (textures: a list with None
   // for what is not wanted) to arrays of the same shapes, or with a leading axis more for a
   // gradient of each image. What is missing is not wanted. ValueError or TypeError for an array of
   // another shape or dtype, or one that is read-only.

@@ -98,7 +98,7 @@ SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
       scenes_(count) {
   const auto positions = Take<T>("positions", arrays_.positions, {vertices_, 3});
   const auto faces = Take<std::int32_t>("faces", arrays_.faces, {faces_, 3});
-  const auto cameras = Take<T>("camera", arrays_.cameras, {kCameraNumbers});
+  const auto cameras = Take<T>("camera", arrays_.camera, {kCameraNumbers});
   for (std::size_t n = 0; n < count; ++n) {
     v0::SceneT<T>& scene = scenes_[n];
     scene.positions = positions.Of(n), scene.faces = faces.Of(n);

@@ -31,7 +31,7 @@ void PutLight(const v0::LightT<T>& light, std::span<T> numbers);
 // What Python hands over; None: not there. A leading axis of `count` numbers is each image's own.
 struct SceneArrays {
   py::object positions = py::none(), faces = py::none();  // [V,3], [F,3] int32
-  py::object cameras = py::none();                        // [17]
+  py::object camera = py::none();                         // [17]
   // [V,C], or [F,3,C] if per corner.
   py::object colors = py::none(), uvs = py::none(), normals = py::none(), attributes = py::none();
   std::vector<bool> per_corner;           // of the four above

@@ -78,15 +78,23 @@ def check_shape(function: str, argument: str, got: Sequence[int], expected: Sequ
                 sizes: Optional[Sizes] = None) -> None:
     """ValueError unless `got` is `expected`; names of lengths as in `as_array`."""
     sizes = {} if sizes is None else sizes
-    if len(got) == len(expected):
-        known = [sizes.get(axis, length) if isinstance(axis, str) else axis
-                 for axis, length in zip(expected, got)]
-        if known == list(got):
-            sizes.update((axis, length) for axis, length in zip(expected, got)
-                         if isinstance(axis, str))
-            return
+    if _fits(got, expected, sizes):
+        return
     raise ValueError(f"{function}: {argument} has shape {tuple(got)}, expected "
                      f"{shape_text(expected, sizes)}")
+
+
+def _fits(got: Sequence[int], expected: Sequence[Axis], sizes: Sizes) -> bool:
+    """Whether `got` is `expected`; then names that are new are noted in `sizes`."""
+    if len(got) != len(expected):
+        return False
+    for length, axis in zip(got, expected):
+        if length != (sizes.get(axis, length) if axis.__class__ is str else axis):
+            return False
+    for length, axis in zip(got, expected):
+        if axis.__class__ is str and sizes.setdefault(axis, length) != length:
+            return False  # a new name that stands for two lengths
+    return True
 
 
 def as_batched(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],

@@ -65,7 +65,7 @@ class RenderOptions:
 class SceneArrays:
     positions: np.ndarray
     faces: np.ndarray
-    cameras: np.ndarray
+    camera: np.ndarray
     colors: Optional[np.ndarray]
     uvs: Optional[np.ndarray]
     normals: Optional[np.ndarray]

@@ -207,11 +207,10 @@ class Scene:
         return numbers, [texture for surface in each for texture in surface.textures()]
 
     def _core_arrays(self, per_corner: Sequence[str]) -> _core.SceneArrays:
-        f = self._fields
         a = _core.SceneArrays()
-        a.positions, a.faces, a.cameras = f["positions"], f["faces"], f["camera"]
-        a.colors, a.uvs = f["colors"], f["uvs"]
-        a.normals, a.attributes = f["normals"], f["attributes"]
+        for name, array in self._fields.items():
+            if array is not None:
+                setattr(a, name, array)
         if per_corner:
             a.per_corner = [name in per_corner for name in _STREAMS]
         if self._textures:
@@ -219,8 +218,6 @@ class Scene:
             a.wraps = [_core.WRAPS.index(wrap) for _, wrap, _ in self._textures]
             a.filters = [_core.FILTERS.index(filter) for _, _, filter in self._textures]
         a.surfaces, a.surface_textures = self._surface
-        a.face_surfaces, a.lights = f["face_surfaces"], f["lights"]
-        a.light_directions, a.sh = f["light_directions"], f["sh"]
         return a
 
     @staticmethod
