@@ -136,8 +136,7 @@ Status ValidateLayeredOptions(const LayeredOptions& options) {
     return InvalidArgument("faces_per_pixel is {}, must be in 1..{}", options.faces_per_pixel,
                            kMostLayers);
   }
-  if (options.blur_radius >= 0 && std::isfinite(options.blur_radius)) return {};
-  return InvalidArgument("blur_radius is {}, must be finite and >= 0", options.blur_radius);
+  return CheckNotNegative("blur_radius", options.blur_radius);
 }
 
 template <class T>

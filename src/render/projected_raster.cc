@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "base/error.h"
 #include "raster/face_visibility.h"
 #include "raster/fragments.h"
 #include "render/validate.h"
@@ -15,11 +14,6 @@ namespace {
 
 constexpr std::size_t kBandRows = 64;
 constexpr std::size_t kFacesPerTask = 256;
-
-Status CheckEps(double eps) {
-  if (eps >= 0 && std::isfinite(eps)) return {};
-  return InvalidArgument("eps is {}, must be finite and >= 0", eps);
-}
 
 // Rows [row, row_end) of an image, from their first pixel on.
 struct RowsOfImage {
@@ -162,7 +156,7 @@ Status RasterizeProjected(const ProjectedBatchT<T>& batch, const ProjectedRaster
                           std::span<const T> features, std::size_t channels, const Workers& workers,
                           std::span<std::int32_t> face_ids, std::span<T> image) {
   TILEGRAD_TRY(ValidateProjected(batch, options.size, {}));
-  TILEGRAD_TRY(CheckEps(options.eps));
+  TILEGRAD_TRY(CheckNotNegative("eps", options.eps));
   TILEGRAD_TRY(CheckSize("face_vertices_z", batch.z.size(), 3 * batch.images * batch.faces));
   TILEGRAD_TRY(CheckFinite("face_vertices_z", batch.z));
   TILEGRAD_TRY(ValidateFeatures(batch, features, channels));
@@ -194,7 +188,7 @@ Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
                                   const Workers& workers,
                                   const ProjectedRasterAdjoint<T>& adjoint) {
   TILEGRAD_TRY(ValidateProjected(batch, options.size, adjoint.face_ids));
-  TILEGRAD_TRY(CheckEps(options.eps));
+  TILEGRAD_TRY(CheckNotNegative("eps", options.eps));
   TILEGRAD_TRY(ValidateFeatures(batch, features, channels));
   TILEGRAD_TRY(ValidateAdjoint(batch, options.size, channels, adjoint));
   const raster::PixelCentresT<T> centres(options.size.width, options.size.height);

@@ -171,10 +171,13 @@ void ForScalarTiles(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions&
   const Bins bins{options.size, batch.images};
   const int width = options.size.width, height = options.size.height;
   const double box = ScalarRule(options, batch.faces).box;
+  std::vector<std::vector<raster::NdcFace<T>>> faces(batch.images);
+  workers.For(batch.images,
+              [&](std::size_t n, std::size_t) { faces[n] = NdcFacesOf(batch.image(n)); });
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
     const std::size_t n = bins.image(task);
-    const NearFacesT<T> near = FacesNear<T>(
-        NdcFacesOf(batch.image(n)), bins.grid.rect(task % bins.grid.tiles()), width, height, box);
+    const NearFacesT<T> near =
+        FacesNear<T>(faces[n], bins.grid.rect(task % bins.grid.tiles()), width, height, box);
     bins.ForTiles(task, [&](const raster::TileRect& rect) {
       visit(task, n, PaperTile{rect, width, height, face_ids.data() + n * PixelCount(options.size)},
             FacesNear(near, rect, width, height, box));
@@ -230,16 +233,11 @@ Status ValidateMaskOptions(const ProjectedMaskOptions& options) {
   if (!(options.max_alpha_error >= 0 && options.max_alpha_error <= 1)) {
     return InvalidArgument("max_alpha_error is {}, must be in [0, 1]", options.max_alpha_error);
   }
-  if (!(options.paper.box >= 0) || !std::isfinite(options.paper.box)) {
-    return InvalidArgument("boxlen is {}, must be finite and >= 0", options.paper.box);
-  }
+  TILEGRAD_TRY(CheckNotNegative("boxlen", options.paper.box));
   if (options.paper.max_faces < 0) {
     return InvalidArgument("knum is {}, must be >= 0", options.paper.max_faces);
   }
-  if (!(options.paper_eps >= 0) || !std::isfinite(options.paper_eps)) {
-    return InvalidArgument("paper_eps is {}, must be finite and >= 0", options.paper_eps);
-  }
-  return {};
+  return CheckNotNegative("paper_eps", options.paper_eps);
 }
 
 }  // namespace

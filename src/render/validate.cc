@@ -103,6 +103,11 @@ Status CheckSize(const char* array, std::size_t got, std::size_t expected) {
   return InvalidArgument("{} has {} numbers, expected {}", array, got, expected);
 }
 
+Status CheckNotNegative(const char* name, double value) {
+  if (value >= 0 && std::isfinite(value)) return {};
+  return InvalidArgument("{} is {}, must be finite and >= 0", name, value);
+}
+
 Status CheckImageSize(const char* axis, int pixels) {
   if (pixels >= 1 && pixels <= raster::kMaxImageSize) return {};
   return InvalidArgument("options.{} is {}, must be in 1..{} pixels", axis, pixels,

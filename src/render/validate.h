@@ -22,6 +22,9 @@ Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::siz
 // Unless there are that many numbers.
 Status CheckSize(const char* array, std::size_t got, std::size_t expected);
 
+// Unless `value` is finite and >= 0.
+Status CheckNotNegative(const char* name, double value);
+
 // Of options.width or options.height.
 Status CheckImageSize(const char* axis, int pixels);
 
