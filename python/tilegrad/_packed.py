@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Optional, Sequence
+from typing import Any, Optional, Sequence, TypeVar
 
 import numpy as np
 
 from tilegrad import _arrays
+
+Record = TypeVar("Record", bound="Packed")
 
 
 class Part:
@@ -39,7 +41,7 @@ class Packed:
     numbers: np.ndarray
 
     @classmethod
-    def of_numbers(cls, numbers: np.ndarray) -> "Packed":
+    def of_numbers(cls: type[Record], numbers: np.ndarray) -> Record:
         """Of an array (..., size), which is not copied."""
         record = cls.__new__(cls)
         record.numbers = numbers
@@ -70,7 +72,7 @@ class Packed:
         raise ValueError(f"{type(self).__name__}: {name} has shape {tuple(got)}, expected "
                          f"{tuple(expected)} or leading axes before that")
 
-    def replace(self, **changes: Any) -> "Packed":
+    def replace(self: Record, **changes: Any) -> Record:
         """The same with some parts changed."""
         parts = {name: getattr(self, name) for name in self._names()}
         unknown = sorted(set(changes) - set(parts))
@@ -87,7 +89,7 @@ class Packed:
             raise TypeError(f"{type(self).__name__}: a single one has no length")
         return len(self.numbers)
 
-    def __getitem__(self, index: Any) -> "Packed":
+    def __getitem__(self: Record, index: Any) -> Record:
         if self.numbers.ndim < 2:
             raise TypeError(f"{type(self).__name__}: a single one cannot be indexed")
         return type(self).of_numbers(self.numbers[index])

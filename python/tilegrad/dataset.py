@@ -163,11 +163,11 @@ class Dataset:
     def _checked_views(self, views: Optional[int]) -> Optional[int]:
         if views is None:
             return None
-        views = _arrays.as_number("Dataset", "views", views, int)
-        if not 1 <= views <= self.info["views"]:
-            raise ValueError(f"Dataset: views is {views}, the dataset has {self.info['views']} of "
+        count = int(_arrays.as_number("Dataset", "views", views, int))
+        if not 1 <= count <= self.info["views"]:
+            raise ValueError(f"Dataset: views is {count}, the dataset has {self.info['views']} of "
                              f"each model")
-        return views
+        return count
 
     def __getstate__(self) -> dict[str, Any]:
         return {"arguments": self._arguments, "epoch": self._epoch}

@@ -28,12 +28,13 @@ def load_image(path: Path) -> np.ndarray:
     if ending != ".exr":
         return _tools.load_image(os.fspath(path))
     layers = load_layers(path)
-    names = list(layers) if len(layers) == 1 else next(
-        (names for names in reversed(_CHANNELS.values()) if set(names) <= set(layers)), None)
-    if names is None:
-        raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} are no picture; "
-                         f"load_layers reads them")
-    return np.stack([layers[name] for name in names], axis=-1)
+    if len(layers) == 1:
+        return np.stack(list(layers.values()), axis=-1)
+    for names in reversed(_CHANNELS.values()):
+        if set(names) <= set(layers):
+            return np.stack([layers[name] for name in names], axis=-1)
+    raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} are no picture; load_layers "
+                     f"reads them")
 
 
 def load_layers(path: Path) -> dict[str, np.ndarray]:

@@ -142,18 +142,22 @@ class Mesh:
             return None if value is None else _arrays.as_array(function, name, value, dtype, shape,
                                                                sizes)
 
-        out = {"positions": array("positions", np.float32, "V", 3),
-               "faces": array("faces", np.int32, "F", 3),
-               "normals": array("normals", np.float32, "V", 3),
-               "corner_uvs": array("corner_uvs", np.float32, "F", 3, 2),
-               "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
-               "face_materials": array("face_materials", np.int32, "F")}
-        out["colors"] = self._rgba(function, sizes)
-        out["materials"] = [dataclasses.asdict(material) for material in self.materials]
-        out["textures"] = [{"name": t.name, "image": _arrays.as_array(
-            function, f"textures[{i}].image", t.image, np.uint8, ("height", "width", "3 or 4")
-            if np.ndim(t.image) != 3 else np.shape(t.image))} for i, t in enumerate(self.textures)]
-        return out
+        return {"positions": array("positions", np.float32, "V", 3),
+                "faces": array("faces", np.int32, "F", 3),
+                "normals": array("normals", np.float32, "V", 3),
+                "colors": self._rgba(function, sizes),
+                "corner_uvs": array("corner_uvs", np.float32, "F", 3, 2),
+                "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
+                "face_materials": array("face_materials", np.int32, "F"),
+                "materials": [dataclasses.asdict(material) for material in self.materials],
+                "textures": [{"name": texture.name, "image": self._texels(function, texture)}
+                             for texture in self.textures]}
+
+    @staticmethod
+    def _texels(function: str, texture: MeshTexture) -> np.ndarray:
+        channels = 4 if np.shape(texture.image)[2:] == (4,) else 3
+        return _arrays.as_array(function, f"image of texture {texture.name!r}", texture.image,
+                                np.uint8, ("height", "width", channels))
 
     def _rgba(self, function: str, sizes: dict[str, int]) -> Optional[np.ndarray]:
         if self.colors is None:

@@ -30,7 +30,8 @@ from tilegrad._threads import thread_count
 Array = Any  # whatever tilegrad takes as an array
 Value = Any  # a tensor, a number, or a nested sequence of numbers
 
-_RECORDS = {"camera": Camera, "lights": Light, "surfaces": Surface}  # of several numbers each
+# Of several numbers each.
+_RECORDS: dict[str, type[Packed]] = {"camera": Camera, "lights": Light, "surfaces": Surface}
 _CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
 
 
@@ -53,7 +54,8 @@ def render(positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Te
            threads: int = 0, surface_textures: Sequence[int] = (), **arguments: Any) -> Images:
     """Images (N, ...) of a scene or of a batch of N.
 
-    positions: (V, 3) or (N, V, 3); its dtype is that of the images. faces: (F, 3) whole numbers.
+    positions: (V, 3) or (N, V, 3); its dtype is that of the images, to which other tensors are
+        converted. faces: (F, 3) whole numbers.
     camera: a Camera, or a tensor ([N,] 17) of `camera`.
     width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always there.
     threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_NUM_THREADS says, or as many as torch uses:
@@ -84,7 +86,7 @@ class Renderer(torch.nn.Module):
 
     def __init__(self, width: int, height: int, **arguments: Any) -> None:
         super().__init__()
-        self.arguments = {"width": width, "height": height, **arguments}
+        self.arguments: dict[str, Any] = {"width": width, "height": height, **arguments}
 
     def forward(self, positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Tensor],
                 **arguments: Any) -> Images:
@@ -166,6 +168,9 @@ class _Call:
         if value.device.type != "cpu":
             raise TypeError(f"render: {name} is on {value.device}; tilegrad renders on the CPU: "
                             f"give {name}.cpu()")
+        if value.is_floating_point() and value.dtype not in (torch.float32, torch.float64):
+            raise TypeError(f"render: {name} has dtype {value.dtype}, expected torch.float32 or "
+                            f"torch.float64 ({name}.float() makes it one)")
         self.places.append((name, index))
         self.tensors.append(value)
 
@@ -196,10 +201,11 @@ class _Call:
         return record
 
     def gradients(self, frame: Frame, wanted: Sequence[bool],
-                  cotangents: dict[str, np.ndarray]) -> list[Optional[torch.Tensor]]:
+                  cotangents: dict[str, Any]) -> list[Optional[torch.Tensor]]:
         """dL/d(tensor) in the order of the tensors; None for those that are not wanted."""
         names = tuple(dict.fromkeys(name for (name, _), want in zip(self.places, wanted) if want))
         found = self._engine().backward(frame, wrt=names, **cotangents)
+        assert isinstance(found, Gradients)  # of one scene
         return [self._gradient(found, *place) if want else None
                 for place, want in zip(self.places, wanted)]
 
@@ -218,7 +224,8 @@ class _Render(torch.autograd.Function):
     """Each call has its own frame, so that renders may follow each other before backward."""
 
     @staticmethod
-    def forward(ctx: Any, call: _Call, *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    def forward(ctx: Any, call: _Call,  # type: ignore[override]
+                *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
         frame = call.frame(tensors)
         images = tuple(torch.from_numpy(frame.shared(name)) for name in frame.outputs)
         face_ids = torch.from_numpy(frame.face_ids.copy())

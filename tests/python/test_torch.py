@@ -3,6 +3,7 @@
 
 import copy
 import pickle
+import threading
 import unittest
 from unittest import mock
 
@@ -290,6 +291,24 @@ class Modules(unittest.TestCase):
         self.assertIn("width=9", repr(renderer))
         self.assertEqual(list(renderer.state_dict()), [])
 
+    def test_python_threads(self):
+        """Renders and backwards of four threads at once are those of one."""
+        data = _Rendered()
+        alone = [data[i] for i in range(4)]
+        got = [None] * 4
+
+        def work(i):
+            for _ in range(3):
+                got[i] = data[i]
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for pair, expected in zip(got, alone):
+            self.assertTrue(all(torch.equal(a, b) for a, b in zip(pair, expected)))
+
     def test_forked_workers(self):
         data = _Rendered()
         loader = torch.utils.data.DataLoader(data, batch_size=2, num_workers=2,
@@ -327,6 +346,8 @@ class Errors(unittest.TestCase):
 
     def test_shapes_and_names(self):
         given = tensors(np.float32)
+        with self.assertRaisesRegex(TypeError, r"colors has dtype torch.bfloat16.*colors.float"):
+            rendered({**given, "colors": given["colors"].bfloat16()})
         with self.assertRaisesRegex(ValueError, r"camera has shape \(3, 3\), expected \(..., 17\)"):
             rendered({**given, "camera": torch.eye(3)})
         with self.assertRaisesRegex(ValueError, r"colors has shape \(5, 3\).*V = 16"):
