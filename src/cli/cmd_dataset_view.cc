@@ -17,13 +17,33 @@ struct ViewOptions {
   int view = 0;
 };
 
-// The model that "class/id" names, or the first of the split.
+// The models of the split, and of the class if one is named.
+Result<std::vector<int>> Candidates(const train::Dataset& dataset, const ViewOptions& options) {
+  const auto split = options.split == "train" ? train::Split::kTrain : train::Split::kTest;
+  std::vector<int> models = dataset.Select(split);
+  if (!options.class_name.empty()) {
+    const auto& classes = dataset.info().classes;
+    const auto found = std::find(classes.begin(), classes.end(), options.class_name);
+    if (found == classes.end()) {
+      return NotFound("{}: no class \"{}\"; there are {}", options.data, options.class_name,
+                      fmt::join(classes, ", "));
+    }
+    const auto wanted = static_cast<int>(found - classes.begin());
+    std::erase_if(models, [&](int m) {
+      return dataset.models()[static_cast<std::size_t>(m)].class_index != wanted;
+    });
+  }
+  if (models.empty()) {
+    return NotFound("{}: no models in the {} split{}", options.data, options.split,
+                    options.class_name.empty() ? "" : " of class " + options.class_name);
+  }
+  return models;
+}
+
+// The model that "class/id" names, or the one in the middle of the candidates.
 Result<int> ChooseModel(const train::Dataset& dataset, const ViewOptions& options) {
   if (options.model.empty()) {
-    const auto split = options.split == "train" ? train::Split::kTrain : train::Split::kTest;
-    const auto models = dataset.Select(split);
-    if (models.empty())
-      return NotFound("{}: no models in the {} split", options.data, options.split);
+    TILEGRAD_ASSIGN(const std::vector<int> models, Candidates(dataset, options));
     return models[models.size() / 2];
   }
   for (std::size_t m = 0; m < dataset.models().size(); ++m) {

@@ -3,6 +3,7 @@
 
 import pickle
 import shutil
+import subprocess
 import unittest
 
 import numpy as np
@@ -54,6 +55,18 @@ class Items(FolderTest):
         np.testing.assert_allclose(data[2]["masks"][1], straight[..., 3], atol=1e-6)
         over_black = np.moveaxis(straight[..., :3] * straight[..., 3:], -1, 0)
         np.testing.assert_allclose(data[2]["images"][1], over_black, atol=1.01 / 255)  # 8 bits
+
+    def test_the_program_shows_the_class_that_is_asked_for(self) -> None:
+        data = files.Dataset(dataset(), "test")
+        for item in data:
+            name = data.classes[item["class"]]
+            run_program("dataset-view", "--data", dataset(), "--class", name, "--out",
+                        self.folder / "view.png")
+            shown = files.load_image(self.folder / "view.png")[..., 3] / 255
+            np.testing.assert_allclose(item["masks"][0], shown, atol=1e-6)
+        with self.assertRaises(subprocess.CalledProcessError) as raised:
+            run_program("dataset-view", "--data", dataset(), "--class", "boat")
+        self.assertIn(b"there are car, chair, lamp", raised.exception.stderr)
 
     def test_truth_renders_to_the_images(self) -> None:
         data = files.Dataset(dataset())
