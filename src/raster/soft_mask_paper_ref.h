@@ -36,8 +36,8 @@ template <class T>
 struct PaperCandidate {
   std::size_t face = 0;
   int from = 0, to = 0;
-  T tau, rx, ry, squared_distance;
-  T influence;  // A, equation 5
+  T tau = T(0), rx = T(0), ry = T(0), squared_distance = T(0);
+  T influence = T(0);  // A, equation 5
 };
 
 template <class T>

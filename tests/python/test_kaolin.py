@@ -435,6 +435,34 @@ class Errors(unittest.TestCase):
                    kaolin.metrics.render.mask_iou, torch.rand(2, 3, 4), torch.rand(1, 3, 4))
 
 
+class Extremes(unittest.TestCase):
+    """Whatever finite numbers come in, finite ones come out."""
+
+    def test_finite_in_finite_out(self):
+        rng = np.random.default_rng(0)
+        for trial in range(240):
+            dtype = (torch.float32, torch.float64)[trial % 2]
+            corners = rng.normal(size=(1, 5, 3, 2))
+            if trial % 3 == 0:
+                corners *= 10.0**rng.uniform(-20, 37)
+            if trial % 5 == 0:
+                corners = np.round(corners * 2) / 2
+            if trial % 7 == 0:
+                corners[:, :, 1] = corners[:, :, 0]  # two corners at one place
+            if trial % 11 == 0:
+                corners[:] = corners[:, :, :1]
+            corners = torch.tensor(corners, dtype=dtype, requires_grad=True)
+            depth = torch.tensor(rng.normal(size=(1, 5, 3)), dtype=dtype)
+            features = torch.tensor(rng.normal(size=(1, 5, 3, 2)), dtype=dtype)
+            image, mask, _ = quiet(mesh.dibr_rasterization, 9, 13, depth, corners, features,
+                                   torch.ones(1, 5), 10.0**rng.uniform(-8, 12),
+                                   exact_kaolin=trial % 4 == 0)
+            self.assertTrue(torch.isfinite(image).all(), trial)
+            self.assertTrue(((mask >= 0) & (mask <= 1)).all(), trial)
+            (image.sum() + mask.sum()).backward()
+            self.assertTrue(torch.isfinite(corners.grad).all(), trial)
+
+
 @unittest.skipUnless(importlib.util.find_spec("tilegrad._tools"), "a build without files")
 class Files(unittest.TestCase):
     def setUp(self):

@@ -158,5 +158,19 @@ TEST(SoftMaskPaper, GradientIsThatOfAComplexStep) {
   }
 }
 
+// The pixel is in the box of a face whose boundary is farther away than `farthest`: A is that of
+// `farthest`, and has no gradient.
+TEST(SoftMaskPaper, FartherThanFarthest) {
+  const std::vector<NdcFace<double>> faces = {{{-200, 200, 0}, {-150, -150, 250}}};
+  const PaperSoftMask rule{.inverse_delta = 0.5};
+  EXPECT_NEAR(PaperAlphaRef<double>(faces, 0, 0, rule), std::exp(-2.0), 1e-15);
+  std::vector<NdcFace<double>> d_faces(1);
+  PaperAlphaRefBackward<double>(faces, 0, 0, rule, 1, d_faces);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(d_faces[0].x[k], 0);
+    EXPECT_EQ(d_faces[0].y[k], 0);
+  }
+}
+
 }  // namespace
 }  // namespace tilegrad::raster
