@@ -21,6 +21,8 @@ Path = Union[str, "os.PathLike[str]"]
 
 _COLOR_SPACES = ("srgb", "linear")
 _NORMALS = ("auto", "smooth", "flat")
+_WRAPS = ("repeat", "mirror", "clamp")
+_ALPHA_MODES = ("opaque", "mask", "blend")
 
 
 @dataclasses.dataclass
@@ -41,6 +43,17 @@ class Material:
     alpha_mode: str = "opaque"
     double_sided: bool = True
     unlit: bool = False
+
+    def checked(self, function: str) -> dict[str, Any]:
+        """Its members for C++. TypeError and ValueError in the name of `function`."""
+        place = f"material {self.name!r}: "
+        _arrays.check_choice(function, place + "wrap", self.wrap, _WRAPS)
+        _arrays.check_choice(function, place + "alpha_mode", self.alpha_mode, _ALPHA_MODES)
+        color = _arrays.as_array(function, place + "base_color", self.base_color, np.float32, (4,))
+        return {"name": str(self.name), "base_color": color.tolist(),
+                "texture": _arrays.as_number(function, place + "texture", self.texture, int),
+                "wrap": self.wrap, "nearest": bool(self.nearest), "alpha_mode": self.alpha_mode,
+                "double_sided": bool(self.double_sided), "unlit": bool(self.unlit)}
 
 
 @dataclasses.dataclass(repr=False)
@@ -149,8 +162,8 @@ class Mesh:
                 "corner_uvs": array("corner_uvs", np.float32, "F", 3, 2),
                 "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
                 "face_materials": array("face_materials", np.int32, "F"),
-                "materials": [dataclasses.asdict(material) for material in self.materials],
-                "textures": [{"name": texture.name, "image": self._texels(function, texture)}
+                "materials": [material.checked(function) for material in self.materials],
+                "textures": [{"name": str(texture.name), "image": self._texels(function, texture)}
                              for texture in self.textures]}
 
     @staticmethod

@@ -38,6 +38,9 @@ def save_weights(path: Path, weights: Mapping[str, Any],
     weights: arrays by name; safetensors: at most five axes of float32, float64, uint8, int32 or
     int64. metadata: texts, safetensors only; by default those of `Weights`.
     """
+    for name in weights:
+        if not isinstance(name, str):
+            raise TypeError(f"save_weights: name {name!r} is no text")
     arrays = {name: _plain(value) for name, value in weights.items()}
     if metadata is None:
         metadata = getattr(weights, "metadata", {})

@@ -75,6 +75,23 @@ class Meshes(FolderTest):
         with self.assertRaisesRegex(ValueError, r"face_materials has shape \(3,\).*F = 2"):
             mesh.scene(CAMERA)
 
+    def test_materials_are_checked(self) -> None:
+        for change, error, message in (
+                ({"wrap": "twice"}, ValueError, "material 'red': wrap is 'twice'"),
+                ({"alpha_mode": None}, ValueError, "material 'red': alpha_mode is None"),
+                ({"base_color": (1, 0, 0)}, ValueError, r"base_color has shape \(3,\)"),
+                ({"texture": "wood"}, TypeError, "material 'red': texture"),
+                ({"texture": 3}, ValueError, "texture")):
+            mesh = textured_mesh()
+            for name, value in change.items():
+                setattr(mesh.materials[0], name, value)
+            with self.assertRaisesRegex(error, message):
+                files.save_mesh(self.folder / "a.glb", mesh)
+        mesh = textured_mesh()
+        mesh.textures[0].image = mesh.textures[0].image[..., 0]
+        with self.assertRaisesRegex(ValueError, r"image of texture 'texels' has shape \(2, 2\)"):
+            files.save_mesh(self.folder / "a.glb", mesh)
+
     def test_text_formats(self) -> None:
         triangle = {"a.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
                     "a.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
@@ -264,6 +281,8 @@ class Weights(FolderTest):
             files.save_weights(path, {"x": np.zeros(2, complex)})
         with self.assertRaisesRegex(TypeError, "save_weights: x has dtype int16"):
             files.save_weights(path, {"x": np.zeros(2, np.int16)})
+        with self.assertRaisesRegex(TypeError, "name 3 is no text"):
+            files.save_weights(path, {3: np.zeros(2)})
         with self.assertRaisesRegex(ValueError, "save_weights: x has 6 axes"):
             files.save_weights(path, {"x": np.zeros((1,) * 6)})
         with self.assertRaisesRegex(ValueError, ".safetensors or .npz"):
