@@ -55,7 +55,8 @@ class Dataset:
 
     Item i is a dict of arrays: images (K, 3, H, W) float32, 0 to 1, RGB over black; masks (K, H, W)
     float32; cameras (K, 17) float32 (`Camera.of_numbers`); views (K,) int64, which of the model's
-    views these are; class (int), of `classes`; model (int), of `models`.
+    views these are; class (int), of `classes`; split (int), of "train", "validation", "test"; model
+    (int), of `models`.
 
     folder: of the dataset. split: "train", "validation", "test", or None for all models.
     views: K views of each item, distinct and at random, by seed, epoch (`set_epoch`) and item;
@@ -125,7 +126,8 @@ class Dataset:
                 first_step: int = 0) -> Iterator[Item]:
         """Batches of `size` items as `tilegrad train` sees them with this seed, from `first_step`
         on: every epoch shows each model once in a new order, and the last batch of an epoch runs
-        into the next. Arrays get a leading axis; class and model become (size,) int64.
+        into the next. Arrays get a leading axis; class, split and model become (size,)
+        int64.
 
         What a step sees depends on (seed, step) only. steps: how many; None: without end.
         """
@@ -158,7 +160,7 @@ class Dataset:
         return {"images": rgba[:, :3], "masks": rgba[:, 3],
                 "cameras": self._cameras[shown].astype(np.float32),
                 "views": shown.astype(np.int64), "class": self.models[model].class_index,
-                "model": model}
+                "split": _SPLITS.index(self.models[model].split), "model": model}
 
     def _checked_views(self, views: Optional[int]) -> Optional[int]:
         if views is None:

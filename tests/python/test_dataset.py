@@ -84,7 +84,11 @@ class Items(FolderTest):
         parts = [files.Dataset(dataset(), split) for split in ("train", "validation", "test")]
         shown = sorted(item["model"] for part in parts for item in part)
         self.assertEqual(shown, list(range(15)))
-        self.assertEqual(len(files.Dataset(dataset(), None)), 15)
+        every = files.Dataset(dataset(), None)
+        self.assertEqual(len(every), 15)
+        for number, part in enumerate(parts):
+            self.assertEqual({item["split"] for item in part}, {number})
+        self.assertEqual(sorted(item["split"] for item in every), 5 * [0] + 5 * [1] + 5 * [2])
 
     def test_views_follow_seed_and_epoch(self) -> None:
         data = files.Dataset(dataset(), views=2, seed=3)
