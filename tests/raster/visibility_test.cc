@@ -177,6 +177,59 @@ TEST_P(VisibilityOnEveryTarget, EqualsTheReferenceBitForBit) {
   }
 }
 
+// What a pixel shows, layer by layer, by sorting all faces that cover it.
+std::vector<std::int32_t> LayersAt(const std::vector<VisibilitySetup<float>>& faces, int x, int y) {
+  std::vector<std::pair<float, std::int32_t>> covering;
+  for (const auto& face : faces) {
+    if (!Covers(face.shape, x, y)) continue;
+    const float z = face.depth.At(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+    covering.emplace_back(-z, face.face);
+  }
+  std::sort(covering.begin(), covering.end());
+  std::vector<std::int32_t> out;
+  for (std::size_t i = 0; i < covering.size(); ++i) {
+    if (i == 0 || covering[i].first != covering[i - 1].first) out.push_back(covering[i].second);
+  }
+  return out;
+}
+
+TEST_P(VisibilityOnEveryTarget, PeelingShowsAllLayersInTheirOrder) {
+  Rng rng(9, 5);
+  for (const double spread : {4.0, 100.0, 1e6}) {
+    Flat flat = RandomTriangles(50, spread, &rng);
+    for (std::size_t f = 0; f < 3; ++f) {  // some again: at one depth only one is seen
+      flat.AddFace(flat.buffers.v0[f], flat.buffers.v1[f], flat.buffers.v2[f]);
+    }
+    const ScreenMesh mesh = flat.Finish();
+    const auto faces = SetUpDrawnFaces(mesh);
+    const DrawnFaces drawn = DrawnFacesOf(mesh);
+    TileListBuffers buffers;
+    const TileLists lists = BinDrawnFaces(drawn, BinGrid(mesh.width, mesh.height), &buffers);
+    const TileRect rect{0, 0, mesh.width, mesh.height};  // one bin
+    std::vector<float> behind(kBinSize * kBinSize, std::numeric_limits<float>::infinity());
+    std::vector<std::vector<std::int32_t>> seen(kBinSize * kBinSize);
+    VisibilityBin bin;
+    bool more = true;
+    for (int layer = 0; layer < 60 && more; ++layer) {
+      PeelVisibility(mesh, {drawn.storage, lists[0]}, rect, behind.data(), &bin);
+      more = false;
+      for (int i = 0; i < mesh.height * kBinSize; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        behind[at] = bin.inverse_depth[i];
+        if (bin.face[i] == kNoFace) continue;
+        seen[at].push_back(bin.face[i]), more = true;
+      }
+    }
+    EXPECT_FALSE(more);
+    for (int y = 0; y < mesh.height; ++y) {
+      for (int x = 0; x < mesh.width; ++x) {
+        ASSERT_EQ(seen[static_cast<std::size_t>(y * kBinSize + x)], LayersAt(faces, x, y))
+            << "pixel " << x << "," << y << " spread " << spread;
+      }
+    }
+  }
+}
+
 TEST_P(VisibilityOnEveryTarget, CoincidingFacesShowTheLowerId) {
   Rng rng(7, 3);
   Flat flat = RandomTriangles(20, 30, &rng);
