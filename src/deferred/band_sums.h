@@ -37,7 +37,7 @@ class BandSums {
     std::size_t channels_;
   };
 
-  // out [n,channels] += the sums of all bands, of rows first to first + n - 1.
+  // out [n,channels] += the sums of all bands, of rows first to first + n - 1. Saturates.
   template <class T>
   void AddTo(std::span<T> out, const Workers& workers, std::size_t first = 0) const;
 
@@ -46,6 +46,8 @@ class BandSums {
     std::vector<std::size_t> rows;  // in the order they were met
     std::vector<double> sums;       // [rows][channels]
   };
+  template <class T>
+  void AddRows(std::span<T> out, std::size_t begin, std::size_t end, std::size_t first) const;
 
   std::size_t rows_, channels_;
   std::vector<OfBand> bands_;

@@ -273,9 +273,11 @@ void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_ou
     const Band band = input.grid.band(index);
     PixelLookup lookup{};
     ForEachPixel(input.grid, band, [&](std::size_t pixel) {
+      const T* d = &d_out[pixel * input.channels];
+      // Mostly the background, which shows whatever stands at (0, 0) and is masked afterwards.
+      if (std::all_of(d, d + input.channels, [](T v) { return v == T(0); })) return;
       LookUp(input, pixel, &lookup);
       if (!lookup.point.valid) return;
-      const T* d = &d_out[pixel * input.channels];
       if (texels) PullTexels(input, lookup, band.image, first, d, &adder);
       if (!coordinates) return;
       WriteCoordinates(input, lookup, PullPoint(input, lookup, band.image, d), pixel, out);

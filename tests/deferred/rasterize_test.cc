@@ -323,6 +323,22 @@ TEST(RasterizeBackward, SumsOverPixelsAndImages) {
   }
 }
 
+TEST(RasterizeBackward, StaysFiniteWhereWIsTiny) {
+  Scene<float> scene = AsScene<float>(WavyGrid(2, 9, 40, 40));
+  for (float& v : scene.positions) v *= 1e-37f;  // the same image, gradients of 1e38 and more
+  const auto out = Rasterize(scene);
+  const Numbers<float> ones(out.rast.size(), 100.0f);
+  Numbers<float> gradient(scene.positions.size());
+  ASSERT_TRUE(
+      RasterizeBackward<float>(scene.input(), {out.rast, ones, ones}, Workers(1), gradient).ok());
+  float largest = 0;
+  for (const float d : gradient) {
+    ASSERT_TRUE(std::isfinite(d));
+    largest = std::max(largest, std::abs(d));
+  }
+  EXPECT_EQ(largest, std::numeric_limits<float>::max());
+}
+
 TEST(RasterizeBackward, EdgeOnFacesPullNothing) {
   Scene<double> scene;
   scene.positions = {-1, -1, 0, 1, 1, 1, 0, 1, 1 - 1e-9, 1, 0, 1};
