@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Iterator, Optional, Sequence, Union
+from typing import Any, Callable, Iterator, Optional, Sequence, Union
 
 import numpy as np
 
@@ -13,7 +13,32 @@ from tilegrad._packed import Packed
 from tilegrad._scene import Light, Scene, Surface
 from tilegrad._threads import thread_count
 
-_D = _core.RenderOptions()
+_Reader = Callable[[str, str, Any], Any]
+
+
+def _number(kind: type) -> _Reader:
+    return lambda function, name, value: _arrays.as_number(function, name, value, kind)
+
+
+def _choice(choices: Sequence[str]) -> _Reader:
+    return lambda function, name, value: _arrays.check_choice(function, name, value, choices)
+
+
+def _option(name: str, choices: Optional[Sequence[str]] = None) -> tuple[Any, _Reader]:
+    """C++'s default of an option, and what checks another value."""
+    value = getattr(_core.RenderOptions(), name)
+    return (choices[value], _choice(choices)) if choices else (value, _number(type(value)))
+
+
+# In the order in which render has them.
+_OPTIONS = {"width": _option("width"), "height": _option("height"), "delta": _option("delta"),
+            "max_alpha_error": _option("max_alpha_error"),
+            "interpolation": _option("interpolation", _core.INTERPOLATIONS),
+            "culling": _option("culling", _core.CULLINGS),
+            "alpha_rule": _option("alpha_rule", _core.ALPHA_RULES),
+            "paper_box": _option("paper_box"), "paper_faces": _option("paper_faces")}
+_D = {name: default for name, (default, _) in _OPTIONS.items()}
+_OUTPUTS = ("color", "alpha")
 _RECORDS = {"camera": Camera, "surfaces": Surface, "lights": Light}  # what is no plain array
 _NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
           "light_directions", "sh", "attributes")
@@ -170,13 +195,12 @@ class Renderer:
         """How many threads were asked for; 0: one for each core."""
         return self._renderer.threads
 
-    def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: int = _D.width,
-               height: int = _D.height, outputs: Sequence[str] = ("color", "alpha"),
-               delta: float = _D.delta, max_alpha_error: float = _D.max_alpha_error,
-               interpolation: str = _core.INTERPOLATIONS[_D.interpolation],
-               culling: str = _core.CULLINGS[_D.culling],
-               alpha_rule: str = _core.ALPHA_RULES[_D.alpha_rule],
-               paper_box: float = _D.paper_box, paper_faces: int = _D.paper_faces) -> Frame:
+    def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: int = _D["width"],
+               height: int = _D["height"], outputs: Sequence[str] = _OUTPUTS,
+               delta: float = _D["delta"], max_alpha_error: float = _D["max_alpha_error"],
+               interpolation: str = _D["interpolation"], culling: str = _D["culling"],
+               alpha_rule: str = _D["alpha_rule"], paper_box: float = _D["paper_box"],
+               paper_faces: int = _D["paper_faces"]) -> Frame:
         """The images of a scene, or of a list of scenes one behind the other.
 
         width, height: pixels, 1 to 16384, of all images.
@@ -195,19 +219,8 @@ class Renderer:
         """
         single = isinstance(scenes, Scene)
         scenes = (scenes,) if single else self._checked(scenes)
-        options = _core.RenderOptions()
-        options.width = _arrays.as_number("render", "width", width, int)
-        options.height = _arrays.as_number("render", "height", height, int)
-        options.delta = _arrays.as_number("render", "delta", delta, float)
-        options.max_alpha_error = _arrays.as_number("render", "max_alpha_error", max_alpha_error,
-                                                    float)
-        options.interpolation = _arrays.check_choice("render", "interpolation", interpolation,
-                                                     _core.INTERPOLATIONS)
-        options.culling = _arrays.check_choice("render", "culling", culling, _core.CULLINGS)
-        options.alpha_rule = _arrays.check_choice("render", "alpha_rule", alpha_rule,
-                                                  _core.ALPHA_RULES)
-        options.paper_box = _arrays.as_number("render", "paper_box", paper_box, float)
-        options.paper_faces = _arrays.as_number("render", "paper_faces", paper_faces, int)
+        options = _options(width, height, delta, max_alpha_error, interpolation, culling,
+                           alpha_rule, paper_box, paper_faces)
         outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
         for name in outputs:
             _arrays.check_choice("render", "outputs", name, _core.IMAGES)
@@ -286,6 +299,15 @@ class Renderer:
                 raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is "
                                  f"{tuple(wrt)!r}")
         return gradients
+
+
+def _options(*values: Any) -> _core.RenderOptions:
+    """Of the values of _OPTIONS, which are checked if they are not the defaults themselves."""
+    options = _core.RenderOptions()
+    for (name, (default, read)), value in zip(_OPTIONS.items(), values):
+        if value is not default:
+            setattr(options, name, read("render", name, value))
+    return options
 
 
 def _empty_like(scene: Scene, name: str) -> Any:

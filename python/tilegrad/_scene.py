@@ -11,7 +11,11 @@ from tilegrad import _arrays, _core
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed, Part, stacked
 
-_STREAMS = {"colors": 3, "uvs": 2, "normals": 3, "attributes": "C"}  # values that faces interpolate
+_SHAPES = {"colors": ("V", 3), "uvs": ("V", 2), "normals": ("V", 3), "attributes": ("V", "C"),
+           "light_directions": ("V", 3), "sh": (9,)}
+_CORNER_SHAPES = {"colors": ("F", 3, 3), "uvs": ("F", 3, 2), "normals": ("F", 3, 3),
+                  "attributes": ("F", 3, "C")}  # in the order that C++ has them
+_FIELDS = ("positions", "faces", "camera", *_SHAPES, "face_surfaces", "lights")
 _S, _L = _core.SURFACE, _core.LIGHT
 
 
@@ -129,26 +133,31 @@ class Scene:
                  two_sided: bool = False, clamp: bool = False, lights: Any = None,
                  light_directions: Any = None, sh: Any = None, attributes: Any = None,
                  per_corner: Sequence[str] = ()) -> None:
-        self._arguments = {name: value for name, value in locals().items() if name != "self"}
+        self._arguments = dict(locals())
+        del self._arguments["self"]
         self._dtype = _arrays.float_dtype("Scene", "positions", positions)
         sizes: dict[str, int] = {}
-        given_normals = None if isinstance(normals, str) else normals
-        streams = {"colors": colors, "uvs": uvs, "normals": given_normals, "attributes": attributes}
+        corners = self._corners(per_corner)
+        values = (("colors", colors), ("uvs", uvs),
+                  ("normals", None if isinstance(normals, str) else normals),
+                  ("attributes", attributes), ("light_directions", light_directions), ("sh", sh))
         fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
-                  "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes)}
-        fields["camera"] = self._camera(camera, sizes)
-        fields.update(self._streams(streams, per_corner, sizes))
-        fields["face_surfaces"] = None if face_surfaces is None else _arrays.as_array(
-            "Scene", "face_surfaces", face_surfaces, np.int32, ("F",), sizes)
-        fields["lights"] = self._lights(lights, sizes)
-        fields["light_directions"] = self._take("light_directions", light_directions, ("V", 3),
-                                                sizes)
-        fields["sh"] = self._take("sh", sh, (9,), sizes)
+                  "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes),
+                  "camera": self._camera(camera, sizes)}
+        for name, value in values:
+            if value is not None:
+                shape = _CORNER_SHAPES[name] if name in corners else _SHAPES[name]
+                fields[name] = self._take(name, value, shape, sizes)
+        if face_surfaces is not None:
+            fields["face_surfaces"] = _arrays.as_array("Scene", "face_surfaces", face_surfaces,
+                                                       np.int32, ("F",), sizes)
+        if lights is not None:
+            fields["lights"] = self._lights(lights, sizes)
         self._fields = fields
-        self._textures = self._take_textures(textures, sizes)
-        self._surface = self._surfaces(surfaces)
+        self._textures = [] if textures is None else self._take_textures(textures, sizes)
+        self._surface = (None, []) if surfaces is None else self._surfaces(surfaces)
         self._count = sizes.get("N", 1)
-        arrays = self._core_arrays(per_corner)
+        arrays = self._core_arrays(corners)
         arrays.lighting = _arrays.check_choice("Scene", "lighting", lighting, _core.LIGHTINGS)
         arrays.normal_kind = self._normal_kind(normals)
         arrays.two_sided, arrays.clamp = bool(two_sided), bool(clamp)
@@ -157,9 +166,7 @@ class Scene:
 
     # What the constructor consists of.
 
-    def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> Optional[np.ndarray]:
-        if value is None:
-            return None
+    def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
         return _arrays.as_batched("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:
@@ -169,26 +176,19 @@ class Scene:
         _arrays.check_batched("Scene", "camera", numbers.shape, (Camera._SIZE,), sizes)
         return numbers
 
-    def _streams(self, values: dict, per_corner: Sequence[str], sizes: dict) -> dict:
+    @staticmethod
+    def _corners(per_corner: Sequence[str]) -> Sequence[str]:
         names = (per_corner,) if isinstance(per_corner, str) else per_corner
         for name in names:
-            _arrays.check_choice("Scene", "per_corner", name, tuple(_STREAMS))
-        out = {}
-        for name, width in _STREAMS.items():
-            shape = ("F", 3, width) if name in names else ("V", width)
-            out[name] = self._take(name, values[name], shape, sizes)
-        return out
+            _arrays.check_choice("Scene", "per_corner", name, tuple(_CORNER_SHAPES))
+        return names
 
-    def _lights(self, lights: Any, sizes: dict) -> Optional[np.ndarray]:
-        if lights is None:
-            return None
+    def _lights(self, lights: Any, sizes: dict) -> np.ndarray:
         numbers = stacked("Scene", "lights", lights, Light).astype(self._dtype)
         _arrays.check_batched("Scene", "lights", numbers.shape, ("L", Light._SIZE), sizes)
         return numbers
 
     def _take_textures(self, textures: Any, sizes: dict) -> list[tuple[np.ndarray, str, str]]:
-        if textures is None:
-            return []
         out = []
         for i, value in enumerate(textures if isinstance(textures, (list, tuple)) else [textures]):
             texture = value if isinstance(value, Texture) else Texture(value)
@@ -198,26 +198,24 @@ class Scene:
             out.append((texels, texture.wrap, texture.filter))
         return out
 
-    def _surfaces(self, surfaces: Any) -> tuple[Optional[np.ndarray], list[int]]:
-        if surfaces is None:
-            return None, []
+    def _surfaces(self, surfaces: Any) -> tuple[np.ndarray, list[int]]:
         numbers = stacked("Scene", "surfaces", surfaces, Surface).astype(self._dtype)
         _arrays.check_shape("Scene", "surfaces", numbers.shape, ("S", Surface._SIZE))
         each = [surfaces] if isinstance(surfaces, Surface) else surfaces
         return numbers, [texture for surface in each for texture in surface.textures()]
 
-    def _core_arrays(self, per_corner: Sequence[str]) -> _core.SceneArrays:
+    def _core_arrays(self, corners: Sequence[str]) -> _core.SceneArrays:
         a = _core.SceneArrays()
         for name, array in self._fields.items():
-            if array is not None:
-                setattr(a, name, array)
-        if per_corner:
-            a.per_corner = [name in per_corner for name in _STREAMS]
+            setattr(a, name, array)
+        if corners:
+            a.per_corner = [name in corners for name in _CORNER_SHAPES]
         if self._textures:
             a.textures = [texels for texels, _, _ in self._textures]
             a.wraps = [_core.WRAPS.index(wrap) for _, wrap, _ in self._textures]
             a.filters = [_core.FILTERS.index(filter) for _, _, filter in self._textures]
-        a.surfaces, a.surface_textures = self._surface
+        if self._surface[1]:
+            a.surfaces, a.surface_textures = self._surface
         return a
 
     @staticmethod
@@ -255,7 +253,9 @@ class Scene:
 
     def __getitem__(self, name: str) -> Optional[np.ndarray]:
         """The array of that name, as the renderer sees it; None if the scene has none."""
-        return self._fields[name]
+        if name not in _FIELDS:
+            raise KeyError(f"Scene has no array {name!r}, but " + ", ".join(_FIELDS))
+        return self._fields.get(name)
 
     def replace(self, **changes: Any) -> "Scene":
         """The same scene with some arguments changed: scene.replace(positions=moved)."""
