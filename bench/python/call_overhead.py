@@ -7,9 +7,9 @@
 A C++ program and this one render the same batch in turns, a few steps each, so that what else the
 machine does meets both alike. A step in Python is what a loop writes: a batch is rendered, and for
 "backward" pulled back to positions and colours, into new arrays. The batch is one scene with a
-leading axis, made anew in every step; a list of 64 scenes that are kept, whose arrays a loop
-changes in place; or 64 scenes made anew, which is 64 constructors more than a call and does not
-count. Times are of the CPU, of all threads; what counts is the median over turns of Python / C++.
+leading axis or a list of 64 scenes; scenes are kept, as by loops that change their arrays in place,
+or made anew in every step, which is constructors more than a call, and does not count for the
+limit. Times are of the CPU, of all threads; the ratio is the median over turns of Python / C++.
 Exit code 1 if it is above the limit.
 """
 
@@ -127,14 +127,15 @@ def main():
         cpp = Cpp(options.server, path, options.threads)
         print("| scenes | step | C++ ms | Python / C++ | quartiles |\n| --- | --- | --- | --- | --- |")
         kept = batch.scenes()
-        kinds = {"one of 64 images, made anew": batch.scene, "64 in a list, kept": lambda: kept,
-                 "64 in a list, made anew": batch.scenes}
+        one = batch.scene()
+        kinds = {"one of 64 images, kept": lambda: one, "64 in a list, kept": lambda: kept,
+                 "one of 64 images, made anew": batch.scene, "64 in a list, made anew": batch.scenes}
         for kind, scenes in kinds.items():
             python = Python(batch, options.threads, scenes)
             for backward in (False, True):
                 found, seconds = ratios(python, cpp, backward, options)
                 low, middle, high = statistics.quantiles(found, n=4)
-                if scenes != batch.scenes:
+                if "kept" in kind:
                     worst = max(worst, middle)
                 print(f"| {kind} | {'forward + backward' if backward else 'forward'} | "
                       f"{1e3 * seconds:.2f} | {middle:.3f} | {low:.3f} to {high:.3f} |", flush=True)

@@ -31,8 +31,21 @@ void PutAll(const std::vector<Record>& from, std::size_t numbers, const Field<T>
 
 template <class T>
 GradientRecord<T>::GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays)
-    : arrays_(arrays), gradients_(scene.count()) {
+    : gradients_(scene.count()) {
+  for (const std::pair<py::handle, py::handle> entry : arrays) {
+    arrays_.emplace_back(py::cast<std::string_view>(entry.first),
+                         py::reinterpret_borrow<py::object>(entry.second));
+  }
   SetStreams(scene), SetTextures(scene), SetRecords(scene);
+}
+
+// The names live as long as the dictionary, which lives as long as the call.
+template <class T>
+const py::object* GradientRecord<T>::Find(std::string_view name) const {
+  for (const auto& [known, array] : arrays_) {
+    if (known == name) return &array;
+  }
+  return nullptr;
 }
 
 template <class T>
@@ -43,7 +56,8 @@ Field<T> GradientRecord<T>::Take(const char* name, const py::object& array,
 
 template <class T>
 Field<T> GradientRecord<T>::Take(const char* name, const std::vector<py::ssize_t>& shape) {
-  return arrays_.contains(name) ? Take(name, arrays_[name], shape) : Field<T>();
+  const py::object* array = Find(name);
+  return array == nullptr ? Field<T>() : Take(name, *array, shape);
 }
 
 template <class T>
@@ -65,6 +79,7 @@ void GradientRecord<T>::SetStreams(const SceneRecord<T>& scene) {
       {"light_directions", a.light_directions, false, &Gradients::light_directions},
   };
   for (const Stream& s : streams) {
+    if (Find(s.name) == nullptr) continue;
     const auto field = Take(s.name, ShapeOfOne(s.of, s.corner ? 3 : 2));
     for (std::size_t n = 0; field.given() && n < gradients_.size(); ++n) {
       gradients_[n].*s.member = field.Of(n);
@@ -76,8 +91,9 @@ void GradientRecord<T>::SetStreams(const SceneRecord<T>& scene) {
 
 template <class T>
 void GradientRecord<T>::SetTextures(const SceneRecord<T>& scene) {
-  if (!arrays_.contains("textures")) return;
-  const py::sequence given = arrays_["textures"];
+  const py::object* wanted = Find("textures");
+  if (wanted == nullptr) return;
+  const py::sequence given = *wanted;
   const std::size_t each = scene.arrays().textures.size();
   if (py::len(given) != each) {
     throw py::value_error(fmt::format("backward: textures has {} gradients, the scene {} textures",

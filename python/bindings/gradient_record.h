@@ -2,6 +2,8 @@
 // Arrays of Python that a backward pass writes to, as the records of the public interface.
 #pragma once
 
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "bindings/scene_record.h"
@@ -29,7 +31,9 @@ class GradientRecord {
   void SetTextures(const SceneRecord<T>& scene);
   void SetRecords(const SceneRecord<T>& scene);
 
-  py::dict arrays_;
+  const py::object* Find(std::string_view name) const;  // null: not wanted
+
+  std::vector<std::pair<std::string_view, py::object>> arrays_;
   std::vector<v0::SceneGradientsT<T>> gradients_;
   std::vector<std::span<T>> textures_;
   Field<T> camera_, surface_, light_;

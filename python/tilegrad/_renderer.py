@@ -320,6 +320,7 @@ def _empty_like(scene: Scene, name: str) -> Any:
         numbers = scene._surface[0]
         return np.empty((1, Surface._SIZE), scene.dtype) if numbers is None else \
             np.empty_like(numbers)
-    if scene[name] is None:
+    array = scene[name]
+    if array is None:
         raise ValueError(f"backward: wrt has {name!r}, but a scene has none")
-    return np.empty_like(scene[name])
+    return np.empty_like(array)
