@@ -14,15 +14,15 @@ PACKAGE = pathlib.Path(tilegrad.__file__).parent
 
 
 def public_modules():
-    """Modules that can be imported here; those that need torch, or what a build of the renderer
-    alone leaves out, only where it is."""
+    """Modules that can be imported here; those that need torch, or _tools, which a build of the
+    renderer alone leaves out, only where it is."""
     for info in pkgutil.walk_packages([str(PACKAGE)], "tilegrad."):
         if info.name.rpartition(".")[2].startswith("_"):
             continue
         try:
             yield importlib.import_module(info.name)
         except ImportError as error:
-            if error.name not in ("torch", "tilegrad._tools"):
+            if error.name != "torch" and "_tools" not in str(error):
                 raise
 
 
