@@ -14,6 +14,13 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// first, first + 1, ... by lanes. hn::Iota of a number that is not constant goes through memory,
+// number by number, and then waits for it.
+template <class D>
+HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
+  return hn::Add(hn::Iota(d, 0), hn::Set(d, first));
+}
+
 // 2^-z and 1 - 2^-z.
 template <class V>
 struct Halving {

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstring>
 
+#include "base/simd_math-inl.h"
 #include "raster/coverage.h"
 #include "raster/drawn_faces.h"
 #include "raster/face_lanes-inl.h"
@@ -21,6 +22,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace simd = tilegrad::HWY_NAMESPACE;
 
 struct ShapeCorners {
   FaceVec x[3], y[3], z[3];
@@ -250,7 +252,7 @@ HWY_INLINE FaceWords WordsOf(const ShapeCorners& corners, ShapeLanes* shapes, st
                              const PixelLanes& columns, const PixelLanes& rows) {
   const FaceIntTag di;
   FaceWords words;
-  words.word[0] = hn::Iota(di, static_cast<std::int32_t>(f));
+  words.word[0] = simd::CountFrom(di, static_cast<std::int32_t>(f));
   words.word[1] = hn::VecFromMask(di, shapes->small);
   words.word[2] = hn::Or(columns.begin, hn::ShiftLeft<16>(columns.end));
   words.word[3] = hn::Or(rows.begin, hn::ShiftLeft<16>(rows.end));

@@ -12,12 +12,14 @@
 #include <cstddef>
 #include <cstring>
 
+#include "base/simd_math-inl.h"
 #include "raster/project.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace simd = tilegrad::HWY_NAMESPACE;
 
 using ProjectTag = HWY_CAPPED(float, 16);
 using ProjectVec = hn::Vec<ProjectTag>;
@@ -108,7 +110,7 @@ void SplitFaces(std::span<const std::int32_t> faces, std::size_t begin, std::siz
     hn::LoadInterleaved3(di, &faces[3 * f], v[0], v[1], v[2]);
     hn::StoreU(v[0], di, &out->v0[f]), hn::StoreU(v[1], di, &out->v1[f]);
     hn::StoreU(v[2], di, &out->v2[f]);
-    hn::StoreU(hn::Iota(di, static_cast<std::int32_t>(f)), di, &out->source_face[f]);
+    hn::StoreU(simd::CountFrom(di, static_cast<std::int32_t>(f)), di, &out->source_face[f]);
   }
   for (; f < end; ++f) {
     out->v0[f] = faces[3 * f], out->v1[f] = faces[3 * f + 1], out->v2[f] = faces[3 * f + 2];

@@ -13,10 +13,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "base/simd_math-inl.h"
 #include "raster/soft_mask_compact-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
+namespace simd = tilegrad::HWY_NAMESPACE;
 
 HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&corner)[6], SoftInt face, SoftMask keep,
                             SoftFaceArrays* to) {
@@ -41,7 +43,7 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
     const auto near = hn::Le(BoxDistance(d, left, top, right, bottom, box), limit);
     if (hn::AllFalse(d, near)) continue;
     const auto is_long = hn::Gt(hn::Max(hn::Sub(right, left), hn::Sub(bottom, top)), long_edge);
-    const SoftInt face = hn::Iota(di, static_cast<std::int32_t>(f));
+    const SoftInt face = simd::CountFrom(di, static_cast<std::int32_t>(f));
     AppendFaces(d, c, face, hn::AndNot(is_long, near), &chunk->shorts);
     if (hn::AllFalse(d, hn::And(is_long, near))) continue;
     AppendFaces(d, c, face, hn::And(is_long, near), &chunk->longs);

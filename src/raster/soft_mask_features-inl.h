@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <initializer_list>
 
+#include "base/simd_math-inl.h"
 #include "raster/soft_mask_faces-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -189,7 +190,7 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan, const
   const SoftIntTag di;
   lists->vertices.count = lists->segments.count = lists->boundaries.count = 0;
   const auto slots = [&](std::size_t first)
-                         HWY_ATTR { return hn::Iota(di, static_cast<std::int32_t>(first)); };
+                         HWY_ATTR { return simd::CountFrom(di, static_cast<std::int32_t>(first)); };
   for (std::size_t i = 0; i < chunk.shorts.count; i += hn::Lanes(d)) {
     FaceEdges f;
     LoadCorners(d, chunk.shorts, i, unit, block, &f);

@@ -104,6 +104,7 @@ struct SoftFaceGradient {
 
 // Backward: a vector of faces near a block, and the product before them.
 struct SoftNearFaces {
+  SoftNearFaces() {}  // clears nothing: much of it is never read
   alignas(64) float edge[3 * SoftLists::kEdgeArrays][kSoftLanes];
   std::int32_t face[kSoftLanes];
   std::size_t count;

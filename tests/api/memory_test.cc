@@ -2,37 +2,17 @@
 // Memory: none is allocated in the steady state, and none that is refused gets past a Status.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <limits>
 #include <memory>
-#include <new>
 
 #include "api/test_scene.h"
-
-// Counts heap allocations of the whole program, the library's included; refuses those from number
-// g_refused on.
-static std::atomic<long> g_allocations{0};
-static std::atomic<long> g_refused{std::numeric_limits<long>::max()};
-
-void* CountedAllocate(std::size_t size, std::size_t alignment) {
-  if (++g_allocations > g_refused) throw std::bad_alloc();
-  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-  if (p == nullptr) std::abort();
-  return p;
-}
-void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return CountedAllocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+#include "support/allocation_count.h"
 
 namespace tilegrad {
 namespace {
 
+using test::g_allocations;
+using test::g_refused;
 using test::kAll;
 using test::kTestOptions;
 using test::TestCotangents;

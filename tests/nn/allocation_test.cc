@@ -3,32 +3,13 @@
 // pool, nodes of the graph and lists from its step memory, scratch is kept.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "nn/game.h"
-
-// Counts heap allocations of the whole program.
-static std::atomic<long> g_allocations{0};
-
-static void* CountedAllocate(std::size_t size, std::size_t alignment) {
-  ++g_allocations;
-  void* p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-  if (p == nullptr) std::abort();
-  return p;
-}
-void* operator new(std::size_t size) { return CountedAllocate(size, alignof(std::max_align_t)); }
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return CountedAllocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+#include "support/allocation_count.h"
 
 namespace tilegrad::nn {
 namespace {
+
+using test::g_allocations;
 
 // How often steps 3 to 8 allocate; the first two may take memory.
 template <class Step>
