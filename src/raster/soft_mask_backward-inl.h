@@ -38,9 +38,15 @@ HWY_INLINE std::uint64_t GradientBitsOf(const SoftMaskPlan& plan, const SoftBloc
   std::uint64_t bits = BackgroundOf(plan, block, face_ids);
   if (bits == 0) return 0;
   ForRows(plan, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
-    alignas(64) float alpha[kBlockSize] = {}, d_alpha[kBlockSize] = {};
-    std::copy_n(adjoint.alpha.data() + from, block.width, alpha);
-    std::copy_n(adjoint.d_alpha.data() + from, block.width, d_alpha);
+    const float *alpha = adjoint.alpha.data() + from, *d_alpha = adjoint.d_alpha.data() + from;
+    alignas(64) float rest[2][kBlockSize];
+    if (block.width < static_cast<int>(kBlockSize)) {
+      std::fill_n(std::copy_n(alpha, block.width, rest[0]),
+                  static_cast<int>(kBlockSize) - block.width, 0.0f);
+      std::fill_n(std::copy_n(d_alpha, block.width, rest[1]),
+                  static_cast<int>(kBlockSize) - block.width, 0.0f);
+      alpha = rest[0], d_alpha = rest[1];
+    }
     std::uint64_t row = 0;
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
       row |= matter(alpha + x, d_alpha + x) << x;
