@@ -125,11 +125,13 @@ def main():
         path = pathlib.Path(folder) / "batch"
         batch.write(path)
         cpp = Cpp(options.server, path, options.threads)
-        print("| scenes | step | C++ ms | Python / C++ | quartiles |\n| --- | --- | --- | --- | --- |")
+        print("| scenes | step | C++ ms | Python / C++ | quartiles |")
+        print("| --- | --- | --- | --- | --- |")
         kept = batch.scenes()
         one = batch.scene()
         kinds = {"one of 64 images, kept": lambda: one, "64 in a list, kept": lambda: kept,
-                 "one of 64 images, made anew": batch.scene, "64 in a list, made anew": batch.scenes}
+                 "one of 64 images, made anew": batch.scene,
+                 "64 in a list, made anew": batch.scenes}
         for kind, scenes in kinds.items():
             python = Python(batch, options.threads, scenes)
             for backward in (False, True):

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Callable
 
 import numpy as np
 
@@ -35,14 +35,14 @@ class _Rows:
                 raise ValueError(f"{function}: {name} has {array.shape[0]} cameras, expected "
                                  f"{self.lead[0]}") from None
             arrays[name] = (array, shape)
-        self.arrays = [self._rows(array, shape) for array, shape in arrays.values()]
+        self.arrays: Any = [self._rows(array, shape) for array, shape in arrays.values()]
 
     def _rows(self, array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         rows = np.broadcast_to(array, self.lead + shape)
         return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
 
-    def camera(self, numbers: np.ndarray) -> "Camera":
-        return Camera.of_numbers(numbers.reshape(self.lead + (Camera._SIZE,)))
+    def camera(self, make: Callable[..., np.ndarray], *arguments: Any) -> "Camera":
+        return Camera.of_numbers(make(*arguments).reshape(self.lead + (Camera._SIZE,)))
 
 
 def _size(function: str, width: int, height: int) -> tuple[int, int]:
@@ -104,7 +104,7 @@ class Camera(Packed):
         rows = _Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
         size = _size("Camera.look_at", width, height)
         fov_y = _arrays.as_number("Camera.look_at", "fov_y", fov_y, float)
-        return rows.camera(_core.camera_look_at(fov_y, size, *rows.arrays))
+        return rows.camera(_core.camera_look_at, fov_y, size, *rows.arrays)
 
     @classmethod
     def orbit(cls, azimuth, elevation, distance, *, fov_y: float = _core.FOV_Y, width: int,
@@ -119,7 +119,7 @@ class Camera(Packed):
                      distance=(distance, ()))
         size = _size(function, width, height)
         fov_y = _arrays.as_number(function, "fov_y", fov_y, float)
-        return rows.camera(_core.camera_orbit(fov_y, size, np.hstack(rows.arrays)))
+        return rows.camera(_core.camera_orbit, fov_y, size, np.hstack(rows.arrays))
 
     @classmethod
     def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer") -> "Camera":
@@ -133,7 +133,7 @@ class Camera(Packed):
         function = "Camera.from_opencv"
         rows = _Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
                      translation=(translation, (3,)))
-        return rows.camera(_core.camera_from_opencv(*rows.arrays, _half(function, pixel_centre)))
+        return rows.camera(_core.camera_from_opencv, *rows.arrays, _half(function, pixel_centre))
 
     @classmethod
     def from_colmap(cls, quaternion, translation, fx, fy, cx, cy) -> "Camera":
@@ -146,7 +146,7 @@ class Camera(Packed):
                      translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
                      cy=(cy, ()))
         intrinsics = np.hstack(rows.arrays[2:])
-        return rows.camera(_core.camera_from_colmap(*rows.arrays[:2], intrinsics))
+        return rows.camera(_core.camera_from_colmap, *rows.arrays[:2], intrinsics)
 
     @classmethod
     def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
@@ -158,7 +158,7 @@ class Camera(Packed):
         function = "Camera.from_opengl"
         rows = _Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
         size = _size(function, width, height)
-        return rows.camera(_core.camera_from_opengl(*rows.arrays, size))
+        return rows.camera(_core.camera_from_opengl, *rows.arrays, size)
 
     @classmethod
     def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
@@ -171,7 +171,7 @@ class Camera(Packed):
         rows = _Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
                      projection=(projection, (3,)))
         size = _size(function, width, height)
-        return rows.camera(_core.camera_from_kaolin(*rows.arrays, size))
+        return rows.camera(_core.camera_from_kaolin, *rows.arrays, size)
 
     @classmethod
     def from_pytorch3d(cls, r, t, focal_length, principal_point=(0, 0), *, width: int,
@@ -185,7 +185,7 @@ class Camera(Packed):
         rows = _Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
                      principal_point=(principal_point, (2,)))
         size = _size(function, width, height)
-        return rows.camera(_core.camera_from_pytorch3d(*rows.arrays, size))
+        return rows.camera(_core.camera_from_pytorch3d, *rows.arrays, size)
 
     @classmethod
     def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy) -> "Camera":
@@ -196,7 +196,7 @@ class Camera(Packed):
         rows = _Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
                      fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
         intrinsics = np.hstack(rows.arrays[1:])
-        return rows.camera(_core.camera_from_nerf(rows.arrays[0], intrinsics))
+        return rows.camera(_core.camera_from_nerf, rows.arrays[0], intrinsics)
 
     # And back: dictionaries of the arguments of the constructors above.
 

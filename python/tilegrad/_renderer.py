@@ -39,7 +39,8 @@ _OPTIONS = {"width": _option("width"), "height": _option("height"), "delta": _op
             "paper_box": _option("paper_box"), "paper_faces": _option("paper_faces")}
 _D = {name: default for name, (default, _) in _OPTIONS.items()}
 _OUTPUTS = ("color", "alpha")
-_RECORDS = {"camera": Camera, "surfaces": Surface, "lights": Light}  # what is no plain array
+# What is no plain array.
+_RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
 _NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
           "light_directions", "sh", "attributes")
 
@@ -218,23 +219,23 @@ class Renderer:
         dtype, and what is None in one is None in all.
         """
         single = isinstance(scenes, Scene)
-        scenes = (scenes,) if single else self._checked(scenes)
+        checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
         options = _options(width, height, delta, max_alpha_error, interpolation, culling,
                            alpha_rule, paper_box, paper_faces)
         outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
         for name in outputs:
             _arrays.check_choice("render", "outputs", name, _core.IMAGES)
-        if "attributes" in outputs and any(scene["attributes"] is None for scene in scenes):
+        if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")
-        frame = self._renderer.render([scene._record for scene in scenes], options,
-                                      [name in outputs for name in _core.IMAGES])
-        return Frame(frame, scenes, single, outputs)
+        records: Any = [scene._record for scene in checked]
+        frame = self._renderer.render(records, options, [name in outputs for name in _core.IMAGES])
+        return Frame(frame, checked, single, outputs)
 
     def backward(self, frame: Frame, *, color: Any = None, alpha: Any = None,
                  attributes: Any = None, depth: Any = None, normals: Any = None, uv: Any = None,
                  wrt: Optional[Sequence[str]] = None,
                  out: Union[Gradients, Sequence[Gradients], None] = None,
-                 accumulate: bool = False) -> Union[Gradients, list[Gradients]]:
+                 accumulate: bool = False) -> Any:
         """The gradients of sum(given * images) with respect to the frame's scenes.
 
         color, alpha, attributes, depth, normals, uv: dL/d(image), in the image's shape and dtype;

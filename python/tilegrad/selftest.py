@@ -5,9 +5,10 @@ is 1 if something fails."""
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
-from typing import Callable
+from typing import Any, Callable
 
 import numpy as np
 
@@ -98,8 +99,9 @@ def _color(dtype: type) -> str:
 def _sphere(dtype: type, lighting: str) -> Scene:
     positions, faces = tilegrad.icosphere(2, 0.8)
     numbers = np.random.default_rng(1)
-    positions = positions.astype(dtype) + numbers.uniform(-0.01, 0.01, positions.shape).astype(dtype)
-    light = {"sh": numbers.uniform(0.1, 0.3, 9).astype(dtype)} \
+    noise = numbers.uniform(-0.01, 0.01, positions.shape)
+    positions = (positions + noise).astype(dtype)
+    light: dict[str, Any] = {"sh": numbers.uniform(0.1, 0.3, 9).astype(dtype)} \
         if lighting == "spherical_harmonics" else {"lights": Light((0.3, 0.5, 1))}
     return Scene(positions, faces, Camera.orbit(20, 30, 3, width=32, height=32), lighting=lighting,
                  colors=numbers.uniform(0.2, 0.9, positions.shape).astype(dtype),
@@ -111,12 +113,12 @@ def _gradients(lighting: str) -> str:
     """Gradients of colour and alpha against central differences in float64, h = 1e-6. Pixels where
     a face becomes another one have no derivative: they are left out of the loss."""
     renderer, h = Renderer(), 1e-6
-    scene = _sphere(np.float64, lighting)
-    options = {"width": 32, "height": 32, "delta": 1e-2}
+    scene: Any = _sphere(np.float64, lighting)
+    options: dict[str, Any] = {"width": 32, "height": 32, "delta": 1e-2}
     frame = renderer.render(scene, **options)
     numbers = np.random.default_rng(2)
-    weights = {"color": numbers.uniform(-1, 1, frame.color.shape),
-               "alpha": numbers.uniform(-1, 1, frame.alpha.shape)}
+    weights: dict[str, Any] = {"color": numbers.uniform(-1, 1, frame.color.shape),
+                               "alpha": numbers.uniform(-1, 1, frame.alpha.shape)}
     names = ("positions", "colors", "uvs")
     worst = 0.0
     for name in names:
@@ -125,7 +127,8 @@ def _gradients(lighting: str) -> str:
                 for s in (h, -h)]
         same = (ends[0].face_ids == frame.face_ids) & (ends[1].face_ids == frame.face_ids)
         _require(same.mean() > 0.99, "the mesh jumps")
-        pulled = {"color": weights["color"] * same[:, None], "alpha": weights["alpha"] * same}
+        pulled: dict[str, Any] = {"color": weights["color"] * same[:, None],
+                                  "alpha": weights["alpha"] * same}
         got = getattr(renderer.backward(frame, wrt=names, **pulled), name)
         expected = sum((pulled[image] * (getattr(ends[0], image) - getattr(ends[1], image))).sum()
                        for image in pulled) / (2 * h)
@@ -137,13 +140,13 @@ def _gradients(lighting: str) -> str:
 def _precision() -> str:
     """The float32 engine's gradients beside those of the float64 reference."""
     renderer, worst = Renderer(), 0.0
-    options = {"width": 32, "height": 32, "delta": 1e-2}
+    options: dict[str, Any] = {"width": 32, "height": 32, "delta": 1e-2}
     results = []
     for dtype in (np.float32, np.float64):
         frame = renderer.render(_sphere(dtype, "phong"), **options)
         numbers = np.random.default_rng(2)
-        weights = {"color": numbers.uniform(-1, 1, frame.color.shape).astype(dtype),
-                   "alpha": numbers.uniform(-1, 1, frame.alpha.shape).astype(dtype)}
+        weights: dict[str, Any] = {name: numbers.uniform(-1, 1, getattr(frame, name).shape)
+                                   .astype(dtype) for name in frame.outputs}
         results.append(renderer.backward(frame, wrt=("positions", "colors", "camera"), **weights))
     for name in ("positions", "colors"):
         single, double = (getattr(result, name) for result in results)
@@ -186,12 +189,11 @@ _TRIANGLE = (("coverage", _coverage), ("alpha", _alpha), ("colour and depth", _c
 
 
 def _checks() -> list[tuple[str, Callable[[], str]]]:
-    out = []
-    for dtype in (np.float32, np.float64):
-        for title, check in _TRIANGLE:
-            out.append((f"{title} of a triangle, {np.dtype(dtype)}", lambda c=check, d=dtype: c(d)))
-    for lighting in ("lambert", "phong", "spherical_harmonics"):
-        out.append((f"gradients, {lighting}", lambda kind=lighting: _gradients(kind)))
+    out: list[tuple[str, Callable[[], str]]] = [
+        (f"{title} of a triangle, {np.dtype(dtype)}", functools.partial(check, dtype))
+        for dtype in (np.float32, np.float64) for title, check in _TRIANGLE]
+    out += [(f"gradients, {lighting}", functools.partial(_gradients, lighting))
+            for lighting in ("lambert", "phong", "spherical_harmonics")]
     out += [("float32 gradients beside float64", _precision), ("same bits", _determinism),
             ("degenerate faces", _finite)]
     return out

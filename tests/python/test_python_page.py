@@ -17,7 +17,8 @@ from support import SOURCE
 
 def blocks(page):
     """The Python of a page, block by block."""
-    return re.findall(r"```python\n(.*?)```", (SOURCE / page).read_text(encoding="utf-8"), re.DOTALL)
+    text = (SOURCE / page).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
 def run(code):
