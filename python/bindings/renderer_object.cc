@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bindings/renderer_object.h"
 
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -44,6 +45,17 @@ Status RendererObject::Run(const Call& call) {
   return call(EngineOf<T>(mine));
 }
 
+namespace {
+
+// "options.width" is the argument `width` in Python.
+Status InPython(const Status& status) {
+  constexpr std::string_view prefix = "options.";
+  if (status.message().rfind(prefix, 0) != 0) return status;
+  return {status.code(), status.message().substr(prefix.size())};
+}
+
+}  // namespace
+
 template <class T>
 std::unique_ptr<FrameObject<T>> RendererObject::Render(
     std::vector<std::shared_ptr<SceneRecord<T>>> scenes, const v0::RenderOptions& options,
@@ -53,9 +65,10 @@ std::unique_ptr<FrameObject<T>> RendererObject::Render(
     views.insert(views.end(), scene->scenes().begin(), scene->scenes().end());
   }
   auto out = std::make_unique<FrameObject<T>>(std::move(scenes), pool<T>());
-  ThrowIfError(Run<T>([&](v0::RendererT<T>& engine) {
-                 return engine.Render(views, options, outputs, &out->frame());
-               }).Within("render"));
+  const Status status = Run<T>([&](v0::RendererT<T>& engine) {
+    return engine.Render(views, options, outputs, &out->frame());
+  });
+  ThrowIfError(InPython(status).Within("render"));
   return out;
 }
 

@@ -442,7 +442,7 @@ class Errors(unittest.TestCase):
              lambda: render([scene, patch(np.float64)])),
             (TypeError, "render: width must be int, got 3.5 (float)",
              lambda: render(scene, width=3.5)),
-            (ValueError, "render: options.width is 0, must be in 1..16384 pixels",
+            (ValueError, "render: width is 0, must be in 1..16384 pixels",
              lambda: render(scene, width=0)),
             (ValueError, f"render: height is {2**40}, out of int32's range",
              lambda: render(scene, height=2**40)),
