@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // EXR in. Between the process that reads and this one go bytes: 'E' and a message, or 'I', width,
 // height, the number of channels, their names, each ended by 0, and the values.
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <exception>
@@ -73,8 +74,9 @@ Status CheckHeader(const Imf::Header& header, const GuardLimits& limits) {
 }
 
 void Append(Bytes& out, const void* data, std::size_t size) {
-  const auto* begin = static_cast<const std::uint8_t*>(data);
-  out.insert(out.end(), begin, begin + size);
+  const std::size_t at = out.size();
+  out.resize(at + size);
+  std::copy_n(static_cast<const std::uint8_t*>(data), size, out.data() + at);
 }
 
 Bytes ErrorBytes(std::string_view message) {
