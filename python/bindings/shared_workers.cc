@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bindings/shared_workers.h"
 
-#include <unistd.h>
+#include <pthread.h>
 
 #include <algorithm>
-#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -19,28 +18,18 @@ struct Pool {
   std::map<int, std::unique_ptr<Workers>> workers;
 };
 
-// Never ended: a child must not touch what belongs to its parent's threads, and at the end of the
-// process nobody waits for them.
-Pool& ThePool() {
-  static Pool* pool = new Pool;
-  return *pool;
-}
-
-std::atomic<pid_t> owner = 0;  // the first process that asked
+// Never ended: at the end of the process nobody waits for threads. A child of a fork has a pool of
+// its own, since the parent's may have been locked at that moment.
+Pool* the_pool = new Pool;
+[[maybe_unused]] const int renewed_in_children =
+    pthread_atfork(nullptr, nullptr, [] { the_pool = new Pool; });
 
 }  // namespace
 
 const Workers& SharedWorkers(int threads) {
-  pid_t nobody = 0;
-  owner.compare_exchange_strong(nobody, getpid());
-  if (owner != getpid()) {
-    static const Workers* alone = new Workers(1);
-    return *alone;
-  }
   const int count = std::clamp(threads > 0 ? threads : AvailableCores(), 1, kMostThreads);
-  Pool& pool = ThePool();
-  const std::lock_guard lock(pool.mutex);
-  std::unique_ptr<Workers>& workers = pool.workers[count];
+  const std::lock_guard lock(the_pool->mutex);
+  std::unique_ptr<Workers>& workers = the_pool->workers[count];
   if (workers == nullptr) workers = std::make_unique<Workers>(count);
   return *workers;
 }

@@ -117,7 +117,7 @@ void ExpectClose(const std::vector<float>& a, const std::vector<double>& b, cons
   EXPECT_LE(NormOf(difference), 1e-3 * NormOf(b)) << name;
 }
 
-TEST(ApiGradients, FloatIsCloseToDouble) {
+TEST(ApiGradients, FloatAgreesWithDouble) {
   const TestScene<float> s(Lighting::kPhong);
   const TestScene<double> t(Lighting::kPhong);
   Renderer renderer;

@@ -24,8 +24,8 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
 constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel takes half of L1
-constexpr std::size_t kItemColumns = 256;  // of C in one work item, at most
-constexpr std::size_t kItemRows = 4096;    // at most: B is packed once for each item of a column
+constexpr std::size_t kItemColumns = 256;  // of C in one work item, at most: the best of 128 to 512
+constexpr std::size_t kItemRows = 4096;    // many: each work item packs its columns of B for itself
 constexpr std::size_t kPackedRows = 4;     // of B between two tiles: L1 holds what waits for it
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 

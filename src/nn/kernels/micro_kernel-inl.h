@@ -72,7 +72,7 @@ HWY_INLINE void PrefetchLine(const float* data) {
 }
 
 constexpr std::size_t kLineFloats = 16;  // in a cache line
-constexpr std::size_t kFetchSteps = 32;  // between two shares of lines
+constexpr std::size_t kFetchSteps = 32;  // between two shares: the loop of a tile stays short
 
 // Asks for the cache lines of a block of a matrix, row after row, a share at a time.
 class LineFetcher {

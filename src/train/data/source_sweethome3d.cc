@@ -19,7 +19,7 @@ struct Library {
 
 // Columns of one line of the list.
 struct Row {
-  std::string class_name, library, license, name, model, creator;
+  std::string class_name, furniture_library, license, name, model, creator;
 };
 
 std::vector<std::string_view> SplitText(std::string_view text, char separator) {
@@ -81,8 +81,8 @@ class SweetHome3d : public ModelSource {
 
  private:
   Status Add(const Path& folder, const Row& row) {
-    if (libraries_.count(row.library) == 0) {
-      auto library = OpenLibrary(folder / (row.library + ".sh3f"));
+    if (libraries_.count(row.furniture_library) == 0) {
+      auto library = OpenLibrary(folder / (row.furniture_library + ".sh3f"));
       if (!library.ok() && library.status().code() == StatusCode::kNotFound) {
         return NotFound(
             "{}; install the models with `sudo apt-get install --no-install-recommends "
@@ -90,13 +90,13 @@ class SweetHome3d : public ModelSource {
             library.status().message());
       }
       if (!library.ok()) return library.status();
-      libraries_.emplace(row.library, std::move(*library));
+      libraries_.emplace(row.furniture_library, std::move(*library));
     }
     const std::string stem = Path(row.model).stem().string();
-    const std::string file = fmt::format("{}.sh3f: {}", row.library, row.model);
-    models_[file] = {row.library, row.model};
+    const std::string file = fmt::format("{}.sh3f: {}", row.furniture_library, row.model);
+    models_[file] = {row.furniture_library, row.model};
     entries_.push_back({row.class_name,
-                        SafeFileName(row.library + "-" + stem),
+                        SafeFileName(row.furniture_library + "-" + stem),
                         row.name,
                         row.license,
                         row.creator,

@@ -139,7 +139,7 @@ TEST_F(Fit, EveryParameterCanBeFitted) {
   }
 }
 
-TEST_F(Fit, ErrorsSayWhatToDo) {
+TEST_F(Fit, ErrorsNameTheCure) {
   FitJob job = Job("run");
   job.config.parameters[Parameter::kSh] = true;
   ExpectMessage(Run(job).status(), "sh cannot be fitted", "spherical harmonics");
