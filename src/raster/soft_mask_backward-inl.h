@@ -208,7 +208,8 @@ class TileBackward {
 
   // Gradients of the faces of the chunk.
   void ClearSums() {
-    for (auto& array : scratch_->sums) std::fill(std::begin(array), std::end(array), 0.0f);
+    std::fill_n(scratch_->sums[0], kSumRow * scratch_->chunk.shorts.count, 0.0f);
+    std::fill_n(scratch_->sums[kChunkRoom], kSumRow * scratch_->chunk.longs.count, 0.0f);
   }
   void EmitSums() {
     Emit(scratch_->chunk.shorts, 0);
@@ -216,12 +217,10 @@ class TileBackward {
   }
 
   void Emit(const SoftFaceArrays& faces, std::size_t slot) {
-    const auto& v = scratch_->sums;
-    for (std::size_t i = 0; i < faces.count; ++i) {
-      const std::size_t s = slot + i;
-      const float x[3] = {v[0][s], v[1][s], v[2][s]}, y[3] = {v[3][s], v[4][s], v[5][s]};
-      AppendGradient(faces.face[i], x, y, scale_, out_);
-    }
+    const auto* sums = scratch_->sums + slot;
+    AppendGradients(
+        faces.face, faces.count, [&](std::size_t q, std::size_t i) { return sums[i] + 4 * q; },
+        scale_, out_);
   }
 
   const SoftTree& tree_;

@@ -48,7 +48,7 @@ struct PixelAxis {
   float first, unit;
 };
 
-// Pixels along one axis within reach of the faces' boxes: the first, and 16 times the one behind
+// Pixels along one axis within reach of the faces' boxes: the first, and 256 times the one behind
 // the last.
 HWY_INLINE SoftInt PixelsNear(SoftTag d, const SoftVec (&corner)[3], const PixelAxis& axis,
                               float reach) {
@@ -65,18 +65,14 @@ HWY_INLINE SoftInt PixelsNear(SoftTag d, const SoftVec (&corner)[3], const Pixel
   const auto clamp = [&](SoftVec v) HWY_ATTR {
     return hn::ConvertTo(di, hn::Min(hn::Max(v, hn::Zero(d)), hn::Set(d, float{kBlockSize})));
   };
-  return hn::Add(clamp(begin), hn::ShiftLeft<4>(clamp(end)));
+  return hn::Add(clamp(begin), hn::ShiftLeft<8>(clamp(end)));
 }
 
 // Bits of the pixels of a SoftList::range.
 HWY_INLINE std::uint64_t RangeBits(std::int32_t range) {
-  const auto up_to = [](int n) {
-    return n >= 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * n) - 1;
-  };
-  const auto columns_up_to = [](int n) { return (std::uint64_t{1} << n) - 1; };
-  const std::uint64_t rows = up_to(range >> 4 & 15) & ~up_to(range & 15);
-  const std::uint64_t columns = columns_up_to(range >> 12 & 15) & ~columns_up_to(range >> 8 & 15);
-  return rows & columns * 0x0101010101010101u;
+  const auto byte = [&](int i) { return static_cast<std::uint32_t>(range) >> 8 * i & 0xff; };
+  const BitsFrom &rows = kBitsFrom.rows, &columns = kBitsFrom.columns;
+  return rows.bits[byte(0)] & ~rows.bits[byte(1)] & columns.bits[byte(2)] & ~columns.bits[byte(3)];
 }
 
 // One of three by lanes.
@@ -166,7 +162,7 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, SoftMask valid, So
       hn::AndNot(vertex, hn::And(far, hn::Or(hn::Or(edge[0], edge[1]), edge[2])));
   const SoftInt rows = PixelsNear(d, f.y, {block.y[0], unit.unit_y}, reach.root);
   const SoftInt columns = PixelsNear(d, f.x, {block.x[0], unit.unit_x}, reach.root);
-  const MemberTags tags{slot, hn::Add(rows, hn::ShiftLeft<8>(columns))};
+  const MemberTags tags{slot, hn::Add(rows, hn::ShiftLeft<16>(columns))};
   AppendVertices(d, f, tags, vertex, corner, &lists->vertices);
   AppendEdges(d, f, tags, segment, edge, &lists->segments);
   AppendBoundaries(d, f, tags, hn::AndNot(hn::Or(vertex, segment), keep), &lists->boundaries);

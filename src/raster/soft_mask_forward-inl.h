@@ -43,9 +43,8 @@ class PartialAlpha {
     const SoftTag d;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const EdgeMembers members(d, list.v[0] + m, list.kRoom);
-      ForPixels(See(list, m), [&](std::size_t i) HWY_ATTR {
-        Put(d, i, simd::HalvingOf(d, SquaredLength(members.At(d, *block_, i))).power);
-      });
+      AddDistances(See(list, m), [&](std::size_t i)
+                                     HWY_ATTR { return SquaredLength(members.At(d, *block_, i)); });
     }
   }
 
@@ -53,9 +52,7 @@ class PartialAlpha {
     const SoftTag d;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
-      ForPixels(See(list, m), [&](std::size_t i) HWY_ATTR {
-        Put(d, i, simd::HalvingOf(d, members.Z(d, *block_, i)).power);
-      });
+      AddDistances(See(list, m), [&](std::size_t i) HWY_ATTR { return members.Z(d, *block_, i); });
     }
   }
 
@@ -85,6 +82,16 @@ class PartialAlpha {
     }
     bits &= block_->live, touched_ |= bits;
     return bits;
+  }
+  // Two loops, so that what is under way at a time is not one chain from the distance to alpha.
+  template <class Distance>
+  HWY_INLINE void AddDistances(std::uint64_t bits, const Distance& z) {
+    const SoftTag d;
+    alignas(64) float of_pixel[kBlockPixels][kSoftLanes];
+    ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(z(i), d, of_pixel[i]); });
+    ForPixels(bits, [&](std::size_t i) HWY_ATTR {
+      Put(d, i, simd::HalvingOf(d, hn::Load(d, of_pixel[i])).power);
+    });
   }
   HWY_INLINE void Put(SoftTag d, std::size_t pixel, SoftVec influence) {
     float* at = partial_[pixel];

@@ -23,13 +23,25 @@ struct PixelScale {
   float x, y;
 };
 
-HWY_INLINE void AppendGradient(std::int32_t face, const float (&x)[3], const float (&y)[3],
-                               const PixelScale& scale, AlignedVector<SoftFaceGradient>* out) {
-  const bool none = x[0] == 0 && x[1] == 0 && x[2] == 0 && y[0] == 0 && y[1] == 0 && y[2] == 0;
-  if (none) return;
-  out->push_back({face,
-                  {x[0] * scale.x, x[1] * scale.x, x[2] * scale.x},
-                  {y[0] * scale.y, y[1] * scale.y, y[2] * scale.y}});
+// Appends those gradients of faces [count] that are not 0: quad(0, i) and quad(1, i) are a row.
+template <class Row>
+HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, const Row& quad,
+                                const PixelScale& scale, AlignedVector<SoftFaceGradient>* out) {
+  const QuadTag d;
+  const hn::FixedTag<float, 2> d_last;
+  HWY_ALIGN const float scales[4] = {scale.x, scale.y, scale.x, scale.y};
+  const Quad to_pixels = hn::Load(d, scales);
+  const std::size_t before = out->size();
+  out->resize(before + count);
+  SoftFaceGradient* to = out->data() + before;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Quad first = hn::Load(d, quad(0, i)), last = hn::Load(d, quad(1, i));
+    if (hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)))) continue;
+    hn::StoreU(hn::Mul(first, to_pixels), d, to->d_corner[0]);
+    hn::StoreU(hn::LowerHalf(d_last, hn::Mul(last, to_pixels)), d_last, to->d_corner[2]);
+    to->face = faces[i], ++to;
+  }
+  out->resize(static_cast<std::size_t>(to - out->data()));
 }
 
 // A / (1 - A) for A <= 15/16: A (1 + A) (1 + A^2) (1 + A^4) ..., until what is lacking is below u.
@@ -74,6 +86,25 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
   return {hn::Min(z01, z[2]), pick(x), pick(y), share, hn::AndNot(on2, closer1), on2};
 }
 
+// The same for the pixels of a block.
+class NearestOfPixels {
+ public:
+  HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
+    hn::Store(n.z, d, v_[0][i]), hn::Store(n.way_x, d, v_[1][i]), hn::Store(n.way_y, d, v_[2][i]);
+    hn::Store(n.second, d, v_[3][i]);
+    hn::Store(hn::VecFromMask(d, n.on1), d, v_[4][i]);
+    hn::Store(hn::VecFromMask(d, n.on2), d, v_[5][i]);
+  }
+  HWY_INLINE SoftVec Z(SoftTag d, std::size_t i) const { return hn::Load(d, v_[0][i]); }
+  HWY_INLINE Nearest At(SoftTag d, std::size_t i) const {
+    const auto load = [&](std::size_t a) HWY_ATTR { return hn::Load(d, v_[a][i]); };
+    return {load(0), load(1), load(2), load(3), hn::MaskFromVec(load(4)), hn::MaskFromVec(load(5))};
+  }
+
+ private:
+  alignas(64) float v_[6][kBlockPixels][kSoftLanes];
+};
+
 // Sums of corner gradients, by faces.
 struct CornerSums {
   SoftVec x[3], y[3];
@@ -93,9 +124,53 @@ struct CornerSums {
   }
 };
 
-// Gradients of the faces of a chunk, by corner and slot.
+// Of the pixels `bits`, pushed by push(pixel, z). Three loops, so that what is under way at a time
+// is not one chain from the edges to the sums.
+template <class Push>
+HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
+                                 std::uint64_t bits, const Push& push) {
+  NearestOfPixels nearest;
+  alignas(64) float pushed[kBlockPixels][kSoftLanes];
+  ForPixels(bits,
+            [&](std::size_t i) HWY_ATTR { nearest.Store(d, i, NearestOf(d, faces, block, i)); });
+  ForPixels(bits,
+            [&](std::size_t i) HWY_ATTR { hn::Store(push(i, nearest.Z(d, i)), d, pushed[i]); });
+  CornerSums sums(d);
+  ForPixels(bits,
+            [&](std::size_t i) HWY_ATTR { sums.Add(d, nearest.At(d, i), hn::Load(d, pushed[i])); });
+  return sums;
+}
+
+// The sums of each face in turn, as rows.
+struct SumRows {
+  alignas(64) float quads[2][4 * kSoftLanes];
+
+  HWY_INLINE SumRows(SoftTag d, const CornerSums& c) {
+    hn::StoreInterleaved4(c.x[0], c.y[0], c.x[1], c.y[1], d, quads[0]);
+    hn::StoreInterleaved4(c.x[2], c.y[2], hn::Zero(d), hn::Zero(d), d, quads[1]);
+  }
+  HWY_INLINE const float* QuadAt(std::size_t q, std::size_t lane) const {
+    return quads[q] + 4 * lane;
+  }
+};
+
+// Gradients of the faces of a chunk, by slot.
 struct ChunkSums {
-  float (&v)[6][2 * kChunkRoom];
+  float (&v)[2 * kChunkRoom][kSumRow];
+
+  // Adds those of the members from m on.
+  HWY_INLINE void Add(SoftTag d, const SoftList& list, std::size_t m,
+                      const CornerSums& corners) const {
+    const QuadTag dq;
+    const SumRows rows(d, corners);
+    const std::size_t count = HWY_MIN(hn::Lanes(d), list.count - m);
+    for (std::size_t i = 0; i < count; ++i) {
+      float* to = v[list.slot[m + i]];
+      for (std::size_t q = 0; q < 2; ++q, to += 4) {
+        hn::Store(hn::Add(hn::Load(dq, to), hn::Load(dq, rows.QuadAt(q, i))), dq, to);
+      }
+    }
+  }
 
   // Adds lanes to corner part + next of the members from m on.
   HWY_INLINE void Add(SoftTag d, const SoftList& list, std::size_t m, std::int32_t next,
@@ -103,8 +178,8 @@ struct ChunkSums {
     alignas(64) float x[kSoftLanes], y[kSoftLanes];
     hn::Store(d_x, d, x), hn::Store(d_y, d, y);
     for (std::size_t i = 0; i < hn::Lanes(d) && m + i < list.count; ++i) {
-      const std::int32_t corner = (list.part[m + i] + next) % 3, slot = list.slot[m + i];
-      v[corner][slot] += x[i], v[3 + corner][slot] += y[i];
+      float* to = v[list.slot[m + i]] + 2 * ((list.part[m + i] + next) % 3);
+      to[0] += x[i], to[1] += y[i];
     }
   }
 };
@@ -164,15 +239,12 @@ struct WeakFaces {
     const SoftTag d;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
-      CornerSums corners(d);
-      ForPixels(PixelsOf(d, list, m, pixels), [&](std::size_t i) HWY_ATTR {
-        const Nearest n = NearestOf(d, members, block, i);
-        const SoftVec odds = Odds(d, simd::HalvingOf(d, n.z).power);
-        corners.Add(d, n, hn::Mul(odds, hn::Set(d, push[i])));
-      });
-      for (std::size_t k = 0; k < 3; ++k) {
-        sums.Add(d, list, m, static_cast<std::int32_t>(k), corners.x[k], corners.y[k]);
-      }
+      const CornerSums corners = SumCorners(
+          d, members, block, PixelsOf(d, list, m, pixels), [&](std::size_t i, SoftVec z) HWY_ATTR {
+            const SoftVec odds = Odds(d, simd::HalvingOf(d, z).power);
+            return hn::Mul(odds, hn::Set(d, push[i]));
+          });
+      sums.Add(d, list, m, corners);
     }
   }
 };
@@ -211,9 +283,11 @@ inline void AppendNear(const SoftBlock& block, const SoftListOf<3 * SoftLists::k
       hn::Store(hn::Load(d, list.v[a] + m), d, faces.edge[a]);
     }
     const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
+    alignas(64) float z[kBlockPixels][kSoftLanes];
+    ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(members.Z(d, block, i), d, z[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
       faces.before[i] = product[i];
-      const SoftVec outside = simd::HalvingOf(d, members.Z(d, block, i)).one_minus;
+      const SoftVec outside = simd::HalvingOf(d, hn::Load(d, z[i])).one_minus;
       product[i] *= hn::GetLane(LaneProducts(d, outside).all);
     });
   }
@@ -230,23 +304,18 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
   for (std::size_t n = near.size(); n-- > 0;) {
     const SoftNearFaces& faces = near[n];
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
-    CornerSums corners(d);
-    ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
-      const Nearest at = NearestOf(d, members, block, i);
-      const auto a = simd::HalvingOf(d, at.z);
-      const LaneProducts outside(d, a.one_minus);
-      const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
-      corners.Add(d, at, hn::Mul(hn::Mul(a.power, rest), outside.others));
-      behind[i] *= hn::GetLane(outside.all);
-    });
-    alignas(64) float sums[6][kSoftLanes];
-    for (std::size_t k = 0; k < 3; ++k) {
-      hn::Store(corners.x[k], d, sums[k]), hn::Store(corners.y[k], d, sums[3 + k]);
-    }
-    for (std::size_t i = 0; i < faces.count; ++i) {
-      AppendGradient(faces.face[i], {sums[0][i], sums[1][i], sums[2][i]},
-                     {sums[3][i], sums[4][i], sums[5][i]}, scale, out);
-    }
+    const CornerSums corners =
+        SumCorners(d, members, block, faces.bits, [&](std::size_t i, SoftVec z) HWY_ATTR {
+          const auto a = simd::HalvingOf(d, z);
+          const LaneProducts outside(d, a.one_minus);
+          const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
+          behind[i] *= hn::GetLane(outside.all);
+          return hn::Mul(hn::Mul(a.power, rest), outside.others);
+        });
+    const SumRows rows(d, corners);
+    AppendGradients(
+        faces.face, faces.count,
+        [&](std::size_t q, std::size_t i) HWY_ATTR { return rows.QuadAt(q, i); }, scale, out);
   }
 }
 

@@ -37,6 +37,21 @@ struct ChosenLanes {
 };
 inline constexpr ChosenLanes kChosenLanes;
 
+// Bits of the pixels of a block from row or column n on.
+struct BitsFrom {
+  std::uint64_t bits[kBlockSize + 1];
+};
+struct BitsFromTables {
+  BitsFrom rows{}, columns{};
+  constexpr BitsFromTables() {
+    for (std::size_t n = 0; n < kBlockSize; ++n) {
+      rows.bits[n] = ~std::uint64_t{0} << kBlockSize * n;
+      columns.bits[n] = (0xffu << n & 0xffu) * 0x0101010101010101u;
+    }
+  }
+};
+inline constexpr BitsFromTables kBitsFrom;
+
 // Pixel centres of a rectangle.
 struct SoftBox {
   float left, top, right, bottom;  // pixels
@@ -81,7 +96,7 @@ struct SoftList {
   static constexpr std::size_t kRoom = 2 * kChunkRoom + kSoftLanes;
   alignas(64) std::int32_t slot[kRoom];  // in the chunk; longs behind shorts
   alignas(64) std::int32_t part[kRoom];  // which corner or edge
-  // First row, the one behind the last, first column, the one behind the last: 4 bits each.
+  // First row, the one behind the last, first column, the one behind the last: a byte each.
   alignas(64) std::int32_t range[kRoom];
   std::size_t count;
 };
@@ -98,9 +113,14 @@ struct SoftLists {
 
 // dL/d(corners) of a face, pixels.
 struct SoftFaceGradient {
+  SoftFaceGradient() {}  // clears nothing: it is written next
+  float d_corner[3][2];  // x, y
   std::int32_t face;
-  float d_x[3], d_y[3];
+  std::int32_t unused;  // so that it is as long as a vector
 };
+
+// Gradients of a face's corners, x and y of each, and what fills it up to quads.
+inline constexpr std::size_t kSumRow = 8;
 
 // Backward: a vector of faces near a block, and the product before them.
 struct SoftNearFaces {
@@ -127,7 +147,7 @@ struct SoftMaskScratch {
   AlignedVector<SoftNearFaces> near[kTileBlocks];
   alignas(
       64) float partial[kBlockPixels][kSoftLanes] = {};  // forward: alpha by lanes; 0 between uses
-  alignas(64) float sums[6][2 * kChunkRoom];
+  alignas(64) float sums[2 * kChunkRoom][kSumRow];       // by slot
 };
 
 }  // namespace tilegrad::raster

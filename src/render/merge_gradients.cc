@@ -41,7 +41,8 @@ void AddBinGeometry(const raster::ScreenMesh& mesh, const BinGradients& bin, flo
     for (int k = 0; k < 3; ++k) {
       const auto v = static_cast<std::size_t>(mesh.vertex(static_cast<std::size_t>(g.face), k));
       float* to = d_vertices + 4 * v;
-      to[0] += g.d_x[k], to[1] += g.d_y[k];
+      const float sum[2] = {to[0] + g.d_corner[k][0], to[1] + g.d_corner[k][1]};
+      std::memcpy(to, sum, sizeof(sum));
     }
   }
 }

@@ -108,7 +108,9 @@ void AddFaceGradients(std::span<const raster::SoftFaceGradient> gradients, const
   const float y = -0.5f * static_cast<float>(size.height);
   for (const raster::SoftFaceGradient& d : gradients) {
     float* to = d_xy + 6 * static_cast<std::size_t>(d.face);
-    for (int k = 0; k < 3; ++k) to[2 * k] += d.d_x[k] * x, to[2 * k + 1] += d.d_y[k] * y;
+    for (int k = 0; k < 3; ++k) {
+      to[2 * k] += d.d_corner[k][0] * x, to[2 * k + 1] += d.d_corner[k][1] * y;
+    }
   }
 }
 

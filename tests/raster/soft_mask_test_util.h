@@ -314,7 +314,9 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
   }
   for (const SoftFaceGradient& g : gradients) {
     float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(g.face);
-    for (std::size_t k = 0; k < 3; ++k) to[2 * k] += g.d_x[k], to[2 * k + 1] += g.d_y[k];
+    for (std::size_t k = 0; k < 3; ++k) {
+      to[2 * k] += g.d_corner[k][0], to[2 * k + 1] += g.d_corner[k][1];
+    }
   }
   return out;
 }
