@@ -141,7 +141,7 @@ class TileBackward {
   }
 
   void FindMembers(std::size_t b) {
-    FindFeatures(scratch_->chunk, plan_, box_, scratch_->blocks[b], reach_, dark_[b] != 0,
+    FindFeatures(scratch_->chunk, plan_, {scratch_->blocks[b], reach_, dark_[b] != 0},
                  &scratch_->lists);
   }
 

@@ -81,6 +81,11 @@ HWY_INLINE PixelBox BoxOf(const SoftBlock& block) {
 HWY_INLINE void PlaceBlock(const SoftBox& unit, SoftBlock* block) {
   const PixelBox box = BoxOf(*block);
   block->live = block->bits, block->whole = 0;
+  block->box = unit;
+  block->box.left = static_cast<float>(box.x0) + 0.5f;
+  block->box.right = static_cast<float>(box.x1) + 0.5f;
+  block->box.top = static_cast<float>(box.y0) + 0.5f;
+  block->box.bottom = static_cast<float>(box.y1) + 0.5f;
   block->centre_x = 0.5f * static_cast<float>(box.x0 + box.x1 + 1);
   block->centre_y = 0.5f * static_cast<float>(box.y0 + box.y1 + 1);
   block->half_x = 0.5f * static_cast<float>(box.x1 - box.x0) * unit.unit_x;

@@ -20,10 +20,11 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 namespace simd = tilegrad::HWY_NAMESPACE;
 
-HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&corner)[6], SoftInt face, SoftMask keep,
-                            SoftFaceArrays* to) {
+// `v`: corners and boxes, as in SoftFaceArrays.
+HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&v)[SoftFaceArrays::kTx], SoftInt face,
+                            SoftMask keep, SoftFaceArrays* to) {
   const Compactor compact(d, keep);
-  for (std::size_t a = 0; a < 6; ++a) compact.Store(corner[a], to->v[a] + to->count);
+  for (std::size_t a = 0; a < SoftFaceArrays::kTx; ++a) compact.Store(v[a], to->v[a] + to->count);
   compact.Store(face, to->face + to->count);
   to->count += compact.count();
 }
@@ -34,19 +35,19 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   const SoftIntTag di;
   const SoftVec limit = hn::Set(d, z), long_edge = hn::Set(d, kLongEdge);
   for (std::size_t f = node * kNodeFaces; f < (node + 1) * kNodeFaces; f += hn::Lanes(d)) {
-    SoftVec c[6];
-    for (std::size_t a = 0; a < 6; ++a) c[a] = hn::Load(d, tree.corner(a) + f);
-    const auto left = hn::Min(hn::Min(c[0], c[1]), c[2]);
-    const auto right = hn::Max(hn::Max(c[0], c[1]), c[2]);
-    const auto top = hn::Min(hn::Min(c[3], c[4]), c[5]);
-    const auto bottom = hn::Max(hn::Max(c[3], c[4]), c[5]);
+    SoftVec v[SoftFaceArrays::kTx];
+    for (std::size_t a = 0; a < 6; ++a) v[a] = hn::Load(d, tree.corner(a) + f);
+    const SoftVec left = v[SoftFaceArrays::kLeft] = hn::Min(hn::Min(v[0], v[1]), v[2]);
+    const SoftVec top = v[SoftFaceArrays::kTop] = hn::Min(hn::Min(v[3], v[4]), v[5]);
+    const SoftVec right = v[SoftFaceArrays::kRight] = hn::Max(hn::Max(v[0], v[1]), v[2]);
+    const SoftVec bottom = v[SoftFaceArrays::kBottom] = hn::Max(hn::Max(v[3], v[4]), v[5]);
     const auto near = hn::Le(BoxDistance(d, left, top, right, bottom, box), limit);
     if (hn::AllFalse(d, near)) continue;
     const auto is_long = hn::Gt(hn::Max(hn::Sub(right, left), hn::Sub(bottom, top)), long_edge);
     const SoftInt face = simd::CountFrom(di, static_cast<std::int32_t>(f));
-    AppendFaces(d, c, face, hn::AndNot(is_long, near), &chunk->shorts);
+    AppendFaces(d, v, face, hn::AndNot(is_long, near), &chunk->shorts);
     if (hn::AllFalse(d, hn::And(is_long, near))) continue;
-    AppendFaces(d, c, face, hn::And(is_long, near), &chunk->longs);
+    AppendFaces(d, v, face, hn::And(is_long, near), &chunk->longs);
   }
 }
 
@@ -93,14 +94,14 @@ struct FaceEdges {
 };
 
 HWY_INLINE void LoadCorners(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
-                            const SoftBox& unit, const SoftBlock& block, FaceEdges* f) {
+                            const SoftBlock& block, FaceEdges* f) {
   for (std::size_t k = 0; k < 3; ++k) {
     const auto from = [&](std::size_t a, float centre, float scale) HWY_ATTR {
       return hn::Mul(hn::Sub(hn::Load(d, faces.v[a + k] + i), hn::Set(d, centre)),
                      hn::Set(d, scale));
     };
-    f->x[k] = from(SoftFaceArrays::kX, block.centre_x, unit.unit_x);
-    f->y[k] = from(SoftFaceArrays::kY, block.centre_y, unit.unit_y);
+    f->x[k] = from(SoftFaceArrays::kX, block.centre_x, block.box.unit_x);
+    f->y[k] = from(SoftFaceArrays::kY, block.centre_y, block.box.unit_y);
   }
 }
 

@@ -30,38 +30,35 @@ HWY_INLINE SoftVec CentreZ(SoftTag d, const FaceEdges& f) {
   return hn::Min(hn::Min(z[0], z[1]), z[2]);
 }
 
-// The face's box is within `reach` of that of the block's background.
-template <class Corners>
-HWY_INLINE SoftMask IsBoxNear(SoftTag d, const Corners& f, const SoftBlock& block, float reach) {
-  const auto gap = [&](const SoftVec(&at)[3], float half) HWY_ATTR {
-    const auto low = hn::Min(hn::Min(at[0], at[1]), at[2]);
-    const auto high = hn::Max(hn::Max(at[0], at[1]), at[2]);
-    const SoftVec h = hn::Set(d, half);
-    return hn::Max(hn::Sub(hn::Max(low, hn::Neg(high)), h), hn::Zero(d));
-  };
-  const auto x = gap(f.x, block.half_x), y = gap(f.y, block.half_y);
-  return hn::Le(hn::MulAdd(x, x, hn::Mul(y, y)), hn::Set(d, reach * reach));
-}
+// Boxes of faces i, i + 1, ... in pixels.
+struct FaceBoxes {
+  SoftVec left, top, right, bottom;
 
-// The pixels of a block along one axis: the first, and how many kernel units are between them.
-struct PixelAxis {
-  float first, unit;
+  HWY_INLINE FaceBoxes(SoftTag d, const SoftFaceArrays& faces, std::size_t i)
+      : left(hn::Load(d, faces.v[SoftFaceArrays::kLeft] + i)),
+        top(hn::Load(d, faces.v[SoftFaceArrays::kTop] + i)),
+        right(hn::Load(d, faces.v[SoftFaceArrays::kRight] + i)),
+        bottom(hn::Load(d, faces.v[SoftFaceArrays::kBottom] + i)) {}
+  // Within `reach` of the block's background.
+  HWY_INLINE SoftMask IsNear(SoftTag d, const SoftBlock& block, float reach) const {
+    return hn::Le(BoxDistance(d, left, top, right, bottom, block.box), hn::Set(d, reach * reach));
+  }
 };
 
-// Pixels along one axis within reach of the faces' boxes: the first, and 256 times the one behind
-// the last.
-HWY_INLINE SoftInt PixelsNear(SoftTag d, const SoftVec (&corner)[3], const PixelAxis& axis,
-                              float reach) {
+// The pixels of a block along one axis, in pixels: the centre of the first, and the reach.
+struct PixelAxis {
+  float first, reach;
+};
+
+// Those within reach of the faces' boxes: the first, and 256 times the one behind the last.
+HWY_INLINE SoftInt PixelsNear(SoftTag d, SoftVec low, SoftVec high, const PixelAxis& axis) {
   const SoftIntTag di;
-  const auto low = hn::Min(hn::Min(corner[0], corner[1]), corner[2]);
-  const auto high = hn::Max(hn::Max(corner[0], corner[1]), corner[2]);
-  const SoftVec per_unit = hn::Set(d, 1 / axis.unit);
-  const auto pixel = [&](SoftVec at, float shift) HWY_ATTR {
-    return hn::Mul(hn::Add(at, hn::Set(d, shift - axis.first)), per_unit);
+  const auto from_first = [&](SoftVec at, float shift) HWY_ATTR {
+    return hn::Add(hn::Sub(at, hn::Set(d, axis.first)), hn::Set(d, shift));
   };
   // 1/64 covers rounding, which is relative to pixel numbers up to a few hundred.
-  const auto begin = hn::Ceil(hn::Sub(pixel(low, -reach), hn::Set(d, 1.0f / 64)));
-  const auto end = hn::Floor(hn::Add(pixel(high, reach), hn::Set(d, 1 + 1.0f / 64)));
+  const auto begin = hn::Ceil(from_first(low, -axis.reach - 1.0f / 64));
+  const auto end = hn::Floor(from_first(high, axis.reach + (1 + 1.0f / 64)));
   const auto clamp = [&](SoftVec v) HWY_ATTR {
     return hn::ConvertTo(di, hn::Min(hn::Max(v, hn::Zero(d)), hn::Set(d, float{kBlockSize})));
   };
@@ -135,11 +132,20 @@ HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, const MemberTags
   AppendTags(tags, hn::Zero(SoftIntTag()), compact, to);
 }
 
-// Appends those of `valid` that are not far. Faces nearer than `reach.near` go to the boundaries if
-// `split`, whatever is seen of them.
-HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, SoftMask valid, SoftInt slot,
-                               const SoftBlock& block, const SoftReach& reach, const SoftBox& unit,
-                               bool split, SoftLists* lists) {
+// Who looks: a block. Faces nearer than `reach.near` go to the boundaries if `split`, whatever is
+// seen of them.
+struct FeatureSearch {
+  const SoftBlock& block;
+  const SoftReach& reach;
+  bool split;
+};
+
+// Appends those of `valid` that are not far.
+HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FaceBoxes& boxes,
+                               SoftMask valid, SoftInt slot, const FeatureSearch& search,
+                               SoftLists* lists) {
+  const SoftBlock& block = search.block;
+  const SoftReach& reach = search.reach;
   const float r = reach.root + block.radius;
   const SoftMask keep = hn::And(valid, hn::Le(CentreZ(d, f), hn::Set(d, r * r)));
   if (hn::AllFalse(d, keep)) return;
@@ -152,7 +158,7 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, SoftMask valid, So
     end[k] = hn::Ge(hn::Sub(f.past[k], half), zero);
   }
   SoftMask far = keep;
-  if (split) far = hn::AndNot(IsBoxNear(d, f, block, reach.near), keep);
+  if (search.split) far = hn::AndNot(boxes.IsNear(d, block, reach.near), keep);
   const SoftMask corner[3] = {hn::And(start[0], end[2]), hn::And(start[1], end[0]),
                               hn::And(start[2], end[1])};
   const SoftMask edge[3] = {hn::And(start[1], end[2]), hn::And(start[2], end[0]),
@@ -160,8 +166,12 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, SoftMask valid, So
   const SoftMask vertex = hn::And(far, hn::Or(hn::Or(corner[0], corner[1]), corner[2]));
   const SoftMask segment =
       hn::AndNot(vertex, hn::And(far, hn::Or(hn::Or(edge[0], edge[1]), edge[2])));
-  const SoftInt rows = PixelsNear(d, f.y, {block.y[0], unit.unit_y}, reach.root);
-  const SoftInt columns = PixelsNear(d, f.x, {block.x[0], unit.unit_x}, reach.root);
+  const SoftInt rows =
+      PixelsNear(d, boxes.top, boxes.bottom,
+                 {static_cast<float>(block.y0) + 0.5f, reach.root / block.box.unit_y});
+  const SoftInt columns =
+      PixelsNear(d, boxes.left, boxes.right,
+                 {static_cast<float>(block.x0) + 0.5f, reach.root / block.box.unit_x});
   const MemberTags tags{slot, hn::Add(rows, hn::ShiftLeft<16>(columns))};
   AppendVertices(d, f, tags, vertex, corner, &lists->vertices);
   AppendEdges(d, f, tags, segment, edge, &lists->segments);
@@ -178,28 +188,44 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
   }
 }
 
+// The vectors of faces of which one is near, by its first: no branch, which would be hard to
+// foretell. Returns how many.
+HWY_INLINE std::size_t FindNear(const SoftFaceArrays& faces, const FeatureSearch& search,
+                                std::int32_t* near) {
+  const SoftTag d;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
+    near[count] = static_cast<std::int32_t>(i);
+    const SoftMask is_near = FaceBoxes(d, faces, i).IsNear(d, search.block, search.reach.root);
+    count += BitsOf(d, is_near) != 0;
+  }
+  return count;
+}
+
 // Fills `lists` with the members of the block among the faces of a chunk.
-inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan, const SoftBox& unit,
-                         const SoftBlock& block, const SoftReach& reach, bool split,
-                         SoftLists* lists) {
+inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
+                         const FeatureSearch& search, SoftLists* lists) {
   const SoftTag d;
   const SoftIntTag di;
   lists->vertices.count = lists->segments.count = lists->boundaries.count = 0;
-  const auto slots = [&](std::size_t first)
-                         HWY_ATTR { return simd::CountFrom(di, static_cast<std::int32_t>(first)); };
-  for (std::size_t i = 0; i < chunk.shorts.count; i += hn::Lanes(d)) {
+  const auto append = [&](const SoftFaceArrays& faces, std::size_t i, const FaceEdges& f,
+                          std::size_t slot) HWY_ATTR {
+    const FaceBoxes boxes(d, faces, i);
+    const SoftMask valid =
+        hn::And(hn::FirstN(d, faces.count - i), boxes.IsNear(d, search.block, search.reach.root));
+    AppendFeatures(d, f, boxes, valid, simd::CountFrom(di, static_cast<std::int32_t>(slot)), search,
+                   lists);
+  };
+  std::int32_t near[kChunkRoom];
+  const std::size_t count = FindNear(chunk.shorts, search, near);
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto i = static_cast<std::size_t>(near[n]);
     FaceEdges f;
-    LoadCorners(d, chunk.shorts, i, unit, block, &f);
-    const SoftMask near =
-        hn::And(hn::FirstN(d, chunk.shorts.count - i), IsBoxNear(d, f, block, reach.root));
-    if (hn::AllFalse(d, near)) continue;
-    ShortEdges(d, chunk.shorts, i, &f);
-    AppendFeatures(d, f, near, slots(i), block, reach, unit, split, lists);
+    LoadCorners(d, chunk.shorts, i, search.block, &f), ShortEdges(d, chunk.shorts, i, &f);
+    append(chunk.shorts, i, f, i);
   }
   for (std::size_t i = 0; i < chunk.longs.count; i += hn::Lanes(d)) {
-    AppendFeatures(d, LongEdges(d, chunk.longs, i, plan, block),
-                   hn::FirstN(d, chunk.longs.count - i), slots(kChunkRoom + i), block, reach, unit,
-                   split, lists);
+    append(chunk.longs, i, LongEdges(d, chunk.longs, i, plan, search.block), kChunkRoom + i);
   }
   PadList({0}, &lists->vertices);
   PadList({SoftLists::kSide}, &lists->segments);

@@ -157,7 +157,7 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (blocks[b].live == 0) continue;
       const SoftLists& lists = scratch->lists;
-      FindFeatures(scratch->chunk, plan, box, blocks[b], reach, false, &scratch->lists);
+      FindFeatures(scratch->chunk, plan, {blocks[b], reach, false}, &scratch->lists);
       PartialAlpha partial(&blocks[b], scratch->partial);
       partial.AddVertices(lists.vertices), partial.AddSegments(lists.segments);
       partial.AddBoundaries(lists.boundaries), partial.Merge();

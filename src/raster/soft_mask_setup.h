@@ -58,16 +58,28 @@ struct SoftBox {
   float unit_x, unit_y;            // kernel units per pixel
 };
 
-// A tile's faces, some at a time: corners in pixels; unit direction t of edge k, from corner k to
-// the next, and 1 / its length. An edge of no length has t = (1, 0) and inverse 0.
+// A tile's faces, some at a time: corners and the box around them in pixels; unit direction t of
+// edge k, from corner k to the next, and 1 / its length. An edge of no length has t = (1, 0) and
+// inverse 0.
 struct SoftFaceArrays {
-  enum Array { kX = 0, kY = 3, kTx = 6, kTy = 9, kInverse = 12, kArrays = 15 };
+  enum Array {
+    kX = 0,
+    kY = 3,
+    kLeft = 6,
+    kTop,
+    kRight,
+    kBottom,
+    kTx,
+    kTy = kTx + 3,
+    kInverse = kTy + 3,
+    kArrays = kInverse + 3
+  };
   alignas(64) float v[kArrays][kChunkRoom];
   alignas(64) std::int32_t face[kChunkRoom];  // of the mesh
   std::size_t count = 0;
 };
 struct SoftChunk {
-  SoftFaceArrays shorts, longs;  // of longs only the corners are set
+  SoftFaceArrays shorts, longs;  // of longs only corners and boxes are set
 };
 
 // A block of a tile. Pixels are row by row.
@@ -75,8 +87,9 @@ struct SoftBlock {
   int x0, y0, width, height;                       // pixels, cut off by the image
   std::uint64_t bits;                              // of pixels to compute
   std::uint64_t live;                              // those that have not stopped
-  float centre_x, centre_y;                        // pixels, the middle of the box of those pixels
-  float half_x, half_y, radius;                    // half the box, and half its diagonal
+  SoftBox box;                                     // of those pixels
+  float centre_x, centre_y;                        // pixels, its middle
+  float half_x, half_y, radius;                    // half of it, and half its diagonal
   alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
   std::size_t whole;                               // faces that all pixels have seen
   alignas(64) double alpha[kBlockPixels];          // 1 where there is nothing to compute
