@@ -148,7 +148,7 @@ TEST(ApiThreads, RenderersOnTwoThreadsDoNotMeet) {
 
 // A renderer that has rendered before the fork, whose frame is used after it, and a new one.
 TEST(ApiThreads, AForkedChildGetsTheSameBits) {
-  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  if (const char* why = test::WhyNoFork()) GTEST_SKIP() << why;
   const TestScene<float> s(Lighting::kPhong);
   const std::vector<Scene> scenes(3, s.scene);
   Renderer renderer{{.threads = 3}};

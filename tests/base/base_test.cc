@@ -82,7 +82,7 @@ std::vector<std::size_t> NestedSums(const Workers& workers) {
 
 // Workers whose threads are those of the parent, and new ones, in a child and in a child of that.
 TEST(Workers, SurviveAFork) {
-  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  if (const char* why = test::WhyNoFork()) GTEST_SKIP() << why;
   const auto before = std::make_unique<Workers>(4);
   const std::vector<std::size_t> expected = NestedSums(*before);
   const auto same = [&] {
@@ -100,7 +100,7 @@ TEST(Workers, SurviveAFork) {
 
 // A child has several workers at once, too, and ends Workers of its parent.
 TEST(Workers, AChildHasThreadsOfItsOwn) {
-  if (!test::kCanFork) GTEST_SKIP() << test::kNoFork;
+  if (const char* why = test::WhyNoFork()) GTEST_SKIP() << why;
   auto before = std::make_unique<Workers>(4);
   NestedSums(*before);
   EXPECT_TRUE(test::TrueInChild([&] {

@@ -5,15 +5,21 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdlib>
+
 namespace tilegrad::test {
 
-// ThreadSanitizer ends a child that starts threads if its parent had some.
+// Why a child of a process with threads cannot start some; null if it can. ThreadSanitizer ends
+// such a child, and so does qemu-user, for which tests/cross sets the variable.
+inline const char* WhyNoFork() {
 #ifdef __SANITIZE_THREAD__
-inline constexpr bool kCanFork = false;
+  return "ThreadSanitizer allows no threads after a fork";
 #else
-inline constexpr bool kCanFork = true;
+  return std::getenv("TILEGRAD_TEST_NO_FORK") == nullptr
+             ? nullptr
+             : "TILEGRAD_TEST_NO_FORK is set: the emulator allows no threads after a fork";
 #endif
-inline constexpr char kNoFork[] = "ThreadSanitizer allows no threads after a fork";
+}
 
 // Runs `call` in a child process, for at most 60 seconds; whether it returned true.
 template <class Call>
