@@ -23,10 +23,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kDepth = 256;        // steps of k in one pass: a B panel takes half of L1
-constexpr std::size_t kItemColumns = 256;  // of C in one work item, at most: the best of 128 to 512
-constexpr std::size_t kItemRows = 4096;    // many: each work item packs its columns of B for itself
-constexpr std::size_t kPackedRows = 4;     // of B between two tiles: L1 holds what waits for it
+constexpr std::size_t kDepth = 256;  // steps of k in one block: a B panel takes half of L1
+// Of B in one block: the best of 64 to 256 columns.
+constexpr std::size_t kBlockPanels = std::max<std::size_t>(256 / kTileColumns, 4);
+constexpr std::size_t kGroupFloats = 24576;  // of A beside that block in L2: the best of 18 to 48 K
+constexpr std::size_t kItemRows = 4096;  // many: each work item packs its columns of B for itself
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
 // How C is cut into work items. The sum of an element does not depend on it, so it may depend on
@@ -34,8 +35,7 @@ constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a
 struct GemmItems {
   GemmItems(std::size_t m, std::size_t n, std::size_t workers) {
     const std::size_t wanted = workers > 1 ? 4 * workers : 1;
-    columns = std::clamp(RoundUp(DivideUp(n, wanted), kTileColumns), 4 * kTileColumns,
-                         std::max(kItemColumns, 4 * kTileColumns));
+    columns = RoundUp(std::max(DivideUp(n, wanted), 4 * kTileColumns), kTileColumns);
     const std::size_t parts = DivideUp(wanted, DivideUp(n, columns));
     rows = std::clamp(DivideUp(m, parts), std::min(m, kLeastRows), kItemRows);
   }
@@ -54,7 +54,7 @@ struct GemmPlan {
 
   std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
   std::size_t packed_b_size() const {
-    return column_blocks.largest() * PackedPanelStride(depths.largest());
+    return std::min(column_blocks.largest(), kBlockPanels) * PackedPanelStride(depths.largest());
   }
   // Of a worker: the columns in use and the next ones.
   std::size_t worker_size() const { return RoundUp(2 * packed_b_size(), kAlignment); }
@@ -102,59 +102,91 @@ HWY_INLINE void MultiplyTile(const GemmPlan& plan, const float* packed_a, std::s
                  TargetOf(plan.p, row, block.begin + j * kTileColumns, block.k == 0));
 }
 
-// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one a
-// function of its own: within a large caller GCC 12 does not keep a tile's sums in registers.
-HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                                const float* packed_a, const ColumnPacker& columns) {
-  for (std::size_t j = 0; j < columns.block().panels(); ++j) {
-    for (std::size_t panel = first; panel < first + rows; ++panel) {
-      MultiplyTile(plan, packed_a, panel, columns.block(), j, PackedColumns{columns.panel(j)});
+// Runs `tile(panel, j)` for row panels [first, first + rows) and all column panels j of a block:
+// for as many row panels as stay in L2, one column panel after the other.
+template <class F>
+HWY_INLINE void ForTiles(std::size_t first, std::size_t rows, const ColumnBlock& block,
+                         const F& tile) {
+  const Panels groups(rows, DivideUp(kGroupFloats, kTileRows * block.steps));
+  for (std::size_t group = 0; group < groups.count(); ++group) {
+    const std::size_t begin = first + groups.begin(group), end = begin + groups.size(group);
+    for (std::size_t j = 0; j < block.panels(); ++j) {
+      for (std::size_t panel = begin; panel < end; ++panel) tile(panel, j);
     }
   }
 }
 
-// The same; meanwhile `next` is packed: fetched by the tiles, and copied as soon as a few of its
-// rows are there.
+// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one a
+// function of its own: within a large caller GCC 12 does not keep a tile's sums in registers.
+HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                const float* packed_a, const ColumnPacker& columns) {
+  ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
+    MultiplyTile(plan, packed_a, panel, columns.block(), j, PackedColumns{columns.panel(j)});
+  });
+}
+
+// The same; meanwhile the tiles pack `next`.
 HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                   const float* packed_a, const ColumnPacker& columns,
                                   const ColumnPacker& next) {
-  const std::size_t panels = columns.block().panels();
-  const std::size_t fetches = rows * panels * DivideUp(columns.block().steps, kFetchSteps);
-  LineFetcher fetcher = next.Fetcher(DivideUp(next.lines(), fetches));
-  std::size_t packed = 0;
-  for (std::size_t j = 0; j < panels; ++j) {
-    for (std::size_t panel = first; panel < first + rows; ++panel) {
-      MultiplyTile(plan, packed_a, panel, columns.block(), j,
-                   FetchingColumns(columns.panel(j), fetcher));
-      const std::size_t fetched = next.units() - fetcher.rows_left();
-      if (fetched < packed + kPackedRows) continue;
-      next.Pack(packed, fetched);
-      packed = fetched;
-    }
-  }
-  next.Pack(packed, next.units());
+  const ColumnBlock& block = columns.block();
+  const std::size_t runs = rows * block.panels() * (block.steps / kTaskSteps);
+  PanelCopier copier = next.Copier(std::max<std::size_t>(1, runs));
+  ForTiles(first, rows, block, [&](std::size_t panel, std::size_t j) HWY_ATTR {
+    MultiplyTile(plan, packed_a, panel, block, j,
+                 BusyColumns<PanelCopier>(columns.panel(j), copier));
+  });
+  copier.Finish();
+  next.PackRest();
 }
+
+// The blocks of B that a work item meets, one after the other: all columns of a depth, as the rows
+// of B lie in memory, or all depths of some columns, as they lie in a transposed B.
+class BlockOrder {
+ public:
+  // Depth blocks [depth, end) of the plan's column block `columns`.
+  BlockOrder(const GemmPlan& plan, std::size_t columns, std::size_t depth, std::size_t end)
+      : plan_(plan),
+        first_panel_(plan.column_blocks.begin(columns)),
+        depth_(depth),
+        depths_(end - depth),
+        blocks_(plan.column_blocks.size(columns), kBlockPanels) {}
+
+  std::size_t count() const { return blocks_.count() * depths_; }
+  ColumnBlock At(std::size_t i) const {
+    const bool depth_first = plan_.p.transpose_b;
+    const std::size_t d = depth_ + (depth_first ? i % depths_ : i / blocks_.count());
+    const std::size_t block = depth_first ? i / depths_ : i % blocks_.count();
+    const std::size_t begin = (first_panel_ + blocks_.begin(block)) * kTileColumns;
+    return {.begin = begin,
+            .end = std::min(plan_.p.n, begin + blocks_.size(block) * kTileColumns),
+            .k = plan_.depths.begin(d),
+            .steps = plan_.depths.size(d)};
+  }
+
+ private:
+  const GemmPlan& plan_;
+  std::size_t first_panel_, depth_, depths_;
+  Panels blocks_;
+};
 
 // Work item: one block of rows by one block of columns, the steps of depth blocks [depth, end).
 // packed_b: plan.worker_size() floats.
 inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t depth, std::size_t end,
                          const float* packed_a, float* packed_b) {
-  const std::size_t rows = item % plan.row_blocks.count(), columns = item / plan.row_blocks.count();
+  const std::size_t rows = item % plan.row_blocks.count();
   const std::size_t panel = plan.row_blocks.begin(rows), panels = plan.row_blocks.size(rows);
-  const std::size_t first = plan.column_blocks.begin(columns) * kTileColumns;
-  const std::size_t last =
-      std::min(plan.p.n, first + plan.column_blocks.size(columns) * kTileColumns);
-  const auto packer = [&](std::size_t d) {
-    return ColumnPacker(plan.p, {first, last, plan.depths.begin(d), plan.depths.size(d)},
-                        packed_b + d % 2 * plan.packed_b_size());
+  const BlockOrder order(plan, item / plan.row_blocks.count(), depth, end);
+  const auto packer = [&](std::size_t i) {
+    return ColumnPacker(plan.p, order.At(i), packed_b + i % 2 * plan.packed_b_size());
   };
   const bool pack_ahead = !plan.p.transpose_b;
-  for (std::size_t d = depth; d < end; ++d) {
-    const ColumnPacker present = packer(d);
-    const float* a = packed_a + plan.p.m * (plan.depths.begin(d) - plan.depths.begin(depth));
-    if (d == depth || !pack_ahead) present.Pack(0, present.units());
-    if (pack_ahead && d + 1 < end) {
-      MultiplyAndPack(plan, panel, panels, a, present, packer(d + 1));
+  for (std::size_t i = 0; i < order.count(); ++i) {
+    const ColumnPacker present = packer(i);
+    const float* a = packed_a + plan.p.m * (present.block().k - plan.depths.begin(depth));
+    if (i == 0 || !pack_ahead) present.Pack();
+    if (pack_ahead && i + 1 < order.count()) {
+      MultiplyAndPack(plan, panel, panels, a, present, packer(i + 1));
     } else {
       MultiplyBlock(plan, panel, panels, a, present);
     }

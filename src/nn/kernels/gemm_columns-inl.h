@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The large operand of a matrix product, packed a block of columns and steps at a time. With few
-// rows on the other side (a training batch) waiting for it would cost as much as multiplying: rows
-// of a B that is not transposed are packed between the tiles of the block before them, when those
-// tiles have fetched them into L1. (Fetching whole blocks into L2 fails: rows that lie a power of
-// two apart share a few sets of that cache.) A transposed B is packed a block at a time, which
-// reads it in runs as long as the block is deep.
+// rows on the other side (a training batch) copying it and waiting for it would cost as much as
+// multiplying: a B that is not transposed is packed by the tiles of the block before, a row of a
+// panel every few steps of theirs. A transposed B is packed a block at a time, which reads it in
+// runs as long as the block is deep.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_
@@ -40,7 +39,56 @@ struct ColumnBlock {
   std::size_t panels() const { return DivideUp(end - begin, kTileColumns); }
 };
 
-// Packs one block in units, [0, units()), in any order: rows of B or, of a transposed B, panels.
+// Copies the whole panels of a block, a row of a panel at a time: row after row of B, so that what
+// is read lies in runs, and asked for in time.
+class PanelCopier {
+ public:
+  // b: the block in B, rows `ld` apart. Copies `share` rows of a panel in one run.
+  PanelCopier(const float* b, std::size_t ld, const ColumnBlock& block, float* packed,
+              std::size_t share)
+      : from_(b),
+        to_(packed),
+        panels_((block.end - block.begin) / kTileColumns),
+        rows_left_(panels_ == 0 ? 0 : block.steps),
+        share_(share) {
+    if (rows_left_ == 0) return;
+    ahead_ = DivideUp(kAhead * share, panels_) * ld;
+    next_panel_ = static_cast<std::ptrdiff_t>(PackedPanelStride(block.steps));
+    next_row_from_ = ld - (panels_ - 1) * kTileColumns;
+    next_row_to_ = kTileColumns - static_cast<std::ptrdiff_t>(panels_ - 1) * next_panel_;
+  }
+
+  HWY_INLINE void Run() {
+    for (std::size_t i = 0; i < share_ && rows_left_ > 0; ++i) Copy();
+  }
+  void Finish() {
+    while (rows_left_ > 0) Copy();
+  }
+
+ private:
+  static constexpr std::size_t kAhead = 16;  // rows of panels between asking and copying
+
+  HWY_INLINE void Copy() {
+    for (std::size_t v = 0; v < kTileColumns; v += kLineFloats) PrefetchLine(from_ + ahead_ + v);
+    for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
+      hn::StoreU(hn::LoadU(Tag(), from_ + v), Tag(), to_ + v);
+    }
+    // Without a branch, which would be mispredicted once a row.
+    const bool last = ++panel_ == panels_;
+    from_ += last ? next_row_from_ : kTileColumns;
+    to_ += last ? next_row_to_ : next_panel_;
+    panel_ = last ? 0 : panel_;
+    rows_left_ -= last ? 1 : 0;
+  }
+
+  const float* from_;
+  float* to_;
+  std::size_t panel_ = 0, panels_, rows_left_, share_;
+  std::size_t ahead_ = 0, next_row_from_ = 0;
+  std::ptrdiff_t next_panel_ = 0, next_row_to_ = 0;
+};
+
+// Packs one block of B.
 class ColumnPacker {
  public:
   ColumnPacker(const GemmProblem<float>& problem, const ColumnBlock& block, float* packed)
@@ -48,40 +96,36 @@ class ColumnPacker {
 
   const ColumnBlock& block() const { return block_; }
   const float* panel(std::size_t i) const { return packed_ + i * PackedPanelStride(block_.steps); }
-  std::size_t units() const { return p_.transpose_b ? block_.panels() : block_.steps; }
 
-  // Not inlined, or the sums of the caller's tiles would not stay in registers.
-  HWY_NOINLINE void Pack(std::size_t begin, std::size_t end) const {
-    for (std::size_t unit = begin; unit < end; ++unit) {
-      p_.transpose_b ? PackPanel(unit) : PackRow(unit);
+  // All at once. Not inlined, or the sums of the caller's tiles would not stay in registers.
+  HWY_NOINLINE void Pack() const {
+    if (p_.transpose_b) {
+      for (std::size_t panel = 0; panel < block_.panels(); ++panel) PackPanel(panel);
+    } else {
+      Copier(block_.steps * block_.panels()).Finish();
+      PackRest();
     }
   }
 
-  // Fetches the block, `share` lines at a time; B not transposed.
-  LineFetcher Fetcher(std::size_t share) const {
-    return LineFetcher(RowOf(0), p_.ldb, block_.steps, block_.end - block_.begin, share);
+  // Of a B that is not transposed: packs all but a last panel of fewer columns in `runs` runs.
+  PanelCopier Copier(std::size_t runs) const {
+    return PanelCopier(RowOf(0), p_.ldb, block_, packed_,
+                       DivideUp(block_.steps * whole_panels(), runs));
   }
-  std::size_t lines() const {
-    return block_.steps * DivideUp(block_.end - block_.begin, kLineFloats);
+  // The last panel of fewer columns.
+  HWY_NOINLINE void PackRest() const {
+    const std::size_t column = whole_panels() * kTileColumns;
+    const std::size_t rest = block_.end - block_.begin - column;
+    if (rest == 0) return;
+    float* out = packed_ + whole_panels() * PackedPanelStride(block_.steps);
+    for (std::size_t k = 0; k < block_.steps; ++k, out += kTileColumns) {
+      std::fill(std::copy_n(RowOf(k) + column, rest, out), out + kTileColumns, 0.0f);
+    }
   }
 
  private:
+  std::size_t whole_panels() const { return (block_.end - block_.begin) / kTileColumns; }
   const float* RowOf(std::size_t k) const { return p_.b + (block_.k + k) * p_.ldb + block_.begin; }
-
-  // Row k of the block, read in one run and dealt out to all panels.
-  void PackRow(std::size_t k) const {
-    const std::size_t columns = block_.end - block_.begin, whole = columns / kTileColumns;
-    const std::size_t stride = PackedPanelStride(block_.steps);
-    const float* row = RowOf(k);
-    float* out = packed_ + k * kTileColumns;
-    for (std::size_t panel = 0; panel < whole; ++panel, row += kTileColumns, out += stride) {
-      for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
-        hn::StoreU(hn::LoadU(Tag(), row + v), Tag(), out + v);
-      }
-    }
-    const std::size_t rest = columns - whole * kTileColumns;
-    if (rest > 0) std::fill(std::copy_n(row, rest, out), out + kTileColumns, 0.0f);
-  }
 
   void PackPanel(std::size_t panel) const {
     const std::size_t column = block_.begin + panel * kTileColumns;

@@ -72,35 +72,14 @@ HWY_INLINE void PrefetchLine(const float* data) {
 }
 
 constexpr std::size_t kLineFloats = 16;  // in a cache line
-constexpr std::size_t kFetchSteps = 32;  // between two shares: the loop of a tile stays short
+constexpr std::size_t kTaskSteps = 8;    // from one run of a task to the next
 
-// Asks for the cache lines of a block of a matrix, row after row, a share at a time.
-class LineFetcher {
- public:
-  // Rows of `columns` floats, `ld` apart; columns > 0.
-  LineFetcher(const float* block, std::size_t ld, std::size_t rows, std::size_t columns,
-              std::size_t share)
-      : row_(block), ld_(ld), rows_left_(rows), last_(columns - 1), share_(share) {}
-
-  HWY_INLINE void Fetch() {
-    for (std::size_t i = 0; i < share_ && rows_left_ > 0; ++i) {
-      PrefetchLine(row_ + column_);
-      column_ += kLineFloats;
-      if (column_ > last_) column_ = 0, row_ += ld_, --rows_left_;
-    }
-  }
-  // That are not asked for to their end.
-  std::size_t rows_left() const { return rows_left_; }
-
- private:
-  const float* row_;
-  std::size_t ld_, rows_left_, last_, share_, column_ = 0;
-};
-
-// A packed panel. Meanwhile a share of lines is asked for every kFetchSteps steps.
-struct FetchingColumns : PackedColumns {
-  FetchingColumns(const float* panel, LineFetcher& lines) : PackedColumns{panel}, fetcher(lines) {}
-  LineFetcher& fetcher;
+// A packed panel; meanwhile `task` runs every kTaskSteps steps, in the time that loads, stores and
+// integer arithmetic have beside the FMAs.
+template <class Task>
+struct BusyColumns : PackedColumns {
+  BusyColumns(const float* panel, Task& t) : PackedColumns{panel}, task(t) {}
+  Task& task;
 };
 
 // The column factor of step k at base[vector] + *offset.
@@ -163,11 +142,11 @@ struct Tile<R, std::index_sequence<row...>> {
   HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
     for (std::size_t k = 0; k < steps; ++k) MultiplyStep(rows, columns);
   }
-  template <class Rows>
-  HWY_INLINE void Multiply(Rows& rows, FetchingColumns& columns, std::size_t steps) {
+  template <class Rows, class Task>
+  HWY_INLINE void Multiply(Rows& rows, BusyColumns<Task>& columns, std::size_t steps) {
     while (steps > 0) {
-      columns.fetcher.Fetch();
-      const std::size_t now = std::min(steps, kFetchSteps);
+      columns.task.Run();
+      const std::size_t now = std::min(steps, kTaskSteps);
       for (std::size_t k = 0; k < now; ++k) MultiplyStep(rows, columns);
       steps -= now;
     }

@@ -123,14 +123,13 @@ TEST(Gemm, AgreesWithReferenceOnSmallestExtents) {
   }
 }
 
-// Few rows and several depth blocks: columns are packed while others are multiplied. Fewer and more
-// tiles than rows to pack, columns with and without a tail, and a row count on both sides of the
-// limit (300) where this ends.
+// Several blocks of B, each packed by the tiles of the block before: fewer and more tiles than rows
+// to pack, columns with and without a tail, several blocks of columns, several groups of rows.
 TEST(Gemm, AgreesWithReferenceWhilePackingAhead) {
   for (const std::string& target : RunnableTargets()) {
     const OnTarget on(target);
     for (std::size_t m : {1, 5, 64, 300, 301}) {
-      for (std::size_t n : {1, 16, 131}) {
+      for (std::size_t n : {1, 16, 131, 530}) {
         CheckAgainstReference({.m = m, .n = n, .k = 521, .bias = true, .slack = 3}, m + n);
         if (HasFatalFailure()) return;
       }
