@@ -178,14 +178,14 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FaceBoxes& b
   AppendBoundaries(d, f, tags, hn::AndNot(hn::Or(vertex, segment), keep), &lists->boundaries);
 }
 
-// Fills a list up to whole vectors: `far` are its arrays of distances.
+// Fills a list up to whole vectors at least: `far` are its arrays of distances.
 template <std::size_t kArrays>
 HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArrays>* list) {
-  for (std::size_t m = list->count; m % kSoftLanes != 0; ++m) {
-    for (auto& array : list->v) array[m] = 0;
-    for (const std::size_t a : far) list->v[a][m] = 1e15f;
-    list->range[m] = 0;
-  }
+  const SoftTag d;
+  const SoftIntTag di;
+  for (auto& array : list->v) hn::StoreU(hn::Zero(d), d, array + list->count);
+  for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
+  hn::StoreU(hn::Zero(di), di, list->range + list->count);
 }
 
 // The vectors of faces of which one is near, by its first: no branch, which would be hard to
