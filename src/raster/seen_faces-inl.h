@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -53,11 +54,15 @@ HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
   };
   number(0);
   int j = 1;
-  for (; j + lanes <= rows.width; j += lanes) {
-    std::uint32_t bits = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
-    for (; bits != 0; bits &= bits - 1) {
-      number(j + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)));
+  while (j + lanes <= rows.width) {
+    // As many pixels as bits at a time: where the loop over bits ends is hard to foretell.
+    const int first = j;
+    std::uint64_t bits = 0;
+    for (; j + lanes <= rows.width && j < first + 64; j += lanes) {
+      const std::uint64_t here = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
+      bits |= here << (j - first);
     }
+    for (; bits != 0; bits &= bits - 1) number(first + std::countr_zero(bits));
   }
   for (; j < rows.width; ++j) number(j);
 }

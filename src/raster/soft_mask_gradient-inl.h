@@ -36,10 +36,11 @@ HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, co
   SoftFaceGradient* to = out->data() + before;
   for (std::size_t i = 0; i < count; ++i) {
     const Quad first = hn::Load(d, quad(0, i)), last = hn::Load(d, quad(1, i));
-    if (hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)))) continue;
     hn::StoreU(hn::Mul(first, to_pixels), d, to->d_corner[0]);
     hn::StoreU(hn::LowerHalf(d_last, hn::Mul(last, to_pixels)), d_last, to->d_corner[2]);
-    to->face = faces[i], ++to;
+    to->face = faces[i];
+    // No branch: it would be hard to foretell.
+    to += !hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)));
   }
   out->resize(static_cast<std::size_t>(to - out->data()));
 }

@@ -230,15 +230,14 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
   // All faces at group_z together are within the budget.
   const SoftHistogram histogram(tree.nodes, found, static_cast<int>(std::ceil(plan.group_z)));
   const int end = histogram.DropFar(plan.node_error / 2, &out.dropped);
-  std::size_t begin[kEndZ];
+  std::size_t begin[kEndZ + 1];
   for (int z = 0; z < end; ++z) {
     out.faces += static_cast<std::size_t>(histogram.faces[z]);
     begin[z] = out.count, out.count += static_cast<std::size_t>(histogram.nodes[z]);
   }
-  if (scratch->nodes.size() < out.count) scratch->nodes.resize(out.count);
-  for (const SoftNodeAt& at : found) {
-    if (at.z < end) scratch->nodes[begin[at.z]++] = at.node;
-  }
+  begin[end] = out.count;  // those that are dropped go behind the others: no branch
+  if (scratch->nodes.size() < count) scratch->nodes.resize(count);
+  for (const SoftNodeAt& at : found) scratch->nodes[begin[std::min(at.z, end)]++] = at.node;
   return out;
 }
 
