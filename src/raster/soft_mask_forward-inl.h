@@ -125,17 +125,34 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
 
 // Before any face: 0 for the pixels to compute, else 1.
 HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
-  const auto width = static_cast<std::size_t>(block.width);
-  ForRows(plan, block, [&](std::size_t to, std::size_t from) {
-    const std::uint64_t row = block.bits >> from & 0xff;
-    std::fill_n(alpha + to, width, row == 0 ? 1.0f : 0.0f);
-    if (row == 0 || row == 0xff) return;
-    for (std::size_t x = 0; x < width; ++x) alpha[to + x] = static_cast<float>(~row >> x & 1);
+  const SoftTag d;
+  ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
+    const std::uint64_t row = block.bits >> from;
+    if (block.width == static_cast<int>(kBlockSize)) {
+      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+        const std::uint8_t bits[8] = {static_cast<std::uint8_t>(row >> x)};
+        const SoftMask background = hn::LoadMaskBits(d, bits);
+        hn::StoreU(hn::IfThenZeroElse(background, hn::Set(d, 1.0f)), d, alpha + to + x);
+      }
+      return;
+    }
+    for (std::size_t x = 0; x < static_cast<std::size_t>(block.width); ++x) {
+      alpha[to + x] = static_cast<float>(~row >> x & 1);
+    }
   });
 }
 
 HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
-  ForRows(plan, block, [&](std::size_t to, std::size_t from) {
+  const hn::CappedTag<double, 4> d;
+  const hn::Rebind<float, decltype(d)> d_alpha;
+  ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
+    if (block.width == static_cast<int>(kBlockSize)) {
+      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+        const auto row = hn::DemoteTo(d_alpha, hn::Load(d, block.alpha + from + x));
+        hn::StoreU(row, d_alpha, alpha + to + x);
+      }
+      return;
+    }
     for (std::size_t x = 0; x < static_cast<std::size_t>(block.width); ++x) {
       alpha[to + x] = static_cast<float>(block.alpha[from + x]);
     }
