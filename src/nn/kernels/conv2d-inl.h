@@ -59,34 +59,49 @@ inline ConvTaps ForwardTaps(const Conv2dShape& s, const PlaneGrid& planes, std::
   return taps;
 }
 
-// Input pixel h = q s + a - p (phase a) meets y[q - m] under tap u = a + m s. Planes are y with
-// zeros around it, beginning at row p / s - (ceil(U / s) - 1).
+// Input pixel h = q s + a (phase a) meets y[q + i] under tap u where u + i s = a + p. Planes are y
+// with zeros around it, beginning at the least i.
+inline std::ptrdiff_t LeastShift(const Conv2dShape& s, std::size_t kernel) {
+  if (s.padding + 1 > kernel) {
+    return static_cast<std::ptrdiff_t>(DivideUp(s.padding + 1 - kernel, s.stride));
+  }
+  return -static_cast<std::ptrdiff_t>((kernel - 1 - s.padding) / s.stride);
+}
+
+// How many i there are.
+inline std::size_t ShiftCount(const Conv2dShape& s, std::size_t kernel) {
+  const auto last = static_cast<std::ptrdiff_t>((s.padding + s.stride - 1) / s.stride);
+  return static_cast<std::size_t>(last - LeastShift(s, kernel)) + 1;
+}
+
 inline PlaneGrid OutputPlanes(const Conv2dShape& s, std::size_t band_rows,
                               std::size_t grid_columns) {
-  const std::size_t down = DivideUp(s.kernel_height, s.stride);
-  const std::size_t across = DivideUp(s.kernel_width, s.stride);
-  const auto first = static_cast<std::ptrdiff_t>(s.padding / s.stride) + 1;
   return {.height = s.out_height(),
           .width = s.out_width(),
           .step = 1,
-          .origin_row = first - static_cast<std::ptrdiff_t>(down),
-          .origin_column = first - static_cast<std::ptrdiff_t>(across),
+          .origin_row = LeastShift(s, s.kernel_height),
+          .origin_column = LeastShift(s, s.kernel_width),
           .planes_down = 1,
           .planes_across = 1,
-          .rows = band_rows + down - 1,
-          .columns = RoundUp(grid_columns, kLanes) + across - 1};
+          .rows = band_rows + ShiftCount(s, s.kernel_height) - 1,
+          .columns = RoundUp(grid_columns, kLanes) + ShiftCount(s, s.kernel_width) - 1};
 }
 
 inline ConvTaps InputGradTaps(const Conv2dShape& s, const PlaneGrid& planes, std::size_t* memory) {
-  const std::size_t last_row = DivideUp(s.kernel_height, s.stride) - 1;
-  const std::size_t last_column = DivideUp(s.kernel_width, s.stride) - 1;
+  const auto shift = [&s](std::size_t phase, std::size_t tap, std::ptrdiff_t least) {
+    const auto ahead = static_cast<std::ptrdiff_t>(phase + s.padding);
+    const auto multiple = ahead - static_cast<std::ptrdiff_t>(tap);
+    return static_cast<std::size_t>(multiple / static_cast<std::ptrdiff_t>(s.stride) - least);
+  };
   ConvTaps taps = LayOutTaps(memory, s.stride * s.stride, s.kernel_area());
   taps.BeginPhases();
   std::size_t t = 0;
   for (std::size_t phase = 0; phase < s.stride * s.stride; ++phase) {
-    for (std::size_t u = phase / s.stride; u < s.kernel_height; u += s.stride) {
-      for (std::size_t v = phase % s.stride; v < s.kernel_width; v += s.stride, ++t) {
-        taps.plane[t] = (last_row - u / s.stride) * planes.columns + last_column - v / s.stride;
+    const std::size_t a = phase / s.stride, b = phase % s.stride;
+    for (std::size_t u = (a + s.padding) % s.stride; u < s.kernel_height; u += s.stride) {
+      for (std::size_t v = (b + s.padding) % s.stride; v < s.kernel_width; v += s.stride, ++t) {
+        taps.plane[t] =
+            shift(a, u, planes.origin_row) * planes.columns + shift(b, v, planes.origin_column);
         taps.weight[t] = u * s.kernel_width + v;
       }
     }
@@ -138,21 +153,25 @@ void Conv2dForwardTarget(const Conv2dShape& s, const float* x, const float* weig
                             .target_height = s.out_height(),
                             .target_width = s.out_width(),
                             .stride = 1,
-                            .padding = 0,
                             .cut = cut};
   RunConvProduct(product, context, product.taps.weight + s.kernel_area());
 }
 
-// Rows (columns) of the grid of each phase, for `extent` rows of the image.
-inline std::size_t PhaseExtent(const Conv2dShape& s, std::size_t extent) {
-  return (s.padding + extent - 1) / s.stride - s.padding / s.stride + 1;
+// Pixels of a work item out of `pixels`: as many as its memory may hold, or less for some items for
+// each of several workers.
+inline std::size_t PhasePixels(std::size_t pixels, const KernelContext& context) {
+  const auto workers = static_cast<std::size_t>(context.workers.count());
+  if (workers == 1) return kPhasePixels;
+  return std::clamp(pixels / (4 * workers), kConvPixels / 4, kPhasePixels);
 }
 
 void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* weight, float* d_x,
                            const KernelContext& context) {
   const std::size_t phases = s.stride * s.stride;
-  const std::size_t rows = PhaseExtent(s, s.in_height), columns = PhaseExtent(s, s.in_width);
-  const BatchCut cut(s.batch, rows, columns, DivideUp(kConvPixels, phases));
+  const std::size_t rows = DivideUp(s.in_height, s.stride);
+  const std::size_t columns = DivideUp(s.in_width, s.stride);
+  const BatchCut cut(s.batch, rows, columns,
+                     phases == 1 ? kConvPixels : PhasePixels(s.batch * rows * columns, context));
   const PlaneGrid planes = OutputPlanes(s, cut.bands.largest(), columns);
   std::size_t* indices = context.scratch.Indices(ConvIndexCount(phases, s.kernel_area()));
   const ConvProduct product{.source = d_y,
@@ -171,7 +190,6 @@ void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* 
                             .target_height = s.in_height,
                             .target_width = s.in_width,
                             .stride = s.stride,
-                            .padding = s.padding,
                             .cut = cut};
   RunConvProduct(product, context, product.taps.weight + s.kernel_area());
 }

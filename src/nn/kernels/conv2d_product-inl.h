@@ -25,8 +25,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kConvDepth = 320;   // steps of k in one pass, about
-constexpr std::size_t kConvPixels = 512;  // of the target grid in one work item, about
+constexpr std::size_t kConvDepth = 320;     // steps of k in one pass, about
+constexpr std::size_t kConvPixels = 512;    // of the target grid in one work item, about
+constexpr std::size_t kPhasePixels = 1024;  // the same of several phases, if there are items enough
+// Of an image gradient: fewer sums than FMA units keep busy, unless a tile has a third vector.
+constexpr std::size_t kFewRows = 4;
 
 // The taps of all phases, phase by phase: offsets into a source channel's planes and into its
 // kernel.
@@ -53,8 +56,8 @@ struct ConvProduct {
   const float* bias;                    // [rows] or null
   float* target;                        // [batch, rows, target_height, target_width]
   std::size_t target_height, target_width;
-  std::size_t stride, padding;  // of the target's phases, if there are several
-  BatchCut cut;                 // of the grids into work items
+  std::size_t stride;  // of the target's phases, if there are several
+  BatchCut cut;        // of the grids into work items
 
   std::size_t target_pixels() const { return target_height * target_width; }
   std::size_t tap_count() const { return taps.phase_begin[taps.phases]; }
@@ -125,12 +128,13 @@ struct ConvPass {
   std::size_t row_stride = 0;  // from one grid row of c to the next
 };
 
-// Two vectors of pixels, side by side or at the end of one row and the beginning of the next.
+// Vectors of pixels, side by side or at the end of one row and the beginning of the next.
+template <std::size_t V>
 struct ConvColumns {
   ConvColumns(const ConvProduct& p, const ConvPass& pass, std::size_t first_vector)
       : target{.c = pass.c, .ldc = pass.ldc, .offset = {}, .count = {}} {
     const std::size_t per_row = DivideUp(p.grid_columns, kLanes);
-    for (std::size_t v = 0; v < kTileVectors; ++v) {
+    for (std::size_t v = 0; v < V; ++v) {
       const std::size_t vector = std::min(first_vector + v, per_row * pass.rows - 1);
       const std::size_t y = vector / per_row, x = vector % per_row * kLanes;
       source.base[v] = pass.planes + y * p.planes.columns + x;
@@ -138,17 +142,19 @@ struct ConvColumns {
       target.count[v] = vector == first_vector + v ? std::min(kLanes, p.grid_columns - x) : 0;
     }
   }
-  IndirectColumns source;
+  IndirectColumns<V> source;
   TileTarget target;
 };
 
-inline void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPass& pass) {
+// In tiles of at most R rows and V vectors.
+template <std::size_t R, std::size_t V>
+void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPass& pass) {
   const std::size_t steps = work.blocks.size(pass.block) * p.taps.count(pass.phase);
   const std::size_t vectors = DivideUp(p.grid_columns, kLanes) * pass.rows;
   const std::size_t* offsets =
       work.offsets + work.blocks.largest() * p.taps.phase_begin[pass.phase];
-  for (std::size_t vector = 0; vector < vectors; vector += kTileVectors) {
-    ConvColumns columns(p, pass, vector);
+  for (std::size_t vector = 0; vector < vectors; vector += V) {
+    ConvColumns<V> columns(p, pass, vector);
     columns.source.offset = offsets;
     // Changed in place: a copy, read in wider words than it was written in, waits for the writing.
     TileTarget& target = columns.target;
@@ -157,8 +163,9 @@ inline void RunConvPass(const ConvProduct& p, const ConvWork& work, const ConvPa
       const std::size_t row = work.panels.begin(panel);
       target.c = pass.c + row * pass.ldc;
       if (pass.block == 0 && p.bias != nullptr) target.row_bias = p.bias + row;
-      PackedRowsTile(PackedConvWeights(p, work, panel, pass.block, pass.phase),
-                     work.panels.size(panel), columns.source, steps, target);
+      PackedRowsTile<IndirectColumns<V>, R>(
+          PackedConvWeights(p, work, panel, pass.block, pass.phase), work.panels.size(panel),
+          columns.source, steps, target);
     }
   }
 }
@@ -177,32 +184,43 @@ inline void RunConvPhases(const ConvProduct& p, const ConvWork& work, const Batc
       pass.ldc = work.band_pixels;
       pass.row_stride = p.grid_columns;
     }
-    RunConvPass(p, work, pass);
-  }
-}
-
-// Pixels of one target row from the phases (a, b) of one grid row: x' s + b - remainder -> x'.
-inline void InterleaveRow(const ConvProduct& p, const float* phase_row, std::size_t phase_stride,
-                          float* out) {
-  const std::size_t remainder = p.padding % p.stride;
-  for (std::size_t b = 0; b < p.stride; ++b, phase_row += phase_stride) {
-    const std::size_t skip = b < remainder ? 1 : 0;  // the first one lies left of the image
-    const std::size_t column = b + skip * p.stride - remainder;
-    for (std::size_t x = 0; column + x * p.stride < p.target_width; ++x) {
-      out[column + x * p.stride] = phase_row[skip + x];
+    if (p.rows <= kFewRows) {
+      RunConvPass<kFewRows, kMostTileVectors>(p, work, pass);
+    } else {
+      RunConvPass<kTileRows, kTileVectors>(p, work, pass);
     }
   }
 }
 
-// Target channel `row` of one image: grid rows [first_row, first_row + rows) of its phases.
+// out[2 x] = even[x], out[2 x + 1] = odd[x], `count` numbers in all.
+inline void InterleavePair(const float* even, const float* odd, std::size_t count, float* out) {
+  std::size_t x = 0;
+  for (; 2 * (x + kLanes) <= count; x += kLanes) {
+    hn::StoreInterleaved2(hn::LoadU(Tag(), even + x), hn::LoadU(Tag(), odd + x), Tag(),
+                          out + 2 * x);
+  }
+  for (x *= 2; x < count; ++x) out[x] = x % 2 == 0 ? even[x / 2] : odd[x / 2];
+}
+
+// Pixels of one target row from the phases (a, b) of one grid row.
+inline void InterleaveRow(const ConvProduct& p, const float* phase_row, std::size_t phase_stride,
+                          float* out) {
+  if (p.stride == 2) {
+    return InterleavePair(phase_row, phase_row + phase_stride, p.target_width, out);
+  }
+  for (std::size_t x = 0; x < p.target_width; ++x) {
+    out[x] = phase_row[x % p.stride * phase_stride + x / p.stride];
+  }
+}
+
+// Target channel `row` of one image, the grid rows of `piece`.
 inline void InterleaveChannel(const ConvProduct& p, const ConvWork& work, const BatchPiece& piece,
                               const float* phases, std::size_t row, float* target) {
   const std::size_t phase_size = p.rows * work.band_pixels;
-  const std::size_t remainder = p.padding % p.stride;
   for (std::size_t y = 0; y < piece.rows; ++y) {
     for (std::size_t a = 0; a < p.stride; ++a) {
-      const std::size_t h = (piece.row + y) * p.stride + a - remainder;  // wraps above the image
-      if (h >= p.target_height) continue;
+      const std::size_t h = (piece.row + y) * p.stride + a;
+      if (h >= p.target_height) break;
       InterleaveRow(
           p, phases + a * p.stride * phase_size + row * work.band_pixels + y * p.grid_columns,
           phase_size, target + h * p.target_width);

@@ -55,7 +55,8 @@ class PanelCopier {
     ahead_ = DivideUp(kAhead * share, panels_) * ld;
     next_panel_ = static_cast<std::ptrdiff_t>(PackedPanelStride(block.steps));
     next_row_from_ = ld - (panels_ - 1) * kTileColumns;
-    next_row_to_ = kTileColumns - static_cast<std::ptrdiff_t>(panels_ - 1) * next_panel_;
+    const auto panels_back = static_cast<std::ptrdiff_t>(panels_ - 1);
+    next_row_to_ = static_cast<std::ptrdiff_t>(kTileColumns) - panels_back * next_panel_;
   }
 
   HWY_INLINE void Run() {

@@ -28,6 +28,7 @@ using Tag = hn::ScalableTag<float>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kLanes = hn::MaxLanes(Tag());
 constexpr std::size_t kTileVectors = 2;
+constexpr std::size_t kMostTileVectors = 3;  // of a tile of few rows
 constexpr std::size_t kTileColumns = kTileVectors * kLanes;
 // Two FMA units of latency 4 need 8 independent sums at least; 6 x 2 sums, two vectors of B and one
 // of A are 15 of 16 registers. Where there are 32 registers, 12 x 2 halve the loads per FMA.
@@ -59,6 +60,7 @@ struct PlainRows {
 
 // The column factor from a packed panel [k][kTileColumns].
 struct PackedColumns {
+  static constexpr std::size_t kVectors = kTileVectors;
   const float* next;
   HWY_INLINE Vec At(std::size_t vector) const { return hn::LoadU(Tag(), next + vector * kLanes); }
   HWY_INLINE void Advance() { next += kTileColumns; }
@@ -83,8 +85,10 @@ struct BusyColumns : PackedColumns {
 };
 
 // The column factor of step k at base[vector] + *offset.
+template <std::size_t V>
 struct IndirectColumns {
-  std::array<const float*, kTileVectors> base;
+  static constexpr std::size_t kVectors = V;
+  std::array<const float*, V> base;
   const std::size_t* offset;
   HWY_INLINE Vec At(std::size_t vector) const { return hn::LoadU(Tag(), base[vector] + *offset); }
   HWY_INLINE void Advance() { ++offset; }
@@ -94,8 +98,8 @@ struct IndirectColumns {
 struct TileTarget {
   float* c;
   std::size_t ldc;
-  std::array<std::size_t, kTileVectors> offset;
-  std::array<std::size_t, kTileVectors> count;
+  std::array<std::size_t, kMostTileVectors> offset;
+  std::array<std::size_t, kMostTileVectors> count;
   const float* row_bias = nullptr;     // one float a row, or none
   const float* column_bias = nullptr;  // one float a column, at the same offsets as in c, or none
   bool accumulate = false;
@@ -127,16 +131,18 @@ HWY_INLINE void StoreVector(Vec sum, const TileTarget& t, std::size_t row, std::
   hn::StoreU(WithBiasAndOld(sum, t, row, t.column_bias + t.offset[v], c), Tag(), c);
 }
 
-// The sums of a tile of R rows. Loops over rows are fold expressions over always-inlined members:
-// arrays of vectors stay in registers only if every index is a constant before the optimiser looks.
-template <std::size_t R, class Row = std::make_index_sequence<R>>
+// The sums of a tile of R rows and V vectors. Loops over both are fold expressions over
+// always-inlined members: arrays of vectors stay in registers only if every index is a constant
+// before the optimiser looks.
+template <std::size_t R, std::size_t V = kTileVectors, class Row = std::make_index_sequence<R>,
+          class Vector = std::make_index_sequence<V>>
 struct Tile;
 
-template <std::size_t R, std::size_t... row>
-struct Tile<R, std::index_sequence<row...>> {
-  Vec sum[R][kTileVectors];
+template <std::size_t R, std::size_t V, std::size_t... row, std::size_t... vector>
+struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
+  Vec sum[R][V];
 
-  HWY_INLINE void Clear() { ((sum[row][0] = sum[row][1] = hn::Zero(Tag())), ...); }
+  HWY_INLINE void Clear() { (ClearRow<row>(), ...); }
   // sum += rows columns^T over `steps` steps of k.
   template <class Rows, class Columns>
   HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
@@ -153,40 +159,44 @@ struct Tile<R, std::index_sequence<row...>> {
   }
   template <class Rows, class Columns>
   HWY_INLINE void MultiplyStep(Rows& rows, Columns& columns) {
-    const Vec b0 = columns.At(0), b1 = columns.At(1);
-    (AddProduct<row>(rows.At(row), b0, b1), ...);
+    const Vec b[V] = {columns.At(vector)...};
+    (AddProduct<row>(rows.At(row), b), ...);
     rows.Advance();
     columns.Advance();
   }
-  template <std::size_t r>
-  HWY_INLINE void AddProduct(Vec a, Vec b0, Vec b1) {
-    sum[r][0] = hn::MulAdd(a, b0, sum[r][0]);
-    sum[r][1] = hn::MulAdd(a, b1, sum[r][1]);
-  }
   HWY_INLINE void Store(const TileTarget& t) const {
-    const bool plain = t.row_bias == nullptr && t.column_bias == nullptr &&
-                       t.count[0] + t.count[1] == kTileColumns;
+    const bool plain =
+        t.row_bias == nullptr && t.column_bias == nullptr && ((t.count[vector] == kLanes) && ...);
     plain ? StoreWhole(t) : StoreAny(t);
   }
 
  private:
+  template <std::size_t r>
+  HWY_INLINE void ClearRow() {
+    ((sum[r][vector] = hn::Zero(Tag())), ...);
+  }
+  template <std::size_t r>
+  HWY_INLINE void AddProduct(Vec a, const Vec (&b)[V]) {
+    ((sum[r][vector] = hn::MulAdd(a, b[vector], sum[r][vector])), ...);
+  }
   // The common case without a question for every vector.
   HWY_INLINE void StoreWhole(const TileTarget& t) const {
-    float *c0 = t.c + t.offset[0], *c1 = t.c + t.offset[1];
-    if (t.accumulate) {
-      ((hn::StoreU(hn::Add(hn::LoadU(Tag(), c0 + row * t.ldc), sum[row][0]), Tag(),
-                   c0 + row * t.ldc),
-        hn::StoreU(hn::Add(hn::LoadU(Tag(), c1 + row * t.ldc), sum[row][1]), Tag(),
-                   c1 + row * t.ldc)),
-       ...);
-    } else {
-      ((hn::StoreU(sum[row][0], Tag(), c0 + row * t.ldc),
-        hn::StoreU(sum[row][1], Tag(), c1 + row * t.ldc)),
-       ...);
-    }
+    float* const c[V] = {t.c + t.offset[vector]...};
+    t.accumulate ? (AddRow<row>(c, row * t.ldc), ...) : (StoreRow<row>(c, row * t.ldc), ...);
   }
-  HWY_INLINE void StoreAny(const TileTarget& target) const {
-    ((StoreVector(sum[row][0], target, row, 0), StoreVector(sum[row][1], target, row, 1)), ...);
+  template <std::size_t r>
+  HWY_INLINE void AddRow(float* const (&c)[V], std::size_t at) const {
+    (hn::StoreU(hn::Add(hn::LoadU(Tag(), c[vector] + at), sum[r][vector]), Tag(), c[vector] + at),
+     ...);
+  }
+  template <std::size_t r>
+  HWY_INLINE void StoreRow(float* const (&c)[V], std::size_t at) const {
+    (hn::StoreU(sum[r][vector], Tag(), c[vector] + at), ...);
+  }
+  HWY_INLINE void StoreAny(const TileTarget& t) const { (StoreAnyRow<row>(t), ...); }
+  template <std::size_t r>
+  HWY_INLINE void StoreAnyRow(const TileTarget& t) const {
+    (StoreVector(sum[r][vector], t, r, vector), ...);
   }
 };
 
@@ -197,14 +207,14 @@ HWY_INLINE void FetchTarget(const TileTarget& t, std::size_t rows) {
 
 template <class Rows, class Columns>
 HWY_INLINE void RunTile(Rows rows, Columns columns, std::size_t steps, const TileTarget& target) {
-  Tile<Rows::kRows> tile;
+  Tile<Rows::kRows, Columns::kVectors> tile;
   tile.Clear();
   if (target.accumulate) FetchTarget(target, Rows::kRows);
   tile.Multiply(rows, columns, steps);
   tile.Store(target);
 }
 
-// One tile from packed rows [k][rows], rows in [1, kTileRows], and any column factor.
+// One tile from packed rows [k][rows], rows in [1, R], and any column factor.
 template <class Columns, std::size_t R = kTileRows>
 HWY_INLINE void PackedRowsTile(const float* packed, std::size_t rows, Columns columns,
                                std::size_t steps, const TileTarget& target) {
