@@ -44,22 +44,30 @@ HWY_INLINE Plane ZeroPlane() {
   return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
 }
 
+// Indices by lane and corner. As numbers, not as vectors: vectors would have to wait until all of
+// them are stored.
+struct CornerIndices {
+  std::int32_t at[3][kMostFaceLanes];
+};
+
+HWY_INLINE CornerIndices VerticesOf(const ScreenMesh& mesh, const std::int32_t* faces) {
+  const std::int32_t* const corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
+  CornerIndices out;
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) out.at[k][i] = corners[k][faces[i]];
+  }
+  return out;
+}
+
 struct CornerLanes {
-  LaneInt vertex[3];
   Lane x[3], y[3], inverse_depth[3];
 };
 
-HWY_INLINE CornerLanes LoadFaceCorners(const ScreenMesh& mesh, LaneInt faces) {
-  const LaneIntTag di;
-  HWY_ALIGN std::int32_t face[kMostFaceLanes], vertex[kMostFaceLanes];
-  hn::Store(faces, di, face);
+HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, const CornerIndices& vertices) {
   CornerLanes out;
-  const std::int32_t* const corners[3] = {mesh.v0.data(), mesh.v1.data(), mesh.v2.data()};
   for (int k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < hn::Lanes(di); ++i) vertex[i] = corners[k][face[i]];
     Lane v[4];
-    LoadVertices(mesh, vertex, v);
-    out.vertex[k] = hn::Load(di, vertex);
+    LoadVertices(mesh, vertices.at[k], v);
     out.x[k] = v[0], out.y[k] = v[1], out.inverse_depth[k] = v[2];
   }
   return out;
@@ -90,14 +98,18 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
 }
 
-// Index of a corner's first attribute.
-HWY_INLINE LaneInt AttributeRow(const InterpolateInput& input, LaneInt face, LaneInt vertex,
-                                int k) {
-  const LaneIntTag di;
-  const auto row = input.attributes.rate == AttributeRate::kVertex
-                       ? vertex
-                       : hn::Add(hn::Mul(face, hn::Set(di, 3)), hn::Set(di, k));
-  return hn::Mul(row, hn::Set(di, input.attributes.channels));
+// Where the corners' attributes begin.
+HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::int32_t* faces,
+                                      const CornerIndices& vertices) {
+  const bool by_vertex = input.attributes.rate == AttributeRate::kVertex;
+  CornerIndices out;
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) {
+      const std::int32_t row = by_vertex ? vertices.at[k][i] : 3 * faces[i] + k;
+      out.at[k][i] = row * input.attributes.channels;
+    }
+  }
+  return out;
 }
 
 // What the planes of a vector of faces are made of.
@@ -105,15 +117,19 @@ struct CornerPlanes {
   Plane weight[3], q;
   Lane m[3];   // 1/depth times `scale`, or 1
   Lane scale;  // makes the largest m 1: N and Q then stay in range whatever unit depth has
-  LaneInt row[3];
+  CornerIndices attributes;
 };
 
 // Planes in terms of the position relative to an origin.
 HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt face, Lane origin_x,
                                          Lane origin_y) {
   const LaneTag d;
-  const CornerLanes corners = LoadFaceCorners(*input.mesh, face);
+  HWY_ALIGN std::int32_t faces[kMostFaceLanes];
+  hn::Store(face, LaneIntTag(), faces);
+  const CornerIndices vertices = VerticesOf(*input.mesh, faces);
+  const CornerLanes corners = LoadCorners(*input.mesh, vertices);
   CornerPlanes out;
+  out.attributes = AttributesAt(input, faces, vertices);
   out.q = ZeroPlane();
   WeightPlanes(corners, origin_x, origin_y, out.weight);
   const auto one = hn::Set(d, 1.0f);
@@ -122,7 +138,6 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
   for (int k = 0; k < 3; ++k) {
     out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
-    out.row[k] = AttributeRow(input, face, corners.vertex[k], k);
     AddScaled(out.m[k], out.weight[k], &out.q);
   }
   return out;
@@ -151,9 +166,8 @@ class AttributeQuads {
 // Channels `first` to first + 3 at corner k; those that do not exist hold anything finite.
 HWY_INLINE void CornerAttributes(const InterpolateInput& input, const CornerPlanes& corners, int k,
                                  int first, Lane (&out)[4]) {
-  HWY_ALIGN std::int32_t row[kMostFaceLanes];
-  hn::Store(corners.row[k], LaneIntTag(), row);
-  LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, row, first), 0, out);
+  LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, corners.attributes.at[k], first), 0,
+            out);
 }
 
 HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
