@@ -37,7 +37,7 @@ struct SoftBench {
     plan = raster::PlanSoftMask(
         {grid.width, grid.height, batch.options.delta, batch.options.max_alpha_error, tree.faces});
   }
-  raster::SoftMaskTile Tile(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
+  raster::SoftMaskRegion Tile(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
   // Calls visit(pixel) for the background pixels of every `step`th row.
   template <class Visit>
   void ForPixels(int step, const Visit& visit) const {

@@ -18,6 +18,17 @@ struct TileRect {
   int x0, y0, x1, y1;
 };
 
+// Calls visit(rect) for the tiles of a rectangle that begins where a tile does.
+template <class Visit>
+void ForTiles(const TileRect& rect, const Visit& visit) {
+  for (int y = rect.y0; y < rect.y1; y += kTileSize) {
+    for (int x = rect.x0; x < rect.x1; x += kTileSize) {
+      visit(TileRect{x, y, x + kTileSize < rect.x1 ? x + kTileSize : rect.x1,
+                     y + kTileSize < rect.y1 ? y + kTileSize : rect.y1});
+    }
+  }
+}
+
 // One face list per tile, as compressed rows: tile t holds faces[begin[t]] .. faces[begin[t+1]-1].
 struct TileLists {
   std::span<const std::int32_t> begin;  // [tiles + 1]

@@ -34,15 +34,15 @@ void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* worker
   for (std::size_t g = 0; g < groups; ++g) tree->faces += static_cast<std::size_t>(faces[g]);
 }
 
-double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
                        std::span<float> alpha, SoftMaskScratch* scratch) {
-  return HWY_DYNAMIC_DISPATCH(SoftMaskForwardTarget)(tree, plan, tile, alpha.data(), scratch);
+  return HWY_DYNAMIC_DISPATCH(SoftMaskForwardTarget)(tree, plan, region, alpha.data(), scratch);
 }
 
-void SoftMaskBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+void SoftMaskBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
                       const SoftMaskAdjoint& adjoint, AlignedVector<SoftFaceGradient>* out,
                       SoftMaskScratch* scratch) {
-  HWY_DYNAMIC_DISPATCH(SoftMaskBackwardTarget)(tree, plan, tile, adjoint, scratch, out);
+  HWY_DYNAMIC_DISPATCH(SoftMaskBackwardTarget)(tree, plan, region, adjoint, scratch, out);
 }
 
 }  // namespace tilegrad::raster

@@ -7,8 +7,8 @@
 // centre to the boundary of face j in NDC. Within a stated error of *all* faces, however many there
 // are and in whatever order: docs/numerics.md has the proof and says what each name here means.
 //
-// Per image: BuildSoftTree, then PlanSoftMask. Per tile, in any order and by any worker:
-// SoftMaskForward, SoftMaskBackward.
+// Per image: BuildSoftTree, then PlanSoftMask. Per region, in any order and by any worker:
+// SoftMaskForward, SoftMaskBackward. The bits do not depend on how an image is cut into regions.
 #pragma once
 
 #include <cstddef>
@@ -41,16 +41,17 @@ struct SoftMaskPlan {
 
 SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options);
 
-// One tile of one image. Images are [H,W]; spans hold whole images.
-struct SoftMaskTile {
+// Whole tiles of one image, best those of a bin: what is far from all of them is found once. Images
+// are [H,W]; spans hold whole images.
+struct SoftMaskRegion {
   TileRect rect;
   std::span<const std::int32_t> face_ids;  // < 0 is background; only those are computed
 };
 
-// Writes alpha of the tile's pixels: 1 where face_ids >= 0. Returns what was spent: no pixel is
+// Writes alpha of the region's pixels: 1 where face_ids >= 0. Returns what was spent: no pixel is
 // farther than this from equation 6 over all faces, rounding aside (docs/numerics.md, "Rounding").
-// At most E. 0 where no pixel of the tile is background.
-double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+// At most E. 0 where no pixel is background.
+double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
                        std::span<float> alpha, SoftMaskScratch* scratch);
 
 struct SoftMaskAdjoint {
@@ -58,10 +59,11 @@ struct SoftMaskAdjoint {
   std::span<const float> d_alpha;  // foreground pixels have no gradient
 };
 
-// Appends dL/d(corners) of the faces that the tile's pixels see to `out`, in an order that depends
-// on the scene only; a face may come more than once. The nearest feature of each face is held fixed
-// (envelope theorem); on the boundary itself, where A has a kink-free maximum, the gradient is 0.
-void SoftMaskBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+// Appends dL/d(corners) of the faces that the region's pixels see to `out`, in an order that
+// depends on the scene only; a face may come more than once. The nearest feature of each face is
+// held fixed (envelope theorem); on the boundary itself, where A has a kink-free maximum, the
+// gradient is 0.
+void SoftMaskBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
                       const SoftMaskAdjoint& adjoint, AlignedVector<SoftFaceGradient>* out,
                       SoftMaskScratch* scratch);
 

@@ -56,10 +56,10 @@ HWY_INLINE std::uint64_t GradientBitsOf(const SoftMaskPlan& plan, const SoftBloc
   return bits;
 }
 
-// Backward through one tile.
+// Backward through one tile, after FindNearGroups.
 class TileBackward {
  public:
-  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskTile& tile,
+  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& tile,
                const SoftMaskAdjoint& adjoint, SoftMaskScratch* scratch,
                AlignedVector<SoftFaceGradient>* out)
       : tree_(tree), plan_(plan), adjoint_(adjoint), scratch_(scratch), out_(out) {
@@ -239,9 +239,12 @@ class TileBackward {
 };
 
 inline void SoftMaskBackwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
-                                   const SoftMaskTile& tile, const SoftMaskAdjoint& adjoint,
+                                   const SoftMaskRegion& region, const SoftMaskAdjoint& adjoint,
                                    SoftMaskScratch* scratch, AlignedVector<SoftFaceGradient>* out) {
-  TileBackward(tree, plan, tile, adjoint, scratch, out).Run();
+  FindNearGroups(tree, plan, region.rect, &scratch->groups);
+  ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
+    TileBackward(tree, plan, {tile, region.face_ids}, adjoint, scratch, out).Run();
+  });
 }
 
 }  // namespace tilegrad::raster::HWY_NAMESPACE

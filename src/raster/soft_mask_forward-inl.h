@@ -183,13 +183,12 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
   }
 }
 
-inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
-                                    const SoftMaskTile& tile, float* alpha,
-                                    SoftMaskScratch* scratch) {
+// One tile, after FindNearGroups. Returns what it spent.
+inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& tile,
+                          const std::int32_t* face_ids, float* alpha, SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
   const SoftBox box = SetUpBlocks(
-      plan, tile.rect,
-      [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, tile.face_ids.data()); },
+      plan, tile, [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, face_ids); },
       blocks);
   SoftNodes nodes;
   SoftReach reach{};
@@ -207,6 +206,17 @@ inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& pl
       WriteClear(plan, blocks[b], alpha);
     }
   }
+  return spent;
+}
+
+inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
+                                    const SoftMaskRegion& region, float* alpha,
+                                    SoftMaskScratch* scratch) {
+  FindNearGroups(tree, plan, region.rect, &scratch->groups);
+  double spent = 0;
+  ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
+    spent = std::max(spent, TileForward(tree, plan, tile, region.face_ids.data(), alpha, scratch));
+  });
   return spent;
 }
 

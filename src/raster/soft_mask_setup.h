@@ -9,6 +9,7 @@
 
 #include "base/aligned.h"
 #include "raster/conventions.h"
+#include "raster/soft_mask_tree.h"
 
 namespace tilegrad::raster {
 
@@ -150,11 +151,19 @@ struct SoftNodeAt {
   std::int32_t node, z;
 };
 
+// The groups of the tree that are near a region.
+struct SoftNearGroups {
+  SoftBoxes boxes;
+  AlignedVector<std::int32_t> group;
+  std::size_t count = 0;
+};
+
 // Memory of one worker. Grows to its largest use, then nothing is allocated.
 struct SoftMaskScratch {
   SoftChunk chunk;
   SoftLists lists;
   SoftBlock blocks[kTileBlocks];
+  SoftNearGroups groups;
   AlignedVector<SoftNodeAt> found;
   AlignedVector<std::int32_t> nodes;  // near ones first
   AlignedVector<SoftNearFaces> near[kTileBlocks];

@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -151,41 +152,77 @@ struct SoftNodes {
   double dropped = 0;     // bound on the sum of A of all other faces
 };
 
-// Nodes of groups nearer than group_z into `found`; returns how many. Adds a bound on the sum of A
-// of the other groups to `dropped`.
-HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPlan& plan,
-                                         const SoftBox& box, AlignedVector<SoftNodeAt>* found,
-                                         double* dropped) {
+// Bits of those of n boxes from i on that are within z of `box`.
+HWY_INLINE std::uint32_t NearBits(SoftTag d, const SoftBoxes& boxes, std::size_t i, std::size_t n,
+                                  const SoftBox& box, float z) {
+  const SoftMask near = hn::Le(BoxDistance(d, boxes, i, box), hn::Set(d, z));
+  return BitsOf(d, hn::And(near, hn::FirstN(d, n - i)));
+}
+
+// The squared distance behind which groups are dropped, and a little for its rounding.
+inline float GroupLimit(const SoftMaskPlan& plan) {
+  return static_cast<float>(plan.group_z * (1 + 0x1p-20));
+}
+
+// The groups that are not far from all pixels of a region. Distances grow with every box inside it,
+// in floating point too, so none that a tile would keep is lost.
+inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& rect,
+                           SoftNearGroups* near) {
   const SoftTag d;
-  const SoftIntTag di;
-  if (found->size() < tree.nodes.count) found->resize(tree.nodes.count);
-  std::size_t count = 0;
-  const auto nodes_of = [&](std::size_t group) HWY_ATTR {
-    const float* faces = tree.nodes.array(SoftBoxes::kFaces);
-    for (std::size_t n = group * kGroupNodes; n < (group + 1) * kGroupNodes; n += hn::Lanes(d)) {
-      HWY_ALIGN std::int32_t whole[kSoftLanes];
-      const SoftVec z = hn::Min(BoxDistance(d, tree.nodes, n, box), hn::Set(d, float{kEndZ}));
-      hn::Store(hn::ConvertTo(di, z), di, whole);
-      for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        (*found)[count] = {static_cast<std::int32_t>(n + i), whole[i]};
-        count += faces[n + i] != 0;
-      }
-    }
-  };
-  const float* faces = tree.groups.array(SoftBoxes::kFaces);
-  const SoftVec limit = hn::Set(d, static_cast<float>(plan.group_z * (1 + 0x1p-20)));
-  double far = 0;
-  for (std::size_t g = 0; g < tree.groups.count; g += hn::Lanes(d)) {
-    const auto near = BitsOf(d, hn::Le(BoxDistance(d, tree.groups, g, box), limit));
-    for (std::size_t i = 0; i < std::min(hn::Lanes(d), tree.groups.count - g); ++i) {
-      if ((near >> i & 1) != 0) {
-        nodes_of(g + i);
-      } else {
-        far += static_cast<double>(faces[g + i]);
+  const SoftBox box{static_cast<float>(rect.x0) + 0.5f, static_cast<float>(rect.y0) + 0.5f,
+                    static_cast<float>(rect.x1) - 0.5f, static_cast<float>(rect.y1) - 0.5f,
+                    static_cast<float>(plan.unit_x),    static_cast<float>(plan.unit_y)};
+  const std::size_t count = tree.groups.count;
+  near->boxes.Resize(count), near->count = 0;
+  if (near->group.size() < count) near->group.resize(count);
+  for (std::size_t g = 0; g < count; g += hn::Lanes(d)) {
+    std::uint32_t bits = NearBits(d, tree.groups, g, count, box, GroupLimit(plan));
+    for (; bits != 0; bits &= bits - 1, ++near->count) {
+      const std::size_t group = g + static_cast<std::size_t>(std::countr_zero(bits));
+      near->group[near->count] = static_cast<std::int32_t>(group);
+      for (std::size_t a = 0; a < SoftBoxes::kArrays; ++a) {
+        near->boxes.array(a)[near->count] = tree.groups.array(a)[group];
       }
     }
   }
-  *dropped += far * plan.group_influence;
+}
+
+// Appends the nodes of a group that have faces to the `count` found; returns the new count.
+HWY_INLINE std::size_t AppendNodes(const SoftTree& tree, std::size_t group, const SoftBox& box,
+                                   std::size_t count, AlignedVector<SoftNodeAt>* found) {
+  const SoftTag d;
+  const SoftIntTag di;
+  const float* faces = tree.nodes.array(SoftBoxes::kFaces);
+  for (std::size_t n = group * kGroupNodes; n < (group + 1) * kGroupNodes; n += hn::Lanes(d)) {
+    HWY_ALIGN std::int32_t whole[kSoftLanes];
+    const SoftVec z = hn::Min(BoxDistance(d, tree.nodes, n, box), hn::Set(d, float{kEndZ}));
+    hn::Store(hn::ConvertTo(di, z), di, whole);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+      (*found)[count] = {static_cast<std::int32_t>(n + i), whole[i]};
+      count += faces[n + i] != 0;
+    }
+  }
+  return count;
+}
+
+// Nodes of groups nearer than group_z into `found`; returns how many. Adds a bound on the sum of A
+// of the other groups to `dropped`.
+HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPlan& plan,
+                                         const SoftBox& box, const SoftNearGroups& groups,
+                                         AlignedVector<SoftNodeAt>* found, double* dropped) {
+  const SoftTag d;
+  if (found->size() < tree.nodes.count) found->resize(tree.nodes.count);
+  std::size_t count = 0;
+  double near_faces = 0;
+  for (std::size_t g = 0; g < groups.count; g += hn::Lanes(d)) {
+    std::uint32_t bits = NearBits(d, groups.boxes, g, groups.count, box, GroupLimit(plan));
+    for (; bits != 0; bits &= bits - 1) {
+      const std::size_t i = g + static_cast<std::size_t>(std::countr_zero(bits));
+      count = AppendNodes(tree, static_cast<std::size_t>(groups.group[i]), box, count, found);
+      near_faces += static_cast<double>(groups.boxes.array(SoftBoxes::kFaces)[i]);
+    }
+  }
+  *dropped += (static_cast<double>(tree.faces) - near_faces) * plan.group_influence;
   return count;
 }
 
@@ -224,7 +261,8 @@ struct SoftHistogram {
 inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
                                SoftMaskScratch* scratch) {
   SoftNodes out;
-  const std::size_t count = FindNodesOfGroups(tree, plan, box, &scratch->found, &out.dropped);
+  const std::size_t count =
+      FindNodesOfGroups(tree, plan, box, scratch->groups, &scratch->found, &out.dropped);
   if (count == 0) return out;
   const auto found = std::span<const SoftNodeAt>(scratch->found).first(count);
   // All faces at group_z together are within the budget.

@@ -23,17 +23,7 @@ struct Bins {
 
   std::size_t tasks() const { return images * grid.tiles(); }
   std::size_t image(std::size_t task) const { return task / grid.tiles(); }
-  // Calls visit(rect) for the tiles of the bin.
-  template <class Visit>
-  void ForTiles(std::size_t task, const Visit& visit) const {
-    const raster::TileRect bin = grid.rect(task % grid.tiles());
-    for (int y = bin.y0; y < bin.y1; y += raster::kTileSize) {
-      for (int x = bin.x0; x < bin.x1; x += raster::kTileSize) {
-        visit(raster::TileRect{x, y, std::min(x + raster::kTileSize, bin.x1),
-                               std::min(y + raster::kTileSize, bin.y1)});
-      }
-    }
-  }
+  raster::TileRect rect(std::size_t task) const { return grid.rect(task % grid.tiles()); }
 };
 
 // ---- Vector code: float, all faces.
@@ -91,12 +81,9 @@ double VectorMask(const ProjectedBatchT<float>& batch, const ProjectedMaskOption
   std::vector<double> spent(bins.tasks());
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t worker) {
     const std::size_t n = bins.image(task);
-    bins.ForTiles(task, [&](const raster::TileRect& rect) {
-      const double error = raster::SoftMaskForward(
-          images[n].tree, images[n].plan, {rect, face_ids.subspan(n * pixels, pixels)},
-          alpha.subspan(n * pixels, pixels), &scratch[worker]);
-      spent[task] = std::max(spent[task], error);
-    });
+    spent[task] = raster::SoftMaskForward(images[n].tree, images[n].plan,
+                                          {bins.rect(task), face_ids.subspan(n * pixels, pixels)},
+                                          alpha.subspan(n * pixels, pixels), &scratch[worker]);
   });
   return spent.empty() ? 0 : *std::max_element(spent.begin(), spent.end());
 }
@@ -124,12 +111,10 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t worker) {
     const std::size_t first = bins.image(task) * pixels;
     const SoftImage& image = images[bins.image(task)];
-    bins.ForTiles(task, [&](const raster::TileRect& rect) {
-      raster::SoftMaskBackward(
-          image.tree, image.plan, {rect, adjoint.face_ids.subspan(first, pixels)},
-          {adjoint.alpha.subspan(first, pixels), adjoint.d_alpha.subspan(first, pixels)},
-          &gradients[task], &scratch[worker]);
-    });
+    raster::SoftMaskBackward(
+        image.tree, image.plan, {bins.rect(task), adjoint.face_ids.subspan(first, pixels)},
+        {adjoint.alpha.subspan(first, pixels), adjoint.d_alpha.subspan(first, pixels)},
+        &gradients[task], &scratch[worker]);
   });
   workers.For(batch.images, [&](std::size_t n, std::size_t) {
     for (std::size_t bin = 0; bin < bins.grid.tiles(); ++bin) {
@@ -180,7 +165,7 @@ void ForScalarTiles(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions&
     const std::size_t n = bins.image(task);
     const NearFacesT<T> near =
         FacesNear<T>(faces[n], bins.grid.rect(task % bins.grid.tiles()), width, height, box);
-    bins.ForTiles(task, [&](const raster::TileRect& rect) {
+    raster::ForTiles(bins.rect(task), [&](const raster::TileRect& rect) {
       visit(task, n, PaperTile{rect, width, height, face_ids.data() + n * PixelCount(options.size)},
             FacesNear(near, rect, width, height, box));
     });

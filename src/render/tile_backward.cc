@@ -191,13 +191,9 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
                                         part(input.d_frame.alpha)};
   out->clear();
   ++worker->stats.softened;
-  for (int y = bin.rect.y0; y < bin.rect.y1; y += raster::kTileSize) {
-    for (int x = bin.rect.x0; x < bin.rect.x1; x += raster::kTileSize) {
-      const raster::SoftMaskTile tile{tiles.rect(tiles.tile(x, y)),
-                                      part(std::span<const std::int32_t>(input.frame.face_ids))};
-      raster::SoftMaskBackward(image.soft, image.soft_plan, tile, adjoint, out, &worker->soft);
-    }
-  }
+  raster::SoftMaskBackward(image.soft, image.soft_plan,
+                           {bin.rect, part(std::span<const std::int32_t>(input.frame.face_ids))},
+                           adjoint, out, &worker->soft);
 }
 
 }  // namespace tilegrad

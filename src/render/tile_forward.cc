@@ -127,22 +127,14 @@ void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerSc
        .any_face = any_face});
 }
 
-// Alpha of the tiles of a bin. Returns the error spent.
-double SoftAlpha(const RenderOptions& options, const ImageScratch& image, const TileTask& task,
-                 const ImageOfFrame& part, WorkerScratch* worker, Frame* frame) {
+// Alpha of a bin. Returns the error spent.
+double SoftAlpha(const ImageScratch& image, const TileTask& task, const ImageOfFrame& part,
+                 WorkerScratch* worker, Frame* frame) {
   const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
   const std::span<float> alpha(part.plane(frame->alpha, 1), part.pixels);
-  const raster::TileGrid tiles(options.width, options.height);
-  double spent = 0;
   ++worker->stats.softened;
-  for (int y = task.rect.y0; y < task.rect.y1; y += raster::kTileSize) {
-    for (int x = task.rect.x0; x < task.rect.x1; x += raster::kTileSize) {
-      const raster::SoftMaskTile tile{tiles.rect(tiles.tile(x, y)), ids};
-      spent = std::max(
-          spent, raster::SoftMaskForward(image.soft, image.soft_plan, tile, alpha, &worker->soft));
-    }
-  }
-  return spent;
+  return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, alpha,
+                                 &worker->soft);
 }
 
 }  // namespace
@@ -173,7 +165,7 @@ double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* wor
   if (input.stage != nullptr) RunStage(input, task, to_stage, worker);
   clock.Lap(&times->stage);
   if (frame->alpha.empty()) return 0;
-  const double spent = SoftAlpha(input.options, image, task, part, worker, frame);
+  const double spent = SoftAlpha(image, task, part, worker, frame);
   clock.Lap(&times->alpha);
   return spent;
 }

@@ -111,6 +111,45 @@ TEST(SoftMaskLong, TwentyThousandScenes) {
 }
 
 // The order of the faces may move alpha within the budget only, and not at all by bits run to run.
+// Groups of the tree of small faces in spots all over an image of several bins: most groups are far
+// from a tile, some of them near its bin.
+SoftScene SpotsScene(std::uint64_t seed) {
+  Rng rng(seed, 78);
+  SoftScene scene;
+  scene.Resize(150, 100);
+  scene.options.max_alpha_error = seed % 2 == 0 ? 1e-6 : 1e-2;
+  scene.options.delta = std::pow(10.0, rng.Uniform(-5, -2));
+  for (int spot = 0; spot < 20; ++spot) {
+    const double cx = rng.Uniform(0, 150), cy = rng.Uniform(0, 100);
+    for (std::size_t f = 0; f < kGroupFaces; ++f) {
+      const auto at = [&](double c) { return static_cast<float>(c + rng.Uniform(-4, 4)); };
+      scene.AddFace({at(cx), at(cx), at(cx)}, {at(cy), at(cy), at(cy)});
+    }
+  }
+  for (float& d : scene.d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
+  return scene;
+}
+
+// Gradients of a face are summed in another order: of some sixty tiles at most, each with an error
+// of 2^-24 of the largest.
+TEST(SoftMask, RegionsDoNotMatter) {
+  SoftMaskScratch scratch;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE(seed);
+    const SoftScene scene = SpotsScene(seed);
+    const SoftResult bins = RunSoftMask(scene, scene.d_alpha, &scratch);
+    const SoftResult tiles = RunSoftMask(scene, scene.d_alpha, &scratch, kTileBits);
+    EXPECT_EQ(bins.alpha, tiles.alpha);
+    EXPECT_EQ(bins.spent, tiles.spent);
+    float largest = 0;
+    for (const float d : tiles.d_corners) largest = std::max(largest, std::abs(d));
+    EXPECT_GT(largest, 0);
+    for (std::size_t i = 0; i < tiles.d_corners.size(); ++i) {
+      ASSERT_NEAR(bins.d_corners[i], tiles.d_corners[i], 60 * 0x1p-24 * largest) << i;
+    }
+  }
+}
+
 TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
   SoftMaskScratch scratch, fresh;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {

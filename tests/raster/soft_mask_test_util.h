@@ -297,20 +297,21 @@ struct SoftResult {
   std::vector<float> d_corners;  // [faces][3][2]
 };
 
+// In regions of 1 << region_bits pixels.
 inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& d_alpha,
-                              SoftMaskScratch* scratch) {
+                              SoftMaskScratch* scratch, int region_bits = kBinBits) {
   const ScreenMesh mesh = scene.mesh.View();
   SoftTree tree;
   BuildSoftTree(mesh, &tree);
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
-  const TileGrid grid(scene.options.width, scene.options.height);
+  const TileGrid grid(scene.options.width, scene.options.height, region_bits);
   SoftResult out;
   out.alpha.assign(scene.pixels(), -1.0f), out.d_corners.assign(6 * mesh.faces(), 0.0f);
   AlignedVector<SoftFaceGradient> gradients;
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
-    const SoftMaskTile tile{grid.rect(t), scene.face_ids};
-    out.spent = std::max(out.spent, SoftMaskForward(tree, plan, tile, out.alpha, scratch));
-    SoftMaskBackward(tree, plan, tile, {out.alpha, d_alpha}, &gradients, scratch);
+    const SoftMaskRegion region{grid.rect(t), scene.face_ids};
+    out.spent = std::max(out.spent, SoftMaskForward(tree, plan, region, out.alpha, scratch));
+    SoftMaskBackward(tree, plan, region, {out.alpha, d_alpha}, &gradients, scratch);
   }
   for (const SoftFaceGradient& g : gradients) {
     float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(g.face);
