@@ -166,7 +166,7 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
   HWY_INLINE void Store(const TileTarget& t) const {
     const bool plain =
-        t.row_bias == nullptr && t.column_bias == nullptr && ((t.count[vector] == kLanes) && ...);
+        t.row_bias == nullptr && t.column_bias == nullptr && (t.count[vector] + ...) == V * kLanes;
     plain ? StoreWhole(t) : StoreAny(t);
   }
 
