@@ -18,13 +18,25 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// out[k * out_stride + i] = in[i * in_stride + k] for a block of 4 x 4.
-HWY_INLINE void Transpose4x4(const float* in, std::size_t in_stride, float* out,
-                             std::size_t out_stride) {
-  const hn::FixedTag<float, 4> d;
-  const hn::RepartitionToWide<decltype(d)> pairs;
-  const auto r0 = hn::LoadU(d, in), r1 = hn::LoadU(d, in + in_stride);
-  const auto r2 = hn::LoadU(d, in + 2 * in_stride), r3 = hn::LoadU(d, in + 3 * in_stride);
+// Four numbers of one row, or of rows i and i + 4, side by side.
+template <class D>
+HWY_INLINE hn::Vec<D> LoadFours(D d, const float* in, std::size_t in_stride) {
+  if constexpr (hn::MaxLanes(d) == 4) {
+    return hn::LoadU(d, in);
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, hn::LoadU(half, in + 4 * in_stride), hn::LoadU(half, in));
+  }
+}
+
+// out[k * out_stride + i] = in[i * in_stride + k] for k < 4 and as many i as d has lanes, 4 or 8.
+template <class D>
+HWY_INLINE void TransposeFours(D d, const float* in, std::size_t in_stride, float* out,
+                               std::size_t out_stride) {
+  const hn::RepartitionToWide<D> pairs;
+  const auto r0 = LoadFours(d, in, in_stride), r1 = LoadFours(d, in + in_stride, in_stride);
+  const auto r2 = LoadFours(d, in + 2 * in_stride, in_stride);
+  const auto r3 = LoadFours(d, in + 3 * in_stride, in_stride);
   const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, r0, r1));  // r0[0] r1[0] r0[1] r1[1]
   const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, r2, r3));
   const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, r0, r1));
@@ -35,15 +47,30 @@ HWY_INLINE void Transpose4x4(const float* in, std::size_t in_stride, float* out,
   hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23)), d, out + 3 * out_stride);
 }
 
+// The same for i < rows and k < steps, `d` lanes at a time; needs rows >= Lanes(d) and whole fours
+// of steps.
+template <class D>
+HWY_INLINE void TransposeStripBy(D d, const float* in, std::size_t in_stride, std::size_t rows,
+                                 std::size_t steps, float* out, std::size_t out_stride) {
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t i = 0; i < rows; i += lanes) {
+    const std::size_t row = std::min(i, rows - lanes);  // may overlap the block before it
+    for (std::size_t k = 0; k < steps; k += 4) {
+      TransposeFours(d, in + row * in_stride + k, in_stride, out + k * out_stride + row,
+                     out_stride);
+    }
+  }
+}
+
 // out[k * out_stride + i] = in[i * in_stride + k] for i < rows, k < steps. Writes nothing else.
 inline void TransposeStrip(const float* in, std::size_t in_stride, std::size_t rows,
                            std::size_t steps, float* out, std::size_t out_stride) {
+  const hn::CappedTag<float, 8> wide;
   const std::size_t whole = rows < 4 ? 0 : steps / 4 * 4;
-  for (std::size_t i = 0; whole > 0 && i < rows; i += 4) {
-    const std::size_t row = std::min(i, rows - 4);  // the last block may overlap the one before it
-    for (std::size_t k = 0; k < whole; k += 4) {
-      Transpose4x4(in + row * in_stride + k, in_stride, out + k * out_stride + row, out_stride);
-    }
+  if (rows >= hn::Lanes(wide)) {
+    TransposeStripBy(wide, in, in_stride, rows, whole, out, out_stride);
+  } else if (rows >= 4) {
+    TransposeStripBy(hn::FixedTag<float, 4>(), in, in_stride, rows, whole, out, out_stride);
   }
   for (std::size_t k = whole; k < steps; ++k) {
     for (std::size_t i = 0; i < rows; ++i) out[k * out_stride + i] = in[i * in_stride + k];
