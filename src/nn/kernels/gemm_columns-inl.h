@@ -74,12 +74,12 @@ class PanelCopier {
     for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
       hn::StoreU(hn::LoadU(Tag(), from_ + v), Tag(), to_ + v);
     }
-    // Without a branch, which would be mispredicted once a row.
-    const bool last = ++panel_ == panels_;
-    from_ += last ? next_row_from_ : kTileColumns;
-    to_ += last ? next_row_to_ : next_panel_;
-    panel_ = last ? 0 : panel_;
-    rows_left_ -= last ? 1 : 0;
+    if (++panel_ < panels_) {
+      from_ += kTileColumns, to_ += next_panel_;
+    } else {
+      from_ += next_row_from_, to_ += next_row_to_;
+      panel_ = 0, --rows_left_;
+    }
   }
 
   const float* from_;
