@@ -16,6 +16,7 @@
 #include "base/rng.h"
 #include "base/simd_target.h"
 #include "support/forked.h"
+#include "support/thread_sanitizer.h"
 
 namespace tilegrad {
 namespace {
@@ -42,6 +43,7 @@ int CoresOfThisThread() {
 }
 
 TEST(Workers, PinnedOnesStayOnACoreWhileTheyWork) {
+  if (test::kThreadSanitizer) GTEST_SKIP() << "not pinned under ThreadSanitizer";
   const int before = CoresOfThisThread();
   const Workers workers(2, Pinning::kOn);
   std::atomic<int> done = 0;

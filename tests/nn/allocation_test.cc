@@ -5,6 +5,7 @@
 
 #include "nn/game.h"
 #include "support/allocation_count.h"
+#include "support/thread_sanitizer.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -37,7 +38,13 @@ long AllocationsOfTraining(Context& context, Network& net, const Shape& input) {
   });
 }
 
-class Allocation : public testing::TestWithParam<int> {};
+class Allocation : public testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    if (GetParam() > 1 && test::kThreadSanitizer)
+      GTEST_SKIP() << "ThreadSanitizer: one worker only";
+  }
+};
 
 TEST_P(Allocation, NoneInTheGame) {
   const Workers workers(GetParam());

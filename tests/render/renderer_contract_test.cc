@@ -13,6 +13,7 @@
 #include "render/renderer.h"
 #include "render/test_batch.h"
 #include "support/allocation_count.h"
+#include "support/thread_sanitizer.h"
 
 namespace tilegrad {
 namespace {
@@ -60,6 +61,7 @@ void ExpectSteadyStateAllocatesNothing(Batch batch, int count) {
 
 TEST(RendererMemory, SteadyStateAllocatesNothing) {
   for (const int workers : {1, 2, 3}) {
+    if (workers > 1 && test::kThreadSanitizer) GTEST_SKIP() << "ThreadSanitizer: one worker only";
     ExpectSteadyStateAllocatesNothing(Batch(), workers);
     ExpectSteadyStateAllocatesNothing(Batch::Large(), workers);
   }

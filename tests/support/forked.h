@@ -7,18 +7,17 @@
 
 #include <cstdlib>
 
+#include "support/thread_sanitizer.h"
+
 namespace tilegrad::test {
 
 // Why a child of a process with threads cannot start some; null if it can. ThreadSanitizer ends
 // such a child, and so does qemu-user, for which tests/cross sets the variable.
 inline const char* WhyNoFork() {
-#ifdef __SANITIZE_THREAD__
-  return "ThreadSanitizer allows no threads after a fork";
-#else
+  if (kThreadSanitizer) return "ThreadSanitizer allows no threads after a fork";
   return std::getenv("TILEGRAD_TEST_NO_FORK") == nullptr
              ? nullptr
              : "TILEGRAD_TEST_NO_FORK is set: the emulator allows no threads after a fork";
-#endif
 }
 
 // Runs `call` in a child process, for at most 60 seconds; whether it returned true.
