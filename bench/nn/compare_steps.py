@@ -5,8 +5,8 @@
     cmake --preset release && cmake --build build/release --target nn_step_server
     python3 bench/nn/compare_steps.py
 
-All of a network run all the time in processes of their own, one step of each in turn, so that what
-else the machine does meets all alike. One core: medians of the CPU time, both bound to the same
+Both run all the time in processes of their own, one step of one, one of the other, so that what
+else the machine does meets both alike. One core: medians of the CPU time, both bound to the same
 core. Two cores: medians of the wall time, OpenMP's threads bound to a core each (without that GNU
 OpenMP often puts both onto one). The first steps, which take memory, are not counted.
 """
@@ -42,24 +42,22 @@ def step(process):
     return json.loads(line)
 
 
-def measure(network, options):
-    """Medians of both on every number of cores: {cores: {"ours": {...}, "pytorch": {...}}}."""
-    commands = {"ours": lambda cores: [options.server, network, str(cores)],
-                "pytorch": lambda cores: [options.python, str(ROOT / "bench/nn/pytorch_steps.py"),
-                                          network, str(cores)]}
-    processes = {(cores, who): start(command(cores), cores)
-                 for cores in options.cores for who, command in commands.items()}
+def measure(network, cores, options):
+    """Medians of both: {"ours": {...}, "pytorch": {...}}."""
+    processes = {
+        "ours": start([options.server, network, str(cores)], cores),
+        "pytorch": start([options.python, str(ROOT / "bench/nn/pytorch_steps.py"), network,
+                          str(cores)], cores)}
     steps = options.steps or NETWORKS[network][0]
-    answers = {key: [] for key in processes}
+    answers = {name: [] for name in processes}
     for _ in range(WARM_UP + steps):
-        for key, process in processes.items():
-            answers[key].append(step(process))
+        for name, process in processes.items():
+            answers[name].append(step(process))
     for process in processes.values():
         process.stdin.close()
         process.wait()
-    return {cores: {who: {key: statistics.median(a[key] for a in answers[cores, who][WARM_UP:])
-                          for key in answers[cores, who][0]} for who in commands}
-            for cores in options.cores}
+    return {name: {key: statistics.median(a[key] for a in given[WARM_UP:]) for key in given[0]}
+            for name, given in answers.items()}
 
 
 def row(cells):
@@ -67,7 +65,7 @@ def row(cells):
 
 
 def report(network, options):
-    both = measure(network, options)
+    both = {cores: measure(network, cores, options) for cores in options.cores}
     _, one_goal, two_goal = NETWORKS[network]
     for cores, result in both.items():
         key, goal = ("cpu_ms", one_goal) if cores == 1 else ("wall_ms", two_goal)
