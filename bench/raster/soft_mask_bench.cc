@@ -23,7 +23,7 @@ struct SoftBench {
     const SceneView& scene = batch.scenes[0];
     raster::Project(FaceSourceOf(scene, batch.options), spec.size, spec.size, &buffers);
     mesh = buffers.View();
-    grid = raster::TileGrid(spec.size, spec.size);
+    grid = raster::BinGrid(spec.size, spec.size);
     Workers one(1);
     Renderer renderer(one);
     const Status status =
@@ -37,7 +37,7 @@ struct SoftBench {
     plan = raster::PlanSoftMask(
         {grid.width, grid.height, batch.options.delta, batch.options.max_alpha_error, tree.faces});
   }
-  raster::SoftMaskRegion Tile(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
+  raster::SoftMaskRegion Bin(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
   // Calls visit(pixel) for the background pixels of every `step`th row.
   template <class Visit>
   void ForPixels(int step, const Visit& visit) const {
@@ -77,7 +77,7 @@ void SoftForward(benchmark::State& state, const SceneSpec& spec, double delta, d
   for (auto _ : state) {
     b.Build();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Tile(t), b.alpha, &b.scratch));
+      spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Bin(t), b.alpha, &b.scratch));
     }
   }
   b.Count(state, 1);
@@ -89,12 +89,12 @@ void SoftBackward(benchmark::State& state, const SceneSpec& spec, double delta, 
   if (b.failed) return state.SkipWithError("the scene did not render");
   const auto d_alpha = std::span<const float>(b.batch.d_alpha).first(b.alpha.size());
   for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-    SoftMaskForward(b.tree, b.plan, b.Tile(t), b.alpha, &b.scratch);
+    SoftMaskForward(b.tree, b.plan, b.Bin(t), b.alpha, &b.scratch);
   }
   for (auto _ : state) {
     b.gradients.clear();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      SoftMaskBackward(b.tree, b.plan, b.Tile(t), {b.alpha, d_alpha}, &b.gradients, &b.scratch);
+      SoftMaskBackward(b.tree, b.plan, b.Bin(t), {b.alpha, d_alpha}, &b.gradients, &b.scratch);
     }
   }
   b.Count(state, 1);

@@ -67,8 +67,8 @@ std::atomic<pid_t> tbb_process{0};
 
 bool TbbIsOfThisProcess() {
 #ifdef __SANITIZE_THREAD__
-  return false;  // ThreadSanitizer cannot see how oneTBB, which is not built with it, hands over
-                 // work
+  // oneTBB is not built with ThreadSanitizer, which therefore cannot see how it hands over work.
+  return false;
 #else
   const pid_t mine = getpid();
   pid_t owner = 0;

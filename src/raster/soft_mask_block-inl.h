@@ -68,28 +68,21 @@ HWY_INLINE std::uint32_t RowsOf(std::uint64_t bits) {
 }
 
 // The bounding box of the block's pixels to compute.
-struct PixelBox {
-  int x0, y0, x1, y1;  // the last ones are inside
-};
-HWY_INLINE PixelBox BoxOf(const SoftBlock& block) {
+HWY_INLINE TileRect BoxOf(const SoftBlock& block) {
   const std::uint32_t columns = ColumnsOf(block.bits), rows = RowsOf(block.bits);
   return {block.x0 + std::countr_zero(columns), block.y0 + std::countr_zero(rows),
-          block.x0 + 31 - std::countl_zero(columns), block.y0 + 31 - std::countl_zero(rows)};
+          block.x0 + static_cast<int>(std::bit_width(columns)),
+          block.y0 + static_cast<int>(std::bit_width(rows))};
 }
 
-// Everything that follows from block.bits, which must not be 0.
-HWY_INLINE void PlaceBlock(const SoftBox& unit, SoftBlock* block) {
-  const PixelBox box = BoxOf(*block);
+// Everything that follows from block.bits, of which `rect` is the bounding box.
+HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const TileRect& rect, SoftBlock* block) {
+  const SoftBox& unit = block->box = CentresOf(rect, plan);
   block->live = block->bits, block->whole = 0;
-  block->box = unit;
-  block->box.left = static_cast<float>(box.x0) + 0.5f;
-  block->box.right = static_cast<float>(box.x1) + 0.5f;
-  block->box.top = static_cast<float>(box.y0) + 0.5f;
-  block->box.bottom = static_cast<float>(box.y1) + 0.5f;
-  block->centre_x = 0.5f * static_cast<float>(box.x0 + box.x1 + 1);
-  block->centre_y = 0.5f * static_cast<float>(box.y0 + box.y1 + 1);
-  block->half_x = 0.5f * static_cast<float>(box.x1 - box.x0) * unit.unit_x;
-  block->half_y = 0.5f * static_cast<float>(box.y1 - box.y0) * unit.unit_y;
+  block->centre_x = 0.5f * static_cast<float>(rect.x0 + rect.x1);
+  block->centre_y = 0.5f * static_cast<float>(rect.y0 + rect.y1);
+  block->half_x = 0.5f * static_cast<float>(rect.x1 - 1 - rect.x0) * unit.unit_x;
+  block->half_y = 0.5f * static_cast<float>(rect.y1 - 1 - rect.y0) * unit.unit_y;
   block->radius = std::sqrt(block->half_x * block->half_x + block->half_y * block->half_y);
   for (std::size_t i = 0; i < kBlockSize; ++i) {
     const float at = static_cast<float>(i) + 0.5f;
@@ -102,8 +95,7 @@ HWY_INLINE void PlaceBlock(const SoftBox& unit, SoftBlock* block) {
 template <class Bits>
 HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, const Bits& bits_of,
                                SoftBlock* blocks) {
-  PixelBox all{rect.x1, rect.y1, rect.x0 - 1, rect.y0 - 1};
-  SoftBox box{0, 0, 0, 0, static_cast<float>(plan.unit_x), static_cast<float>(plan.unit_y)};
+  TileRect all{rect.x1, rect.y1, rect.x0, rect.y0};
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     SoftBlock& block = blocks[b];
     block.x0 = rect.x0 + static_cast<int>(b % 2 * kBlockSize);
@@ -113,14 +105,12 @@ HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, c
     block.bits = block.width == 0 ? 0 : bits_of(block);
     block.live = 0;
     if (block.bits == 0) continue;
-    PlaceBlock(box, &block);
-    const PixelBox own = BoxOf(block);
+    const TileRect own = BoxOf(block);
+    PlaceBlock(plan, own, &block);
     all = {std::min(all.x0, own.x0), std::min(all.y0, own.y0), std::max(all.x1, own.x1),
            std::max(all.y1, own.y1)};
   }
-  box.left = static_cast<float>(all.x0) + 0.5f, box.right = static_cast<float>(all.x1) + 0.5f;
-  box.top = static_cast<float>(all.y0) + 0.5f, box.bottom = static_cast<float>(all.y1) + 0.5f;
-  return box;
+  return CentresOf(all, plan);
 }
 
 HWY_INLINE bool AnyLive(const SoftBlock* blocks) {

@@ -159,6 +159,13 @@ HWY_INLINE std::uint32_t NearBits(SoftTag d, const SoftBoxes& boxes, std::size_t
   return BitsOf(d, hn::And(near, hn::FirstN(d, n - i)));
 }
 
+// The box around the pixel centres of a rectangle.
+inline SoftBox CentresOf(const TileRect& rect, const SoftMaskPlan& plan) {
+  return {static_cast<float>(rect.x0) + 0.5f, static_cast<float>(rect.y0) + 0.5f,
+          static_cast<float>(rect.x1) - 0.5f, static_cast<float>(rect.y1) - 0.5f,
+          static_cast<float>(plan.unit_x),    static_cast<float>(plan.unit_y)};
+}
+
 // The squared distance behind which groups are dropped, and a little for its rounding.
 inline float GroupLimit(const SoftMaskPlan& plan) {
   return static_cast<float>(plan.group_z * (1 + 0x1p-20));
@@ -169,9 +176,7 @@ inline float GroupLimit(const SoftMaskPlan& plan) {
 inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& rect,
                            SoftNearGroups* near) {
   const SoftTag d;
-  const SoftBox box{static_cast<float>(rect.x0) + 0.5f, static_cast<float>(rect.y0) + 0.5f,
-                    static_cast<float>(rect.x1) - 0.5f, static_cast<float>(rect.y1) - 0.5f,
-                    static_cast<float>(plan.unit_x),    static_cast<float>(plan.unit_y)};
+  const SoftBox box = CentresOf(rect, plan);
   const std::size_t count = tree.groups.count;
   near->boxes.Resize(count), near->count = 0;
   if (near->group.size() < count) near->group.resize(count);

@@ -110,7 +110,6 @@ TEST(SoftMaskLong, TwentyThousandScenes) {
   CheckScenes(300000, 2000, 300);
 }
 
-// The order of the faces may move alpha within the budget only, and not at all by bits run to run.
 // Groups of the tree of small faces in spots all over an image of several bins: most groups are far
 // from a tile, some of them near its bin.
 SoftScene SpotsScene(std::uint64_t seed) {
@@ -150,6 +149,7 @@ TEST(SoftMask, RegionsDoNotMatter) {
   }
 }
 
+// The order of the faces may move alpha within the budget only, and not at all by bits run to run.
 TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
   SoftMaskScratch scratch, fresh;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
