@@ -80,7 +80,7 @@ Result<double> Train(Context& context, Module& net, const Data& data, std::int64
     const Var scores = net.Forward(Varied(batch.images, rng), Mode::kTrain);
     const Var loss = CrossEntropy(scores, batch.labels);
     adam.options().learning_rate = WarmedUp(CosineRate(2e-3, {steps, 0.01}, step), 20, step);
-    TILEGRAD_TRY(adam.Step(Grad(loss, adam.parameters())));
+    TILEGRAD_TRY(adam.Step(Gradients(loss, adam.parameters())));
     smoothed = step == 0 ? loss.item() : 0.95 * smoothed + 0.05 * loss.item();
   }
   return smoothed;

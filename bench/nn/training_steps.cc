@@ -25,7 +25,7 @@ class StepOf : public TrainingStep {
       : network_(context), adam_(context, network_.All(), {.learning_rate = 1e-4}) {}
   Status Run() override {
     const Var loss = network_.Loss();
-    const Status status = adam_.Step(Grad(loss, adam_.parameters()));
+    const Status status = adam_.Step(Gradients(loss, adam_.parameters()));
     loss_ = loss.item();
     return status;
   }

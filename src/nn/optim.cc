@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/optim.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/error.h"
 #include "nn/kernels/adam.h"
+#include "nn/kernels/product_adam.h"
 #include "nn/kernels/update.h"
 
 namespace tilegrad::nn {
@@ -17,7 +20,8 @@ Tensor ZerosLike(Context& context, const Tensor& tensor) {
   return zeros;
 }
 
-Status CheckGradient(const std::string& optimizer, const NamedVar& parameter, const Var& gradient) {
+Status CheckGradient(const std::string& optimizer, const NamedVar& parameter,
+                     const Gradient& gradient) {
   const Tensor& p = parameter.value.value();
   if (gradient.valid() && gradient.shape() == p.shape() && gradient.dtype() == p.dtype()) return {};
   return InvalidArgument("{}: parameter \"{}\" is {} of shape {}, its gradient {} of shape {}",
@@ -42,6 +46,13 @@ Optimizer::Optimizer(Context& context, std::string name, std::vector<std::string
 }
 
 Status Optimizer::Step(std::span<const Var> gradients, double gradient_scale) {
+  StepVector<Gradient> as_they_are(context_.allocator<Gradient>());
+  as_they_are.reserve(gradients.size());
+  for (const Var& g : gradients) as_they_are.emplace_back(g);
+  return Step(as_they_are, gradient_scale);
+}
+
+Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scale) {
   TILEGRAD_TRY(context_.status());
   if (gradients.size() != slots_.size()) {
     return InvalidArgument("{}: {} gradients for {} parameters", name_, gradients.size(),
@@ -52,7 +63,13 @@ Status Optimizer::Step(std::span<const Var> gradients, double gradient_scale) {
   }
   ++steps_;
   BeginStep(gradient_scale);
-  for (std::size_t i = 0; i < slots_.size(); ++i) Update(slots_[i], gradients[i].value());
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    if (gradients[i].is_product()) {
+      UpdateByProduct(slots_[i], gradients[i]);
+    } else {
+      Update(slots_[i], gradients[i].Value().value());
+    }
+  }
   return {};
 }
 
@@ -91,14 +108,37 @@ void Adam::BeginStep(double gradient_scale) {
   coefficients_.inverse_root = 1.0 / std::sqrt(1.0 - std::pow(options_.beta2, t));
 }
 
-void Adam::Update(Slot& slot, const Tensor& gradient) {
+template <class T>
+AdamProblem<T> Adam::Problem(Slot& slot) {
   Tensor& p = slot.parameter.value.value();
   coefficients_.keep = 1.0 - options_.learning_rate * DecayOf(p, options_.weight_decay);
-  WithFloatType(p.dtype(), [&]<class T>(T) {
-    AdamStep(AdamProblem<T>{p.elements(), p.data<T>(), gradient.data<T>(),
-                            slot.moments[0].data<T>(), slot.moments[1].data<T>(), coefficients_},
-             workers());
+  return {.n = p.elements(),
+          .parameter = p.data<T>(),
+          .m = slot.moments[0].data<T>(),
+          .v = slot.moments[1].data<T>(),
+          .coefficients = coefficients_};
+}
+
+void Adam::Update(Slot& slot, const Tensor& gradient) {
+  WithFloatType(gradient.dtype(), [&]<class T>(T) {
+    AdamProblem<T> problem = Problem<T>(slot);
+    problem.gradient = gradient.data<T>();
+    AdamStep(problem, workers());
   });
+}
+
+void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
+  const Tensor &a = product.a().value(), &b = product.b().value();
+  const auto steps = static_cast<std::size_t>(a.shape()[0]);
+  if (a.dtype() != DType::kF32 || steps == 0 || steps > kMostProductAdamSteps) {
+    return Optimizer::UpdateByProduct(slot, product);
+  }
+  GemmProblem<float> gradient;
+  gradient.m = static_cast<std::size_t>(a.shape()[1]), gradient.k = steps;
+  gradient.n = static_cast<std::size_t>(b.shape()[1]);
+  gradient.a = a.data<float>(), gradient.lda = gradient.m, gradient.transpose_a = true;
+  gradient.b = b.data<float>(), gradient.ldb = gradient.n;
+  ProductAdamStep(gradient, Problem<float>(slot), context().kernels());
 }
 
 void Sgd::Update(Slot& slot, const Tensor& gradient) {
@@ -112,15 +152,43 @@ void Sgd::Update(Slot& slot, const Tensor& gradient) {
   });
 }
 
+namespace {
+
+double SquaresOf(const Context& context, const Var& x) {
+  if (!x.valid()) return 0;
+  return WithFloatType(x.dtype(), [&]<class T>(T) {
+    return SumOfSquares(x.value().data<T>(), x.value().elements(), context.workers());
+  });
+}
+
+// |a_i . b_j| <= |a_i| |b_j| <= |a| |b|, and so is every partial sum but for rounding.
+bool IsSurelyFinite(const Context& context, const Gradient& product) {
+  const double bound =
+      std::sqrt(SquaresOf(context, product.a())) * std::sqrt(SquaresOf(context, product.b()));
+  return WithFloatType(product.dtype(), [&]<class T>(T) {
+    return bound < 0.5 * static_cast<double>(std::numeric_limits<T>::max());
+  });
+}
+
+}  // namespace
+
 double GlobalNorm(Context& context, std::span<const Var> gradients) {
   double sum = 0;
-  for (const Var& g : gradients) {
-    if (!g.valid()) continue;
-    sum += WithFloatType(g.dtype(), [&]<class T>(T) {
-      return SumOfSquares(g.value().data<T>(), g.value().elements(), context.workers());
-    });
-  }
+  for (const Var& g : gradients) sum += SquaresOf(context, g);
   return std::sqrt(sum);
+}
+
+double GlobalNorm(Context& context, std::span<const Gradient> gradients) {
+  double sum = 0;
+  for (const Gradient& g : gradients) sum += SquaresOf(context, g.Value());
+  return std::sqrt(sum);
+}
+
+bool IsFinite(Context& context, std::span<const Gradient> gradients) {
+  return std::all_of(gradients.begin(), gradients.end(), [&](const Gradient& g) {
+    return (g.is_product() && IsSurelyFinite(context, g)) ||
+           std::isfinite(SquaresOf(context, g.Value()));
+  });
 }
 
 double ClipFactor(double norm, double max_norm) { return norm > max_norm ? max_norm / norm : 1.0; }

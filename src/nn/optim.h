@@ -19,9 +19,10 @@ class Optimizer {
   Optimizer(const Optimizer&) = delete;
   Optimizer& operator=(const Optimizer&) = delete;
 
-  // One step along `gradients` (as Grad returns them for parameters()), each multiplied by
-  // `gradient_scale` on the way (see ClipFactor). A gradient that is not valid or does not fit is
-  // refused before anything is changed.
+  // One step along `gradients` (as Gradients or Grad return them for parameters(): same bits), each
+  // multiplied by `gradient_scale` on the way (see ClipFactor). A gradient that is not valid or
+  // does not fit is refused before anything is changed.
+  Status Step(std::span<const Gradient> gradients, double gradient_scale = 1.0);
   Status Step(std::span<const Var> gradients, double gradient_scale = 1.0);
 
   std::span<const Var> parameters() const { return parameters_; }  // in the order given
@@ -42,6 +43,11 @@ class Optimizer {
   // What all parameters of step steps() (1, 2, ..) share, then each of them.
   virtual void BeginStep(double gradient_scale) = 0;
   virtual void Update(Slot& slot, const Tensor& gradient) = 0;
+  // Where the gradient is a product; as it stands it computes that first.
+  virtual void UpdateByProduct(Slot& slot, const Gradient& product) {
+    Update(slot, product.Value().value());
+  }
+  Context& context() const { return context_; }
   const Workers& workers() const { return context_.workers(); }
 
  private:
@@ -63,7 +69,8 @@ struct AdamOptions {
   double weight_decay = 0;
 };
 
-// Adam (Kingma, Ba 2015): one pass over parameter, gradient and both moments "m" and "v".
+// Adam (Kingma, Ba 2015): one pass over parameter, gradient and both moments "m" and "v"; where the
+// gradient is a product of few steps, as with batches of up to 256, without the gradient.
 class Adam : public Optimizer {
  public:
   Adam(Context& context, std::vector<NamedVar> parameters, const AdamOptions& options)
@@ -73,6 +80,9 @@ class Adam : public Optimizer {
  private:
   void BeginStep(double gradient_scale) override;
   void Update(Slot& slot, const Tensor& gradient) override;
+  void UpdateByProduct(Slot& slot, const Gradient& product) override;
+  template <class T>
+  AdamProblem<T> Problem(Slot& slot);
   AdamOptions options_;
   AdamCoefficients coefficients_;
 };
@@ -102,6 +112,10 @@ class Sgd : public Optimizer {
 // Square root of the sum of all squares, summed in double and in a fixed order. Not finite where a
 // gradient is not: look before you step.
 double GlobalNorm(Context& context, std::span<const Var> gradients);
+double GlobalNorm(Context& context, std::span<const Gradient> gradients);  // computes products
+// Whether GlobalNorm is finite. A product is only computed to find out where its factors are not
+// small enough for the inequality of Cauchy and Schwarz to tell.
+bool IsFinite(Context& context, std::span<const Gradient> gradients);
 // The factor that brings a norm above `max_norm` down to it: min(1, max_norm / norm).
 double ClipFactor(double norm, double max_norm);
 

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
 #include "base/error.h"
+#include "nn/ops/matmul.h"
 #include "nn/ops/pointwise.h"
 
 namespace tilegrad::nn {
@@ -45,10 +47,14 @@ bool WantsNode(const Context& context, std::span<const Var> inputs) {
 // One walk backwards over the graph of `output`.
 class Backward {
  public:
-  Backward(const Var& output, std::span<const Var> inputs, const GradOptions& options)
+  // `leave_products`: those that are the whole gradient of an input are left to the caller.
+  Backward(const Var& output, std::span<const Var> inputs, const GradOptions& options,
+           bool leave_products)
       : context_(output.context()),
         output_(output),
         options_(options),
+        leave_products_(leave_products),
+        inputs_(inputs),
         order_(context_.allocator<Node*>()),
         visits_(context_.allocator<std::pair<Node* const, Visit>>()) {
     if (output.requires_grad()) Collect(output.node().get());
@@ -70,15 +76,16 @@ class Backward {
     }
   }
 
-  Var Result(const Var& input) {
+  Gradient Result(const Var& input) {
     const auto it = visits_.find(input.node().get());
+    if (it != visits_.end() && it->second.product.valid()) return it->second.product;
     if (it != visits_.end() && !it->second.d.empty()) {
       const Var& d = it->second.d[static_cast<std::size_t>(input.slot())];
-      if (d.valid()) return d;
+      if (d.valid()) return Gradient(d);
     }
     Tensor zeros = context_.Empty(input.shape(), input.dtype());
     std::fill_n(zeros.raw(), zeros.bytes(), std::byte{0});
-    return Constant(context_, std::move(zeros));
+    return Gradient(Constant(context_, std::move(zeros)));
   }
 
  private:
@@ -86,6 +93,7 @@ class Backward {
     bool useful = false;     // leads to something that was asked for
     bool wanted = false;     // was asked for: its adjoint must survive
     InlineVector<Var, 1> d;  // adjoint of each output, summed over the uses met so far
+    Gradient product;        // or that of a leaf which met one use
   };
 
   void Collect(Node* root) {
@@ -123,13 +131,15 @@ class Backward {
     // What was asked for must survive the rule, which may take its adjoint.
     InlineVector<Var, 1> d = visit.wanted ? visit.d : std::move(visit.d);
     if (!visit.wanted) visit.d.clear();
-    const Vars d_inputs = node.rule(Adjoint(y, d, needs));
+    UncomputedAdjoint left;
+    const Vars d_inputs = node.rule(Adjoint(y, d, needs, leave_products_ ? &left : nullptr));
     d.clear();
     for (std::size_t i = 0; i < d_inputs.size(); ++i) {
       if (needs[i] && d_inputs[i].valid()) {
         Deposit(node.edges[i].node.get(), node.edges[i].slot, d_inputs[i]);
       }
     }
+    if (left.product.valid()) DepositProduct(node.edges[left.input], left.product);
     if (!options_.create_graph && !options_.keep_graph) Release(node);
   }
 
@@ -147,7 +157,29 @@ class Backward {
     node.released = true;
   }
 
+  void DepositProduct(const Node::Edge& edge, const Gradient& product) {
+    Visit& visit = visits_[edge.node.get()];
+    const bool first = edge.node->edges.empty() && visit.d.empty() && !visit.product.valid();
+    if (first && !ReadsInputs(product)) {
+      visit.product = product;
+    } else {
+      Deposit(edge.node.get(), edge.slot, product.Value());
+    }
+  }
+
+  // Whether a factor is one of the inputs, which change before the product is used.
+  bool ReadsInputs(const Gradient& product) const {
+    return std::any_of(inputs_.begin(), inputs_.end(), [&](const Var& input) {
+      return input.value().raw() == product.a().value().raw() ||
+             input.value().raw() == product.b().value().raw();
+    });
+  }
+
   void Deposit(Node* node, int slot, const Var& d) {
+    if (Visit& visit = visits_[node]; visit.product.valid()) {
+      const Gradient before = std::exchange(visit.product, Gradient());
+      Deposit(node, slot, before.Value());
+    }
     auto& sums = visits_[node].d;
     sums.resize(static_cast<std::size_t>(node->slots));
     Var& sum = sums[static_cast<std::size_t>(slot)];
@@ -157,6 +189,8 @@ class Backward {
   Context& context_;
   const Var& output_;
   const GradOptions& options_;
+  const bool leave_products_;
+  std::span<const Var> inputs_;
   StepVector<Node*> order_;
   std::unordered_map<Node*, Visit, std::hash<Node*>, std::equal_to<>,
                      StepAllocator<std::pair<Node* const, Visit>>>
@@ -176,6 +210,16 @@ Var Constant(Context& context, double value) { return Var(context, context.Full(
 
 Var Parameter(Context& context, Tensor value) {
   return Var(context, std::move(value), MakeNode(context, {"parameter"}, {}));
+}
+
+Var Gradient::Value() const {
+  return is_product() ? Matmul(first_, second_, {.transpose_a = true}) : first_;
+}
+
+Var Adjoint::Product(std::size_t input, const Var& a, const Var& b) const {
+  if (left_ == nullptr) return Matmul(a, b, {.transpose_a = true});
+  *left_ = {input, Gradient(a, b)};
+  return {};
 }
 
 Var Detach(const Var& x) { return x.has_context() ? Var(x.context(), x.value()) : x; }
@@ -244,12 +288,14 @@ Var Ones(const Var& like) {
   return Constant(like.context(), std::move(ones));
 }
 
-}  // namespace
-
-StepVector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradOptions& options) {
-  StepAllocator<Var> allocator;
-  if (output.has_context()) allocator = output.context().allocator<Var>();
-  StepVector<Var> result(inputs.size(), Invalid({&output}), allocator);
+// The gradients as values or, where G is Gradient, also as products.
+template <class G>
+StepVector<G> Differentiate(const Var& output, std::span<const Var> inputs,
+                            const GradOptions& options) {
+  constexpr bool kProducts = std::is_same_v<G, Gradient>;
+  StepAllocator<G> allocator;
+  if (output.has_context()) allocator = output.context().allocator<G>();
+  StepVector<G> result(inputs.size(), G(Invalid({&output})), allocator);
   if (!output.valid()) return result;
   Context& context = output.context();
   if (const Status status = CheckGrad(output, options.d_output); !status.ok()) {
@@ -261,12 +307,27 @@ StepVector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradO
     context.Fail(InvalidArgument("Grad: an input is not part of a graph; make it by Parameter"));
     return result;
   }
-  Backward walk(output, inputs, options);
+  Backward walk(output, inputs, options, kProducts);
   walk.Run(options.d_output.valid() ? options.d_output : Ones(output));
   if (!context.status().ok()) return result;
-  std::transform(inputs.begin(), inputs.end(), result.begin(),
-                 [&](const Var& input) { return walk.Result(input); });
+  std::transform(inputs.begin(), inputs.end(), result.begin(), [&](const Var& input) -> G {
+    if constexpr (kProducts) {
+      return walk.Result(input);
+    } else {
+      return walk.Result(input).Value();
+    }
+  });
   return result;
+}
+
+}  // namespace
+
+StepVector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradOptions& options) {
+  return Differentiate<Var>(output, inputs, options);
+}
+
+StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters) {
+  return Differentiate<Gradient>(output, parameters, {});
 }
 
 StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,

@@ -72,6 +72,34 @@ StepVector<Var> Grad(const Var& output, std::span<const Var> inputs,
 StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
                      const GradOptions& options = {});
 
+// A gradient as optimisers take it: a value, or a product a^T b of matrices [k, m] and [k, n] that
+// nobody has computed yet. That of a linear layer's weight is one (a: the adjoint of the layer's
+// output, b: its input): Adam computes it a block at a time and uses each block at once, so that
+// the whole, as large as the weight, never lies in memory.
+class Gradient {
+ public:
+  Gradient() = default;  // invalid
+  explicit Gradient(Var value) : first_(std::move(value)) {}
+  Gradient(const Var& a, const Var& b) : first_(Detach(a)), second_(Detach(b)) {}
+
+  bool valid() const { return first_.valid(); }
+  bool is_product() const { return second_.valid(); }
+  const Var& a() const { return first_; }  // of a product, as b()
+  const Var& b() const { return second_; }
+  Shape shape() const {
+    return is_product() ? Shape{first_.shape()[1], second_.shape()[1]} : first_.shape();
+  }
+  DType dtype() const { return first_.dtype(); }
+  Var Value() const;  // computes a product, anew at each call
+
+ private:
+  Var first_, second_;
+};
+
+// Grad without options, for an optimiser. Products look at a and b when they are used: until then
+// nothing that the output was computed from may be overwritten but `parameters`.
+StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters);
+
 // An operation that is computed elsewhere (a renderer, a loss) and has a first derivative only.
 // `backward` receives one adjoint for each output (empty Tensor: zero) and returns one for each
 // input (empty Tensor: zero), of the input's shape and dtype.
@@ -86,22 +114,33 @@ std::vector<Var> External(Context& context, ExternalOp op);
 // ---- For those who write operations
 // --------------------------------------------------------------
 
+struct UncomputedAdjoint {
+  std::size_t input = 0;
+  Gradient product;
+};
+
 // What a rule is given: the adjoints that arrived, and what is asked for.
 class Adjoint {
  public:
-  Adjoint(const Var& y, std::span<Var> d_outputs, std::span<const std::uint8_t> needs)
-      : y_(y), d_outputs_(d_outputs), needs_(needs) {}
+  // `left`: where a rule may leave a product, or null.
+  Adjoint(const Var& y, std::span<Var> d_outputs, std::span<const std::uint8_t> needs,
+          UncomputedAdjoint* left)
+      : y_(y), d_outputs_(d_outputs), needs_(needs), left_(left) {}
   const Var& dy() const { return d_outputs_[0]; }
   // dy() for an operation that may work in its memory: once, and dy() no more.
   Var TakeDy() const { return std::move(d_outputs_[0]); }
   std::span<const Var> d_outputs() const { return d_outputs_; }
   const Var& y() const { return y_; }  // the output, if the operation saved it
   bool needs(std::size_t input) const { return needs_[input] != 0; }
+  // The adjoint of `input` is a^T b: returns that or, where nobody needs it now, leaves it to who
+  // will use it and returns an invalid Var. For one input of an operation.
+  Var Product(std::size_t input, const Var& a, const Var& b) const;
 
  private:
   const Var& y_;
   std::span<Var> d_outputs_;
   std::span<const std::uint8_t> needs_;
+  UncomputedAdjoint* left_;
 };
 
 // Returns the adjoint of each input; an invalid Var where none flows or none is needed.

@@ -122,15 +122,15 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
 Result<LossValues> TrainStep::Run(const BatchTensors& batch, std::int64_t step) {
   LossValues values;
   const nn::Var loss = Loss(batch, step, &values);
-  const auto gradients = nn::Grad(loss, adam_.parameters());
+  const auto gradients = nn::Gradients(loss, adam_.parameters());
   TILEGRAD_TRY(context_.TakeStatus());
-  const double norm = nn::GlobalNorm(context_, gradients);
-  if (!std::isfinite(values.total) || !std::isfinite(norm)) {
+  if (!std::isfinite(values.total) || !nn::IsFinite(context_, gradients)) {
     return InternalError(
         "step {}: the loss is {} (iou {}, color {}, smoothness {}, laplacian {}), the gradient's "
         "norm {}; a smaller "
         "optimizer.learning_rate may help",
-        step, values.total, values.iou, values.color, values.smoothness, values.laplacian, norm);
+        step, values.total, values.iou, values.color, values.smoothness, values.laplacian,
+        nn::GlobalNorm(context_, gradients));
   }
   adam_.options().learning_rate = LearningRateAt(config_, step);
   TILEGRAD_TRY(adam_.Step(gradients));

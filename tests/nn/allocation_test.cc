@@ -33,7 +33,7 @@ long AllocationsOfTraining(Context& context, Network& net, const Shape& input) {
   const Var x = Constant(context, image);
   return AllocationsLater([&](std::uint64_t) {
     const Var loss = Mean(Square(net.Forward(x, Mode::kTrain)));
-    const Status status = adam.Step(Grad(loss, adam.parameters()));
+    const Status status = adam.Step(Gradients(loss, adam.parameters()));
     EXPECT_TRUE(status.ok()) << status.message();
   });
 }

@@ -95,7 +95,7 @@ TEST(Adam, RefusesWhatDoesNotFit) {
   const std::vector<Var> wrong = {Constant(context, context.Full({3}, 1.0))};
   const Status status = adam.Step(wrong);
   EXPECT_NE(status.message().find("net.p"), std::string::npos);
-  EXPECT_FALSE(adam.Step({}).ok());
+  EXPECT_FALSE(adam.Step(std::vector<Var>()).ok());
   EXPECT_EQ(p.value().data<float>()[0], 1.0f);
   EXPECT_EQ(adam.steps(), 0);
 }

@@ -138,5 +138,93 @@ TEST(SavedAndRestored, SameBitsForAnyNumberOfWorkers) {
   }
 }
 
+// A network of the same start for each, trained along Gradients and along Grad.
+class ProductsOfGradients : public ::testing::Test {
+ protected:
+  struct Net {
+    explicit Net(Trained::Make make, DType dtype) : context(workers, dtype) {
+      Rng rng(3);
+      net.Add<LinearLayer>("fc1", context, LinearShape{.in = 37, .out = 50}, rng);
+      net.Add<Activation>("tanh", &Tanh);
+      net.Add<LinearLayer>("fc2", context, LinearShape{.in = 50, .out = 50}, rng);
+      optimizer = make(context, Parameters(net));
+    }
+    // `twice`: the second layer is used two times, so that its gradient is a sum.
+    Var Loss(std::int64_t batch, bool twice) {
+      Rng data(9);
+      Tensor x = context.Empty({batch, 37});
+      FillUniform(x, data, -1, 1);
+      Var y = net.Forward(Constant(context, x), Mode::kTrain);
+      const auto parameters = optimizer->parameters();
+      if (twice) y = Linear(y, parameters[2], parameters[3]);
+      return Mean(Square(y - 1.0));
+    }
+    Bytes Encoded() {
+      std::vector<NamedTensor> all = State(net);
+      for (const NamedTensor& moment : optimizer->State()) all.push_back(moment);
+      return EncodeSafetensors({all, {}}).value();
+    }
+    Workers workers{2};
+    Context context;
+    Sequential net;
+    std::unique_ptr<Optimizer> optimizer;
+  };
+};
+
+TEST_F(ProductsOfGradients, SameBitsAsValues) {
+  for (const Trained::Make make : kMakes) {
+    for (const DType dtype : {DType::kF32, DType::kF64}) {
+      for (const std::int64_t batch : {7, 300}) {  // 300: more than ProductAdamStep takes
+        for (const bool twice : {false, true}) {
+          Net products(make, dtype), values(make, dtype);
+          for (int step = 0; step < 2; ++step) {
+            const auto g = Gradients(products.Loss(batch, twice), products.optimizer->parameters());
+            EXPECT_TRUE(g[0].is_product());
+            EXPECT_EQ(g[2].is_product(), !twice);
+            EXPECT_FALSE(g[1].is_product());
+            EXPECT_TRUE(products.optimizer->Step(g, 0.5).ok());
+            const auto v = Grad(values.Loss(batch, twice), values.optimizer->parameters());
+            EXPECT_TRUE(values.optimizer->Step(v, 0.5).ok());
+          }
+          EXPECT_EQ(products.Encoded(), values.Encoded()) << batch << twice;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ProductsOfGradients, NormIsThatOfValues) {
+  Net net(kMakes[0], DType::kF32);
+  const auto g = Gradients(net.Loss(5, false), net.optimizer->parameters());
+  const auto v = Grad(net.Loss(5, false), net.optimizer->parameters());
+  EXPECT_EQ(GlobalNorm(net.context, g), GlobalNorm(net.context, v));
+  EXPECT_TRUE(IsFinite(net.context, g));
+}
+
+// A step changes the first matrix, which the gradient of the second one is made of.
+TEST_F(Optimisers, ProductsOfParametersAreComputedAtOnce) {
+  const auto make = [&](double x) { return Parameter(context_, context_.Full({2, 2}, x)); };
+  const Var a = make(2), b = make(3);
+  const auto g = Gradients(Sum(Square(Linear(a, b, Var()))), std::vector<Var>{a, b});
+  EXPECT_FALSE(g[1].is_product());
+}
+
+// Of factors x and 1, both [1, 1].
+TEST(FinitenessOfProducts, IsThatOfTheirValues) {
+  const Workers workers(1);
+  Context context(workers);
+  const auto finite = [&](double x, double y) {
+    const auto factor = [&](double number) {
+      return Constant(context, context.Full({1, 1}, number));
+    };
+    return IsFinite(context, std::vector<Gradient>{Gradient(factor(x), factor(y))});
+  };
+  EXPECT_TRUE(finite(2, 3));
+  EXPECT_TRUE(finite(3e38, 1));   // computed: too near to the largest float
+  EXPECT_FALSE(finite(3e38, 2));  // the product overflows, its factors do not
+  EXPECT_FALSE(finite(std::nan(""), 1));
+  EXPECT_FALSE(finite(INFINITY, 0));
+}
+
 }  // namespace
 }  // namespace tilegrad::nn

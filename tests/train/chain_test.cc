@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "nn/nn.h"
 #include "train/step.h"
@@ -87,8 +89,7 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
   LossValues values;
   std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
-  const auto gradients =
-      nn::Grad(step.Loss(batch, 0, &values), step.adam().parameters());
+  const auto gradients = nn::Grad(step.Loss(batch, 0, &values), step.adam().parameters());
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   EXPECT_LT(values.iou, 0.95);  // the scene is not empty: silhouettes overlap
   Rng rng(9);
@@ -174,6 +175,31 @@ TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
   EXPECT_EQ(finals[0], finals[1]);
   EXPECT_EQ(finals[0], finals[2]);
   EXPECT_LT(last, 0.7 * first);  // three pictures can be learned by heart
+}
+
+// One weight of infinity, whatever layer it is in.
+TEST(Chain, WhatIsNotFiniteIsRefusedBeforeAnythingChanges) {
+  const SmallProblem p;
+  const Workers workers(2);
+  nn::Context context(workers);
+  TrainStep step(context, p.config, p.store.size);
+  const BatchTensors batch = GatherBatch(context, p.store, p.samples);
+  ASSERT_TRUE(step.Run(batch, 0).ok());
+  const auto bits = [&] {  // of weights and moments
+    std::vector<nn::NamedTensor> all = step.adam().State();
+    for (const nn::NamedVar& weight : nn::Parameters(step.network().module())) {
+      all.push_back({weight.name, weight.value.value()});
+    }
+    return nn::EncodeSafetensors({all, {}}).value();
+  };
+  const Bytes before = bits();
+  for (nn::NamedVar& parameter : nn::Parameters(step.network().module())) {
+    float& weight = *parameter.value.value().data<float>();
+    const float finite = std::exchange(weight, std::numeric_limits<float>::infinity());
+    EXPECT_FALSE(step.Run(batch, 1).ok()) << parameter.name;
+    weight = finite;
+    EXPECT_EQ(bits(), before) << parameter.name;
+  }
 }
 
 TEST(Schedules, LearningRateAndSharpness) {

@@ -16,35 +16,53 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-void AdamRange(const AdamProblem<float>& problem, std::size_t begin, std::size_t end) {
+// The formulas of adam.h on vectors.
+struct AdamRule {
+  // Written out: a default member initialiser would not be compiled for the target.
+  HWY_INLINE explicit AdamRule(const AdamCoefficients& c)
+      : scale(Set(c.gradient_scale)),
+        beta1(Set(c.beta1)),
+        rest1(Set(1 - c.beta1)),
+        beta2(Set(c.beta2)),
+        rest2(Set(1 - c.beta2)),
+        root(Set(c.inverse_root)),
+        epsilon(Set(c.epsilon)),
+        step(Set(c.step)),
+        keep(Set(c.keep)) {}
+
+  // `count` numbers: a whole vector or a tail.
+  HWY_INLINE void Update(VF gradient, float* parameter, float* m_at, float* v_at,
+                         std::size_t count) const {
+    const DF d;
+    const VF g = hn::Mul(scale, gradient);
+    const VF m = hn::MulAdd(beta1, LoadSome(d, m_at, count), hn::Mul(rest1, g));
+    const VF v = hn::MulAdd(beta2, LoadSome(d, v_at, count), hn::Mul(rest2, hn::Mul(g, g)));
+    const VF denominator = hn::MulAdd(hn::Sqrt(v), root, epsilon);
+    const VF p = hn::Mul(keep, LoadSome(d, parameter, count));
+    StoreSome(m, d, m_at, count);
+    StoreSome(v, d, v_at, count);
+    StoreSome(hn::Sub(p, hn::Div(hn::Mul(step, m), denominator)), d, parameter, count);
+  }
+
+  VF scale, beta1, rest1, beta2, rest2, root, epsilon, step, keep;
+
+ private:
+  static HWY_INLINE VF Set(double x) { return hn::Set(DF(), static_cast<float>(x)); }
+};
+
+inline void AdamRange(const AdamProblem<float>& problem, std::size_t begin, std::size_t end) {
   const DF d;
   const std::size_t lanes = hn::Lanes(d);
-  const AdamCoefficients& c = problem.coefficients;
-  const VF scale = hn::Set(d, static_cast<float>(c.gradient_scale));
-  const VF beta1 = hn::Set(d, static_cast<float>(c.beta1));
-  const VF rest1 = hn::Set(d, static_cast<float>(1 - c.beta1));
-  const VF beta2 = hn::Set(d, static_cast<float>(c.beta2));
-  const VF rest2 = hn::Set(d, static_cast<float>(1 - c.beta2));
-  const VF root = hn::Set(d, static_cast<float>(c.inverse_root));
-  const VF epsilon = hn::Set(d, static_cast<float>(c.epsilon));
-  const VF step = hn::Set(d, static_cast<float>(c.step));
-  const VF keep = hn::Set(d, static_cast<float>(c.keep));
+  const AdamRule rule(problem.coefficients);
   for (std::size_t i = begin; i < end; i += lanes) {
     const std::size_t count = HWY_MIN(lanes, end - i);
-    const VF g = hn::Mul(scale, LoadSome(d, problem.gradient + i, count));
-    const VF m = hn::MulAdd(beta1, LoadSome(d, problem.m + i, count), hn::Mul(rest1, g));
-    const VF v =
-        hn::MulAdd(beta2, LoadSome(d, problem.v + i, count), hn::Mul(rest2, hn::Mul(g, g)));
-    const VF denominator = hn::MulAdd(hn::Sqrt(v), root, epsilon);
-    const VF p = hn::Mul(keep, LoadSome(d, problem.parameter + i, count));
-    StoreSome(m, d, problem.m + i, count);
-    StoreSome(v, d, problem.v + i, count);
-    StoreSome(hn::Sub(p, hn::Div(hn::Mul(step, m), denominator)), d, problem.parameter + i, count);
+    rule.Update(LoadSome(d, problem.gradient + i, count), problem.parameter + i, problem.m + i,
+                problem.v + i, count);
   }
 }
 
 // In double, two halves of each vector of floats apart.
-double SquaresRange(const float* x, std::size_t n) {
+inline double SquaresRange(const float* x, std::size_t n) {
   const hn::Repartition<double, DF> dd;
   const hn::Half<DF> half;
   const std::size_t lanes = hn::Lanes(half);

@@ -31,17 +31,19 @@ constexpr std::size_t kItemRows = 4096;  // many: each work item packs its colum
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
 // How C is cut into work items. The sum of an element does not depend on it, so it may depend on
-// the number of workers: with several, some four items for each, narrower first, then shorter.
+// the number of workers: with several, some eight items for each, narrower first, then shorter.
 struct GemmItems {
-  GemmItems(std::size_t m, std::size_t n, std::size_t workers) {
-    const std::size_t wanted = workers > 1 ? 4 * workers : 1;
-    columns = RoundUp(std::max(DivideUp(n, wanted), 4 * kTileColumns), kTileColumns);
-    const std::size_t parts = DivideUp(wanted, DivideUp(n, columns));
-    rows = std::clamp(DivideUp(m, parts), std::min(m, kLeastRows), kItemRows);
-  }
-  static constexpr std::size_t kLeastRows = 128;  // or packing B would weigh too much
   std::size_t rows, columns;
 };
+
+inline GemmItems ItemsFor(std::size_t m, std::size_t n, std::size_t workers) {
+  constexpr std::size_t kLeastRows = 128;  // or packing B would weigh too much
+  const std::size_t wanted = workers > 1 ? 8 * workers : 1;
+  const std::size_t columns =
+      RoundUp(std::max(DivideUp(n, wanted), 4 * kTileColumns), kTileColumns);
+  const std::size_t parts = DivideUp(wanted, DivideUp(n, columns));
+  return {std::clamp(DivideUp(m, parts), std::min(m, kLeastRows), kItemRows), columns};
+}
 
 struct GemmPlan {
   GemmPlan(const GemmProblem<float>& problem, const GemmItems& items)
@@ -52,6 +54,12 @@ struct GemmPlan {
         depths(p.k, kDepth),
         passes(depths.count(), std::max<std::size_t>(1, kPackedFloats / p.m / kDepth)) {}
 
+  std::size_t items() const { return row_blocks.count() * column_blocks.count(); }
+  // Column block `block`, all steps.
+  ColumnBlock Columns(std::size_t block) const {
+    const auto [begin, end] = column_blocks.range(block);
+    return {begin * kTileColumns, std::min(p.n, end * kTileColumns), 0, p.k};
+  }
   std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
   std::size_t packed_b_size() const {
     return std::min(column_blocks.largest(), kBlockPanels) * PackedPanelStride(depths.largest());
@@ -118,17 +126,17 @@ HWY_INLINE void ForTiles(std::size_t first, std::size_t rows, const ColumnBlock&
 
 // The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one a
 // function of its own: within a large caller GCC 12 does not keep a tile's sums in registers.
-HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                                const float* packed_a, const ColumnPacker& columns) {
+inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                       const float* packed_a, const ColumnPacker& columns) {
   ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
     MultiplyTile(plan, packed_a, panel, columns.block(), j, PackedColumns{columns.panel(j)});
   });
 }
 
 // The same; meanwhile the tiles pack `next`.
-HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                                  const float* packed_a, const ColumnPacker& columns,
-                                  const ColumnPacker& next) {
+inline HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                         const float* packed_a, const ColumnPacker& columns,
+                                         const ColumnPacker& next) {
   const ColumnBlock& block = columns.block();
   const std::size_t runs = rows * block.panels() * (block.steps / kTaskSteps);
   PanelCopier copier = next.Copier(std::max<std::size_t>(1, runs));
@@ -193,9 +201,9 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
   }
 }
 
-void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
+inline void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
-  const GemmPlan plan(problem, GemmItems(problem.m, problem.n, workers));
+  const GemmPlan plan(problem, ItemsFor(problem.m, problem.n, workers));
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
   float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
   for (std::size_t pass = 0; pass < plan.passes.count(); ++pass) {
@@ -203,11 +211,10 @@ void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context)
     context.workers.For(plan.rows.count(), [&](std::size_t panel, std::size_t) {
       PackRowPanel(plan, panel, depth, end, packed_a);
     });
-    context.workers.For(plan.row_blocks.count() * plan.column_blocks.count(),
-                        [&](std::size_t item, std::size_t worker) {
-                          MultiplyItem(plan, item, depth, end, packed_a,
-                                       packed_a + a_size + worker * plan.worker_size());
-                        });
+    context.workers.For(plan.items(), [&](std::size_t item, std::size_t worker) {
+      MultiplyItem(plan, item, depth, end, packed_a,
+                   packed_a + a_size + worker * plan.worker_size());
+    });
   }
 }
 

@@ -23,6 +23,13 @@ class Panels {
   std::size_t begin(std::size_t panel) const {
     return panel * small_ + std::min(panel, large_count_);
   }
+  struct Range {
+    std::size_t begin, end;
+  };
+  // [begin, end) of a panel, counted from `origin`.
+  Range range(std::size_t panel, std::size_t origin = 0) const {
+    return {origin + begin(panel), origin + begin(panel + 1)};
+  }
   std::size_t size(std::size_t panel) const { return small_ + (panel < large_count_ ? 1 : 0); }
   std::size_t largest() const { return small_ + (large_count_ > 0 ? 1 : 0); }
 

@@ -79,7 +79,7 @@ Var Linear(const Var& x, const Var& w, const Var& b) {
   const auto rule = [x, w](const Adjoint& adj) {
     const Var& dy = adj.dy();
     return Vars{adj.needs(0) ? Matmul(dy, w) : Var(),
-                adj.needs(1) ? Matmul(dy, x, {true, false}) : Var(),
+                adj.needs(1) ? adj.Product(1, dy, x) : Var(),
                 adj.needs(2) ? Sum(dy, {0}) : Var()};
   };
   return Record({"linear"}, Product(x, w, b, options), {x, w, b}, rule);

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector body of product_adam.h: the loops of gemm-inl.h around groups of rows that stay in cache
+// until Adam has used them.
+
+#if defined(TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
+#undef TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
+#else
+#define TILEGRAD_NN_KERNELS_PRODUCT_ADAM_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "nn/kernels/adam-inl.h"
+#include "nn/kernels/gemm-inl.h"
+#include "nn/kernels/product_adam.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::nn::HWY_NAMESPACE {
+
+// A work item packs its columns of B for itself; rows of as many columns are long enough for
+// memory. A group of rows of C, two of them, stay in L2 beside those columns.
+constexpr GemmItems kUpdateItems{.rows = 256, .columns = 1024};
+constexpr std::size_t kGroupPanels = 2;  // row panels in a group: the best of 1 to 8
+
+static_assert(kMostProductAdamSteps <= kDepth);  // or a group would be summed in several passes
+
+struct ProductAdamPlan {
+  ProductAdamPlan(const GemmProblem<float>& product, const AdamProblem<float>& problem)
+      : gemm(product, kUpdateItems), adam(problem), rule(problem.coefficients) {}
+
+  // Between rows of a group: a line more than they have, so that they do not share cache sets.
+  std::size_t group_ld() const { return gemm.column_blocks.largest() * kTileColumns + kLineFloats; }
+  std::size_t group_size() const {
+    return RoundUp(kGroupPanels * gemm.rows.largest() * group_ld(), kAlignment);
+  }
+  std::size_t packed_b_size() const {
+    return RoundUp(gemm.column_blocks.largest() * PackedPanelStride(gemm.p.k), kAlignment);
+  }
+  // Of a worker: packed columns, the group that is computed and the one that Adam uses.
+  std::size_t worker_size() const { return packed_b_size() + 2 * group_size(); }
+
+  GemmPlan gemm;
+  AdamProblem<float> adam;
+  AdamRule rule;
+};
+
+// Adam over some rows and columns of the gradient, a little at a time: whoever multiplies runs it
+// between two tiles, so that what it asks memory for arrives while the tile is computed.
+class GroupUpdater {
+ public:
+  GroupUpdater() = default;  // of no rows
+  // gradient: of these rows and columns; rows lie plan.group_ld() apart.
+  GroupUpdater(const ProductAdamPlan& plan, Panels::Range rows, const ColumnBlock& columns,
+               const float* gradient)
+      : plan_(&plan),
+        row_(rows.begin),
+        end_row_(rows.end),
+        begin_(columns.begin),
+        columns_(columns.end - columns.begin),
+        gradient_(gradient) {}
+
+  // As many numbers as a tile has. Not inlined, or the tile's sums would not stay in registers.
+  HWY_NOINLINE void Run() {
+    if (row_ < end_row_) Update(kTileRows * kTileColumns);
+  }
+  void Finish() {
+    while (row_ < end_row_) Update(columns_);
+  }
+
+ private:
+  // The next `count` numbers of the present row, or all that it has left.
+  HWY_INLINE void Update(std::size_t count) {
+    const AdamRule rule = plan_->rule;
+    const std::size_t ld = plan_->gemm.p.n, at = row_ * ld + begin_;
+    const std::size_t next_row = row_ + 1 < plan_->gemm.p.m ? ld : 0;
+    float* const p = plan_->adam.parameter + at;
+    float* const m = plan_->adam.m + at;
+    float* const v = plan_->adam.v + at;
+    const std::size_t end = std::min(columns_, column_ + count);
+    for (std::size_t i = column_; i < end; i += kLanes) {
+      if (i % kLineFloats == 0) {
+        for (const float* x : {p, m, v}) PrefetchLine(x + next_row + i);
+      }
+      const std::size_t lanes = std::min(kLanes, end - i);
+      rule.Update(LoadSome(DF(), gradient_ + i, lanes), p + i, m + i, v + i, lanes);
+    }
+    column_ = end;
+    if (column_ == columns_) column_ = 0, ++row_, gradient_ += plan_->group_ld();
+  }
+
+  const ProductAdamPlan* plan_ = nullptr;
+  std::size_t row_ = 0, end_row_ = 0;
+  std::size_t begin_ = 0, columns_ = 0, column_ = 0;
+  const float* gradient_ = nullptr;
+};
+
+// Row panels [first, end) of the packed columns, into `group`; meanwhile `before` is updated.
+inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Range panels,
+                                       const float* packed_a, const ColumnPacker& columns,
+                                       float* group, GroupUpdater& before) {
+  const ColumnBlock& block = columns.block();
+  const Panels& rows = plan.gemm.rows;
+  GemmProblem<float> out;
+  out.n = block.end - block.begin, out.c = group, out.ldc = plan.group_ld();
+  for (std::size_t j = 0; j < block.panels(); ++j) {
+    for (std::size_t panel = panels.begin; panel < panels.end; ++panel) {
+      const std::size_t row = rows.begin(panel);
+      PackedRowsTile(packed_a + row * block.steps, rows.size(panel),
+                     PackedColumns{columns.panel(j)}, block.steps,
+                     TargetOf(out, row - rows.begin(panels.begin), j * kTileColumns, true));
+      before.Run();
+    }
+  }
+  before.Finish();
+}
+
+// Work item: one block of rows by one block of columns. memory: plan.worker_size() floats.
+inline void UpdateItem(const ProductAdamPlan& plan, std::size_t item, const float* packed_a,
+                       float* memory) {
+  const GemmPlan& gemm = plan.gemm;
+  const ColumnBlock block = gemm.Columns(item / gemm.row_blocks.count());
+  const ColumnPacker columns(gemm.p, block, memory);
+  columns.Pack();
+  const Panels::Range row_panels = gemm.row_blocks.range(item % gemm.row_blocks.count());
+  const Panels groups(row_panels.end - row_panels.begin, kGroupPanels);
+  GroupUpdater updater;
+  for (std::size_t g = 0; g < groups.count(); ++g) {
+    float* gradient = memory + plan.packed_b_size() + g % 2 * plan.group_size();
+    const Panels::Range panels = groups.range(g, row_panels.begin);
+    MultiplyGroup(plan, panels, packed_a, columns, gradient, updater);
+    updater = GroupUpdater(plan, {gemm.rows.begin(panels.begin), gemm.rows.begin(panels.end)},
+                           block, gradient);
+  }
+  updater.Finish();
+}
+
+inline void ProductAdamTarget(const GemmProblem<float>& product, const AdamProblem<float>& adam,
+                              const KernelContext& context) {
+  const ProductAdamPlan plan(product, adam);
+  const std::size_t a_size = RoundUp(plan.gemm.packed_a_size(), kAlignment);
+  float* packed_a = context.scratch.Floats(
+      a_size + plan.worker_size() * static_cast<std::size_t>(context.workers.count()));
+  context.workers.For(plan.gemm.rows.count(), [&](std::size_t panel, std::size_t) {
+    PackRowPanel(plan.gemm, panel, 0, 1, packed_a);
+  });
+  context.workers.For(plan.gemm.items(), [&](std::size_t item, std::size_t worker) {
+    UpdateItem(plan, item, packed_a, packed_a + a_size + worker * plan.worker_size());
+  });
+}
+
+}  // namespace tilegrad::nn::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

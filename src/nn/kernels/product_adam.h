@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// One step of Adam over a matrix whose gradient is a product, as of a linear layer's weight: the
+// gradient is computed block by block, and each block used while it lies in cache. Nothing of it
+// goes to memory, which would take as long as the step itself.
+#pragma once
+
+#include <cstddef>
+
+#include "nn/kernels/adam.h"
+#include "nn/kernels/gemm.h"
+#include "nn/kernels/kernel_context.h"
+
+namespace tilegrad::nn {
+
+// The most steps k of a product that ProductAdamStep takes; beyond them multiplying weighs more
+// than memory.
+constexpr std::size_t kMostProductAdamSteps = 256;
+
+// The same bits as Gemm(product) into a gradient and AdamStep(adam) over it. `product.c` and
+// `adam.gradient` are not used; product.k is in [1, kMostProductAdamSteps], it has no bias and does
+// not accumulate, and adam.n = product.m product.n.
+void ProductAdamStep(const GemmProblem<float>& product, const AdamProblem<float>& adam,
+                     const KernelContext& context);
+
+}  // namespace tilegrad::nn
