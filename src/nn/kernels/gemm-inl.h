@@ -26,6 +26,8 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 constexpr std::size_t kDepth = 256;  // steps of k in one block: a B panel takes half of L1
 // Of B in one block: the best of 64 to 256 columns.
 constexpr std::size_t kBlockPanels = std::max<std::size_t>(256 / kTileColumns, 4);
+// Of a transposed B, as it lies in memory and packed: both stay in L2.
+constexpr std::size_t kFetchedPanels = std::max<std::size_t>(64 / kTileColumns, 4);
 constexpr std::size_t kGroupFloats = 24576;  // of A beside that block in L2: the best of 18 to 48 K
 constexpr std::size_t kItemRows = 4096;  // many: each work item packs its columns of B for itself
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
@@ -61,8 +63,9 @@ struct GemmPlan {
     return {begin * kTileColumns, std::min(p.n, end * kTileColumns), 0, p.k};
   }
   std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
+  std::size_t block_panels() const { return p.transpose_b ? kFetchedPanels : kBlockPanels; }
   std::size_t packed_b_size() const {
-    return std::min(column_blocks.largest(), kBlockPanels) * PackedPanelStride(depths.largest());
+    return std::min(column_blocks.largest(), block_panels()) * PackedPanelStride(depths.largest());
   }
   // Of a worker: the columns in use and the next ones.
   std::size_t worker_size() const { return RoundUp(2 * packed_b_size(), kAlignment); }
@@ -133,19 +136,37 @@ inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, 
   });
 }
 
+// The same; meanwhile a task runs.
+template <class Task>
+HWY_INLINE void MultiplyBusily(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                               const float* packed_a, const ColumnPacker& columns, Task& task) {
+  ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
+    MultiplyTile(plan, packed_a, panel, columns.block(), j,
+                 BusyColumns<Task>(columns.panel(j), task));
+  });
+}
+
+// How often: at least 1.
+inline std::size_t TaskRuns(std::size_t rows, const ColumnBlock& block) {
+  return std::max<std::size_t>(1, rows * block.panels() * (block.steps / kTaskSteps));
+}
+
 // The same; meanwhile the tiles pack `next`.
 inline HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                          const float* packed_a, const ColumnPacker& columns,
                                          const ColumnPacker& next) {
-  const ColumnBlock& block = columns.block();
-  const std::size_t runs = rows * block.panels() * (block.steps / kTaskSteps);
-  PanelCopier copier = next.Copier(std::max<std::size_t>(1, runs));
-  ForTiles(first, rows, block, [&](std::size_t panel, std::size_t j) HWY_ATTR {
-    MultiplyTile(plan, packed_a, panel, block, j,
-                 BusyColumns<PanelCopier>(columns.panel(j), copier));
-  });
+  PanelCopier copier = next.Copier(TaskRuns(rows, columns.block()));
+  MultiplyBusily(plan, first, rows, packed_a, columns, copier);
   copier.Finish();
   next.PackRest();
+}
+
+// The same; meanwhile the tiles ask memory for `next`, of a transposed B.
+inline HWY_NOINLINE void MultiplyAndFetch(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                          const float* packed_a, const ColumnPacker& columns,
+                                          const ColumnPacker& next) {
+  BlockFetcher fetcher = next.Fetcher(TaskRuns(rows, columns.block()));
+  MultiplyBusily(plan, first, rows, packed_a, columns, fetcher);
 }
 
 // The blocks of B that a work item meets, one after the other: all columns of a depth, as the rows
@@ -158,7 +179,7 @@ class BlockOrder {
         first_panel_(plan.column_blocks.begin(columns)),
         depth_(depth),
         depths_(end - depth),
-        blocks_(plan.column_blocks.size(columns), kBlockPanels) {}
+        blocks_(plan.column_blocks.size(columns), plan.block_panels()) {}
 
   std::size_t count() const { return blocks_.count() * depths_; }
   ColumnBlock At(std::size_t i) const {
@@ -188,15 +209,17 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
   const auto packer = [&](std::size_t i) {
     return ColumnPacker(plan.p, order.At(i), packed_b + i % 2 * plan.packed_b_size());
   };
-  const bool pack_ahead = !plan.p.transpose_b;
+  const bool transposed = plan.p.transpose_b;
   for (std::size_t i = 0; i < order.count(); ++i) {
     const ColumnPacker present = packer(i);
     const float* a = packed_a + plan.p.m * (present.block().k - plan.depths.begin(depth));
-    if (i == 0 || !pack_ahead) present.Pack();
-    if (pack_ahead && i + 1 < order.count()) {
-      MultiplyAndPack(plan, panel, panels, a, present, packer(i + 1));
-    } else {
+    if (i == 0 || transposed) present.Pack();
+    if (i + 1 == order.count()) {
       MultiplyBlock(plan, panel, panels, a, present);
+    } else if (transposed) {
+      MultiplyAndFetch(plan, panel, panels, a, present, packer(i + 1));
+    } else {
+      MultiplyAndPack(plan, panel, panels, a, present, packer(i + 1));
     }
   }
 }

@@ -3,7 +3,7 @@
 // rows on the other side (a training batch) copying it and waiting for it would cost as much as
 // multiplying: a B that is not transposed is packed by the tiles of the block before, a row of a
 // panel every few steps of theirs. A transposed B is packed a block at a time, which reads it in
-// runs as long as the block is deep.
+// runs as long as the block is deep; the tiles of the block before ask for them.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_
@@ -89,6 +89,28 @@ class PanelCopier {
   std::ptrdiff_t next_panel_ = 0, next_row_to_ = 0;
 };
 
+// Asks for the lines of a block of a transposed B, some in one run.
+class BlockFetcher {
+ public:
+  // b: the block in B^T, `rows` runs of `steps` floats, `ld` apart. Asks for `share` lines in a
+  // run.
+  BlockFetcher(const float* b, std::size_t ld, std::size_t rows, std::size_t steps,
+               std::size_t share)
+      : row_(b), ld_(ld), rows_left_(rows), steps_(steps), share_(share) {}
+
+  HWY_INLINE void Run() {
+    for (std::size_t i = 0; i < share_ && rows_left_ > 0; ++i) {
+      PrefetchLineToL2(row_ + at_);
+      at_ += kLineFloats;
+      if (at_ >= steps_) at_ = 0, row_ += ld_, --rows_left_;
+    }
+  }
+
+ private:
+  const float* row_;
+  std::size_t ld_, rows_left_, steps_, share_, at_ = 0;
+};
+
 // Packs one block of B.
 class ColumnPacker {
  public:
@@ -112,6 +134,12 @@ class ColumnPacker {
   PanelCopier Copier(std::size_t runs) const {
     return PanelCopier(RowOf(0), p_.ldb, block_, packed_,
                        DivideUp(block_.steps * whole_panels(), runs));
+  }
+  // Of a transposed B: asks for the block in `runs` runs.
+  BlockFetcher Fetcher(std::size_t runs) const {
+    const std::size_t columns = block_.end - block_.begin;
+    return BlockFetcher(p_.b + block_.begin * p_.ldb + block_.k, p_.ldb, columns, block_.steps,
+                        DivideUp(columns * DivideUp(block_.steps, kLineFloats), runs));
   }
   // The last panel of fewer columns.
   HWY_NOINLINE void PackRest() const {
