@@ -30,7 +30,7 @@ struct SoftBench {
         renderer.Render({&scene, 1}, batch.options, {false, false, false, false}, &frame);
     failed = !status.ok();
     Build();
-    alpha.resize(frame.face_ids.size());
+    alpha.resize(frame.face_ids.size()), transmittance.resize(alpha.size());
   }
   void Build() {
     raster::BuildSoftTree(mesh, &tree);
@@ -38,6 +38,7 @@ struct SoftBench {
         {grid.width, grid.height, batch.options.delta, batch.options.max_alpha_error, tree.faces});
   }
   raster::SoftMaskRegion Bin(std::size_t t) const { return {grid.rect(t), frame.face_ids}; }
+  raster::SoftMaskImages Images() { return {alpha, transmittance}; }
   // Calls visit(pixel) for the background pixels of every `step`th row.
   template <class Visit>
   void ForPixels(int step, const Visit& visit) const {
@@ -65,7 +66,7 @@ struct SoftBench {
   raster::SoftMaskPlan plan;
   raster::TileGrid grid;
   raster::SoftTree tree;
-  std::vector<float> alpha;
+  std::vector<float> alpha, transmittance;
   AlignedVector<raster::SoftFaceGradient> gradients;
   raster::SoftMaskScratch scratch;
 };
@@ -77,7 +78,7 @@ void SoftForward(benchmark::State& state, const SceneSpec& spec, double delta, d
   for (auto _ : state) {
     b.Build();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Bin(t), b.alpha, &b.scratch));
+      spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Bin(t), b.Images(), &b.scratch));
     }
   }
   b.Count(state, 1);
@@ -89,12 +90,13 @@ void SoftBackward(benchmark::State& state, const SceneSpec& spec, double delta, 
   if (b.failed) return state.SkipWithError("the scene did not render");
   const auto d_alpha = std::span<const float>(b.batch.d_alpha).first(b.alpha.size());
   for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-    SoftMaskForward(b.tree, b.plan, b.Bin(t), b.alpha, &b.scratch);
+    SoftMaskForward(b.tree, b.plan, b.Bin(t), b.Images(), &b.scratch);
   }
   for (auto _ : state) {
     b.gradients.clear();
     for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
-      SoftMaskBackward(b.tree, b.plan, b.Bin(t), {b.alpha, d_alpha}, &b.gradients, &b.scratch);
+      SoftMaskBackward(b.tree, b.plan, b.Bin(t), {b.alpha, b.transmittance, d_alpha}, &b.gradients,
+                       &b.scratch);
     }
   }
   b.Count(state, 1);

@@ -35,8 +35,8 @@ void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* worker
 }
 
 double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
-                       std::span<float> alpha, SoftMaskScratch* scratch) {
-  return HWY_DYNAMIC_DISPATCH(SoftMaskForwardTarget)(tree, plan, region, alpha.data(), scratch);
+                       const SoftMaskImages& images, SoftMaskScratch* scratch) {
+  return HWY_DYNAMIC_DISPATCH(SoftMaskForwardTarget)(tree, plan, region, images, scratch);
 }
 
 void SoftMaskBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,

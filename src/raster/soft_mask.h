@@ -48,15 +48,26 @@ struct SoftMaskRegion {
   std::span<const std::int32_t> face_ids;  // < 0 is background; only those are computed
 };
 
-// Writes alpha of the region's pixels: 1 where face_ids >= 0. Returns what was spent: no pixel is
-// farther than this from equation 6 over all faces, rounding aside (docs/numerics.md, "Rounding").
-// At most E. 0 where no pixel is background.
+struct SoftMaskImages {
+  std::span<float> alpha;  // 1 where face_ids >= 0
+  // May be empty. Written only about background pixels whose alpha is more than E / 4, for the way
+  // back: the product over all faces, 1 - alpha, to relative precision, where no more is needed; 0
+  // where there is nothing to hand on, kUnknownTransmittance where it must multiply again
+  // (docs/numerics.md, "Gradients").
+  std::span<float> transmittance = {};
+};
+inline constexpr float kUnknownTransmittance = -1;
+
+// Writes the region's pixels. Returns what was spent: no pixel's alpha is farther than this from
+// equation 6 over all faces, rounding aside (docs/numerics.md, "Rounding"). At most E. 0 where no
+// pixel is background.
 double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,
-                       std::span<float> alpha, SoftMaskScratch* scratch);
+                       const SoftMaskImages& images, SoftMaskScratch* scratch);
 
 struct SoftMaskAdjoint {
-  std::span<const float> alpha;    // as SoftMaskForward wrote it
-  std::span<const float> d_alpha;  // foreground pixels have no gradient
+  std::span<const float> alpha;          // as SoftMaskForward wrote it
+  std::span<const float> transmittance;  // likewise; empty: from alpha, for more work
+  std::span<const float> d_alpha;        // foreground pixels have no gradient
 };
 
 // Appends dL/d(corners) of the faces that the region's pixels see to `out`, in an order that

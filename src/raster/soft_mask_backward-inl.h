@@ -23,38 +23,17 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// Pixels that have a gradient to hand on: all faces together have A <= about alpha, so that one may
-// be dropped where alpha is within `least`.
-HWY_INLINE std::uint64_t GradientBitsOf(const SoftMaskPlan& plan, const SoftBlock& block,
-                                        const std::int32_t* face_ids,
-                                        const SoftMaskAdjoint& adjoint) {
-  const SoftTag d;
-  const SoftVec least = hn::Set(d, static_cast<float>(plan.stop_error));
-  const auto matter = [&](const float* alpha, const float* d_alpha) HWY_ATTR {
-    const SoftMask none =
-        hn::Or(hn::Le(hn::LoadU(d, alpha), least), hn::Eq(hn::LoadU(d, d_alpha), hn::Zero(d)));
-    return std::uint64_t{BitsOf(d, hn::Not(none))};
-  };
-  std::uint64_t bits = BackgroundOf(plan, block, face_ids);
-  if (bits == 0) return 0;
-  ForRows(plan, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
-    const float *alpha = adjoint.alpha.data() + from, *d_alpha = adjoint.d_alpha.data() + from;
-    alignas(64) float rest[2][kBlockSize];
-    if (block.width < static_cast<int>(kBlockSize)) {
-      std::fill_n(std::copy_n(alpha, block.width, rest[0]),
-                  static_cast<int>(kBlockSize) - block.width, 0.0f);
-      std::fill_n(std::copy_n(d_alpha, block.width, rest[1]),
-                  static_cast<int>(kBlockSize) - block.width, 0.0f);
-      alpha = rest[0], d_alpha = rest[1];
-    }
-    std::uint64_t row = 0;
-    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      row |= matter(alpha + x, d_alpha + x) << x;
-    }
-    bits &= ~(std::uint64_t{0xff} << to) | row << to;
-  });
-  return bits;
-}
+// A row of up to kBlockSize pixels of an image, filled up with zeros where it has fewer.
+struct PixelRow {
+  const float* pixels;
+  alignas(64) float copy[kBlockSize];
+
+  HWY_INLINE PixelRow(const float* image, int width) : pixels(image) {
+    if (width == static_cast<int>(kBlockSize)) return;
+    std::fill(std::copy_n(image, width, copy), copy + kBlockSize, 0.0f);
+    pixels = copy;
+  }
+};
 
 // Backward through one tile, after FindNearGroups.
 class TileBackward {
@@ -64,9 +43,7 @@ class TileBackward {
                AlignedVector<SoftFaceGradient>* out)
       : tree_(tree), plan_(plan), adjoint_(adjoint), scratch_(scratch), out_(out) {
     box_ = SetUpBlocks(
-        plan, tile.rect,
-        [&](const SoftBlock& b)
-            HWY_ATTR { return GradientBitsOf(plan, b, tile.face_ids.data(), adjoint); },
+        plan, tile.rect, [&](const SoftBlock& b) HWY_ATTR { return TakePixels(tile, b); },
         scratch->blocks);
     // dz / d(pixel) has the unit, dA / dz has ln 2.
     scale_ = {static_cast<float>(plan.unit_x * std::numbers::ln2),
@@ -79,7 +56,7 @@ class TileBackward {
     if (nodes_.count == 0) return;
     reach_ = ReachOf(plan_, nodes_.faces);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
-      if (scratch_->blocks[b].bits != 0) TakeLightPixels(b);
+      weak_[b] = scratch_->blocks[b].bits, scratch_->blocks[b].live = dark_[b];
     }
     std::size_t next = 0;
     FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
@@ -99,18 +76,49 @@ class TileBackward {
                       block.y0 + static_cast<int>(i / kBlockSize));
   }
 
-  // push_[b] is 2 d_alpha times the product over all faces: moving the nearest point along the way
-  // to the pixel lowers z. In light pixels it is 1 - alpha, at least 1/16; the others stay live.
-  void TakeLightPixels(std::size_t b) {
-    SoftBlock& block = scratch_->blocks[b];
-    const double spent = plan_.node_error + plan_.face_error + plan_.stop_error;
-    ForPixels(block.bits, [&](std::size_t i) {
-      const std::size_t at = IndexOf(block, i);
-      const float product = 1 - adjoint_.alpha[at];
-      push_[b][i] = 2 * adjoint_.d_alpha[at] * product;
-      if (static_cast<double>(product) < kLightProduct + spent) dark_[b] |= std::uint64_t{1} << i;
+  // Bits of the pixels that have a gradient to hand on. Sets their push, 2 d_alpha times the
+  // product over all faces: moving the nearest point along the way to the pixel lowers z. Dark
+  // ones, whose product is not known, have none yet.
+  HWY_INLINE std::uint64_t TakePixels(const SoftMaskRegion& tile, const SoftBlock& block) {
+    const std::uint64_t background = BackgroundOf(plan_, block, tile.face_ids.data());
+    if (background == 0) return 0;
+    const auto b = static_cast<std::size_t>(&block - scratch_->blocks);
+    std::uint64_t bits = 0;
+    ForRows(plan_, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
+      const std::uint64_t row = background >> to & PixelsThatMatter(from, block.width);
+      if (row != 0) bits |= TakeRow(from, to, row, b);
     });
-    weak_[b] = block.bits, block.live = dark_[b];
+    return bits;
+  }
+
+  // Bits of a row's pixels that are pulled on, and where alpha is not so small that all faces may
+  // be dropped: together they have A <= about alpha.
+  HWY_INLINE std::uint64_t PixelsThatMatter(std::size_t from, int width) const {
+    const SoftTag d;
+    const SoftVec least = hn::Set(d, static_cast<float>(plan_.stop_error));
+    const PixelRow alpha(adjoint_.alpha.data() + from, width);
+    const PixelRow d_alpha(adjoint_.d_alpha.data() + from, width);
+    std::uint64_t row = 0;
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      const SoftMask none = hn::Or(hn::Le(hn::LoadU(d, alpha.pixels + x), least),
+                                   hn::Eq(hn::LoadU(d, d_alpha.pixels + x), hn::Zero(d)));
+      row |= std::uint64_t{BitsOf(d, hn::Not(none))} << x;
+    }
+    return row;
+  }
+
+  // The push of the pixels `row` of a row of block b; returns the bits of those that have one.
+  std::uint64_t TakeRow(std::size_t from, std::size_t to, std::uint64_t row, std::size_t b) {
+    std::uint64_t bits = 0;
+    ForPixels(row, [&](std::size_t x) {
+      const float product = adjoint_.transmittance.empty()
+                                ? TransmittanceOf(plan_, adjoint_.alpha[from + x])
+                                : adjoint_.transmittance[from + x];
+      push_[b][to + x] = 2 * adjoint_.d_alpha[from + x] * product;
+      bits |= std::uint64_t{product != 0} << (to + x);
+      dark_[b] |= std::uint64_t{product < 0} << (to + x);
+    });
+    return bits;
   }
 
   // All faces are in the chunk: the members of a block are listed once.
@@ -232,7 +240,7 @@ class TileBackward {
   SoftNodes nodes_;
   SoftReach reach_;
   PixelScale scale_;
-  std::uint64_t dark_[kTileBlocks] = {};
+  std::uint64_t dark_[kTileBlocks] = {};  // pixels whose product is to be found
   std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter
   alignas(64) float push_[kTileBlocks][kBlockPixels];
   alignas(64) float near_product_[kTileBlocks][kBlockPixels];

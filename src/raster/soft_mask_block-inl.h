@@ -119,8 +119,11 @@ HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
 
 // Alpha of a block over no faces: 0 for the pixels to compute.
 HWY_INLINE void ClearAlpha(SoftBlock* block) {
-  for (std::size_t i = 0; i < kBlockPixels; ++i)
+  for (std::size_t i = 0; i < kBlockPixels; ++i) {
     block->alpha[i] = (block->bits >> i & 1) != 0 ? 0 : 1;
+    block->product[i] = 1 - block->alpha[i];
+  }
+  std::fill_n(block->least, kBlockPixels, 1.0f);
 }
 
 }  // namespace tilegrad::raster::HWY_NAMESPACE

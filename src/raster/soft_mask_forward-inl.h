@@ -60,12 +60,15 @@ class PartialAlpha {
   HWY_INLINE void Merge() {
     const SoftTag d;
     ForPixels(touched_, [&](std::size_t i) HWY_ATTR {
-      SoftVec a = hn::Load(d, partial_[i]);
+      const SoftVec lanes = hn::Load(d, partial_[i]);
       hn::Store(hn::Zero(d), d, partial_[i]);
+      SoftVec a = lanes;
       if constexpr (hn::MaxLanes(d) > 4) a = Over(d, a, NextQuartet(d, a));
       a = Over(d, a, NextPair(d, a));
       a = Over(d, a, Neighbour(d, a));
-      block_->alpha[i] += (1 - block_->alpha[i]) * static_cast<double>(hn::GetLane(a));
+      const auto alpha = static_cast<double>(hn::GetLane(a));
+      block_->alpha[i] += (1 - block_->alpha[i]) * alpha;
+      block_->product[i] *= 1 - alpha >= kLightProduct ? 1 - alpha : SmallProduct(d, lanes, i);
     });
     touched_ = 0;
   }
@@ -93,6 +96,15 @@ class PartialAlpha {
       Put(d, i, simd::HalvingOf(d, hn::Load(d, of_pixel[i])).power);
     });
   }
+  // What lanes with alpha `a` leave together: 1 - alpha has no digits left. Notes the least of one.
+  HWY_INLINE double SmallProduct(SoftTag d, SoftVec a, std::size_t pixel) {
+    SoftVec left = hn::Sub(hn::Set(d, 1.0f), a);
+    const SoftMask dark = hn::Lt(left, hn::Set(d, static_cast<float>(kLightProduct)));
+    const SoftVec rounding = hn::Set(d, static_cast<float>(kLaneRounding));
+    left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
+    block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, left)));
+    return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));
+  }
   HWY_INLINE void Put(SoftTag d, std::size_t pixel, SoftVec influence) {
     float* at = partial_[pixel];
     hn::Store(Over(d, hn::Load(d, at), influence), d, at);
@@ -103,10 +115,14 @@ class PartialAlpha {
   std::uint64_t touched_ = 0;
 };
 
-// Pixels whose product is within `stop` need no more faces.
-HWY_INLINE void StopPixels(double stop, SoftBlock* block) {
+// Pixels whose product is within `stop` need no more faces. Where others might have mattered on the
+// way back, it has to look at them.
+HWY_INLINE void StopPixels(const SoftMaskPlan& plan, double stop, SoftBlock* block) {
   ForPixels(block->live, [&](std::size_t i) {
-    if (1 - block->alpha[i] <= stop) block->live &= ~(std::uint64_t{1} << i);
+    if (1 - block->alpha[i] > stop) return;
+    block->live &= ~(std::uint64_t{1} << i);
+    const auto least = static_cast<double>(block->least[i]);
+    if (!IsUnseen(plan, block->product[i], least)) block->least[i] = 0;
   });
 }
 
@@ -123,38 +139,64 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
   return std::min(spent, 1.0);
 }
 
-// Before any face: 0 for the pixels to compute, else 1.
-HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
+// A row of a block to an image.
+HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float* to) {
   const SoftTag d;
+  if (width < kBlockSize) {
+    std::copy_n(row, width, to);
+    return;
+  }
+  for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+    hn::StoreU(hn::Load(d, row + x), d, to + x);
+  }
+}
+
+// Before any face: 0 for the pixels to compute, else 1.
+HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* image) {
+  const SoftTag d;
+  const auto size = static_cast<std::size_t>(block.width);
   ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
     const std::uint64_t row = block.bits >> from;
-    if (block.width == static_cast<int>(kBlockSize)) {
-      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-        const std::uint8_t bits[8] = {static_cast<std::uint8_t>(row >> x)};
-        const SoftMask background = hn::LoadMaskBits(d, bits);
-        hn::StoreU(hn::IfThenZeroElse(background, hn::Set(d, 1.0f)), d, alpha + to + x);
-      }
-      return;
+    alignas(64) float alpha[kBlockSize];
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      const std::uint8_t bits[8] = {static_cast<std::uint8_t>(row >> x)};
+      const SoftMask background = hn::LoadMaskBits(d, bits);
+      hn::Store(hn::IfThenZeroElse(background, hn::Set(d, 1.0f)), d, alpha + x);
     }
-    for (std::size_t x = 0; x < static_cast<std::size_t>(block.width); ++x) {
-      alpha[to + x] = static_cast<float>(~row >> x & 1);
-    }
+    CopyRow(alpha, size, image + to);
   });
 }
 
-HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, float* alpha) {
-  const hn::CappedTag<double, 4> d;
-  const hn::Rebind<float, decltype(d)> d_alpha;
+using SoftDoubleTag = hn::CappedTag<double, 4>;
+using SoftWrittenTag = hn::Rebind<float, SoftDoubleTag>;
+
+// The transmittance of background pixels: see SoftBlock.
+template <class V>
+HWY_INLINE V Transmittance(const SoftMaskPlan& plan, V product, V least) {
+  const SoftWrittenTag d;
+  const auto set = [&](double v) HWY_ATTR { return hn::Set(d, static_cast<float>(v)); };
+  const auto unseen = hn::Le(product, hn::Mul(least, set(kUnseenShare * plan.stop_error)));
+  const auto known = hn::Ge(least, set(kLightProduct));
+  return hn::IfThenZeroElse(unseen, hn::IfThenElse(known, product, set(kUnknownTransmittance)));
+}
+
+HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block,
+                           const SoftMaskImages& images) {
+  const SoftDoubleTag d;
+  const SoftWrittenTag d_written;
+  const auto size = static_cast<std::size_t>(block.width);
   ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
-    if (block.width == static_cast<int>(kBlockSize)) {
-      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-        const auto row = hn::DemoteTo(d_alpha, hn::Load(d, block.alpha + from + x));
-        hn::StoreU(row, d_alpha, alpha + to + x);
-      }
-      return;
+    alignas(64) float alpha[kBlockSize], transmittance[kBlockSize];
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      const auto a = hn::DemoteTo(d_written, hn::Load(d, block.alpha + from + x));
+      const auto product = hn::DemoteTo(d_written, hn::Load(d, block.product + from + x));
+      hn::Store(a, d_written, alpha + x);
+      hn::Store(Transmittance(plan, product, hn::Load(d_written, block.least + from + x)),
+                d_written, transmittance + x);
     }
-    for (std::size_t x = 0; x < static_cast<std::size_t>(block.width); ++x) {
-      alpha[to + x] = static_cast<float>(block.alpha[from + x]);
+    CopyRow(alpha, size, images.alpha.data() + to);
+    if (!images.transmittance.empty()) {
+      CopyRow(transmittance, size, images.transmittance.data() + to);
     }
   });
 }
@@ -178,17 +220,19 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
       PartialAlpha partial(&blocks[b], scratch->partial);
       partial.AddVertices(lists.vertices), partial.AddSegments(lists.segments);
       partial.AddBoundaries(lists.boundaries), partial.Merge();
-      if (next < order.size()) StopPixels(stop, &blocks[b]);
+      if (next < order.size()) StopPixels(plan, stop, &blocks[b]);
     }
   }
 }
 
 // One tile, after FindNearGroups. Returns what it spent.
-inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& tile,
-                          const std::int32_t* face_ids, float* alpha, SoftMaskScratch* scratch) {
+inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
+                          const SoftMaskRegion& tile, const SoftMaskImages& images,
+                          SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
   const SoftBox box = SetUpBlocks(
-      plan, tile, [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, face_ids); },
+      plan, tile.rect,
+      [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, tile.face_ids.data()); },
       blocks);
   SoftNodes nodes;
   SoftReach reach{};
@@ -201,21 +245,21 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan, const 
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
     if (blocks[b].bits != 0 && nodes.count > 0) {
-      WriteAlpha(plan, blocks[b], alpha);
+      WriteAlpha(plan, blocks[b], images);
     } else if (blocks[b].width > 0) {
-      WriteClear(plan, blocks[b], alpha);
+      WriteClear(plan, blocks[b], images.alpha.data());
     }
   }
   return spent;
 }
 
 inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& plan,
-                                    const SoftMaskRegion& region, float* alpha,
+                                    const SoftMaskRegion& region, const SoftMaskImages& images,
                                     SoftMaskScratch* scratch) {
   FindNearGroups(tree, plan, region.rect, &scratch->groups);
   double spent = 0;
   ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
-    spent = std::max(spent, TileForward(tree, plan, tile, region.face_ids.data(), alpha, scratch));
+    spent = std::max(spent, TileForward(tree, plan, {tile, region.face_ids}, images, scratch));
   });
   return spent;
 }

@@ -56,7 +56,7 @@ HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
     }
   };
   times(2);  // A^8 is lacking, relatively
-  if (!hn::AllTrue(d, hn::Le(a, hn::Set(d, 0.125f)))) times(5);
+  if (!hn::AllTrue(d, hn::Le(a, hn::Set(d, 0.125f)))) times(7);
   return odds;
 }
 
@@ -246,21 +246,6 @@ struct WeakFaces {
             return hn::Mul(odds, hn::Set(d, push[i]));
           });
       sums.Add(d, list, m, corners);
-    }
-  }
-};
-
-// The products of all lanes, and of all lanes but the own.
-struct LaneProducts {
-  SoftVec all, others;
-
-  HWY_INLINE LaneProducts(SoftTag d, SoftVec v) {
-    others = Neighbour(d, v), all = hn::Mul(v, others);
-    const SoftVec pairs = NextPair(d, all);
-    others = hn::Mul(others, pairs), all = hn::Mul(all, pairs);
-    if constexpr (hn::MaxLanes(d) > 4) {
-      const SoftVec quartets = NextQuartet(d, all);
-      others = hn::Mul(others, quartets), all = hn::Mul(all, quartets);
     }
   }
 };

@@ -117,6 +117,21 @@ HWY_INLINE SoftVec Neighbour(SoftTag, SoftVec v) { return hn::Shuffle2301(v); }
 HWY_INLINE SoftVec NextPair(SoftTag, SoftVec v) { return hn::Shuffle1032(v); }
 HWY_INLINE SoftVec NextQuartet(SoftTag d, SoftVec v) { return hn::ReverseBlocks(d, v); }
 
+// The products of all lanes, and of all lanes but the own.
+struct LaneProducts {
+  SoftVec all, others;
+
+  HWY_INLINE LaneProducts(SoftTag d, SoftVec v) {
+    others = Neighbour(d, v), all = hn::Mul(v, others);
+    const SoftVec pairs = NextPair(d, all);
+    others = hn::Mul(others, pairs), all = hn::Mul(all, pairs);
+    if constexpr (hn::MaxLanes(d) > 4) {
+      const SoftVec quartets = NextQuartet(d, all);
+      others = hn::Mul(others, quartets), all = hn::Mul(all, quartets);
+    }
+  }
+};
+
 }  // namespace tilegrad::raster::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -30,6 +30,16 @@ SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
 
 double StopProduct(const SoftMaskPlan& plan) { return std::max(plan.stop_error, kUnseenProduct); }
 
+bool IsUnseen(const SoftMaskPlan& plan, double product, double least) {
+  return product <= kUnseenShare * plan.stop_error * least;
+}
+
+float TransmittanceOf(const SoftMaskPlan& plan, float alpha) {
+  const double spent = plan.node_error + plan.face_error + plan.stop_error;
+  const float product = 1 - alpha;
+  return static_cast<double>(product) < kLightProduct + spent ? kUnknownTransmittance : product;
+}
+
 SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
   const double z = DropZ(faces, plan.face_error);
   const double pixel = std::hypot(plan.unit_x, plan.unit_y);

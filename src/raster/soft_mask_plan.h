@@ -12,14 +12,25 @@ inline constexpr int kEndZ = 126;
 inline constexpr double kUnseenProduct = 0x1p-26;
 // Backward: faces nearer than this to a block are near ones. A <= 1/8 for the others.
 inline constexpr double kFarZ = 3;
-// Backward: the product in light pixels. A <= 15/16 in them for all faces.
-inline constexpr double kLightProduct = 1.0 / 16;
+// The least product in light pixels, or of each of their lanes. A <= 15/16 there for all faces.
+inline constexpr double kLightProduct = 1.0 / 64;
+// What rounding may take from the product of a lane.
+inline constexpr double kLaneRounding = 0x1p-18;
+// Covers the rounding of products of lanes.
+inline constexpr double kUnseenShare = 0.9;
 
 // z from which on `n` faces have A <= share / n each, and together no more than `share`.
 double DropZ(std::size_t n, double share);
 
 // The product at which a pixel may stop.
 double StopProduct(const SoftMaskPlan& plan);
+
+// No product of a pixel over all faces but one is more than product / least, that of all lanes and
+// the least of one, both not too small: whether that is too little to hand on.
+bool IsUnseen(const SoftMaskPlan& plan, double product, double least);
+
+// SoftMaskImages::transmittance of a background pixel of which only alpha is known.
+float TransmittanceOf(const SoftMaskPlan& plan, float alpha);
 
 // What the faces of nodes may drop, `faces` of them.
 SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces);

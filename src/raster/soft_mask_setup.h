@@ -94,6 +94,10 @@ struct SoftBlock {
   alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
   std::size_t whole;                               // faces that all pixels have seen
   alignas(64) double alpha[kBlockPixels];          // 1 where there is nothing to compute
+  // 1 - alpha to relative precision as long as no lane of a chunk leaves less than kLightProduct;
+  // else not less. The least that a lane leaves.
+  alignas(64) double product[kBlockPixels];
+  alignas(64) float least[kBlockPixels];
 };
 
 // From where on faces are far. Kernel units.

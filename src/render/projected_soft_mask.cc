@@ -83,7 +83,7 @@ double VectorMask(const ProjectedBatchT<float>& batch, const ProjectedMaskOption
     const std::size_t n = bins.image(task);
     spent[task] = raster::SoftMaskForward(images[n].tree, images[n].plan,
                                           {bins.rect(task), face_ids.subspan(n * pixels, pixels)},
-                                          alpha.subspan(n * pixels, pixels), &scratch[worker]);
+                                          {alpha.subspan(n * pixels, pixels)}, &scratch[worker]);
   });
   return spent.empty() ? 0 : *std::max_element(spent.begin(), spent.end());
 }
@@ -113,7 +113,7 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
     const SoftImage& image = images[bins.image(task)];
     raster::SoftMaskBackward(
         image.tree, image.plan, {bins.rect(task), adjoint.face_ids.subspan(first, pixels)},
-        {adjoint.alpha.subspan(first, pixels), adjoint.d_alpha.subspan(first, pixels)},
+        {adjoint.alpha.subspan(first, pixels), {}, adjoint.d_alpha.subspan(first, pixels)},
         &gradients[task], &scratch[worker]);
   });
   workers.For(batch.images, [&](std::size_t n, std::size_t) {

@@ -261,6 +261,7 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
+  frame->transmittance.resize(options.soft_rule == SoftRule::kAllFaces ? frame->alpha.size() : 0);
   if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
     return impl_->Render({scenes, options, {true, request.alpha, false}, frame, stage});
   }

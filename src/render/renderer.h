@@ -5,7 +5,7 @@
 // A batch of N scenes, each with its own mesh and camera, is rendered to N images of one size.
 // Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha of
 // background pixels is equation 6 over all faces, within `max_alpha_error`. The backward pass is
-// analytic and needs only the Frame: face ids and alpha.
+// analytic and needs only the Frame: face ids and alpha, and goes faster with its transmittance.
 #pragma once
 
 #include <cstddef>
@@ -80,8 +80,11 @@ struct FrameT {
   AlignedVector<T> depth;       // [N,H,W]; +infinity at background pixels
   AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
                                   // at background
-  double alpha_error_bound = 0;   // what culling really spent: no pixel is farther than this from
-                                  // equation 6; infinite with SoftRule::kPaper
+  // [N,H,W] 1 - alpha with more digits, where Backward has use for it (raster/soft_mask.h,
+  // SoftMaskImages); the rest is unspecified. May be emptied: Backward then takes more time.
+  AlignedVector<T> transmittance;
+  double alpha_error_bound = 0;  // what culling really spent: no pixel is farther than this from
+                                 // equation 6; infinite with SoftRule::kPaper
 };
 
 // dL/d(image); an empty span is zero. Shapes as in Frame.
@@ -148,9 +151,9 @@ class Renderer {
                 const RenderRequest& request, Frame* frame, PixelStage* stage = nullptr);
 
   // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` needs alpha
-  // where d_frame has it. A gradient that overflows float is an error too; after an error d_scenes
-  // may be written in part.
-  // With a stage, the cotangents of `attributes` come from it, and d_frame.attributes is empty.
+  // where d_frame has it. A gradient that overflows float is an error too;
+  // after an error d_scenes may be written in part. With a stage, the cotangents of `attributes`
+  // come from it, and d_frame.attributes is empty.
   Status Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                   const Frame& frame, const FrameGradients& d_frame,
                   std::span<SceneGradients> d_scenes, PixelStage* stage = nullptr);

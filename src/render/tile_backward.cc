@@ -186,8 +186,11 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
   const raster::TileGrid tiles(input.options.width, input.options.height);
   const std::size_t pixels =
       static_cast<std::size_t>(tiles.width) * static_cast<std::size_t>(tiles.height);
-  const auto part = [&](auto batch) { return batch.subspan(bin.image * pixels, pixels); };
+  const auto part = [&](auto batch) {
+    return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
+  };
   const raster::SoftMaskAdjoint adjoint{part(std::span<const float>(input.frame.alpha)),
+                                        part(std::span<const float>(input.frame.transmittance)),
                                         part(input.d_frame.alpha)};
   out->clear();
   ++worker->stats.softened;

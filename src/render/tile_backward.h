@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way back from images to faces, from face ids and alpha alone: attributes by bands of rows,
+// The way back from images to faces, from face ids and alpha: attributes by bands of rows,
 // alpha by bins.
 #pragma once
 

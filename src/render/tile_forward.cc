@@ -131,9 +131,10 @@ void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerSc
 double SoftAlpha(const ImageScratch& image, const TileTask& task, const ImageOfFrame& part,
                  WorkerScratch* worker, Frame* frame) {
   const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
-  const std::span<float> alpha(part.plane(frame->alpha, 1), part.pixels);
+  const raster::SoftMaskImages images{{part.plane(frame->alpha, 1), part.pixels},
+                                      {part.plane(frame->transmittance, 1), part.pixels}};
   ++worker->stats.softened;
-  return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, alpha,
+  return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, images,
                                  &worker->soft);
 }
 

@@ -74,6 +74,9 @@ Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const F
   if (!d_frame.alpha.empty()) {
     TILEGRAD_TRY(CheckSize("d_frame.alpha", d_frame.alpha.size(), pixels));
     TILEGRAD_TRY(CheckSize("frame.alpha", frame.alpha.size(), pixels));
+    if (!frame.transmittance.empty()) {
+      TILEGRAD_TRY(CheckSize("frame.transmittance", frame.transmittance.size(), pixels));
+    }
   }
   return {};
 }

@@ -19,6 +19,7 @@ namespace {
 using test::RandomScene;
 using test::RunSoftMask;
 using test::SoftResult;
+using test::SoftRun;
 using test::SoftScene;
 using test::SoftTruth;
 
@@ -79,7 +80,28 @@ std::vector<float> ComparableGradient(const SoftScene& scene, const SoftTruth& t
   return d_alpha;
 }
 
-void CheckScenes(std::uint64_t first, std::uint64_t count, std::size_t most_faces) {
+// Lanes that leave at least 1/64 each are off by 42 u a / (1 - a), which is no more than
+// 42 u (63 / ln 64) = 636 u times the logarithm of what they leave ("Gradients").
+void CheckTransmittance(const SoftScene& scene, const SoftTruth& truth, const SoftResult& result) {
+  const double e = scene.options.max_alpha_error, u = 0x1p-24;
+  for (std::size_t i = 0; i < scene.pixels(); ++i) {
+    const auto alpha = static_cast<double>(result.alpha[i]);
+    if (scene.face_ids[i] >= 0 || alpha <= e / 4) continue;
+    const auto known = static_cast<double>(result.transmittance[i]);
+    const auto [product, most] = truth.Products(i);
+    const double rounding = truth.Rounding(i);
+    if (known == 0) {
+      EXPECT_LE(most, e / 4 + rounding) << "pixel " << i;
+    }
+    if (known <= 0) continue;
+    const double of_lanes = 636 * u * (1 - std::log(product)) * product;
+    EXPECT_LE(std::abs(known - product), result.spent + rounding - 42 * u * alpha + of_lanes)
+        << "pixel " << i;
+  }
+}
+
+void CheckScenes(std::uint64_t first, std::uint64_t count, std::size_t most_faces,
+                 const SoftRun& run = {}) {
   SoftMaskScratch scratch;
   std::size_t compared = 0;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
@@ -90,8 +112,8 @@ void CheckScenes(std::uint64_t first, std::uint64_t count, std::size_t most_face
     for (const std::string& target : RunnableTargets()) {
       SCOPED_TRACE(target);
       ASSERT_TRUE(ForceTarget(target).ok());
-      const SoftResult result = RunSoftMask(scene, d_alpha, &scratch);
-      CheckAlpha(scene, truth, result);
+      const SoftResult result = RunSoftMask(scene, d_alpha, &scratch, run);
+      CheckAlpha(scene, truth, result), CheckTransmittance(scene, truth, result);
       CheckGradient(scene, truth, d_alpha, result);
       compared += scene.pixels();
     }
@@ -105,6 +127,10 @@ TEST(SoftMask, FewFacesOnEveryTarget) { CheckScenes(0, 1800, 12); }
 TEST(SoftMask, ManyFacesOnEveryTarget) { CheckScenes(100000, 200, 150); }
 // More than a chunk, and than a group of nodes: pixels may stop in between.
 TEST(SoftMask, HundredsOfFacesOnEveryTarget) { CheckScenes(150000, 20, 900); }
+TEST(SoftMask, WayBackFromAlphaAlone) {
+  CheckScenes(400000, 600, 12, {.with_transmittance = false});
+  CheckScenes(450000, 60, 150, {.with_transmittance = false});
+}
 TEST(SoftMaskLong, TwentyThousandScenes) {
   CheckScenes(200000, 18000, 12);
   CheckScenes(300000, 2000, 300);
@@ -137,7 +163,8 @@ TEST(SoftMask, RegionsDoNotMatter) {
     SCOPED_TRACE(seed);
     const SoftScene scene = SpotsScene(seed);
     const SoftResult bins = RunSoftMask(scene, scene.d_alpha, &scratch);
-    const SoftResult tiles = RunSoftMask(scene, scene.d_alpha, &scratch, kTileBits);
+    const SoftResult tiles =
+        RunSoftMask(scene, scene.d_alpha, &scratch, {.region_bits = kTileBits});
     EXPECT_EQ(bins.alpha, tiles.alpha);
     EXPECT_EQ(bins.spent, tiles.spent);
     float largest = 0;

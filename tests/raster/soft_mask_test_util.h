@@ -150,6 +150,15 @@ class SoftTruth {
     return {1 - outside, sum + 1e-16 * static_cast<double>(errors.size())};
   }
   double Rounding(std::size_t i) const { return Bound(i).rounding; }
+  // The product over all faces, and the largest over all but one.
+  std::array<double, 2> Products(std::size_t i) const {
+    std::vector<double> factors;
+    for (const double z : AllZ(i)) factors.push_back(-std::expm1(-z));
+    double product = 1, most = 0;
+    for (const double factor : factors) product *= factor;
+    for (const double others : ProductsOfOthers(factors)) most = std::max(most, others);
+    return {product, most};
+  }
   // Whether coordinates are small enough for double to tell how far the pixel is from each face
   // that may matter. Far beyond 1e8 pixels neither this truth nor a kernel knows.
   bool Resolved(std::size_t i) const {
@@ -292,26 +301,34 @@ class SoftTruth {
 
 // The kernel over all tiles, merged in tile order.
 struct SoftResult {
-  std::vector<float> alpha;
+  std::vector<float> alpha, transmittance;
   double spent = 0;
   std::vector<float> d_corners;  // [faces][3][2]
 };
 
-// In regions of 1 << region_bits pixels.
+struct SoftRun {
+  int region_bits = kBinBits;      // regions of 1 << region_bits pixels
+  bool with_transmittance = true;  // on the way back
+};
+
 inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& d_alpha,
-                              SoftMaskScratch* scratch, int region_bits = kBinBits) {
+                              SoftMaskScratch* scratch, const SoftRun& run = {}) {
   const ScreenMesh mesh = scene.mesh.View();
   SoftTree tree;
   BuildSoftTree(mesh, &tree);
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
-  const TileGrid grid(scene.options.width, scene.options.height, region_bits);
+  const TileGrid grid(scene.options.width, scene.options.height, run.region_bits);
   SoftResult out;
-  out.alpha.assign(scene.pixels(), -1.0f), out.d_corners.assign(6 * mesh.faces(), 0.0f);
+  out.alpha.assign(scene.pixels(), -1.0f), out.transmittance.assign(scene.pixels(), -2.0f);
+  out.d_corners.assign(6 * mesh.faces(), 0.0f);
   AlignedVector<SoftFaceGradient> gradients;
+  std::span<const float> known(out.transmittance);
+  if (!run.with_transmittance) known = {};
   for (std::size_t t = 0; t < grid.tiles(); ++t) {
     const SoftMaskRegion region{grid.rect(t), scene.face_ids};
-    out.spent = std::max(out.spent, SoftMaskForward(tree, plan, region, out.alpha, scratch));
-    SoftMaskBackward(tree, plan, region, {out.alpha, d_alpha}, &gradients, scratch);
+    out.spent = std::max(
+        out.spent, SoftMaskForward(tree, plan, region, {out.alpha, out.transmittance}, scratch));
+    SoftMaskBackward(tree, plan, region, {out.alpha, known, d_alpha}, &gradients, scratch);
   }
   for (const SoftFaceGradient& g : gradients) {
     float* to = out.d_corners.data() + 6 * static_cast<std::size_t>(g.face);

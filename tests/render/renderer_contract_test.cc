@@ -67,7 +67,7 @@ TEST(RendererMemory, SteadyStateAllocatesNothing) {
 }
 
 // What a caller must keep from Render to Backward: at most 16 bytes a pixel, whatever was rendered.
-TEST(RendererMemory, BackwardNeedsFaceIdsAndAlphaOnly) {
+TEST(RendererMemory, BackwardNeedsFaceIdsAndWhatAlphaLeaves) {
   Batch batch = Batch::Large();
   const Workers workers(1);
   Frame frame;
@@ -85,8 +85,40 @@ TEST(RendererMemory, BackwardNeedsFaceIdsAndAlphaOnly) {
   EXPECT_EQ(batch.positions, positions);
   EXPECT_EQ(batch.attributes, attributes);
   const std::size_t bytes = frame.face_ids.size() * sizeof(frame.face_ids[0]) +
-                            frame.alpha.size() * sizeof(frame.alpha[0]);
+                            frame.alpha.size() * sizeof(frame.alpha[0]) +
+                            frame.transmittance.size() * sizeof(frame.transmittance[0]);
   EXPECT_LE(bytes, 16 * batch.d_alpha.size());
+}
+
+// Both ways round at every pixel and face by some 1e-6 of the largest gradients.
+TEST(RendererMemory, BackwardWithoutTransmittanceIsTheSame) {
+  Batch batch = Batch::Large();
+  const Workers workers(1);
+  Renderer renderer(workers);
+  Frame frame;
+  const auto backward = [&] {
+    EXPECT_TRUE(renderer
+                    .Backward(batch.views, batch.options, frame,
+                              {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
+                    .ok());
+    return batch.positions;
+  };
+  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true}, &frame).ok());
+  ASSERT_EQ(frame.transmittance.size(), frame.alpha.size());
+  const auto with = backward();
+  frame.transmittance.clear();
+  const auto without = backward();
+  for (std::size_t n = 0; n < with.size(); ++n) {
+    float largest = 0;
+    for (const float d : with[n]) largest = std::max(largest, std::abs(d));
+    for (std::size_t i = 0; i < with[n].size(); ++i) {
+      EXPECT_NEAR(with[n][i], without[n][i], 1e-5f * largest) << "scene " << n << " number " << i;
+    }
+  }
+  frame.transmittance.resize(3);
+  const Status status =
+      renderer.Backward(batch.views, batch.options, frame, {{}, batch.d_alpha}, batch.d_scenes);
+  EXPECT_NE(status.message().find("frame.transmittance"), std::string::npos);
 }
 
 bool operator==(const RenderStats& a, const RenderStats& b) {
