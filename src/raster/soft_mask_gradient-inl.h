@@ -45,19 +45,25 @@ HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, co
   out->resize(static_cast<std::size_t>(to - out->data()));
 }
 
-// A / (1 - A) for A <= 15/16: A (1 + A) (1 + A^2) (1 + A^4) ..., until what is lacking is below u.
-HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
+// A / (1 - A) as A (1 + A) (1 + A^2) (1 + A^4) ..., so many factors, until what is lacking is
+// about u.
+template <int kFactors>
+HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
   // The least power is far below u, and far from denormal numbers, which are slow.
   const SoftVec base = hn::Max(a, hn::Set(d, 0x1p-30f));
   SoftVec power = hn::Mul(base, base), odds = hn::MulAdd(a, a, a);
-  const auto times = [&](int factors) HWY_ATTR {
-    for (int i = 0; i < factors; ++i) {
-      odds = hn::MulAdd(odds, power, odds), power = hn::Mul(power, power);
-    }
-  };
-  times(2);  // A^8 is lacking, relatively
-  if (!hn::AllTrue(d, hn::Le(a, hn::Set(d, 0.125f)))) times(7);
+  for (int i = 1; i < kFactors; ++i) {
+    odds = hn::MulAdd(odds, power, odds), power = hn::Mul(power, power);
+  }
   return odds;
+}
+// For A <= kSmallInfluence: lacks A^8, relatively.
+inline constexpr float kSmallInfluence = 0.125f;
+HWY_INLINE SoftVec SmallOdds(SoftTag d, SoftVec a) { return OddsSeries<3>(d, a); }
+// For A <= 63/64: lacks A^1024.
+HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
+  const bool small = hn::AllTrue(d, hn::Le(a, hn::Set(d, kSmallInfluence)));
+  return small ? SmallOdds(d, a) : OddsSeries<10>(d, a);
 }
 
 // The nearest of the faces' three edges: the way to the pixel, and the share of the edge's second
@@ -185,7 +191,7 @@ struct ChunkSums {
   }
 };
 
-// Faces of a block of which A <= 15/16; push [kBlockPixels] is 2 d_alpha times the product over all
+// Faces of a block of which A <= 63/64; push [kBlockPixels] is 2 d_alpha times the product over all
 // faces.
 struct WeakFaces {
   const SoftBlock& block;
@@ -198,13 +204,26 @@ struct WeakFaces {
       const std::uint64_t bits = PixelsOf(d, list, m, pixels);
       if (bits == 0) continue;
       const VertexMembers members(d, list, m, block, bits);
-      SoftVec d_x = hn::Zero(d), d_y = hn::Zero(d);
-      ForPixels(bits, [&](std::size_t i) HWY_ATTR {
-        const SoftVec w = hn::Mul(Odds(d, members.Influence(i)), hn::Set(d, push[i]));
-        d_x = hn::MulAdd(w, members.columns.way[i % kBlockSize], d_x);
-        d_y = hn::MulAdd(w, members.rows.way[i / kBlockSize], d_y);
-      });
-      sums.Add(d, list, m, 0, d_x, d_y);
+      const auto add = [&](const auto& odds) HWY_ATTR {
+        SoftVec d_x = hn::Zero(d), d_y = hn::Zero(d);
+        ForRowsOf(bits, [&](std::size_t row, std::uint64_t columns) HWY_ATTR {
+          const SoftVec of_row = members.rows.power[row];
+          const float* row_push = push + row * kBlockSize;
+          SoftVec pushed = hn::Zero(d);
+          ForPixels(columns, [&](std::size_t x) HWY_ATTR {
+            const SoftVec influence = hn::Mul(members.columns.power[x], of_row);
+            const SoftVec w = hn::Mul(odds(influence), hn::Set(d, row_push[x]));
+            d_x = hn::MulAdd(w, members.columns.way[x], d_x), pushed = hn::Add(pushed, w);
+          });
+          d_y = hn::MulAdd(pushed, members.rows.way[row], d_y);
+        });
+        sums.Add(d, list, m, 0, d_x, d_y);
+      };
+      if (members.AllWithin(d, kSmallInfluence)) {
+        add([&](SoftVec a) HWY_ATTR { return SmallOdds(d, a); });
+      } else {
+        add([&](SoftVec a) HWY_ATTR { return Odds(d, a); });
+      }
     }
   }
 

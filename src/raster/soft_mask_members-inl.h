@@ -28,6 +28,15 @@ HWY_INLINE void ForPixels(std::uint64_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
+// Calls visit(row, bits of its columns) for each row that has some.
+template <class Visit>
+HWY_INLINE void ForRowsOf(std::uint64_t bits, const Visit& visit) {
+  for (std::uint32_t rows = RowsOf(bits); rows != 0; rows &= rows - 1) {
+    const auto row = static_cast<std::size_t>(std::countr_zero(rows));
+    visit(row, bits >> row * kBlockSize & 0xff);
+  }
+}
+
 // The pixels of `among` that see one of a vector of members.
 HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftList& list, std::size_t m,
                                   std::uint64_t among) {
@@ -38,14 +47,16 @@ HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftList& list, std::size_t m
 
 // Squared lengths along one axis, halved that often, and the ways themselves: [column or row].
 struct AxisInfluence {
-  SoftVec power[kBlockSize], way[kBlockSize];
+  SoftVec power[kBlockSize], way[kBlockSize], most;
 
   // For the bits of `pixels`, columns or rows at `at`.
-  HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels) {
+  HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels)
+      : most(hn::Zero(d)) {
     for (; pixels != 0; pixels &= pixels - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
       way[i] = hn::Sub(hn::Set(d, at[i]), vertex);
       power[i] = simd::HalvingOf(d, hn::Mul(way[i], way[i])).power;
+      most = hn::Max(most, power[i]);
     }
   }
 };
@@ -59,8 +70,9 @@ struct VertexMembers {
                            const SoftBlock& block, std::uint64_t bits)
       : columns(d, block.x, hn::Load(d, list.v[0] + m), ColumnsOf(bits)),
         rows(d, block.y, hn::Load(d, list.v[1] + m), RowsOf(bits)) {}
-  HWY_INLINE SoftVec Influence(std::size_t pixel) const {
-    return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);
+  // All within `limit`.
+  HWY_INLINE bool AllWithin(SoftTag d, float limit) const {
+    return hn::AllTrue(d, hn::Le(hn::Mul(columns.most, rows.most), hn::Set(d, limit)));
   }
 };
 
