@@ -23,18 +23,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// A row of up to kBlockSize pixels of an image, filled up with zeros where it has fewer.
-struct PixelRow {
-  const float* pixels;
-  alignas(64) float copy[kBlockSize];
-
-  HWY_INLINE PixelRow(const float* image, int width) : pixels(image) {
-    if (width == static_cast<int>(kBlockSize)) return;
-    std::fill(std::copy_n(image, width, copy), copy + kBlockSize, 0.0f);
-    pixels = copy;
-  }
-};
-
 // Backward through one tile, after FindNearGroups.
 class TileBackward {
  public:
@@ -80,29 +68,33 @@ class TileBackward {
   // product over all faces: moving the nearest point along the way to the pixel lowers z. Dark
   // ones, whose product is not known, have none yet.
   HWY_INLINE std::uint64_t TakePixels(const SoftMaskRegion& tile, const SoftBlock& block) {
-    const std::uint64_t background = BackgroundOf(plan_, block, tile.face_ids.data());
-    if (background == 0) return 0;
     const auto b = static_cast<std::size_t>(&block - scratch_->blocks);
     std::uint64_t bits = 0;
     ForRows(plan_, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
-      const std::uint64_t row = background >> to & PixelsThatMatter(from, block.width);
+      const std::uint64_t row = SoftPixels(tile, from, block.width);
       if (row != 0) bits |= TakeRow(from, to, row, b);
     });
     return bits;
   }
 
-  // Bits of a row's pixels that are pulled on, and where alpha is not so small that all faces may
-  // be dropped: together they have A <= about alpha.
-  HWY_INLINE std::uint64_t PixelsThatMatter(std::size_t from, int width) const {
+  // Bits of a row's background pixels where alpha is not so small that all faces may be dropped:
+  // together they have A <= about alpha.
+  HWY_INLINE std::uint64_t SoftPixels(const SoftMaskRegion& tile, std::size_t from,
+                                      int width) const {
     const SoftTag d;
-    const SoftVec least = hn::Set(d, static_cast<float>(plan_.stop_error));
-    const PixelRow alpha(adjoint_.alpha.data() + from, width);
-    const PixelRow d_alpha(adjoint_.d_alpha.data() + from, width);
+    const SoftIntTag di;
+    const std::int32_t* ids = tile.face_ids.data() + from;
+    const float* alpha = adjoint_.alpha.data() + from;
+    const auto least = static_cast<float>(plan_.stop_error);
     std::uint64_t row = 0;
+    if (width < static_cast<int>(kBlockSize)) {
+      for (int x = 0; x < width; ++x) row |= std::uint64_t{ids[x] < 0 && alpha[x] > least} << x;
+      return row;
+    }
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      const SoftMask none = hn::Or(hn::Le(hn::LoadU(d, alpha.pixels + x), least),
-                                   hn::Eq(hn::LoadU(d, d_alpha.pixels + x), hn::Zero(d)));
-      row |= std::uint64_t{BitsOf(d, hn::Not(none))} << x;
+      const auto background = hn::RebindMask(d, hn::Lt(hn::LoadU(di, ids + x), hn::Zero(di)));
+      const auto soft = hn::Gt(hn::LoadU(d, alpha + x), hn::Set(d, least));
+      row |= std::uint64_t{BitsOf(d, hn::And(background, soft))} << x;
     }
     return row;
   }
@@ -114,9 +106,10 @@ class TileBackward {
       const float product = adjoint_.transmittance.empty()
                                 ? TransmittanceOf(plan_, adjoint_.alpha[from + x])
                                 : adjoint_.transmittance[from + x];
-      push_[b][to + x] = 2 * adjoint_.d_alpha[from + x] * product;
-      bits |= std::uint64_t{product != 0} << (to + x);
-      dark_[b] |= std::uint64_t{product < 0} << (to + x);
+      const float d_alpha = adjoint_.d_alpha[from + x];
+      const std::uint64_t bit = std::uint64_t{product != 0 && d_alpha != 0} << (to + x);
+      push_[b][to + x] = 2 * d_alpha * product;
+      bits |= bit, dark_[b] |= product < 0 ? bit : 0;
     });
     return bits;
   }

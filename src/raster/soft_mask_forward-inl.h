@@ -160,9 +160,15 @@ HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float
 HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* image) {
   const SoftTag d;
   const auto size = static_cast<std::size_t>(block.width);
+  alignas(64) float alpha[kBlockSize];
+  if (block.bits == 0) {  // most blocks that have not seen a face are all face, or all background
+    std::fill_n(alpha, kBlockSize, 1.0f);
+    ForRows(plan, block,
+            [&](std::size_t to, std::size_t) HWY_ATTR { CopyRow(alpha, size, image + to); });
+    return;
+  }
   ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
     const std::uint64_t row = block.bits >> from;
-    alignas(64) float alpha[kBlockSize];
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
       const std::uint8_t bits[8] = {static_cast<std::uint8_t>(row >> x)};
       const SoftMask background = hn::LoadMaskBits(d, bits);

@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Yes or no about whole arrays, fast: what is wrong, and where, is found by validate.h afterwards.
+// Yes or no, fast: what is wrong, and where, is found by validate.h afterwards.
 #pragma once
 
-#include <cstdint>
-#include <span>
-
+#include "base/array_checks.h"
 #include "scene/camera.h"
 
 namespace tilegrad {
-
-bool AllFinite(std::span<const float> values);
-bool AllFinite(std::span<const double> values);
-
-// Whether every value is in [least, end).
-bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end);
 
 bool IsFiniteCamera(const Camera& camera);  // all of its numbers
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/array_checks.h"
 #include "base/error.h"
 #include "nn/context.h"
 #include "nn/kernels/adam.h"
@@ -14,10 +15,6 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
-
-bool AllFinite(const AlignedVector<float>& values) {
-  return std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); });
-}
 
 // The arrays of a block that are state.
 template <class Block>

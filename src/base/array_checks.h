@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Yes or no about whole arrays, fast.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace tilegrad {
+
+bool AllFinite(std::span<const float> values);
+bool AllFinite(std::span<const double> values);
+
+// Whether every value is in [least, end).
+bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end);
+
+}  // namespace tilegrad

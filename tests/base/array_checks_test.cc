@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// On every target and for every length around whole vectors: a wrong value is found wherever it is,
+// and no right one is taken for wrong.
+#include "base/array_checks.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/simd_target.h"
+
+namespace tilegrad {
+namespace {
+
+template <class T>
+void CheckFinite() {
+  using Limits = std::numeric_limits<T>;
+  const T fine[] = {0, T(-0.0), Limits::denorm_min(), Limits::max(), Limits::lowest()};
+  const T bad[] = {Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN()};
+  for (std::size_t n = 0; n < 100; ++n) {
+    std::vector<T> values(n);
+    for (std::size_t i = 0; i < n; ++i) values[i] = fine[i % 5];
+    EXPECT_TRUE(AllFinite(values)) << n;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (const T wrong : bad) {
+        const T right = std::exchange(values[i], wrong);
+        EXPECT_FALSE(AllFinite(values)) << n << " " << i;
+        values[i] = right;
+      }
+    }
+  }
+}
+
+void CheckWithin(std::int32_t least, std::int32_t end) {
+  using Limits = std::numeric_limits<std::int32_t>;
+  for (std::size_t n = 0; n < 100; ++n) {
+    std::vector<std::int32_t> values(n, least);
+    for (std::size_t i = 0; i < n; i += 2) values[i] = end - 1;
+    EXPECT_TRUE(AllWithin(values, least, end));
+    for (std::size_t i = 0; i < n; ++i) {
+      for (const std::int32_t wrong : {Limits::min(), least - 1, end, Limits::max()}) {
+        const std::int32_t right = std::exchange(values[i], wrong);
+        EXPECT_FALSE(AllWithin(values, least, end)) << n << " " << i << " " << wrong;
+        values[i] = right;
+      }
+    }
+  }
+}
+
+TEST(ArrayChecks, FindWrongValuesOnEveryTarget) {
+  for (const std::string& target : RunnableTargets()) {
+    SCOPED_TRACE(target);
+    ASSERT_TRUE(ForceTarget(target).ok());
+    CheckFinite<float>(), CheckFinite<double>();
+    CheckWithin(-1, 5000), CheckWithin(0, 1), CheckWithin(-7, 1 << 30);
+    EXPECT_TRUE(AllWithin({}, 0, 0));
+    EXPECT_FALSE(
+        AllWithin(std::vector<std::int32_t>{0}, 0, std::numeric_limits<std::int32_t>::min()));
+  }
+  ASSERT_TRUE(ForceTarget("").ok());
+}
+
+}  // namespace
+}  // namespace tilegrad
