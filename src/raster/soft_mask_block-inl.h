@@ -119,11 +119,13 @@ HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
 
 // Alpha of a block over no faces: 0 for the pixels to compute.
 HWY_INLINE void ClearAlpha(SoftBlock* block) {
-  for (std::size_t i = 0; i < kBlockPixels; ++i) {
-    block->alpha[i] = (block->bits >> i & 1) != 0 ? 0 : 1;
-    block->product[i] = 1 - block->alpha[i];
-  }
+  std::fill_n(block->alpha, kBlockPixels, 0.0);
+  std::fill_n(block->product, kBlockPixels, 1.0);
   std::fill_n(block->least, kBlockPixels, 1.0f);
+  for (std::uint64_t others = ~block->bits; others != 0; others &= others - 1) {
+    const int i = std::countr_zero(others);
+    block->alpha[i] = 1, block->product[i] = 0;
+  }
 }
 
 }  // namespace tilegrad::raster::HWY_NAMESPACE
