@@ -35,12 +35,7 @@ class PartialAlpha {
       const std::uint64_t bits = See(list, m);
       if (bits == 0) continue;
       const VertexMembers members(d, list, m, *block_, bits);
-      ForRowsOf(bits, [&](std::size_t row, std::uint64_t columns) HWY_ATTR {
-        const SoftVec of_row = members.rows.power[row];
-        ForPixels(columns, [&](std::size_t x) HWY_ATTR {
-          Put(d, row * kBlockSize + x, hn::Mul(members.columns.power[x], of_row));
-        });
-      });
+      ForPixels(bits, [&](std::size_t i) HWY_ATTR { Put(d, i, members.Influence(i)); });
     }
   }
 

@@ -70,6 +70,9 @@ struct VertexMembers {
                            const SoftBlock& block, std::uint64_t bits)
       : columns(d, block.x, hn::Load(d, list.v[0] + m), ColumnsOf(bits)),
         rows(d, block.y, hn::Load(d, list.v[1] + m), RowsOf(bits)) {}
+  HWY_INLINE SoftVec Influence(std::size_t pixel) const {
+    return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);
+  }
   // All within `limit`.
   HWY_INLINE bool AllWithin(SoftTag d, float limit) const {
     return hn::AllTrue(d, hn::Le(hn::Mul(columns.most, rows.most), hn::Set(d, limit)));
