@@ -9,17 +9,39 @@
 namespace tilegrad::raster {
 namespace {
 
-// The tiles of faces [begin, end).
+// The tiles of a face. Most have one.
 template <class Emit>
-void ForEachTile(const AlignedVector<TileRange>& ranges, std::size_t begin, std::size_t end,
-                 int columns, const Emit& emit) {
-  for (std::size_t f = begin; f < end; ++f) {
-    const TileRange r = ranges[f];
-    for (int row = r.row_begin; row < r.row_end; ++row) {
-      for (int column = r.column_begin; column < r.column_end; ++column) {
-        emit(static_cast<std::size_t>(row * columns + column), static_cast<std::int32_t>(f));
-      }
+void ForEachTile(const TileRange& range, int columns, const Emit& emit) {
+  if ((range.columns | range.rows) == 1) {
+    emit(static_cast<std::size_t>(range.first));
+    return;
+  }
+  for (int row = 0; row < range.rows; ++row) {
+    for (int column = 0; column < range.columns; ++column) {
+      emit(static_cast<std::size_t>(range.first + row * columns + column));
     }
+  }
+}
+
+TileRange RangeOf(const DrawnFace& face, const TileGrid& grid) {
+  const int up = (1 << grid.bits) - 1;
+  const int column = face.column_begin >> grid.bits, row = face.row_begin >> grid.bits;
+  return {row * grid.columns + column,
+          static_cast<std::int16_t>(((face.column_end + up) >> grid.bits) - column),
+          static_cast<std::int16_t>(((face.row_end + up) >> grid.bits) - row)};
+}
+
+// Sets the ranges of the faces of lists [begin, end), and counts them by tile.
+void FindRanges(const DrawnFaces& faces, const TileGrid& grid, std::size_t begin, std::size_t end,
+                AlignedVector<TileRange>* ranges, std::int32_t* counts) {
+  for (std::size_t list = begin; list < end; ++list) {
+    TileRange* to = ranges->data() + list * DrawnFaces::kChunk;
+    for (const DrawnFace& face : faces.list(list)) {
+      *to = RangeOf(face, grid);
+      ForEachTile(*to++, grid.columns, [&](std::size_t tile) { ++counts[tile]; });
+    }
+    const std::size_t next = std::min((list + 1) * DrawnFaces::kChunk, ranges->size());
+    std::fill(to, ranges->data() + next, TileRange{0, 0, 0});
   }
 }
 
@@ -36,27 +58,27 @@ void PlaceChunks(std::size_t tiles, TileListBuffers* buffers) {
   buffers->begin[tiles] = total;
 }
 
-// A counting sort of buffers->ranges, which is stable, in chunks of faces.
-TileLists SortIntoTiles(const TileGrid& grid, TileListBuffers* buffers, const Workers* workers) {
+// A counting sort, which is stable, in chunks of lists of faces.
+TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
+                        const Workers* workers) {
+  constexpr std::size_t kList = DrawnFaces::kChunk;
   const std::size_t n = buffers->ranges.size(), tiles = grid.tiles();
-  const std::size_t chunk = std::max(DrawnFaces::kChunk, tiles);
+  const std::size_t lists = faces.counts.size(), share = (tiles + kList - 1) / kList;
   buffers->begin.resize(tiles + 1);
-  buffers->cursor.assign((n + chunk - 1) / chunk * tiles, 0);
-  const auto cursors = [&](std::size_t begin) {
-    return buffers->cursor.data() + begin / chunk * tiles;
-  };
-  ForChunks(workers, n, chunk, [&](std::size_t begin, std::size_t end) {
-    std::int32_t* const counts = cursors(begin);
-    ForEachTile(buffers->ranges, begin, end, grid.columns,
-                [&](std::size_t tile, std::int32_t) { ++counts[tile]; });
+  buffers->cursor.assign((lists + share - 1) / share * tiles, 0);
+  const auto cursors = [&](std::size_t chunk) { return buffers->cursor.data() + chunk * tiles; };
+  ForChunks(workers, lists, share, [&](std::size_t begin, std::size_t end) {
+    FindRanges(faces, grid, begin, end, &buffers->ranges, cursors(begin / share));
   });
   PlaceChunks(tiles, buffers);
   buffers->faces.resize(static_cast<std::size_t>(buffers->begin.back()));
-  ForChunks(workers, n, chunk, [&](std::size_t begin, std::size_t end) {
-    std::int32_t* const cursor = cursors(begin);
-    ForEachTile(buffers->ranges, begin, end, grid.columns, [&](std::size_t tile, std::int32_t f) {
-      buffers->faces[static_cast<std::size_t>(cursor[tile]++)] = f;
-    });
+  ForChunks(workers, n, share * kList, [&](std::size_t begin, std::size_t end) {
+    std::int32_t* const cursor = cursors(begin / (share * kList));
+    for (std::size_t f = begin; f < end; ++f) {
+      ForEachTile(buffers->ranges[f], grid.columns, [&](std::size_t tile) {
+        buffers->faces[static_cast<std::size_t>(cursor[tile]++)] = static_cast<std::int32_t>(f);
+      });
+    }
   });
   return buffers->View();
 }
@@ -74,28 +96,15 @@ TileLists ListAll(const DrawnFaces& faces, TileListBuffers* buffers) {
   return buffers->View();
 }
 
-TileRange RangeOf(const DrawnFace& face, int bits) {
-  const int up = (1 << bits) - 1;
-  return {static_cast<std::int16_t>(face.column_begin >> bits),
-          static_cast<std::int16_t>((face.column_end + up) >> bits),
-          static_cast<std::int16_t>(face.row_begin >> bits),
-          static_cast<std::int16_t>((face.row_end + up) >> bits)};
-}
-
 }  // namespace
 
 TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
                         const Workers* workers) {
   if (grid.tiles() == 1) return ListAll(faces, buffers);
-  constexpr std::size_t kChunk = DrawnFaces::kChunk;
-  const std::size_t chunks = faces.counts.size();
-  buffers->ranges.resize(chunks == 0 ? 0 : (chunks - 1) * kChunk + faces.counts.back());
-  ForChunks(workers, buffers->ranges.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    TileRange* to = buffers->ranges.data() + begin;
-    for (const DrawnFace& face : faces.list(begin / kChunk)) *to++ = RangeOf(face, grid.bits);
-    std::fill(to, buffers->ranges.data() + end, TileRange{0, 0, 0, 0});
-  });
-  return SortIntoTiles(grid, buffers, workers);
+  const std::size_t lists = faces.counts.size();
+  const std::size_t before_last = lists == 0 ? 0 : (lists - 1) * DrawnFaces::kChunk;
+  buffers->ranges.resize(lists == 0 ? 0 : before_last + faces.counts.back());
+  return SortIntoTiles(faces, grid, buffers, workers);
 }
 
 }  // namespace tilegrad::raster

@@ -68,9 +68,10 @@ struct TileGrid {
 // Faces are drawn by bins.
 inline TileGrid BinGrid(int width, int height) { return {width, height, kBinBits}; }
 
-// Tiles [column_begin, column_end) x [row_begin, row_end) of a face.
+// Tiles of a face: `columns` x `rows` from tile `first` on; none of a face that is not drawn.
 struct TileRange {
-  std::int16_t column_begin, column_end, row_begin, row_end;
+  std::int32_t first;
+  std::int16_t columns, rows;
 };
 
 // Owns the memory of a TileLists; reused from frame to frame.

@@ -50,7 +50,7 @@ struct PixelAxis {
   float first, reach;
 };
 
-// Those within reach of the faces' boxes: the first, and 256 times the one behind the last.
+// Those within reach of the faces' boxes: the first, and 16 times the one behind the last.
 HWY_INLINE SoftInt PixelsNear(SoftTag d, SoftVec low, SoftVec high, const PixelAxis& axis) {
   const SoftIntTag di;
   const auto from_first = [&](SoftVec at, float shift) HWY_ATTR {
@@ -62,14 +62,13 @@ HWY_INLINE SoftInt PixelsNear(SoftTag d, SoftVec low, SoftVec high, const PixelA
   const auto clamp = [&](SoftVec v) HWY_ATTR {
     return hn::ConvertTo(di, hn::Min(hn::Max(v, hn::Zero(d)), hn::Set(d, float{kBlockSize})));
   };
-  return hn::Add(clamp(begin), hn::ShiftLeft<8>(clamp(end)));
+  return hn::Add(clamp(begin), hn::ShiftLeft<4>(clamp(end)));
 }
 
 // Bits of the pixels of a SoftList::range.
 HWY_INLINE std::uint64_t RangeBits(std::int32_t range) {
-  const auto byte = [&](int i) { return static_cast<std::uint32_t>(range) >> 8 * i & 0xff; };
-  const BitsFrom &rows = kBitsFrom.rows, &columns = kBitsFrom.columns;
-  return rows.bits[byte(0)] & ~rows.bits[byte(1)] & columns.bits[byte(2)] & ~columns.bits[byte(3)];
+  const auto both = static_cast<std::uint32_t>(range);
+  return kRangeTables.rows[both & 0xff] & kRangeTables.columns[both >> 8];
 }
 
 // One of three by lanes.
@@ -172,7 +171,7 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FaceBoxes& b
   const SoftInt columns =
       PixelsNear(d, boxes.left, boxes.right,
                  {static_cast<float>(block.x0) + 0.5f, reach.root / block.box.unit_x});
-  const MemberTags tags{slot, hn::Add(rows, hn::ShiftLeft<16>(columns))};
+  const MemberTags tags{slot, hn::Add(rows, hn::ShiftLeft<8>(columns))};
   AppendVertices(d, f, tags, vertex, corner, &lists->vertices);
   AppendEdges(d, f, tags, segment, edge, &lists->segments);
   AppendBoundaries(d, f, tags, hn::AndNot(hn::Or(vertex, segment), keep), &lists->boundaries);

@@ -38,20 +38,22 @@ struct ChosenLanes {
 };
 inline constexpr ChosenLanes kChosenLanes;
 
-// Bits of the pixels of a block from row or column n on.
-struct BitsFrom {
-  std::uint64_t bits[kBlockSize + 1];
-};
-struct BitsFromTables {
-  BitsFrom rows{}, columns{};
-  constexpr BitsFromTables() {
-    for (std::size_t n = 0; n < kBlockSize; ++n) {
-      rows.bits[n] = ~std::uint64_t{0} << kBlockSize * n;
-      columns.bits[n] = (0xffu << n & 0xffu) * 0x0101010101010101u;
+// Bits of the pixels of a block in rows or columns [begin, end), at begin + 16 end.
+struct RangeTables {
+  static constexpr std::size_t kRoom = 16 * (kBlockSize + 1);
+  std::uint64_t rows[kRoom] = {}, columns[kRoom] = {};
+  constexpr RangeTables() {
+    for (std::size_t end = 0; end <= kBlockSize; ++end) {
+      for (std::size_t i = 0; i < end; ++i) {
+        for (std::size_t begin = 0; begin <= i; ++begin) {
+          rows[begin + 16 * end] |= std::uint64_t{0xff} << kBlockSize * i;
+          columns[begin + 16 * end] |= std::uint64_t{0x0101010101010101} << i;
+        }
+      }
     }
   }
 };
-inline constexpr BitsFromTables kBitsFrom;
+inline constexpr RangeTables kRangeTables;
 
 // Pixel centres of a rectangle.
 struct SoftBox {
@@ -114,7 +116,7 @@ struct SoftList {
   static constexpr std::size_t kRoom = 2 * kChunkRoom + kSoftLanes;
   alignas(64) std::int32_t slot[kRoom];  // in the chunk; longs behind shorts
   alignas(64) std::int32_t part[kRoom];  // which corner or edge
-  // First row, the one behind the last, first column, the one behind the last: a byte each.
+  // Rows and columns, a byte each, as RangeTables has them.
   alignas(64) std::int32_t range[kRoom];
   std::size_t count;
 };
