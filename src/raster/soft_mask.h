@@ -49,10 +49,11 @@ struct SoftMaskRegion {
 };
 
 struct SoftMaskImages {
-  std::span<float> alpha;  // 1 where face_ids >= 0
-  // May be empty. Written only about background pixels whose alpha is more than E / 4, for the way
-  // back: the product over all faces, 1 - alpha, to relative precision, where no more is needed; 0
-  // where there is nothing to hand on, kUnknownTransmittance where it must multiply again
+  std::span<float> alpha;  // [H,W] 1 where face_ids >= 0
+  // May be empty. For the way back, as many numbers, but block after block of up to 8 x 8 pixels, a
+  // row of blocks after the other. Written only where a block has background pixels whose alpha is
+  // more than E / 4: the product over all faces, 1 - alpha, to relative precision, where no more is
+  // needed; 0 where there is nothing to hand on, kUnknownTransmittance where it must multiply again
   // (docs/numerics.md, "Gradients").
   std::span<float> transmittance = {};
 };

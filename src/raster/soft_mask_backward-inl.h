@@ -102,10 +102,13 @@ class TileBackward {
   // The push of the pixels `row` of a row of block b; returns the bits of those that have one.
   std::uint64_t TakeRow(std::size_t from, std::size_t to, std::uint64_t row, std::size_t b) {
     std::uint64_t bits = 0;
+    const SoftBlock& block = scratch_->blocks[b];
+    const std::size_t known =
+        TransmittanceIndex(plan_, block) + to / kBlockSize * static_cast<std::size_t>(block.width);
     ForPixels(row, [&](std::size_t x) {
       const float product = adjoint_.transmittance.empty()
                                 ? TransmittanceOf(plan_, adjoint_.alpha[from + x])
-                                : adjoint_.transmittance[from + x];
+                                : adjoint_.transmittance[known + x];
       const float d_alpha = adjoint_.d_alpha[from + x];
       const std::uint64_t bit = std::uint64_t{product != 0 && d_alpha != 0} << (to + x);
       push_[b][to + x] = 2 * d_alpha * product;

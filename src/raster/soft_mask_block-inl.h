@@ -25,6 +25,12 @@ HWY_INLINE std::size_t PixelIndex(const SoftMaskPlan& plan, int x, int y) {
          static_cast<std::size_t>(x);
 }
 
+// Where a block begins in SoftMaskImages::transmittance; its rows follow, `width` numbers each.
+HWY_INLINE std::size_t TransmittanceIndex(const SoftMaskPlan& plan, const SoftBlock& block) {
+  return static_cast<std::size_t>(block.y0) * static_cast<std::size_t>(plan.width) +
+         static_cast<std::size_t>(block.x0) * static_cast<std::size_t>(block.height);
+}
+
 // Calls visit(pixel of the image, pixel of the block) for the first pixel of each row.
 template <class Visit>
 HWY_INLINE void ForRows(const SoftMaskPlan& plan, const SoftBlock& block, const Visit& visit) {

@@ -139,9 +139,10 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
   return std::min(spent, 1.0);
 }
 
-// A row of a block to an image.
+// A row of a block to an image. By quads, which is how rows are made: a wider load would have to
+// wait for their stores.
 HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float* to) {
-  const SoftTag d;
+  const QuadTag d;
   if (width < kBlockSize) {
     std::copy_n(row, width, to);
     return;
@@ -186,24 +187,33 @@ HWY_INLINE V Transmittance(const SoftMaskPlan& plan, V product, V least) {
   return hn::IfThenZeroElse(unseen, hn::IfThenElse(known, product, set(kUnknownTransmittance)));
 }
 
-HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block,
-                           const SoftMaskImages& images) {
+HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, float* image) {
+  const SoftDoubleTag d;
+  const auto size = static_cast<std::size_t>(block.width);
+  ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
+    alignas(64) float alpha[kBlockSize];
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      const auto row = hn::Load(d, block.alpha + from + x);
+      hn::Store(hn::DemoteTo(SoftWrittenTag(), row), SoftWrittenTag(), alpha + x);
+    }
+    CopyRow(alpha, size, image + to);
+  });
+}
+
+HWY_INLINE void WriteTransmittance(const SoftMaskPlan& plan, const SoftBlock& block,
+                                   float* transmittance) {
   const SoftDoubleTag d;
   const SoftWrittenTag d_written;
   const auto size = static_cast<std::size_t>(block.width);
-  ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
-    alignas(64) float alpha[kBlockSize], transmittance[kBlockSize];
+  float* to = transmittance + TransmittanceIndex(plan, block);
+  ForRows(plan, block, [&](std::size_t, std::size_t from) HWY_ATTR {
+    alignas(64) float row[kBlockSize];
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      const auto a = hn::DemoteTo(d_written, hn::Load(d, block.alpha + from + x));
       const auto product = hn::DemoteTo(d_written, hn::Load(d, block.product + from + x));
-      hn::Store(a, d_written, alpha + x);
       hn::Store(Transmittance(plan, product, hn::Load(d_written, block.least + from + x)),
-                d_written, transmittance + x);
+                d_written, row + x);
     }
-    CopyRow(alpha, size, images.alpha.data() + to);
-    if (!images.transmittance.empty()) {
-      CopyRow(transmittance, size, images.transmittance.data() + to);
-    }
+    CopyRow(row, size, to), to += size;
   });
 }
 
@@ -251,7 +261,10 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
     if (blocks[b].bits != 0 && nodes.count > 0) {
-      WriteAlpha(plan, blocks[b], images);
+      WriteAlpha(plan, blocks[b], images.alpha.data());
+      if (!images.transmittance.empty()) {
+        WriteTransmittance(plan, blocks[b], images.transmittance.data());
+      }
     } else if (blocks[b].width > 0) {
       WriteClear(plan, blocks[b], images.alpha.data());
     }

@@ -80,8 +80,9 @@ struct FrameT {
   AlignedVector<T> depth;       // [N,H,W]; +infinity at background pixels
   AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
                                   // at background
-  // [N,H,W] 1 - alpha with more digits, where Backward has use for it (raster/soft_mask.h,
-  // SoftMaskImages); the rest is unspecified. May be emptied: Backward then takes more time.
+  // [N, H W] 1 - alpha with more digits, where Backward has use for it, in the order of
+  // raster/soft_mask.h, SoftMaskImages; the rest is unspecified. May be emptied: Backward then
+  // takes more time.
   AlignedVector<T> transmittance;
   double alpha_error_bound = 0;  // what culling really spent: no pixel is farther than this from
                                  // equation 6; infinite with SoftRule::kPaper

@@ -80,6 +80,16 @@ std::vector<float> ComparableGradient(const SoftScene& scene, const SoftTruth& t
   return d_alpha;
 }
 
+// The place of pixel i where blocks of 8 x 8 come one after the other.
+std::size_t BlockOrder(const SoftScene& scene, std::size_t i) {
+  const auto w = static_cast<std::size_t>(scene.options.width);
+  const auto h = static_cast<std::size_t>(scene.options.height);
+  const std::size_t x = i % w, y = i / w, x0 = x / 8 * 8, y0 = y / 8 * 8;
+  const std::size_t width = std::min<std::size_t>(8, w - x0);
+  const std::size_t height = std::min<std::size_t>(8, h - y0);
+  return y0 * w + x0 * height + (y - y0) * width + x - x0;
+}
+
 // Lanes that leave at least 1/64 each are off by 42 u a / (1 - a), which is no more than
 // 42 u (63 / ln 64) = 636 u times the logarithm of what they leave ("Gradients").
 void CheckTransmittance(const SoftScene& scene, const SoftTruth& truth, const SoftResult& result) {
@@ -87,7 +97,7 @@ void CheckTransmittance(const SoftScene& scene, const SoftTruth& truth, const So
   for (std::size_t i = 0; i < scene.pixels(); ++i) {
     const auto alpha = static_cast<double>(result.alpha[i]);
     if (scene.face_ids[i] >= 0 || alpha <= e / 4) continue;
-    const auto known = static_cast<double>(result.transmittance[i]);
+    const auto known = static_cast<double>(result.transmittance[BlockOrder(scene, i)]);
     const auto [product, most] = truth.Products(i);
     const double rounding = truth.Rounding(i);
     if (known == 0) {
