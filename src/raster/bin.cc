@@ -58,7 +58,8 @@ void PlaceChunks(std::size_t tiles, TileListBuffers* buffers) {
   buffers->begin[tiles] = total;
 }
 
-// A counting sort, which is stable, in chunks of lists of faces.
+// A counting sort, which is stable, in chunks of `share` lists: no fewer faces than tiles, or their
+// counters would cost more than they.
 TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
                         const Workers* workers) {
   constexpr std::size_t kList = DrawnFaces::kChunk;

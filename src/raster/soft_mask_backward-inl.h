@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The way back through alpha. Where A is not close to 1, the product over all other faces is the
-// whole product times 1 + A + A^2 + ... So it is in light pixels, which take the product from
-// alpha, and with the far faces of dark ones. For the near faces of dark pixels the products before
-// and behind each are kept. Nothing is divided by 1 - A. Lanes are faces, pixels are in the loop.
+// whole product times 1 + A + A^2 + ... So it is in light pixels, of which forward hands on the
+// product, and with the far faces of dark ones. For the near faces of dark pixels the products
+// before and behind each are kept. Nothing is divided by 1 - A. Lanes are faces, pixels are in the
+// loop.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_

@@ -12,11 +12,12 @@ inline constexpr int kEndZ = 126;
 inline constexpr double kUnseenProduct = 0x1p-26;
 // Backward: faces nearer than this to a block are near ones. A <= 1/8 for the others.
 inline constexpr double kFarZ = 3;
-// The least product in light pixels, or of each of their lanes. A <= 15/16 there for all faces.
+// The least product in light pixels, or of each of their lanes: A <= 63/64 there for all faces, and
+// ten factors of Odds suffice. Smaller ones would cost digits, larger ones make more pixels dark.
 inline constexpr double kLightProduct = 1.0 / 64;
-// What rounding may take from the product of a lane.
+// More than rounding may take from the product of a lane: 37 u (docs/numerics.md, "Rounding" 4).
 inline constexpr double kLaneRounding = 0x1p-18;
-// Covers the rounding of products of lanes.
+// Of what may be dropped: the rest covers the rounding of products of lanes.
 inline constexpr double kUnseenShare = 0.9;
 
 // z from which on `n` faces have A <= share / n each, and together no more than `share`.

@@ -38,7 +38,8 @@ struct ChosenLanes {
 };
 inline constexpr ChosenLanes kChosenLanes;
 
-// Bits of the pixels of a block in rows or columns [begin, end), at begin + 16 end.
+// Bits of the pixels of a block in rows or columns [begin, end), at begin + 16 end: a half of a
+// byte each.
 struct RangeTables {
   static constexpr std::size_t kRoom = 16 * (kBlockSize + 1);
   std::uint64_t rows[kRoom] = {}, columns[kRoom] = {};

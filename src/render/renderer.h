@@ -152,9 +152,9 @@ class Renderer {
                 const RenderRequest& request, Frame* frame, PixelStage* stage = nullptr);
 
   // `scenes`, `options` and `frame` as they were given to and filled by Render; `frame` needs alpha
-  // where d_frame has it. A gradient that overflows float is an error too;
-  // after an error d_scenes may be written in part. With a stage, the cotangents of `attributes`
-  // come from it, and d_frame.attributes is empty.
+  // where d_frame has it. A gradient that overflows float is an error too; after an error d_scenes
+  // may be written in part.
+  // With a stage, the cotangents of `attributes` come from it, and d_frame.attributes is empty.
   Status Backward(std::span<const SceneView> scenes, const RenderOptions& options,
                   const Frame& frame, const FrameGradients& d_frame,
                   std::span<SceneGradients> d_scenes, PixelStage* stage = nullptr);
