@@ -10,7 +10,6 @@
 
 #include <hwy/highway.h>
 
-#include <cmath>
 #include <cstddef>
 
 #include "base/simd_math-inl.h"
@@ -118,52 +117,70 @@ HWY_INLINE void ShortEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i
   }
 }
 
-// The same of faces with long edges, one by one in double: a difference of large numbers.
-struct LongFace {
-  enum { kX = 0, kY = 3, kEdges = 6, kAll = 24 };
-  float v[kAll];
-};
-inline LongFace LongEdges(const SoftFaceArrays& faces, std::size_t i, const SoftMaskPlan& plan,
-                          const SoftBlock& block) {
-  // Finite, and the square is at most infinite.
-  const auto to_float = [](double v) {
-    return static_cast<float>(std::fmin(std::fmax(v, -1e30), 1e30));
-  };
-  LongFace out;
-  double x[3], y[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    x[k] = (static_cast<double>(faces.v[SoftFaceArrays::kX + k][i]) -
-            static_cast<double>(block.centre_x)) *
-           plan.unit_x;
-    y[k] = (static_cast<double>(faces.v[SoftFaceArrays::kY + k][i]) -
-            static_cast<double>(block.centre_y)) *
-           plan.unit_y;
-    out.v[LongFace::kX + k] = to_float(x[k]), out.v[LongFace::kY + k] = to_float(y[k]);
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t next = k == 2 ? 0 : k + 1;
-    const double ex = x[next] - x[k], ey = y[next] - y[k], length = std::sqrt(ex * ex + ey * ey);
-    const double inverse = length > 0 ? 1 / length : 0;
-    const double tx = length > 0 ? ex * inverse : 1, ty = ey * inverse;
-    const double along = -(tx * x[k] + ty * y[k]);
-    const double edge[] = {tx, ty, ty * x[k] - tx * y[k], along, along - length, inverse};
-    for (std::size_t a = 0; a < 6; ++a) out.v[LongFace::kEdges + 6 * k + a] = to_float(edge[a]);
-  }
-  return out;
+using SoftDoubleTag = hn::CappedTag<double, kSoftLanes / 2>;
+using SoftDouble = hn::Vec<SoftDoubleTag>;
+using SoftNarrowTag = hn::Rebind<float, SoftDoubleTag>;  // as many floats
+
+// Finite, and the square is at most infinite.
+HWY_INLINE void StoreNarrow(SoftDouble v, float* to) {
+  const SoftDoubleTag d;
+  const SoftDouble most = hn::Set(d, 1e30);
+  hn::StoreU(hn::DemoteTo(SoftNarrowTag(), hn::Min(hn::Max(v, hn::Neg(most)), most)),
+             SoftNarrowTag(), to);
 }
 
+// What FaceEdges has of a face, array by array.
+struct LongFaces {
+  enum Array { kX = 0, kY = 3, kEdges = 6, kArrays = 24 };
+  alignas(64) float v[kArrays][kSoftLanes];
+};
+
+// Edge k of the faces with corners x, y, in double: a difference of large numbers. To lanes `at`.
+HWY_INLINE void LongEdge(const SoftDouble (&x)[3], const SoftDouble (&y)[3], std::size_t k,
+                         std::size_t at, LongFaces* out) {
+  const SoftDoubleTag d;
+  const SoftDouble zero = hn::Zero(d), one = hn::Set(d, 1.0);
+  const std::size_t next = k == 2 ? 0 : k + 1;
+  const SoftDouble ex = hn::Sub(x[next], x[k]), ey = hn::Sub(y[next], y[k]);
+  const SoftDouble length = hn::Sqrt(hn::MulAdd(ex, ex, hn::Mul(ey, ey)));
+  const auto real = hn::Gt(length, zero);
+  const SoftDouble inverse = hn::IfThenElseZero(real, hn::Div(one, length));
+  const SoftDouble tx = hn::IfThenElse(real, hn::Mul(ex, inverse), one);
+  const SoftDouble ty = hn::Mul(ey, inverse);
+  const SoftDouble side = hn::MulSub(ty, x[k], hn::Mul(tx, y[k]));
+  const SoftDouble along = hn::NegMulSub(tx, x[k], hn::Mul(ty, y[k]));
+  const SoftDouble edge[] = {tx, ty, side, along, hn::Sub(along, length), inverse};
+  for (std::size_t a = 0; a < 6; ++a) {
+    StoreNarrow(edge[a], out->v[LongFaces::kEdges + 6 * k + a] + at);
+  }
+}
+
+// The same of faces with long edges.
 HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
                                const SoftMaskPlan& plan, const SoftBlock& block) {
-  HWY_ALIGN float lanes[LongFace::kAll][kSoftLanes];
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-    const LongFace face = LongEdges(faces, i + lane < faces.count ? i + lane : i, plan, block);
-    for (std::size_t a = 0; a < LongFace::kAll; ++a) lanes[a][lane] = face.v[a];
+  const SoftDoubleTag dd;
+  const SoftNarrowTag d_narrow;
+  LongFaces lanes;
+  for (std::size_t at = 0; at < hn::Lanes(d); at += hn::Lanes(dd)) {
+    SoftDouble x[3], y[3];
+    const auto from = [&](const float* corners, float centre, double unit) HWY_ATTR {
+      const auto corner = hn::PromoteTo(dd, hn::Load(d_narrow, corners + i + at));
+      return hn::Mul(hn::Sub(corner, hn::Set(dd, static_cast<double>(centre))), hn::Set(dd, unit));
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+      x[k] = from(faces.v[SoftFaceArrays::kX + k], block.centre_x, plan.unit_x);
+      y[k] = from(faces.v[SoftFaceArrays::kY + k], block.centre_y, plan.unit_y);
+      StoreNarrow(x[k], lanes.v[LongFaces::kX + k] + at);
+      StoreNarrow(y[k], lanes.v[LongFaces::kY + k] + at);
+    }
+    for (std::size_t k = 0; k < 3; ++k) LongEdge(x, y, k, at, &lanes);
   }
   FaceEdges f;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto edge = [&](std::size_t a)
-                          HWY_ATTR { return hn::Load(d, lanes[LongFace::kEdges + 6 * k + a]); };
-    f.x[k] = hn::Load(d, lanes[LongFace::kX + k]), f.y[k] = hn::Load(d, lanes[LongFace::kY + k]);
+                          HWY_ATTR { return hn::Load(d, lanes.v[LongFaces::kEdges + 6 * k + a]); };
+    f.x[k] = hn::Load(d, lanes.v[LongFaces::kX + k]);
+    f.y[k] = hn::Load(d, lanes.v[LongFaces::kY + k]);
     f.tx[k] = edge(0), f.ty[k] = edge(1), f.side[k] = edge(2);
     f.along[k] = edge(3), f.past[k] = edge(4), f.inverse[k] = edge(5);
   }

@@ -216,14 +216,16 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
                    lists);
   };
   std::int32_t near[kChunkRoom];
-  const std::size_t count = FindNear(chunk.shorts, search, near);
-  for (std::size_t n = 0; n < count; ++n) {
+  const std::size_t shorts = FindNear(chunk.shorts, search, near);
+  for (std::size_t n = 0; n < shorts; ++n) {
     const auto i = static_cast<std::size_t>(near[n]);
     FaceEdges f;
     LoadCorners(d, chunk.shorts, i, search.block, &f), ShortEdges(d, chunk.shorts, i, &f);
     append(chunk.shorts, i, f, i);
   }
-  for (std::size_t i = 0; i < chunk.longs.count; i += hn::Lanes(d)) {
+  const std::size_t longs = FindNear(chunk.longs, search, near);
+  for (std::size_t n = 0; n < longs; ++n) {
+    const auto i = static_cast<std::size_t>(near[n]);
     append(chunk.longs, i, LongEdges(d, chunk.longs, i, plan, search.block), kChunkRoom + i);
   }
   PadList({0}, &lists->vertices);

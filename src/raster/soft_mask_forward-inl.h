@@ -174,13 +174,10 @@ HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, flo
   });
 }
 
-using SoftDoubleTag = hn::CappedTag<double, 4>;
-using SoftWrittenTag = hn::Rebind<float, SoftDoubleTag>;
-
 // The transmittance of background pixels: see SoftBlock.
 template <class V>
 HWY_INLINE V Transmittance(const SoftMaskPlan& plan, V product, V least) {
-  const SoftWrittenTag d;
+  const SoftNarrowTag d;
   const auto set = [&](double v) HWY_ATTR { return hn::Set(d, static_cast<float>(v)); };
   const auto unseen = hn::Le(product, hn::Mul(least, set(kUnseenShare * plan.stop_error)));
   const auto known = hn::Ge(least, set(kLightProduct));
@@ -194,7 +191,7 @@ HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, flo
     alignas(64) float alpha[kBlockSize];
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
       const auto row = hn::Load(d, block.alpha + from + x);
-      hn::Store(hn::DemoteTo(SoftWrittenTag(), row), SoftWrittenTag(), alpha + x);
+      hn::Store(hn::DemoteTo(SoftNarrowTag(), row), SoftNarrowTag(), alpha + x);
     }
     CopyRow(alpha, size, image + to);
   });
@@ -203,7 +200,7 @@ HWY_INLINE void WriteAlpha(const SoftMaskPlan& plan, const SoftBlock& block, flo
 HWY_INLINE void WriteTransmittance(const SoftMaskPlan& plan, const SoftBlock& block,
                                    float* transmittance) {
   const SoftDoubleTag d;
-  const SoftWrittenTag d_written;
+  const SoftNarrowTag d_written;
   const auto size = static_cast<std::size_t>(block.width);
   float* to = transmittance + TransmittanceIndex(plan, block);
   ForRows(plan, block, [&](std::size_t, std::size_t from) HWY_ATTR {
