@@ -146,7 +146,8 @@ class TileBackward {
   }
 
   void FindMembers(std::size_t b) {
-    FindFeatures(scratch_->chunk, plan_, {scratch_->blocks[b], reach_, dark_[b] != 0},
+    const SoftBlock& block = scratch_->blocks[b];
+    FindFeatures(scratch_->chunk, plan_, {block, block.bits, reach_, dark_[b] != 0},
                  &scratch_->lists);
   }
 
@@ -173,9 +174,9 @@ class TileBackward {
   void MultiplyProducts(std::size_t b) {
     SoftBlock& block = scratch_->blocks[b];
     const SoftLists& lists = scratch_->lists;
-    PartialAlpha far(&block, scratch_->partial);
-    far.AddVertices(lists.vertices), far.AddSegments(lists.segments), far.Merge();
-    AppendNear(block, lists.boundaries, scratch_->chunk, near_product_[b], &scratch_->near[b]);
+    PartialAlpha far(lists, &block, scratch_->partial);
+    far.AddVertices(), far.AddSegments(), far.Merge();
+    AppendNear(block, lists, scratch_->chunk, near_product_[b], &scratch_->near[b]);
     // The square: a face's gradient may be as large as the root of the product
     // (docs/numerics.md).
     const double stop = plan_.stop_error * plan_.stop_error;
@@ -205,10 +206,9 @@ class TileBackward {
   }
 
   void AddWeakGradients(std::size_t b) {
-    const SoftLists& lists = scratch_->lists;
-    const WeakFaces faces{scratch_->blocks[b], push_[b], {scratch_->sums}};
-    faces.Vertices(lists.vertices, weak_[b]), faces.Segments(lists.segments, weak_[b]);
-    faces.Boundaries(lists.boundaries, weak_[b] & ~dark_[b]);
+    const WeakFaces faces{scratch_->blocks[b], scratch_->lists, push_[b], {scratch_->sums}};
+    faces.Vertices(weak_[b]), faces.Segments(weak_[b]);
+    faces.Boundaries(weak_[b] & ~dark_[b]);
   }
 
   // Gradients of the faces of the chunk.

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 
 #include "raster/soft_mask_tree-inl.h"
@@ -89,7 +88,6 @@ HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const TileRect& rect, SoftB
   block->centre_y = 0.5f * static_cast<float>(rect.y0 + rect.y1);
   block->half_x = 0.5f * static_cast<float>(rect.x1 - 1 - rect.x0) * unit.unit_x;
   block->half_y = 0.5f * static_cast<float>(rect.y1 - 1 - rect.y0) * unit.unit_y;
-  block->radius = std::sqrt(block->half_x * block->half_x + block->half_y * block->half_y);
   for (std::size_t i = 0; i < kBlockSize; ++i) {
     const float at = static_cast<float>(i) + 0.5f;
     block->x[i] = (static_cast<float>(block->x0) + at - block->centre_x) * unit.unit_x;

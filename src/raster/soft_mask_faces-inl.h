@@ -73,6 +73,37 @@ HWY_INLINE void SetUpDirections(SoftTag d, float unit_x, float unit_y, SoftFaceA
   }
 }
 
+// What their octagons have beyond boxes.
+HWY_INLINE void SetUpDiagonals(SoftTag d, SoftFaceArrays* faces) {
+  for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
+    SoftVec sum[3], difference[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const SoftVec x = hn::Load(d, faces->v[SoftFaceArrays::kX + k] + i);
+      const SoftVec y = hn::Load(d, faces->v[SoftFaceArrays::kY + k] + i);
+      sum[k] = hn::Add(x, y), difference[k] = hn::Sub(x, y);
+    }
+    const auto store = [&](const SoftVec(&v)[3], SoftFaceArrays::Array least,
+                           SoftFaceArrays::Array most) HWY_ATTR {
+      hn::Store(hn::Min(hn::Min(v[0], v[1]), v[2]), d, faces->v[least] + i);
+      hn::Store(hn::Max(hn::Max(v[0], v[1]), v[2]), d, faces->v[most] + i);
+    };
+    store(sum, SoftFaceArrays::kLeastSum, SoftFaceArrays::kMostSum);
+    store(difference, SoftFaceArrays::kLeastDifference, SoftFaceArrays::kMostDifference);
+  }
+}
+
+// Faces with long edges have none: a sum of large numbers may lie anywhere.
+HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
+  for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
+    for (const auto least : {SoftFaceArrays::kLeastSum, SoftFaceArrays::kLeastDifference}) {
+      hn::Store(hn::Set(d, -kNowhere), d, faces->v[least] + i);
+    }
+    for (const auto most : {SoftFaceArrays::kMostSum, SoftFaceArrays::kMostDifference}) {
+      hn::Store(hn::Set(d, kNowhere), d, faces->v[most] + i);
+    }
+  }
+}
+
 // The next faces of a tile: fills the chunk from nodes[*next] on.
 inline void FillChunk(const SoftTree& tree, std::span<const std::int32_t> nodes, const SoftBox& box,
                       float z, std::size_t* next, SoftChunk* chunk) {
@@ -83,6 +114,7 @@ inline void FillChunk(const SoftTree& tree, std::span<const std::int32_t> nodes,
     AppendNode(d, tree, static_cast<std::size_t>(nodes[(*next)++]), box, z, chunk);
   }
   SetUpDirections(d, box.unit_x, box.unit_y, &chunk->shorts);
+  SetUpDiagonals(d, &chunk->shorts), ForgetDiagonals(d, &chunk->longs);
 }
 
 // Faces seen from the middle of a block's background: corners, and for each edge where that point

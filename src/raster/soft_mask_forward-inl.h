@@ -27,10 +27,12 @@ HWY_INLINE SoftVec Over(SoftTag d, SoftVec a, SoftVec influence) {
 class PartialAlpha {
  public:
   // `partial` is 0, and is again after Merge.
-  PartialAlpha(SoftBlock* block, float (*partial)[kSoftLanes]) : block_(block), partial_(partial) {}
+  PartialAlpha(const SoftLists& lists, SoftBlock* block, float (*partial)[kSoftLanes])
+      : lists_(lists), block_(block), partial_(partial) {}
 
-  HWY_INLINE void AddVertices(const SoftListOf<2>& list) {
+  HWY_INLINE void AddVertices() {
     const SoftTag d;
+    const auto& list = lists_.vertices;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const std::uint64_t bits = See(list, m);
       if (bits == 0) continue;
@@ -39,8 +41,9 @@ class PartialAlpha {
     }
   }
 
-  HWY_INLINE void AddSegments(const SoftListOf<SoftLists::kEdgeArrays>& list) {
+  HWY_INLINE void AddSegments() {
     const SoftTag d;
+    const auto& list = lists_.segments;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const EdgeMembers members(d, list.v[0] + m, list.kRoom);
       AddDistances(See(list, m), [&](std::size_t i)
@@ -48,8 +51,9 @@ class PartialAlpha {
     }
   }
 
-  HWY_INLINE void AddBoundaries(const SoftListOf<3 * SoftLists::kEdgeArrays>& list) {
+  HWY_INLINE void AddBoundaries() {
     const SoftTag d;
+    const auto& list = lists_.boundaries;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
       AddDistances(See(list, m), [&](std::size_t i) HWY_ATTR { return members.Z(d, *block_, i); });
@@ -74,16 +78,10 @@ class PartialAlpha {
   }
 
  private:
-  // The pixels that see a vector of members. Counts members that all pixels see.
+  // The pixels that see a vector of members.
   HWY_INLINE std::uint64_t See(const SoftList& list, std::size_t m) {
-    const SoftTag d;
-    std::uint64_t bits = 0;
-    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-      const std::uint64_t near = RangeBits(list.range[m + lane]);
-      block_->whole += (block_->bits & ~near) == 0;
-      bits |= near;
-    }
-    bits &= block_->live, touched_ |= bits;
+    const std::uint64_t bits = PixelsOf(SoftTag(), lists_, list, m, block_->live);
+    touched_ |= bits;
     return bits;
   }
   // Two loops, so that what is under way at a time is not one chain from the distance to alpha.
@@ -110,6 +108,7 @@ class PartialAlpha {
     hn::Store(Over(d, hn::Load(d, at), influence), d, at);
   }
 
+  const SoftLists& lists_;
   SoftBlock* block_;
   float (*partial_)[kSoftLanes];
   std::uint64_t touched_ = 0;
@@ -228,11 +227,11 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
     FillChunk(tree, order, box, reach.z, &next, &scratch->chunk);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (blocks[b].live == 0) continue;
-      const SoftLists& lists = scratch->lists;
-      FindFeatures(scratch->chunk, plan, {blocks[b], reach, false}, &scratch->lists);
-      PartialAlpha partial(&blocks[b], scratch->partial);
-      partial.AddVertices(lists.vertices), partial.AddSegments(lists.segments);
-      partial.AddBoundaries(lists.boundaries), partial.Merge();
+      FindFeatures(scratch->chunk, plan, {blocks[b], blocks[b].live, reach, false},
+                   &scratch->lists);
+      blocks[b].whole += scratch->lists.whole;
+      PartialAlpha partial(scratch->lists, &blocks[b], scratch->partial);
+      partial.AddVertices(), partial.AddSegments(), partial.AddBoundaries(), partial.Merge();
       if (next < order.size()) StopPixels(plan, stop, &blocks[b]);
     }
   }

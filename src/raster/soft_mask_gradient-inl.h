@@ -195,13 +195,15 @@ struct ChunkSums {
 // faces.
 struct WeakFaces {
   const SoftBlock& block;
+  const SoftLists& lists;
   const float* push;
   ChunkSums sums;
 
-  void Vertices(const SoftListOf<2>& list, std::uint64_t pixels) const {
+  void Vertices(std::uint64_t pixels) const {
     const SoftTag d;
+    const auto& list = lists.vertices;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
-      const std::uint64_t bits = PixelsOf(d, list, m, pixels);
+      const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       if (bits == 0) continue;
       const VertexMembers members(d, list, m, block, bits);
       const auto add = [&](const auto& odds) HWY_ATTR {
@@ -227,10 +229,11 @@ struct WeakFaces {
     }
   }
 
-  void Segments(const SoftListOf<SoftLists::kEdgeArrays>& list, std::uint64_t pixels) const {
+  void Segments(std::uint64_t pixels) const {
     const SoftTag d;
+    const auto& list = lists.segments;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
-      const std::uint64_t bits = PixelsOf(d, list, m, pixels);
+      const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       if (bits == 0) continue;
       const EdgeMembers edge(d, list.v[0] + m, list.kRoom);
       // Of push along n and t, and of both times the share of the second corner.
@@ -255,27 +258,30 @@ struct WeakFaces {
     }
   }
 
-  void Boundaries(const SoftListOf<3 * SoftLists::kEdgeArrays>& list, std::uint64_t pixels) const {
+  void Boundaries(std::uint64_t pixels) const {
     const SoftTag d;
+    const auto& list = lists.boundaries;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
-      const CornerSums corners = SumCorners(
-          d, members, block, PixelsOf(d, list, m, pixels), [&](std::size_t i, SoftVec z) HWY_ATTR {
-            const SoftVec odds = Odds(d, simd::HalvingOf(d, z).power);
-            return hn::Mul(odds, hn::Set(d, push[i]));
-          });
+      const CornerSums corners = SumCorners(d, members, block, PixelsOf(d, lists, list, m, pixels),
+                                            [&](std::size_t i, SoftVec z) HWY_ATTR {
+                                              const SoftVec odds =
+                                                  Odds(d, simd::HalvingOf(d, z).power);
+                                              return hn::Mul(odds, hn::Set(d, push[i]));
+                                            });
       sums.Add(d, list, m, corners);
     }
   }
 };
 
-// Appends the boundaries of `list`, which come from `chunk`, for the live pixels; `product` is that
-// of all near faces.
-inline void AppendNear(const SoftBlock& block, const SoftListOf<3 * SoftLists::kEdgeArrays>& list,
-                       const SoftChunk& chunk, float* product, AlignedVector<SoftNearFaces>* near) {
+// Appends the boundaries of `lists`, which come from `chunk`, for the live pixels; `product` is
+// that of all near faces.
+inline void AppendNear(const SoftBlock& block, const SoftLists& lists, const SoftChunk& chunk,
+                       float* product, AlignedVector<SoftNearFaces>* near) {
   const SoftTag d;
+  const auto& list = lists.boundaries;
   for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
-    const std::uint64_t bits = PixelsOf(d, list, m, block.live);
+    const std::uint64_t bits = PixelsOf(d, lists, list, m, block.live);
     if (bits == 0) continue;
     SoftNearFaces& faces = near->emplace_back();
     faces.count = std::min(hn::Lanes(d), list.count - m), faces.bits = bits;

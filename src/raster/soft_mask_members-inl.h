@@ -37,11 +37,11 @@ HWY_INLINE void ForRowsOf(std::uint64_t bits, const Visit& visit) {
   }
 }
 
-// The pixels of `among` that see one of a vector of members.
-HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftList& list, std::size_t m,
-                                  std::uint64_t among) {
+// The pixels of `among` that see one of the members of a list from m on.
+HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftLists& lists, const SoftList& list,
+                                  std::size_t m, std::uint64_t among) {
   std::uint64_t bits = 0;
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) bits |= RangeBits(list.range[m + lane]);
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) bits |= lists.pixels[list.slot[m + lane]];
   return bits & among;
 }
 

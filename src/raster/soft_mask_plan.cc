@@ -47,8 +47,15 @@ SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
   const auto with_rounding = [&](double root) {
     return static_cast<float>(root + 0x1p-18 * (root + (kLongEdge + kBlockSize) * pixel));
   };
-  return {static_cast<float>(z * (1 + 0x1p-20)), with_rounding(std::sqrt(z)),
-          with_rounding(std::sqrt(kFarZ)), std::exp2(-z)};
+  const float root = with_rounding(std::sqrt(z));
+  const auto in_pixels = [&](double pixels) { return static_cast<float>(root * pixels); };
+  return {static_cast<float>(z * (1 + 0x1p-20)),
+          root,
+          with_rounding(std::sqrt(kFarZ)),
+          std::exp2(-z),
+          in_pixels(1 / plan.unit_x),
+          in_pixels(1 / plan.unit_y),
+          in_pixels(std::hypot(1 / plan.unit_x, 1 / plan.unit_y))};
 }
 
 }  // namespace tilegrad::raster

@@ -38,33 +38,15 @@ struct ChosenLanes {
 };
 inline constexpr ChosenLanes kChosenLanes;
 
-// Bits of the pixels of a block in rows or columns [begin, end), at begin + 16 end: a half of a
-// byte each.
-struct RangeTables {
-  static constexpr std::size_t kRoom = 16 * (kBlockSize + 1);
-  std::uint64_t rows[kRoom] = {}, columns[kRoom] = {};
-  constexpr RangeTables() {
-    for (std::size_t end = 0; end <= kBlockSize; ++end) {
-      for (std::size_t i = 0; i < end; ++i) {
-        for (std::size_t begin = 0; begin <= i; ++begin) {
-          rows[begin + 16 * end] |= std::uint64_t{0xff} << kBlockSize * i;
-          columns[begin + 16 * end] |= std::uint64_t{0x0101010101010101} << i;
-        }
-      }
-    }
-  }
-};
-inline constexpr RangeTables kRangeTables;
-
 // Pixel centres of a rectangle.
 struct SoftBox {
   float left, top, right, bottom;  // pixels
   float unit_x, unit_y;            // kernel units per pixel
 };
 
-// A tile's faces, some at a time: corners and the box around them in pixels; unit direction t of
-// edge k, from corner k to the next, and 1 / its length. An edge of no length has t = (1, 0) and
-// inverse 0.
+// A tile's faces, some at a time: corners and the octagon around them in pixels, which is the box
+// and the least and largest x + y and x - y; unit direction t of edge k, from corner k to the next,
+// and 1 / its length. An edge of no length has t = (1, 0) and inverse 0.
 struct SoftFaceArrays {
   enum Array {
     kX = 0,
@@ -73,6 +55,10 @@ struct SoftFaceArrays {
     kTop,
     kRight,
     kBottom,
+    kLeastSum,
+    kMostSum,
+    kLeastDifference,
+    kMostDifference,
     kTx,
     kTy = kTx + 3,
     kInverse = kTy + 3,
@@ -83,7 +69,7 @@ struct SoftFaceArrays {
   std::size_t count = 0;
 };
 struct SoftChunk {
-  SoftFaceArrays shorts, longs;  // of longs only corners and boxes are set
+  SoftFaceArrays shorts, longs;  // longs have no directions, and no diagonals to their octagons
 };
 
 // A block of a tile. Pixels are row by row.
@@ -93,7 +79,7 @@ struct SoftBlock {
   std::uint64_t live;                              // those that have not stopped
   SoftBox box;                                     // of those pixels
   float centre_x, centre_y;                        // pixels, its middle
-  float half_x, half_y, radius;                    // half of it, and half its diagonal
+  float half_x, half_y;                            // half of it
   alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
   std::size_t whole;                               // faces that all pixels have seen
   alignas(64) double alpha[kBlockPixels];          // 1 where there is nothing to compute
@@ -105,20 +91,21 @@ struct SoftBlock {
 
 // From where on faces are far. Kernel units.
 struct SoftReach {
-  float z;       // squared distance at which a face is dropped
-  float root;    // its root, and something for rounding
-  float near;    // A may exceed kFarInfluence within this distance
-  double share;  // A at z
+  float z;              // squared distance at which a face is dropped
+  float root;           // its root, and something for rounding
+  float near;           // A may exceed kFarInfluence within this distance
+  double share;         // A at z
+  float columns, rows;  // the root, pixels
+  float diagonals;      // how much x + y or x - y change within it, pixels
 };
 
 // Members of a block, by what of a face its pixels see. Structures of arrays, filled up to whole
 // vectors with members that no pixel sees.
 struct SoftList {
   static constexpr std::size_t kRoom = 2 * kChunkRoom + kSoftLanes;
-  alignas(64) std::int32_t slot[kRoom];  // in the chunk; longs behind shorts
-  alignas(64) std::int32_t part[kRoom];  // which corner or edge
-  // Rows and columns, a byte each, as RangeTables has them.
-  alignas(64) std::int32_t range[kRoom];
+  static constexpr std::int32_t kNoSlot = 2 * kChunkRoom;  // of what fills it up
+  alignas(64) std::int32_t slot[kRoom];                    // in the chunk; longs behind shorts
+  alignas(64) std::int32_t part[kRoom];                    // which corner or edge
   std::size_t count;
 };
 template <std::size_t kArrays>
@@ -130,6 +117,8 @@ struct SoftLists {
   SoftListOf<2> vertices;                  // the nearest point is one corner: x, y
   SoftListOf<kEdgeArrays> segments;        // ... is on one edge
   SoftListOf<3 * kEdgeArrays> boundaries;  // ... is anywhere; edge after edge
+  alignas(64) std::uint64_t pixels[SoftList::kNoSlot + 1] = {};  // that see a face, by slot
+  std::size_t whole;  // members that all pixels to compute see
 };
 
 // dL/d(corners) of a face, pixels.
