@@ -142,9 +142,9 @@ struct SoftNearFaces {
   alignas(64) float before[kBlockPixels];
 };
 
-// A node that a tile looks at, and the whole part of its squared distance.
-struct SoftNodeAt {
-  std::int32_t node, z;
+// Nodes near a tile, and the whole part of their squared distance.
+struct SoftNodesAt {
+  AlignedVector<std::int32_t> node, z;
 };
 
 // The groups of the tree that are near a region.
@@ -160,7 +160,7 @@ struct SoftMaskScratch {
   SoftLists lists;
   SoftBlock blocks[kTileBlocks];
   SoftNearGroups groups;
-  AlignedVector<SoftNodeAt> found;
+  SoftNodesAt found;
   AlignedVector<std::int32_t> nodes;  // near ones first
   AlignedVector<SoftNearFaces> near[kTileBlocks];
   alignas(

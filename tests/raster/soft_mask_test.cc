@@ -207,6 +207,37 @@ TEST(SoftMask, OrderOfFacesStaysWithinTheBudget) {
   }
 }
 
+// What is behind the camera or has no place on the screen is no part of the mask, whatever else is
+// said of the face.
+TEST(SoftMask, RejectedFacesDoNotTakePart) {
+  SoftMaskScratch scratch;
+  for (const int reject : {+kFaceBehind, +kFaceOverflow, kFaceBehind | kFaceOverflow}) {
+    SCOPED_TRACE(reject);
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      SoftScene scene = RandomScene(seed, 60);
+      scene.options.max_alpha_error = 0;
+      SoftScene others = scene;
+      others.mesh.v0.clear(), others.mesh.v1.clear(), others.mesh.v2.clear();
+      others.mesh.reject.clear();
+      for (std::size_t f = 0; f < scene.mesh.reject.size(); ++f) {
+        if (f % 3 == 1) {
+          scene.mesh.reject[f] = static_cast<std::uint8_t>(reject);
+          continue;
+        }
+        others.mesh.v0.push_back(scene.mesh.v0[f]), others.mesh.v1.push_back(scene.mesh.v1[f]);
+        others.mesh.v2.push_back(scene.mesh.v2[f]), others.mesh.reject.push_back(kFaceDrawn);
+      }
+      others.options.faces = others.mesh.reject.size();
+      const SoftTruth truth(others);
+      const SoftResult a = RunSoftMask(scene, scene.d_alpha, &scratch);
+      const SoftResult b = RunSoftMask(others, scene.d_alpha, &scratch);
+      for (std::size_t i = 0; i < scene.pixels(); ++i) {
+        ASSERT_NEAR(a.alpha[i], b.alpha[i], 2 * truth.Rounding(i) + 1e-30);
+      }
+    }
+  }
+}
+
 // Far faces are dropped by groups and nodes without being looked at; what is reported covers them.
 TEST(SoftMask, DroppedNodesAreBooked) {
   SoftScene scene;
