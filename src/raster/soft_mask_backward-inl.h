@@ -101,21 +101,39 @@ class TileBackward {
   }
 
   // The push of the pixels `row` of a row of block b; returns the bits of those that have one.
-  std::uint64_t TakeRow(std::size_t from, std::size_t to, std::uint64_t row, std::size_t b) {
-    std::uint64_t bits = 0;
+  HWY_INLINE std::uint64_t TakeRow(std::size_t from, std::size_t to, std::uint64_t row,
+                                   std::size_t b) {
     const SoftBlock& block = scratch_->blocks[b];
-    const std::size_t known =
-        TransmittanceIndex(plan_, block) + to / kBlockSize * static_cast<std::size_t>(block.width);
+    const bool known = !adjoint_.transmittance.empty();
+    const float* products =
+        known ? adjoint_.transmittance.data() + TransmittanceIndex(plan_, block) : nullptr;
+    const float* d_alphas = adjoint_.d_alpha.data() + from;
+    if (known && block.width == static_cast<int>(kBlockSize)) {
+      return TakeRow(products + to, d_alphas, to, row, b);
+    }
+    float product[kBlockSize] = {}, d_alpha[kBlockSize] = {};
     ForPixels(row, [&](std::size_t x) {
-      const float product = adjoint_.transmittance.empty()
-                                ? TransmittanceOf(plan_, adjoint_.alpha[from + x])
-                                : adjoint_.transmittance[known + x];
-      const float d_alpha = adjoint_.d_alpha[from + x];
-      const std::uint64_t bit = std::uint64_t{product != 0 && d_alpha != 0} << (to + x);
-      push_[b][to + x] = 2 * d_alpha * product;
-      bits |= bit, dark_[b] |= product < 0 ? bit : 0;
+      const std::size_t at = to / kBlockSize * static_cast<std::size_t>(block.width) + x;
+      product[x] = known ? products[at] : TransmittanceOf(plan_, adjoint_.alpha[from + x]);
+      d_alpha[x] = d_alphas[x];
     });
-    return bits;
+    return TakeRow(product, d_alpha, to, row, b);
+  }
+
+  HWY_INLINE std::uint64_t TakeRow(const float* product, const float* d_alpha, std::size_t to,
+                                   std::uint64_t row, std::size_t b) {
+    const SoftTag d;
+    const SoftVec zero = hn::Zero(d);
+    std::uint64_t bits = 0, dark = 0;
+    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
+      const SoftVec p = hn::LoadU(d, product + x), g = hn::LoadU(d, d_alpha + x);
+      hn::Store(hn::Mul(hn::Add(g, g), p), d, push_[b] + to + x);
+      const SoftMask has_push = hn::And(hn::Ne(p, zero), hn::Ne(g, zero));
+      bits |= std::uint64_t{BitsOf(d, has_push)} << x;
+      dark |= std::uint64_t{BitsOf(d, hn::Lt(p, zero))} << x;
+    }
+    bits &= row, dark_[b] |= (bits & dark) << to;
+    return bits << to;
   }
 
   // All faces are in the chunk: the members of a block are listed once.
