@@ -148,18 +148,23 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
   for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
 }
 
-// The vectors of faces of which one is near, by its first: no branch, which would be hard to
-// foretell. Returns how many.
-HWY_INLINE std::size_t FindNear(const SoftFaceArrays& faces, const FeatureSearch& search,
-                                std::int32_t* near) {
-  const SoftTag d;
+// Vectors of faces of which one is near: their first faces, and which lanes are near.
+struct NearVectors {
   std::size_t count = 0;
-  for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
-    near[count] = static_cast<std::int32_t>(i);
-    count += BitsOf(d, BoxesNear(d, faces, i, search.block, search.reach.root)) != 0;
+  std::int32_t first[kChunkRoom];
+  std::uint8_t lanes[kChunkRoom + 8];  // as many are read with each
+
+  // No branch, which would be hard to foretell.
+  HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {
+    for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
+      const SoftMask near = hn::And(BoxesNear(d, faces, i, search.block, search.reach.root),
+                                    hn::FirstN(d, faces.count - i));
+      first[count] = static_cast<std::int32_t>(i);
+      lanes[count] = static_cast<std::uint8_t>(BitsOf(d, near));
+      count += lanes[count] != 0;
+    }
   }
-  return count;
-}
+};
 
 // Fills `lists` with the members of the block among the faces of a chunk.
 inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
@@ -167,15 +172,14 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
   const SoftTag d;
   const SoftIntTag di;
   lists->vertices.count = lists->segments.count = lists->boundaries.count = lists->whole = 0;
-  std::int32_t near[kChunkRoom];
   const auto append = [&](const SoftFaceArrays& faces, std::size_t first_slot,
                           const auto& edges) HWY_ATTR {
-    const std::size_t count = FindNear(faces, search, near);
-    for (std::size_t n = 0; n < count; ++n) {
-      const auto i = static_cast<std::size_t>(near[n]), slot = first_slot + i;
+    const NearVectors near(d, faces, search);
+    for (std::size_t n = 0; n < near.count; ++n) {
+      const auto i = static_cast<std::size_t>(near.first[n]), slot = first_slot + i;
       const FacePixels pixels = PixelsOfFaces(d, faces, i, search.block, search.reach);
-      const SoftMask exist = hn::FirstN(d, faces.count - i);
-      const SoftMask seen = hn::AndNot(pixels.UnseenBy(search.pixels), exist);
+      const SoftMask seen =
+          hn::AndNot(pixels.UnseenBy(search.pixels), hn::LoadMaskBits(d, near.lanes + n));
       if (hn::AllFalse(d, seen)) continue;
       pixels.Store(lists->pixels + slot);
       lists->whole += hn::CountTrue(d, hn::And(seen, pixels.SeenByAll(search.block.bits)));
