@@ -69,14 +69,17 @@ void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradi
 void PackRows(const AlignedVector<float>& quads, std::size_t channels, std::span<float> rows) {
   const std::size_t groups = raster::ChannelGroups(static_cast<int>(channels));
   const float* from = quads.data();
-  for (std::size_t row = 0; row < rows.size(); row += channels) {
+  float* row = rows.data();
+  float* const end = row + rows.size();
+  const auto room = static_cast<std::ptrdiff_t>(3 * groups + 1);  // of the quads of a row
+  for (; end - row >= room; row += channels) {
     for (std::size_t g = 0; g < groups; ++g, from += 4) {
-      const std::size_t to = row + 3 * g;
-      if (to + 4 <= rows.size()) {
-        std::memcpy(rows.data() + to, from, 4 * sizeof(float));
-      } else {
-        std::copy(from, from + (rows.size() - to), rows.data() + to);
-      }
+      std::memcpy(row + 3 * g, from, 4 * sizeof(float));
+    }
+  }
+  for (; row < end; row += channels) {
+    for (std::size_t g = 0; g < groups; ++g, from += 4) {
+      std::copy_n(from, std::min<std::ptrdiff_t>(4, end - (row + 3 * g)), row + 3 * g);
     }
   }
 }
