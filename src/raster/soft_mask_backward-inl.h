@@ -109,7 +109,7 @@ class TileBackward {
         known ? adjoint_.transmittance.data() + TransmittanceIndex(plan_, block) : nullptr;
     const float* d_alphas = adjoint_.d_alpha.data() + from;
     if (known && block.width == static_cast<int>(kBlockSize)) {
-      return TakeRow(products + to, d_alphas, to, row, b);
+      return SetPushes(products + to, d_alphas, to, row, b);
     }
     float product[kBlockSize] = {}, d_alpha[kBlockSize] = {};
     ForPixels(row, [&](std::size_t x) {
@@ -117,11 +117,12 @@ class TileBackward {
       product[x] = known ? products[at] : TransmittanceOf(plan_, adjoint_.alpha[from + x]);
       d_alpha[x] = d_alphas[x];
     });
-    return TakeRow(product, d_alpha, to, row, b);
+    return SetPushes(product, d_alpha, to, row, b);
   }
 
-  HWY_INLINE std::uint64_t TakeRow(const float* product, const float* d_alpha, std::size_t to,
-                                   std::uint64_t row, std::size_t b) {
+  // The same from the row's transmittance and d_alpha, kBlockSize of each.
+  HWY_INLINE std::uint64_t SetPushes(const float* product, const float* d_alpha, std::size_t to,
+                                     std::uint64_t row, std::size_t b) {
     const SoftTag d;
     const SoftVec zero = hn::Zero(d);
     std::uint64_t bits = 0, dark = 0;

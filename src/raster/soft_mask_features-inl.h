@@ -31,22 +31,6 @@ HWY_INLINE SoftMask BoxesNear(SoftTag d, const SoftFaceArrays& faces, std::size_
   return hn::Le(z, hn::Set(d, reach * reach));
 }
 
-// The pixels of a block that see faces i, i + 1, ...
-HWY_INLINE FacePixels PixelsOfFaces(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
-                                    const SoftBlock& block, const SoftReach& reach) {
-  using A = SoftFaceArrays;
-  const auto range = [&](A::Array low, A::Array high, const PixelAxis& axis) HWY_ATTR {
-    return PixelRange(d, faces.v[low] + i, faces.v[high] + i, axis);
-  };
-  const auto x = static_cast<float>(block.x0) + 0.5f, y = static_cast<float>(block.y0) + 0.5f;
-  constexpr float kLast = kBlockSize - 1, kStraight = kBlockSize, kDiagonals = 2 * kLast + 1;
-  return FacePixels({range(A::kLeft, A::kRight, {x, reach.columns, kStraight}),
-                     range(A::kTop, A::kBottom, {y, reach.rows, kStraight}),
-                     range(A::kLeastSum, A::kMostSum, {x + y, reach.diagonals, kDiagonals}),
-                     range(A::kLeastDifference, A::kMostDifference,
-                           {x - y - kLast, reach.diagonals, kDiagonals})});
-}
-
 // One of three by lanes.
 template <class V, class M>
 HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
@@ -152,7 +136,7 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
 struct NearVectors {
   std::size_t count = 0;
   std::int32_t first[kChunkRoom];
-  std::uint8_t lanes[kChunkRoom + 8];  // as many are read with each
+  std::uint8_t lanes[kChunkRoom + 8];  // bits; hn::LoadMaskBits may read eight bytes from each on
 
   // No branch, which would be hard to foretell.
   HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {

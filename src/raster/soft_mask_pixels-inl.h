@@ -13,6 +13,7 @@
 
 #include <cstddef>
 
+#include "raster/soft_mask_setup.h"
 #include "raster/soft_mask_tree-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -135,6 +136,22 @@ struct FacePixels {
     return hn::MaskFromVec(hn::ConcatEven(d, half(b), half(a)));
   }
 };
+
+// The pixels of a block that see faces i, i + 1, ...
+HWY_INLINE FacePixels PixelsOfFaces(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
+                                    const SoftBlock& block, const SoftReach& reach) {
+  using A = SoftFaceArrays;
+  const auto range = [&](A::Array low, A::Array high, const PixelAxis& axis) HWY_ATTR {
+    return PixelRange(d, faces.v[low] + i, faces.v[high] + i, axis);
+  };
+  const auto x = static_cast<float>(block.x0) + 0.5f, y = static_cast<float>(block.y0) + 0.5f;
+  constexpr float kLast = kBlockSize - 1, kStraight = kBlockSize, kDiagonals = 2 * kLast + 1;
+  return FacePixels({range(A::kLeft, A::kRight, {x, reach.columns, kStraight}),
+                     range(A::kTop, A::kBottom, {y, reach.rows, kStraight}),
+                     range(A::kLeastSum, A::kMostSum, {x + y, reach.diagonals, kDiagonals}),
+                     range(A::kLeastDifference, A::kMostDifference,
+                           {x - y - kLast, reach.diagonals, kDiagonals})});
+}
 
 }  // namespace tilegrad::raster::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -93,7 +93,7 @@ struct SoftBlock {
 struct SoftReach {
   float z;              // squared distance at which a face is dropped
   float root;           // its root, and something for rounding
-  float near;           // A may exceed kFarInfluence within this distance
+  float near;           // the root of kFarZ likewise: within, A may exceed 1/8
   double share;         // A at z
   float columns, rows;  // the root, pixels
   float diagonals;      // how much x + y or x - y change within it, pixels
