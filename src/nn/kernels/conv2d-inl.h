@@ -132,9 +132,18 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
   });
 }
 
+// Pixels of a work item out of `pixels`: `most`, or fewer for some items for each of several
+// workers.
+inline std::size_t PiecePixels(std::size_t pixels, std::size_t most, const KernelContext& context) {
+  const auto workers = static_cast<std::size_t>(context.workers.count());
+  if (workers == 1) return most;
+  return std::clamp(pixels / (4 * workers), kConvPixels / 4, most);
+}
+
 void Conv2dForwardTarget(const Conv2dShape& s, const float* x, const float* weight,
                          const float* bias, float* y, const KernelContext& context) {
-  const BatchCut cut(s.batch, s.out_height(), s.out_width(), kConvPixels);
+  const BatchCut cut(s.batch, s.out_height(), s.out_width(),
+                     PiecePixels(s.batch * s.out_pixels(), kConvPixels, context));
   const PlaneGrid planes = InputPlanes(s, cut.bands.largest());
   std::size_t* indices = context.scratch.Indices(ConvIndexCount(1, s.kernel_area()));
   const ConvProduct product{.source = x,
@@ -157,21 +166,13 @@ void Conv2dForwardTarget(const Conv2dShape& s, const float* x, const float* weig
   RunConvProduct(product, context, product.taps.weight + s.kernel_area());
 }
 
-// Pixels of a work item out of `pixels`: as many as its memory may hold, or less for some items for
-// each of several workers.
-inline std::size_t PhasePixels(std::size_t pixels, const KernelContext& context) {
-  const auto workers = static_cast<std::size_t>(context.workers.count());
-  if (workers == 1) return kPhasePixels;
-  return std::clamp(pixels / (4 * workers), kConvPixels / 4, kPhasePixels);
-}
-
 void Conv2dInputGradTarget(const Conv2dShape& s, const float* d_y, const float* weight, float* d_x,
                            const KernelContext& context) {
   const std::size_t phases = s.stride * s.stride;
   const std::size_t rows = DivideUp(s.in_height, s.stride);
   const std::size_t columns = DivideUp(s.in_width, s.stride);
-  const BatchCut cut(s.batch, rows, columns,
-                     phases == 1 ? kConvPixels : PhasePixels(s.batch * rows * columns, context));
+  const std::size_t most = phases == 1 ? kConvPixels : kPhasePixels;
+  const BatchCut cut(s.batch, rows, columns, PiecePixels(s.batch * rows * columns, most, context));
   const PlaneGrid planes = OutputPlanes(s, cut.bands.largest(), columns);
   std::size_t* indices = context.scratch.Indices(ConvIndexCount(phases, s.kernel_area()));
   const ConvProduct product{.source = d_y,

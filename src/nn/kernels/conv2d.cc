@@ -12,26 +12,80 @@
 #include <algorithm>
 
 #include "nn/kernels/conv2d_winograd.h"
+#include "nn/kernels/gemm.h"
 
 namespace tilegrad::nn {
+namespace {
+
 HWY_EXPORT(Conv2dForwardTarget);
 HWY_EXPORT(Conv2dInputGradTarget);
 HWY_EXPORT(Conv2dWeightGradTarget);
 
+// A kernel that is as large as the image has one place on it: x is [N, C U V], w [O, C U V] and
+// y [N, O], and the three functions are products of these matrices.
+bool IsProduct(const Conv2dShape& shape) {
+  return shape.padding == 0 && shape.kernel_height == shape.in_height &&
+         shape.kernel_width == shape.in_width;
+}
+
+// A kernel of one pixel does not ask where pixels lie: those of a small image go into one row,
+// which fills vectors better than its own rows.
+Conv2dShape Flattened(Conv2dShape shape) {
+  constexpr std::size_t kRow = 512;
+  if (shape.kernel_area() == 1 && shape.stride == 1 && shape.padding == 0 &&
+      shape.in_pixels() <= kRow) {
+    shape.in_width = shape.in_pixels(), shape.in_height = 1;
+  }
+  return shape;
+}
+
+// Numbers that an output sees.
+std::size_t FilterSize(const Conv2dShape& shape) { return shape.in_channels * shape.kernel_area(); }
+
+}  // namespace
+
 void Conv2dForward(const Conv2dShape& shape, const float* x, const float* weight, const float* bias,
                    float* y, const KernelContext& context) {
+  if (IsProduct(shape)) {
+    const std::size_t k = FilterSize(shape), n = shape.out_channels;
+    return Gemm({.m = shape.batch,
+                 .n = n,
+                 .k = k,
+                 .a = x,
+                 .lda = k,
+                 .b = weight,
+                 .ldb = k,
+                 .transpose_b = true,
+                 .c = y,
+                 .ldc = n,
+                 .bias = bias},
+                context);
+  }
   if (context.winograd && WinogradFits(shape)) {
     return WinogradForward(shape, x, weight, bias, y, context);
   }
-  HWY_DYNAMIC_DISPATCH(Conv2dForwardTarget)(shape, x, weight, bias, y, context);
+  HWY_DYNAMIC_DISPATCH(Conv2dForwardTarget)(Flattened(shape), x, weight, bias, y, context);
 }
 
 void Conv2dInputGrad(const Conv2dShape& shape, const float* d_y, const float* weight, float* d_x,
                      const KernelContext& context) {
+  if (IsProduct(shape)) {
+    const std::size_t n = FilterSize(shape), k = shape.out_channels;
+    return Gemm({.m = shape.batch,
+                 .n = n,
+                 .k = k,
+                 .a = d_y,
+                 .lda = k,
+                 .b = weight,
+                 .ldb = n,
+                 .c = d_x,
+                 .ldc = n},
+                context);
+  }
   if (context.winograd && WinogradFits(shape)) {
     return WinogradInputGrad(shape, d_y, weight, d_x, context);
   }
-  HWY_DYNAMIC_DISPATCH(Conv2dInputGradTarget)(shape, d_y, weight, d_x, context);
+  HWY_DYNAMIC_DISPATCH(Conv2dInputGradTarget)(Flattened(shape), d_y, weight, d_x, context);
 }
 
 void Conv2dWeightGrad(const Conv2dShape& shape, const float* x, const float* d_y, float* d_weight,
@@ -40,10 +94,24 @@ void Conv2dWeightGrad(const Conv2dShape& shape, const float* x, const float* d_y
     std::fill_n(d_weight, shape.weight_size(), 0.0f);
     return;
   }
+  if (IsProduct(shape)) {
+    const std::size_t n = FilterSize(shape), m = shape.out_channels;
+    return Gemm({.m = m,
+                 .n = n,
+                 .k = shape.batch,
+                 .a = d_y,
+                 .lda = m,
+                 .transpose_a = true,
+                 .b = x,
+                 .ldb = n,
+                 .c = d_weight,
+                 .ldc = n},
+                context);
+  }
   if (context.winograd && WinogradFits(shape)) {
     return WinogradWeightGrad(shape, x, d_y, d_weight, context);
   }
-  HWY_DYNAMIC_DISPATCH(Conv2dWeightGradTarget)(shape, x, d_y, d_weight, context);
+  HWY_DYNAMIC_DISPATCH(Conv2dWeightGradTarget)(Flattened(shape), x, d_y, d_weight, context);
 }
 
 }  // namespace tilegrad::nn

@@ -56,11 +56,12 @@ TEST(Conv2d, AgreesWithReferenceOnRandomShapes) {
 }
 
 // Shapes chosen to cross the blocks of the fast paths: many channels, many images a block, wide
-// rows, a 1 x 1 kernel with a stride that skips pixels, a kernel as large as the image.
+// rows, 1 x 1 kernels with and without a stride that skips pixels, kernels as large as the image.
 const std::vector<Conv2dShape> kBlockCrossers = {
-    {5, 70, 9, 9, 30, 5, 5, 2, 2}, {2, 300, 4, 4, 40, 3, 3, 1, 1}, {9, 3, 8, 8, 130, 3, 3, 1, 1},
-    {1, 2, 5, 150, 3, 3, 3, 1, 1}, {2, 40, 7, 7, 70, 1, 1, 2, 0},  {70, 8, 3, 3, 9, 3, 3, 1, 0},
-    {1, 2, 70, 33, 3, 4, 4, 2, 1}, {3, 1, 1, 1, 1, 1, 1, 1, 0},    {2, 3, 5, 6, 4, 2, 3, 4, 5},
+    {5, 70, 9, 9, 30, 5, 5, 2, 2},  {2, 300, 4, 4, 40, 3, 3, 1, 1}, {9, 3, 8, 8, 130, 3, 3, 1, 1},
+    {1, 2, 5, 150, 3, 3, 3, 1, 1},  {2, 40, 7, 7, 70, 1, 1, 2, 0},  {70, 8, 3, 3, 9, 3, 3, 1, 0},
+    {1, 2, 70, 33, 3, 4, 4, 2, 1},  {3, 1, 1, 1, 1, 1, 1, 1, 0},    {2, 3, 5, 6, 4, 2, 3, 4, 5},
+    {32, 300, 4, 4, 1, 4, 4, 1, 0}, {3, 40, 5, 7, 30, 1, 1, 1, 0},
 };
 
 TEST(Conv2d, AgreesWithReferenceAcrossBlocks) {
