@@ -10,6 +10,9 @@
 // is a cross-correlation: kernels are not flipped. Tensors are dense: x [N,C,H,W], w [O,C,U,V],
 // y [N,O,H',W'].
 //
+// Each shape goes the way that is fastest for it: a matrix product where the kernel is as large as
+// the image, Winograd's algorithm where it fits (conv2d_winograd.h), else directly.
+//
 // The bits of the results depend on shape and SIMD target, never on the number of workers.
 #pragma once
 
