@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The direct convolutions; conv2d_winograd_test.cc has the others.
+// The direct convolutions, and those that are matrix products; conv2d_winograd_test.cc has the
+// others.
 #include "nn/kernels/conv2d.h"
 
 #include <gtest/gtest.h>
