@@ -147,20 +147,20 @@ void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> tas
     ForOnOwnThreads(this, &own_loop_, n, task);
     return;
   }
-  impl_->arena.execute([&] {
+  const auto loop = [&] {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, n, 1),
         [&](const tbb::blocked_range<std::size_t>& range) {
           const auto worker =
               static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
-          // Isolated: while a nested For waits it may only take its own work, so a worker's scratch
-          // is never entered twice.
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            tbb::this_task_arena::isolate([&] { task(i, worker); });
-          }
+          for (std::size_t i = range.begin(); i != range.end(); ++i) task(i, worker);
         },
         tbb::simple_partitioner());
-  });
+  };
+  // Isolated: while a thread waits for a loop, a nested one above all, it may only take that loop's
+  // tasks, so a worker's scratch is never entered twice. Inside the arena, because to execute in an
+  // arena, be it the same one, ends the isolation of the caller.
+  impl_->arena.execute([&] { tbb::this_task_arena::isolate(loop); });
 }
 
 void Workers::ForRanges(std::size_t n, std::size_t grain,

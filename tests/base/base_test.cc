@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <memory>
 #include <set>
@@ -64,6 +65,26 @@ TEST(Workers, NestedLoopsKeepWorkersApart) {
     --busy[w];
   });
   EXPECT_EQ(total, 400);
+}
+
+// Threads that wait for the rest of an inner loop meet tasks of the outer one that nobody has
+// taken. Inner tasks sleep, so that others take some of them.
+TEST(Workers, AWorkerThatWaitsForANestedLoopTakesNoOtherTask) {
+  const Workers workers(4);
+  std::vector<std::atomic<int>> busy(4);
+  std::atomic<int> overlaps = 0, total = 0;
+  for (int round = 0; round < 20; ++round) {
+    workers.For(20, [&](std::size_t, std::size_t w) {
+      if (busy[w]++ != 0) ++overlaps;
+      workers.For(4, [&](std::size_t j, std::size_t) {
+        std::this_thread::sleep_for(std::chrono::microseconds(100 * j));
+        ++total;
+      });
+      --busy[w];
+    });
+  }
+  EXPECT_EQ(overlaps, 0);
+  EXPECT_EQ(total, 20 * 20 * 4);
 }
 
 // Sums of a nested loop by index, on `workers`; each worker's scratch is used by one task at a
