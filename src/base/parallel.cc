@@ -10,9 +10,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <mutex>
 #include <optional>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -76,6 +76,22 @@ bool TbbIsOfThisProcess() {
 #endif
 }
 
+// Lets the process have `count` oneTBB threads. More workers than cores (tests of determinism do
+// that) must be allowed, or oneTBB prints a warning. Of several limits it takes the least, so there
+// is one for all workers, which only grows.
+void AllowThreads(int count) {
+  static std::mutex mutex;
+  static int most = AvailableCores();
+  static tbb::global_control* limit = nullptr;  // is never ended: oneTBB may be gone by then
+  const std::lock_guard lock(mutex);
+  if (count <= most) return;
+  const auto* const before = limit;
+  limit = new tbb::global_control(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(count));
+  delete before;
+  most = count;
+}
+
 // The loop on threads of its own that the calling thread takes part in.
 struct OwnLoop {
   const Workers* workers = nullptr;
@@ -93,9 +109,16 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
   }
   const std::lock_guard lock(*one_loop);
   std::atomic<std::size_t> next = 0;
+  std::once_flag failed;
+  std::exception_ptr error;  // the first: no memory, which is the caller's to hear, as with oneTBB
   const auto work = [&](std::size_t worker) {
     const OwnLoop outer = std::exchange(own_loop, {workers, worker});
-    for (std::size_t i = next++; i < n; i = next++) task(i, worker);
+    try {
+      for (std::size_t i = next++; i < n; i = next++) task(i, worker);
+    } catch (...) {
+      std::call_once(failed, [&] { error = std::current_exception(); });
+      next = n;
+    }
     own_loop = outer;
   };
   std::vector<std::thread> threads;
@@ -103,11 +126,12 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
   try {
     threads.reserve(count);
     for (std::size_t w = 1; w < count; ++w) threads.emplace_back(work, w);
-  } catch (const std::system_error&) {
+  } catch (...) {
     // The system gives no more threads: those that are there do it.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
+  if (error != nullptr) std::rethrow_exception(error);
 }
 
 }  // namespace
@@ -115,12 +139,8 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
 struct Workers::Impl {
   Impl(int count, Pinning pinning) : arena(count) {
     if (pinning == Pinning::kOn) observer.emplace(arena);
-    // More workers than cores (tests of determinism do that) must be allowed, or oneTBB prints a
-    // warning.
-    if (count > AvailableCores())
-      limit.emplace(tbb::global_control::max_allowed_parallelism, count);
+    AllowThreads(count);
   }
-  std::optional<tbb::global_control> limit;
   tbb::task_arena arena;
   std::optional<PinningObserver> observer;
 };

@@ -33,8 +33,9 @@ class Workers {
   // Calls task(index, worker) once for each index in [0, n) and returns when all are done; worker
   // is in [0, count()) and no two calls with the same worker overlap, so it selects scratch memory.
   // Which worker takes which index is not determined: results must depend on the index only, which
-  // is how the library keeps the same bits for any thread count. The task must not throw. Calls may
-  // nest.
+  // is how the library keeps the same bits for any thread count. What a task throws (it may run out
+  // of memory) comes out here when the others have ended, some of which may not have begun. Calls
+  // may nest.
   void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
 
   // The same over fixed ranges [begin, end) of at most `grain` indices; the split depends on n and

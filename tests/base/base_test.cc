@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <new>
 #include <set>
 #include <thread>
 #include <vector>
@@ -134,6 +135,43 @@ TEST(Workers, AChildHasThreadsOfItsOwn) {
     before.reset();
     return true;
   }));
+}
+
+// oneTBB prints a warning where it gives fewer threads than workers.
+TEST(Workers, OfSeveralCountsBeyondTheCoresPrintNothing) {
+  testing::internal::CaptureStderr();
+  {
+    const int cores = AvailableCores();
+    const Workers few(cores + 1), many(cores + 9), some(cores + 5);
+    for (const Workers* workers : {&few, &many, &some}) NestedSums(*workers);
+  }
+  const Workers more(AvailableCores() + 17);
+  NestedSums(more);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+// A task that runs out of memory is an error of the caller's, in a child of a fork as elsewhere.
+bool ThrowsWhatATaskThrows(const Workers& workers) {
+  std::atomic<int> calls = 0;
+  try {
+    workers.For(100, [&](std::size_t i, std::size_t) {
+      ++calls;
+      if (i % 10 == 7) throw std::bad_alloc();
+    });
+  } catch (const std::bad_alloc&) {
+    return calls <= 100 && !NestedSums(workers).empty();
+  }
+  return false;
+}
+
+TEST(Workers, WhatATaskThrowsComesOut) {
+  for (int count : {1, 2, 5}) {
+    const Workers workers(count);
+    NestedSums(workers);
+    EXPECT_TRUE(ThrowsWhatATaskThrows(workers)) << count;
+    if (test::WhyNoFork() != nullptr) continue;
+    EXPECT_TRUE(test::TrueInChild([&] { return ThrowsWhatATaskThrows(workers); })) << count;
+  }
 }
 
 TEST(Workers, RangesDependOnSizeAndGrainOnly) {
