@@ -2,6 +2,7 @@
 #include "bindings/scene_record.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace tilegrad::python {
@@ -135,7 +136,8 @@ void SceneRecord<T>::SetStreams() {
       scenes_[n].*s.member = {field.Of(n), corner ? v0::Rate::kCorner : v0::Rate::kVertex};
     }
   }
-  for (v0::SceneT<T>& scene : scenes_) scene.channels = static_cast<int>(channels);
+  constexpr py::ssize_t kMost = std::numeric_limits<int>::max();  // more than the engine takes
+  for (v0::SceneT<T>& scene : scenes_) scene.channels = static_cast<int>(std::min(channels, kMost));
 }
 
 template <class T>

@@ -113,6 +113,7 @@ Status NarrowBatch::Validate(const RenderOptions& options) const {
 }
 
 Status NarrowBatch::ValidateBackward(const RenderOptions& options,
+                                     const ShadedFrameT<double>& frame,
                                      const ShadedFrameGradientsT<double>& d_frame,
                                      std::span<const ShadedGradientsT<double>> d_scenes) {
   TILEGRAD_TRY(Validate(options));
@@ -124,7 +125,7 @@ Status NarrowBatch::ValidateBackward(const RenderOptions& options,
   for (const auto& d_scene : d_scenes) gradients.push_back(Copy(d_scene));
   TILEGRAD_TRY(ValidateShadedBackward(scenes_, options, d, gradients));
   TILEGRAD_TRY(CheckFinite("d_frame.alpha", d.alpha));
-  return ValidateShadedCotangents(d);
+  return ValidateShadedCotangents(d, frame.face_ids);
 }
 
 }  // namespace tilegrad

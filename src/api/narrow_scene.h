@@ -19,7 +19,7 @@ class NarrowBatch {
 
   Status Validate(const RenderOptions& options) const;
   // Sizes of cotangents and of gradients, and the numbers of the former.
-  Status ValidateBackward(const RenderOptions& options,
+  Status ValidateBackward(const RenderOptions& options, const ShadedFrameT<double>& frame,
                           const ShadedFrameGradientsT<double>& d_frame,
                           std::span<const ShadedGradientsT<double>> d_scenes);
 

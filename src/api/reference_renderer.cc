@@ -133,7 +133,7 @@ Status ReferenceRenderer::Backward(std::span<const SceneD> scenes, const RenderO
                                    const FrameD& frame,
                                    const ShadedFrameGradientsT<double>& d_frame,
                                    std::span<GradientsD> d_scenes) {
-  TILEGRAD_TRY(NarrowBatch(scenes).ValidateBackward(options, d_frame, d_scenes));
+  TILEGRAD_TRY(NarrowBatch(scenes).ValidateBackward(options, frame, d_frame, d_scenes));
   if (!d_frame.alpha.empty() && frame.alpha.size() != d_frame.alpha.size()) {
     return InvalidArgument("frame.alpha has {} numbers, expected {}", frame.alpha.size(),
                            d_frame.alpha.size());

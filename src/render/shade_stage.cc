@@ -212,7 +212,7 @@ bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t firs
   };
   const auto channels = static_cast<std::size_t>(scene.scene->channels);
   if (sound(d_frame_->color, 3) && sound(d_frame_->normals, 3) && sound(d_frame_->uv, 2) &&
-      sound(d_frame_->attributes, channels) && sound(d_frame_->depth, 1)) {
+      sound(d_frame_->attributes, channels)) {
     return true;
   }
   sound_ = false;
@@ -231,13 +231,16 @@ void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run
   if (backward_->wishes.d_normals) gather(d_frame_->normals, d->unit);
 }
 
-// depth = -(z . p + t_z), z the third row of the rotation.
+// depth = -(z . p + t_z), z the third row of the rotation. Background pixels, whose depth is
+// infinite, are not looked at: what a loss pulls on them is often NaN.
 void ShadeStage::DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
-                              SceneSums* sums) const {
+                              SceneSums* sums) {
   const Camera& camera = scenes_[block.image].scene->camera;
   RunPlane d_depth;
   GatherCotangents(run, PlaneOf(d_frame_->depth.data(), 1, 0, pixels_, block), {options_->width},
                    &d_depth);
+  if (!AllFinite(std::span<const float>(d_depth.at, run.count))) sound_ = false;
+  if (!backward_->geometry) return;
   const bool position = backward_->recomputed[Varying::kPosition];
   for (std::size_t i = 0; i < run.count; ++i) {
     const float d = d_depth.at[i];
@@ -315,7 +318,7 @@ void ShadeStage::BackwardRun(const PixelBlock& block, const PixelRun& run,
                   {d, &band.sums.surfaces[static_cast<std::size_t>(run.surface())], &band.sums,
                    NewShares(scene, run.count, &band)});
   if (plan.wishes.d_uv && plan.pulled[Varying::kUv]) AddUvCotangents(block, run, d);
-  if (plan.wishes.d_depth && plan.geometry) DepthAdjoint(block, run, worker, &band.sums);
+  if (plan.wishes.d_depth) DepthAdjoint(block, run, worker, &band.sums);
   clock.Lap(&work->adjoint);
   ScatterCotangents(block, run, d_varyings, *d);
   clock.Lap(&work->scatter);

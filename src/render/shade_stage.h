@@ -80,7 +80,7 @@ class ShadeStage : public PixelStage {
   void AddUvCotangents(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
   shade::TexelShare* NewShares(const RunScene& scene, std::size_t count, StageBand* band) const;
   void DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
-                    SceneSums* sums) const;
+                    SceneSums* sums);
   void ScatterCotangents(const PixelBlock& block, const PixelRun& run,
                          const raster::PlanarView<float>& d_varyings, const RunCotangents& d) const;
 

@@ -126,6 +126,9 @@ Status CheckMesh(const ShadedScene& scene, const ShadedScene& known) {
 // `known`: the scene before, or an empty one.
 Status CheckScene(const ShadedScene& scene, const ShadedScene& known) {
   TILEGRAD_TRY(CheckMesh(scene, known));
+  if (!SameArray(scene.attributes, known.attributes)) {
+    TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
+  }
   TILEGRAD_TRY(CheckStream("colors", scene.colors, 3, scene, known.colors));
   TILEGRAD_TRY(CheckStream("uvs", scene.uvs, 2, scene, known.uvs));
   if (scene.model.normals == NormalKind::kGiven) {
@@ -269,11 +272,16 @@ Status ValidateShadedBackward(std::span<const ShadedScene> scenes, const RenderO
   return {};
 }
 
-Status ValidateShadedCotangents(const ShadedFrameGradients& d_frame) {
+Status ValidateShadedCotangents(const ShadedFrameGradients& d_frame,
+                                std::span<const std::int32_t> face_ids) {
   TILEGRAD_TRY(CheckFinite("d_frame.color", d_frame.color));
   TILEGRAD_TRY(CheckFinite("d_frame.normals", d_frame.normals));
   TILEGRAD_TRY(CheckFinite("d_frame.uv", d_frame.uv));
-  TILEGRAD_TRY(CheckFinite("d_frame.depth", d_frame.depth));
+  for (std::size_t i = 0; i < d_frame.depth.size(); ++i) {
+    const bool background = i < face_ids.size() && face_ids[i] < 0;
+    if (background || std::isfinite(d_frame.depth[i])) continue;
+    return InvalidArgument("d_frame.depth[{}] is {}", i, d_frame.depth[i]);
+  }
   return CheckFinite("d_frame.attributes", d_frame.attributes);
 }
 

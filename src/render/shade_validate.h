@@ -2,6 +2,7 @@
 // The border of the shaded renderer, beside validate.h: what shading adds to scenes.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "render/shade_plan.h"
@@ -19,8 +20,10 @@ Status ValidateShadedBackward(std::span<const ShadedScene> scenes, const RenderO
                               const ShadedFrameGradients& d_frame,
                               std::span<const ShadedGradients> d_scenes);
 
-// Cotangents that are not finite; only after something was found to be wrong.
-Status ValidateShadedCotangents(const ShadedFrameGradients& d_frame);
+// Cotangents that are not finite, of depth those of pixels that have a face; only after something
+// was found to be wrong.
+Status ValidateShadedCotangents(const ShadedFrameGradients& d_frame,
+                                std::span<const std::int32_t> face_ids);
 
 // Gradients that overflow float are an error, not an Inf that spreads.
 Status ValidateShadedResult(std::span<const ShadedGradients> d_scenes);

@@ -402,7 +402,9 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   if (backward.user_only) d_images.attributes = d_frame.attributes;
   const Status status =
       renderer.Backward(views, options, frame, d_images, d_views, staged ? &stage : nullptr);
-  if (!status.ok() || (staged && !stage.sound())) TILEGRAD_TRY(ValidateShadedCotangents(d_frame));
+  if (!status.ok() || (staged && !stage.sound())) {
+    TILEGRAD_TRY(ValidateShadedCotangents(d_frame, frame.face_ids));
+  }
   TILEGRAD_TRY(status);
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;

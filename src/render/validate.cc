@@ -134,12 +134,9 @@ Status ValidateOptions(const RenderOptions& options) {
     return InvalidArgument("options.max_alpha_error is {}, must be in [0, 1]",
                            options.max_alpha_error);
   }
-  const double box = options.paper.box;
-  if (!(box >= 0 && std::isfinite(box)) || options.paper.max_faces < 0) {
-    return InvalidArgument("options.paper is {{box {}, max_faces {}}}, must be finite and >= 0",
-                           box, options.paper.max_faces);
-  }
-  return {};
+  TILEGRAD_TRY(CheckNotNegative("options.paper_box", options.paper.box));
+  if (options.paper.max_faces >= 0) return {};
+  return InvalidArgument("options.paper_faces is {}, must be >= 0", options.paper.max_faces);
 }
 
 Status ValidateSceneSizes(const SceneView& scene) {
@@ -157,6 +154,9 @@ Status ValidateSceneSizes(const SceneView& scene) {
   }
   const std::size_t vertices = scene.positions.size() / 3;
   if (scene.channels < 0) return InvalidArgument("channels is {}, must be >= 0", scene.channels);
+  if (static_cast<std::size_t>(scene.channels) > kMost) {
+    return ResourceExhausted("{} channels: the limit is {}", scene.channels, kMost);
+  }
   const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
   return CheckShape("attributes", scene.attributes.size(), rows,
                     static_cast<std::size_t>(scene.channels));

@@ -321,6 +321,42 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
   }
 }
 
+// Channels that no array has, because there is no vertex, are not added up beyond what int holds.
+TEST(ApiErrors, ChannelsHaveALimit) {
+  TestScene<float> s(Lighting::kNone);
+  Scene scene;
+  scene.shading.lighting = Lighting::kSphericalHarmonics;
+  const std::vector<float> sh(9, 0.5f);
+  scene.sh = sh, scene.channels = std::numeric_limits<int>::max();
+  Renderer renderer;
+  Frame frame;
+  const Status status = renderer.Render({&scene, 1}, kTestOptions, {}, &frame);
+  EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
+  EXPECT_NE(status.message().find("2147483647 channels"), std::string::npos) << status.message();
+}
+
+template <class T>
+void ExpectDepthOfBackgroundIsNotRead() {
+  const TestScene<T> s(Lighting::kNone);
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {.depth = true}, &frame).ok());
+  const ImagesT<T>& images = frame.images();
+  std::vector<T> d_depth(images.depth.size(), std::numeric_limits<T>::quiet_NaN());
+  for (std::size_t i = 0; i < d_depth.size(); ++i) {
+    if (images.face_ids[i] >= 0) d_depth[i] = T(1);
+  }
+  std::vector<T> d_positions(s.positions.size());
+  const SceneGradientsT<T> d_scene{.positions = d_positions};
+  const Status status = renderer.Backward(frame, {.depth = d_depth}, {&d_scene, 1});
+  EXPECT_TRUE(status.ok()) << status.message();
+  for (const T d : d_positions) EXPECT_TRUE(std::isfinite(d));
+}
+TEST(ApiBackward, CotangentsOfDepthAreNotReadAtTheBackground) {
+  ExpectDepthOfBackgroundIsNotRead<float>();
+  ExpectDepthOfBackgroundIsNotRead<double>();
+}
+
 TEST(ApiErrors, OfTheWayBackAndOfRenderers) {
   const TestScene<float> s(Lighting::kNone);
   Renderer renderer;

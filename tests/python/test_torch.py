@@ -189,6 +189,16 @@ class Graphs(unittest.TestCase):
         self.assertEqual(tilegrad.stats()["copies"], 0)
         self.assertTrue(first.alpha.is_contiguous())
 
+    def test_a_loss_of_depth_that_is_nan_outside(self):
+        """Its gradient is NaN where depth is infinite, whatever `where` chooses there."""
+        images = rendered(self.given, outputs="depth")
+        inside = images.face_ids >= 0
+        self.assertFalse(bool(inside.all()))
+        chosen = self.gradient((images.depth[inside] - 2).square().sum())
+        images = rendered(self.given, outputs="depth")
+        loss = torch.where(inside, (images.depth - 2).square(), torch.zeros(()))
+        self.assertTrue(torch.equal(self.gradient(loss.sum()), chosen))
+
     def test_renders_between_forward_and_backward(self):
         alone = self.gradient(rendered(self.given).color.sum())
         first = rendered(self.given)

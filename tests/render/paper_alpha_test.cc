@@ -221,7 +221,7 @@ TEST(PaperAlpha, BadOptionsAndGradientsAreErrors) {
             "d_frame.alpha[3] is nan");
   options.paper.box = -1;
   EXPECT_EQ(renderer.Render(views, options, {}, &frame).message(),
-            "options.paper is {box -1, max_faces 5}, must be finite and >= 0");
+            "options.paper_box is -1, must be finite and >= 0");
 }
 
 }  // namespace

@@ -381,5 +381,54 @@ TEST(ShadedErrors, CotangentsAreChecked) {
   EXPECT_NE(status.message().find("d_frame.color has 5"), std::string::npos) << status.message();
 }
 
+// The depth of background pixels is infinite, and what a loss makes of that is often NaN.
+TEST(ShadedErrors, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
+  OwnedScene<float> scene = Sphere(Lighting::kPhong);
+  const ShadedScene view = scene.View();
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  ShadedRequest request;
+  request.depth = true;
+  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), request, &frame).ok());
+  std::vector<float> nan(kPixels, NAN), zero(kPixels, 0.0f);
+  std::size_t seen = kPixels;
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (frame.face_ids[i] < 0) continue;
+    nan[i] = zero[i] = 0.25f;
+    seen = i;
+  }
+  ASSERT_LT(seen, kPixels);
+  OwnedGradients<float> gradients(scene), expected(scene);
+  ShadedGradients d_scene = gradients.View(), d_expected = expected.View();
+  ShadedFrameGradients d_frame;
+  d_frame.depth = zero;
+  ASSERT_TRUE(renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_expected, 1}).ok());
+  d_frame.depth = nan;
+  Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  ASSERT_TRUE(status.ok()) << status.message();
+  EXPECT_TRUE(
+      std::equal(d_scene.positions.begin(), d_scene.positions.end(), d_expected.positions.begin()));
+  nan[seen] = INFINITY;
+  status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  EXPECT_EQ(status.message(), "d_frame.depth[" + std::to_string(seen) + "] is inf");
+}
+
+// Numbers that nobody asked for are looked at, too.
+TEST(ShadedErrors, AttributesAreCheckedWhateverIsWanted) {
+  OwnedScene<float> scene = Sphere(Lighting::kPhong);
+  ShadedScene view = scene.View();
+  std::vector<float> attributes(view.positions.size() / 3, 0.5f);
+  attributes[2] = NAN;
+  view.attributes = attributes, view.channels = 1, view.rate = AttributeRate::kVertex;
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  ShadedRequest request;
+  request.attributes = false;
+  const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
+  EXPECT_EQ(status.message(), "scene 0: attributes[2] is nan");
+}
+
 }  // namespace
 }  // namespace tilegrad
