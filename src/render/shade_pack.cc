@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "render/direction_scale.h"
+
 namespace tilegrad {
 namespace {
 
@@ -91,10 +93,11 @@ void PackVaryings(const ShadedScene& scene, const VaryingSet& set, const SceneNo
     if (!set[what]) continue;
     const Stream stream = StreamOf(scene, normals, what);
     const auto width = static_cast<std::size_t>(set.width(what));
+    const float scale = StreamScale(scene, what);
     float* const to = out->data() + set.first(what);
     ForEachRow(scene, set.rate, stream.rows, [&](std::size_t row, std::size_t from) {
       for (std::size_t c = 0; c < width; ++c) {
-        to[row * channels + c] = stream.values[from * stream.stride + c];
+        to[row * channels + c] = scale * stream.values[from * stream.stride + c];
       }
     });
   }
@@ -104,9 +107,12 @@ void AddStream(const ShadedScene& scene, const VaryingSet& set, Varying what,
                std::span<const float> packed, std::span<float> stream) {
   const auto channels = static_cast<std::size_t>(set.channels());
   const auto width = static_cast<std::size_t>(set.width(what));
+  const float scale = StreamScale(scene, what);
   const float* const from = packed.data() + set.first(what);
   ForEachRow(scene, set.rate, RowsOfStream(scene, what), [&](std::size_t row, std::size_t to) {
-    for (std::size_t c = 0; c < width; ++c) stream[to * width + c] += from[row * channels + c];
+    for (std::size_t c = 0; c < width; ++c) {
+      stream[to * width + c] += scale * from[row * channels + c];
+    }
   });
 }
 

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "render/direction_scale.h"
 #include "render/renderer_ref.h"
 #include "render/shade_pixel_ref.h"
 #include "render/shade_plan.h"
@@ -83,10 +84,11 @@ void PackRef(ShadedRefScene<T>* s) {
   s->packed.assign(scene.faces.size() * channels, T(0));
   ForEachRefStream(scene, StreamsOf(scene), [&](Varying v, AttributeRate rate, auto stream) {
     const auto width = static_cast<std::size_t>(s->set.width(v));
+    const T scale = T(StreamScale(scene, v));
     for (std::size_t i = 0; i < scene.faces.size(); ++i) {
       for (std::size_t c = 0; c < width && !stream.empty(); ++c) {
         s->packed[i * channels + static_cast<std::size_t>(s->set.first(v)) + c] =
-            stream[StreamRow(scene, rate, i) * width + c];
+            scale * stream[StreamRow(scene, rate, i) * width + c];
       }
     }
   });
@@ -340,10 +342,11 @@ void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::spa
                               d_scene->normals, d_scene->light_directions, d_scene->attributes};
   ForEachRefStream(scene, streams, [&](Varying v, AttributeRate rate, std::span<T> stream) {
     const auto width = static_cast<std::size_t>(s.set.width(v));
+    const T scale = T(StreamScale(scene, v));
     for (std::size_t i = 0; i < scene.faces.size() && !stream.empty(); ++i) {
       for (std::size_t c = 0; c < width; ++c) {
         stream[StreamRow(scene, rate, i) * width + c] +=
-            d_packed[i * channels + static_cast<std::size_t>(s.set.first(v)) + c];
+            scale * d_packed[i * channels + static_cast<std::size_t>(s.set.first(v)) + c];
       }
     }
   });

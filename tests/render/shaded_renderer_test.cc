@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -101,6 +102,45 @@ TEST(ShadedRenderer, LightFromTheSideGivesItsCosine) {
   ExpectColor(Draw(scene), 8, 8, {0.8f, 0.8f, 0.8f});
   scene.model.normals = NormalKind::kFlat;
   ExpectColor(Draw(scene), 3, 12, {0.8f, 0.8f, 0.8f});
+}
+
+// Normals that are sums over tiny faces, and light directions, need not be near 1: their lengths
+// are powers of two here, so that nothing is rounded, and the gradient is as much larger as they
+// are smaller.
+TEST(ShadedRenderer, DirectionsThatAreGivenMayHaveAnyLength) {
+  const Square square;
+  const std::vector<float> normals = {0, 0, 1, 0.25f, 0, 1, 0, 0.5f, 1, 0.5f, 0.5f, 0.75f};
+  const std::vector<float> lights = {1, 0, 1, 0, 1, 1, 0.5f, 0, 1, 0, 0, 1};
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  std::vector<float> color, d_normals, d_lights;
+  for (const int power : {0, -20, -60, -100, 20, 60, 100}) {
+    std::vector<float> n = normals, l = lights, d_n(12), d_l(12);
+    for (float& x : n) x = std::ldexp(x, power);
+    for (float& x : l) x = std::ldexp(x, -power);
+    ShadedScene scene = square.Scene();
+    scene.normals = {n, AttributeRate::kVertex}, scene.light_directions = l;
+    scene.model.normals = NormalKind::kGiven, scene.model.lighting = Lighting::kLambert;
+    const ShadedFrame frame = Draw(scene);
+    const std::vector<float> d_color(3 * kPixels, 0x1p-10f);
+    ShadedFrameGradients d_frame;
+    d_frame.color = d_color;
+    ShadedGradients d_scene;
+    d_scene.normals = d_n, d_scene.light_directions = d_l;
+    const Status status = renderer.Backward({&scene, 1}, Options(), frame, d_frame, {&d_scene, 1});
+    ASSERT_TRUE(status.ok()) << status.message();
+    for (float& x : d_n) x = std::ldexp(x, power);
+    for (float& x : d_l) x = std::ldexp(x, -power);
+    if (power == 0) {
+      color.assign(frame.color.begin(), frame.color.end()), d_normals = d_n, d_lights = d_l;
+      EXPECT_GT(color[0], 0.5f);
+      EXPECT_NE(d_normals[0], 0.0f);
+      continue;
+    }
+    EXPECT_TRUE(std::equal(color.begin(), color.end(), frame.color.begin())) << power;
+    EXPECT_EQ(d_n, d_normals) << power;
+    EXPECT_EQ(d_l, d_lights) << power;
+  }
 }
 
 TEST(ShadedRenderer, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
