@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The C interface of tilegrad, in float; C99 or later, and what speaks C: Rust, Julia, ctypes.
  * Meanings, shapes and conventions are those of renderer.h and scene.h; a pointer with its count
- * stands for a span, and NULL for one that is not there.
+ * stands for a span, and NULL, with a count of 0, for one that is not there.
  *
  * Large structs begin with their size, by which the library knows what the caller was compiled
  * with: members are only ever added at the end, and what a caller does not know has its default.
@@ -131,7 +131,8 @@ typedef struct tilegrad_frame_gradients {
   const float *color, *alpha, *attributes, *depth, *normals, *uv;
 } tilegrad_frame_gradients;
 
-/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. */
+/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. What the scene does not have
+ * cannot be asked for. */
 typedef struct tilegrad_scene_gradients {
   size_t struct_size;
   float* positions;

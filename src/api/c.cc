@@ -89,7 +89,8 @@ Status ReadScenes(const tilegrad_scene* scenes, std::size_t count, tilegrad_fram
   frame->views.clear();
   for (std::size_t n = 0; n < count; ++n) {
     tilegrad_scene scene = DefaultScene();
-    const Status status = api::ReadSized("scene", api::EntryOf(scenes, n), &scene);
+    Status status = api::ReadSized("scene", api::EntryOf(scenes, n), &scene);
+    if (status.ok()) status = api::CheckCounts(scene);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
     frame->scenes[n].Set(scene);
     frame->views.push_back(frame->scenes[n].scene);
@@ -111,7 +112,9 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
   if (r->gradients.size() < count) r->gradients.resize(count);
   r->views.clear();
   for (std::size_t n = 0; n < count; ++n) {
-    TILEGRAD_TRY(api::ReadSized("d_scene", api::EntryOf(d_scenes, n), &r->wanted[n]));
+    Status status = api::ReadSized("d_scene", api::EntryOf(d_scenes, n), &r->wanted[n]);
+    if (status.ok()) status = api::CheckWanted(r->wanted[n], frame->views[n]);
+    if (!status.ok()) return status.Within(fmt::format("scene {}", n));
     r->gradients[n].Set(r->wanted[n], frame->views[n]);
     r->views.push_back(r->gradients[n].gradients);
   }
@@ -164,10 +167,12 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
   return Run(renderer, [&]() -> Status {
     if (frame == nullptr) return InvalidArgument("frame is NULL");
     tilegrad_options known = DefaultOptions();
-    TILEGRAD_TRY(api::ReadSized("options", options, &known));
-    Status status = ReadScenes(scenes, count, frame);
+    const Status status = api::Guarded([&]() -> Status {
+      TILEGRAD_TRY(api::ReadSized("options", options, &known));
+      return ReadScenes(scenes, count, frame);
+    });
     if (!status.ok()) {
-      frame->frame = {};
+      frame->frame = {}, frame->count = 0;
       return status;
     }
     return renderer->renderer.Render(frame->views, api::OptionsOf(known), api::OutputsOf(known),

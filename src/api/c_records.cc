@@ -58,6 +58,41 @@ const float* DataOf(std::span<const float> image) { return image.empty() ? nullp
 
 }  // namespace
 
+Status CheckCounts(const tilegrad_scene& scene) {
+  const struct {
+    const char* array;
+    bool given;
+    const char* name;
+    std::size_t count;
+  } all[] = {{"positions", scene.positions != nullptr, "vertices", scene.vertices},
+             {"faces", scene.faces != nullptr, "face_count", scene.face_count},
+             {"textures", scene.textures != nullptr, "texture_count", scene.texture_count},
+             {"surfaces", scene.surfaces != nullptr, "surface_count", scene.surface_count},
+             {"lights", scene.lights != nullptr, "light_count", scene.light_count}};
+  for (const auto& a : all) {
+    if (a.given || a.count == 0) continue;
+    return InvalidArgument("{} is NULL, but {} is {}", a.array, a.name, a.count);
+  }
+  return {};
+}
+
+Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
+  const struct {
+    const char* array;
+    const float *wanted, *given;
+  } all[] = {{"colors", wanted.colors, scene.colors.values.data()},
+             {"uvs", wanted.uvs, scene.uvs.values.data()},
+             {"normals", wanted.normals, scene.normals.values.data()},
+             {"attributes", wanted.attributes, scene.attributes.values.data()},
+             {"light_directions", wanted.light_directions, scene.light_directions.data()},
+             {"sh", wanted.sh, scene.sh.data()}};
+  for (const auto& a : all) {
+    if (a.wanted == nullptr || a.given != nullptr) continue;
+    return InvalidArgument("d_scene.{} is wanted, but the scene has none", a.array);
+  }
+  return {};
+}
+
 void CScene::Set(const tilegrad_scene& from) {
   const std::size_t vertices = from.vertices, corners = 3 * from.face_count;
   const auto channels = static_cast<std::size_t>(std::max(from.channels, 0));

@@ -42,6 +42,11 @@ const S* EntryOf(const S* array, std::size_t n) {
   return reinterpret_cast<const S*>(reinterpret_cast<const char*>(array) + n * array->struct_size);
 }
 
+// An array that is NULL has no entries: a count says otherwise where a pointer was forgotten.
+Status CheckCounts(const tilegrad_scene& scene);
+// A gradient of an array that the scene does not have would be left as it is.
+Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene);
+
 // A scene, and the lists that it looks at.
 struct CScene {
   std::vector<Texture> textures;

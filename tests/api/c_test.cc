@@ -155,6 +155,44 @@ TEST_F(CApi, LongerStructsMustNotSayWhatIsNotKnown) {
             "options has members that this library (" TILEGRAD_VERSION ") does not know");
 }
 
+TEST_F(CApi, AFrameHoldsNothingAfterAnyError) {
+  ASSERT_EQ(Render(), TILEGRAD_OK);
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, nullptr, frame)), "options is NULL");
+  tilegrad_images images;
+  tilegrad_images_init(&images);
+  ASSERT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_OK);
+  EXPECT_EQ(images.face_ids, nullptr);
+  EXPECT_EQ(images.count, 0);
+}
+
+TEST_F(CApi, APointerThatWasForgottenIsNoEmptyArray) {
+  const tilegrad_scene sound = c.scene;
+  c.scene.faces = nullptr;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: faces is NULL, but face_count is 18");
+  c.scene = sound, c.scene.positions = nullptr;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: positions is NULL, but vertices is 16");
+  c.scene = sound, c.scene.textures = nullptr;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: textures is NULL, but texture_count is 1");
+  c.scene = sound, c.scene.surfaces = nullptr;
+  EXPECT_EQ(ErrorOf(Render()), "scene 0: surfaces is NULL, but surface_count is 1");
+}
+
+// Their arrays would stay as they were, whatever that was.
+TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
+  ASSERT_EQ(Render(), TILEGRAD_OK);
+  tilegrad_frame_gradients d_frame;
+  tilegrad_frame_gradients_init(&d_frame);
+  tilegrad_scene_gradients d_scene;
+  tilegrad_scene_gradients_init(&d_scene);
+  float numbers[48] = {};
+  d_scene.sh = numbers;
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+            "scene 0: d_scene.sh is wanted, but the scene has none");
+  d_scene.sh = nullptr, d_scene.normals = numbers;
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+            "scene 0: d_scene.normals is wanted, but the scene has none");
+}
+
 TEST_F(CApi, SaysWhatIsWrong) {
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, nullptr, frame)), "options is NULL");
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 1, &options, frame)),
