@@ -56,10 +56,10 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     dtype = np.dtype(dtype)
     array = value if type(value) is np.ndarray else _foreign(function, argument, value)
     _counts["arrays"] += 1
-    if array.dtype == dtype and array.flags.c_contiguous:
+    if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
     _check_dtype(function, argument, array, dtype)
-    copy = np.ascontiguousarray(array, dtype)
+    copy = np.require(array, dtype, ("C", "ALIGNED"))
     if not isinstance(value, _NUMBERS):
         _count_copy(copy)
     return copy.reshape(array.shape)  # ascontiguousarray makes one axis of none
@@ -134,10 +134,33 @@ def check_choice(function: str, argument: str, value: Any, choices: Sequence[str
     raise ValueError(f"{function}: {argument} is {value!r}, expected one of {expected}")
 
 
+def check_indices(function: str, argument: str, indices: np.ndarray, count: int) -> None:
+    """ValueError unless all `indices` are in [0, count)."""
+    wrong = np.flatnonzero((indices < 0) | (indices >= count))
+    if wrong.size:
+        raise ValueError(f"{function}: {argument}[{wrong[0]}] is {indices.flat[wrong[0]]}, outside "
+                         f"of [0, {count})")
+
+
+def as_names(function: str, argument: str, value: Any, choices: Sequence[str]) -> tuple[str, ...]:
+    """A name of `choices`, or several, as a tuple; TypeError if it is neither, ValueError if one is
+    not among them."""
+    try:
+        names = (value,) if isinstance(value, str) else tuple(value)
+    except TypeError:
+        raise TypeError(f"{function}: {argument} must be a name or a sequence of names, got "
+                        f"{type(value).__name__}") from None
+    for name in names:
+        check_choice(function, argument, name, choices)
+    return names
+
+
 def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
     """`value` as an int of 32 bits or a float; TypeError if it is none, ValueError if it is out of
     range."""
     try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
         number = operator.index(value) if kind is int else float(value)
     except (TypeError, ValueError):
         raise TypeError(f"{function}: {argument} must be {kind.__name__}, got "

@@ -103,10 +103,16 @@ def stacked(function: str, argument: str, value: Any, kind: type) -> np.ndarray:
     """The numbers of records given as one object of `kind` or a sequence of them; a leading axis
     for the records."""
     records = [value] if isinstance(value, kind) else value
-    if isinstance(records, (list, tuple)) and all(isinstance(r, kind) for r in records):
-        if len(records) == 1:
-            numbers = records[0].numbers
-            return numbers[None] if numbers.ndim == 1 else numbers
-        return np.stack([record.numbers for record in records], axis=-2)
-    raise TypeError(f"{function}: {argument} must be a {kind.__name__} or a sequence of them, got "
-                    f"{type(value).__name__}")
+    if not isinstance(records, (list, tuple)) or not all(isinstance(r, kind) for r in records):
+        raise TypeError(f"{function}: {argument} must be a {kind.__name__} or a sequence of them, "
+                        f"got {type(value).__name__}")
+    shapes = sorted({record.numbers.shape[:-1] for record in records})
+    if not shapes:
+        raise ValueError(f"{function}: {argument} is an empty sequence; None stands for none")
+    if len(shapes) > 1:
+        raise ValueError(f"{function}: {argument} has records of leading axes {shapes[0]} and "
+                         f"{shapes[1]}: they must be alike")
+    if len(records) == 1:
+        numbers = records[0].numbers
+        return numbers[None] if numbers.ndim == 1 else numbers
+    return np.stack([record.numbers for record in records], axis=-2)

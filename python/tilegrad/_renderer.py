@@ -222,9 +222,7 @@ class Renderer:
         checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
         options = _options(width, height, delta, max_alpha_error, interpolation, culling,
                            alpha_rule, paper_box, paper_faces)
-        outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        for name in outputs:
-            _arrays.check_choice("render", "outputs", name, _core.IMAGES)
+        outputs = _arrays.as_names("render", "outputs", outputs, _core.IMAGES)
         if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")
         records: Any = [scene._record for scene in checked]
@@ -285,20 +283,20 @@ class Renderer:
                  accumulate: bool) -> list[Gradients]:
         if out is None and accumulate:
             raise ValueError("backward: accumulate=True needs out")
+        names = _arrays.as_names("backward", "wrt", "positions" if wrt is None else wrt, _NAMES)
         if out is None:
-            names = ("positions",) if wrt is None else (wrt,) if isinstance(wrt, str) else wrt
-            for name in names:
-                _arrays.check_choice("backward", "wrt", name, _NAMES)
             return [Gradients({name: _empty_like(scene, name) for name in names})
                     for scene in frame.scenes]
+        if not isinstance(out, (Gradients, list, tuple)):
+            raise TypeError(f"backward: out must be Gradients or a list of them, got "
+                            f"{type(out).__name__}")
         gradients = [out] if isinstance(out, Gradients) else list(out)
         for i, gradient in enumerate(gradients):
             if not isinstance(gradient, Gradients):
                 raise TypeError(f"backward: out[{i}] must be Gradients, got "
                                 f"{type(gradient).__name__}")
-            if wrt is not None and set(wrt) != set(gradient):
-                raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is "
-                                 f"{tuple(wrt)!r}")
+            if wrt is not None and set(names) != set(gradient):
+                raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is {names!r}")
         return gradients
 
 

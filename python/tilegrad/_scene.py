@@ -48,8 +48,12 @@ class Surface(Packed):
 
     def textures(self) -> list[int]:
         """The texture of each surface."""
-        count = self.numbers.shape[:-1]
-        return np.broadcast_to(self.texture, count or (1,)).ravel().tolist()
+        count = self.numbers.shape[:-1] or (1,)
+        try:
+            return np.broadcast_to(self.texture, count).ravel().tolist()
+        except ValueError:
+            raise ValueError(f"Surface: texture has shape {self.texture.shape}, expected () or "
+                             f"{count}, one for each surface") from None
 
 
 class Light(Packed):
@@ -178,10 +182,7 @@ class Scene:
 
     @staticmethod
     def _corners(per_corner: Sequence[str]) -> Sequence[str]:
-        names = (per_corner,) if isinstance(per_corner, str) else per_corner
-        for name in names:
-            _arrays.check_choice("Scene", "per_corner", name, tuple(_CORNER_SHAPES))
-        return names
+        return _arrays.as_names("Scene", "per_corner", per_corner, tuple(_CORNER_SHAPES))
 
     def _lights(self, lights: Any, sizes: dict) -> np.ndarray:
         numbers = stacked("Scene", "lights", lights, Light).astype(self._dtype)

@@ -103,6 +103,7 @@ def _scenes_of(source: Any, width: Optional[int],
 
 def _face_vertices(scene: Scene, width: int, height: int) -> np.ndarray:
     """(N, F, 3, 3) corners of a scene's faces in its images: x, y in PyTorch3D's NDC, and depth."""
+    _arrays.check_indices("to_fragments", "faces", scene.faces, scene.positions.shape[-2])
     camera = Camera.of_numbers(np.asarray(scene.camera.numbers, np.float64))
     numbers = camera.numbers.reshape(-1, 1, camera.numbers.shape[-1])
     each = Camera.of_numbers(numbers)  # (N or 1, 1): broadcasts over vertices

@@ -50,6 +50,16 @@ class Shared(unittest.TestCase):
             self.assertEqual(got.dtype, np.float32)
             self.assertEqual(tilegrad.stats(), {"arrays": 1, "copies": 1, "bytes_copied": 24})
 
+    def test_what_is_not_aligned_is_copied(self):
+        memory = np.zeros(25, np.uint8)[1:]
+        values = memory.view(np.float32).reshape(2, 3)
+        values[:] = np.arange(6).reshape(2, 3)
+        self.assertFalse(values.flags.aligned)
+        got = take(values)
+        self.assertTrue(got.flags.aligned)
+        self.assertTrue(np.array_equal(got, values))
+        self.assertEqual(tilegrad.stats(), {"arrays": 1, "copies": 1, "bytes_copied": 24})
+
     def test_numbers_and_buffers(self):
         self.assertEqual(take([[1, 2, 3.5]]).dtype, np.float32)
         self.assertEqual(take(array.array("f", [1, 2, 3]), shape=(3,)).tolist(), [1, 2, 3])

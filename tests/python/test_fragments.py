@@ -146,6 +146,9 @@ class ToFragments(unittest.TestCase):
 
         fails(TypeError, "to_fragments: source must be a Frame, a Scene or a list", 3)
         fails(ValueError, "to_fragments: source has no scene", [])
+        for wrong in (-1, len(scene.positions)):
+            fails(ValueError, fr"to_fragments: faces\[2\] is {wrong}, outside of \[0, ",
+                  scene.replace(faces=[[0, 1, wrong]]), width=8, height=8)
         fails(ValueError, "to_fragments: scenes need width and height", scene)
         fails(ValueError, "to_fragments: faces_per_pixel is 0, expected 1..1024", scene, 0,
               width=8, height=8)
@@ -235,6 +238,15 @@ class RasterizeMeshes(unittest.TestCase):
             pytorch3d.rasterize_meshes(Meshes(corners.half()))
         with self.assertRaisesRegex(ValueError, "rasterize_meshes: width is 0"):
             pytorch3d.rasterize_meshes(Meshes(corners), (4, 0))
+        with self.assertRaisesRegex(ValueError, r"image_size is \(1, 2, 3\), expected pixels or"):
+            pytorch3d.rasterize_meshes(Meshes(corners), (1, 2, 3))
+        meshes = Meshes(corners)
+        for wrong in (-1, meshes.verts_packed().shape[0]):
+            faces = meshes.faces_packed().clone()
+            faces[0, 1] = wrong
+            meshes.faces_packed = lambda faces=faces: faces
+            with self.assertRaisesRegex(ValueError, fr"faces_packed\(\)\[1\] is {wrong}, outside"):
+                pytorch3d.rasterize_meshes(meshes)
         corners[3, 1, 0] = float("nan")
         with self.assertRaisesRegex(ValueError, r"face_vertices\[30\] is nan"):
             pytorch3d.rasterize_meshes(Meshes(corners))

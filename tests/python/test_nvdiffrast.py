@@ -378,7 +378,11 @@ class Errors(unittest.TestCase):
         self.check(ValueError, "rasterize: face 0 has vertex 3, but there are 3", dr.rasterize,
                    context, pos, tri + 1, (4, 4))
         self.check(ValueError, "resolution is 4, expected", dr.rasterize, context, pos, tri, 4)
-        self.check(ValueError, "0 x 4 pixels", dr.rasterize, context, pos, tri, (0, 4))
+        for wrong in ((0, 4), (-1, 4), (4, 16385), (10**9, 10**9), (4.5, 4), (None, 4),
+                      (4, float("inf")), (4, float("nan"))):
+            for function in (dr.rasterize, dr.DepthPeeler):
+                self.check(ValueError, f"{function.__name__}: resolution is .*, each 1 to 16384",
+                           function, context, pos, tri, wrong)
         self.check(ValueError, "range 0 is 2 faces from 0 on", dr.rasterize, context, pos[0], tri,
                    (4, 4), ranges=torch.tensor([[0, 2]], dtype=torch.int32))
         bad = pos.clone()

@@ -216,6 +216,17 @@ class Gradients(unittest.TestCase):
         for name, value in self.arrays(first).items():
             np.testing.assert_allclose(value, 2 * kept[name], rtol=1e-6)
 
+    def test_wrt_may_be_one_name_with_out(self):
+        renderer = Renderer()
+        frame = renderer.render(patch(), **IMAGE)
+        pulled = cotangents(frame)
+        first = renderer.backward(frame, wrt="positions", **pulled)
+        expected = np.array(first.positions)
+        renderer.backward(frame, wrt="positions", out=first, **pulled)
+        self.assertTrue(np.array_equal(first.positions, expected))
+        with self.assertRaisesRegex(ValueError, "wrt is .'camera',"):
+            renderer.backward(frame, wrt="camera", out=first, **pulled)
+
     @staticmethod
     def arrays(gradients):
         return {name: value[0] if name == "textures" else value
@@ -424,6 +435,14 @@ class Errors(unittest.TestCase):
             (ValueError, "Scene: textures[0] has shape (5, 3), expected (Ht, Wt, 3) or "
              "(N, Ht, Wt, 3)", {"textures": np.zeros((5, 3), np.float32)}),
             (TypeError, "Scene.replace: no argument is called 'colour'", {"colour": 1}),
+            (ValueError, "Scene: lights is an empty sequence; None stands for none",
+             {"lights": []}),
+            (ValueError, "Scene: lights has records of leading axes () and (2,): they must be "
+             "alike", {"lights": [Light(), Light(intensity=[1, 2])]}),
+            (ValueError, "Surface: texture has shape (3,), expected () or (2,), one for each "
+             "surface", {"surfaces": Surface(base_color=np.ones((2, 3)), texture=[0, 0, 0])}),
+            (TypeError, "Scene: per_corner must be a name or a sequence of names, got int",
+             {"per_corner": 3}),
         ]
         for error, text, change in cases:
             self.expect(error, text, lambda: scene.replace(**change))
@@ -448,6 +467,12 @@ class Errors(unittest.TestCase):
              lambda: render(scene, height=2**40)),
             (TypeError, "render: delta must be float, got 'soft' (str)",
              lambda: render(scene, delta="soft")),
+            (TypeError, "render: delta must be float, got '1' (str)",
+             lambda: render(scene, delta="1")),
+            (TypeError, "render: outputs must be a name or a sequence of names, got int",
+             lambda: render(scene, outputs=3)),
+            (ValueError, "render: paper_faces is -1, must be >= 0",
+             lambda: render(scene, paper_faces=-1)),
             (ValueError, "render: outputs is 'colour', expected one of 'color', 'alpha', "
              "'attributes', 'depth', 'normals', 'uv', 'barycentrics'",
              lambda: render(scene, outputs=("colour",))),
@@ -483,6 +508,10 @@ class Errors(unittest.TestCase):
              lambda: renderer.backward(frame, alpha=ones, accumulate=True)),
             (TypeError, "backward: out[0] must be Gradients, got int",
              lambda: renderer.backward(frame, alpha=ones, out=[3])),
+            (TypeError, "backward: out must be Gradients or a list of them, got int",
+             lambda: renderer.backward(frame, alpha=ones, out=3)),
+            (TypeError, "backward: wrt must be a name or a sequence of names, got int",
+             lambda: renderer.backward(frame, alpha=ones, wrt=3)),
         ]
         for error, text, call in cases:
             self.expect(error, text, call)

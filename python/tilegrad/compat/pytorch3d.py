@@ -21,6 +21,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from tilegrad import _core, fragments
+from tilegrad._arrays import check_indices
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Fragments = fragments.Fragments
@@ -77,7 +78,14 @@ def rasterize_meshes(meshes: Any, image_size: Union[int, Sequence[int]] = 256,
     vertices, faces = meshes.verts_packed(), meshes.faces_packed()
     check_floats(name, "meshes.verts_packed()", vertices, ("V", 3))
     check_tensor(name, "meshes.faces_packed()", faces, ("F", 3))
-    height, width = (image_size, image_size) if isinstance(image_size, int) else image_size
+    if faces.dtype not in (torch.int32, torch.int64):
+        raise TypeError(f"{name}: meshes.faces_packed() has dtype {faces.dtype}, expected "
+                        f"torch.int64")
+    check_indices(name, "meshes.faces_packed()", faces.numpy(), len(vertices))
+    size = (image_size, image_size) if isinstance(image_size, int) else image_size
+    if not isinstance(size, (tuple, list)) or len(size) != 2:
+        raise ValueError(f"{name}: image_size is {image_size!r}, expected pixels or (H, W)")
+    height, width = size
     options = fragments.layered_options(name, height, width, faces_per_pixel, blur_radius,
                                         perspective_correct, clip_barycentric_coords,
                                         cull_backfaces)

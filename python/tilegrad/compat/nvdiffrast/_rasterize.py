@@ -17,6 +17,7 @@ from tilegrad.compat.nvdiffrast import _inputs
 from tilegrad.compat.nvdiffrast._context import RasterizeCpuContext
 
 Images = tuple  # of two tensors
+_MOST_PIXELS = 16384  # in a row or a column
 
 
 class _Call(NamedTuple):
@@ -129,6 +130,10 @@ def _checked(function: str, glctx: Any, pos: Any, tri: Any, resolution: Any, ran
 
 def _resolution(function: str, resolution: Any) -> tuple[int, int]:
     numbers = tuple(resolution) if isinstance(resolution, (tuple, list, torch.Size)) else ()
-    if len(numbers) != 2 or any(int(n) != n for n in numbers):
-        raise ValueError(f"{function}: resolution is {resolution!r}, expected (height, width)")
-    return int(numbers[0]), int(numbers[1])
+    try:
+        if len(numbers) == 2 and all(int(n) == n and 1 <= n <= _MOST_PIXELS for n in numbers):
+            return int(numbers[0]), int(numbers[1])
+    except (TypeError, ValueError, OverflowError):
+        pass  # no number, NaN, infinity
+    raise ValueError(f"{function}: resolution is {resolution!r}, expected (height, width), each 1 "
+                     f"to {_MOST_PIXELS}")
