@@ -414,6 +414,26 @@ TEST(ShadedErrors, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
   EXPECT_EQ(status.message(), "d_frame.depth[" + std::to_string(seen) + "] is inf");
 }
 
+// White has no gradient, but its cotangent is an error as any other.
+TEST(ShadedErrors, CotangentsThatPullNothingAreChecked) {
+  OwnedScene<float> scene = Sphere(Lighting::kPhong);
+  ShadedScene view;
+  view.positions = scene.mesh.positions, view.faces = scene.mesh.faces;
+  view.camera = scene.mesh.camera;
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), {}, &frame).ok());
+  std::vector<float> d_color(3 * kPixels, 1.0f), d_positions(view.positions.size());
+  d_color[70] = NAN;
+  ShadedFrameGradients d_frame;
+  d_frame.color = d_color;
+  ShadedGradients d_scene;
+  d_scene.positions = d_positions;
+  const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  EXPECT_EQ(status.message(), "d_frame.color[70] is nan");
+}
+
 // Numbers that nobody asked for are looked at, too.
 TEST(ShadedErrors, AttributesAreCheckedWhateverIsWanted) {
   OwnedScene<float> scene = Sphere(Lighting::kPhong);
