@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <iterator>
+#include <new>
 #include <utility>
 #if __has_include(<sanitizer/asan_interface.h>)
 #include <sanitizer/asan_interface.h>  // macros that are empty without AddressSanitizer
@@ -80,22 +80,25 @@ std::byte* AddressArena::Grow(std::size_t size) {
   Region& region = regions_.back();
   std::byte* const end = region.begin + region.used;
   std::byte* begin = end;
+  auto joined = free_.end();
   if (const auto after = free_.lower_bound(end); after != free_.begin()) {
     const auto last = std::prev(after);
     if (last->first >= region.begin && last->first + last->second == end) {
       begin = last->first;
-      free_.erase(last);
+      joined = last;
     }
   }
   const std::size_t more = size - static_cast<std::size_t>(end - begin);
-  region.used += more;
-  held_ += more;
-  if (region.used > region.usable) {
-    const std::size_t usable = std::min(RoundUpTo(region.used, kHugePage), region.reserved);
-    if (mprotect(region.begin, usable, PROT_READ | PROT_WRITE) != 0) std::abort();
+  if (region.used + more > region.usable) {
+    const std::size_t usable = std::min(RoundUpTo(region.used + more, kHugePage), region.reserved);
+    if (mprotect(region.begin, usable, PROT_READ | PROT_WRITE) != 0) throw std::bad_alloc();
     ASAN_POISON_MEMORY_REGION(region.begin + region.usable, usable - region.usable);
     region.usable = usable;
   }
+  // From here on nothing fails.
+  if (joined != free_.end()) free_.erase(joined);
+  region.used += more;
+  held_ += more;
   return begin;
 }
 
@@ -106,7 +109,7 @@ void AddressArena::AddRegion(std::size_t bytes) {
     size /= 2;
     memory = Reserve(size);
   }
-  if (memory == MAP_FAILED) std::abort();
+  if (memory == MAP_FAILED) throw std::bad_alloc();
   // Fewer page faults at the start, fewer TLB misses in every pass over weights and activations.
   // Advice only: where the system does not follow it, nothing changes but speed.
   madvise(memory, size, MADV_HUGEPAGE);

@@ -22,8 +22,8 @@ class AddressArena {
   AddressArena& operator=(const AddressArena&) = delete;
 
   static std::size_t Rounded(std::size_t bytes);  // what Take really takes
-  // Uninitialised, aligned to kAlignment. Ends the program where the system has no memory, as
-  // operator new does.
+  // Uninitialised, aligned to kAlignment. Throws std::bad_alloc where the system has no memory, as
+  // operator new does, and is as before then.
   std::byte* Take(std::size_t bytes);
   void Give(std::byte* data, std::size_t bytes);  // of Take(bytes)
   void Trim();                                    // lets the system have what is free

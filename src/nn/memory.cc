@@ -65,8 +65,8 @@ BlockRef MemoryPool::Allocate(std::size_t bytes) {
     state_->unused.reserve(state_->blocks.size());
   }
   Block* block = state_->unused.back();
+  block->data = state_->ArenaOf(bytes).Take(bytes);  // or throws
   state_->unused.pop_back();
-  block->data = state_->ArenaOf(bytes).Take(bytes);
   block->bytes = bytes;
   stats.live_bytes += AddressArena::Rounded(bytes);
   stats.peak_bytes = std::max(stats.peak_bytes, stats.live_bytes);

@@ -53,6 +53,16 @@ TEST(AddressArena, GrowsByWhatIsMissingBehindAFreeEnd) {
   arena.Give(a, kMega);
 }
 
+TEST(AddressArena, WithoutMemoryItIsAsBefore) {
+  AddressArena arena;
+  std::byte* const first = arena.Take(1 << 20);
+  const std::size_t held = arena.held();
+  EXPECT_THROW(arena.Take(std::size_t{1} << 60), std::bad_alloc);
+  EXPECT_EQ(arena.held(), held);
+  arena.Give(first, 1 << 20);
+  EXPECT_EQ(arena.Take(1 << 20), first);
+}
+
 TEST(AddressArena, TrimmedMemoryIsThereAgain) {
   AddressArena arena;
   std::byte* a = arena.Take(8 * kMega);
