@@ -100,7 +100,35 @@ Result<std::string> ReadText(const Path& path, std::size_t max_bytes) {
   return ReadWhole<std::string>(path, max_bytes);
 }
 
-Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes) {
+namespace {
+
+// Terminals, pipes, /dev/null: a rename would put a file in their place.
+bool IsDevice(const Path& path) {
+  struct stat info = {};
+  return ::stat(path.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode);
+}
+
+Status WriteToDevice(const Path& path, std::span<const std::uint8_t> bytes) {
+  FileHandle file(path, O_WRONLY);
+  if (file.fd() < 0) return SystemError(path, "cannot open");
+  if (!WriteAll(file.fd(), bytes)) return SystemError(path, "cannot write");
+  if (!file.Close()) return SystemError(path, "cannot close");
+  return {};
+}
+
+// What a symbolic link stands for; `path` itself where there is none, or nothing behind it.
+Path BehindLinks(const Path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  Path target = std::filesystem::canonical(path, error);
+  return error ? path : target;
+}
+
+}  // namespace
+
+Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> bytes) {
+  if (IsDevice(path_or_link)) return WriteToDevice(path_or_link, bytes);
+  const Path path = BehindLinks(path_or_link);
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   Path temporary = path;
   temporary += fmt::format(".{}.tmp", ::getpid());

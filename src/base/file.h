@@ -25,7 +25,7 @@ Result<std::string> ReadText(const Path& path, std::size_t max_bytes = std::size
 
 // Writes to a temporary name beside `path`, fsyncs, renames over `path`, fsyncs the folder. On any
 // failure (full disk, ...) the temporary is removed and what stood under `path` is untouched.
-// Missing parent folders are created.
+// Missing parent folders are created. Symbolic links stay, devices and pipes are written to.
 Status WriteFileAtomic(const Path& path, std::span<const std::uint8_t> bytes);
 Status WriteTextAtomic(const Path& path, std::string_view text);
 

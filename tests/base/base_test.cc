@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -254,6 +256,24 @@ TEST_F(FileTest, ErrorsNameThePath) {
   ASSERT_TRUE(WriteTextAtomic(folder_ / "big", "12345").ok());
   EXPECT_EQ(ReadFile(folder_ / "big", 4).status().code(), StatusCode::kResourceExhausted);
   EXPECT_EQ(ReadFile(folder_).status().code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(FileTest, LinksAndPipesStayWhatTheyAre) {
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "real", "old").ok());
+  std::filesystem::create_symlink("real", folder_ / "link");
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "link", "new").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link"));
+  EXPECT_EQ(ReadText(folder_ / "real").value(), "new");
+  const Path pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int end = ::open(pipe.c_str(), O_RDWR | O_NONBLOCK);  // a reader, so that writing can begin
+  ASSERT_GE(end, 0);
+  ASSERT_TRUE(WriteTextAtomic(pipe, "through").ok());
+  char text[16] = {};
+  EXPECT_EQ(::read(end, text, sizeof(text)), 7);
+  EXPECT_STREQ(text, "through");
+  ::close(end);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
 }
 
 TEST_F(FileTest, FailedWriteLeavesTheOldFile) {
