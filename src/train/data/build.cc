@@ -95,6 +95,7 @@ class Builder {
 
   Status Prepare() {
     std::error_code error;
+    info_.classes = ClassesOf(source_, chosen_);
     if (std::filesystem::exists(DatasetInfoPath(folder_), error)) {
       TILEGRAD_ASSIGN(const DatasetInfo there, ReadDatasetInfo(folder_));
       if (there.recipe != info_.recipe) {
@@ -103,8 +104,9 @@ class Builder {
             "another folder or delete it",
             folder_.string(), there.source, there.image_size, there.views);
       }
+      // The index that may be there belongs to the classes of then, and stays until the new one.
+      return {};
     }
-    info_.classes = ClassesOf(source_, chosen_);
     return WriteDatasetInfo(folder_, info_);
   }
 
@@ -213,13 +215,15 @@ class Builder {
                       RejectedPath(folder_).string());
     }
     Split();
+    // No list for a moment rather than one that does not fit the classes.
+    std::error_code error;
+    std::filesystem::remove(ModelsPath(folder_), error);
     TILEGRAD_TRY(WriteDatasetInfo(folder_, info_));
     TILEGRAD_TRY(WriteModels(folder_, info_, summary_.models));
     TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder_));
     TILEGRAD_TRY(WriteContactSheet(dataset));
     summary_.info = info_;
     for (std::size_t i = 0; i < summary_.models.size(); ++i) {
-      std::error_code error;
       summary_.bytes += std::filesystem::file_size(dataset.ModelPath(static_cast<int>(i)), error);
     }
     return std::move(summary_);

@@ -70,7 +70,7 @@ void SplitModels(const std::vector<std::string>& classes, const SplitRule& rule,
       return static_cast<std::size_t>(std::lround(part * static_cast<double>(count)));
     };
     if (groups.size() < 2) continue;
-    Take(&groups, share(rule.test_share), Split::kTest, true);
+    Take(&groups, share(rule.test_share), Split::kTest, rule.test_share > 0);
     Take(&groups, share(rule.validation_share), Split::kValidation, false);
     for (const Group& group : groups) {
       for (std::size_t i : group.models) (*models)[i].split = group.split;

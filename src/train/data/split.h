@@ -22,7 +22,7 @@ std::uint64_t HashText(std::string_view text, std::uint64_t seed);
 // Sets models[i].split. Models of one class with the same `geometry` (not 0) form a group that is
 // never divided. Groups are put in the order of a hash of seed, class and id; the first whose
 // models fit into the share are the test set, then validation, and the rest train. A class of two
-// groups or more has at least one test model and at least one training model.
+// groups or more has at least one training model and, if test_share is above 0, one test model.
 void SplitModels(const std::vector<std::string>& classes, const SplitRule& rule,
                  std::vector<ModelInfo>* models);
 

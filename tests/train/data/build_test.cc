@@ -114,6 +114,17 @@ TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
   EXPECT_EQ(Build(*source, root_ / "parts")->reused, 10);
 }
 
+TEST_F(BuildTest, StoppedWithOtherClassesTheIndexStillFits) {
+  const auto source = ProceduralSource(2, 1);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  options_.limit = 2;
+  stop_ = true;
+  ASSERT_EQ(Build(*source, root_ / "set").status().code(), StatusCode::kCancelled);
+  const auto dataset = Dataset::Open(root_ / "set");
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  EXPECT_EQ(dataset->models().size(), 10u);
+}
+
 TEST_F(BuildTest, BrokenModelFilesAreMadeAgain) {
   const auto source = ProceduralSource(1, 3);
   ASSERT_TRUE(Build(*source, root_ / "set").ok());

@@ -65,6 +65,12 @@ TEST(Split, EveryClassHasATestModelAndATrainingModel) {
   EXPECT_EQ(one[0].split, Split::kTrain);
 }
 
+TEST(Split, AShareOfNothingIsNone) {
+  auto models = Models(10);
+  SplitModels({"x"}, {.test_share = 0, .validation_share = 0, .seed = 0}, &models);
+  EXPECT_EQ(Count(models), (std::array<int, 3>{10, 0, 0}));
+}
+
 TEST(Split, CopiesOfOneMeshStayTogether) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     auto models = Models(30);
