@@ -107,7 +107,7 @@ Result<train::FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& 
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return train::LoadNewestCheckpoint(context, path);
   TILEGRAD_ASSIGN(train::Checkpoint checkpoint, train::LoadCheckpoint(context, path));
-  return train::FoundCheckpoint{std::move(checkpoint), path, {}};
+  return train::FoundCheckpoint{std::move(checkpoint), path, {}, {}};
 }
 
 py::dict LoadCheckpoint(const Path& path) {

@@ -28,19 +28,24 @@ struct Checkpoint {
 // Whole or not at all.
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors);
-// Errors name the file: cut short, not a checkpoint of this program, ...
+// Errors name the file: cut short, not a checkpoint of this program, another checksum, ...
 Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& file);
 
 struct FoundCheckpoint {
   Checkpoint checkpoint;
   Path file;
   std::vector<std::string> warnings;  // newer files that could not be read
+  std::vector<Path> broken;           // these files
 };
 // The newest one that is whole. NotFound if there is none, DataLoss naming the first reason if
 // there are only broken ones.
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
 
-// All checkpoint files of a run, oldest first.
+// Renames files, "step_00000012.safetensors.broken", for whoever goes on from an older one: they
+// would count among those that are kept, and push out what is whole.
+void SetAside(const std::vector<Path>& broken);
+
+// All checkpoint files of a run, oldest first: step_NUMBER.safetensors, nothing else.
 std::vector<Path> ListCheckpoints(const Path& run);
 // Removes all but the newest `keep`, and temporary files that a killed run left.
 void PruneCheckpoints(const Path& run, std::int64_t keep);

@@ -180,11 +180,11 @@ Status ApplyOverrides(const std::vector<std::string>& assignments, TrainConfig* 
     const auto field =
         std::find_if(fields.begin(), fields.end(), [&](const Field& f) { return f.key == key; });
     if (field == fields.end()) return UnknownKey(fields, key);
-    if (auto* text = std::get_if<std::string*>(&field->target)) {
-      **text = value;
-      continue;
-    }
-    TILEGRAD_TRY(ParseInto(key + " = " + value, config).Within(assignment));
+    // Text needs no quotes here; what TOML cannot hold (no UTF-8) is refused like in a file.
+    std::string text = value;
+    const bool is_text = std::holds_alternative<std::string*>(field->target);
+    TILEGRAD_TRY(
+        ParseInto(key + " = " + (is_text ? ValueText(&text) : value), config).Within(assignment));
   }
   return {};
 }

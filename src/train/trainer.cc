@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
 #include "train/checkpoint.h"
@@ -12,6 +13,7 @@
 #include "train/run_log.h"
 #include "train/sample_images.h"
 #include "train/step.h"
+#include "train/trained_models.h"
 
 namespace tilegrad::train {
 namespace {
@@ -74,6 +76,7 @@ class Run {
   const Workers& workers_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
+  FolderLock lock_;
   nn::Context context_;
   std::optional<Dataset> dataset_;
   ImageStore train_, held_out_;
@@ -89,21 +92,28 @@ class Run {
   std::string note_;
 };
 
-Status Run::CheckExisting() const {
-  const Path config_file = job_.run / "config.toml";
-  if (!std::filesystem::exists(config_file)) return {};
-  if (job_.existing == ExistingRun::kRefuse) {
-    return InvalidArgument(
-        "{}: there is a run already; give --resume to go on with it, or another --out",
-        job_.run.string());
-  }
-  TILEGRAD_ASSIGN(const TrainConfig before, ReadConfig(config_file));
-  const std::string then = FateOf(before), now = FateOf(job_.config);
+// Of what `place` holds.
+Status CheckSame(const TrainConfig& before, const TrainConfig& config, const Path& place) {
+  const std::string then = FateOf(before), now = FateOf(config);
   if (then == now) return {};
   return InvalidArgument(
       "{}: this run was started with another configuration: {}; resume with the same, or give "
       "another --out",
-      job_.run.string(), FirstDifference(then, now));
+      place.string(), FirstDifference(then, now));
+}
+
+Status Run::CheckExisting() const {
+  const Path config_file = job_.run / "config.toml";
+  const bool started = std::filesystem::exists(config_file);
+  // Checkpoints alone are a run, too, or a fit.
+  if ((started || !ListCheckpoints(job_.run).empty()) && job_.existing == ExistingRun::kRefuse) {
+    return InvalidArgument(
+        "{}: there is a run already; give --resume to go on with it, or another --out",
+        job_.run.string());
+  }
+  if (!started) return {};
+  TILEGRAD_ASSIGN(const TrainConfig before, ReadConfig(config_file));
+  return CheckSame(before, job_.config, job_.run);
 }
 
 Status Run::LoadData() {
@@ -148,6 +158,8 @@ Status Run::Restore() {
   for (auto& warning : found->warnings) outcome_.warnings.push_back("passed over: " + warning);
   const Checkpoint& checkpoint = found->checkpoint;
   const std::string file = found->file.string();
+  TILEGRAD_ASSIGN(const TrainConfig before, ParseConfig(checkpoint.info.config, file));
+  TILEGRAD_TRY(CheckSame(before, job_.config, found->file));
   if (checkpoint.info.image_size != train_.size) {
     return InvalidArgument("{}: trained on images of {} pixels a side, the dataset has {}", file,
                            checkpoint.info.image_size, train_.size);
@@ -158,6 +170,7 @@ Status Run::Restore() {
     return InvalidArgument("{}: the optimizer has taken {} steps, the run {}", file,
                            step_->adam().steps(), checkpoint.info.step);
   }
+  SetAside(found->broken);
   outcome_.first_step = saved_step_ = checkpoint.info.step;
   seconds_before_ = checkpoint.info.seconds;
   return {};
@@ -170,18 +183,24 @@ Status Run::WriteHeader() {
                                  {"training_models", train_.models},
                                  {"parameters", nn::CountParameters(step_->network().module())}};
   for (const auto& [key, value] : DescribeMachine()) json["machine"][key] = value;
-  TILEGRAD_TRY(WriteTextAtomic(job_.run / "run.json", json.dump(2) + "\n"));
+  // Paths need be no UTF-8: then a replacement character, not an exception.
+  const std::string text =
+      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  TILEGRAD_TRY(WriteTextAtomic(job_.run / "run.json", text + "\n"));
   return WriteTextAtomic(job_.run / "config.toml", WriteConfig(job_.config));
 }
 
 Status Run::Prepare() {
   TILEGRAD_TRY(CheckExisting());
   TILEGRAD_TRY(LoadData());
+  TILEGRAD_ASSIGN(lock_, FolderLock::Take(job_.run));
   step_.emplace(context_, job_.config, train_.size);
   order_.emplace(train_.models, train_.views,
                  static_cast<std::uint64_t>(job_.config.schedule.seed));
   TILEGRAD_TRY(context_.TakeStatus());
   TILEGRAD_TRY(Restore());
+  TILEGRAD_TRY(RememberTrainedModels(
+      job_.run, *dataset_, outcome_.first_step == 0 ? RunStart::kNew : RunStart::kGoingOn));
   TILEGRAD_TRY(WriteHeader());
   PruneCheckpoints(job_.run, job_.config.schedule.keep_checkpoints);
   TILEGRAD_ASSIGN(log_, RunLog::Open(job_.run, outcome_.first_step));

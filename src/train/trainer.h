@@ -3,6 +3,7 @@
 //
 //   <run>/config.toml    the complete configuration
 //   <run>/run.json       dataset, machine, versions
+//   <run>/training_models.txt
 //   <run>/metrics.jsonl, tensorboard/, samples/, checkpoints/
 #pragma once
 
@@ -38,7 +39,8 @@ struct TrainOutcome {
 // Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled
 // and a message how to resume). A continued run must have the same configuration
 // (schedule.log_every, sample_every, checkpoint_every, keep_checkpoints and name may differ); an
-// error names the first key that differs.
+// error names the first key that differs. So must the training models be the same. Another process
+// that trains in the folder is an error.
 Result<TrainOutcome> Train(const TrainJob& job, const Workers& workers,
                            const ProgressSink& progress, const StopFlag& stop);
 

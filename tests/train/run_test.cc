@@ -61,6 +61,13 @@ TEST_F(RunTest, Overrides) {
   EXPECT_TRUE(ApplyOverrides({"schedule.steps=5", "name=me", "loss.color=0.5"}, &config).ok());
   EXPECT_EQ(config.schedule.steps, 5);
   EXPECT_EQ(config.name, "me");
+  // Whatever a name holds, the file can be read back.
+  for (const char* name : {"a\"b\n\tc\\ \u00e9", "\xff\xfe", "\x27\x27\x27", "\x01", ""}) {
+    if (!ApplyOverrides({std::string("name=") + name}, &config).ok()) continue;
+    const auto again = ParseConfig(WriteConfig(config), "written");
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->name, config.name);
+  }
   ExpectMessage(ApplyOverrides({"schedule.step=5"}, &config), "schedule.steps");
   ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
@@ -110,6 +117,50 @@ TEST_F(RunTest, PruneKeepsTheNewest) {
   ASSERT_EQ(files.size(), 2u);
   EXPECT_EQ(files[0].filename(), "step_00000003.safetensors");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "checkpoints"), {}), 2);
+}
+
+TEST_F(RunTest, OneWrongBitIsFoundAnywhere) {
+  ASSERT_TRUE(SaveCheckpoint(folder_, {7, 64, "name = \"x\"", 1.5}, SomeTensors(context_, 3)).ok());
+  const Path file = ListCheckpoints(folder_)[0];
+  Bytes bytes = ReadFile(file).value();
+  int harmless = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] ^= 4;
+    Write("checkpoints/step_00000007.safetensors", bytes);
+    const auto loaded = LoadCheckpoint(context_, file);
+    bytes[i] ^= 4;
+    if (!loaded.ok()) continue;
+    // The key "checksum" itself and the spaces behind the header bear nothing.
+    ++harmless;
+    EXPECT_EQ(loaded->info.step, 7);
+    EXPECT_EQ(std::as_const(loaded->tensors[0].value).data<float>()[5], 3);
+  }
+  EXPECT_LE(harmless, 8);
+}
+
+TEST_F(RunTest, WhatIsSetAsideDoesNotPushOutWhatIsWhole) {
+  for (const std::int64_t step : {10, 20}) {
+    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, SomeTensors(context_, 0)).ok());
+  }
+  Write("checkpoints/step_00000030.safetensors", "garbage");
+  const auto found = LoadNewestCheckpoint(context_, folder_);
+  ASSERT_TRUE(found.ok());
+  SetAside(found->broken);
+  PruneCheckpoints(folder_, 1);
+  const auto files = ListCheckpoints(folder_);
+  ASSERT_EQ(files.size(), 1u);
+  EXPECT_EQ(files[0].filename(), "step_00000020.safetensors");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "checkpoints/step_00000030.safetensors.broken"));
+}
+
+TEST_F(RunTest, OnlyFilesOfStepsAreCheckpoints) {
+  for (const std::int64_t step : {99'999'999, 100'000'000}) {  // nine digits come after eight
+    ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, SomeTensors(context_, 0)).ok());
+  }
+  Write("checkpoints/step_00000010_best.safetensors", "somebody's copy");
+  EXPECT_EQ(LoadNewestCheckpoint(context_, folder_)->checkpoint.info.step, 100'000'000);
+  PruneCheckpoints(folder_, 1);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "checkpoints/step_00000010_best.safetensors"));
 }
 
 TEST_F(RunTest, LogForgetsWhatCameAfterTheCheckpoint) {

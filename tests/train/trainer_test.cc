@@ -8,11 +8,13 @@
 #include <csignal>
 #include <cstring>
 
+#include "base/folder_lock.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
 #include "train/checkpoint.h"
 #include "train/run_log.h"
+#include "train/trained_models.h"
 
 namespace tilegrad::train {
 namespace {
@@ -141,6 +143,62 @@ TEST_F(TrainerTest, HalfACheckpointFallsBackToTheOneBefore) {
   ASSERT_EQ(outcome->warnings.size(), 1u);
   EXPECT_NE(outcome->warnings[0].find("step_00000008"), std::string::npos);
   ExpectSameBits("whole", "run");
+}
+
+TEST_F(TrainerTest, ABrokenCheckpointDoesNotPushOutNewOnes) {
+  StopAfter(8);
+  CutInHalf(ListCheckpoints(job_.run).back());
+  job_.existing = ExistingRun::kContinue;
+  job_.config.schedule.keep_checkpoints = 1;
+  StopAfter(7);
+  const auto found = LoadNewestCheckpoint(context_, job_.run);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_EQ(found->checkpoint.info.step, 7);
+}
+
+TEST_F(TrainerTest, CheckpointsAloneAreARun) {
+  StopAfter(2);
+  std::filesystem::remove(job_.run / "config.toml");
+  ExpectMessage(Run().status(), "--resume");
+  job_.existing = ExistingRun::kContinue;
+  job_.config.optimizer.learning_rate *= 2;
+  ExpectMessage(Run().status(), "learning_rate", "another configuration");
+  job_.config.optimizer.learning_rate /= 2;
+  ExpectFinishes();
+}
+
+TEST_F(TrainerTest, RefusesOtherTrainingModels) {
+  StopAfter(2);
+  job_.existing = ExistingRun::kContinue;
+  const Path list = ModelsPath(job_.data);
+  const std::string models = ReadText(list).value();
+  std::string other = models;
+  other.replace(other.find("\"train\""), 7, "\"test\"");
+  Write("data/models.jsonl", other);
+  ExpectMessage(Run().status(), "noise/m0", "other training models");
+  // What it was trained on is not held out then; runs without a list cannot tell.
+  const Dataset split_anew = Dataset::Open(job_.data).value();
+  ExpectMessage(CheckHeldOut(job_.run, split_anew), "1 of the 3 test models", "noise/m0");
+  EXPECT_TRUE(CheckHeldOut(folder_ / "other", split_anew).ok());
+  Write("data/models.jsonl", models);
+  EXPECT_TRUE(CheckHeldOut(job_.run, Dataset::Open(job_.data).value()).ok());
+  ExpectFinishes();
+}
+
+TEST_F(TrainerTest, OneProcessAtATimeInARun) {
+  {
+    const auto lock = FolderLock::Take(job_.run);
+    ASSERT_TRUE(lock.ok()) << lock.status().message();
+    ExpectMessage(Run().status(), "another process", "run");
+  }
+  ExpectFinishes();
+}
+
+TEST_F(TrainerTest, FolderNamesNeedNotBeUtf8) {
+  const Path data = folder_ / "da\xffta";
+  std::filesystem::rename(job_.data, data);
+  job_.data = data;
+  ExpectFinishes();
 }
 
 TEST_F(TrainerTest, OnlyBrokenCheckpointsAreAnErrorAndStay) {

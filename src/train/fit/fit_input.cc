@@ -141,7 +141,12 @@ Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   std::error_code error;
   const Path test = folder / "transforms_test.json";
   const bool has_test = std::filesystem::exists(test, error);
-  HoldOut(has_test ? 0 : hold_out, &input);
+  if (has_test && hold_out > 0) {
+    return InvalidArgument(
+        "{}: says already which views are held out: leave out --hold-out, or that file",
+        test.string());
+  }
+  HoldOut(hold_out, &input);
   if (has_test) {
     TILEGRAD_ASSIGN(const auto more, ReadTransforms(test));
     for (const TransformsFrame& frame : more) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "nn/context.h"
@@ -69,6 +70,7 @@ class Session {
 
   const FitJob& job_;
   const Workers& workers_;
+  FolderLock lock_;
   nn::Context context_;
   Fitter fitter_;
   std::optional<RunLog> log_;
@@ -79,7 +81,7 @@ class Session {
 };
 
 Status Session::Open(FitOutcome* outcome) {
-  TILEGRAD_TRY(MakeFolder(job_.out));
+  TILEGRAD_ASSIGN(lock_, FolderLock::Take(job_.out));
   if (!ListCheckpoints(job_.out).empty()) {
     if (!job_.resume) {
       return InvalidArgument(
@@ -96,6 +98,7 @@ Status Session::Open(FitOutcome* outcome) {
     }
     const Status loaded = fitter_.LoadState(found.checkpoint.tensors);
     if (!loaded.ok()) return loaded.Within(found.file.string());
+    SetAside(found.broken);
     step_ = info.step, seconds_before_ = info.seconds;
     outcome->warnings = std::move(found.warnings);
   }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/rng.h"
 #include "scene/shapes.h"
 #include "train/fit/fit_run.h"
@@ -129,16 +130,38 @@ void SetLight(const FitConfig& config, FitScene* scene) {
   scene->sh[0] = kFirstHarmonic;
 }
 
+void AddMesh(const Mesh& mesh, Hash* hash) {
+  hash->AddAll(mesh.positions), hash->AddAll(mesh.faces);
+  hash->AddAll(mesh.colors), hash->AddAll(mesh.corner_uvs);
+  for (const Texture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
+}
+
+// Of the images, the cameras, which of them are held out, and the mesh to start from.
+std::string InputHash(const FitJob& job) {
+  Hash hash;
+  hash.AddAll(job.input.images.color), hash.AddAll(job.input.images.alpha);
+  for (const Camera& c : job.input.cameras) {
+    hash.AddBytes(c.rotation, sizeof(c.rotation));
+    hash.AddBytes(c.translation, sizeof(c.translation));
+    for (const float number : {c.fx, c.fy, c.cx, c.cy}) hash.AddBytes(&number, sizeof(number));
+  }
+  hash.AddAll(job.input.held_out);
+  if (job.start.has_value()) AddMesh(*job.start, &hash);
+  return hash.Text();
+}
+
 }  // namespace
 
 std::string DescribeJob(const FitJob& job) {
   return DescribeConfig(job.config) +
-         fmt::format("images = {} of {} x {}, {} held out\nmesh = {}\n", job.input.cameras.size(),
-                     job.input.images.width, job.input.images.height, job.input.held_out.size(),
+         fmt::format("images = {} of {} x {}, {} held out\nmesh = {}\ninput = {}\n",
+                     job.input.cameras.size(), job.input.images.width, job.input.images.height,
+                     job.input.held_out.size(),
                      job.start.has_value()
                          ? fmt::format("{} vertices, {} faces", job.start->positions.size(),
                                        job.start->faces.size())
-                         : "sphere");
+                         : "sphere",
+                     InputHash(job));
 }
 
 Result<FitStart> PrepareFit(const FitJob& job) {

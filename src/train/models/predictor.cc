@@ -14,10 +14,12 @@ namespace {
 
 constexpr std::size_t kBatch = 32;  // images at a time: bounds the memory of activations
 
-Result<Checkpoint> FindCheckpoint(nn::Context& context, const Path& path) {
+Result<Checkpoint> FindCheckpoint(nn::Context& context, const Path& path,
+                                  std::vector<std::string>* warnings) {
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) return LoadCheckpoint(context, path);
   TILEGRAD_ASSIGN(FoundCheckpoint found, LoadNewestCheckpoint(context, path));
+  *warnings = std::move(found.warnings);
   return std::move(found.checkpoint);
 }
 
@@ -28,6 +30,7 @@ struct Predictor::Impl {
   nn::Context context;
   CheckpointInfo info;
   TrainConfig config;
+  std::vector<std::string> warnings;
   std::unique_ptr<MeshNetwork> network;
   Mesh template_mesh;
 
@@ -46,7 +49,7 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   Predictor out;
   out.impl_ = std::make_unique<Impl>(workers);
   Impl& impl = *out.impl_;
-  TILEGRAD_ASSIGN(const Checkpoint checkpoint, FindCheckpoint(impl.context, path));
+  TILEGRAD_ASSIGN(const Checkpoint checkpoint, FindCheckpoint(impl.context, path, &impl.warnings));
   impl.info = checkpoint.info;
   TILEGRAD_ASSIGN(impl.config,
                   ParseConfig(impl.info.config, path.string() + ": its configuration"));
@@ -61,6 +64,8 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   TILEGRAD_TRY(NormalizeToBox(impl.template_mesh, kPredictionHalfExtent));
   return out;
 }
+
+const std::vector<std::string>& Predictor::warnings() const { return impl_->warnings; }
 
 int Predictor::image_size() const { return static_cast<int>(impl_->info.image_size); }
 

@@ -24,6 +24,8 @@ class Predictor {
   Predictor(Predictor&&) noexcept;
   Predictor& operator=(Predictor&&) noexcept;
 
+  // Newer checkpoints of the run folder that could not be read.
+  const std::vector<std::string>& warnings() const;
   int image_size() const;             // pixels
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"
   const Mesh& template_mesh() const;  // the sphere, normalised as predictions are

@@ -8,6 +8,7 @@
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/report/sections.h"
+#include "train/trained_models.h"
 
 namespace tilegrad::train {
 namespace {
@@ -36,6 +37,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   ReportFacts facts;
   TILEGRAD_ASSIGN(facts.run, ReadRun(job.run));
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  TILEGRAD_TRY(CheckHeldOut(job.run, dataset));
   facts.dataset = &dataset;
   facts.data = job.data.string();
   TILEGRAD_ASSIGN(facts.evaluation, ReadEvaluation(job.run, dataset));
@@ -51,7 +53,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
   TILEGRAD_TRY(WriteTextAtomic(job.out, page));
   return ReportSummary{page.size(), static_cast<int>(facts.models.size()),
-                       facts.evaluation.has_value()};
+                       facts.evaluation.has_value(), predictor.warnings()};
 }
 
 }  // namespace tilegrad::train

@@ -3,6 +3,9 @@
 // pictures, meshes to turn, configuration, credits. It loads nothing from anywhere.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "base/file.h"
 #include "base/parallel.h"
 #include "base/progress.h"
@@ -17,9 +20,10 @@ struct ReportJob {
 };
 
 struct ReportSummary {
-  std::size_t bytes = 0;   // of the page
-  int models = 0;          // that it shows
-  bool evaluated = false;  // the run has an eval.json
+  std::size_t bytes = 0;              // of the page
+  int models = 0;                     // that it shows
+  bool evaluated = false;             // the run has an eval.json
+  std::vector<std::string> warnings;  // newer checkpoints that could not be read
 };
 
 // The page appears whole or not at all. The same run and dataset give the same bytes. Errors name

@@ -93,6 +93,20 @@ TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
 }
 
+TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
+  FitJob job = Job("run");
+  job.config.steps = 20;
+  ASSERT_TRUE(Run(job).ok());
+  job.resume = true;
+  job.input.images.color[5] += 0.1f;
+  ExpectMessage(Run(job).status(), "input = ");
+  job.input.images.color[5] -= 0.1f;
+  job.input.cameras[1].translation[2] += 1;
+  ExpectMessage(Run(job).status(), "input = ");
+  // Nor is a wish passed over that contradicts the files.
+  ExpectMessage(ReadFitFolder(folder_ / "views", 3).status(), "transforms_test.json", "--hold-out");
+}
+
 TEST_F(Fit, RefinesCameras) {
   FitJob job = Job("run");
   const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// One process at a time in a folder.
+#pragma once
+
+#include <utility>
+
+#include "base/file.h"
+
+namespace tilegrad {
+
+// Held while it lives, and not longer than the process: killed, it is free again.
+class FolderLock {
+ public:
+  FolderLock() = default;  // of nothing
+  ~FolderLock();
+  FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  FolderLock& operator=(FolderLock&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+
+  // Makes the folder and a file `.lock` in it. kInvalidArgument if another holds it. A file system
+  // without locks gives one of nothing.
+  static Result<FolderLock> Take(const Path& folder);
+
+ private:
+  int fd_ = -1;
+};
+
+}  // namespace tilegrad

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which models a run was trained on, in its folder: a dataset can be split anew or made again under
+// the same name, and then neither goes a run on with it, nor are its test models held out.
+//
+//   <run>/training_models.txt    "recipe <hex>", then "<geometry> <class>/<id>" a line, in the
+//   order
+//                                of training
+#pragma once
+
+#include "base/file.h"
+#include "train/data/dataset.h"
+
+namespace tilegrad::train {
+
+enum class RunStart {
+  kNew,      // no step is done yet
+  kGoingOn,  // from a checkpoint
+};
+
+// Writes the list of a new run; compares with that of a run that goes on: InvalidArgument names the
+// first model that differs. A run of an earlier version has no list and gets one.
+Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start);
+
+// InvalidArgument if the run was trained on models of the dataset's test split. Fine for a run
+// without a list, and for a single checkpoint.
+Status CheckHeldOut(const Path& run, const Dataset& dataset);
+
+}  // namespace tilegrad::train
