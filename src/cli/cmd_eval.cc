@@ -7,6 +7,7 @@
 #include "cli/run_folder.h"
 #include "train/evaluate.h"
 #include "train/models/predictor.h"
+#include "train/trained_models.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -21,8 +22,9 @@ Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
   TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(data));
+  if (!options.training_models) TILEGRAD_TRY(train::CheckHeldOut(run, dataset));
   const Workers workers(options.on.workers);
-  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(run, workers));
+  TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   train::EvaluationJob job;
   job.dataset = &dataset;
   job.split = options.training_models ? train::Split::kTrain : train::Split::kTest;

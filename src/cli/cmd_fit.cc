@@ -63,8 +63,7 @@ Status ParseRate(const std::string& text, train::LearningRates* rates) {
 
 Result<Mesh> Load(const std::string& path) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
-  for (const auto& warning : loaded.warnings)
-    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   return std::move(loaded.mesh);
 }
 
@@ -106,8 +105,8 @@ Result<train::FitJob> MakeJob(const Options& options) {
 void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
   for (const auto& f : findings) {
     if (f.blocked) {
-      fmt::print(stderr, "tilegrad: no gradient for {} at the start: {}\n",
-                 train::NameOf(f.parameter), f.sentence);
+      PrintNote("tilegrad: no gradient for {} at the start: {}\n", train::NameOf(f.parameter),
+                f.sentence);
     } else if (all) {
       fmt::print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
     }
@@ -121,7 +120,7 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  for (const auto& warning : o.warnings) fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  for (const auto& warning : o.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   fmt::print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);

@@ -4,7 +4,9 @@
 
 #include "base/error.h"
 #include "cli/command.h"
+#include "cli/console.h"
 #include "cli/run_folder.h"
+#include "cli/unique_names.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "train/cutout.h"
@@ -28,7 +30,8 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(file));
   if (options.mask.empty()) return image;
   TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(options.mask));
-  return train::WithMask(image, mask);
+  auto masked = train::WithMask(image, mask);
+  return masked.ok() ? std::move(masked) : masked.status().Within(file);
 }
 
 Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers) {
@@ -43,13 +46,24 @@ Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers)
   return io::SavePng(file, train::TileImages(views, kTurntableColumns));
 }
 
+// Image files and what their results are called: by the file, each name once.
+std::vector<std::pair<std::string, std::string>> NameResults(
+    const std::vector<std::string>& images) {
+  std::vector<std::pair<std::string, std::string>> named;
+  UniqueNames names;
+  for (const std::string& file : images)
+    named.emplace_back(file, names.Take(Path(file).stem().string()));
+  return named;
+}
+
 Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
-                  const std::string& file, const Workers& workers) {
+                  const std::pair<std::string, std::string>& image, const Workers& workers) {
+  const auto& [file, stem] = image;
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
-  TILEGRAD_ASSIGN(const auto input, train::PrepareCutout(cutout, predictor.image_size(), framing));
-  TILEGRAD_ASSIGN(const auto meshes, predictor.Predict(input));
-  const std::string stem = Path(file).stem().string();
+  const auto input = train::PrepareCutout(cutout, predictor.image_size(), framing);
+  if (!input.ok()) return input.status().Within(file);
+  TILEGRAD_ASSIGN(const auto meshes, predictor.Predict(*input));
   const Path glb = Path(options.out) / (stem + ".glb"),
              turntable = Path(options.out) / (stem + "_turntable.png");
   TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
@@ -63,14 +77,14 @@ Status RunPrediction(const PredictOptions& options) {
     return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const Workers workers(options.workers);
-  TILEGRAD_ASSIGN(const train::Predictor predictor, train::Predictor::Load(run, workers));
+  TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   // One bad image does not keep the others from being predicted; the first error is the result.
   Status first;
-  for (const std::string& file : options.images) {
-    const Status status = PredictOne(predictor, options, file, workers).Within(file);
+  for (const auto& image : NameResults(options.images)) {
+    const Status status = PredictOne(predictor, options, image, workers);
     if (status.ok()) continue;
-    if (!first.ok()) fmt::print(stderr, "tilegrad: {}\n", first.message());
-    first = status;
+    if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
+    if (first.ok()) first = status;
   }
   return first;
 }
@@ -85,7 +99,10 @@ void AddPredict(CLI::App& app, Action* action) {
       ->required();
   command->add_option("--run", options->run,
                       "run folder or one checkpoint [the newest below runs/]");
-  command->add_option("--out", options->out, "folder for NAME.glb and NAME_turntable.png")
+  command
+      ->add_option("--out", options->out,
+                   "folder for NAME.glb and NAME_turntable.png, by the image; NAME_2 for a second "
+                   "of that name")
       ->capture_default_str();
   command->add_option("--mask", options->mask, "grey image of the same size: white is the object");
   command->add_flag("--keep-framing", options->keep_framing,

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <map>
-#include <set>
 #include <tuple>
 
 #include "base/error.h"
@@ -11,6 +10,7 @@
 #include "cli/console.h"
 #include "cli/render_job.h"
 #include "cli/run_folder.h"
+#include "cli/unique_names.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -86,7 +86,6 @@ class RenderRun {
 
  private:
   Status View(const MeshScene& scene, const io::CameraView& view, const PictureName& name);
-  std::string UniqueStem(const std::string& file);
   FaceCulling Culling(const MeshScene& scene) const;
   void Explain(const Picture& picture, const std::string& name) const;
 
@@ -95,18 +94,11 @@ class RenderRun {
   PictureRenderer renderer_;
   ProgressLine line_;
   const StopFlag& stop_ = StopOnSignals();
-  std::set<std::string> stems_;
+  UniqueNames stems_;
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
   std::size_t written_ = 0;
   Path last_;
 };
-
-std::string RenderRun::UniqueStem(const std::string& file) {
-  const std::string base = Path(file).stem().string();
-  std::string stem = base;
-  for (int i = 2; !stems_.insert(stem).second; ++i) stem = fmt::format("{}_{}", base, i);
-  return stem;
-}
 
 FaceCulling RenderRun::Culling(const MeshScene& scene) const {
   const bool back = settings_.cull == "back" || (settings_.cull == "auto" && scene.single_sided());
@@ -148,13 +140,12 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
 
 Status RenderRun::Mesh(const std::string& file) {
   TILEGRAD_ASSIGN(const io::LoadedMesh loaded, io::LoadMesh(Path(file)));
-  for (const std::string& warning : loaded.warnings) fmt::print(stderr, "{}: {}\n", file, warning);
-  for (const std::string& note : MaterialNotes(loaded.mesh))
-    fmt::print(stderr, "{}: {}\n", file, note);
+  for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
+  for (const std::string& note : MaterialNotes(loaded.mesh)) PrintNote("{}: {}\n", file, note);
   auto views = ChooseViews(settings_.view, loaded);
   if (!views.ok()) return views.status().Within(file);
   const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
-  const std::string stem = UniqueStem(file);
+  const std::string stem = stems_.Take(Path(file).stem().string());
   const bool single = settings_.meshes.size() == 1 && views->size() == 1;
   for (std::size_t i = 0; i < views->size(); ++i) {
     if (stop_) return Cancelled("stopped; {} files are written", written_);
@@ -182,7 +173,7 @@ Status RunRender(const RenderSettings& settings) {
   for (const std::string& file : settings.meshes) {
     const Status status = run.Mesh(file);
     if (status.ok()) continue;
-    if (!first.ok()) fmt::print(stderr, "tilegrad: {}\n", status.message());
+    if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
     if (status.code() == StatusCode::kCancelled) break;
   }

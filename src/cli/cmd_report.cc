@@ -27,6 +27,8 @@ Status RunReport(const ReportOptions& options) {
   const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!summary.ok()) return summary.status();
+  for (const std::string& warning : summary->warnings)
+    PrintNote("tilegrad: warning: passed over: {}\n", warning);
   fmt::print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
              static_cast<double>(summary->bytes) / 1e6);
   if (!summary->evaluated)

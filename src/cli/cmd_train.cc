@@ -20,8 +20,7 @@ struct TrainOptions {
 };
 
 void PrintOutcome(const train::TrainOutcome& outcome, const TrainOptions& options) {
-  for (const auto& warning : outcome.warnings)
-    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  for (const auto& warning : outcome.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   if (outcome.first_step == outcome.last_step) {
     fmt::print("{}: the run is complete at step {}; nothing to do\n", options.out,
                outcome.last_step);

@@ -19,8 +19,7 @@ struct Options {
 
 Status Run(const Options& options) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(options.mesh));
-  for (const auto& warning : loaded.warnings)
-    fmt::print(stderr, "tilegrad: warning: {}\n", warning);
+  for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   ProgressLine line;
   TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, line.Sink(),
                                 StopOnSignals()));

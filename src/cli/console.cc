@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/console.h"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -24,6 +25,12 @@ double Seconds(std::chrono::steady_clock::duration d) {
 }
 
 }  // namespace
+
+void OpenStandardStreams() {
+  int fd = 0;
+  while (fd >= 0 && fd <= STDERR_FILENO) fd = ::open("/dev/null", O_RDWR);
+  if (fd > STDERR_FILENO) ::close(fd);  // all are open
+}
 
 std::string FormatDuration(double seconds) {
   const auto s = static_cast<long>(seconds + 0.5);
@@ -73,15 +80,14 @@ void ProgressLine::Draw(const Progress& p, double seconds) {
     line += fmt::format("  {}", p.done);
   }
   if (!p.note.empty()) line += "  " + p.note;
-  fmt::print(stderr, "{}{}{}", terminal_ ? "\r" : "", line, terminal_ ? "\x1b[K" : "\n");
-  std::fflush(stderr);
+  PrintNote("{}{}{}", terminal_ ? "\r" : "", line, terminal_ ? "\x1b[K" : "\n");
   drawn_ = true;
 }
 
 void ProgressLine::Finish() {
   if (drawn_) {
     Draw(last_, Seconds(Clock::now() - stage_start_));
-    if (terminal_) fmt::print(stderr, "\n");
+    if (terminal_) PrintNote("\n");
   }
   drawn_ = false;
   last_ = {};

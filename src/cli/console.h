@@ -3,11 +3,27 @@
 // of killing.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <chrono>
+#include <cstdio>
+#include <string>
 
 #include "base/progress.h"
 
 namespace tilegrad::cli {
+
+// As fmt::print to stderr, but what cannot be written there (a full disk, a closed stream) is no
+// reason to end hours of work.
+template <class... Args>
+void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
+  const std::string text = fmt::format(format, std::forward<Args>(args)...);
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+// Opens those of the three standard streams that are closed, on /dev/null: the first files that are
+// opened would get their numbers, and the progress line would be written into a checkpoint.
+void OpenStandardStreams();
 
 // Draws "stage  12/820  1%  0:31 left  note" on stderr: rewritten in place on a terminal, a line
 // every ten seconds elsewhere. Work that ends within two seconds draws nothing. Finish() (or a new

@@ -4,11 +4,14 @@
 // saved).
 #include <fmt/core.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 
 #include "base/simd_target.h"
 #include "cli/command.h"
+#include "cli/console.h"
 #include "tilegrad/version.h"
 
 namespace tilegrad::cli {
@@ -31,8 +34,14 @@ int ExitCode(StatusCode code) {
 }
 
 int Report(const Status& status) {
-  if (!status.ok()) fmt::print(stderr, "tilegrad: {}\n", status.message());
+  if (!status.ok()) PrintNote("tilegrad: {}\n", status.message());
   return ExitCode(status.code());
+}
+
+// What was printed may still wait in memory: a full disk shows here.
+Status FlushOutput() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return {};
+  return {StatusCode::kIo, fmt::format("standard output: {}", std::strerror(errno))};
 }
 
 bool IsCommand(const CLI::App& app, const std::string& name) {
@@ -69,18 +78,20 @@ int Run(int argc, char** argv) {
     return code == 0 ? 0 : 2;
   }
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
-  return Report(action());
+  if (const Status status = action(); !status.ok()) return Report(status);
+  return Report(FlushOutput());
 }
 
 }  // namespace
 }  // namespace tilegrad::cli
 
 int main(int argc, char** argv) {
+  tilegrad::cli::OpenStandardStreams();
   try {
     return tilegrad::cli::Run(argc, argv);
   } catch (const std::exception&
                error) {  // out of memory, or a library that throws: still a sentence and a code
-    fmt::print(stderr, "tilegrad: unexpected failure: {}\n", error.what());
+    tilegrad::cli::PrintNote("tilegrad: unexpected failure: {}\n", error.what());
     return 1;
   }
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <charconv>
-#include <set>
 
 #include "base/error.h"
 #include "cli/render_job.h"
+#include "cli/unique_names.h"
 #include "scene/framing.h"
 
 namespace tilegrad::cli {
@@ -45,13 +45,10 @@ std::string FileStem(const std::string& name) {
 
 // Names become names of files, each once.
 void NameFiles(std::vector<CameraView>* views) {
-  std::set<std::string> taken;
+  UniqueNames names;
   for (std::size_t i = 0; i < views->size(); ++i) {
-    std::string name = FileStem((*views)[i].name);
-    if (name.empty() || taken.count(name) > 0)
-      name += fmt::format("{}{}", name.empty() ? "" : "_", i);
-    taken.insert(name);
-    (*views)[i].name = name;
+    const std::string name = FileStem((*views)[i].name);
+    (*views)[i].name = names.Take(name.empty() ? std::to_string(i) : name);
   }
 }
 

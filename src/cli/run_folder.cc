@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "cli/console.h"
 
 namespace tilegrad::cli {
 
@@ -36,6 +37,14 @@ Result<Path> ChooseRun(const std::string& given) {
   return newest->path();
 }
 
+Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) {
+  auto predictor = train::Predictor::Load(run, workers);
+  if (!predictor.ok()) return predictor;
+  for (const std::string& warning : predictor->warnings())
+    PrintNote("tilegrad: warning: passed over: {}\n", warning);
+  return predictor;
+}
+
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
   const Path file = run / "run.json";
@@ -44,7 +53,13 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!json.is_object() || !json.contains("dataset") || !json["dataset"].is_string()) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }
-  return Path(json["dataset"].get<std::string>());
+  const Path dataset = json["dataset"].get<std::string>();
+  std::error_code error;
+  if (!std::filesystem::exists(dataset, error)) {
+    return NotFound("{}: its dataset {} is not there, seen from this folder; name it with --data",
+                    file.string(), dataset.string());
+  }
+  return dataset;
 }
 
 }  // namespace tilegrad::cli

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/file.h"
+#include "train/models/predictor.h"
 
 namespace tilegrad::cli {
 
@@ -20,6 +21,8 @@ void AddWorkersOption(CLI::App* command, int* workers);
 // `given`, or if that is empty the folder below runs/ that was changed last; an error if there is
 // none.
 Result<Path> ChooseRun(const std::string& given);
+// With a note on the terminal of each newer checkpoint that could not be read.
+Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);
 // `given`, or if that is empty the dataset that the run's run.json names.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);
 

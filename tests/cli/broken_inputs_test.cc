@@ -154,6 +154,61 @@ TEST_F(BrokenInputs, DatasetsAndCheckpoints) {
   ExpectRefused("predict --run " + (folder_ / "half").string() + " x.png", "half", "step_");
 }
 
+TEST_F(BrokenInputs, SeveralImagesOneOfThemBad) {
+  ImageU8 image(8, 8, 4, 255);
+  image.at(0, 0)[3] = 0;
+  for (const char* name : {"a/x.png", "b/x.png"}) {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    ASSERT_TRUE(io::SavePng(folder_ / name, image).ok());
+  }
+  ASSERT_TRUE(io::SavePng(folder_ / "opaque.png", ImageU8(8, 8, 4, 255)).ok());
+  const Outcome outcome =
+      RunProgram("predict --run " + RunFolder().string() + " --out " + folder_.string() + " " +
+                 (folder_ / "none.png").string() + " " + (folder_ / "a/x.png").string() + " " +
+                 (folder_ / "b/x.png").string() + " " + (folder_ / "opaque.png").string());
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;  // the first one's: missing
+  // Two images of one name are two meshes.
+  for (const char* name : {"x.glb", "x_turntable.png", "x_2.glb", "x_2_turntable.png"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
+}
+
+TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
+  const Path copy = CopyOfData(), run = folder_ / "run";
+  std::filesystem::copy(RunFolder(), run, std::filesystem::copy_options::recursive);
+  std::string models = ReadText(copy / "models.jsonl").value();
+  for (std::size_t at; (at = models.find("\"train\"")) != std::string::npos;)
+    models.replace(at, 7, "\"test\"");
+  Write("copy/models.jsonl", models);
+  for (const std::string command : {"eval", "report"}) {
+    ExpectRefused(command + " --run " + run.string() + " --data " + copy.string(), "trained on",
+                  "split anew");
+  }
+  const std::string json = ReadText(run / "run.json").value();
+  const auto at = json.find(Data().string());
+  ASSERT_NE(at, std::string::npos);
+  Write("run/run.json", std::string(json).replace(at, Data().string().size(), "elsewhere"));
+  ExpectRefused("eval --run " + run.string(), "elsewhere", "--data");
+}
+
+TEST_F(BrokenInputs, OutputThatCannotBePrinted) {
+  EXPECT_EQ(RunProgram("info > /dev/full").exit_code, 1);
+  EXPECT_EQ(RunProgram("render none.obj 2> /dev/full; exit $?").exit_code, 3);
+  // Nor does training end for want of its progress line, which comes after two seconds; and that
+  // does not go into files where the stream is closed.
+  const auto train = [](const Path& out, const std::string& streams) {
+    return RunProgram("train --config " + Config() + " --data " + Data().string() + " --out " +
+                      out.string() + kTiny + " --set schedule.steps=100000 --max-minutes 0.05 " +
+                      streams);
+  };
+  for (const std::string streams : {"2> /dev/full; exit $?", "<&- 2>&-; exit $?"}) {
+    const Path out = folder_ / std::to_string(streams.size());
+    const Outcome outcome = train(out, streams);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_EQ(ReadText(out / "metrics.jsonl").value().find("training"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::is_empty(out / "checkpoints"));
+  }
+}
+
 TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   Write("file", "in the way");
   ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +

@@ -136,6 +136,16 @@ TEST_F(Render, ManyMeshesOneOfThemBroken) {
   EXPECT_TRUE(Exists("out/box.png"));
 }
 
+TEST_F(Render, ViewsOfOneNameDoNotOverwriteEachOther) {
+  const std::string camera = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
+  std::string frames;
+  for (const std::string name : {"a_2.png", "a.png", "a.jpg"})
+    frames += (frames.empty() ? "" : ",") + ("{\"file_path\":\"" + name + "\"," + camera);
+  Write("views.json", "{\"camera_angle_x\":0.7,\"frames\":[" + frames + "]}");
+  ExpectDone("--cameras " + In("views.json") + " --size 16 --out " + In("out"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "out"), {}), 3);
+}
+
 TEST_F(Render, ExplainSaysWhatWasDone) {
   const Outcome outcome = Run("--out " + In("a.png") + " --size 16 --explain");
   EXPECT_EQ(outcome.exit_code, 0);
