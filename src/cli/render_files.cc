@@ -212,6 +212,11 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
   const Path out(settings.out);
   std::string ending = out.extension().string();
   if (!ending.empty()) ending.erase(0, 1);
+  // A folder pic.jpg with a PNG in it is not what anybody asks for.
+  for (const char* other : {"jpg", "jpeg", "bmp", "gif", "tga", "tif", "tiff", "webp", "ppm"}) {
+    if (ending != other) continue;
+    return InvalidArgument("--out {}: pictures are written as .png, .exr or .npy", settings.out);
+  }
   const bool is_file = ending == "png" || ending == "exr" || ending == "npy";
   if (is_file && !single) {
     return InvalidArgument("--out {}: there are several pictures; name a folder", settings.out);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "base/error.h"
 #include "cli/render_job.h"
@@ -118,6 +119,10 @@ Result<std::vector<CameraView>> ChooseViews(const ViewSettings& settings,
   TILEGRAD_ASSIGN(const ImageSize size, ParseSize(settings.size));
   if (!(settings.fov > 0 && settings.fov < 180))
     return InvalidArgument("--fov {}: must be between 0 and 180 degrees", settings.fov);
+  for (const auto& [name, value] :
+       {std::pair("--azimuth", settings.azimuth), std::pair("--elevation", settings.elevation)}) {
+    if (!std::isfinite(value)) return InvalidArgument("{} {}: must be degrees", name, value);
+  }
   const ImageSize shown = OrDefault(size);
   auto views = !settings.camera_file.empty()   ? FileViews(settings, size)
                : !settings.gltf_camera.empty() ? GltfViews(settings, mesh, shown)

@@ -168,6 +168,9 @@ TEST_F(Render, WorkersDoNotChangeAByte) {
 }
 
 TEST_F(Render, WrongCommandLines) {
+  ExpectRefused("--out " + In("a.jpg"), 2, ".png, .exr or .npy");
+  EXPECT_FALSE(Exists("a.jpg"));
+  ExpectRefused("--elevation nan", 2, "--elevation");
   ExpectRefused("--size 0", 2, "--size");
   ExpectRefused("--size 10x", 2, "--size");
   ExpectRefused("--size 16000 --supersample 3", 2, "samples");
