@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <new>
 
 #include "base/simd_target.h"
 #include "cli/command.h"
@@ -89,8 +90,11 @@ int main(int argc, char** argv) {
   tilegrad::cli::OpenStandardStreams();
   try {
     return tilegrad::cli::Run(argc, argv);
-  } catch (const std::exception&
-               error) {  // out of memory, or a library that throws: still a sentence and a code
+  } catch (const std::bad_alloc&) {
+    tilegrad::cli::PrintNote(
+        "tilegrad: not enough memory; smaller images, batches or networks take less\n");
+    return 1;
+  } catch (const std::exception& error) {  // a library that throws: still a sentence and a code
     tilegrad::cli::PrintNote("tilegrad: unexpected failure: {}\n", error.what());
     return 1;
   }
