@@ -161,6 +161,8 @@ Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, 
 Var Fail(const Var& operand, Status status);
 // True where all are valid, of one float dtype; else the context of `operands` knows why.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);
+// True where a tensor can have the shape of a result; else the context of `operand` knows why.
+bool Makeable(const char* op, const Var& operand, const Shape& result);
 // The invalid result that follows from an invalid operand.
 Var Invalid(std::initializer_list<const Var*> operands);
 

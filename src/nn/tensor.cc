@@ -19,6 +19,16 @@ const char* NameOf(DType dtype) {
 
 std::int64_t Shape::elements() const { return Product(0, rank_); }
 
+bool Shape::IsPossible() const {
+  std::int64_t product = 1;
+  for (int axis = 0; axis < rank_; ++axis) {
+    const std::int64_t extent = (*this)[axis];
+    if (extent < 0 || extent > kMostElements / product) return false;
+    product *= std::max<std::int64_t>(extent, 1);
+  }
+  return true;
+}
+
 std::int64_t Shape::Product(int begin, int end) const {
   std::int64_t n = 1;
   for (int axis = begin; axis < end; ++axis) n *= (*this)[axis];

@@ -36,6 +36,8 @@ inline constexpr DType kDTypeOf<std::int64_t> = DType::kI64;
 class Shape {
  public:
   static constexpr int kMaxRank = 5;
+  // More than any memory holds, and few enough that no sum of sizes in bytes overflows.
+  static constexpr std::int64_t kMostElements = std::int64_t{1} << 40;
 
   Shape() = default;
   Shape(std::initializer_list<std::int64_t> extents) {  // NOLINT: {2, 3} is a shape
@@ -46,10 +48,13 @@ class Shape {
   std::int64_t operator[](int axis) const { return extents_[static_cast<std::size_t>(axis)]; }
   std::int64_t& operator[](int axis) { return extents_[static_cast<std::size_t>(axis)]; }
   void Append(std::int64_t extent) {
-    assert(rank_ < kMaxRank && extent >= -1);
+    assert(rank_ < kMaxRank);
     extents_[static_cast<std::size_t>(rank_++)] = extent;
   }
   std::int64_t elements() const;
+  // Whether a tensor can have it: no extent is negative, and their product, empty ones left out, is
+  // at most kMostElements.
+  bool IsPossible() const;
   // Product of the extents of axes [begin, end).
   std::int64_t Product(int begin, int end) const;
   std::string ToString() const;  // "[64, 3, 32, 32]"

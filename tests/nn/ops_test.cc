@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "nn/gradient_check.h"
 
@@ -94,6 +95,8 @@ TEST_F(Ops, PooledImages) {
   EXPECT_EQ(Numbers(MaxPool2d(x, {3, 2, 1})), (std::vector<double>{4, 6, 8, 8}));
   EXPECT_EQ(Numbers(AvgPool2d(x, {2, 1})), (std::vector<double>{0.5, 1.5, 3.5, 2.25}));
   EXPECT_EQ(Numbers(AvgPool2d(x, {2, 2, 1})), (std::vector<double>{0.25, 1.25, 2.75, 2.25}));
+  EXPECT_EQ(Numbers(MaxPool2d(x, {4, 2}, Rounding::kUp)), (std::vector<double>{8}));
+  EXPECT_FALSE(MaxPool2d(x, {5, 2}, Rounding::kUp).valid());
   EXPECT_FALSE(MaxPool2d(x, {4, 2}).valid());
   EXPECT_FALSE(context_.TakeStatus().ok());
 }
@@ -134,6 +137,58 @@ TEST_F(Ops, WhatDoesNotFitIsNamed) {
   refused(SpectralNorm(w, context_.Zeros({3})), "u [3]");
   refused(LogSoftmax(x, 7), "axis 7");
   refused(CrossEntropy(x, indices({0, 1})), "2 labels");
+  refused(BinaryCrossEntropy(Random({4, 1}), c), "target [4]");
+  const Tensor none, three = context_.Zeros({3});
+  refused(BatchNormEval(x, Random({3}), Random({3}), {three, none}), "running statistics");
+  const Context floats(workers_);
+  refused(BatchNormEval(x, Random({3}), Random({3}), {three, floats.Zeros({3})}), "F32 [3]");
+  const Var whole = Constant(context_, indices({1, 2}));
+  refused(BroadcastTo(whole, {3, 2}), "I32");
+  refused(SumTo(whole, {1}), "I32");
+}
+
+// Negative sizes, and those whose product no integer holds, must not reach a kernel.
+TEST_F(Ops, ImpossibleSizesAreRefused) {
+  constexpr std::int64_t kHuge = std::int64_t{1} << 62;
+  constexpr int kLargest = std::numeric_limits<int>::max();
+  const auto refused = [&](const Var& y, const char* word) {
+    EXPECT_FALSE(y.valid()) << word;
+    EXPECT_NE(context_.TakeStatus().message().find(word), std::string::npos) << word;
+  };
+  const Var x = Random({1, 2, 3, 3}), w = Random({2, 2, 3, 3}), row = Random({1, 2});
+  refused(ConvTranspose2d(Random({1, 2, 1, 1}), w, Var(), {1, 2}), "[1, 2, -1, -1]");
+  refused(Conv2dInputGrad(Random({1, 2, 1, 1}), w, {-3, 3}, {1, 3}), "[1, 2, -3, 3]");
+  refused(Conv2dInputGrad(x, w, {std::numeric_limits<std::int64_t>::max(), 3}, {1, 1}),
+          "no tensor");
+  refused(Conv2dWeightGrad(x, x, {-1, 1}, {}), "[2, 2, -1, 1]");
+  refused(Conv2d(x, w, Var(), {1, kLargest}), "no tensor");
+  refused(ConvTranspose2d(x, w, Var(), {kLargest, 0}), "no tensor");
+  refused(Reshape(row, {-1, -1, -1}), "[-1, -1, -1]");
+  refused(Reshape(row, {-1, kHuge, 4}), "reshape");
+  refused(BroadcastTo(row, {-1, 2}), "[-1, 2]");
+  refused(BroadcastTo(row, {kHuge, 4, 2}), "no tensor");
+  refused(Pad(row, 0, kHuge, kHuge), "pad");
+  refused(Pad(row, 0, 1 << 30, 1 << 30, PadMode::kReplicate), "pad");
+  refused(Resize(x, {kHuge, 1}, ResizeMode::kNearest), "resize");
+  const Tensor nothing = context_.Indices({});
+  refused(ScatterAdd(Random({0}), 0, nothing, -5), "[-5]");
+  refused(ScatterAdd(Random({0}), 0, nothing, kHuge), "no tensor");
+  const Var tall = Random({1 << 21, 0}), wide = Random({0, 1 << 21});
+  refused(Matmul(tall, wide), "[2097152, 2097152]");
+  refused(Linear(tall, tall, Var()), "[2097152, 2097152]");
+}
+
+// A stride or a window beyond the image is like one that just leaves it.
+TEST_F(Ops, StridesAndWindowsBeyondTheImage) {
+  constexpr int kLargest = std::numeric_limits<int>::max();
+  const Var x = Random({1, 2, 4, 3}), w = Random({2, 2, 3, 3});
+  const auto derivative = [&](int stride) {
+    const Var y = Conv2d(x, w, Var(), {stride, 1});
+    return Numbers(Grad(Sum(Square(y)), {x})[0]);
+  };
+  EXPECT_EQ(derivative(kLargest), derivative(6));
+  const Var mean = AvgPool2d(x, {kLargest, 1, kLargest / 2});
+  EXPECT_NEAR(Numbers(mean)[0] * kLargest * kLargest, Numbers(Sum(x, {2, 3}))[0], 1e-9);
 }
 
 TEST_F(Ops, ConvolutionsOverTheEdge) {

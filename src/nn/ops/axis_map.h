@@ -3,6 +3,8 @@
 // adjoint of a map is that of the transposed matrix, so one operation is closed.
 #pragma once
 
+#include <limits>
+
 #include "base/function_ref.h"
 #include "nn/tape.h"
 
@@ -10,6 +12,9 @@ namespace tilegrad::nn {
 
 // A matrix [out, in] in compressed rows.
 struct AxisMap {
+  // Of `in` and `out`; MakeAxisMap requires it.
+  static constexpr std::int64_t kMostExtent = std::numeric_limits<std::int32_t>::max();
+
   std::int64_t in = 0, out = 0;
   Tensor begin;   // [out + 1] of kI32: row i has the terms begin[i] .. begin[i + 1]
   Tensor index;   // [terms] of kI32, below `in`

@@ -118,6 +118,12 @@ Var BatchNormEval(const Var& x, const Var& gamma, const Var& beta,
                   const BatchStatistics& statistics, const BatchNormOptions& options) {
   if (!Usable("batch norm", {&x, &gamma, &beta})) return Invalid({&x, &gamma, &beta});
   if (const Status s = CheckOperands(x, gamma, beta); !s.ok()) return Fail(x, s);
+  for (const Tensor* t : {&statistics.mean, &statistics.variance}) {
+    if (!t->empty() && t->dtype() == x.dtype() && t->shape() == gamma.shape()) continue;
+    return Fail(x,
+                InvalidArgument("batch norm: input {}, running statistics of {} {}",
+                                x.shape().ToString(), NameOf(t->dtype()), t->shape().ToString()));
+  }
   Context& context = x.context();
   const Var mean = Constant(context, statistics.mean);
   const Var variance = Constant(context, statistics.variance);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/conv.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/error.h"
@@ -16,11 +17,27 @@ struct Extents {
   Shape x, weight;
 };
 
+Shape OutputShape(const Conv2dShape& s) {
+  const auto extent = [](std::size_t size) { return static_cast<std::int64_t>(size); };
+  return {extent(s.batch), extent(s.out_channels), extent(s.out_height()), extent(s.out_width())};
+}
+
+// The image with its padding, which every other size here is below.
+Shape PaddedShape(const Shape& x, std::int64_t padding) {
+  return {x[0], x[1], x[2] + 2 * padding, x[3] + 2 * padding};
+}
+
 Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   const bool images = e.x.rank() == 4 && e.weight.rank() == 4 && e.x[1] == e.weight[1];
   if (!images || options.stride < 1 || options.padding < 0) {
     return InvalidArgument("conv2d: input {} with weight {}, stride {}, padding {}", e.x.ToString(),
                            e.weight.ToString(), options.stride, options.padding);
+  }
+  // An image that is asked for by its size may have any.
+  if (!e.x.IsPossible() || !e.weight.IsPossible() ||
+      !PaddedShape(e.x, options.padding).IsPossible()) {
+    return InvalidArgument("conv2d: input {} with weight {}, padding {}: no tensor has such a size",
+                           e.x.ToString(), e.weight.ToString(), options.padding);
   }
   const auto size = [](std::int64_t extent) { return static_cast<std::size_t>(extent); };
   if (options.padding_mode != PadMode::kZero && options.padding > 0) {
@@ -31,15 +48,16 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
   s.in_height = size(e.x[2]), s.in_width = size(e.x[3]);
   s.out_channels = size(e.weight[0]);
   s.kernel_height = size(e.weight[2]), s.kernel_width = size(e.weight[3]);
-  s.stride = static_cast<std::size_t>(options.stride);
   s.padding = static_cast<std::size_t>(options.padding);
+  // A step beyond the padded image leaves one pixel, as any longer one does; the kernels' tables
+  // grow with the square of the stride.
+  const Shape padded = PaddedShape(e.x, options.padding);
+  s.stride = size(
+      std::min<std::int64_t>(options.stride, std::max({padded[2], padded[3], std::int64_t{1}})));
   TILEGRAD_TRY(s.Check());
-  return s;
-}
-
-Shape OutputShape(const Conv2dShape& s) {
-  const auto extent = [](std::size_t size) { return static_cast<std::int64_t>(size); };
-  return {extent(s.batch), extent(s.out_channels), extent(s.out_height()), extent(s.out_width())};
+  if (OutputShape(s).IsPossible()) return s;
+  return InvalidArgument("conv2d: input {} with weight {} would give {}", e.x.ToString(),
+                         e.weight.ToString(), OutputShape(s).ToString());
 }
 
 // That dy is of the output's shape.

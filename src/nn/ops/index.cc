@@ -49,7 +49,9 @@ Var Gather(const Var& x, int axis, const Tensor& indices) {
   if (const Status s = CheckRows("gather", x.shape(), axis, indices, extent); !s.ok()) {
     return Fail(x, s);
   }
-  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, indices.shape()[0]), x.dtype());
+  const Shape picked = WithExtent(x.shape(), axis, indices.shape()[0]);
+  if (!Makeable("gather", x, picked)) return Invalid({&x});
+  Tensor y = x.context().Empty(picked, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     GatherRows(RowsOf(x.shape(), axis, indices), x.value().data<T>(), y.data<T>(),
                x.context().workers());
@@ -68,7 +70,9 @@ Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t exten
     return Fail(x, InvalidArgument("scatter: {} indices for axis {} of {}", indices.shape()[0],
                                    axis, x.shape().ToString()));
   }
-  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, extent), x.dtype());
+  const Shape whole = WithExtent(x.shape(), axis, extent);
+  if (!Makeable("scatter", x, whole)) return Invalid({&x});
+  Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     ScatterRows(RowsOf(y.shape(), axis, indices), x.value().data<T>(), y.data<T>(),
                 x.context().workers());
@@ -124,7 +128,9 @@ Var PlaceAlong(const Var& x, const Tensor& indices, std::int64_t extent) {
                              x.shape().ToString());
   }
   if (!status.ok()) return Fail(x, status);
-  Tensor y = x.context().Empty(WithExtent(x.shape(), x.shape().rank() - 1, extent), x.dtype());
+  const Shape whole = WithExtent(x.shape(), x.shape().rank() - 1, extent);
+  if (!Makeable("place along", x, whole)) return Invalid({&x});
+  Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     PlaceElements(PickedOf(indices, extent), x.value().data<T>(), y.data<T>(),
                   x.context().workers());

@@ -25,15 +25,18 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
   const std::int64_t extent = axis >= 0 && axis < x.shape().rank() ? x.shape()[axis] : 0;
   const std::int64_t most = std::max(before, after);
   const bool fits = mode == PadMode::kReflect ? most < extent : extent > 0;
-  if (!fits || before < 0 || after < 0) {
+  if (!fits || before < 0 || after < 0 || most > AxisMap::kMostExtent ||
+      before + extent + after > AxisMap::kMostExtent) {
     return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {} in this mode", before, after,
                                    axis, x.shape().ToString()));
   }
   if (most == 0) return x;
-  const AxisMap map =
-      MakeAxisMap(x, {extent, before + extent + after}, [&](std::int64_t i, AxisTerms& terms) {
-        terms.push_back({SourceOf(i - before, extent, mode), 1.0});
-      });
+  Shape padded = x.shape();
+  padded[axis] += before + after;
+  if (!Makeable("pad", x, padded)) return Invalid({&x});
+  const AxisMap map = MakeAxisMap(x, {extent, padded[axis]}, [&](std::int64_t i, AxisTerms& terms) {
+    terms.push_back({SourceOf(i - before, extent, mode), 1.0});
+  });
   return MapAxis(x, axis, map);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/pool.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "base/error.h"
@@ -13,19 +14,22 @@ namespace tilegrad::nn {
 namespace {
 
 std::int64_t Windows(std::int64_t extent, const PoolOptions& o, Rounding rounding) {
-  const std::int64_t room = extent + 2 * o.padding - o.kernel;
+  const std::int64_t room = extent + 2 * static_cast<std::int64_t>(o.padding) - o.kernel;
   if (rounding == Rounding::kDown) return room / o.stride + 1;
   const std::int64_t windows = (room + o.stride - 1) / o.stride + 1;
   // The last one must begin in the image or in the padding before it.
   return (windows - 1) * o.stride >= extent + o.padding ? windows - 1 : windows;
 }
 
-Status Check(const char* op, const Shape& x, const PoolOptions& o) {
+Status Check(const char* op, const Shape& x, const PoolOptions& o,
+             Rounding rounding = Rounding::kDown) {
   const bool options =
       o.kernel >= 1 && o.stride >= 1 && o.padding >= 0 && o.padding <= o.kernel / 2;
-  if (options && x.rank() == 4 && x[2] + 2 * o.padding >= o.kernel && x[2] > 0 && x[3] > 0 &&
-      x[3] + 2 * o.padding >= o.kernel &&
-      x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
+  // A first window may hang over the edge as a last one may.
+  const std::int64_t least = o.kernel - (rounding == Rounding::kUp ? o.stride - 1 : 0);
+  const std::int64_t padding = 2 * static_cast<std::int64_t>(o.padding);
+  if (options && x.rank() == 4 && x[2] > 0 && x[3] > 0 && x[2] + padding >= least &&
+      x[3] + padding >= least && x.Product(2, 4) <= std::numeric_limits<std::int32_t>::max()) {
     return {};
   }
   return InvalidArgument("{}: input {}, kernel {}, stride {}, padding {}", op, x.ToString(),
@@ -35,9 +39,10 @@ Status Check(const char* op, const Shape& x, const PoolOptions& o) {
 Var MeanAlong(const Var& x, int axis, const PoolOptions& o) {
   const AxisExtents extents{x.shape()[axis], Windows(x.shape()[axis], o, Rounding::kDown)};
   const auto row = [&](std::int64_t i, AxisTerms& terms) {
-    for (std::int64_t k = 0; k < o.kernel; ++k) {
-      const std::int64_t at = i * o.stride - o.padding + k;
-      if (at >= 0 && at < extents.in) terms.push_back({at, 1.0 / o.kernel});
+    const std::int64_t begin = i * o.stride - o.padding;
+    const std::int64_t end = std::min(extents.in, begin + o.kernel);
+    for (std::int64_t at = std::max<std::int64_t>(0, begin); at < end; ++at) {
+      terms.push_back({at, 1.0 / o.kernel});
     }
   };
   return MapAxis(x, axis, MakeAxisMap(x, extents, row));
@@ -54,7 +59,9 @@ Var AvgPool2d(const Var& x, const PoolOptions& options) {
 // The elements are picked by index; picking is linear, and its adjoint puts them back.
 Var MaxPool2d(const Var& x, const PoolOptions& options, Rounding rounding) {
   if (!Usable("max pooling", {&x})) return Invalid({&x});
-  if (const Status s = Check("max pooling", x.shape(), options); !s.ok()) return Fail(x, s);
+  if (const Status s = Check("max pooling", x.shape(), options, rounding); !s.ok()) {
+    return Fail(x, s);
+  }
   const Shape& in = x.shape();
   const Shape out = {in[0], in[1], Windows(in[2], options, rounding),
                      Windows(in[3], options, rounding)};

@@ -152,7 +152,8 @@ Var ReduceMin(const Var& x, std::initializer_list<int> axes, Keep keep) {
 }
 
 Var SumTo(const Var& x, const Shape& shape) {
-  if (!Usable("sum to", {&x}) || x.shape() == shape) return x;
+  if (!Usable("sum to", {&x})) return Invalid({&x});
+  if (x.shape() == shape) return x;
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == x.shape())) {
     return Fail(x, InvalidArgument("sum to: {} was not broadcast from {}", x.shape().ToString(),

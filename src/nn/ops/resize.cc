@@ -47,9 +47,14 @@ Var ResizeAxis(const Var& x, int axis, std::int64_t extent, ResizeMode mode) {
 Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
   if (!Usable("resize", {&x})) return Invalid({&x});
   const bool image = x.shape().rank() == 4 && x.shape()[2] > 0 && x.shape()[3] > 0;
-  if (!image || size.height < 1 || size.width < 1) {
+  const bool fits = size.height >= 1 && size.height <= AxisMap::kMostExtent && size.width >= 1 &&
+                    size.width <= AxisMap::kMostExtent;
+  if (!image || !fits) {
     return Fail(
         x, InvalidArgument("resize: {} to {} x {}", x.shape().ToString(), size.height, size.width));
+  }
+  if (!Makeable("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
+    return Invalid({&x});
   }
   return ResizeAxis(ResizeAxis(x, 2, size.height, mode), 3, size.width, mode);
 }

@@ -75,6 +75,8 @@ Shape WithExtent(Shape shape, int axis, std::int64_t extent) {
   return shape;
 }
 
+bool IsPadding(std::int64_t count) { return count >= 0 && count <= Shape::kMostElements; }
+
 }  // namespace
 
 Var Reshape(const Var& x, Shape shape) {
@@ -85,12 +87,12 @@ Var Reshape(const Var& x, Shape shape) {
   for (int axis = 0; axis < shape.rank(); ++axis) {
     if (shape[axis] == -1 && open < 0) open = axis;
   }
-  if (open >= 0) {
-    shape[open] = 1;
+  if (open >= 0) shape[open] = 1;
+  if (open >= 0 && shape.IsPossible()) {
     const std::int64_t rest = std::max<std::int64_t>(1, shape.elements());
     shape[open] = x.shape().elements() / rest;
   }
-  if (shape.elements() != x.shape().elements()) {
+  if (!shape.IsPossible() || shape.elements() != x.shape().elements()) {
     return Fail(x, InvalidArgument("reshape: {} to {}", x.shape().ToString(), asked.ToString()));
   }
   return Record(
@@ -99,7 +101,9 @@ Var Reshape(const Var& x, Shape shape) {
 }
 
 Var BroadcastTo(const Var& x, const Shape& shape) {
-  if (!Usable("broadcast", {&x}) || x.shape() == shape) return x;
+  if (!Usable("broadcast", {&x})) return Invalid({&x});
+  if (x.shape() == shape) return x;
+  if (!Makeable("broadcast", x, shape)) return Invalid({&x});
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape)) {
     return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
@@ -164,12 +168,14 @@ Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
 
 Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
   if (!Usable("pad", {&x})) return Invalid({&x});
-  if (!HasAxis(x.shape(), axis) || before < 0 || after < 0) {
+  if (!HasAxis(x.shape(), axis) || !IsPadding(before) || !IsPadding(after)) {
     return Fail(x, InvalidArgument("pad: {} and {} along axis {} of {}", before, after, axis,
                                    x.shape().ToString()));
   }
   const std::int64_t extent = x.shape()[axis];
-  Tensor y = Zeros(x, WithExtent(x.shape(), axis, before + extent + after));
+  const Shape padded = WithExtent(x.shape(), axis, before + extent + after);
+  if (!Makeable("pad", x, padded)) return Invalid({&x});
+  Tensor y = Zeros(x, padded);
   MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
   return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
     return Vars{Slice(adj.dy(), axis, before, before + extent)};

@@ -2,6 +2,7 @@
 #include "nn/ops/softmax.h"
 
 #include "base/error.h"
+#include "nn/ops/broadcast.h"
 #include "nn/ops/index.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
@@ -54,6 +55,13 @@ Var CrossEntropy(const Var& logits, const Var& target) {
 }
 
 Var BinaryCrossEntropy(const Var& logits, const Var& target) {
+  if (!Usable("binary cross-entropy", {&logits, &target})) return Invalid({&logits, &target});
+  // [n, 1] beside [n] would be n x n numbers, and a loss that looks like one.
+  Shape joined;
+  if (!BroadcastShape(logits.shape(), target.shape(), joined) || !(joined == logits.shape())) {
+    return Fail(logits, InvalidArgument("binary cross-entropy: logits {} with target {}",
+                                        logits.shape().ToString(), target.shape().ToString()));
+  }
   return Mean(Sub(Softplus(logits), Mul(logits, target)));
 }
 
