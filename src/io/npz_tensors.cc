@@ -37,7 +37,14 @@ Result<nn::Tensor> TensorFromNpy(const nn::Context& context, const NpyArray& arr
         name, NpyTypeName(array.type), array.shape.size(), nn::Shape::kMaxRank);
   }
   nn::Shape shape;
-  for (const std::size_t extent : array.shape) shape.Append(static_cast<std::int64_t>(extent));
+  for (const std::size_t extent : array.shape) {
+    // Beside an extent of 0 the others may be anything.
+    const bool possible = extent <= static_cast<std::size_t>(nn::Shape::kMostElements);
+    if (possible) shape.Append(static_cast<std::int64_t>(extent));
+    if (!possible || !shape.IsPossible()) {
+      return DataLoss("{}: an extent of {} is none of a tensor", name, extent);
+    }
+  }
   nn::Tensor tensor = context.Empty(shape, *dtype);
   if (!array.data.empty()) std::memcpy(tensor.raw(), array.data.data(), array.data.size());
   return tensor;

@@ -15,7 +15,8 @@ static_assert(std::endian::native == std::endian::little, "safetensors data is l
 namespace tilegrad::nn {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;
+using OrderedJson = nlohmann::ordered_json;  // slow to search: for writing only
 
 constexpr std::size_t kLengthBytes = 8;
 constexpr std::size_t kMaxHeader = 100u << 20;  // the format's own limit
@@ -46,17 +47,19 @@ Result<Shape> ParseShape(const std::string& name, const Json& extents, std::size
     return BadEntry(name, "more than five axes");
   }
   Shape shape;
-  std::size_t elements = 1;
   for (const Json& extent : extents) {
     if (!IsCount(extent)) return BadEntry(name, "an extent is not a count");
     const auto e = extent.get<std::uint64_t>();
-    if (e > max_elements || (e != 0 && elements > max_elements / e)) {
+    if (e > static_cast<std::uint64_t>(Shape::kMostElements)) {
       return BadEntry(name, "its shape is larger than the file");
     }
-    elements *= e;
     shape.Append(static_cast<std::int64_t>(e));
   }
-  return shape;
+  // [0, 3] has more columns than a file without data has bytes.
+  if (shape.IsPossible() && static_cast<std::uint64_t>(shape.elements()) <= max_elements) {
+    return shape;
+  }
+  return BadEntry(name, "its shape is larger than the file");
 }
 
 Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t data_bytes) {
@@ -81,7 +84,41 @@ Result<Entry> ParseEntry(const std::string& name, const Json& json, std::size_t 
   return entry;
 }
 
-Result<Json> ParseHeader(std::span<const std::uint8_t> bytes) {
+// Notes the names of an object's entries as they come, twice where they stand twice. (What keeps
+// the order while it parses, ordered_json or a callback, looks through all entries at each.)
+class EntryNames : public nlohmann::json_sax<Json> {
+ public:
+  std::vector<std::string> names;
+
+  bool start_object(std::size_t) override { return ++depth_ > 0; }
+  bool end_object() override { return depth_-- > 0; }
+  bool start_array(std::size_t) override { return ++depth_ > 0; }
+  bool end_array() override { return depth_-- > 0; }
+  bool key(string_t& name) override {
+    if (depth_ == 1) names.push_back(name);
+    return true;
+  }
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool parse_error(std::size_t, const std::string&, const Json::exception&) override {
+    return false;
+  }
+
+ private:
+  std::size_t depth_ = 0;
+};
+
+struct Header {
+  Json json;
+  std::vector<std::string> names;  // as they come
+};
+
+Result<Header> ParseHeader(std::span<const std::uint8_t> bytes) {
   std::uint64_t length = 0;
   if (bytes.size() < kLengthBytes)
     return DataLoss("safetensors: {} bytes are no file", bytes.size());
@@ -92,8 +129,14 @@ Result<Json> ParseHeader(std::span<const std::uint8_t> bytes) {
         bytes.size());
   }
   const auto* begin = bytes.data() + kLengthBytes;
-  Json header = Json::parse(begin, begin + length, nullptr, /*allow_exceptions=*/false);
-  if (!header.is_object()) return DataLoss("safetensors: the header is not a JSON object");
+  Header header{Json::parse(begin, begin + length, nullptr, /*allow_exceptions=*/false), {}};
+  if (!header.json.is_object()) return DataLoss("safetensors: the header is not a JSON object");
+  EntryNames entries;
+  Json::sax_parse(begin, begin + length, &entries);
+  header.names = std::move(entries.names);
+  if (header.json.size() != header.names.size()) {
+    return DataLoss("safetensors: the header has a name twice");
+  }
   return header;
 }
 
@@ -110,12 +153,13 @@ Status ParseMetadata(const Json& json, std::map<std::string, std::string>& metad
 }  // namespace
 
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes) {
-  TILEGRAD_ASSIGN(const Json header, ParseHeader(bytes));
+  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
   std::uint64_t length = 0;
   std::memcpy(&length, bytes.data(), kLengthBytes);
   const auto data = bytes.subspan(kLengthBytes + static_cast<std::size_t>(length));
   TensorFile file;
-  for (const auto& [name, json] : header.items()) {
+  for (const std::string& name : header.names) {
+    const Json& json = header.json[name];
     if (name == kMetadata) {
       TILEGRAD_TRY(ParseMetadata(json, file.metadata));
       continue;
@@ -135,15 +179,31 @@ Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
   return file;
 }
 
+namespace {
+
+// A name that is not would be written as another one.
+bool IsUtf8(const std::string& text) {
+  const std::string dumped = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Json::parse(dumped).get<std::string>() == text;
+}
+
+}  // namespace
+
 Result<Bytes> EncodeSafetensors(const TensorFile& file) {
-  Json header = Json::object();
+  OrderedJson header = OrderedJson::object();
   if (!file.metadata.empty()) header[kMetadata] = file.metadata;
+  for (const auto& [key, value] : file.metadata) {
+    if (!IsUtf8(key) || !IsUtf8(value)) {
+      return InvalidArgument("safetensors: the metadata are not UTF-8");
+    }
+  }
   std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
     if (t.value.empty() || t.name == kMetadata || header.contains(t.name)) {
       return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
     }
-    Json extents = Json::array();
+    if (!IsUtf8(t.name)) return InvalidArgument("safetensors: a tensor's name is not UTF-8");
+    OrderedJson extents = OrderedJson::array();
     for (int axis = 0; axis < t.value.shape().rank(); ++axis) {
       extents.push_back(static_cast<std::uint64_t>(t.value.shape()[axis]));
     }
@@ -152,7 +212,7 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
                       {"shape", std::move(extents)},
                       {"data_offsets", {begin, end}}};
   }
-  std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = header.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
   Bytes bytes(kLengthBytes + text.size() + end);
   const std::uint64_t length = text.size();

@@ -25,7 +25,7 @@ struct TensorFile {
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes);
 Result<TensorFile> ReadSafetensors(Context& context, const Path& path);
 
-// Names must be unique and not "__metadata__".
+// Names must be unique and not "__metadata__"; they and the metadata UTF-8.
 Result<Bytes> EncodeSafetensors(const TensorFile& file);
 Status WriteSafetensors(const Path& path, const TensorFile& file);  // whole or not at all
 

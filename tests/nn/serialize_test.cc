@@ -2,8 +2,10 @@
 // safetensors against bytes written by hand, and against files that lie.
 #include "nn/serialize.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstring>
 
 namespace tilegrad::nn {
@@ -139,6 +141,11 @@ TEST_F(Safetensors, HeadersThatLie) {
       {R"({"a":{"dtype":"F32","shape":[3],"data_offsets":[0,8]}})", "differ in size"},
       {R"({"a":{"dtype":"F32","shape":[-2],"data_offsets":[0,8]}})", "not a count"},
       {R"({"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,8]}})", "larger"},
+      {R"({"a":{"dtype":"F32","shape":[0,4294967296,4294967296],"data_offsets":[0,0]}})", "larger"},
+      {R"({"a":{"dtype":"F32","shape":[0,18446744073709551615],"data_offsets":[0,0]}})", "larger"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]},
+           "a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})",
+       "a name twice"},
       {R"({"a":{"dtype":"F32","shape":[1,1,1,1,1,2],"data_offsets":[0,8]}})", "five axes"},
       {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8.5]}})", "two counts"},
       {R"({"__metadata__":{"a":1}})", "not a string"},
@@ -171,6 +178,41 @@ TEST_F(Safetensors, NamesMustBeUnique) {
   const Tensor t = context_.Full({1}, 0);
   EXPECT_FALSE(EncodeSafetensors({{{"a", t}, {"a", t}}, {}}).ok());
   EXPECT_FALSE(EncodeSafetensors({{{"__metadata__", t}}, {}}).ok());
+}
+
+// Two names that are no UTF-8 would be written as one.
+TEST_F(Safetensors, NamesAndMetadataMustBeUtf8) {
+  const Tensor t = context_.Full({1}, 0);
+  EXPECT_FALSE(EncodeSafetensors({{{"a\xff", t}, {"a\xfe", t}}, {}}).ok());
+  EXPECT_FALSE(EncodeSafetensors({{{"a", t}}, {{"\xff", ""}}}).ok());
+  EXPECT_FALSE(EncodeSafetensors({{{"a", t}}, {{"k", "\xff"}}}).ok());
+  EXPECT_TRUE(EncodeSafetensors({{{"g\xc3\xb6\"\\", t}}, {{"k", "\xc3\xb6"}}}).ok());
+}
+
+TEST_F(Safetensors, TensorsWithoutElements) {
+  const Bytes bytes = EncodeSafetensors({{{"a", context_.Zeros({0, 300})}}, {}}).value();
+  const auto back = DecodeSafetensors(context_, bytes);
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ(back->tensors[0].value.shape(), (Shape{0, 300}));
+}
+
+// In time that grows with their number: its square, which took minutes here, is for a hostile
+// file to choose.
+TEST_F(Safetensors, ManyTensorsKeepTheirOrder) {
+  constexpr int kCount = 100000;
+  std::string header = "{";
+  for (int i = 0; i < kCount; ++i) {
+    header += fmt::format(R"({}"{}":{{"dtype":"U8","shape":[0],"data_offsets":[0,0]}})",
+                          i == 0 ? "" : ",", kCount - i);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const auto file = DecodeSafetensors(context_, File(header + "}", 0));
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  ASSERT_TRUE(file.ok()) << file.status().message();
+  ASSERT_EQ(file->tensors.size(), static_cast<std::size_t>(kCount));
+  EXPECT_EQ(file->tensors[0].name, std::to_string(kCount));
+  EXPECT_EQ(file->tensors.back().name, "1");
+  EXPECT_LT(taken.count(), 30);  // about 1
 }
 
 }  // namespace
