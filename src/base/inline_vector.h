@@ -34,10 +34,14 @@ class InlineVector {
 
   void resize(std::size_t size) {
     if (size > N) {
-      if (size_ <= N) many_.assign(few_.begin(), few_.begin() + static_cast<std::ptrdiff_t>(size_));
+      // Moved: a copy that stayed behind would hold on to what its element holds.
+      if (size_ <= N) {
+        many_.reserve(size);
+        for (std::size_t i = 0; i < size_; ++i) many_.push_back(std::exchange(few_[i], T()));
+      }
       many_.resize(size);
     } else if (size_ > N) {
-      for (std::size_t i = 0; i < size; ++i) few_[i] = many_[i];
+      for (std::size_t i = 0; i < size; ++i) few_[i] = std::move(many_[i]);
       many_.clear();
     }
     for (std::size_t i = size; i < size_ && i < N; ++i) few_[i] = T();

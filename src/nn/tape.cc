@@ -16,6 +16,11 @@ namespace tilegrad::nn {
 // One operation of the graph. Holds values only through its rule (and `saved`), so a value that no
 // rule needs is free as soon as the caller lets go of its Var.
 struct Node : std::enable_shared_from_this<Node> {
+  Node() = default;
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  ~Node();
+
   struct Edge {
     std::shared_ptr<Node> node;  // null: no gradient flows there
     int slot = 0;
@@ -27,7 +32,35 @@ struct Node : std::enable_shared_from_this<Node> {
   Rule rule;
   Tensor saved;  // the output, where the rule wants it
   bool released = false;
+  std::shared_ptr<Node> next_doomed;  // while a graph is taken apart
 };
+
+namespace {
+
+// Lets go of what `node` depends on; what nobody else holds goes before `doomed`.
+void Dismantle(Node& node, std::shared_ptr<Node>& doomed) {
+  node.rule = nullptr;  // its Vars are of the nodes that the edges still hold
+  for (Node::Edge& edge : node.edges) {
+    const std::shared_ptr<Node> below = std::move(edge.node);
+    if (below.use_count() != 1) continue;
+    below->next_doomed = std::move(doomed);
+    doomed = below;
+  }
+}
+
+}  // namespace
+
+// In a loop: left to themselves the nodes of a long chain would end inside each other, on a stack
+// that has room for some hundred thousand.
+Node::~Node() {
+  std::shared_ptr<Node> doomed;
+  Dismantle(*this, doomed);
+  while (doomed) {
+    const std::shared_ptr<Node> node = std::move(doomed);
+    doomed = std::move(node->next_doomed);
+    Dismantle(*node, doomed);
+  }
+}
 
 namespace {
 

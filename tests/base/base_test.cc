@@ -16,6 +16,7 @@
 
 #include "base/aligned.h"
 #include "base/file.h"
+#include "base/inline_vector.h"
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/simd_target.h"
@@ -228,6 +229,16 @@ TEST(Arena, ReusesMemoryAfterReset) {
   const std::size_t held = arena.capacity();
   for (int i = 0; i < 10; ++i) (void)arena.Allocate<float>(50000);
   EXPECT_EQ(arena.capacity(), held);
+}
+
+// What lies on the heap is not held a second time by the places in the object.
+TEST(InlineVector, HoldsEachElementOnce) {
+  const auto shared = std::make_shared<int>(1);
+  InlineVector<std::shared_ptr<int>, 2> list;
+  for (int i = 0; i < 5; ++i) list.push_back(shared);
+  EXPECT_EQ(shared.use_count(), 6);
+  list.resize(1);
+  EXPECT_EQ(shared.use_count(), 2);
 }
 
 class FileTest : public testing::Test {

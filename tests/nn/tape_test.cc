@@ -127,6 +127,17 @@ TEST_F(Tape, ReleasedGraphIsAnError) {
   EXPECT_NE(Message().find("was released"), std::string::npos);
 }
 
+// Nodes that end inside each other would need more stack than there is.
+TEST_F(Tape, LongChainsAreTakenApart) {
+  const Var x = Vector({1});
+  Var y = x;
+  for (int i = 0; i < 400000; ++i) y = y + 1.0;
+  EXPECT_EQ(Grad(y, {x})[0].item(), 1);
+  y = x;
+  for (int i = 0; i < 400000; ++i) y = y * y;
+  y = Var();
+}
+
 TEST_F(Tape, NoGradRecordsNothing) {
   const Var x = Vector({2});
   {
