@@ -77,27 +77,41 @@ void LinearLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
 }
 
-Spectral::Spectral(const Var& weight, Rng& rng)
-    : u_(weight.context().Empty({weight.shape()[0]}, weight.dtype())) {
+namespace {
+
+// [in, out, k, k] as [out, in, k, k], and back.
+Var Swapped(const Var& weight) { return Permute(weight, {1, 0, 2, 3}); }
+
+}  // namespace
+
+Spectral::Spectral(const Var& weight, bool transposed, Rng& rng)
+    : transposed_(transposed),
+      u_(weight.context().Empty({weight.shape()[transposed ? 1 : 0]}, weight.dtype())) {
   FillNormal(u_, rng, 1.0);
-  SpectralStep(weight, u_);
+  const NoGrad off(weight.context());
+  SpectralStep(transposed_ ? Swapped(weight) : weight, u_);
 }
 
 Var Spectral::Normalised(const Var& weight, Mode mode) {
   if (u_.empty()) return weight;
-  if (mode == Mode::kTrain) SpectralStep(weight, u_);
+  const Var by_output = transposed_ ? Swapped(weight) : weight;
+  if (mode == Mode::kTrain) SpectralStep(by_output, u_);
   // A copy: what this pass records must not see the steps of later ones.
-  return SpectralNorm(weight, weight.context().Copy(u_));
+  const Var normalised = SpectralNorm(by_output, weight.context().Copy(u_));
+  return transposed_ ? Swapped(normalised) : normalised;
 }
 
 void Spectral::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   if (!u_.empty()) visitor.Buffer(prefix + "spectral_u", u_);
 }
 
-ConvLayer::ConvLayer(Context& context, const ConvShape& shape, const Shape& weights, Rng& rng)
-    : weight(Initialised(context, weights, rng, FanIn(weights))), options_(shape.options) {
+ConvLayer::ConvLayer(Context& context, const ConvShape& shape, bool transposed, Rng& rng)
+    : options_(shape.options) {
+  const Shape weights = {transposed ? shape.in : shape.out, transposed ? shape.out : shape.in,
+                         shape.kernel, shape.kernel};
+  weight = Initialised(context, weights, rng, FanIn(weights));
   if (shape.bias) bias = Initialised(context, {shape.out}, rng, FanIn(weights));
-  if (shape.spectral) spectral_ = Spectral(weight, rng);
+  if (shape.spectral) spectral_ = Spectral(weight, transposed, rng);
 }
 
 void ConvLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {

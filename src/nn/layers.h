@@ -63,12 +63,14 @@ struct LinearShape {
 class Spectral {
  public:
   Spectral() = default;  // none: leaves weights as they are
-  Spectral(const Var& weight, Rng& rng);
+  // `transposed`: the weight is [in, out, ..], as that of a transposed convolution.
+  Spectral(const Var& weight, bool transposed, Rng& rng);
   Var Normalised(const Var& weight, Mode mode);
   void Visit(const std::string& prefix, ModuleVisitor& visitor);
 
  private:
-  Tensor u_;
+  bool transposed_ = false;
+  Tensor u_;  // [out]
 };
 
 class LinearLayer : public Module {
@@ -98,8 +100,8 @@ class ConvLayer : public Module {
   Var bias;  // [out]; invalid without
 
  protected:
-  // FillDefault by the fan-in of `weights`, the weight's shape, as PyTorch counts it.
-  ConvLayer(Context& context, const ConvShape& shape, const Shape& weights, Rng& rng);
+  // FillDefault by the fan-in of the weight's shape, as PyTorch counts it.
+  ConvLayer(Context& context, const ConvShape& shape, bool transposed, Rng& rng);
   ConvOptions options_;
   Spectral spectral_;
 };
@@ -108,7 +110,7 @@ class Conv2dLayer : public ConvLayer {
  public:
   // weight: [out, in, kernel, kernel]
   Conv2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-      : ConvLayer(context, shape, {shape.out, shape.in, shape.kernel, shape.kernel}, rng) {}
+      : ConvLayer(context, shape, /*transposed=*/false, rng) {}
   Var Forward(const Var& x, Mode mode) override;
 };
 
@@ -116,7 +118,7 @@ class ConvTranspose2dLayer : public ConvLayer {
  public:
   // weight: [in, out, kernel, kernel]
   ConvTranspose2dLayer(Context& context, const ConvShape& shape, Rng& rng)
-      : ConvLayer(context, shape, {shape.in, shape.out, shape.kernel, shape.kernel}, rng) {}
+      : ConvLayer(context, shape, /*transposed=*/true, rng) {}
   Var Forward(const Var& x, Mode mode) override;
 };
 

@@ -199,6 +199,23 @@ TEST_F(Networks, SpectralStepsConverge) {
   }
 }
 
+// The matrix of a transposed convolution has a row for each output too: here of lengths 3 and 4,
+// while its one row for the input has length 5.
+TEST_F(Networks, SpectralNormOfATransposedConvolution) {
+  ConvTranspose2dLayer layer(
+      context_, {.in = 1, .out = 2, .kernel = 2, .bias = false, .spectral = true}, rng_);
+  FillConstant(layer.weight.value(), 0);
+  layer.weight.value().data<double>()[0] = 3;
+  layer.weight.value().data<double>()[5] = 4;
+  EXPECT_EQ(State(layer)[1].value.shape(), (Shape{2}));
+  const Var x = Constant(context_, context_.Full({1, 1, 1, 1}, 1));
+  Var y;
+  for (int i = 0; i < 100; ++i) y = layer.Forward(x, Mode::kTrain);
+  EXPECT_NEAR(y.value().data<double>()[0], 0.75, 1e-12);
+  EXPECT_NEAR(y.value().data<double>()[5], 1, 1e-12);
+  ExpectGradient(layer, [&] { return Mean(Square(layer.Forward(x, Mode::kEval))); });
+}
+
 // A network of torchvision's names with few channels.
 struct SmallFeatures {
   explicit SmallFeatures(Context& c, Rng& r) : context(c), rng(r) {}
