@@ -15,12 +15,13 @@ struct NormOptions {
 // (Ulyanov et al. 2016).
 Var InstanceNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions& options = {});
 
-// x [n, c, h, w] or [n, c]; statistics over c / groups channels of each sample (Wu, He 2018).
+// x [n, c, h, w] or [n, c]; statistics over c / groups channels of each sample, which must have at
+// least two elements (Wu, He 2018).
 Var GroupNorm(const Var& x, int groups, const Var& gamma, const Var& beta,
               const NormOptions& options = {});
 
-// Statistics over the last axes, those of gamma's shape: x [.., gamma's shape], beta as gamma (Ba
-// et al. 2016).
+// Statistics over the last axes, those of gamma's shape, of at least two elements: x [.., gamma's
+// shape], beta as gamma (Ba et al. 2016).
 Var LayerNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions& options = {});
 
 // weight / sigma, sigma = |W^T u| with W = weight as [out, rest] and u [out] of length 1: the
