@@ -149,6 +149,7 @@ void AddDataset(CLI::App& app, Action* action) {
   command
       ->add_option("--seed", build.split.seed,
                    "of the choice of models, the split and procedural shapes")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--test-share", build.split.test_share, "of each class's models")
       ->capture_default_str();

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "cli/command.h"
+#include "cli/file_ending.h"
 #include "io/image_file.h"
 #include "train/data/dataset.h"
 
@@ -104,7 +105,9 @@ void AddDatasetView(CLI::App& app, Action* action) {
   command->add_option("--view", options->view, "which view")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--out", options->out, "PNG file")->capture_default_str();
+  command->add_option("--out", options->out, "PNG file")
+      ->check(FileEnding(".png"))
+      ->capture_default_str();
   command->callback([options, action] { *action = [options] { return WriteView(*options); }; });
 }
 

@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/file_ending.h"
 #include "cli/run_folder.h"
 #include "train/fit/figure2.h"
 
@@ -39,7 +40,9 @@ void AddFigure2(CLI::App& app, Action* action) {
       "figure2",
       "The paper's Figure 2: optimise positions, colours, texture, uv, camera, light and material\n"
       "in eight small scenes, and draw start, target, result and error curve of each");
-  command->add_option("--out", options->out, "the picture, SVG")->capture_default_str();
+  command->add_option("--out", options->out, "the picture, SVG")
+      ->check(FileEnding(".svg"))
+      ->capture_default_str();
   command->add_option("--size", options->figure.size, "pixels a side of each image")
       ->check(CLI::Range(8, 2048))
       ->capture_default_str();

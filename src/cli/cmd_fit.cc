@@ -181,7 +181,7 @@ void AddWhat(CLI::App* command, Options* o) {
 
 void AddHow(CLI::App* command, FitConfig* c) {
   const auto number = [&](const char* name, auto* value, const char* help) {
-    command->add_option(name, *value, help)->capture_default_str();
+    return command->add_option(name, *value, help)->capture_default_str();
   };
   number("--steps", &c->steps, "gradient steps");
   number("--views-per-step", &c->views_per_step, "images a step looks at");
@@ -197,7 +197,7 @@ void AddHow(CLI::App* command, FitConfig* c) {
   number("--color-weight", &c->loss.color_weight, "of the L1 loss of colours");
   number("--silhouette-weight", &c->loss.silhouette_weight, "of the IoU loss of masks");
   number("--perturb-cameras", &c->perturb_cameras, "turn each by DEG at random, to try refining");
-  number("--seed", &c->seed, "of the choice of images");
+  number("--seed", &c->seed, "of the choice of images")->check(CLI::NonNegativeNumber);
   number("--checkpoint-every", &c->checkpoint_every, "steps");
   number("--timelapse", &c->timelapse, "pictures of the run; 0: none");
 }

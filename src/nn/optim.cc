@@ -87,9 +87,12 @@ std::vector<NamedTensor> Optimizer::State() const {
 }
 
 Status Optimizer::LoadState(const std::vector<NamedTensor>& state) {
-  std::vector<NamedTensor> own = State();
+  std::vector<NamedTensor> own = State(), count = {own.back()};
+  TILEGRAD_TRY(CopyByName(state, count));
+  const std::int64_t steps = *count[0].value.data<std::int64_t>();
+  if (steps < 0) return DataLoss("{}: an optimizer has not taken {} steps", count[0].name, steps);
   TILEGRAD_TRY(CopyByName(state, own));
-  steps_ = *own.back().value.data<std::int64_t>();
+  steps_ = steps;
   return {};
 }
 

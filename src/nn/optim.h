@@ -29,7 +29,7 @@ class Optimizer {
   std::int64_t steps() const { return steps_; }
 
   // "<name>.<moment>.<parameter>" for each moment, and "<name>.steps" ([1] of kI64); name: "adam"
-  // or "sgd". Loading restores the same bits; errors as CopyByName.
+  // or "sgd". Loading restores the same bits; errors as CopyByName, and DataLoss if steps < 0.
   std::vector<NamedTensor> State() const;
   Status LoadState(const std::vector<NamedTensor>& state);
 

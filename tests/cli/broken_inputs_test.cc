@@ -209,6 +209,17 @@ TEST_F(BrokenInputs, OutputThatCannotBePrinted) {
   }
 }
 
+TEST_F(BrokenInputs, OptionsThatMeanSomethingElse) {
+  ExpectRefused(
+      "dataset-view --data " + Data().string() + " --out " + (folder_ / "view.jpg").string(),
+      "view.jpg", ".png");
+  ExpectRefused("figure2 --out " + (folder_ / "figure.png").string(), "figure.png", ".svg");
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  ExpectRefused("dataset --source procedural --seed -1 --out " + (folder_ / "d").string(),
+                "--seed");
+  ExpectRefused("fit " + Data().string() + " --seed -1", "--seed");
+}
+
 TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   Write("file", "in the way");
   ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +

@@ -290,6 +290,8 @@ TEST_F(Networks, FeatureExtractors) {
     EXPECT_EQ(PerceptualL1(features, network->Features(Detach(x))).item(), 0);
     EXPECT_EQ(Grad(distance, {x})[0].shape(), x.shape());
     EXPECT_TRUE(context_.status().ok()) << context_.status().message();
+    EXPECT_FALSE(PerceptualL1(features, std::span(features).first(1)).valid());
+    EXPECT_EQ(context_.TakeStatus().code(), StatusCode::kInvalidArgument);
 
     weights.pop_back();
     EXPECT_EQ(FeatureNetwork::Load(context_, c.kind, weights).status().code(),

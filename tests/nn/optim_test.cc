@@ -138,6 +138,22 @@ TEST(SavedAndRestored, SameBitsForAnyNumberOfWorkers) {
   }
 }
 
+TEST(SavedAndRestored, RefusesACountOfStepsBelowZero) {
+  const Workers workers(1);
+  for (const Trained::Make make : kMakes) {
+    Trained trained(workers, make);
+    trained.Step(0);
+    const Bytes before = trained.Encoded();
+    auto state = DecodeSafetensors(trained.context, before).value().tensors;
+    for (NamedTensor& t : state) {
+      if (t.name.ends_with(".steps")) *t.value.data<std::int64_t>() = -1;
+      if (t.value.dtype() == DType::kF32) t.value.data<float>()[0] += 1;
+    }
+    EXPECT_EQ(trained.optimizer->LoadState(state).code(), StatusCode::kDataLoss);
+    EXPECT_EQ(trained.Encoded(), before);
+  }
+}
+
 // A network of the same start for each, trained along Gradients and along Grad.
 class ProductsOfGradients : public ::testing::Test {
  protected:

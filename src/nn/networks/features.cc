@@ -172,8 +172,12 @@ std::vector<Var> FeatureNetwork::Features(const Var& x) const {
 }
 
 Var PerceptualL1(std::span<const Var> a, std::span<const Var> b) {
+  if (a.size() != b.size()) {
+    return Fail(a.empty() ? b[0] : a[0],
+                InvalidArgument("perceptual loss: {} layers beside {}", a.size(), b.size()));
+  }
   Var sum;
-  for (std::size_t i = 0; i < a.size() && i < b.size(); ++i) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
     const Var layer = Mean(Abs(Sub(a[i], b[i])));
     sum = i == 0 ? layer : Add(sum, layer);
   }

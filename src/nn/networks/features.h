@@ -38,7 +38,7 @@ class FeatureNetwork {
   std::vector<Convolution> convolutions_;  // in the order of use
 };
 
-// sum over layers of mean |a - b|: the paper's equation 16.
+// sum over layers of mean |a - b|: the paper's equation 16. As many layers of both.
 Var PerceptualL1(std::span<const Var> a, std::span<const Var> b);
 
 }  // namespace tilegrad::nn
