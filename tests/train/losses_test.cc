@@ -125,6 +125,30 @@ TEST_F(Losses, SmoothnessIsFiniteForCollapsedFaces) {
   for (const double g : nn::Grad(loss, {p})[0].value().span<double>()) EXPECT_EQ(g, 0);
 }
 
+// Half a million terms, one after the other: in float the sums would lose 1e-4 (movement) and 4e-4
+// (angles). What remains is the rounding of each term, which averages out.
+TEST_F(Losses, MeshLossesInFloatAreRightOnALargeMesh) {
+  const Mesh mesh = Icosphere(7, 0.5f);
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  const auto noise = Uniform(3 * mesh.positions.size(), -1e-3, 1e-3, 7);
+  const std::vector<float> movement(noise.begin(), noise.end());
+  std::vector<float> positions = movement, residual(movement.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    positions[i] += mesh.positions[i / 3][static_cast<int>(i % 3)];
+  }
+  const std::vector<double> exact_movement(movement.begin(), movement.end()),
+      exact_positions(positions.begin(), positions.end());
+  std::vector<double> exact_residual(movement.size());
+  std::vector<FaceNormal<float>> normals;
+  std::vector<FaceNormal<double>> exact_normals;
+  const double laplacian = LaplacianForward<double>(topology, exact_movement, exact_residual);
+  const double smoothness =
+      SmoothnessForward<double>(topology, mesh.faces, exact_positions, exact_normals);
+  EXPECT_NEAR(LaplacianForward<float>(topology, movement, residual), laplacian, 1e-6 * laplacian);
+  EXPECT_NEAR(SmoothnessForward<float>(topology, mesh.faces, positions, normals), smoothness,
+              1e-5 * smoothness);
+}
+
 TEST_F(Losses, ShapesThatDoNotFitAreErrors) {
   const nn::Var a = nn::Constant(context_, context_.Zeros({2, 4}));
   EXPECT_FALSE(IouLoss(a, context_.Zeros({2, 5})).valid());

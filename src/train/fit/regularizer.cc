@@ -19,10 +19,10 @@ Regularizer::Regularizer(std::span<const std::int32_t> faces, std::span<const fl
 double Regularizer::AddLaplacian(float weight, std::span<const float> positions,
                                  std::span<float> d_positions) {
   for (std::size_t i = 0; i < start_.size(); ++i) movement_[i] = positions[i] - start_[i];
-  const float loss = LaplacianForward<float>(*topology_, movement_, residual_);
+  const double loss = LaplacianForward<float>(*topology_, movement_, residual_);
   LaplacianBackward<float>(*topology_, residual_, weight, d_movement_);
   for (std::size_t i = 0; i < start_.size(); ++i) d_positions[i] += d_movement_[i];
-  return static_cast<double>(loss);
+  return loss;
 }
 
 RegularizerTerms Regularizer::Add(const RegularizerTerms& weights, std::span<const float> positions,
@@ -32,14 +32,13 @@ RegularizerTerms Regularizer::Add(const RegularizerTerms& weights, std::span<con
     value.laplacian = AddLaplacian(static_cast<float>(weights.laplacian), positions, d_positions);
   }
   if (weights.flatness > 0) {
-    value.flatness =
-        static_cast<double>(SmoothnessForward<float>(*topology_, faces_, positions, normals_));
+    value.flatness = SmoothnessForward<float>(*topology_, faces_, positions, normals_);
     AddSmoothnessGradient<float>(*topology_, faces_, positions, normals_,
                                  static_cast<float>(weights.flatness), &scratch_, d_positions);
   }
   if (weights.edge_length > 0) {
-    EdgeSums<float> sums;
-    value.edge_length = static_cast<double>(EdgeLengthForward<float>(*topology_, positions, &sums));
+    EdgeSums sums;
+    value.edge_length = EdgeLengthForward<float>(*topology_, positions, &sums);
     AddEdgeLengthGradient<float>(*topology_, positions, sums,
                                  static_cast<float>(weights.edge_length), d_positions);
   }

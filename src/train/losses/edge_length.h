@@ -12,9 +12,9 @@
 
 namespace tilegrad::train {
 
-template <class T>
+// Over all edges; in double, since the loss is what little remains of their quotient.
 struct EdgeSums {
-  T length = 0, square = 0;  // over all edges
+  double length = 0, square = 0;
 };
 
 template <class T>
@@ -29,27 +29,30 @@ T EdgeLength(std::span<const T> p, const Edge& e) {
 
 // One mesh: p [V,3]. 0 for a mesh without edges or extent.
 template <class T>
-T EdgeLengthForward(const Topology& topology, std::span<const T> p, EdgeSums<T>* sums) {
+double EdgeLengthForward(const Topology& topology, std::span<const T> p, EdgeSums* sums) {
   *sums = {};
   for (const Edge& e : topology.edges) {
-    const T length = EdgeLength(p, e);
+    const double length = static_cast<double>(EdgeLength(p, e));
     sums->length += length, sums->square += length * length;
   }
-  if (!(sums->length > T(0))) return T(0);
-  return T(topology.edges.size()) * sums->square / (sums->length * sums->length) - T(1);
+  if (!(sums->length > 0)) return 0;
+  const auto edges = static_cast<double>(topology.edges.size());
+  return edges * sums->square / (sums->length * sums->length) - 1;
 }
 
 // d_p += scale times the gradient: dL/dl = 2 n (l - square / length) / length^2. An edge without
 // length has no direction and pulls nothing.
 template <class T>
-void AddEdgeLengthGradient(const Topology& topology, std::span<const T> p, const EdgeSums<T>& sums,
+void AddEdgeLengthGradient(const Topology& topology, std::span<const T> p, const EdgeSums& sums,
                            T scale, std::span<T> d_p) {
-  if (!(sums.length > T(0))) return;
-  const T factor = 2 * scale * T(topology.edges.size()) / (sums.length * sums.length);
+  if (!(sums.length > 0)) return;
+  const double factor = 2 * static_cast<double>(scale) *
+                        static_cast<double>(topology.edges.size()) / (sums.length * sums.length);
+  const double balance = sums.square / sums.length;  // an edge of this length is left alone
   for (const Edge& e : topology.edges) {
     const T length = EdgeLength(p, e);
     if (!(length > T(0))) continue;
-    const T along = factor * (length - sums.square / sums.length) / length;
+    const T along = static_cast<T>(factor * (static_cast<double>(length) - balance)) / length;
     for (std::int32_t c = 0; c < 3; ++c) {
       const T d = along * (p[3 * e.b + c] - p[3 * e.a + c]);
       d_p[3 * e.b + c] += d, d_p[3 * e.a + c] -= d;

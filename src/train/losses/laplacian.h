@@ -12,10 +12,10 @@
 namespace tilegrad::train {
 
 // One mesh: m [V,3]. residual [V,3] is filled with L m, with (L m)_i = mean_{j in N(i)} m_j - m_i;
-// a vertex without neighbours has 0. Returns the sum of squares.
+// a vertex without neighbours has 0. Returns the sum of squares, taken in double.
 template <class T>
-T LaplacianForward(const Topology& topology, std::span<const T> m, std::span<T> residual) {
-  T sum = 0;
+double LaplacianForward(const Topology& topology, std::span<const T> m, std::span<T> residual) {
+  double sum = 0;
   for (std::size_t v = 0; v + 1 < topology.offsets.size(); ++v) {
     const std::int32_t begin = topology.offsets[v], end = topology.offsets[v + 1];
     for (std::size_t c = 0; c < 3; ++c) {
@@ -23,7 +23,7 @@ T LaplacianForward(const Topology& topology, std::span<const T> m, std::span<T> 
       for (std::int32_t n = begin; n < end; ++n) mean += m[3 * topology.neighbors[n] + c];
       const T r = end > begin ? mean / T(end - begin) - m[3 * v + c] : T(0);
       residual[3 * v + c] = r;
-      sum += r * r;
+      sum += static_cast<double>(r) * static_cast<double>(r);
     }
   }
   return sum;

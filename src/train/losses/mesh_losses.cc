@@ -33,9 +33,9 @@ nn::Var MeshLoss(const char* name, const nn::Var& x, PerMesh per_mesh) {
 
 nn::Var LaplacianLoss(const nn::Var& movement, const Topology& topology) {
   return MeshLoss("laplacian loss", movement,
-                  [&]<class T>(std::span<const T> m, T scale, std::span<T> d) -> double {
+                  [&]<class T>(std::span<const T> m, T scale, std::span<T> d) {
                     std::vector<T> residual(m.size());
-                    const T loss = LaplacianForward<T>(topology, m, residual);
+                    const double loss = LaplacianForward<T>(topology, m, residual);
                     LaplacianBackward<T>(topology, residual, scale, d);
                     return loss;
                   });
@@ -44,9 +44,9 @@ nn::Var LaplacianLoss(const nn::Var& movement, const Topology& topology) {
 nn::Var SmoothnessLoss(const nn::Var& positions, std::span<const Face> faces,
                        const Topology& topology) {
   return MeshLoss("smoothness loss", positions,
-                  [&]<class T>(std::span<const T> p, T scale, std::span<T> d) -> double {
+                  [&]<class T>(std::span<const T> p, T scale, std::span<T> d) {
                     std::vector<FaceNormal<T>> normals;
-                    const T loss = SmoothnessForward<T>(topology, faces, p, normals);
+                    const double loss = SmoothnessForward<T>(topology, faces, p, normals);
                     SmoothnessBackward<T>(topology, faces, p, normals, scale, d);
                     return loss;
                   });

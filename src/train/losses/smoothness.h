@@ -49,17 +49,17 @@ FaceNormal<T> NormalOf(std::span<const T> p, const Face& face) {
   return {{n[0] * inverse, n[1] * inverse, n[2] * inverse}, inverse};
 }
 
-// Of one mesh: p [V,3]; normals [F] are filled.
+// Of one mesh: p [V,3]; normals [F] are filled. The sum is taken in double.
 template <class T>
-T SmoothnessForward(const Topology& topology, std::span<const Face> faces, std::span<const T> p,
-                    std::vector<FaceNormal<T>>& normals) {
+double SmoothnessForward(const Topology& topology, std::span<const Face> faces,
+                         std::span<const T> p, std::vector<FaceNormal<T>>& normals) {
   normals.resize(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f) normals[f] = NormalOf(p, faces[f]);
-  T sum = 0;
+  double sum = 0;
   for (const Edge& e : topology.edges) {
     if (e.face1 < 0 || normals[e.face0].inverse_length == 0 || normals[e.face1].inverse_length == 0)
       continue;
-    const T gap = Dot(normals[e.face0].unit, normals[e.face1].unit) - 1;
+    const auto gap = static_cast<double>(Dot(normals[e.face0].unit, normals[e.face1].unit) - 1);
     sum += gap * gap;
   }
   return sum;
@@ -83,7 +83,8 @@ void NormalBackward(std::span<const T> p, const Face& face, const FaceNormal<T>&
   }
 }
 
-// d_p += `scale` times the gradient; `normals` as SmoothnessForward filled it. `scratch` is overwritten.
+// d_p += `scale` times the gradient; `normals` as SmoothnessForward filled it. `scratch` is
+// overwritten.
 template <class T>
 void AddSmoothnessGradient(const Topology& topology, std::span<const Face> faces,
                            std::span<const T> p, const std::vector<FaceNormal<T>>& normals, T scale,
