@@ -147,9 +147,11 @@ def endless(loader: torch.utils.data.DataLoader) -> Iterator[Item]:
 
 def train(model: MeshPredictor, data: torch.utils.data.Dataset, steps: int, batch: int = 16,
           workers: int = 2) -> dict[str, list[float]]:
-    """Trains the model; the losses of every step by name."""
-    loader = torch.utils.data.DataLoader(data, batch, shuffle=True, num_workers=workers,
-                                         drop_last=True, persistent_workers=workers > 0)
+    """Trains the model on batches of `batch` objects, or of all if there are fewer; the losses of
+    every step by name."""
+    loader = torch.utils.data.DataLoader(data, min(batch, len(data)), shuffle=True,
+                                         num_workers=workers, drop_last=True,
+                                         persistent_workers=workers > 0)
     optimizer = torch.optim.Adam(model.parameters())
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, max_lr=5e-3, total_steps=steps)
     curves: dict[str, list[float]] = {"image": [], "silhouette": []}

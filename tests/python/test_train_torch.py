@@ -61,6 +61,13 @@ class TrainTorch(FolderTest):
         self.assertTrue(all(np.isfinite(values).all() for values in curves.values()))
         self.assertTrue(torch.isfinite(after.mask))
 
+    def test_fewer_objects_than_a_batch(self):
+        """Full batches only would be none, and their loop would have no end."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            curves = train_torch.train(train_torch.MeshPredictor(),
+                                       train_torch.Ellipsoids(3, seed=6), steps=2, workers=0)
+        self.assertEqual(len(curves["image"]), 2)
+
 
 @needs_torch
 @long_test
