@@ -37,13 +37,17 @@ std::string FateOf(TrainConfig config) {
   return WriteConfig(config);
 }
 
+// A line of a configuration without its comment.
+std::string WithoutComment(const std::string& line) {
+  const std::string setting = line.substr(0, line.find("  #"));
+  return setting.substr(0, setting.find_last_not_of(' ') + 1);
+}
+
 // The first line in which two texts differ.
 std::string FirstDifference(const std::string& a, const std::string& b) {
   std::istringstream left(a), right(b);
   for (std::string l, r; std::getline(left, l) && std::getline(right, r);) {
-    if (l != r)
-      return fmt::format("\"{}\" against \"{}\"", l.substr(0, l.find("  #")),
-                         r.substr(0, r.find("  #")));
+    if (l != r) return fmt::format("\"{}\" against \"{}\"", WithoutComment(l), WithoutComment(r));
   }
   return "length";
 }

@@ -128,7 +128,9 @@ TEST_F(TrainerTest, RefusesAnotherConfiguration) {
   StopAfter(2);
   job_.existing = ExistingRun::kContinue;
   job_.config.optimizer.learning_rate *= 2;
-  ExpectMessage(Run().status(), "learning_rate", "another configuration");
+  const Status refusal = Run().status();
+  ExpectMessage(refusal, "learning_rate", "another configuration");
+  EXPECT_EQ(refusal.message().find("  "), std::string::npos) << refusal.message();
   EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 2);
 }
 
