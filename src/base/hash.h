@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A checksum of bytes, the same on every machine of one byte order. No defence against forgery.
+// Eight bytes at a time: a checkpoint has hundreds of megabytes. HashText (train/data/split.h)
+// stays as it is, since the split of every dataset follows from its values.
 #pragma once
 
 #include <fmt/format.h>

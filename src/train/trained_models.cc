@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "base/error.h"
+#include "train/first_difference.h"
 
 namespace tilegrad::train {
 namespace {
@@ -21,19 +22,6 @@ std::string TextOf(const Dataset& dataset) {
   std::string text = fmt::format("recipe {}\n", dataset.info().recipe);
   for (const int model : dataset.Select(Split::kTrain)) text += LineOf(dataset, model) + "\n";
   return text;
-}
-
-// The first lines in which two texts differ.
-std::string FirstDifference(const std::string& then, const std::string& now) {
-  std::istringstream left(then), right(now);
-  const auto next = [](std::istringstream& lines) {
-    std::string line;
-    return std::getline(lines, line) ? fmt::format("\"{}\"", line) : std::string("none");
-  };
-  std::string l, r;
-  do l = next(left), r = next(right);
-  while (l == r && l != "none");
-  return fmt::format("{} then, {} now", l, r);
 }
 
 }  // namespace

@@ -2,9 +2,8 @@
 // Which models a run was trained on, in its folder: a dataset can be split anew or made again under
 // the same name, and then neither goes a run on with it, nor are its test models held out.
 //
-//   <run>/training_models.txt    "recipe <hex>", then "<geometry> <class>/<id>" a line, in the
-//   order
-//                                of training
+//   <run>/training_models.txt    a line "recipe <hex>", then one "<geometry> <class>/<id>" for each
+//                                model, as the dataset lists them
 #pragma once
 
 #include "base/file.h"

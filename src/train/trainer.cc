@@ -3,12 +3,14 @@
 
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "base/error.h"
 #include "base/folder_lock.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
 #include "train/checkpoint.h"
+#include "train/first_difference.h"
 #include "train/machine.h"
 #include "train/run_log.h"
 #include "train/sample_images.h"
@@ -37,19 +39,15 @@ std::string FateOf(TrainConfig config) {
   return WriteConfig(config);
 }
 
-// A line of a configuration without its comment.
-std::string WithoutComment(const std::string& line) {
-  const std::string setting = line.substr(0, line.find("  #"));
-  return setting.substr(0, setting.find_last_not_of(' ') + 1);
-}
-
-// The first line in which two texts differ.
-std::string FirstDifference(const std::string& a, const std::string& b) {
-  std::istringstream left(a), right(b);
-  for (std::string l, r; std::getline(left, l) && std::getline(right, r);) {
-    if (l != r) return fmt::format("\"{}\" against \"{}\"", WithoutComment(l), WithoutComment(r));
+// The settings of a configuration without the comments beside them.
+std::string WithoutComments(const std::string& text) {
+  std::string out;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const std::string setting = line.substr(0, line.find("  #"));
+    out += setting.substr(0, setting.find_last_not_of(' ') + 1) + "\n";
   }
-  return "length";
+  return out;
 }
 
 class Run {
@@ -103,7 +101,7 @@ Status CheckSame(const TrainConfig& before, const TrainConfig& config, const Pat
   return InvalidArgument(
       "{}: this run was started with another configuration: {}; resume with the same, or give "
       "another --out",
-      place.string(), FirstDifference(then, now));
+      place.string(), FirstDifference(WithoutComments(then), WithoutComments(now)));
 }
 
 Status Run::CheckExisting() const {

@@ -361,92 +361,93 @@ TEST(ShadedErrors, ScenesOfABatchMustAgree) {
   EXPECT_NE(status.message().find("scene 1"), std::string::npos) << status.message();
 }
 
-TEST(ShadedErrors, CotangentsAreChecked) {
-  OwnedScene<float> scene = Sphere(Lighting::kPhong);
-  const ShadedScene view = scene.View();
-  const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
-  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), {}, &frame).ok());
-  OwnedGradients<float> gradients(scene);
+// A sphere under Phong's light, and the frame of what is asked of it.
+class ShadedErrorsOfPhong : public ::testing::Test {
+ protected:
+  Status Render(const ShadedScene& view, const ShadedRequest& request = {}) {
+    return renderer_.Render({&view, 1}, Options(), request, &frame_);
+  }
+  Status Backward(const ShadedScene& view, const ShadedFrameGradients& d_frame,
+                  ShadedGradients* d_scene) {
+    return renderer_.Backward({&view, 1}, Options(), frame_, d_frame, {d_scene, 1});
+  }
+
+  OwnedScene<float> scene_ = Sphere(Lighting::kPhong);
+  const Workers workers_ = Workers(1);
+  ShadedRenderer renderer_ = ShadedRenderer(workers_);
+  ShadedFrame frame_;
+};
+
+TEST_F(ShadedErrorsOfPhong, CotangentsAreChecked) {
+  const ShadedScene view = scene_.View();
+  ASSERT_TRUE(Render(view).ok());
+  OwnedGradients<float> gradients(scene_);
   ShadedGradients d_scene = gradients.View();
   std::vector<float> d_color(3 * kPixels, 1.0f);
   d_color[70] = NAN;
   ShadedFrameGradients d_frame;
   d_frame.color = d_color;
-  Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  Status status = Backward(view, d_frame, &d_scene);
   EXPECT_NE(status.message().find("d_frame.color[70]"), std::string::npos) << status.message();
   d_frame.color = std::span(d_color).first(5);
-  status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  status = Backward(view, d_frame, &d_scene);
   EXPECT_NE(status.message().find("d_frame.color has 5"), std::string::npos) << status.message();
 }
 
 // The depth of background pixels is infinite, and what a loss makes of that is often NaN.
-TEST(ShadedErrors, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
-  OwnedScene<float> scene = Sphere(Lighting::kPhong);
-  const ShadedScene view = scene.View();
-  const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
+TEST_F(ShadedErrorsOfPhong, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
+  const ShadedScene view = scene_.View();
   ShadedRequest request;
   request.depth = true;
-  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), request, &frame).ok());
+  ASSERT_TRUE(Render(view, request).ok());
   std::vector<float> nan(kPixels, NAN), zero(kPixels, 0.0f);
   std::size_t seen = kPixels;
   for (std::size_t i = 0; i < kPixels; ++i) {
-    if (frame.face_ids[i] < 0) continue;
+    if (frame_.face_ids[i] < 0) continue;
     nan[i] = zero[i] = 0.25f;
     seen = i;
   }
   ASSERT_LT(seen, kPixels);
-  OwnedGradients<float> gradients(scene), expected(scene);
+  OwnedGradients<float> gradients(scene_), expected(scene_);
   ShadedGradients d_scene = gradients.View(), d_expected = expected.View();
   ShadedFrameGradients d_frame;
   d_frame.depth = zero;
-  ASSERT_TRUE(renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_expected, 1}).ok());
+  ASSERT_TRUE(Backward(view, d_frame, &d_expected).ok());
   d_frame.depth = nan;
-  Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  Status status = Backward(view, d_frame, &d_scene);
   ASSERT_TRUE(status.ok()) << status.message();
   EXPECT_TRUE(
       std::equal(d_scene.positions.begin(), d_scene.positions.end(), d_expected.positions.begin()));
   nan[seen] = INFINITY;
-  status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  status = Backward(view, d_frame, &d_scene);
   EXPECT_EQ(status.message(), "d_frame.depth[" + std::to_string(seen) + "] is inf");
 }
 
 // White has no gradient, but its cotangent is an error as any other.
-TEST(ShadedErrors, CotangentsThatPullNothingAreChecked) {
-  OwnedScene<float> scene = Sphere(Lighting::kPhong);
+TEST_F(ShadedErrorsOfPhong, CotangentsThatPullNothingAreChecked) {
   ShadedScene view;
-  view.positions = scene.mesh.positions, view.faces = scene.mesh.faces;
-  view.camera = scene.mesh.camera;
-  const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
-  ASSERT_TRUE(renderer.Render({&view, 1}, Options(), {}, &frame).ok());
+  view.positions = scene_.mesh.positions, view.faces = scene_.mesh.faces;
+  view.camera = scene_.mesh.camera;
+  ASSERT_TRUE(Render(view).ok());
   std::vector<float> d_color(3 * kPixels, 1.0f), d_positions(view.positions.size());
   d_color[70] = NAN;
   ShadedFrameGradients d_frame;
   d_frame.color = d_color;
   ShadedGradients d_scene;
   d_scene.positions = d_positions;
-  const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+  const Status status = Backward(view, d_frame, &d_scene);
   EXPECT_EQ(status.message(), "d_frame.color[70] is nan");
 }
 
 // Numbers that nobody asked for are looked at, too.
-TEST(ShadedErrors, AttributesAreCheckedWhateverIsWanted) {
-  OwnedScene<float> scene = Sphere(Lighting::kPhong);
-  ShadedScene view = scene.View();
+TEST_F(ShadedErrorsOfPhong, AttributesAreCheckedWhateverIsWanted) {
+  ShadedScene view = scene_.View();
   std::vector<float> attributes(view.positions.size() / 3, 0.5f);
   attributes[2] = NAN;
   view.attributes = attributes, view.channels = 1, view.rate = AttributeRate::kVertex;
-  const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
   ShadedRequest request;
   request.attributes = false;
-  const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
+  const Status status = Render(view, request);
   EXPECT_EQ(status.message(), "scene 0: attributes[2] is nan");
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "base/error.h"
 #include "base/rng.h"
@@ -69,17 +68,6 @@ std::string DescribeConfig(const FitConfig& c) {
   line("edge_length", c.regularizers.edge_length);
   line("perturb_cameras", c.perturb_cameras);
   return out;
-}
-
-std::string FirstDifference(const std::string& was, const std::string& is) {
-  std::istringstream old_lines(was), new_lines(is);
-  std::string a, b;
-  while (true) {
-    const bool more_a = static_cast<bool>(std::getline(old_lines, a));
-    const bool more_b = static_cast<bool>(std::getline(new_lines, b));
-    if (!more_a && !more_b) return "";
-    if (more_a != more_b || a != b) return fmt::format("was \"{}\", is \"{}\"", a, b);
-  }
 }
 
 FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size) {

@@ -43,8 +43,6 @@ struct FitConfig {
 // One line "key = value" for each that shapes the result; two runs with the same lines and input
 // do the same.
 std::string DescribeConfig(const FitConfig& config);
-// The first line in which two such texts differ, as a sentence; "" if they are equal.
-std::string FirstDifference(const std::string& was, const std::string& is);
 
 // The state of the schedules at a step.
 struct FitSchedule {

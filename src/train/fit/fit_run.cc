@@ -14,6 +14,7 @@
 #include "nn/context.h"
 #include "train/checkpoint.h"
 #include "train/data/dataset.h"
+#include "train/first_difference.h"
 #include "train/fit/fit_pictures.h"
 #include "train/fit/transforms.h"
 #include "train/metrics.h"

@@ -17,7 +17,7 @@ from tilegrad.compat.nvdiffrast import _inputs
 from tilegrad.compat.nvdiffrast._context import RasterizeCpuContext
 
 Images = tuple  # of two tensors
-_MOST_PIXELS = 16384  # in a row or a column
+_MOST_PIXELS = 16384  # in a row or a column: kMaxImageSize of src/raster/conventions.h
 
 
 class _Call(NamedTuple):
