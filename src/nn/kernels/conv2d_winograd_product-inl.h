@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The products of conv2d_winograd.h, one for each slot, and the weights' side of it.
+// The products of conv2d_winograd.h, one for each slot, and the way back to a weight's gradient.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
@@ -15,6 +15,8 @@
 
 #include "base/parallel.h"
 #include "nn/kernels/conv2d_winograd_tiles-inl.h"
+#include "nn/kernels/conv2d_winograd_weights-inl.h"
+#include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
@@ -22,117 +24,6 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half of L1
 constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
 constexpr std::size_t kSlotColumnPanels = 16;  // in one work item: 256 tiles
-constexpr std::size_t kRowVectors = DivideUp(kTileRows, kLanes);
-
-// ---- Weights as the row factor: [slot][group][panel][k][rows of the panel]
-// -------------------------
-
-// Taps of one phase of `rows` kernels, transformed: row r to lane r of out(slot).
-template <std::size_t Ra, std::size_t Rb>
-struct TransformWeights {
-  // taps: [Ra * Rb][kRowVectors * kLanes]
-  template <class Out>
-  static HWY_INLINE void Run(const float* taps, const Out& out) {
-    for (std::size_t v = 0; v < kRowVectors; ++v) {
-      Square in, result;
-      for (std::size_t i = 0; i < Ra; ++i) {
-        for (std::size_t j = 0; j < Rb; ++j) {
-          in[i][j] = hn::LoadU(Tag(), taps + ((i * Rb + j) * kRowVectors + v) * kLanes);
-        }
-      }
-      Transform<WeightTransform<Ra>, WeightTransform<Rb>>(in, result);
-      for (std::size_t i = 0; i <= Ra; ++i) {
-        for (std::size_t j = 0; j <= Rb; ++j) {
-          hn::StoreU(result[i][j], Tag(), out.data[i][j] + v * kLanes);
-        }
-      }
-    }
-  }
-};
-
-struct SlotTargets {
-  float* data[4][4];
-};
-
-// The row factor of each slot's product: `rows` by `depth`, one of them the input's side. A group
-// of rows is a phase where the input's side is the rows.
-struct PackedWinogradWeights {
-  PackedWinogradWeights(const WinogradSide& rows_side, const WinogradSide& depth_side)
-      : plan(rows_side.plan),
-        rows(rows_side),
-        depth(depth_side),
-        panels(rows.channels(), kTileRows) {
-    std::size_t begin = 0;
-    for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
-      base[slot] = begin;
-      begin += panel_count(slot) * panel_size(slot);
-    }
-    total = begin;
-  }
-  std::size_t size() const { return total; }
-  std::size_t panel_count(std::size_t slot) const { return rows.groups(slot) * panels.count(); }
-  // A vector's store may run over the end of its row.
-  std::size_t panel_size(std::size_t slot) const {
-    return depth.size(slot) * kTileRows + kRowVectors * kLanes;
-  }
-  // Panel `index` of all groups: where it lies, its rows among those of the slot.
-  const float* Panel(const float* packed, std::size_t slot, std::size_t index) const {
-    return packed + base[slot] + index * panel_size(slot);
-  }
-  std::size_t RowBegin(std::size_t index) const {
-    return index / panels.count() * rows.channels() + panels.begin(index % panels.count());
-  }
-  std::size_t RowCount(std::size_t index) const { return panels.size(index % panels.count()); }
-
-  void Fill(const float* weight, float* packed, const Workers& workers) const {
-    workers.For(panels.count(), [&](std::size_t panel, std::size_t) {
-      for (std::size_t a = 0; a < plan.stride; ++a) {
-        for (std::size_t b = 0; b < plan.stride; ++b) FillPhase(weight, panel, a, b, packed);
-      }
-    });
-  }
-
-  const WinogradPlan& plan;
-  WinogradSide rows, depth;
-  Panels panels;  // of the channels of a group
-  std::array<std::size_t, kMaxSlots> base{};
-  std::size_t total = 0;
-
- private:
-  // In the order of k: what a store writes beyond its row, the next one overwrites.
-  void FillPhase(const float* weight, std::size_t panel, std::size_t a, std::size_t b,
-                 float* packed) const {
-    const std::size_t ra = plan.taps(a), rb = plan.taps(b), area = plan.kernel * plan.kernel;
-    const std::size_t filter = plan.s.in_channels * area;  // weights of one output channel
-    const std::size_t row_stride = rows.input ? area : filter;
-    const std::size_t k_stride = rows.input ? filter : area;
-    const std::size_t count = panels.size(panel);
-    SlotTargets to;
-    for (std::size_t i = 0; i <= ra; ++i) {
-      for (std::size_t j = 0; j <= rb; ++j) {
-        const std::size_t slot = i * plan.axis_slots + j;
-        const std::size_t phase = plan.phase_index(slot, a, b);
-        const std::size_t group = rows.input ? phase : 0;
-        const std::size_t k = rows.input ? 0 : phase * depth.channels();
-        to.data[i][j] =
-            packed + base[slot] + (group * panels.count() + panel) * panel_size(slot) + k * count;
-      }
-    }
-    float taps[9 * kRowVectors * kLanes] = {};
-    const float* first = weight + panels.begin(panel) * row_stride + a * plan.kernel + b;
-    for (std::size_t k = 0; k < depth.channels(); ++k, first += k_stride) {
-      for (std::size_t tap = 0; tap < ra * rb; ++tap) {
-        const float* from = first + (tap / rb * plan.kernel + tap % rb) * plan.stride;
-        float* lane = taps + tap * kRowVectors * kLanes;
-        for (std::size_t r = 0; r < count; ++r) lane[r] = from[r * row_stride];
-      }
-      ForTaps<TransformWeights>(ra, rb, taps, to);
-      for (std::size_t i = 0; i <= ra; ++i) {
-        for (std::size_t j = 0; j <= rb; ++j) to.data[i][j] += count;
-      }
-    }
-  }
-};
 
 // ---- Forward and input gradient: out[slot] = weights[slot] in[slot]
 // --------------------------------
@@ -174,14 +65,16 @@ inline void MultiplyItem(const SlotProduct& p, const SlotItem& item) {
   }
 }
 
-inline void MultiplySlots(const SlotProduct& p, const Workers& workers) {
+// loops: as in conv2d_winograd_portions-inl.h.
+template <class Loops>
+void MultiplySlots(const SlotProduct& p, const Loops& loops) {
   const WinogradPlan& plan = p.weights.plan;
   std::size_t most = 0;
   for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
     most = std::max(most, DivideUp(p.weights.panel_count(slot), kSlotRowPanels));
   }
   const Panels columns(p.rows.padded / kTileColumns, kSlotColumnPanels);
-  workers.For(plan.slots() * most * columns.count(), [&](std::size_t index, std::size_t) {
+  loops.For(plan.slots() * most * columns.count(), [&](std::size_t index, std::size_t) {
     const std::size_t slot = index / (most * columns.count());
     const std::size_t block = index / columns.count() % most, column = index % columns.count();
     const Panels blocks(p.weights.panel_count(slot), kSlotRowPanels);
@@ -327,7 +220,7 @@ inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t pan
       sums[a * plan.stride + b] = SumsOfPhase(product, panel, a, b);
     }
   }
-  float taps[25 * kTileColumns];
+  float taps[kMostTaps * kTileColumns];
   for (std::size_t c = 0; c < in_channels; ++c) {
     for (std::size_t a = 0; a < plan.stride; ++a) {
       for (std::size_t b = 0; b < plan.stride; ++b) {
@@ -335,10 +228,8 @@ inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t pan
                                       plan, taps + (a * plan.kernel + b) * kTileColumns);
       }
     }
-    for (std::size_t o = 0; o < channels; ++o) {
-      float* to = d_weight + ((first + o) * in_channels + c) * area;
-      for (std::size_t tap = 0; tap < area; ++tap) to[tap] = taps[tap * kTileColumns + o];
-    }
+    TransposeStrip(taps, kTileColumns, area, channels, d_weight + (first * in_channels + c) * area,
+                   in_channels * area);
   }
 }
 

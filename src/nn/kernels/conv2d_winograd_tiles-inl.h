@@ -16,7 +16,9 @@
 #include <array>
 #include <cstddef>
 
+#include "nn/kernels/conv2d_winograd_rows-inl.h"
 #include "nn/kernels/conv2d_winograd_transform-inl.h"
+#include "nn/kernels/pack-inl.h"
 #include "nn/kernels/winograd_plan.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -63,21 +65,35 @@ inline std::size_t SlotLayoutSize(const WinogradSide& side, const TileRows& rows
 // ---- Inputs: tiles of span x span at distance `step`
 // -----------------------------------------
 
-// Memory of one worker: [span * span][pitch] for the places of a tile, and one padded image row.
+// Memory of one worker: [span * span][pitch] for the places of a tile, and the image rows that a
+// tile sees, padded.
 inline std::size_t PlacesSize(const WinogradPlan& plan, const TileRows& rows) {
   return plan.span * plan.span * rows.pitch;
 }
-inline std::size_t PaddedRowSize(const WinogradPlan& plan) {
-  return RoundUp(plan.step * plan.tiles_across + plan.span, kTileColumns);
+inline std::size_t PaddedPitch(const WinogradPlan& plan) {
+  return RoundUp(plan.step * (plan.tiles_across + kLanes) + plan.span, kTileColumns);
+}
+inline std::size_t PaddedRowsSize(const WinogradPlan& plan) {
+  return plan.span * PaddedPitch(plan);
 }
 
-// places[j][t] = padded[t step + j]
-template <std::size_t kSpan, std::size_t kStep>
-HWY_INLINE void DealRow(const float* padded, std::size_t tiles, std::size_t pitch, float* places) {
-  for (std::size_t t = 0; t < tiles; ++t, padded += kStep) {
-    for (std::size_t j = 0; j < kSpan; ++j) places[j * pitch + t] = padded[j];
+// Those of the image rows that a row of tiles sees that are in the image: row i is `first` + i.
+struct SeenRows {
+  SeenRows(const WinogradPlan& plan, const TileRow& row)
+      : first(static_cast<std::ptrdiff_t>(row.down * plan.step) -
+              static_cast<std::ptrdiff_t>(plan.s.padding)),
+        begin(static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, -first))),
+        end(static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
+            static_cast<std::ptrdiff_t>(plan.s.in_height) - first,
+            static_cast<std::ptrdiff_t>(begin), static_cast<std::ptrdiff_t>(plan.span)))) {}
+  bool Has(std::size_t i) const { return i >= begin && i < end; }
+  // Row i, begin <= i < end.
+  std::size_t operator[](std::size_t i) const {
+    return static_cast<std::size_t>(first + static_cast<std::ptrdiff_t>(i));
   }
-}
+  std::ptrdiff_t first;
+  std::size_t begin, end;
+};
 
 inline void DealRow(const WinogradPlan& plan, const float* padded, std::size_t pitch,
                     float* places) {
@@ -87,28 +103,44 @@ inline void DealRow(const WinogradPlan& plan, const float* padded, std::size_t p
   DealRow<7, 4>(padded, tiles, pitch, places);
 }
 
-// All places of channel c of the input.
+// Asks for what row `index` of tiles sees first of channel c.
+inline void PrefetchRows(const WinogradPlan& plan, std::size_t index, const float* x,
+                         std::size_t c) {
+  const Conv2dShape& s = plan.s;
+  const TileRow row(plan, std::min(index, plan.tile_rows() - 1));
+  const float* first =
+      x + (row.image * s.in_channels + c) * s.in_pixels() + row.down * plan.step * s.in_width;
+  const std::size_t count = std::min(plan.step, s.in_height - row.down * plan.step) * s.in_width;
+  for (std::size_t i = 0; i < count; i += kLineFloats) PrefetchLine(first + i);
+}
+
+// All places of channel c of the input. What a row writes beyond its tiles, the next one
+// overwrites.
 inline void GatherInput(const WinogradPlan& plan, const TileRows& rows, const float* x,
                         std::size_t c, float* places, float* padded) {
   const Conv2dShape& s = plan.s;
-  std::fill_n(padded, PaddedRowSize(plan), 0.0f);
+  const std::size_t pitch = PaddedPitch(plan);
+  std::fill_n(padded, PaddedRowsSize(plan), 0.0f);
   // What a tile sees of a row: not more than the row, not more than the padded one has.
   const std::size_t seen =
       std::min(s.in_width, plan.step * (plan.tiles_across - 1) + plan.span - s.padding);
   for (std::size_t r = 0; r < rows.count; ++r) {
     const TileRow row(plan, rows.first + r);
+    const SeenRows in_image(plan, row);
     const float* channel = x + (row.image * s.in_channels + c) * s.in_pixels();
+    PrefetchRows(plan, rows.first + r + 2, x, c);
+    // All rows before any is dealt: loads do not wait for what was just stored.
+    CopyStrip(channel + in_image[in_image.begin] * s.in_width, s.in_width, seen,
+              in_image.end - in_image.begin, padded + in_image.begin * pitch + s.padding, pitch);
     for (std::size_t i = 0; i < plan.span; ++i) {
       float* to = places + i * plan.span * rows.pitch + r * plan.tiles_across;
-      const std::size_t h = row.down * plan.step + i - s.padding;  // wraps above the image
-      if (h >= s.in_height) {
+      if (in_image.Has(i)) {
+        DealRow(plan, padded + i * pitch, rows.pitch, to);
+      } else {
         for (std::size_t j = 0; j < plan.span; ++j) {
           std::fill_n(to + j * rows.pitch, plan.tiles_across, 0.0f);
         }
-        continue;
       }
-      std::copy_n(channel + h * s.in_width, seen, padded + s.padding);
-      DealRow(plan, padded, rows.pitch, to);
     }
   }
   for (std::size_t place = 0; place < plan.span * plan.span; ++place) {
@@ -158,7 +190,10 @@ struct TransformPhase {
         float* to = values + v * kLanes;
         for (std::size_t i = 0; i <= Ra; ++i) {
           for (std::size_t j = 0; j <= Rb; ++j) {
-            hn::StoreU(out[i][j], Tag(), to + at.slot[i][j] + panel * at.slot_step[i][j]);
+            float* slot = to + at.slot[i][j] + panel * at.slot_step[i][j];
+            hn::StoreU(out[i][j], Tag(), slot);
+            // Of the next channel, or of the next panel.
+            if (v * kLanes % kLineFloats == 0) PrefetchLineToWrite(slot + kTileColumns);
           }
         }
       }
@@ -199,18 +234,10 @@ HWY_INLINE void ForPhases(const ChannelPass& pass, const float* from, float* to)
   }
 }
 
-// One row of places of one row of tiles, summed where tiles overlap, as a padded image row.
 inline void SumRow(const WinogradPlan& plan, const float* places, std::size_t pitch,
                    float* padded) {
-  const std::size_t tiles = plan.tiles_across;
-  for (std::size_t j = 0; j < plan.step; ++j) {
-    const float* own = places + j * pitch;
-    for (std::size_t t = 0; t < tiles; ++t) padded[t * plan.step + j] = own[t];
-    padded[tiles * plan.step + j] = 0.0f;
-    if (j >= plan.overlap) continue;
-    const float* left = own + plan.step * pitch;  // what the tile to the left adds
-    for (std::size_t t = 0; t < tiles; ++t) padded[(t + 1) * plan.step + j] += left[t];
-  }
+  const RowOfTiles row{plan.tiles_across, pitch, plan.overlap};
+  plan.step == 2 ? SumRow<2>(places, row, padded) : SumRow<4>(places, row, padded);
 }
 
 // Adds up the places of one channel of one row of tiles. Rows of the image that the tiles above
@@ -218,18 +245,21 @@ inline void SumRow(const WinogradPlan& plan, const float* places, std::size_t pi
 inline void ScatterTileRow(const WinogradPlan& plan, const TileRow& row, const float* places,
                            std::size_t pitch, float* channel, float* padded) {
   const Conv2dShape& s = plan.s;
+  const SeenRows in_image(plan, row);
+  const std::size_t padded_pitch = PaddedPitch(plan);
   const std::size_t width =
       std::min(s.in_width, plan.step * (plan.tiles_across + 1) - s.padding);  // of the padded row
-  for (std::size_t i = 0; i < plan.span; ++i) {
-    const std::size_t h = row.down * plan.step + i - s.padding;  // wraps above the image
-    if (h >= s.in_height) continue;
-    float* out = channel + h * s.in_width;
-    SumRow(plan, places + i * plan.span * pitch, pitch, padded);
-    const float* sums = padded + s.padding;
+  // All rows before any goes to the image: loads do not wait for what was just stored.
+  for (std::size_t i = in_image.begin; i < in_image.end; ++i) {
+    SumRow(plan, places + i * plan.span * pitch, pitch, padded + i * padded_pitch);
+  }
+  for (std::size_t i = in_image.begin; i < in_image.end; ++i) {
+    float* out = channel + in_image[i] * s.in_width;
+    const float* sums = padded + i * padded_pitch + s.padding;
     if (i < plan.overlap && row.down > 0) {
       for (std::size_t w = 0; w < width; ++w) out[w] += sums[w];
     } else {
-      std::copy_n(sums, width, out);
+      CopyStrip(sums, 0, width, 1, out, 0);
       std::fill(out + width, out + s.in_width, 0.0f);
     }
   }
@@ -265,10 +295,7 @@ inline void GatherOutputGrad(const WinogradPlan& plan, const TileRows& rows, con
                           (2 * row.down + i) * s.out_width();
       float* even = quads + 2 * i * rows.pitch + r * plan.tiles_across;
       float* odd = even + rows.pitch;
-      for (std::size_t t = 0; t < s.out_width() / 2; ++t) {
-        even[t] = from[2 * t];
-        odd[t] = from[2 * t + 1];
-      }
+      SplitPairs(from, s.out_width() / 2, even, odd);
       if (s.out_width() % 2 == 1) even[s.out_width() / 2] = from[s.out_width() - 1];
     }
   }
@@ -284,10 +311,7 @@ inline void ScatterOutput(const WinogradPlan& plan, const TileRows& rows, const 
                   (2 * row.down + i) * s.out_width();
       const float* even = quads + 2 * i * rows.pitch + r * plan.tiles_across;
       const float* odd = even + rows.pitch;
-      for (std::size_t t = 0; t < s.out_width() / 2; ++t) {
-        to[2 * t] = even[t];
-        to[2 * t + 1] = odd[t];
-      }
+      JoinPairs(even, odd, s.out_width() / 2, to);
       if (s.out_width() % 2 == 1) to[s.out_width() - 1] = even[s.out_width() / 2];
     }
   }
@@ -319,8 +343,9 @@ HWY_INLINE void TransformOutputGrad(const TileRows& rows, const SlotLayout& layo
     }
     Transform<OutputAdjoint<kSlots>, OutputAdjoint<kSlots>>(in, out);
     for (std::size_t slot = 0; slot < kSlots * kSlots; ++slot) {
-      hn::StoreU(out[slot / kSlots][slot % kSlots], Tag(),
-                 values + layout.At(slot, o, t / kTileColumns) + t % kTileColumns);
+      float* to = values + layout.At(slot, o, t / kTileColumns) + t % kTileColumns;
+      hn::StoreU(out[slot / kSlots][slot % kSlots], Tag(), to);
+      PrefetchLineToWrite(to + kTileColumns);  // where the next channel's will lie
     }
   }
 }
@@ -338,13 +363,11 @@ inline void GatherChannels(const WinogradPlan& plan, const TileRow& row, const f
   const Conv2dShape& s = plan.s;
   const std::size_t width = 2 * plan.tiles_across;
   std::fill_n(quads, TileRowQuadsSize(plan), 0.0f);
-  for (std::size_t lane = 0; lane < std::min(kTileColumns, s.out_channels - o); ++lane) {
-    for (std::size_t i = 0; i < std::min<std::size_t>(2, s.out_height() - 2 * row.down); ++i) {
-      const float* from = d_y + (row.image * s.out_channels + o + lane) * s.out_pixels() +
-                          (2 * row.down + i) * s.out_width();
-      float* to = quads + i * width * kTileColumns + lane;
-      for (std::size_t x = 0; x < s.out_width(); ++x) to[x * kTileColumns] = from[x];
-    }
+  const float* from = d_y + (row.image * s.out_channels + o) * s.out_pixels();
+  for (std::size_t i = 0; i < std::min<std::size_t>(2, s.out_height() - 2 * row.down); ++i) {
+    TransposeStrip(from + (2 * row.down + i) * s.out_width(), s.out_pixels(),
+                   std::min(kTileColumns, s.out_channels - o), s.out_width(),
+                   quads + i * width * kTileColumns, kTileColumns);
   }
 }
 

@@ -19,6 +19,13 @@ class Panels {
         small_(count_ == 0 ? 0 : total / count_),
         large_count_(count_ == 0 ? 0 : total % count_) {}
 
+  // The same as `count` parts, 0 < count <= total.
+  static Panels Parts(std::size_t total, std::size_t count) {
+    Panels parts(total, total);
+    parts.count_ = count, parts.small_ = total / count, parts.large_count_ = total % count;
+    return parts;
+  }
+
   std::size_t count() const { return count_; }
   std::size_t begin(std::size_t panel) const {
     return panel * small_ + std::min(panel, large_count_);

@@ -81,6 +81,24 @@ TEST(Conv2dWinograd, AgreesWithDirectWhereTilesComeInPortions) {
   EXPECT_EQ(RunConv2d(s, o, {.workers = 2, .winograd = true}), fast);
 }
 
+// Enough tiles for portions of one worker's own: several for one and for two workers, while seven
+// share one. Of the input gradient portions are whole images, of which there are 61.
+TEST(Conv2dWinograd, AgreesWithDirectWhereWorkersHavePortionsOfTheirOwn) {
+  for (const Conv2dShape& s :
+       {Conv2dShape{61, 64, 16, 15, 50, 4, 4, 2, 1}, Conv2dShape{61, 40, 14, 15, 64, 3, 3, 1, 1}}) {
+    SCOPED_TRACE(Describe(s));
+    const Operands o = RandomOperands(s, 9);
+    const Results direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
+    const Bound bound(s, o);
+    ExpectWithin(fast.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
+    ExpectWithin(fast.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
+    ExpectWithin(fast.d_weight, ToDouble(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
+    for (const int workers : {2, 7}) {
+      EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), fast);
+    }
+  }
+}
+
 double RootMeanSquareError(const std::vector<float>& got, const std::vector<double>& want) {
   double sum = 0;
   for (std::size_t i = 0; i < got.size(); ++i) {
