@@ -38,13 +38,22 @@ struct GemmItems {
   std::size_t rows, columns;
 };
 
-inline GemmItems ItemsFor(std::size_t m, std::size_t n, std::size_t workers) {
-  constexpr std::size_t kLeastRows = 128;  // or packing B would weigh too much
+constexpr std::size_t kLeastRows = 128;  // of an item, or packing B would weigh too much
+
+// The fewest columns of an item. All rows of A pass by for each item: where they are few and B is
+// read row by row, as many columns as one block has, if there are some for each worker.
+inline std::size_t LeastColumns(const GemmProblem<float>& p, std::size_t workers) {
+  constexpr std::size_t kLeast = 4 * kTileColumns;
+  if (p.transpose_b || p.m > kLeastRows) return kLeast;
+  return std::max(kLeast, std::min(kBlockPanels * kTileColumns, p.n / workers));
+}
+
+inline GemmItems ItemsFor(const GemmProblem<float>& p, std::size_t workers) {
   const std::size_t wanted = workers > 1 ? 8 * workers : 1;
   const std::size_t columns =
-      RoundUp(std::max(DivideUp(n, wanted), 4 * kTileColumns), kTileColumns);
-  const std::size_t parts = DivideUp(wanted, DivideUp(n, columns));
-  return {std::clamp(DivideUp(m, parts), std::min(m, kLeastRows), kItemRows), columns};
+      RoundUp(std::max(DivideUp(p.n, wanted), LeastColumns(p, workers)), kTileColumns);
+  const std::size_t parts = DivideUp(wanted, DivideUp(p.n, columns));
+  return {std::clamp(DivideUp(p.m, parts), std::min(p.m, kLeastRows), kItemRows), columns};
 }
 
 struct GemmPlan {
@@ -226,7 +235,7 @@ inline void MultiplyItem(const GemmPlan& plan, std::size_t item, std::size_t dep
 
 inline void GemmTarget(const GemmProblem<float>& problem, const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
-  const GemmPlan plan(problem, ItemsFor(problem.m, problem.n, workers));
+  const GemmPlan plan(problem, ItemsFor(problem, workers));
   const std::size_t a_size = RoundUp(plan.packed_a_size(), kAlignment);
   float* packed_a = context.scratch.Floats(a_size + plan.worker_size() * workers);
   for (std::size_t pass = 0; pass < plan.passes.count(); ++pass) {
