@@ -108,9 +108,9 @@ inline void PrefetchRows(const WinogradPlan& plan, std::size_t index, const floa
                          std::size_t c) {
   const Conv2dShape& s = plan.s;
   const TileRow row(plan, std::min(index, plan.tile_rows() - 1));
-  const float* first =
-      x + (row.image * s.in_channels + c) * s.in_pixels() + row.down * plan.step * s.in_width;
-  const std::size_t count = std::min(plan.step, s.in_height - row.down * plan.step) * s.in_width;
+  const std::size_t top = std::min(row.down * plan.step, s.in_height);
+  const float* first = x + (row.image * s.in_channels + c) * s.in_pixels() + top * s.in_width;
+  const std::size_t count = std::min(plan.step, s.in_height - top) * s.in_width;
   for (std::size_t i = 0; i < count; i += kLineFloats) PrefetchLine(first + i);
 }
 

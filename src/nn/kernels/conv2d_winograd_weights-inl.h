@@ -23,10 +23,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kRowVectors = DivideUp(kTileRows, kLanes);
+constexpr std::size_t kRowLanes = RoundUp(kTileRows, kLanes);
 constexpr std::size_t kMostTaps = 25;
-
-constexpr std::size_t kRowLanes = kRowVectors * kLanes;
 
 struct SlotTargets {
   float* data[4][4];
