@@ -14,17 +14,10 @@ constexpr std::size_t RoundUp(std::size_t a, std::size_t b) { return DivideUp(a,
 // panels of at most 6 are 9 x 6 + 2 x 5, so that no panel is left nearly empty.
 class Panels {
  public:
-  Panels(std::size_t total, std::size_t limit)
-      : count_(DivideUp(total, limit)),
-        small_(count_ == 0 ? 0 : total / count_),
-        large_count_(count_ == 0 ? 0 : total % count_) {}
+  Panels(std::size_t total, std::size_t limit) : Panels(Count{DivideUp(total, limit)}, total) {}
 
   // The same as `count` parts, 0 < count <= total.
-  static Panels Parts(std::size_t total, std::size_t count) {
-    Panels parts(total, total);
-    parts.count_ = count, parts.small_ = total / count, parts.large_count_ = total % count;
-    return parts;
-  }
+  static Panels Parts(std::size_t total, std::size_t count) { return Panels(Count{count}, total); }
 
   std::size_t count() const { return count_; }
   std::size_t begin(std::size_t panel) const {
@@ -41,6 +34,14 @@ class Panels {
   std::size_t largest() const { return small_ + (large_count_ > 0 ? 1 : 0); }
 
  private:
+  struct Count {
+    std::size_t parts;
+  };
+  Panels(Count count, std::size_t total)
+      : count_(count.parts),
+        small_(count_ == 0 ? 0 : total / count_),
+        large_count_(count_ == 0 ? 0 : total % count_) {}
+
   std::size_t count_, small_, large_count_;
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 
 #include "nn/kernels/conv2d_test_util.h"
 
@@ -68,35 +69,30 @@ TEST(Conv2dWinograd, AgreesWithReference) {
   }
 }
 
-// More tiles than are transformed at a time, cut within an image. Both kernels are off by no more
-// than the bound.
-TEST(Conv2dWinograd, AgreesWithDirectWhereTilesComeInPortions) {
-  const Conv2dShape s{1, 16, 131, 140, 16, 3, 3, 1, 1};
-  const Operands o = RandomOperands(s, 7);
-  const Results direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
+// Both kernels are off by no more than the bound; any number of workers gives the same bits.
+void ExpectAgreesWithDirect(const Conv2dShape& s, std::uint64_t seed) {
+  SCOPED_TRACE(Describe(s));
+  const Operands o = RandomOperands(s, seed);
+  const Results direct = RunConv2d(s, o, {}), winograd = RunConv2d(s, o, {.winograd = true});
   const Bound bound(s, o);
-  ExpectWithin(fast.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
-  ExpectWithin(fast.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
-  ExpectWithin(fast.d_weight, ToDouble(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
-  EXPECT_EQ(RunConv2d(s, o, {.workers = 2, .winograd = true}), fast);
+  ExpectWithin(winograd.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
+  ExpectWithin(winograd.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
+  ExpectWithin(winograd.d_weight, ToDouble(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
+  for (const int workers : {2, 7}) {
+    EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), winograd);
+  }
+}
+
+// More tiles than are transformed at a time, cut within an image.
+TEST(Conv2dWinograd, AgreesWithDirectWhereTilesComeInPortions) {
+  ExpectAgreesWithDirect({1, 16, 131, 140, 16, 3, 3, 1, 1}, 7);
 }
 
 // Enough tiles for portions of one worker's own: several for one and for two workers, while seven
 // share one. Of the input gradient portions are whole images, of which there are 61.
 TEST(Conv2dWinograd, AgreesWithDirectWhereWorkersHavePortionsOfTheirOwn) {
-  for (const Conv2dShape& s :
-       {Conv2dShape{61, 64, 16, 15, 50, 4, 4, 2, 1}, Conv2dShape{61, 40, 14, 15, 64, 3, 3, 1, 1}}) {
-    SCOPED_TRACE(Describe(s));
-    const Operands o = RandomOperands(s, 9);
-    const Results direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
-    const Bound bound(s, o);
-    ExpectWithin(fast.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
-    ExpectWithin(fast.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
-    ExpectWithin(fast.d_weight, ToDouble(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
-    for (const int workers : {2, 7}) {
-      EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), fast);
-    }
-  }
+  ExpectAgreesWithDirect({61, 64, 16, 15, 50, 4, 4, 2, 1}, 9);
+  ExpectAgreesWithDirect({61, 40, 14, 15, 64, 3, 3, 1, 1}, 9);
 }
 
 double RootMeanSquareError(const std::vector<float>& got, const std::vector<double>& want) {
