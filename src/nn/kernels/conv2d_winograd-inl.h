@@ -26,36 +26,61 @@ inline void TransformInput(const WinogradPlan& plan, const TileRows& rows, const
   ForPhases<TransformPhase>({plan, rows, layout, c}, memory, values);
 }
 
-void WinogradForwardTarget(const Conv2dShape& s, const float* x, const float* weight,
-                           const float* bias, float* y, const KernelContext& context) {
-  const WinogradPlan plan(s);
+struct WinogradOperands {
+  const float *x, *weight, *bias;
+  WeightsOf weights_of;
+  float* y;
+};
+
+inline void Convolve(const WinogradPlan& plan, const WinogradOperands& operands,
+                     const KernelContext& context) {
   const Portions portions(plan, OwnPortions(plan, 1, context.workers));
-  const PackedWinogradWeights packed(portions.output, portions.input);
+  const PackedWinogradWeights packed(portions.output, portions.input, operands.weights_of);
   const WinogradMemory memory(portions, packed.size(), context);
-  packed.Fill(weight, memory.weights, context.workers);
+  packed.Fill(operands.weight, memory.weights, context.workers);
   ForPortions(portions, context.workers, [&](const TileRows& rows, const auto& loops) {
     const SlotLayout in = PanelLayout(portions.input, rows);
     const SlotLayout out = RowLayout(portions.output, rows);
     float *const inputs = memory.inputs(loops.owner), *const outputs = memory.outputs(loops.owner);
-    loops.For(s.in_channels, [&](std::size_t c, std::size_t worker) {
-      TransformInput(plan, rows, in, x, c, memory.places(worker), inputs);
+    loops.For(plan.s.in_channels, [&](std::size_t c, std::size_t worker) {
+      TransformInput(plan, rows, in, operands.x, c, memory.places(worker), inputs);
     });
     MultiplySlots({packed, memory.weights, in, inputs, out, outputs, rows}, loops);
-    loops.For(s.out_channels, [&](std::size_t o, std::size_t worker) {
+    loops.For(plan.s.out_channels, [&](std::size_t o, std::size_t worker) {
       float* quads = memory.places(worker);
-      const float offset = bias == nullptr ? 0.0f : bias[o];
+      const float offset = operands.bias == nullptr ? 0.0f : operands.bias[o];
       if (plan.axis_slots == 4) {
         TransformOutput<4>(rows, out, o, offset, outputs, quads);
       } else {
         TransformOutput<3>(rows, out, o, offset, outputs, quads);
       }
-      ScatterOutput(plan, rows, quads, o, y);
+      ScatterOutput(plan, rows, quads, o, operands.y);
     });
   });
 }
 
+void WinogradForwardTarget(const Conv2dShape& s, const float* x, const float* weight,
+                           const float* bias, float* y, const KernelContext& context) {
+  Convolve(WinogradPlan(s), {x, weight, bias, WeightsOf::kItself, y}, context);
+}
+
+// The convolution that leads from d_y to d_x, for a stride of 1: its tiles do not overlap, and
+// need not be whole images.
+inline Conv2dShape TransposeOf(const Conv2dShape& s) {
+  Conv2dShape t = s;
+  t.in_channels = s.out_channels, t.out_channels = s.in_channels;
+  t.in_height = s.out_height(), t.in_width = s.out_width();
+  t.padding = s.kernel_height - 1 - s.padding;
+  return t;
+}
+
 void WinogradInputGradTarget(const Conv2dShape& s, const float* d_y, const float* weight,
                              float* d_x, const KernelContext& context) {
+  if (s.stride == 1) {
+    Convolve(WinogradPlan(TransposeOf(s)), {d_y, weight, nullptr, WeightsOf::kTranspose, d_x},
+             context);
+    return;
+  }
   const WinogradPlan plan(s);
   // Rows of tiles of one image add to the same pixels.
   const Portions portions(plan, OwnPortions(plan, plan.tiles_down, context.workers));

@@ -8,8 +8,11 @@
 //   products, direct        36        64       100      to a tile of 2 x 2 outputs
 //   products, here          16        36        49
 //
-// The transforms hold 0, 1, -1 and 1/2 only, so that little accuracy is lost: the error is 0.7
-// to 2.2 times that of the direct kernels (tests/nn/kernels/conv2d_winograd_test.cc).
+// With a stride of 1 the input gradient is a convolution of the output's gradient by the kernel
+// turned by 180 degrees; with a stride of 2 it goes the way of the transposed transforms.
+//
+// The transforms hold 0, 1, -1 and 1/2 only, so that little accuracy is lost: the error is 0.6
+// to 2.4 times that of the direct kernels (tests/nn/kernels/conv2d_winograd_test.cc).
 #pragma once
 
 #include <cstddef>

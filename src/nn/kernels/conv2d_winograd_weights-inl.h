@@ -61,13 +61,19 @@ HWY_INLINE void ForSlots(std::size_t ra, std::size_t rb, const F& f) {
   }
 }
 
+// Whose weights a convolution is given: its own, [O,C,U,V], or those of the one that it is the
+// transpose of, [C,O,U,V] with kernels turned by 180 degrees.
+enum class WeightsOf { kItself, kTranspose };
+
 // The row factor of each slot's product: `rows` by `depth`, one of them the input's side. A group
 // of rows is a phase where the input's side is the rows.
 struct PackedWinogradWeights {
-  PackedWinogradWeights(const WinogradSide& rows_side, const WinogradSide& depth_side)
+  PackedWinogradWeights(const WinogradSide& rows_side, const WinogradSide& depth_side,
+                        WeightsOf weights_of = WeightsOf::kItself)
       : plan(rows_side.plan),
         rows(rows_side),
         depth(depth_side),
+        of(weights_of),
         panels(rows.channels(), kTileRows) {
     std::size_t begin = 0;
     for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
@@ -98,6 +104,7 @@ struct PackedWinogradWeights {
 
   const WinogradPlan& plan;
   WinogradSide rows, depth;
+  WeightsOf of;
   Panels panels;  // of the channels of a group
   std::array<std::size_t, kMaxSlots> base{};
   std::size_t total = 0;
@@ -120,9 +127,9 @@ struct PackedWinogradWeights {
   // numbers stored one by one waits for them.
   void FillPanel(const float* weight, std::size_t panel, float* packed) const {
     const std::size_t area = plan.kernel * plan.kernel;
-    const std::size_t filter = plan.s.in_channels * area;  // weights of one output channel
-    const std::size_t row_stride = rows.input ? area : filter;
-    const std::size_t k_stride = rows.input ? filter : area;
+    const bool by_rows = rows.input == (of == WeightsOf::kTranspose);  // else by steps
+    const std::size_t row_stride = by_rows ? depth.channels() * area : area;
+    const std::size_t k_stride = by_rows ? area : rows.channels() * area;
     const float* first = weight + panels.begin(panel) * row_stride;
     Taps taps[kStepsAtATime] = {};
     for (std::size_t k = 0; k < depth.channels(); k += kStepsAtATime) {
@@ -165,9 +172,15 @@ struct PackedWinogradWeights {
              [&](std::size_t i, std::size_t j) { std::copy_n(lanes[i][j], count, to.data[i][j]); });
   }
 
+  // Where taps in reverse order have the value that they have for slot i in theirs: at 0 and
+  // infinity each has the other's.
+  std::size_t SlotOf(std::size_t i) const {
+    return of == WeightsOf::kTranspose && i % 2 == 0 ? 2 - i : i;
+  }
+
   // Where the strip's values of slot (i, j) lie.
   std::size_t At(const Strip& strip, std::size_t i, std::size_t j) const {
-    const std::size_t slot = i * plan.axis_slots + j;
+    const std::size_t slot = SlotOf(i) * plan.axis_slots + SlotOf(j);
     const std::size_t phase = plan.phase_index(slot, strip.a, strip.b);
     const std::size_t group = rows.input ? phase : 0;
     const std::size_t k = strip.k + (rows.input ? 0 : phase * depth.channels());

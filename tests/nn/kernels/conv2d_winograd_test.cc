@@ -18,6 +18,7 @@ const std::vector<Conv2dShape> kShapes = {
     {2, 32, 16, 16, 40, 4, 4, 2, 0}, {2, 20, 9, 10, 16, 3, 3, 1, 1},
     {1, 16, 40, 44, 16, 3, 3, 1, 0}, {2, 16, 6, 5, 18, 3, 3, 1, 2},
     {2, 20, 12, 9, 16, 5, 5, 2, 2},  {5, 18, 9, 7, 30, 5, 5, 2, 1},
+    {3, 16, 1, 2, 17, 3, 3, 1, 2},
 };
 
 double Largest(const std::vector<float>& v) {
@@ -89,7 +90,7 @@ TEST(Conv2dWinograd, AgreesWithDirectWhereTilesComeInPortions) {
 }
 
 // Enough tiles for portions of one worker's own: several for one and for two workers, while seven
-// share one. Of the input gradient portions are whole images, of which there are 61.
+// share one. Where the stride is 2, those of the input gradient are whole images.
 TEST(Conv2dWinograd, AgreesWithDirectWhereWorkersHavePortionsOfTheirOwn) {
   ExpectAgreesWithDirect({61, 64, 16, 15, 50, 4, 4, 2, 1}, 9);
   ExpectAgreesWithDirect({61, 40, 14, 15, 64, 3, 3, 1, 1}, 9);
@@ -105,7 +106,7 @@ double RootMeanSquareError(const std::vector<float>& got, const std::vector<doub
 }
 
 // The bound above is far from what happens. Next to the error of the direct kernels, measured on
-// these shapes and AVX2: y 0.7 to 1.5, d_x 0.7 to 1.4, d_weight 1.1 to 2.2 times.
+// these shapes and AVX2: y 0.7 to 1.6, d_x 0.6 to 1.4, d_weight 1.1 to 2.4 times.
 TEST(Conv2dWinograd, ErrorIsNearThatOfDirect) {
   for (const Conv2dShape& s : kShapes) {
     SCOPED_TRACE(Describe(s));
@@ -138,6 +139,7 @@ TEST(Conv2dWinograd, LeavesWhatItDoesNotFitToTheDirectKernels) {
   EXPECT_FALSE(WinogradFits({2, 3, 16, 16, 16, 3, 3, 1, 1}));   // few channels
   EXPECT_FALSE(WinogradFits({2, 16, 16, 16, 16, 3, 3, 2, 1}));  // one tap in some phases
   EXPECT_FALSE(WinogradFits({2, 16, 16, 16, 16, 1, 1, 1, 0}));
+  EXPECT_FALSE(WinogradFits({2, 16, 16, 16, 16, 3, 3, 1, 3}));  // outputs that see padding only
   EXPECT_FALSE(WinogradFits({2, 16, 16, 16, 16, 3, 4, 1, 0}));  // not square
   EXPECT_FALSE(WinogradFits({2, 16, 4, 4, 16, 4, 4, 2, 1}));    // tiles mostly beyond the edge
 }
