@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Cross-compiles base, scene, raster, shade and render with their tests for aarch64 (NEON) and runs the tests under qemu-user.
+# Cross-compiles base, scene, raster, shade, render and nn with their tests for aarch64 (NEON) and runs the tests under qemu-user.
 #
 #   tests/cross/aarch64.sh [CTEST OPTIONS]      e.g. -R raster; default: all short tests of these folders
 #
