@@ -35,7 +35,7 @@ class Workers {
   // Which worker takes which index is not determined: results must depend on the index only, which
   // is how the library keeps the same bits for any thread count. What a task throws (it may run out
   // of memory) comes out here when the others have ended, some of which may not have begun. Calls
-  // may nest.
+  // may nest, but not those of A within those of B within those of A, which may wait for ever.
   void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
 
   // The same over fixed ranges [begin, end) of at most `grain` indices; the split depends on n and
