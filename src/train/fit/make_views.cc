@@ -17,6 +17,9 @@ namespace tilegrad::train {
 namespace {
 
 constexpr float kHalfExtent = 0.45f;
+constexpr const char* kTrainName = "transforms_train.json";
+constexpr const char* kTestName = "transforms_test.json";
+constexpr const char* kTruthName = "truth.glb";
 
 Status Check(const ViewsOptions& o) {
   if (o.views < 1 || o.held_out < 0 || o.views + o.held_out > 100000) {
@@ -68,6 +71,25 @@ bool IsHeldOut(const ViewsOptions& o, int index) {
   return (index + 1) * o.held_out / all != index * o.held_out / all;
 }
 
+// Takes away the cameras that an earlier call left: views of another mesh that stay would be fitted
+// or judged by. Those of somebody else are left alone; transforms.json is what a fit reads first.
+Status ClearEarlierViews(const Path& folder) {
+  std::error_code error;
+  const bool ours = std::filesystem::exists(folder / kTruthName, error);
+  for (const char* name : {"transforms.json", kTrainName, kTestName}) {
+    const Path file = folder / name;
+    if (!std::filesystem::exists(file, error)) continue;
+    if (!ours || name == std::string_view("transforms.json")) {
+      return InvalidArgument("{}: is there already, and of other images; choose another folder",
+                             file.string());
+    }
+    if (!std::filesystem::remove(file, error)) {
+      return IoError("{}: cannot be replaced: {}", file.string(), error.message());
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
@@ -75,6 +97,8 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   TILEGRAD_TRY(Check(options));
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
+  TILEGRAD_TRY(ClearEarlierViews(folder));
+  TILEGRAD_TRY(io::SaveGlb(folder / kTruthName, mesh));
   LitRenderer renderer;
   std::vector<TransformsView> train, test;
   const int all = options.views + options.held_out;
@@ -92,10 +116,9 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   }
   const ImageSize size{options.size, options.size};
   if (!test.empty()) {
-    TILEGRAD_TRY(WriteTextAtomic(folder / "transforms_test.json", WriteTransforms(test, size)));
+    TILEGRAD_TRY(WriteTextAtomic(folder / kTestName, WriteTransforms(test, size)));
   }
-  TILEGRAD_TRY(io::SaveGlb(folder / "truth.glb", mesh));
-  return WriteTextAtomic(folder / "transforms_train.json", WriteTransforms(train, size));
+  return WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size));
 }
 
 }  // namespace tilegrad::train

@@ -22,7 +22,9 @@ struct ViewsOptions {
 //   <folder>/images/000.png, ...       RGBA, straight alpha
 //   <folder>/transforms_train.json, transforms_test.json
 //   <folder>/truth.glb                 the mesh as it was rendered
-// Cameras lie on a spiral that spreads evenly over the sphere between the two elevations.
+// What an earlier call wrote there is replaced: files of cameras first, so that those of a call
+// that was stopped belong to nothing else. Errors: options out of range; cameras that no such call
+// wrote. Cameras lie on a spiral that spreads evenly over the sphere between the two elevations.
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
                  const ProgressSink& progress, const StopFlag& stop);
 

@@ -107,6 +107,29 @@ TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
   ExpectMessage(ReadFitFolder(folder_ / "views", 3).status(), "transforms_test.json", "--hold-out");
 }
 
+// Held-out views of another mesh would judge the fit.
+TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
+  const auto make = [&](int held_out, const Path& folder) {
+    return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder, {},
+                     stop_);
+  };
+  ASSERT_TRUE(make(0, folder_ / "views").ok());
+  const auto input = ReadFitFolder(folder_ / "views", 3);
+  ASSERT_TRUE(input.ok()) << input.status().message();
+  EXPECT_EQ(input->images.width, 16);
+  EXPECT_EQ(input->held_out.size(), 1u);
+  stop_ = true;  // a call that is stopped leaves no cameras for images of two meshes
+  EXPECT_EQ(make(1, folder_ / "views").code(), StatusCode::kCancelled);
+  EXPECT_EQ(ReadFitFolder(folder_ / "views", 0).status().code(), StatusCode::kNotFound);
+  stop_ = false;
+  EXPECT_TRUE(make(1, folder_ / "views").ok());
+  for (const std::string name : {"transforms.json", "transforms_train.json"}) {
+    const Path file = Write("photos_" + name + "/" + name, std::string("{}"));
+    ExpectMessage(make(1, file.parent_path()), name, "another folder");
+    EXPECT_EQ(ReadText(file).value(), "{}");
+  }
+}
+
 TEST_F(Fit, RefinesCameras) {
   FitJob job = Job("run");
   const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
