@@ -19,6 +19,8 @@ namespace {
 using train::FitConfig;
 using train::Parameter;
 
+constexpr double kMostRate = 1e6;
+
 struct Options {
   std::string input, dataset_model, out, mesh, truth, optimize, lighting = "none",
                                                                 filter = "bilinear";
@@ -48,14 +50,27 @@ Status ParseParameters(const std::string& text, train::ParameterSet* out) {
   return {};
 }
 
+// Whether a fit of these, which are the mesh and its colours if none is named, may move `p`.
+bool MayMove(const train::ParameterSet& set, Parameter p) {
+  const bool usual =
+      p == Parameter::kPositions || p == Parameter::kColors || p == Parameter::kTexture;
+  return set.empty() ? usual : set[p];
+}
+
 // "positions=0.01"
-Status ParseRate(const std::string& text, train::LearningRates* rates) {
+Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
+                 train::LearningRates* rates) {
   const auto equals = text.find('=');
   TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(text.substr(0, equals)));
   const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
   double rate = 0;
-  if (!CLI::detail::lexical_cast(number, rate) || !(rate >= 0 && rate < 1e6)) {
-    return InvalidArgument("--rate {}: expected NAME=NUMBER with a number of 0 or more", text);
+  if (!CLI::detail::lexical_cast(number, rate) || !(rate >= 0 && rate < kMostRate)) {
+    return InvalidArgument("--rate {}: expected NAME=NUMBER with a number in [0, {})", text,
+                           kMostRate);
+  }
+  if (!MayMove(fitted, p)) {
+    return InvalidArgument("--rate {}: {} is not fitted; name it in --optimize", text,
+                           train::NameOf(p));
   }
   (*rates)[p] = rate;
   return {};
@@ -69,13 +84,19 @@ Result<Mesh> Load(const std::string& path) {
 
 Status SetConfig(const Options& options, FitConfig* config) {
   TILEGRAD_TRY(ParseParameters(options.optimize, &config->parameters));
-  for (const auto& rate : options.rates) TILEGRAD_TRY(ParseRate(rate, &config->rates));
+  for (const auto& rate : options.rates) {
+    TILEGRAD_TRY(ParseRate(rate, config->parameters, &config->rates));
+  }
   static const std::vector<std::string> lightings = {"none", "lambert", "phong", "sh"};
   const auto index = std::find(lightings.begin(), lightings.end(), options.lighting);
   config->lighting = static_cast<Lighting>(index - lightings.begin());
   config->filter =
       options.filter == "trilinear" ? shade::Filter::kTrilinear : shade::Filter::kBilinear;
   if (!options.light_direction.empty()) {
+    if (options.lighting != "lambert" && options.lighting != "phong") {
+      return InvalidArgument("--light-direction: --lighting {} has none; give lambert or phong",
+                             options.lighting);
+    }
     std::copy_n(options.light_direction.begin(), 3, config->light_direction.begin());
   }
   // Vertex colours are what a template gets if they, and no texture, are to be fitted.

@@ -104,7 +104,9 @@ void AddPredict(CLI::App& app, Action* action) {
                    "folder for NAME.glb and NAME_turntable.png, by the image; NAME_2 for a second "
                    "of that name")
       ->capture_default_str();
-  command->add_option("--mask", options->mask, "grey image of the same size: white is the object");
+  command->add_option(
+      "--mask", options->mask,
+      "image of the same size: white is the object, or what is opaque if some of it is not");
   command->add_flag("--keep-framing", options->keep_framing,
                     "only resize: the image is framed like a training image already");
   AddWorkersOption(command, &options->workers);

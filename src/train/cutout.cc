@@ -88,17 +88,34 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, F
   return out;
 }
 
+std::vector<std::uint8_t> MaskValues(const ImageU8& mask) {
+  const auto channels = static_cast<std::size_t>(mask.channels);
+  const auto channel = [&](std::size_t c) {
+    std::vector<std::uint8_t> out(mask.pixels.size() / channels);
+    for (std::size_t p = 0; p < out.size(); ++p) out[p] = mask.pixels[channels * p + c];
+    return out;
+  };
+  if (channels == 2 || channels == 4) {
+    std::vector<std::uint8_t> alpha = channel(channels - 1);
+    if (std::any_of(alpha.begin(), alpha.end(), [](std::uint8_t a) { return a < 255; })) {
+      return alpha;
+    }
+  }
+  return channel(0);
+}
+
 Result<ImageU8> WithMask(const ImageU8& rgb, const ImageU8& mask) {
   if (rgb.width != mask.width || rgb.height != mask.height) {
     return InvalidArgument("the mask is {} x {} pixels, the image {} x {}; they must be equal",
                            mask.width, mask.height, rgb.width, rgb.height);
   }
   ImageU8 out(rgb.width, rgb.height, 4);
+  const std::vector<std::uint8_t> values = MaskValues(mask);
   for (int y = 0; y < rgb.height; ++y) {
     for (int x = 0; x < rgb.width; ++x) {
       const bool color = rgb.channels >= 3;
       for (int c = 0; c < 3; ++c) out.at(x, y)[c] = rgb.at(x, y)[color ? c : 0];
-      out.at(x, y)[3] = mask.at(x, y)[0];
+      out.at(x, y)[3] = values[static_cast<std::size_t>(y * rgb.width + x)];
     }
   }
   return out;

@@ -26,7 +26,11 @@ Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, F
 // 0.4571).
 inline constexpr double kTrainingFill = 0.679;
 
-// Puts a mask (grey, or the first channel) as alpha on an RGB image of the same size; other sizes
+// The object's share of each pixel, 255 inside: alpha where some of the picture is transparent;
+// else grey, of the first channel, as programs save masks in RGBA files, too.
+std::vector<std::uint8_t> MaskValues(const ImageU8& mask);
+
+// Puts the values of a mask as alpha on an RGB image of the same size; other sizes
 // are an error that says both.
 Result<ImageU8> WithMask(const ImageU8& rgb, const ImageU8& mask);
 

@@ -220,6 +220,15 @@ TEST_F(BrokenInputs, OptionsThatMeanSomethingElse) {
   ExpectRefused("fit " + Data().string() + " --seed -1", "--seed");
 }
 
+TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {
+  const std::string fit = "fit " + folder_.string() + " --out " + (folder_ / "fit").string();
+  ExpectRefused(fit + " --light-direction 0 0 1", "--light-direction", "--lighting");
+  ExpectRefused(fit + " --rate camera=0.1", "camera is not fitted", "--optimize");
+  ExpectRefused(fit + " --rate uv=0.1 --optimize texture", "uv is not fitted");
+  ExpectRefused(fit + " --rate texture=1e6 --optimize texture", "[0, 1000000)");
+  ExpectRefused(fit + " --rate texture=0.1 --optimize texture", "transforms.json");  // no images
+}
+
 TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   Write("file", "in the way");
   ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "train/cutout.h"
 #include "train/data/dataset.h"
 #include "train/fit/transforms.h"
 
@@ -22,18 +23,15 @@ ImageSize SizeOf(const ImageU8& image) { return {image.width, image.height}; }
 
 std::string Describe(ImageSize size) { return fmt::format("{} x {}", size.width, size.height); }
 
-// Alpha of each pixel, from the mask's last channel: alpha if it has one, grey if it has not.
 Status TakeMask(const Path& path, ImageSize size, float* alpha) {
   TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(path));
   if (mask.width != size.width || mask.height != size.height) {
     return DataLoss("{}: the mask has {} pixels, its image {}", path.string(),
                     Describe(SizeOf(mask)), Describe(size));
   }
-  const auto channels = static_cast<std::size_t>(mask.channels);
-  const std::size_t last = mask.channels == 3 ? 0 : channels - 1;
-  for (std::size_t p = 0; p < mask.pixels.size() / channels; ++p) {
-    alpha[p] = static_cast<float>(mask.pixels[channels * p + last]) / 255;
-  }
+  const std::vector<std::uint8_t> values = MaskValues(mask);
+  std::transform(values.begin(), values.end(), alpha,
+                 [](std::uint8_t v) { return static_cast<float>(v) / 255; });
   return {};
 }
 

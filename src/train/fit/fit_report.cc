@@ -62,8 +62,12 @@ Result<std::string> Figure(const ImageU8& image, const std::string& caption) {
 Result<std::string> Views(const FitJob& job, const FitOutcome& o) {
   const bool held = !o.held_out.empty();
   std::span<const ViewScore> scores = held ? o.held_out : o.training;
-  std::string out = fmt::format("<h2>{} views: image | fit</h2>\n", held ? "Held-out" : "Fitted");
-  for (const ViewScore& s : scores.first(std::min(kShownViews, scores.size()))) {
+  const std::size_t shown = std::min(kShownViews, scores.size());
+  const std::string some =
+      shown < scores.size() ? fmt::format(" (the first {} of {})", shown, scores.size()) : "";
+  std::string out =
+      fmt::format("<h2>{} views{}: image | fit</h2>\n", held ? "Held-out" : "Fitted", some);
+  for (const ViewScore& s : scores.first(shown)) {
     const std::string& name = job.input.names[static_cast<std::size_t>(s.view)];
     TILEGRAD_ASSIGN(const std::string truth, Figure(s.truth, name));
     TILEGRAD_ASSIGN(const std::string rendered,

@@ -2,6 +2,7 @@
 // From a job to the scene that its fit starts with.
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -37,9 +38,17 @@ Status CheckConfig(const FitConfig& c) {
   TILEGRAD_TRY(CheckRange("laplacian", c.regularizers.laplacian, 0, 1e6));
   TILEGRAD_TRY(CheckRange("flatness", c.regularizers.flatness, 0, 1e6));
   TILEGRAD_TRY(CheckRange("edge_length", c.regularizers.edge_length, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("perturb_cameras", c.perturb_cameras, 0, 180));
+  TILEGRAD_TRY(CheckRange("timelapse", c.timelapse, 0, 1e6));
   TILEGRAD_TRY(CheckRange("checkpoint_every", static_cast<double>(c.checkpoint_every), 1, 1e9));
   if (c.loss.color_weight + c.loss.silhouette_weight == 0) {
     return InvalidArgument("both weights, of colour and silhouette, are 0: nothing is left to fit");
+  }
+  const auto& d = c.light_direction;
+  if (!(std::isfinite(d[0]) && std::isfinite(d[1]) && std::isfinite(d[2])) ||
+      (d[0] == 0 && d[1] == 0 && d[2] == 0)) {
+    return InvalidArgument("light_direction is {} {} {}, must be finite and not 0 0 0", d[0], d[1],
+                           d[2]);
   }
   return {};
 }
@@ -84,20 +93,27 @@ Result<FitScene> MeshScene(const FitJob& job) {
   return scene;
 }
 
-float RadiusOf(const FitScene& scene) {
-  float low[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF}, high[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
-  for (std::size_t i = 0; i < scene.positions.size(); ++i) {
-    low[i % 3] = std::min(low[i % 3], scene.positions[i]);
-    high[i % 3] = std::max(high[i % 3], scene.positions[i]);
+struct Bounds {
+  glm::vec3 low{HUGE_VALF}, high{-HUGE_VALF};
+};
+Bounds BoundsOf(const FitScene& scene) {
+  Bounds box;
+  for (std::size_t i = 0; i < scene.positions.size(); i += 3) {
+    const glm::vec3 p(scene.positions[i], scene.positions[i + 1], scene.positions[i + 2]);
+    box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
   }
-  float extent = 0;
-  for (int c = 0; c < 3; ++c) extent = std::max(extent, high[c] - low[c]);
-  return 0.5f * extent;
+  return box;
 }
 
-// Turns a camera about the world's origin by `degrees` around a random axis: it moves and looks
+float RadiusOf(const FitScene& scene) {
+  const Bounds box = BoundsOf(scene);
+  const glm::vec3 extent = box.high - box.low;
+  return 0.5f * std::max({extent.x, extent.y, extent.z, 0.0f});
+}
+
+// Turns a camera about the object's middle by `degrees` around a random axis: it moves and looks
 // elsewhere, but still at the object.
-Camera Perturbed(const Camera& camera, double degrees, Rng* rng) {
+Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees, Rng* rng) {
   const glm::dvec3 axis =
       glm::normalize(glm::dvec3(rng->Normal(), rng->Normal(), rng->Normal()) + 1e-9);
   const double angle = degrees * std::numbers::pi / 180, s = std::sin(angle), c = std::cos(angle);
@@ -108,6 +124,8 @@ Camera Perturbed(const Camera& camera, double degrees, Rng* rng) {
     const glm::dvec3 turned =
         c * row + s * glm::cross(axis, row) + (1 - c) * glm::dot(axis, row) * axis;
     for (int k = 0; k < 3; ++k) out.rotation[3 * r + k] = static_cast<float>(turned[k]);
+    // R p + t at the middle stays what it was.
+    out.translation[r] += static_cast<float>(glm::dot(row - turned, middle));
   }
   return out;
 }
@@ -117,9 +135,11 @@ void SetCameras(const FitJob& job, FitScene* scene) {
   if (job.config.perturb_cameras == 0) return;
   constexpr std::uint64_t kStream = 0x6361'6d65'7261;  // apart from those of the steps
   Rng rng(job.config.seed, kStream);
+  const Bounds box = BoundsOf(*scene);
+  const glm::dvec3 middle = 0.5 * (glm::dvec3(box.low) + glm::dvec3(box.high));
   for (const int i : job.input.training) {
     Camera& camera = scene->cameras[static_cast<std::size_t>(i)];
-    camera = Perturbed(camera, job.config.perturb_cameras, &rng);
+    camera = Perturbed(camera, middle, job.config.perturb_cameras, &rng);
   }
 }
 

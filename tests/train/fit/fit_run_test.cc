@@ -176,6 +176,18 @@ TEST_F(Fit, EveryParameterCanBeFitted) {
   }
 }
 
+TEST_F(Fit, ThePageSaysWhichViewsItShows) {
+  FitJob job = Job("run");
+  job.config.steps = 1;
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_NE(ReadText(job.out / "report.html")->find(">Held-out views: "), std::string::npos);
+  job = Job("fitted");
+  job.config.steps = 1, job.input.held_out.clear();
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_NE(ReadText(job.out / "report.html")->find(">Fitted views (the first 6 of 8): "),
+            std::string::npos);
+}
+
 TEST_F(Fit, ErrorsNameTheCure) {
   FitJob job = Job("run");
   job.config.parameters[Parameter::kSh] = true;
@@ -186,9 +198,62 @@ TEST_F(Fit, ErrorsNameTheCure) {
   job = Job("run");
   job.config.steps = 0;
   ExpectMessage(Run(job).status(), "steps is 0");
+  job = Job("run");
+  job.config.perturb_cameras = NAN;
+  ExpectMessage(Run(job).status(), "perturb_cameras is nan");
+  job = Job("run");
+  job.config.timelapse = -1;
+  ExpectMessage(Run(job).status(), "timelapse is -1");
+  job = Job("run");
+  job.config.lighting = Lighting::kLambert, job.config.light_direction = {0, 0, 0};
+  ExpectMessage(Run(job).status(), "light_direction is 0 0 0");
   EXPECT_EQ(ReadFitFolder(folder_ / "none", 0).status().code(), StatusCode::kNotFound);
   Write("broken/transforms.json", std::string("{\"frames\": [{\"file_path\": \"a.png\"}]}"));
   ExpectMessage(ReadFitFolder(folder_ / "broken", 0).status(), "frame 0", "camera_angle_x");
+}
+
+// Black and white saved as RGBA has an alpha that says nothing; a cut-out has one that says all.
+TEST_F(Fit, MasksAreWhiteOrCutOut) {
+  ImageU8 opaque(8, 8, 4, 255), cut(8, 8, 4, 0), grey(8, 8, 1, 0);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      for (int c = 0; c < 3; ++c) opaque.at(x, y)[c] = x < 4 ? 255 : 0;
+      cut.at(x, y)[3] = grey.at(x, y)[0] = x < 4 ? 255 : 0;
+    }
+  }
+  const std::string pose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
+  Write("masks/transforms.json", R"({"camera_angle_x":0.7,"frames":[{"file_path":"a.png",)"
+                                 R"("mask_path":"mask.png",)" +
+                                     pose + "]}");
+  ASSERT_TRUE(io::SavePng(folder_ / "masks/a.png", ImageU8(8, 8, 3, 99)).ok());
+  for (const ImageU8& mask : {opaque, cut, grey}) {
+    ASSERT_TRUE(io::SavePng(folder_ / "masks/mask.png", mask).ok());
+    const auto input = ReadFitFolder(folder_ / "masks", 0);
+    ASSERT_TRUE(input.ok()) << input.status().message();
+    for (std::size_t p = 0; p < 64; ++p) {
+      EXPECT_EQ(input->images.alpha[p], p % 8 < 4 ? 1.0f : 0.0f) << mask.channels << ", " << p;
+    }
+  }
+}
+
+// Cameras that are turned about the world's origin would lose an object that stands elsewhere.
+TEST_F(Fit, PerturbedCamerasStillSeeTheObject) {
+  FitJob job = Job("run");
+  job.start = Icosphere(1, 0.1f);
+  for (glm::vec3& p : job.start->positions) p += glm::vec3(50, 0, 0);
+  for (Camera& camera : job.input.cameras) {
+    for (int r = 0; r < 3; ++r) camera.translation[r] -= 50 * camera.rotation[3 * r];
+  }
+  job.config.perturb_cameras = 10;
+  const auto start = PrepareFit(job);
+  ASSERT_TRUE(start.ok()) << start.status().message();
+  for (std::size_t i = 0; i < job.input.cameras.size(); ++i) {
+    const Camera &before = job.input.cameras[i], &after = start->scene.cameras[i];
+    for (int r = 0; r < 3; ++r) {
+      EXPECT_NEAR(after.rotation[3 * r] * 50 + after.translation[r],
+                  before.rotation[3 * r] * 50 + before.translation[r], 1e-4);
+    }
+  }
 }
 
 TEST_F(Fit, TransformsRoundTrip) {
