@@ -134,7 +134,7 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   written_ += files.size();
   last_ = files.back();
   if (settings_.explain) Explain(picture, name.stem.string());
-  views_.push_back({name.stem.filename().string() + "." + name.format, view.camera, view.size});
+  views_.push_back({name.stem.filename().string() + name.ending, view.camera, view.size});
   return {};
 }
 
@@ -164,6 +164,43 @@ Status RenderRun::Finish() {
   if (cameras.empty() || views_.empty()) return {};
   return cameras.extension() == ".json" ? io::SaveNerfCameras(cameras, views_)
                                         : io::SaveColmapCameras(cameras, views_);
+}
+
+// An option that would change nothing is a mistake: what it is for is not asked for.
+Status CheckEffects(const CLI::App& command, const RenderSettings& s) {
+  const bool phong = s.lighting == Lighting::kPhong,
+             lit = phong || s.lighting == Lighting::kLambert;
+  const bool from_file = !s.view.camera_file.empty() || !s.view.gltf_camera.empty();
+  const bool framed = !from_file && s.view.eye.empty();
+  struct Effect {
+    const char* option;
+    bool there;
+    const char* what;
+  };
+  const Effect effects[] = {
+      {"--light", lit, "--shading lambert or phong"},
+      {"--light-at-camera", lit && !s.lights.empty(), "--light"},
+      {"--ambient", lit, "--shading lambert or phong"},
+      {"--specular", phong, "--shading phong"},
+      {"--shininess", phong, "--shading phong"},
+      {"--sh", s.lighting == Lighting::kSphericalHarmonics, "--shading sh"},
+      {"--opencv-centre", !s.view.camera_file.empty(), "--cameras"},
+      {"--fov", !from_file, "cameras that are not of a file"},
+      {"--azimuth", framed, "a camera that is framed by itself"},
+      {"--elevation", framed, "a camera that is framed by itself"},
+      {"--distance", framed, "a camera that is framed by itself"},
+      {"--margin", framed, "a camera that is framed by itself"},
+  };
+  for (const auto& [option, there, what] : effects) {
+    if (command.count(option) == 0 || there) continue;
+    return InvalidArgument("{} would do nothing: it is for {}", option, what);
+  }
+  for (const auto& [x, y, z, intensity] : s.lights) {
+    if (x == 0 && y == 0 && z == 0) {
+      return InvalidArgument("--light 0 0 0 {}: must point towards the light", intensity);
+    }
+  }
+  return {};
 }
 
 // One bad mesh does not keep the others from being rendered; the first error is the result.
@@ -308,7 +345,12 @@ void AddRender(CLI::App& app, Action* action) {
   AddViewOptions(command, &settings->view);
   AddShadingOptions(command, settings.get());
   AddWorkersOption(command, &settings->workers);
-  command->callback([settings, action] { *action = [settings] { return RunRender(*settings); }; });
+  command->callback([settings, action, command] {
+    *action = [settings, command]() -> Status {
+      TILEGRAD_TRY(CheckEffects(*command, *settings));
+      return RunRender(*settings);
+    };
+  });
 }
 
 }  // namespace tilegrad::cli

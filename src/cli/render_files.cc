@@ -104,7 +104,7 @@ struct Writer {
 
   Path File(const std::string& output) const {
     const std::string suffix = output == "color" ? "" : "_" + output;
-    return Path(name.stem.string() + suffix + "." + name.format);
+    return Path(name.stem.string() + suffix + name.ending);
   }
   Status Png(const std::string& output, std::span<const float> values, int channels) {
     written.push_back(File(output));
@@ -212,6 +212,8 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
   const Path out(settings.out);
   std::string ending = out.extension().string();
   if (!ending.empty()) ending.erase(0, 1);
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   // A folder pic.jpg with a PNG in it is not what anybody asks for.
   for (const char* other : {"jpg", "jpeg", "bmp", "gif", "tga", "tif", "tiff", "webp", "ppm"}) {
     if (ending != other) continue;
@@ -223,8 +225,12 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
   }
   if (is_file && !settings.format.empty() && settings.format != ending)
     return InvalidArgument("--out {} and --format {} disagree", settings.out, settings.format);
-  if (is_file) return PictureName{Path(out).replace_extension(), ending};
-  return PictureName{out / name, settings.format.empty() ? "png" : settings.format};
+  const std::string format = is_file ? ending : settings.format.empty() ? "png" : settings.format;
+  if (format == "exr" && !settings.background.empty()) {
+    return InvalidArgument("--background: pictures in EXR keep their alpha and have none");
+  }
+  if (is_file) return PictureName{Path(out).replace_extension(), format, out.extension()};
+  return PictureName{out / name, format, "." + format};
 }
 
 Result<std::vector<Path>> WritePicture(const Picture& picture, ColorSpace space,

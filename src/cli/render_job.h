@@ -39,7 +39,8 @@ Status RequestOutputs(const FileSettings& settings, PictureRequest* request);
 // The place of a picture without ending: for one picture `out` itself, else NAME in the folder.
 struct PictureName {
   Path stem;
-  std::string format;
+  std::string format;  // png, exr, npy
+  std::string ending;  // of its files: ".png", or as `out` has it, ".PNG"
 };
 Result<PictureName> NamePicture(const FileSettings& settings, const std::string& name, bool single);
 

@@ -189,6 +189,33 @@ TEST_F(Render, WrongCommandLines) {
   ExpectRefused("--light 1 0 0", 2, "");
 }
 
+TEST_F(Render, EndingsInCapitalsAreTheSameFormats) {
+  ExpectDone("--size 16 --outputs color,depth --out " + In("a.PNG"));
+  EXPECT_TRUE(io::LoadImage(folder_ / "a.PNG").ok());
+  EXPECT_TRUE(Exists("a_depth.PNG"));
+  ExpectRefused("--out " + In("a.JPG"), 2, ".png, .exr or .npy");
+  ExpectRefused("--out " + In("a.PNG") + " --format npy", 2, "disagree");
+}
+
+TEST_F(Render, OptionsThatWouldDoNothing) {
+  ExpectRefused("--sh 1 0 0 0 0 0 0 0 0", 2, "--shading sh");
+  ExpectRefused("--shading none --light 0 0 1 1", 2, "--light would do nothing");
+  ExpectRefused("--shading sh --ambient 0.3", 2, "--ambient would do nothing");
+  ExpectRefused("--specular 0.3", 2, "--shading phong");
+  ExpectRefused("--shininess 3", 2, "--shading phong");
+  ExpectRefused("--light-at-camera", 2, "it is for --light");
+  ExpectRefused("--light 0 0 0 1", 2, "towards the light");
+  ExpectRefused("--opencv-centre half", 2, "--cameras");
+  ExpectRefused("--eye 0 0 4 --azimuth 30", 2, "--azimuth would do nothing");
+  ExpectRefused("--gltf-camera 0 --fov 30", 2, "--fov would do nothing");
+  ExpectRefused("--background 1 1 1 --out " + In("a.exr"), 2, "--background");
+  ExpectDone("--size 8 --fov 30 --azimuth 9 --elevation 9 --distance 9 --out " + In("a.png"));
+  ExpectDone(
+      "--size 8 --eye 0 0 4 --fov 30 --shading phong --specular 1 --shininess 3 --light 1 1 "
+      "1 1 --light-at-camera --ambient 0 --out " +
+      In("b.png"));
+}
+
 TEST_F(Render, BrokenFiles) {
   ExpectRefused("--cameras " + In("none"), 3, "none");
   ExpectRefused("--cameras " + folder_.string(), 3, "cameras.txt");
