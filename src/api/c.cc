@@ -75,9 +75,10 @@ tilegrad_options DefaultOptions() {
   return to;
 }
 
-// As much of `value` as the caller's struct holds.
+// As much of `value` as the caller's struct holds; nothing where there is none.
 template <class S>
 void WriteSized(S value, std::size_t size, S* to) {
+  if (to == nullptr) return;
   value.struct_size = size;
   std::memset(to, 0, size);
   std::memcpy(to, &value, std::min(size, sizeof(S)));

@@ -49,7 +49,8 @@ Status RendererT<T>::Impl::Render(std::span<const SceneT<T>> scenes, const Rende
                                   const Outputs& outputs, typename FrameT<T>::Impl* frame) {
   TILEGRAD_TRY(ValidateEnumerations(options));
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Status status = ValidateEnumerations(scenes[n]);
+    Status status = ValidateEnumerations(scenes[n]);
+    if (status.ok()) status = ValidateLights(scenes[n]);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
   }
   frame->options = ToEngine(options);

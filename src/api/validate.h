@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the engine takes for granted and a caller may still get wrong, from C at least: numbers that
-// are no enumerator.
+// What the engine takes for granted and a caller may still get wrong: numbers that are no
+// enumerator, from C at least, and lights without a direction.
 #pragma once
+
+#include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "tilegrad/renderer.h"
@@ -34,6 +37,22 @@ Status ValidateEnumerations(const SceneT<T>& scene) {
   for (const TextureT<T>& texture : scene.textures) {
     TILEGRAD_TRY(CheckEnumerator("texture.wrap", texture.wrap, Wrap::kMirror));
     TILEGRAD_TRY(CheckEnumerator("texture.filter", texture.filter, Filter::kTrilinear));
+  }
+  return {};
+}
+
+// To the engine it is darkness, and it pulls nothing: an optimiser would stay there.
+template <class T>
+Status ValidateLights(const SceneT<T>& scene) {
+  constexpr T kLeast = T(1e-30);  // as the engine has it
+  const Lighting lighting = scene.shading.lighting;
+  if (lighting != Lighting::kLambert && lighting != Lighting::kPhong) return {};
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const auto& d = scene.lights[i].direction;
+    if (std::all_of(d.begin(), d.end(), [](T x) { return std::abs(x) <= kLeast; })) {
+      return InvalidArgument("lights[{}]: direction is {} {} {}, must not be 0", i, d[0], d[1],
+                             d[2]);
+    }
   }
   return {};
 }

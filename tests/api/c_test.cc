@@ -141,6 +141,7 @@ TEST_F(CApi, ShorterStructsHaveDefaultsForTheRest) {
   tilegrad_options_init_sized(&small, offsetof(tilegrad_options, delta));
   EXPECT_EQ(small.width, 64);
   EXPECT_NE(small.delta, 1.0 / 7000);
+  tilegrad_options_init(static_cast<tilegrad_options*>(nullptr));  // nothing to fill
 }
 
 TEST_F(CApi, LongerStructsMustNotSayWhatIsNotKnown) {

@@ -274,6 +274,7 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
   static const std::vector<int> bad_faces = {0, 1, 16};
   static std::vector<float> with_nan(48, 0.0f);
   with_nan[5] = std::numeric_limits<float>::quiet_NaN();
+  static const std::vector<Light> no_direction = {{}, {.direction = {0, 0, 0}}};
   const std::vector<BadCall> calls = {
       {"scene 1: positions must be [V,3], got 7 numbers",
        [](Scene& s, RenderOptions&) { s.positions = seven; }},
@@ -300,6 +301,10 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
       {"scene 1: camera.near_plane", [](Scene& s, RenderOptions&) { s.camera.near_plane = 0; }},
       {"scene 1: sh",
        [](Scene& s, RenderOptions&) { s.shading.lighting = Lighting::kSphericalHarmonics; }},
+      {"scene 1: lights[1]: direction is 0 0 0, must not be 0",
+       [](Scene& s, RenderOptions&) {
+         s.shading.lighting = Lighting::kPhong, s.lights = no_direction;
+       }},
       {"options.width is 0", [](Scene&, RenderOptions& o) { o.width = 0; }},
       {"options.delta is -1", [](Scene&, RenderOptions& o) { o.delta = -1; }},
       {"options.max_alpha_error is 2", [](Scene&, RenderOptions& o) { o.max_alpha_error = 2; }},
