@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "bindings/camera_numbers.h"
 #include "bindings/scene_record.h"
 #include "scene/camera_conventions.h"
@@ -100,6 +101,9 @@ py::array LookAt(double fov_y, Size size, const py::object& eyes, const py::obje
       return std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]),
                                   static_cast<float>(v[2])};
     };
+    if (narrow(eye[i]) == narrow(target[i])) {
+      return InvalidArgument("eye and target are the same point, so there is no way to look");
+    }
     return CameraCast<double>(
         LookAtCamera(lens, narrow(eye[i]).data(), narrow(target[i]).data(), narrow(up[i]).data()));
   });

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Built-in shapes, as arrays.
+#include <cmath>
+
 #include "bindings/arrays.h"
 #include "scene/shapes.h"
 
@@ -30,6 +32,10 @@ void BindShapes(py::module_& m) {
       [](int level, float radius) {
         if (level < 0 || level > 8) {
           throw py::value_error(fmt::format("icosphere: level is {}, must be in 0..8", level));
+        }
+        if (!(radius > 0 && std::isfinite(radius))) {
+          throw py::value_error(
+              fmt::format("icosphere: radius is {}, must be finite and > 0", radius));
         }
         return ArraysOf(Icosphere(level, radius));
       },

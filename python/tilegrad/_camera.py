@@ -96,7 +96,8 @@ class Camera(Packed):
     @classmethod
     def look_at(cls, eye, target=(0, 0, 0), up=(0, 1, 0), *, fov_y: float = _core.FOV_Y,
                 width: int, height: int) -> "Camera":
-        """At `eye`, looking at `target`, with `up` upwards; world units, (3,) or (N, 3).
+        """At `eye`, looking at `target`, with `up` upwards; world units, (3,) or (N, 3). Where
+        `up` lies along the view another axis of the world takes its place.
 
         fov_y: degrees, the whole vertical field of view, (0, 180). Pixels are square, the principal
             point is the middle of an image of width x height pixels.

@@ -76,7 +76,7 @@ class Light(Packed):
 class Texture:
     """Texels with the rules by which they are looked up.
 
-    texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image; row 0 on top;
+    texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image, 0 to 1; row 0 on top;
         (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
     wrap: "repeat", "clamp" (the border goes on) or "mirror".
     filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid).
@@ -107,7 +107,7 @@ class Scene:
         float32, for the engine.
     faces: (F, 3) int32, indices of vertices; counter-clockwise is the front.
     camera: Camera, of one view or of N.
-    colors: (V, 3), 0 to 1.
+    colors: (V, 3), 0 to 1; bytes are refused, in textures, too.
     uvs: (V, 2); (0, 0) is the lower left corner of a texture.
     textures: Texture or an array (Ht, Wt, 3), or a list of them.
     surfaces: Surface or a list of them; without any, one of C++'s defaults that has texture 0.
@@ -171,6 +171,10 @@ class Scene:
     # What the constructor consists of.
 
     def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
+        # Pixels as files have them would be 255 times too bright, and nothing would say so.
+        if name.startswith(("colors", "textures")) and "uint8" in str(getattr(value, "dtype", "")):
+            raise TypeError(f"Scene: {name} has dtype uint8, expected {self._dtype} from 0 to 1: "
+                            f"divide by 255")
         return _arrays.as_batched("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:

@@ -13,7 +13,7 @@ def icosphere(level: int = 3, radius: float = 1.0) -> tuple[np.ndarray, np.ndarr
     seen from outside.
 
     level: 0 to 8; V = 10 * 4^level + 2, F = 20 * 4^level. Level 3 is the DIB-R paper's template.
-    radius: world units.
+    radius: world units, > 0.
     """
     return _core.icosphere(_arrays.as_number("icosphere", "level", level, int),
                            _arrays.as_number("icosphere", "radius", radius, float))

@@ -41,6 +41,13 @@ class ModelInfo:
     source_faces: int
 
 
+def _counting(function: str, argument: str, value: int) -> int:
+    number = _arrays.as_number(function, argument, value, int)
+    if number < 0:
+        raise ValueError(f"{function}: {argument} is {number}, must be >= 0")
+    return number
+
+
 class Truth:
     """What evaluation compares with. occupancy: (32, 32, 32) bool as [x, y, z]; points: (2500, 3)
     float32 on the surface, largest half-extent 0.45; mesh: with colours, at most 5,000 faces. The
@@ -61,7 +68,7 @@ class Dataset:
     folder: of the dataset. split: "train", "validation", "test", or None for all models.
     views: K views of each item, distinct and at random, by seed, epoch (`set_epoch`) and item;
         None: all views in their order.
-    seed: of every random choice.
+    seed: of every random choice, >= 0.
     in_memory: read all images now, as bytes, with `threads` threads (as of `tilegrad.Renderer`)
         instead of one file for each item.
 
@@ -80,7 +87,7 @@ class Dataset:
         self.models: list[ModelInfo] = [ModelInfo(**model) for model in self._files.models]
         self._indices = [i for i, model in enumerate(self.models) if split in (None, model.split)]
         self._views = self._checked_views(views)
-        self._seed = _arrays.as_number("Dataset", "seed", seed, int)
+        self._seed = _counting("Dataset", "seed", seed)
         self._cameras = self._files.cameras
         self._epoch = 0
         self._images = self._files.load_all_images(
@@ -102,17 +109,15 @@ class Dataset:
         return Camera.of_numbers(self._cameras)
 
     def set_epoch(self, epoch: int) -> None:
-        """Items show other views from now on. Workers of a DataLoader see what was set before they
+        """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was set before they
         started."""
-        self._epoch = _arrays.as_number("set_epoch", "epoch", epoch, int)
+        self._epoch = _counting("set_epoch", "epoch", epoch)
 
     def __len__(self) -> int:
         return len(self._indices)
 
     def __getitem__(self, index: int) -> Item:
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"Dataset: item {index} of {len(self)}")
-        index %= len(self)
+        index = self._checked_index(index)
         shown = np.arange(self.info["views"])
         if self._views is not None:
             random = np.random.default_rng((self._seed, self._epoch, index))
@@ -141,7 +146,7 @@ class Dataset:
 
     def truth(self, index: int) -> Truth:
         """Solid, surface and mesh of item `index`."""
-        data = self._files.load_truth(self._indices[index])
+        data = self._files.load_truth(self._indices[self._checked_index(index)])
         mesh = data["mesh"]
         return Truth(data["occupancy"].astype(bool), data["points"],
                      None if mesh is None else mesh_of_dict(mesh))
@@ -161,6 +166,13 @@ class Dataset:
                 "cameras": self._cameras[shown].astype(np.float32),
                 "views": shown.astype(np.int64), "class": self.models[model].class_index,
                 "split": _SPLITS.index(self.models[model].split), "model": model}
+
+    def _checked_index(self, index: int) -> int:
+        """From 0 on."""
+        index = _arrays.as_number("Dataset", "item", index, int)
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"Dataset: item {index} of {len(self)}")
+        return index % len(self)
 
     def _checked_views(self, views: Optional[int]) -> Optional[int]:
         if views is None:

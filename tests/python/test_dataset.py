@@ -137,6 +137,14 @@ class Batches(unittest.TestCase):
             files.Dataset(dataset(), views=5)
         with self.assertRaisesRegex(ValueError, "split is 'dev'"):
             files.Dataset(dataset(), "dev")
+        with self.assertRaisesRegex(ValueError, "^set_epoch: epoch is -1, must be >= 0"):
+            data.set_epoch(-1)
+        with self.assertRaisesRegex(ValueError, "^Dataset: seed is -1, must be >= 0"):
+            files.Dataset(dataset(), views=2, seed=-1)
+        with self.assertRaisesRegex(TypeError, r"^Dataset: item must be int, got 1.0 \(float\)"):
+            data[1.0]
+        with self.assertRaisesRegex(IndexError, "^Dataset: item 99 of "):
+            data.truth(99)
 
 
 class Workers(unittest.TestCase):

@@ -443,6 +443,11 @@ class Errors(unittest.TestCase):
              "surface", {"surfaces": Surface(base_color=np.ones((2, 3)), texture=[0, 0, 0])}),
             (TypeError, "Scene: per_corner must be a name or a sequence of names, got int",
              {"per_corner": 3}),
+            (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
+             "255", {"colors": np.full((16, 3), 255, np.uint8)}),
+            (TypeError, "Scene: textures[1] has dtype uint8, expected float32 from 0 to 1: divide "
+             "by 255", {"textures": [np.ones((2, 2, 3), np.float32),
+                                     Texture(np.full((2, 2, 3), 255, np.uint8))]}),
         ]
         for error, text, change in cases:
             self.expect(error, text, lambda: scene.replace(**change))
@@ -527,6 +532,11 @@ class Errors(unittest.TestCase):
         small._arrays["positions"] = fixed
         self.expect(ValueError, "backward: positions is read-only",
                     lambda: renderer.backward(frame, alpha=ones, out=small))
+
+    def test_icosphere(self):
+        for radius in (float("nan"), float("inf"), 0.0, -1.0):
+            self.expect(ValueError, f"icosphere: radius is {radius:g}, must be finite and > 0",
+                        lambda: tilegrad.icosphere(1, radius))
 
     def test_renderer(self):
         self.expect(ValueError, "Renderer: threads is -1, must be in 0..1024",
