@@ -31,9 +31,14 @@ class FileHandle {
 };
 
 Status SystemError(const Path& path, const char* doing) {
-  const int error = errno;
-  const auto code = error == ENOENT ? StatusCode::kNotFound : StatusCode::kIo;
-  return {code, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(error))};
+  return {StatusCode::kIo, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(errno))};
+}
+
+// What is to be read and is not there, or below a file, is not found.
+Status CannotOpenToRead(const Path& path) {
+  const bool missing = errno == ENOENT || errno == ENOTDIR;
+  const Status status = SystemError(path, "cannot open");
+  return missing ? Status(StatusCode::kNotFound, status.message()) : status;
 }
 
 bool WriteAll(int fd, std::span<const std::uint8_t> bytes) {
@@ -57,19 +62,21 @@ Status SyncFolder(const Path& folder) {
   return {};
 }
 
-Status WriteTemporary(const Path& temporary, std::span<const std::uint8_t> bytes) {
+// Errors name `path`, which the caller knows.
+Status WriteTemporary(const Path& temporary, const Path& path,
+                      std::span<const std::uint8_t> bytes) {
   FileHandle file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-  if (file.fd() < 0) return SystemError(temporary, "cannot create");
-  if (!WriteAll(file.fd(), bytes)) return SystemError(temporary, "cannot write");
-  if (::fsync(file.fd()) != 0) return SystemError(temporary, "cannot sync");
-  if (!file.Close()) return SystemError(temporary, "cannot close");
+  if (file.fd() < 0) return SystemError(path, "cannot create");
+  if (!WriteAll(file.fd(), bytes)) return SystemError(path, "cannot write");
+  if (::fsync(file.fd()) != 0) return SystemError(path, "cannot sync");
+  if (!file.Close()) return SystemError(path, "cannot close");
   return {};
 }
 
 template <class Container>
 Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
   FileHandle file(path, O_RDONLY);
-  if (file.fd() < 0) return SystemError(path, "cannot open");
+  if (file.fd() < 0) return CannotOpenToRead(path);
   struct stat info = {};
   if (::fstat(file.fd(), &info) != 0) return SystemError(path, "cannot stat");
   if (!S_ISREG(info.st_mode)) return InvalidArgument("{}: not a regular file", path.string());
@@ -132,9 +139,9 @@ Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> b
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   Path temporary = path;
   temporary += fmt::format(".{}.tmp", ::getpid());
-  Status status = WriteTemporary(temporary, bytes);
+  Status status = WriteTemporary(temporary, path, bytes);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
-    status = SystemError(path, "cannot rename the temporary file to this name");
+    status = SystemError(path, "cannot be replaced");
   }
   if (!status.ok()) {
     ::unlink(temporary.c_str());
@@ -159,6 +166,7 @@ Status AppendText(const Path& path, std::string_view text, bool durable) {
 Status MakeFolder(const Path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
+  if (path.empty()) return InvalidArgument("the name of a folder is empty");
   if (error) return IoError("{}: cannot create the folder: {}", path.string(), error.message());
   return {};
 }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/run_folder.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "cli/console.h"
+#include "train/checkpoint.h"
 
 namespace tilegrad::cli {
 
@@ -25,16 +28,22 @@ void AddRunOptions(CLI::App* command, RunOptions* options) {
 
 Result<Path> ChooseRun(const std::string& given) {
   if (!given.empty()) return Path(given);
-  std::optional<std::filesystem::directory_entry> newest;
+  // By when a checkpoint was written, and by name where that is the same moment: a look at an old
+  // run (eval, report) changes its folder, too.
+  std::optional<std::pair<std::filesystem::file_time_type, Path>> newest;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator("runs", error)) {
-    if (!std::filesystem::exists(entry.path() / "run.json", error)) continue;
-    if (!newest || entry.last_write_time(error) > newest->last_write_time(error)) newest = entry;
+    const std::vector<Path> files = train::ListCheckpoints(entry.path());
+    if (files.empty() || !std::filesystem::exists(entry.path() / "run.json", error)) continue;
+    const auto when = std::filesystem::last_write_time(files.back(), error);
+    newest = std::max(newest, std::optional(std::pair(when, entry.path())));
   }
   if (!newest)
     return NotFound(
-        "no run below runs/; name one with --run, or train one (tilegrad train --help)");
-  return newest->path();
+        "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
+        "--help)");
+  PrintNote("{}: the newest run below runs/; --run names another\n", newest->second.string());
+  return newest->second;
 }
 
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) {
@@ -48,13 +57,17 @@ Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) 
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
   const Path file = run / "run.json";
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) {
+    return NotFound("{}: no run folder of tilegrad train: there is no run.json in it",
+                    run.string());
+  }
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || !json.contains("dataset") || !json["dataset"].is_string()) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }
   const Path dataset = json["dataset"].get<std::string>();
-  std::error_code error;
   if (!std::filesystem::exists(dataset, error)) {
     return NotFound("{}: its dataset {} is not there, seen from this folder; name it with --data",
                     file.string(), dataset.string());

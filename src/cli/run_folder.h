@@ -18,8 +18,8 @@ struct RunOptions {
 void AddRunOptions(CLI::App* command, RunOptions* options);
 void AddWorkersOption(CLI::App* command, int* workers);
 
-// `given`, or if that is empty the folder below runs/ that was changed last; an error if there is
-// none.
+// `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
+// note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);
 // With a note on the terminal of each newer checkpoint that could not be read.
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);

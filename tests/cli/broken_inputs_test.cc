@@ -229,6 +229,49 @@ TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {
   ExpectRefused(fit + " --rate texture=0.1 --optimize texture", "transforms.json");  // no images
 }
 
+// What the program writes into a run's folder when it looks at it does not make the run newer.
+TEST_F(BrokenInputs, TheNewestRunIsTheOneThatWasTrainedLast) {
+  using std::filesystem::last_write_time;
+  const auto options = std::filesystem::copy_options::recursive;
+  std::filesystem::create_directories(folder_ / "runs/started");
+  for (const char* name : {"old", "new"})
+    std::filesystem::copy(RunFolder(), folder_ / "runs" / name, options);
+  Write("runs/started/run.json", "{}");
+  const auto now = last_write_time(folder_ / "runs/new/run.json");
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "runs/old/checkpoints"))
+    last_write_time(entry.path(), now - std::chrono::hours(1));
+  last_write_time(folder_ / "runs/old", now + std::chrono::hours(1));
+  const Path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_);
+  const Outcome outcome = RunProgram("report");
+  std::filesystem::remove_all(folder_ / "runs/new");
+  std::filesystem::remove_all(folder_ / "runs/old");
+  const Outcome none = RunProgram("report");
+  std::filesystem::current_path(before);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("runs/new: the newest run"), std::string::npos) << outcome.output;
+  EXPECT_EQ(none.exit_code, 3) << none.output;
+}
+
+// 3: what is to be read is missing; 1: what is to be written cannot be.
+TEST_F(BrokenInputs, ExitCodesOfPlaces) {
+  Write("file", "in the way");
+  const auto code = [](const std::string& arguments, const std::string& part) {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+    return outcome.exit_code;
+  };
+  const std::string file = (folder_ / "file").string();
+  EXPECT_EQ(code("eval --run " + file, file + ": no run folder"), 3);
+  EXPECT_EQ(code("eval --run " + folder_.string(), "no run.json"), 3);
+  EXPECT_EQ(code(Train(file + "/a.toml", Data()), "a.toml"), 3);
+  EXPECT_EQ(code("report --run " + RunFolder().string() + " --out /proc/a.html", "/proc/a.html: "),
+            1);
+  EXPECT_EQ(
+      code("train --config " + Config() + " --data " + Data().string() + " --out ''", "is empty"),
+      2);
+}
+
 TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   Write("file", "in the way");
   ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +
