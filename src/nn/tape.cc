@@ -286,6 +286,13 @@ Var Fail(const Var& operand, Status status) {
 bool Usable(const char* op, std::initializer_list<const Var*> operands) {
   const Var& first = **operands.begin();
   for (const Var* v : operands) {
+    if (v->has_context() && first.has_context() && &v->context() != &first.context()) {
+      // Memory, errors and whether anything is recorded are of a context: two would each know half.
+      for (Context* of : {&first.context(), &v->context()}) {
+        of->Fail(InvalidArgument("{}: operands are of two contexts; copy one's tensor", op));
+      }
+      return false;
+    }
     if (!v->valid()) return false;
     const bool is_float = v->dtype() == DType::kF32 || v->dtype() == DType::kF64;
     if (!is_float || v->dtype() != first.dtype()) {

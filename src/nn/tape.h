@@ -159,7 +159,8 @@ Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, 
 
 // The invalid Var of the operands' context, after noting `status` there.
 Var Fail(const Var& operand, Status status);
-// True where all are valid, of one float dtype; else the context of `operands` knows why.
+// True where all are valid, of one context and float dtype; else the contexts of `operands` know
+// why.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);
 // True where a tensor can have the shape of a result; else the context of `operand` knows why.
 bool Makeable(const char* op, const Var& operand, const Shape& result);

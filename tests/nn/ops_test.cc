@@ -147,6 +147,22 @@ TEST_F(Ops, WhatDoesNotFitIsNamed) {
   refused(SumTo(whole, {1}), "I32");
 }
 
+// What goes wrong in one of two contexts would not be seen in the other.
+TEST_F(Ops, OperandsOfTwoContextsAreRefused) {
+  Context other(workers_, DType::kF64);
+  const Var x = Random({3}), y = Parameter(other, other.Full({3}, 1)), broken = Gather(y, 9, {});
+  EXPECT_FALSE(other.TakeStatus().ok());
+  for (const Var& foreign : {y, broken}) {
+    EXPECT_FALSE((x + foreign).valid());
+    EXPECT_NE(context_.TakeStatus().message().find("add: operands are of two contexts"),
+              std::string::npos);
+    EXPECT_FALSE(other.TakeStatus().ok());
+    EXPECT_FALSE(Concat({x, foreign}, 0).valid());
+    EXPECT_FALSE(context_.TakeStatus().ok());
+    EXPECT_FALSE(other.TakeStatus().ok());
+  }
+}
+
 // Negative sizes, and those whose product no integer holds, must not reach a kernel.
 TEST_F(Ops, ImpossibleSizesAreRefused) {
   constexpr std::int64_t kHuge = std::int64_t{1} << 62;
@@ -210,6 +226,32 @@ TEST_F(Ops, SoftmaxOfLargeNumbersIsFinite) {
   const Tensor beyond = context_.Indices(std::vector<std::int32_t>{2});
   EXPECT_FALSE(CrossEntropy(x, beyond).valid());
   EXPECT_NE(context_.TakeStatus().message().find("index 2 of 2"), std::string::npos);
+}
+
+TEST_F(Ops, LogSumExpOfInfinities) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const double n = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> rows = {-kInfinity, -kInfinity, -kInfinity, 2,     kInfinity,
+                                    1,          n,          -kInfinity, 1e300, 1e300};
+  for (const DType dtype : {DType::kF64, DType::kF32}) {
+    Context context(workers_, dtype);
+    const Var x = Parameter(context, context.From({5, 2}, rows));
+    const Var y = LogSumExp(x, 1);
+    const auto doubles = [&](const Tensor& t) {
+      if (dtype == DType::kF64)
+        return std::vector<double>(t.span<double>().begin(), t.span<double>().end());
+      return std::vector<double>(t.span<float>().begin(), t.span<float>().end());
+    };
+    const std::vector<double> got = doubles(y.value());
+    EXPECT_EQ(got[0], -kInfinity);
+    EXPECT_EQ(got[1], 2);
+    EXPECT_EQ(got[2], kInfinity);
+    EXPECT_TRUE(std::isnan(got[3]));
+    EXPECT_EQ(got[4], dtype == DType::kF64 ? 1e300 : kInfinity);
+    std::vector<double> d = doubles(Grad(Sum(y), {x})[0].value());
+    d.resize(4);
+    EXPECT_EQ(d, (std::vector<double>{0, 0, 0, 1}));
+  }
 }
 
 TEST_F(Ops, NormalisedSamplesHaveMeanAndVariance) {

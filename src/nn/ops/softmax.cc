@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nn/ops/softmax.h"
 
+#include <limits>
+
 #include "base/error.h"
 #include "nn/ops/broadcast.h"
 #include "nn/ops/index.h"
@@ -31,8 +33,16 @@ Var Softmax(const Var& x, int axis) {
 }
 
 Var LogSumExp(const Var& x, int axis) {
+  if (!Usable("log sum exp", {&x})) return Invalid({&x});
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const double most = x.dtype() == DType::kF64 ? std::numeric_limits<double>::max()
+                                               : std::numeric_limits<float>::max();
   const Var largest = Detach(ReduceMax(x, {axis}, Keep::kYes));
-  return Sum(Add(Log(Sum(Exp(Sub(x, largest)), {axis}, Keep::kYes)), largest), {axis});
+  // Infinity less infinity has no value, so a finite number is taken out. The sum has a term of 1,
+  // or none at all, and log 0 would pull NaN.
+  const Var lowered = Sub(x, Clamp(largest, -most, most));
+  const Var sum = Clamp(Sum(Exp(lowered), {axis}, Keep::kYes), 0.5, kInfinity);
+  return Sum(Add(Log(sum), largest), {axis});
 }
 
 Var CrossEntropy(const Var& logits, const Tensor& labels) {
