@@ -24,12 +24,29 @@ struct DatasetOptions {
   std::string source = "sweethome3d", input, out, split_list;
   int workers = 0;
   bool fixed_size = false;  // --size or --views was given
+  bool shares = false;      // of the split were given
   train::BuildOptions build;
 };
 
 constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
 
+// An option that would do nothing is a mistake: somebody expects a split that there will not be.
+Status CheckEffects(const DatasetOptions& options) {
+  if (!options.split_list.empty() && options.source != "shapenet") {
+    return InvalidArgument("--split-list is for --source shapenet, not {}", options.source);
+  }
+  if (!options.input.empty() && options.source == "procedural") {
+    return InvalidArgument("--input: --source procedural reads no models; folder does");
+  }
+  if (options.shares && (options.source == "nmr" || !options.split_list.empty())) {
+    return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
+                           options.source == "nmr" ? "--source nmr" : "--split-list");
+  }
+  return {};
+}
+
 Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetOptions& options) {
+  TILEGRAD_TRY(CheckEffects(options));
   const train::BuildOptions& build = options.build;
   if (options.source == "procedural") {
     return train::ProceduralSource(build.per_class > 0 ? build.per_class : kProceduralModels,
@@ -151,15 +168,18 @@ void AddDataset(CLI::App& app, Action* action) {
                    "of the choice of models, the split and procedural shapes")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--test-share", build.split.test_share, "of each class's models")
-      ->capture_default_str();
-  command->add_option("--validation-share", build.split.validation_share, "of each class's models")
-      ->capture_default_str();
+  auto* test = command->add_option("--test-share", build.split.test_share, "of each class's models")
+                   ->capture_default_str();
+  auto* validation =
+      command
+          ->add_option("--validation-share", build.split.validation_share, "of each class's models")
+          ->capture_default_str();
   command->add_option("--split-list", options->split_list,
                       "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action, size, views] {
+  command->callback([options, action, size, views, test, validation] {
     options->fixed_size = size->count() + views->count() > 0;
+    options->shares = test->count() + validation->count() > 0;
     *action = [options] { return Make(*options); };
   });
 }

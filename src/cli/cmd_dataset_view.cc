@@ -96,10 +96,12 @@ void AddDatasetView(CLI::App& app, Action* action) {
   auto options = std::make_shared<ViewOptions>();
   auto* command = app.add_subcommand("dataset-view", "Save one image of a dataset as an RGBA PNG");
   command->add_option("--data", options->data, "dataset folder")->required();
-  command->add_option("--model", options->model,
-                      "CLASS/ID, as the files below models/ [one of --split]");
-  command->add_option("--class", options->class_name, "choose among the models of this class");
+  auto* model = command->add_option("--model", options->model,
+                                    "CLASS/ID, as the files below models/ [one of --split]");
+  command->add_option("--class", options->class_name, "choose among the models of this class")
+      ->excludes(model);
   command->add_option("--split", options->split, "train or test")
+      ->excludes(model)
       ->capture_default_str()
       ->check(CLI::IsMember({"train", "test"}));
   command->add_option("--view", options->view, "which view")

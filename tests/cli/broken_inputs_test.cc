@@ -227,6 +227,14 @@ TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {
   ExpectRefused(fit + " --rate uv=0.1 --optimize texture", "uv is not fitted");
   ExpectRefused(fit + " --rate texture=1e6 --optimize texture", "[0, 1000000)");
   ExpectRefused(fit + " --rate texture=0.1 --optimize texture", "transforms.json");  // no images
+  const std::string dataset = "dataset --out " + (folder_ / "d").string();
+  ExpectRefused(dataset + " --source procedural --split-list a", "--split-list", "shapenet");
+  ExpectRefused(dataset + " --source procedural --input a", "--input", "procedural");
+  ExpectRefused(dataset + " --source nmr --input a --test-share 0.1", "--test-share", "its own");
+  ExpectRefused(dataset + " --source shapenet --input a --split-list b --validation-share 0.1",
+                "--validation-share", "--split-list");
+  ExpectRefused("dataset-view --data " + Data().string() + " --model a --class b", "--class",
+                "--model");
 }
 
 // What the program writes into a run's folder when it looks at it does not make the run newer.
