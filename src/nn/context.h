@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every computation of this library is handed: workers, memory, the number type, and the place
-// where errors are noted. There are no globals; two contexts are independent, and an operation whose
-// operands are of two is an error.
+// where errors are noted. There are no globals; two contexts are independent, and an operation
+// whose operands are of two is an error.
 #pragma once
 
 #include <cstdint>
