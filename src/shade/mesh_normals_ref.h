@@ -3,7 +3,10 @@
 // scatter, so the float version is this code too.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "shade/mesh_normals.h"
@@ -40,17 +43,42 @@ void FaceNormalAdjointRef(const TriangleMeshT<T>& mesh, std::size_t face, const 
   }
 }
 
+template <class T>
+auto LargestRef(const Vec3<T>& x) {
+  return std::max({std::abs(RealPart(x[0])), std::abs(RealPart(x[1])), std::abs(RealPart(x[2]))});
+}
+
+// How large the products are whose differences are a face's normal: the sum of its roundings is a
+// few units in the last place of this, however thin the face is.
+template <class T>
+T NormalScaleRef(const TriangleMeshT<T>& mesh, std::size_t face) {
+  const Vec3<T> a = PositionRef(mesh, face, 0);
+  return T(LargestRef(Minus(PositionRef(mesh, face, 1), a)) *
+           LargestRef(Minus(PositionRef(mesh, face, 2), a)));
+}
+
+// Of a sum of normals whose scales add up to `scale`. What cancels leaves 7 half units of rounding
+// from each face, and one for each addition; normals that do not cancel are as large as the scale.
+template <class T>
+UnitVector<T> DirectionOfSumRef(const Vec3<T>& sum, const T& scale) {
+  using Real = decltype(RealPart(T()));
+  const Real rounding = 16 * std::numeric_limits<Real>::epsilon() * RealPart(scale);
+  return LargestRef(sum) > rounding ? NormalizeScaledRef(sum) : UnitVector<T>();
+}
+
 // units [V]
 template <class T>
 void SmoothNormalsRef(const TriangleMeshT<T>& mesh, std::span<UnitVector<T>> units) {
   for (auto& u : units) u = {};
   for (std::size_t f = 0; f < mesh.faces.size() / 3; ++f) {
     const Vec3<T> n = FaceNormalRef(mesh, f);
+    const T scale = NormalScaleRef(mesh, f);
     for (std::size_t k = 0; k < 3; ++k) {
-      AddScaled(T(1), n, units[static_cast<std::size_t>(mesh.faces[3 * f + k])].unit);
+      auto& sum = units[static_cast<std::size_t>(mesh.faces[3 * f + k])];
+      AddScaled(T(1), n, sum.unit), sum.inverse_length += scale;  // borrowed until the sum is there
     }
   }
-  for (auto& u : units) u = NormalizeScaledRef(u.unit);
+  for (auto& u : units) u = DirectionOfSumRef(u.unit, u.inverse_length);
 }
 
 // units [F]

@@ -58,6 +58,37 @@ TEST(MeshNormals, TinyMeshesHaveTheNormalsOfLargeOnes) {
   for (std::size_t v = 0; v < units.size(); ++v) EXPECT_EQ(units[v].unit, expected[v].unit) << v;
 }
 
+// Both sides of a sheet as faces of the same vertices, which start at any corner: what is left of
+// the sum is rounding, and would be a direction of no meaning with a gradient without bound.
+template <class T>
+void ExpectNoNormalOfBothSides(const std::vector<std::int32_t>& back) {
+  Rng rng(7, 2);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<T> positions(12);
+    for (T& p : positions) p = static_cast<T>(rng.Uniform(-1, 1) + (trial % 3) * 10);
+    std::vector<std::int32_t> faces = {0, 1, 2, 2, 1, 3};
+    faces.insert(faces.end(), back.begin(), back.end());
+    std::vector<UnitVector<T>> units(4);
+    const TriangleMeshT<T> mesh{positions, faces};
+    SmoothNormalsRef<T>(mesh, units);
+    std::vector<Vec3<T>> d_units(4, Vec3<T>{1, 2, 3});
+    std::vector<T> d_positions(positions.size());
+    SmoothNormalsAdjointRef<T>(mesh, units, d_units, d_positions);
+    for (const auto& u : units) EXPECT_EQ(u.unit, (Vec3<T>{0, 0, 0})) << trial;
+    for (const T d : d_positions) EXPECT_EQ(d, 0) << trial;
+    faces.resize(6);
+    SmoothNormalsRef<T>({positions, faces}, units);
+    for (const auto& u : units) EXPECT_NEAR(Dot(u.unit, u.unit), 1, 1e-6) << trial;
+  }
+}
+
+TEST(MeshNormals, BothSidesOfASheetHaveNoSmoothNormal) {
+  for (const std::vector<std::int32_t>& back :
+       {std::vector<std::int32_t>{0, 2, 1, 2, 3, 1}, {1, 0, 2, 1, 2, 3}, {2, 1, 0, 3, 1, 2}}) {
+    ExpectNoNormalOfBothSides<float>(back), ExpectNoNormalOfBothSides<double>(back);
+  }
+}
+
 // A derivative along a random direction of a random linear loss, against a complex step.
 template <class Normals, class Adjoint>
 void ExpectComplexStep(std::size_t rows, const Normals& normals, const Adjoint& adjoint) {
