@@ -23,10 +23,23 @@ std::int64_t Snap(const T& pixels) {
   return std::llrint(p * static_cast<double>(kSubpixels));
 }
 
+// Faces up to this wide and high are small: relative to a pixel centre within the face's box, the
+// products of their exact edge functions fit into 32 bits.
+inline constexpr std::int32_t kSmallExtent = 30 * 1024;  // subpixels
+// And they are not farther away than this.
+inline constexpr std::int32_t kFarSubpixels = 1 << 30;
+
 // A face in subpixels.
 struct SnappedFace {
   std::int64_t x[3], y[3];
 
+  bool small() const {
+    for (const auto* c : {x, y}) {
+      const auto [low, high] = std::minmax({c[0], c[1], c[2]});
+      if (low <= -kFarSubpixels || high >= kFarSubpixels || high - low > kSmallExtent) return false;
+    }
+    return true;
+  }
   // All corners within the guard band: edge functions fit into 64 bits, and after division by
   // kSubpixels, stepped through a tile, into 32.
   bool guarded() const {

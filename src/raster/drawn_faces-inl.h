@@ -47,14 +47,13 @@ HWY_INLINE ShapeCorners LoadShapeCorners(const ScreenMesh& mesh, std::size_t f, 
 }
 
 // Corners in subpixels. What is beyond any image saturates.
-inline constexpr float kFarSubpixels = 0x1p30f;
 struct SnappedLanes {
   FaceInt x[3], y[3];
 };
 
 HWY_INLINE FaceInt SnapLanes(FaceVec pixels) {
   const FaceTag d;
-  const auto far = hn::Set(d, kFarSubpixels);
+  const auto far = hn::Set(d, static_cast<float>(kFarSubpixels));
   const auto scaled = hn::Mul(pixels, hn::Set(d, static_cast<float>(kSubpixels)));
   return hn::NearestInt(hn::Min(hn::Max(scaled, hn::Neg(far)), far));
 }
@@ -69,7 +68,7 @@ HWY_INLINE RangeLanes RangeOf(const FaceInt (&c)[3]) {
 
 HWY_INLINE FaceIntMask IsSmall(const RangeLanes& range) {
   const FaceIntTag di;
-  const auto far = hn::Set(di, static_cast<std::int32_t>(kFarSubpixels));
+  const auto far = hn::Set(di, kFarSubpixels);
   const auto within = hn::And(hn::Gt(range.low, hn::Neg(far)), hn::Lt(range.high, far));
   return hn::And(within, hn::Lt(hn::Sub(range.high, range.low), hn::Set(di, kSmallExtent + 1)));
 }
@@ -146,7 +145,7 @@ HWY_INLINE void OrderLanes(ShapeCorners* c, int i, int j) {
   }
 }
 
-// MakeDepthPlane of face_plane.h, in the same order of operations.
+// NarrowDepthPlane of face_plane.h, in the same order of operations.
 HWY_INLINE void SetDepth(ShapeCorners c, FaceWords* out) {
   const FaceTag d;
   OrderLanes(&c, 0, 1), OrderLanes(&c, 1, 2), OrderLanes(&c, 0, 1);
@@ -262,6 +261,13 @@ HWY_INLINE FaceWords WordsOf(const ShapeCorners& corners, ShapeLanes* shapes, st
   return words;
 }
 
+void SetWideDepths(const ScreenMesh& mesh, DrawnFace* first, DrawnFace* end) {
+  for (; first != end; ++first) {
+    if (first->small != 0) continue;
+    first->depth = WideDepthPlane(mesh, static_cast<std::size_t>(first->face));
+  }
+}
+
 // Faces [begin, end). `out` null, or room for all of them. Returns how many were written.
 std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t end, bool cull_back,
                        std::uint8_t* reject, DrawnFace* out) {
@@ -277,7 +283,11 @@ std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t en
                      rows = PixelsOf(shapes.y, mesh.height);
     const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
     const std::uint32_t keep = drawn & MaskBits(covers);
-    if (keep != 0) to = StoreRecords(WordsOf(corners, &shapes, f, columns, rows), keep, to);
+    if (keep == 0) continue;
+    DrawnFace* const first = to;
+    const std::uint32_t small = MaskBits(shapes.small);
+    to = StoreRecords(WordsOf(corners, &shapes, f, columns, rows), keep, to);
+    if ((keep & ~small) != 0) SetWideDepths(mesh, first, to);
   }
   return static_cast<std::size_t>(to - out);
 }

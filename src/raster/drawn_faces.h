@@ -8,14 +8,11 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
+#include "raster/coverage.h"
 #include "raster/face_plane.h"
 #include "raster/screen_mesh.h"
 
 namespace tilegrad::raster {
-
-// Faces up to this wide and high are small: relative to a pixel centre within the face's box, the
-// products of their exact edge functions fit into 32 bits.
-inline constexpr std::int32_t kSmallExtent = 30 * 1024;  // subpixels
 
 // A face that has a pixel centre of the image in its box. Edge k at pixel (column, row) is
 // edge[k] + step_x[k] * (column - column_begin) + step_y[k] * (row - row_begin), and the pixel is
@@ -23,7 +20,8 @@ inline constexpr std::int32_t kSmallExtent = 30 * 1024;  // subpixels
 // which keeps their sign because a step of one pixel is a multiple of kSubpixels.
 struct DrawnFace {
   std::int32_t face;   // index into the ScreenMesh
-  std::int32_t small;  // 0: edge and steps are not set (TileFaceSetup makes them per tile)
+  std::int32_t small;  // SnappedFace::small; 0: edge and steps are not set (TileFaceSetup makes
+                       // them per tile)
   std::int16_t column_begin, column_end, row_begin, row_end;  // pixels, within the image
   std::int32_t edge[3], step_x[3], step_y[3];
   DepthPlane<float> depth;

@@ -3,11 +3,16 @@
 // Scalar template, shared by references and set-up code.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "raster/conventions.h"
+#include "raster/coverage.h"
 #include "raster/scalar.h"
 #include "raster/screen_mesh.h"
 
@@ -98,12 +103,18 @@ void SwapUnlessOrdered(ScreenCorners<T>* c, int i, int j) {
   std::swap(c->x[i], c->x[j]), std::swap(c->y[i], c->y[j]), std::swap(c->z[i], c->z[j]);
 }
 
-// The same bits for coinciding faces whatever corner they start at and however they are wound (both
-// sides of a double-sided face), so that the tie rule decides between them and not rounding.
+// Corners in an order that does not depend on where a face starts and how it is wound: coinciding
+// faces (both sides of a double-sided face) then have the same bits, so that the tie rule decides
+// between them and not rounding.
 template <class T>
-DepthPlane<T> MakeDepthPlane(const ScreenMeshT<T>& mesh, std::size_t face) {
+ScreenCorners<T> OrderedCorners(const ScreenMeshT<T>& mesh, std::size_t face) {
   ScreenCorners<T> c = CornersOf(mesh, face);
   SwapUnlessOrdered(&c, 0, 1), SwapUnlessOrdered(&c, 1, 2), SwapUnlessOrdered(&c, 0, 1);
+  return c;
+}
+
+template <class T>
+DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
   const FacePlane<T> weights = MakeFacePlane(c);
   DepthPlane<T> plane{weights.x0, weights.y0, T(0), T(0), T(0), c.z[0], c.z[0]};
   for (int k = 0; k < 3; ++k) {
@@ -113,6 +124,42 @@ DepthPlane<T> MakeDepthPlane(const ScreenMeshT<T>& mesh, std::size_t face) {
     if (RealPart(c.z[k]) > RealPart(plane.high)) plane.high = c.z[k];
   }
   return plane;
+}
+
+// Set up in double and counted from the middle of what the image holds of the face's box. A face
+// that was cut reaches far out of the image, where its 1/depth is hundreds of times what it is in
+// the image: seen from a corner out there, little would be left of it in float.
+inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face) {
+  const ScreenCorners<float> c = OrderedCorners(mesh, face);
+  ScreenCorners<double> wide;
+  std::copy_n(c.x, 3, wide.x), std::copy_n(c.y, 3, wide.y), std::copy_n(c.z, 3, wide.z);
+  const DepthPlane<double> plane = NarrowDepthPlane(wide);
+  const auto middle = [](const float(&v)[3], int size) {
+    const auto [low, high] = std::minmax({v[0], v[1], v[2]});
+    const auto end = static_cast<float>(size);
+    return (std::clamp(low, 0.0f, end) + std::clamp(high, 0.0f, end)) / 2;
+  };
+  const float x0 = middle(c.x, mesh.width), y0 = middle(c.y, mesh.height);
+  const double base = plane.base + (plane.gx * (x0 - plane.x0) + plane.gy * (y0 - plane.y0));
+  constexpr double kMost = std::numeric_limits<float>::max();
+  for (const double v : {base, plane.gx, plane.gy}) {
+    if (!(std::abs(v) <= kMost)) return NarrowDepthPlane(c);
+  }
+  return {x0,
+          y0,
+          static_cast<float>(base),
+          static_cast<float>(plane.gx),
+          static_cast<float>(plane.gy),
+          static_cast<float>(plane.low),
+          static_cast<float>(plane.high)};
+}
+
+template <class T>
+DepthPlane<T> MakeDepthPlane(const ScreenMeshT<T>& mesh, std::size_t face) {
+  if constexpr (std::is_same_v<T, float>) {
+    if (!SnapFace(mesh, face).small()) return WideDepthPlane(mesh, face);
+  }
+  return NarrowDepthPlane(OrderedCorners(mesh, face));
 }
 
 }  // namespace tilegrad::raster

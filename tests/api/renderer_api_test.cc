@@ -95,6 +95,49 @@ TEST(ApiImages, FloatAndDoubleAgree) {
   }
 }
 
+// A wall that reaches past the camera: what the image shows of it lies far from where it is cut, at
+// a hundredth of that depth. T: float or double.
+template <class T>
+struct CutWall {
+  std::vector<T> positions;
+  std::vector<std::int32_t> faces = {0, 1, 2};
+  SceneT<T> scene;
+
+  explicit CutWall(test::Numbers* numbers) : positions(numbers->Vector<T>(9, 4)) {
+    for (T& p : positions) p = static_cast<T>(static_cast<float>(p));
+    scene.positions = positions, scene.faces = faces;
+    scene.camera.fx = scene.camera.fy = 20, scene.camera.cx = 24, scene.camera.cy = 20;
+    scene.camera.near_plane = static_cast<T>(0.01f);
+  }
+};
+
+// Relative to depth 1e-5 is 170 roundings; 1/depth varies by up to 500 in these.
+TEST(ApiImages, FacesCutAtTheNearPlaneKeepTheirDigits) {
+  test::Numbers numbers, again;
+  RenderOptions options;
+  options.width = 48, options.height = 40;
+  const Outputs outputs = {.color = false, .depth = true};
+  Renderer renderer;
+  RendererT<double> reference;
+  Frame frame;
+  FrameT<double> truth;
+  int pixels = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const CutWall<float> wall(&numbers);
+    const CutWall<double> same(&again);
+    ASSERT_TRUE(renderer.Render({&wall.scene, 1}, options, outputs, &frame).ok());
+    ASSERT_TRUE(reference.Render({&same.scene, 1}, options, outputs, &truth).ok());
+    const Images& a = frame.images();
+    const ImagesT<double>& b = truth.images();
+    for (std::size_t i = 0; i < a.face_ids.size(); ++i) {
+      if (a.face_ids[i] < 0 || b.face_ids[i] < 0) continue;
+      ++pixels;
+      EXPECT_NEAR(a.depth[i], b.depth[i], 1e-5 * b.depth[i]) << trial << ' ' << i;
+    }
+  }
+  EXPECT_GT(pixels, 40000);
+}
+
 TEST(ApiImages, ScenesOfABatchAreRenderedAsAlone) {
   const TestScene<float> s(Lighting::kLambert);
   std::vector<Scene> scenes(5, s.scene);
