@@ -15,6 +15,7 @@
 #include <span>
 
 #include "raster/face_lanes-inl.h"
+#include "raster/face_plane.h"
 #include "raster/interpolate.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -98,6 +99,48 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
 }
 
+// Faces on which 1/depth varies by more than this are set up in double. Of such a face, cut at the
+// near plane for instance, the image holds a far end, where attributes are the quotient of two
+// small remainders: what float loses beside the near end is lost beside them.
+inline constexpr float kSteepDepth = 8;
+
+struct WeightLanes {
+  float value[kMostFaceLanes], dx[kMostFaceLanes], dy[kMostFaceLanes];
+};
+
+// WeightPlanes again for the lanes in `steep`.
+inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, Lane origin_y,
+                                         hn::Mask<LaneTag> steep, Plane out[3]) {
+  const LaneTag d;
+  HWY_ALIGN float x[3][kMostFaceLanes], y[3][kMostFaceLanes];
+  HWY_ALIGN float origin[2][kMostFaceLanes];
+  HWY_ALIGN WeightLanes lanes[3];
+  hn::Store(origin_x, d, origin[0]), hn::Store(origin_y, d, origin[1]);
+  for (int k = 0; k < 3; ++k) {
+    hn::Store(c.x[k], d, x[k]), hn::Store(c.y[k], d, y[k]);
+    hn::Store(out[k].value, d, lanes[k].value);
+    hn::Store(out[k].dx, d, lanes[k].dx), hn::Store(out[k].dy, d, lanes[k].dy);
+  }
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, steep, bits);
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
+    // Thin, or too large for float to tell: flat it stays.
+    if (lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0) continue;
+    const FacePlane<double> plane = MakeFacePlane(
+        ScreenCorners<double>{{x[0][i], x[1][i], x[2][i]}, {y[0][i], y[1][i], y[2][i]}, {0, 0, 0}});
+    const auto value = plane.Weights(origin[0][i], origin[1][i]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      lanes[k].value[i] = static_cast<float>(value[k]);
+      lanes[k].dx[i] = static_cast<float>(plane.gx[k]);
+      lanes[k].dy[i] = static_cast<float>(plane.gy[k]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    out[k] = {hn::Load(d, lanes[k].value), hn::Load(d, lanes[k].dx), hn::Load(d, lanes[k].dy)};
+  }
+}
+
 // Where the corners' attributes begin.
 HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::int32_t* faces,
                                       const CornerIndices& vertices) {
@@ -120,6 +163,10 @@ struct CornerPlanes {
   CornerIndices attributes;
 };
 
+HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
+  return hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
+}
+
 // Planes in terms of the position relative to an origin.
 HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt face, Lane origin_x,
                                          Lane origin_y) {
@@ -136,10 +183,12 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   const auto& z = corners.inverse_depth;
   const bool perspective = input.mode == Interpolation::kPerspective;
   out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
-  for (int k = 0; k < 3; ++k) {
-    out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
-    AddScaled(out.m[k], out.weight[k], &out.q);
+  for (int k = 0; k < 3; ++k) out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
+  const auto steep = hn::Lt(LeastQ(out), hn::Set(d, 1 / kSteepDepth));
+  if (HWY_UNLIKELY(!hn::AllFalse(d, steep))) {
+    SetSteepWeights(corners, origin_x, origin_y, steep, out.weight);
   }
+  for (int k = 0; k < 3; ++k) AddScaled(out.m[k], out.weight[k], &out.q);
   return out;
 }
 
@@ -168,10 +217,6 @@ HWY_INLINE void CornerAttributes(const InterpolateInput& input, const CornerPlan
                                  int first, Lane (&out)[4]) {
   LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, corners.attributes.at[k], first), 0,
             out);
-}
-
-HWY_INLINE Lane LeastQ(const CornerPlanes& corners) {
-  return hn::Min(hn::Min(corners.m[0], corners.m[1]), corners.m[2]);
 }
 
 inline constexpr int kQuadPixels = 4;

@@ -111,12 +111,13 @@ struct CutWall {
   }
 };
 
-// Relative to depth 1e-5 is 170 roundings; 1/depth varies by up to 500 in these.
+// Relative to depth 1e-5 is 170 roundings; weights are 1 at most, and amplify what is rounded of a
+// face's 1/depth, which varies by up to 500 in these.
 TEST(ApiImages, FacesCutAtTheNearPlaneKeepTheirDigits) {
   test::Numbers numbers, again;
   RenderOptions options;
   options.width = 48, options.height = 40;
-  const Outputs outputs = {.color = false, .depth = true};
+  const Outputs outputs = {.color = false, .depth = true, .barycentrics = true};
   Renderer renderer;
   RendererT<double> reference;
   Frame frame;
@@ -133,6 +134,9 @@ TEST(ApiImages, FacesCutAtTheNearPlaneKeepTheirDigits) {
       if (a.face_ids[i] < 0 || b.face_ids[i] < 0) continue;
       ++pixels;
       EXPECT_NEAR(a.depth[i], b.depth[i], 1e-5 * b.depth[i]) << trial << ' ' << i;
+      for (const std::size_t k : {i, i + a.face_ids.size()}) {
+        EXPECT_NEAR(a.barycentrics[k], b.barycentrics[k], 5e-5) << trial << ' ' << i;
+      }
     }
   }
   EXPECT_GT(pixels, 40000);
