@@ -13,9 +13,10 @@
 
 namespace tilegrad::train {
 
-// Solid occupancy of a mesh that is first scaled and moved so that its bounding box is centred in,
-// and its longest side fills, the cube [0, resolution]^3; voxel (i, j, k) has its centre at (i +
-// 0.5, j + 0.5, k + 0.5). A voxel is solid if the surface passes through it or if it cannot be
+// Solid occupancy of a mesh that is first scaled and moved so that the bounding box of its faces is
+// centred in, and its longest side fills, the cube [0, resolution]^3, up to a thousandth of a voxel
+// (a surface on a border of voxels belongs to one side only); voxel (i, j, k) has its centre at (i
+// + 0.5, j + 0.5, k + 0.5). A voxel is solid if the surface passes through it or if it cannot be
 // reached from outside (carving), so soups of open shells have a well-defined inside. Returns
 // [x][y][z] of 0 or 1. An error for an invalid mesh or one without extent.
 Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
