@@ -15,13 +15,13 @@ HWY_EXPORT(WinogradInputGradTarget);
 HWY_EXPORT(WinogradWeightGradTarget);
 
 bool WinogradFits(const Conv2dShape& s) {
-  constexpr std::size_t kChannels = 16;  // fewer do not pay for the transforms
   const std::size_t kernel = s.kernel_height;
   const bool known = (kernel == 3 && s.stride == 1 && s.padding < kernel) ||
                      (kernel == 4 && s.stride == 2) || (kernel == 5 && s.stride == 2);
   // Tiles of 2 x 2 must not hang over the edge by too much.
-  return known && kernel == s.kernel_width && s.batch > 0 && s.in_channels >= kChannels &&
-         s.out_channels >= kChannels && s.out_height() >= 3 && s.out_width() >= 3;
+  return known && kernel == s.kernel_width && s.batch > 0 &&
+         s.in_channels >= kLeastWinogradChannels && s.out_channels >= kLeastWinogradChannels &&
+         s.out_height() >= 3 && s.out_width() >= 3;
 }
 
 void WinogradForward(const Conv2dShape& shape, const float* x, const float* weight,

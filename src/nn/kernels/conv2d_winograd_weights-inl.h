@@ -16,6 +16,7 @@
 #include <cstddef>
 
 #include "base/parallel.h"
+#include "nn/kernels/conv2d_winograd.h"
 #include "nn/kernels/conv2d_winograd_tiles-inl.h"
 #include "nn/kernels/conv2d_winograd_transform-inl.h"
 #include "nn/kernels/pack-inl.h"
@@ -25,6 +26,16 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 
 constexpr std::size_t kRowLanes = RoundUp(kTileRows, kLanes);
 constexpr std::size_t kMostTaps = 25;  // of a kernel of 5 x 5
+
+// Whether the vectors of a step never end behind the step after it, which overwrites what is not
+// theirs: FillPhase counts on it. Of more channels no panel is smaller.
+constexpr bool StepsEndInTheNext() {
+  for (std::size_t n = kLeastWinogradChannels; n < kLeastWinogradChannels + 4 * kTileRows; ++n) {
+    if (2 * (n / DivideUp(n, kTileRows)) < kRowLanes) return false;
+  }
+  return true;
+}
+static_assert(StepsEndInTheNext());
 
 struct SlotTargets {
   float* data[4][4];
