@@ -31,8 +31,9 @@ constexpr std::size_t kTileVectors = 2;
 constexpr std::size_t kMostTileVectors = 3;  // of a tile of few rows
 constexpr std::size_t kTileColumns = kTileVectors * kLanes;
 // Two FMA units of latency 4 need 8 independent sums at least; 6 x 2 sums, two vectors of B and one
-// of A are 15 of 16 registers. Where there are 32 registers, 12 x 2 halve the loads per FMA.
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_ZEN4 || HWY_TARGET == HWY_NEON
+// of A are 15 of 16 registers. Where there are 32 registers, 12 x 2 halve the loads per FMA: AVX3
+// and what is better, which has lower bits and, in newer Highways, further names.
+#if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3) || HWY_TARGET == HWY_NEON
 constexpr std::size_t kTileRows = 12;
 #else
 constexpr std::size_t kTileRows = 6;

@@ -12,13 +12,14 @@ namespace tilegrad::nn {
 namespace {
 
 // Every kind of kernel; odd extents and paddings, so that tiles hang over each edge; channels that
-// leave tails; pixels that no output sees.
+// leave tails, and more inputs than are packed at a time, with panels of the fewest outputs; pixels
+// that no output sees.
 const std::vector<Conv2dShape> kShapes = {
     {3, 17, 8, 8, 19, 4, 4, 2, 1},   {2, 16, 13, 15, 33, 4, 4, 2, 1},
     {2, 32, 16, 16, 40, 4, 4, 2, 0}, {2, 20, 9, 10, 16, 3, 3, 1, 1},
     {1, 16, 40, 44, 16, 3, 3, 1, 0}, {2, 16, 6, 5, 18, 3, 3, 1, 2},
     {2, 20, 12, 9, 16, 5, 5, 2, 2},  {5, 18, 9, 7, 30, 5, 5, 2, 1},
-    {3, 16, 1, 2, 17, 3, 3, 1, 2},
+    {3, 16, 1, 2, 17, 3, 3, 1, 2},   {2, 40, 9, 8, 16, 4, 4, 2, 1},
 };
 
 double Largest(const std::vector<float>& v) {
