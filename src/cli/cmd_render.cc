@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "base/error.h"
@@ -96,7 +97,7 @@ class RenderRun {
   const StopFlag& stop_ = StopOnSignals();
   UniqueNames stems_;
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
-  std::size_t written_ = 0;
+  std::set<Path> files_;               // written
   Path last_;
 };
 
@@ -131,7 +132,11 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
   TILEGRAD_ASSIGN(const auto files,
                   WritePicture(picture, settings_.scene.color_space, settings_.file, name));
-  written_ += files.size();
+  for (const Path& file : files) {
+    if (files_.insert(file).second) continue;
+    return InvalidArgument("{}: is of two pictures; render these meshes into folders of their own",
+                           file.string());
+  }
   last_ = files.back();
   if (settings_.explain) Explain(picture, name.stem.string());
   views_.push_back({name.stem.filename().string() + name.ending, view.camera, view.size});
@@ -148,7 +153,7 @@ Status RenderRun::Mesh(const std::string& file) {
   const std::string stem = stems_.Take(Path(file).stem().string());
   const bool single = settings_.meshes.size() == 1 && views->size() == 1;
   for (std::size_t i = 0; i < views->size(); ++i) {
-    if (stop_) return Cancelled("stopped; {} files are written", written_);
+    if (stop_) return Cancelled("stopped; {} files are written", files_.size());
     line_.Sink()({"rendering " + stem, i, views->size(), ""});
     const std::string name = views->size() == 1 ? stem : stem + "_" + (*views)[i].name;
     TILEGRAD_ASSIGN(const PictureName picture, NamePicture(settings_.file, name, single));
@@ -159,7 +164,9 @@ Status RenderRun::Mesh(const std::string& file) {
 
 Status RenderRun::Finish() {
   line_.Finish();
-  if (written_ > 0) fmt::print("{} files, the last is {}\n", written_, last_.string());
+  if (!files_.empty()) {
+    fmt::print("{} files, the last is {}\n", files_.size(), last_.string());
+  }
   const Path cameras(settings_.write_cameras);
   if (cameras.empty() || views_.empty()) return {};
   return cameras.extension() == ".json" ? io::SaveNerfCameras(cameras, views_)

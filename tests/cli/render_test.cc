@@ -146,6 +146,13 @@ TEST_F(Render, ViewsOfOneNameDoNotOverwriteEachOther) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "out"), {}), 3);
 }
 
+// The depth of "ball" and the colours of "ball_depth".
+TEST_F(Render, PicturesOfOneNameAreRefused) {
+  ASSERT_TRUE(io::SaveGlb(folder_ / "ball_depth.glb", Icosphere(1, 1)).ok());
+  const std::string rest = "--size 8 --outputs color,depth --out " + In("out");
+  ExpectRefused(In("ball_depth.glb") + " " + rest, 2, "ball_depth.png: is of two pictures");
+}
+
 TEST_F(Render, ExplainSaysWhatWasDone) {
   const Outcome outcome = Run("--out " + In("a.png") + " --size 16 --explain");
   EXPECT_EQ(outcome.exit_code, 0);
