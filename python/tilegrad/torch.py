@@ -129,11 +129,21 @@ def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.
 
 def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
-    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019)."""
+    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).
+
+    ValueError where the first three are 0 or the last three parallel to them.
+    """
     first, second = numbers[..., :3], numbers[..., 3:]
     x = torch.nn.functional.normalize(first, dim=-1)
-    y = torch.nn.functional.normalize(second - (x * second).sum(-1, keepdim=True) * x, dim=-1)
-    return torch.stack([x, y, torch.cross(x, y, dim=-1)], dim=-2)
+    across = second - (x * second).sum(-1, keepdim=True) * x
+    y = torch.nn.functional.normalize(across, dim=-1)
+    z = torch.cross(x, y, dim=-1)
+    with torch.no_grad():
+        rounding = 8 * torch.finfo(numbers.dtype).eps * second.norm(dim=-1)
+        if not ((z.norm(dim=-1) > 0.5) & (across.norm(dim=-1) > rounding)).all():
+            raise ValueError("rotation_6d: of six numbers the first three are 0, or the last "
+                             "three parallel to them")
+    return torch.stack([x, y, z], dim=-2)
 
 
 _OPTIONS = frozenset(("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule",
@@ -148,6 +158,9 @@ class _Call:
 
     def __init__(self, arguments: dict[str, Any], options: dict[str, Any], threads: int,
                  surface_textures: Sequence[int]) -> None:
+        for name, value in options.items():
+            if isinstance(value, torch.Tensor) and value.requires_grad:
+                raise ValueError(f"render: {name} has no gradient; give {name}.item()")
         self.options, self.threads, self.surface_textures = options, threads, surface_textures
         self.arguments = dict(arguments)
         self.places: list[tuple[str, int]] = []

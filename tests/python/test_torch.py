@@ -2,6 +2,7 @@
 """tilegrad.torch: gradients against differences, graphs, memory, workers."""
 
 import copy
+import math
 import pickle
 import threading
 import unittest
@@ -368,9 +369,17 @@ class Errors(unittest.TestCase):
             rendered(given, outputs=("rgb",))
         with self.assertRaisesRegex(ValueError, r"rotation has shape \(3,\)"):
             tg.camera(rotation=torch.zeros(3))
+        with self.assertRaisesRegex(ValueError, "delta has no gradient"):
+            rendered(given, delta=torch.tensor(1e-3, requires_grad=True))
         given["positions"][3, 1] = float("nan")
         with self.assertRaisesRegex(ValueError, r"positions\[10\] is nan"):
             rendered(given)
+
+    def test_six_numbers_without_a_rotation(self):
+        for numbers in ([0, 0, 0, 1, 0, 0], [1, 2, 3, 2, 4, 6], [1, 0, 0, 0, 0, 0], [math.nan] * 6):
+            for dtype in (torch.float32, torch.float64):
+                with self.assertRaisesRegex(ValueError, "rotation_6d"):
+                    tg.rotation_6d(torch.tensor([[1, 0, 0, 0, 1, 0], numbers], dtype=dtype))
 
     def test_constants_of_the_package_are_taken(self):
         given = arguments(np.float32)
