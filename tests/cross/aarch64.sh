@@ -41,5 +41,8 @@ TEXT
 [ -e "$SYSROOT/complete" ] || fetch_libraries
 cmake --preset aarch64
 cmake --build --preset aarch64
+# qemu-user keeps books on each page of addresses that a program ever reserved; the networks' arenas take 64 GB of them each where
+# they may, and less where they may not.
+export QEMU_RESERVED_VA=8G
 export TILEGRAD_TEST_NO_FORK=1  # qemu-user stops at an assertion of its own where a forked child starts a thread
 exec ctest --preset aarch64 -L short "$@"
