@@ -109,8 +109,8 @@ class Dataset:
         return Camera.of_numbers(self._cameras)
 
     def set_epoch(self, epoch: int) -> None:
-        """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was set before they
-        started."""
+        """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was
+        set before they started."""
         self._epoch = _counting("set_epoch", "epoch", epoch)
 
     def __len__(self) -> int:

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "shade/normalize.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad::v0 {
@@ -44,12 +45,12 @@ Status ValidateEnumerations(const SceneT<T>& scene) {
 // To the engine it is darkness, and it pulls nothing: an optimiser would stay there.
 template <class T>
 Status ValidateLights(const SceneT<T>& scene) {
-  constexpr T kLeast = T(1e-30);  // as the engine has it
   const Lighting lighting = scene.shading.lighting;
   if (lighting != Lighting::kLambert && lighting != Lighting::kPhong) return {};
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
     const auto& d = scene.lights[i].direction;
-    if (std::all_of(d.begin(), d.end(), [](T x) { return std::abs(x) <= kLeast; })) {
+    if (std::all_of(d.begin(), d.end(),
+                    [](T x) { return std::abs(x) <= shade::kLeastComponent; })) {
       return InvalidArgument("lights[{}]: direction is {} {} {}, must not be 0", i, d[0], d[1],
                              d[2]);
     }

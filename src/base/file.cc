@@ -164,9 +164,9 @@ Status AppendText(const Path& path, std::string_view text, bool durable) {
 }
 
 Status MakeFolder(const Path& path) {
+  if (path.empty()) return InvalidArgument("the name of a folder is empty");
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (path.empty()) return InvalidArgument("the name of a folder is empty");
   if (error) return IoError("{}: cannot create the folder: {}", path.string(), error.message());
   return {};
 }

@@ -3,8 +3,6 @@
 // scatter, so the float version is this code too.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -41,11 +39,6 @@ void FaceNormalAdjointRef(const TriangleMeshT<T>& mesh, std::size_t face, const 
     to(1)[i] += d_e1[i];
     to(2)[i] += d_e2[i];
   }
-}
-
-template <class T>
-auto LargestRef(const Vec3<T>& x) {
-  return std::max({std::abs(RealPart(x[0])), std::abs(RealPart(x[1])), std::abs(RealPart(x[2]))});
 }
 
 // How large the products are whose differences are a face's normal: the sum of its roundings is a

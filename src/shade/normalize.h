@@ -15,6 +15,8 @@ namespace tilegrad::shade {
 inline constexpr float kLeastUnitSquare = 1e-12f;
 // Of vectors in units of the world.
 inline constexpr float kLeastWorldSquare = 1e-30f;
+// Of the largest component, where vectors may have any scale: normals of tiny faces, lights.
+inline constexpr float kLeastComponent = 1e-30f;
 
 // unit[3], *inverse_length <- x[3]. `unit` may be `x`.
 void Normalize(std::size_t count, const RunPlane* x, float least, RunPlane* unit,

@@ -27,13 +27,17 @@ UnitVector<T> NormalizeRef(const Vec3<T>& x, float least) {
   return {{x[0] * inverse, x[1] * inverse, x[2] * inverse}, inverse};
 }
 
-// The same for vectors of any scale, such as the normals of tiny faces: only what is below 1e-30 in
-// every component has no direction.
+template <class T>
+auto LargestRef(const Vec3<T>& x) {
+  return std::max({std::abs(RealPart(x[0])), std::abs(RealPart(x[1])), std::abs(RealPart(x[2]))});
+}
+
+// The same for vectors of any scale: only what has no component beyond kLeastComponent has no
+// direction.
 template <class T>
 UnitVector<T> NormalizeScaledRef(const Vec3<T>& x) {
-  auto scale = std::abs(RealPart(x[0]));
-  for (const T& c : x) scale = std::max(scale, std::abs(RealPart(c)));
-  if (!(scale > 1e-30f) || !std::isfinite(scale)) return {};
+  const auto scale = LargestRef(x);
+  if (!(scale > kLeastComponent) || !std::isfinite(scale)) return {};
   // Scaling by a constant changes neither the direction nor its derivative.
   const T s = T(1) / T(scale);
   UnitVector<T> out = NormalizeRef<T>({x[0] * s, x[1] * s, x[2] * s}, 0);

@@ -2,9 +2,11 @@
 // Two-dimensional convolution and its two adjoints, which are each other's derivatives: whatever
 // order of derivative is asked for, it is one of these three again.
 //
-//   forward      y[n,o,i,j]   = sum_{c,u,v} w[o,c,u,v] x[n,c,i s - p + u, j s - p + v]   (+
-//   bias[o]) input grad   d_x[n,c,..]  = the transpose of forward in x; also transposed convolution
-//   of d_y weight grad  d_w[o,c,u,v] = sum_{n,i,j} d_y[n,o,i,j] x[n,c,i s - p + u, j s - p + v]
+//   forward       y[n,o,i,j] = bias[o] + sum_{c,u,v} w[o,c,u,v] x[n,c,i s - p + u,j s - p + v]
+//
+//   input grad    d_x = the transpose of forward in x, applied to d_y: a transposed convolution
+//
+//   weight grad   d_w[o,c,u,v] = sum_{n,i,j} d_y[n,o,i,j] x[n,c,i s - p + u,j s - p + v]
 //
 // with x zero outside the image, s the stride, p the padding. Like the field's "convolution" this
 // is a cross-correlation: kernels are not flipped. Tensors are dense: x [N,C,H,W], w [O,C,U,V],
