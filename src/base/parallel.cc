@@ -158,29 +158,55 @@ Workers::~Workers() {
   if (impl_ != nullptr && !TbbIsOfThisProcess()) static_cast<void>(impl_.release());
 }
 
+bool Workers::HasArena() const { return impl_ != nullptr && TbbIsOfThisProcess(); }
+
+namespace {
+
+// The loop, by the threads of the arena that the calling one is in.
+void ForInArena(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, n, 1),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        const auto worker = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
+        for (std::size_t i = range.begin(); i != range.end(); ++i) task(i, worker);
+      },
+      tbb::simple_partitioner());
+}
+
+}  // namespace
+
 void Workers::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) const {
   if (count_ == 1 || n <= 1) {
     for (std::size_t i = 0; i < n; ++i) task(i, 0);
     return;
   }
-  if (impl_ == nullptr || !TbbIsOfThisProcess()) {
+  if (!HasArena()) {
     ForOnOwnThreads(this, &own_loop_, n, task);
     return;
   }
-  const auto loop = [&] {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, n, 1),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          const auto worker =
-              static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
-          for (std::size_t i = range.begin(); i != range.end(); ++i) task(i, worker);
-        },
-        tbb::simple_partitioner());
-  };
   // Isolated: while a thread waits for a loop, a nested one above all, it may only take that loop's
   // tasks, so a worker's scratch is never entered twice. Inside the arena, because to execute in an
   // arena, be it the same one, ends the isolation of the caller.
-  impl_->arena.execute([&] { tbb::this_task_arena::isolate(loop); });
+  impl_->arena.execute([&] { tbb::this_task_arena::isolate([&] { ForInArena(n, task); }); });
+}
+
+void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) const {
+  if (parts_ == 1) {  // not in the arena
+    workers_.For(n, task);
+  } else if (n > 1 && waiting_.load(std::memory_order_relaxed) == 0 && workers_.HasArena()) {
+    // Not isolated: what may be taken meanwhile are tasks of loops like this one, which never wait.
+    ForInArena(n, task);
+  } else {
+    for (std::size_t i = 0; i < n; ++i) task(i, worker_);
+  }
+}
+
+void Workers::ForParts(std::size_t n, FunctionRef<void(std::size_t, const Part&)> task) const {
+  std::atomic<std::size_t> waiting{n};
+  For(n, [&](std::size_t index, std::size_t worker) {
+    waiting.fetch_sub(1, std::memory_order_relaxed);
+    task(index, Part(*this, worker, n, waiting));
+  });
 }
 
 void Workers::ForRanges(std::size_t n, std::size_t grain,

@@ -3,6 +3,7 @@
 // oneTBB.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -44,8 +45,36 @@ class Workers {
       std::size_t n, std::size_t grain,
       FunctionRef<void(std::size_t begin, std::size_t end, std::size_t worker)> task) const;
 
+  // A task of ForParts.
+  class Part {
+   public:
+    std::size_t worker() const { return worker_; }
+
+    // Workers::For within the task, but for what it says of nesting: `task` has no loops.
+    void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
+
+   private:
+    friend class Workers;
+    const Workers& workers_;
+    std::size_t worker_, parts_;
+    const std::atomic<std::size_t>& waiting_;  // parts that nobody has taken
+
+    Part(const Workers& workers, std::size_t worker, std::size_t parts,
+         const std::atomic<std::size_t>& waiting)
+        : workers_(workers), worker_(worker), parts_(parts), waiting_(waiting) {}
+  };
+
+  // For where tasks are few and long, so that the last ones would leave workers idle: as long as
+  // some wait to be taken, a worker goes through the loops of its task alone; then those that have
+  // none take part in them. A worker that waits for the end of such a loop may run a part of
+  // another one, so what is to outlast a loop must be in memory of the task, not in scratch of its
+  // worker that those of other tasks use.
+  void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task) const;
+
  private:
   struct Impl;
+  bool HasArena() const;  // of oneTBB, which this process may use
+
   int count_;
   std::unique_ptr<Impl> impl_;  // null where oneTBB is not used
   mutable std::mutex own_loop_;

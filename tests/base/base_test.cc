@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -89,6 +90,50 @@ TEST(Workers, AWorkerThatWaitsForANestedLoopTakesNoOtherTask) {
   }
   EXPECT_EQ(overlaps, 0);
   EXPECT_EQ(total, 20 * 20 * 4);
+}
+
+TEST(Workers, PartsShareTheirLoops) {
+  for (const int count : {1, 2, 3, 7}) {
+    for (const std::size_t parts : {1, 2, 7, 20}) {
+      const Workers workers(count);
+      std::vector<std::atomic<int>> calls(parts * 30), busy(static_cast<std::size_t>(count));
+      std::vector<std::atomic<int>> owned(static_cast<std::size_t>(count));
+      std::atomic<int> overlaps = 0;
+      workers.ForParts(parts, [&](std::size_t p, const Workers::Part& part) {
+        if (owned.at(part.worker())++ != 0) ++overlaps;
+        for (std::size_t loop = 0; loop < 3; ++loop) {
+          part.For(10, [&](std::size_t i, std::size_t worker) {
+            if (busy.at(worker)++ != 0) ++overlaps;
+            ++calls[p * 30 + loop * 10 + i];
+            --busy.at(worker);
+          });
+        }
+        --owned.at(part.worker());
+      });
+      EXPECT_EQ(overlaps, 0);
+      for (const auto& c : calls) EXPECT_EQ(c, 1);
+    }
+  }
+}
+
+// One part has much to do, and the others nothing. Tasks sleep, so that others take some of them.
+TEST(Workers, WithoutAPartTheyTakeThoseOfOthers) {
+  const Workers workers(3);
+  std::vector<std::atomic<int>> tasks(3);
+  workers.ForParts(3, [&](std::size_t p, const Workers::Part& part) {
+    for (int loop = 0; p == 0 && loop < 100; ++loop) {
+      part.For(8, [&](std::size_t, std::size_t worker) {
+        std::this_thread::sleep_for(std::chrono::microseconds(100));
+        ++tasks.at(worker);
+      });
+    }
+  });
+  EXPECT_EQ(tasks[0] + tasks[1] + tasks[2], 800);
+  const int most = std::max({tasks[0].load(), tasks[1].load(), tasks[2].load()});
+  // Loops on threads of their own do not share.
+  if (!test::kThreadSanitizer) {
+    EXPECT_LT(most, 800);
+  }
 }
 
 // Sums of a nested loop by index, on `workers`; each worker's scratch is used by one task at a

@@ -109,7 +109,8 @@ struct WinogradMemory {
   float *weights, *values, *all_places;
 };
 
-// The loops of a portion: all workers share them, or its owner goes through them alone.
+// The loops of a portion: all workers share them, or its owner goes through them, with workers that
+// have no portion left.
 struct SharedLoops {
   const Workers& workers;
   static constexpr std::size_t owner = 0;
@@ -120,10 +121,11 @@ struct SharedLoops {
 };
 
 struct OwnLoops {
+  const Workers::Part& part;
   std::size_t owner;
   template <class Task>
   void For(std::size_t n, const Task& task) const {
-    for (std::size_t i = 0; i < n; ++i) task(i, owner);
+    part.For(n, task);
   }
 };
 
@@ -132,8 +134,8 @@ template <class Run>
 void ForPortions(const Portions& portions, const Workers& workers, const Run& run) {
   const std::size_t count = portions.cut.units.count();
   if (portions.cut.own) {
-    workers.For(count, [&](std::size_t portion, std::size_t worker) {
-      run(portions.rows(portion), OwnLoops{worker});
+    workers.ForParts(count, [&](std::size_t portion, const Workers::Part& part) {
+      run(portions.rows(portion), OwnLoops{part, part.worker()});
     });
   } else {
     for (std::size_t portion = 0; portion < count; ++portion) {
