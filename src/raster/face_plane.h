@@ -59,6 +59,16 @@ ScreenCorners<T> CornersOf(const ScreenMeshT<T>& mesh, std::size_t face) {
   return out;
 }
 
+// The same in double, for what takes small differences of large products of them.
+template <class T>
+ScreenCorners<double> Wide(const ScreenCorners<T>& c) {
+  ScreenCorners<double> out;
+  for (int k = 0; k < 3; ++k) {
+    out.x[k] = RealPart(c.x[k]), out.y[k] = RealPart(c.y[k]), out.z[k] = RealPart(c.z[k]);
+  }
+  return out;
+}
+
 template <class T>
 FacePlane<T> MakeFacePlane(const ScreenCorners<T>& c) {
   const T x1 = c.x[1] - c.x[0], y1 = c.y[1] - c.y[0];
@@ -131,9 +141,7 @@ DepthPlane<T> NarrowDepthPlane(const ScreenCorners<T>& c) {
 // the image: seen from a corner out there, little would be left of it in float.
 inline DepthPlane<float> WideDepthPlane(const ScreenMesh& mesh, std::size_t face) {
   const ScreenCorners<float> c = OrderedCorners(mesh, face);
-  ScreenCorners<double> wide;
-  std::copy_n(c.x, 3, wide.x), std::copy_n(c.y, 3, wide.y), std::copy_n(c.z, 3, wide.z);
-  const DepthPlane<double> plane = NarrowDepthPlane(wide);
+  const DepthPlane<double> plane = NarrowDepthPlane(Wide(c));
   const auto middle = [](const float(&v)[3], int size) {
     const auto [low, high] = std::minmax({v[0], v[1], v[2]});
     const auto end = static_cast<float>(size);

@@ -23,7 +23,8 @@ struct ShadePixel {
   shade::Vec3<T> color = {T(1), T(1), T(1)};
   std::array<T, 2> uv = {T(0), T(0)};
   shade::Vec3<T> normal = {}, position = {}, light_direction = {};
-  float side = 1, level = 0;
+  float side = 1;
+  decltype(RealPart(T())) level = 0;
   std::size_t surface = 0;
 };
 

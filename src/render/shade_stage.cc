@@ -31,9 +31,10 @@ T* PlaneOf(T* batch, std::size_t planes, std::size_t c, std::size_t pixels,
   return batch + (block.image * planes + c) * pixels + block.first;
 }
 
-// Counter-clockwise in space is clockwise here, where y goes down.
+// Counter-clockwise in space is clockwise here, where y goes down. In double: of faces that reach
+// far out of the image float does not know the sign.
 bool SeenFromFront(const raster::ScreenMesh& mesh, std::size_t f) {
-  const raster::ScreenCorners<float> c = raster::CornersOf(mesh, f);
+  const raster::ScreenCorners<double> c = raster::Wide(raster::CornersOf(mesh, f));
   return (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]) <= 0;
 }
 
@@ -66,7 +67,7 @@ void SetLevels(const PixelBlock& block, const PixelRun& run, int first_uv, Inter
     const int x = block.rows.x0 + (at & (raster::kBinSize - 1));
     const int y = block.rows.row_begin + (at >> raster::kBinBits);
     const double uv[2] = {v->uv[0].at[to], v->uv[1].at[to]};
-    v->level.at[to] = UvLevel(planes, x + 0.5, y + 0.5, uv, size);
+    v->level.at[to] = UvLevel<float>(planes, x + 0.5, y + 0.5, uv, size);
   });
   PadRun(run.count, &v->level);
 }

@@ -204,9 +204,9 @@ ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& opti
   const double uv[2] = {static_cast<double>(RealPart(p.uv[0])),
                         static_cast<double>(RealPart(p.uv[1]))};
   const int size[2] = {view.width, view.height};
-  p.level = UvLevel(UvPlanesOf(mesh, s.prepared.attributes, s.set.first(Varying::kUv), at.face,
-                               options.interpolation),
-                    RealPart(at.px), RealPart(at.py), uv, size);
+  const UvPlanes planes = UvPlanesOf(mesh, s.prepared.attributes, s.set.first(Varying::kUv),
+                                     at.face, options.interpolation);
+  p.level = UvLevel<decltype(p.level)>(planes, RealPart(at.px), RealPart(at.py), uv, size);
   return p;
 }
 

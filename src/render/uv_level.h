@@ -3,7 +3,9 @@
 // crosses, the longer of the steps to the right and down (L. Williams, Pyramidal parametrics,
 // 1983).
 //
-// With u = N / Q over a face (raster/interpolate.h), du/dx = (dN/dx - u dQ/dx) / Q.
+// With u = N / Q over a face (raster/interpolate.h), du/dx = (dN/dx - u dQ/dx) / Q. Planes are in
+// double for any T: of a face that was cut at the near plane the image holds a far end, where that
+// difference is a small remainder of what N and Q are elsewhere.
 #pragma once
 
 #include <algorithm>
@@ -23,41 +25,52 @@ struct UvPlanes {
   double x0 = 0, y0 = 0, least_q = 0;
 };
 
+// How what is v0, v1, v2 at the corners of a face changes over the screen.
+inline void SetSlopes(const raster::FacePlane<double>& face, double v0, double v1, double v2,
+                      double* x, double* y) {
+  *x = face.gx[1] * (v1 - v0) + face.gx[2] * (v2 - v0);
+  *y = face.gy[1] * (v1 - v0) + face.gy[2] * (v2 - v0);
+}
+
 // Channels [first, first + 2) of the attributes are u, v.
 template <class T>
 UvPlanes UvPlanesOf(const raster::ScreenMeshT<T>& mesh,
                     const raster::AttributeViewT<const T>& attributes, int first, std::size_t face,
                     Interpolation mode) {
-  const auto plane = raster::MakeFacePlane(mesh, face);
-  UvPlanes out;
-  out.x0 = raster::RealPart(plane.x0), out.y0 = raster::RealPart(plane.y0);
+  const raster::ScreenCorners<double> corners = raster::Wide(raster::CornersOf(mesh, face));
+  const raster::FacePlane<double> plane = raster::MakeFacePlane(corners);
+  const bool perspective = mode == Interpolation::kPerspective;
+  double m[3], n[2][3];
   for (int k = 0; k < 3; ++k) {
-    const auto vertex = static_cast<std::size_t>(mesh.vertex(face, k));
-    const bool perspective = mode == Interpolation::kPerspective;
-    const double m = perspective ? raster::RealPart(mesh.inverse_depth[vertex]) : 1.0;
-    const double gx = m * raster::RealPart(plane.gx[k]), gy = m * raster::RealPart(plane.gy[k]);
+    m[k] = perspective ? corners.z[k] : 1.0;
     const T* const uv = attributes.corner(mesh, face, k) + first;
-    for (int i = 0; i < 2; ++i) {
-      out.n_x[i] += gx * raster::RealPart(uv[i]), out.n_y[i] += gy * raster::RealPart(uv[i]);
-    }
-    out.q_x += gx, out.q_y += gy, out.q += m * raster::RealPart(plane.base[k]);
-    out.least_q = k == 0 ? m : std::min(out.least_q, m);
+    for (int i = 0; i < 2; ++i) n[i][k] = m[k] * raster::RealPart(uv[i]);
   }
+  UvPlanes out;
+  for (int i = 0; i < 2; ++i) {
+    SetSlopes(plane, n[i][0], n[i][1], n[i][2], &out.n_x[i], &out.n_y[i]);
+  }
+  SetSlopes(plane, m[0], m[1], m[2], &out.q_x, &out.q_y);
+  out.x0 = plane.x0, out.y0 = plane.y0;
+  out.q = plane.base[0] * m[0] + plane.base[1] * m[1] + plane.base[2] * m[2];
+  out.least_q = std::min({m[0], m[1], m[2]});
   return out;
 }
 
-// At the pixel centre (px, py), where the coordinates are (u, v), of a texture's size.
-inline float UvLevel(const UvPlanes& p, double px, double py, const double (&uv)[2],
-                     const int (&size)[2]) {
+// At the pixel centre (px, py), where the coordinates are (u, v), of a texture's size. Real: float,
+// whose logarithm is quicker, or double.
+template <class Real>
+Real UvLevel(const UvPlanes& p, double px, double py, const double (&uv)[2], const int (&size)[2]) {
   const double q = std::max(p.q + p.q_x * (px - p.x0) + p.q_y * (py - p.y0), p.least_q);
   double across = 0, down = 0;
   for (int i = 0; i < 2; ++i) {
-    const double x = (p.n_x[i] - uv[i] * p.q_x) / q * size[i];
-    const double y = (p.n_y[i] - uv[i] * p.q_y) / q * size[i];
+    const double texels = size[i] / q;
+    const double x = (p.n_x[i] - uv[i] * p.q_x) * texels;
+    const double y = (p.n_y[i] - uv[i] * p.q_y) * texels;
     across += x * x, down += y * y;
   }
   const double most = std::clamp(std::max(across, down), 1e-30, 1e30);
-  return 0.5f * std::log2(static_cast<float>(most));
+  return Real(0.5) * std::log2(static_cast<Real>(most));
 }
 
 }  // namespace tilegrad

@@ -19,9 +19,10 @@ void TexturePyramid::Build(const TextureView& texture) {
   for (std::size_t l = 0; l < sizes_.size(); ++l) {
     levels_.push_back({texels_.data() + 4 * sizes_[l].first, sizes_[l].width, sizes_[l].height});
     if (l == 0) continue;
-    ForEachCovered(sizes_[l - 1], sizes_[l], [&](std::size_t to, std::size_t source, float weight) {
+    const auto add = [&](std::size_t to, std::size_t source, float weight) {
       for (std::size_t c = 0; c < 4; ++c) texels_[4 * to + c] += weight * texels_[4 * source + c];
-    });
+    };
+    ForEachCovered<float>(sizes_[l - 1], sizes_[l], add);
   }
 }
 
@@ -49,11 +50,12 @@ void TextureGradient::Scatter(std::span<const TexelShare> shares, const RowShare
 
 void TextureGradient::Finish(std::span<float> out) {
   for (std::size_t l = sizes_.size(); l-- > 1;) {
-    ForEachCovered(sizes_[l - 1], sizes_[l], [&](std::size_t to, std::size_t source, float weight) {
+    const auto add = [&](std::size_t to, std::size_t source, float weight) {
       for (std::size_t c = 0; c < 4; ++c) {
         d_texels_[4 * source + c] += weight * d_texels_[4 * to + c];
       }
-    });
+    };
+    ForEachCovered<float>(sizes_[l - 1], sizes_[l], add);
   }
   for (std::size_t i = 0; i < sizes_[0].texels(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) out[3 * i + c] = d_texels_[4 * i + c];

@@ -36,31 +36,34 @@ inline int LevelCount(int width, int height, Filter filter) {
   return count;
 }
 
-// The texels of the finer level that a texel covers, along one axis: at most three.
+// The texels of the finer level that a texel covers, along one axis: at most three. Real: float or
+// double.
+template <class Real>
 struct Coverage {
   int first, count;
-  float weight[3];  // sum to 1
+  Real weight[3];  // sum to 1
 };
 
-inline Coverage CoverageOf(int j, int coarse, int fine) {
+template <class Real>
+Coverage<Real> CoverageOf(int j, int coarse, int fine) {
   if (fine % coarse == 0) {
     const int ratio = fine / coarse;  // 1, 2, or 3 texels that become one
-    const float weight = 1.0f / static_cast<float>(ratio);
+    const Real weight = Real(1) / static_cast<Real>(ratio);
     return {j * ratio, ratio, {weight, weight, weight}};
   }
-  const auto m = static_cast<float>(coarse), x = static_cast<float>(j);
-  const float all = static_cast<float>(fine) / m;
+  const auto m = static_cast<Real>(coarse), x = static_cast<Real>(j);
+  const Real all = static_cast<Real>(fine) / m;
   return {2 * j, 3, {(1 - x / m) / all, 1 / all, (x + 1) / m / all}};
 }
 
 // Texels of all levels in one array, [texel][kChannels]; level 0 is given. One loop for the way
 // there and back: calls visit(coarse texel, fine texel, weight).
-template <class Visit>
+template <class Real, class Visit>
 void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit& visit) {
   for (int y = 0; y < coarse.height; ++y) {
-    const Coverage rows = CoverageOf(y, coarse.height, fine.height);
+    const Coverage<Real> rows = CoverageOf<Real>(y, coarse.height, fine.height);
     for (int x = 0; x < coarse.width; ++x) {
-      const Coverage columns = CoverageOf(x, coarse.width, fine.width);
+      const Coverage<Real> columns = CoverageOf<Real>(x, coarse.width, fine.width);
       const auto to = coarse.first + static_cast<std::size_t>(y * coarse.width + x);
       for (int r = 0; r < rows.count; ++r) {
         for (int c = 0; c < columns.count; ++c) {

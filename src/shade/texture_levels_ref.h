@@ -19,6 +19,8 @@ namespace tilegrad::shade {
 // The levels of a texture, [texel][channels] one after the other.
 template <class T>
 struct PyramidRef {
+  using Real = decltype(RealPart(T()));
+
   TextureViewT<T> texture;
   std::vector<LevelSize> sizes;
   std::vector<T> texels;
@@ -31,11 +33,12 @@ struct PyramidRef {
       sizes.push_back(size);
       texels.resize(channels * (size.first + size.texels()), T(0));
       if (sizes.size() == 1) continue;
-      ForEachCovered(*(sizes.end() - 2), size, [&](std::size_t to, std::size_t from, float weight) {
+      const auto add = [&](std::size_t to, std::size_t from, Real weight) {
         for (std::size_t c = 0; c < channels; ++c) {
           texels[channels * to + c] += T(weight) * texels[channels * from + c];
         }
-      });
+      };
+      ForEachCovered<Real>(*(sizes.end() - 2), size, add);
     }
   }
 
@@ -57,31 +60,35 @@ struct PyramidRef {
   void Fold(std::span<T> d_texels) const {
     const auto channels = static_cast<std::size_t>(texture.channels);
     for (std::size_t l = sizes.size(); l-- > 1;) {
-      ForEachCovered(sizes[l - 1], sizes[l], [&](std::size_t to, std::size_t from, float weight) {
+      const auto add = [&](std::size_t to, std::size_t from, Real weight) {
         for (std::size_t c = 0; c < channels; ++c) {
           d_texels[channels * from + c] += T(weight) * d_texels[channels * to + c];
         }
-      });
+      };
+      ForEachCovered<Real>(sizes[l - 1], sizes[l], add);
     }
   }
 };
 
 // The levels that a lookup mixes, and the share of the coarser one.
+template <class Real>
 struct LevelMix {
   std::size_t fine, coarse;
-  float share;
+  Real share;
 };
 
-inline LevelMix MixLevels(float level, std::size_t levels) {
-  const float most = static_cast<float>(levels - 1);
-  const float kept = level > 0 ? std::min(level, most) : 0.0f;  // NaN: the finest
+template <class Real>
+LevelMix<Real> MixLevels(Real level, std::size_t levels) {
+  const auto most = static_cast<Real>(levels - 1);
+  const Real kept = level > 0 ? std::min(level, most) : Real(0);  // NaN: the finest
   const auto fine = static_cast<std::size_t>(kept);
-  return {fine, std::min(fine + 1, levels - 1), kept - static_cast<float>(fine)};
+  return {fine, std::min(fine + 1, levels - 1), kept - static_cast<Real>(fine)};
 }
 
 // `level` as TextureInput::level; not read unless the filter is trilinear.
 template <class T>
-std::array<T, 3> SampleRef(const PyramidRef<T>& pyramid, const T& u, const T& v, float level) {
+std::array<T, 3> SampleRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
+                           typename PyramidRef<T>::Real level) {
   std::array<T, 3> fine, coarse;
   const LevelMix mix = MixLevels(level, pyramid.sizes.size());
   SampleLevelRef<T>(pyramid.Level(mix.fine), u, v, fine);
@@ -93,8 +100,9 @@ std::array<T, 3> SampleRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
 
 // Adds to d_uv[2] and to d_texels of all levels; Fold brings those to the finest.
 template <class T>
-void SampleAdjointRef(const PyramidRef<T>& pyramid, const T& u, const T& v, float level,
-                      const std::array<T, 3>& d_color, std::span<T> d_uv, std::span<T> d_texels) {
+void SampleAdjointRef(const PyramidRef<T>& pyramid, const T& u, const T& v,
+                      typename PyramidRef<T>::Real level, const std::array<T, 3>& d_color,
+                      std::span<T> d_uv, std::span<T> d_texels) {
   const LevelMix mix = MixLevels(level, pyramid.sizes.size());
   const auto add = [&](std::size_t l, const T& share) {
     if (share == T(0)) return;
