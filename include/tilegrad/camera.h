@@ -2,6 +2,8 @@
 // The camera. docs/conventions.md has a picture and a number for each rule below.
 #pragma once
 
+#include <type_traits>
+
 #include "tilegrad/abi.h"
 #include "tilegrad/status.h"
 
@@ -37,26 +39,36 @@ struct Orbit {
   double distance = 1;                // world units, > 0
 };
 
-// Errors: a number that is not finite or out of its range.
-TILEGRAD_API Result<Camera> MakeCamera(const Lens& lens, const Orbit& orbit);
+// Of functions below T is float or double; inside, both are computed in double.
+
+// MakeCamera<double>(lens, orbit) is for SceneT<double>. Errors: a number that is not finite or out
+// of its range.
+template <class T = float>
+TILEGRAD_API Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit);
 
 // Six numbers of rotation, the first two rows of a matrix before they are made orthonormal
 // (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019), and
 // the rest of a camera: what an optimiser may move freely.
-struct CameraParameters {
-  float rotation[6] = {1, 0, 0, 0, 1, 0};
-  float translation[3] = {0, 0, 0};
-  float fx = 64, fy = 64, cx = 32, cy = 32;
+template <class T>
+struct CameraParametersT {
+  T rotation[6] = {1, 0, 0, 0, 1, 0};
+  T translation[3] = {0, 0, 0};
+  T fx = 64, fy = 64, cx = 32, cy = 32;
 };
+using CameraParameters = CameraParametersT<float>;
 
-TILEGRAD_API CameraParameters ParametersOf(const Camera& camera);
+template <class T = float>
+TILEGRAD_API CameraParametersT<T> ParametersOf(const CameraT<T>& camera);
 
 // Errors: a number that is not finite; rows so short or so nearly parallel that they give no
 // rotation; a focal length or near plane that is not positive.
-TILEGRAD_API Result<Camera> CameraFromParameters(const CameraParameters& parameters,
-                                                 float near_plane = 1e-2f);
+template <class T = float>
+TILEGRAD_API Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
+                                                     std::type_identity_t<T> near_plane = T(1e-2));
 
 // dL/d(parameters) from dL/d(camera). `parameters` as CameraFromParameters accepts them.
-TILEGRAD_API CameraParameters PullBack(const CameraParameters& parameters, const Camera& d_camera);
+template <class T = float>
+TILEGRAD_API CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
+                                           const std::type_identity_t<CameraT<T>>& d_camera);
 
 }  // namespace tilegrad::TILEGRAD_ABI

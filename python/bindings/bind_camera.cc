@@ -97,15 +97,10 @@ py::array LookAt(double fov_y, Size size, const py::object& eyes, const py::obje
   const Rows<3> eye(function, "eye", eyes), target(function, "target", targets),
       up(function, "up", ups);
   return MakeAll(function, eye.count(), [&](std::size_t i) -> Result<Camera64> {
-    const auto narrow = [](const std::array<double, 3>& v) {
-      return std::array<float, 3>{static_cast<float>(v[0]), static_cast<float>(v[1]),
-                                  static_cast<float>(v[2])};
-    };
-    if (narrow(eye[i]) == narrow(target[i])) {
+    if (eye[i] == target[i]) {
       return InvalidArgument("eye and target are the same point, so there is no way to look");
     }
-    return CameraCast<double>(
-        LookAtCamera(lens, narrow(eye[i]).data(), narrow(target[i]).data(), narrow(up[i]).data()));
+    return LookAtCamera(lens, eye[i].data(), target[i].data(), up[i].data());
   });
 }
 
@@ -116,7 +111,7 @@ py::array Orbit(double fov_y, Size size, const py::object& orbits) {
   return MakeAll(function, rows.count(), [&](std::size_t i) -> Result<Camera64> {
     const auto [azimuth, elevation, distance] = rows[i];
     TILEGRAD_TRY(v0::MakeCamera({}, {azimuth, elevation, distance}).status());
-    return CameraCast<double>(OrbitCamera(lens, azimuth, elevation, distance));
+    return OrbitCamera<double>(lens, azimuth, elevation, distance);
   });
 }
 

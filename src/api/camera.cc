@@ -49,12 +49,13 @@ Status CheckOrbit(const Orbit& orbit) {
 
 }  // namespace
 
-Result<Camera> MakeCamera(const Lens& lens, const Orbit& orbit) {
-  Camera camera;
+template <class T>
+Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit) {
+  CameraT<T> camera;
   const Status status = Guarded([&]() -> Status {
     TILEGRAD_TRY(CheckLens(lens));
     TILEGRAD_TRY(CheckOrbit(orbit));
-    camera = CopyCamera<Camera>(engine::OrbitCamera(
+    camera = CopyCamera<CameraT<T>>(engine::OrbitCamera<T>(
         {lens.fov_y, lens.width, lens.height}, orbit.azimuth, orbit.elevation, orbit.distance));
     return {};
   });
@@ -62,28 +63,43 @@ Result<Camera> MakeCamera(const Lens& lens, const Orbit& orbit) {
   return camera;
 }
 
-CameraParameters ParametersOf(const Camera& camera) {
-  return CopyRest(engine::ParametersOf(CopyCamera<engine::Camera>(camera)), CameraParameters());
+template <class T>
+CameraParametersT<T> ParametersOf(const CameraT<T>& camera) {
+  return CopyRest(engine::ParametersOf(CopyCamera<engine::CameraT<T>>(camera)),
+                  CameraParametersT<T>());
 }
 
-Result<Camera> CameraFromParameters(const CameraParameters& parameters, float near_plane) {
-  Camera camera;
+template <class T>
+Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
+                                        std::type_identity_t<T> near_plane) {
+  CameraT<T> camera;
   const Status status = Guarded([&]() -> Status {
-    TILEGRAD_ASSIGN(
-        const engine::Camera made,
-        engine::CameraFromParameters(CopyRest(parameters, engine::CameraParameters()), near_plane));
-    camera = CopyCamera<Camera>(made);
+    TILEGRAD_ASSIGN(const engine::CameraT<T> made,
+                    engine::CameraFromParameters(
+                        CopyRest(parameters, engine::CameraParametersT<T>()), near_plane));
+    camera = CopyCamera<CameraT<T>>(made);
     return {};
   });
   if (!status.ok()) return status;
   return camera;
 }
 
-CameraParameters PullBack(const CameraParameters& parameters, const Camera& d_camera) {
-  engine::CameraParameters d_parameters;
-  engine::PullBack(CopyRest(parameters, engine::CameraParameters()),
-                   CopyCamera<engine::Camera>(d_camera), &d_parameters);
-  return CopyRest(d_parameters, CameraParameters());
+template <class T>
+CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
+                              const std::type_identity_t<CameraT<T>>& d_camera) {
+  engine::CameraParametersT<T> d_parameters;
+  engine::PullBack(CopyRest(parameters, engine::CameraParametersT<T>()),
+                   CopyCamera<engine::CameraT<T>>(d_camera), &d_parameters);
+  return CopyRest(d_parameters, CameraParametersT<T>());
 }
+
+#define TILEGRAD_INSTANTIATE(T)                                                     \
+  template Result<CameraT<T>> MakeCamera<T>(const Lens&, const Orbit&);             \
+  template CameraParametersT<T> ParametersOf(const CameraT<T>&);                    \
+  template Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>&, T); \
+  template CameraParametersT<T> PullBack(const CameraParametersT<T>&, const CameraT<T>&);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
 
 }  // namespace tilegrad::v0

@@ -41,11 +41,13 @@ struct Lens {
 // A camera at distance * (cos el cos az, sin el, cos el sin az) that looks at the origin with y up;
 // degrees. Elevations of exactly +-90 take the limit from below (up is then the horizontal
 // direction), so every finite input gives a rotation.
-Camera OrbitCamera(const Lens& lens, double azimuth, double elevation, double distance);
+template <class T = float>  // or double
+CameraT<T> OrbitCamera(const Lens& lens, double azimuth, double elevation, double distance);
 
 // A camera at `eye` that looks at `target`. `up` need only be independent of the viewing direction;
-// if it is not, another axis is taken.
-Camera LookAtCamera(const Lens& lens, const float eye[3], const float target[3], const float up[3]);
+// if it is not, another axis is taken. T: float or double.
+template <class T>
+CameraT<T> LookAtCamera(const Lens& lens, const T eye[3], const T target[3], const T up[3]);
 
 // Element-wise conversion, e.g. to double for the reference.
 template <class T, class U>

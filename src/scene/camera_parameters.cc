@@ -38,30 +38,43 @@ Status CheckIndependent(const CameraParametersT<double>& p) {
 
 }  // namespace
 
-CameraParameters ParametersOf(const Camera& camera) {
-  CameraParameters p;
+template <class T>
+CameraParametersT<T> ParametersOf(const CameraT<T>& camera) {
+  CameraParametersT<T> p;
   std::copy_n(camera.rotation, 6, p.rotation.begin());
   std::copy_n(camera.translation, 3, p.translation.begin());
   p.fx = camera.fx, p.fy = camera.fy, p.cx = camera.cx, p.cy = camera.cy;
   return p;
 }
 
-Result<Camera> CameraFromParameters(const CameraParameters& parameters, float near_plane) {
+template <class T>
+Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
+                                        std::type_identity_t<T> near_plane) {
   const auto p = ParametersCast<double>(parameters);
   if (!std::all_of(p.rotation.begin(), p.rotation.end(), [](double x) { return std::isfinite(x); }))
     return InvalidArgument("a number of the camera's rotation is not finite");
   TILEGRAD_TRY(CheckIndependent(p));
   const Camera64 camera = CameraFromParametersRef(p, static_cast<double>(near_plane));
   TILEGRAD_TRY(Validate(camera));
-  return CameraCast<float>(camera);
+  return CameraCast<T>(camera);
 }
 
-void PullBack(const CameraParameters& parameters, const Camera& d_camera,
-              CameraParameters* d_parameters) {
+template <class T>
+void PullBack(const CameraParametersT<T>& parameters,
+              const std::type_identity_t<CameraT<T>>& d_camera,
+              std::type_identity_t<CameraParametersT<T>>* d_parameters) {
   CameraParametersT<double> d;
   CameraFromParametersAdjointRef(ParametersCast<double>(parameters), CameraCast<double>(d_camera),
                                  &d);
-  *d_parameters = ParametersCast<float>(d);
+  *d_parameters = ParametersCast<T>(d);
 }
+
+#define TILEGRAD_INSTANTIATE(T)                                                        \
+  template CameraParametersT<T> ParametersOf(const CameraT<T>&);                       \
+  template Result<CameraT<T>> CameraFromParameters<T>(const CameraParametersT<T>&, T); \
+  template void PullBack<T>(const CameraParametersT<T>&, const CameraT<T>&, CameraParametersT<T>*);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
 
 }  // namespace tilegrad

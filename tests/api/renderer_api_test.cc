@@ -447,5 +447,24 @@ TEST(ApiCamera, ParametersGoThereAndBack) {
   EXPECT_FALSE(CameraFromParameters({.rotation = {0, 0, 0, 0, 1, 0}}).ok());
 }
 
+// A few roundings of numbers up to 3.
+TEST(ApiCamera, OfDoubleHasTheDigitsOfDouble) {
+  const Orbit orbit{.azimuth = 30, .elevation = 20, .distance = 3};
+  const Result<CameraT<double>> camera = MakeCamera<double>({.width = 48, .height = 32}, orbit);
+  ASSERT_TRUE(camera.ok());
+  EXPECT_NEAR(camera->rotation[7], std::sin(20 * M_PI / 180), 1e-15);
+  EXPECT_NEAR(camera->translation[2], -3, 2e-15);
+  const CameraParametersT<double> parameters = ParametersOf(*camera);
+  const auto again = CameraFromParameters(parameters, camera->near_plane);
+  ASSERT_TRUE(again.ok());
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(again->rotation[i], camera->rotation[i], 1e-15) << i;
+  CameraT<double> d_camera = {};
+  d_camera.rotation[0] = d_camera.rotation[4] = d_camera.rotation[8] = 0;
+  d_camera.rotation[1] = 0.1;  // moves the first row only, and is brought across it
+  const CameraParametersT<double> d = PullBack(parameters, d_camera);
+  EXPECT_NEAR(d.rotation[1], 0.1 * (1 - camera->rotation[1] * camera->rotation[1]), 1e-16);
+  EXPECT_EQ(CameraFromParameters(parameters)->near_plane, 0.01);
+}
+
 }  // namespace
 }  // namespace tilegrad

@@ -63,6 +63,21 @@ class Conventions(unittest.TestCase):
         np.testing.assert_allclose(pixel(camera, np.zeros(3)), (320, 240), atol=1e-3)
         self.assertAlmostEqual(camera.fy, 240 / np.tan(np.radians(20)), places=3)
 
+    def test_look_at_and_orbit_have_the_digits_of_float64(self):
+        orbit = Camera.orbit(30, 20, 5, fov_y=40, **SIZE)
+        az, el = np.radians([30, 20])
+        eye = 5 * np.array([np.cos(el) * np.cos(az), np.sin(el), np.cos(el) * np.sin(az)])
+        look = Camera.look_at(eye, fov_y=40, **SIZE)
+        for camera in (orbit, look):  # a few roundings of numbers up to 5
+            np.testing.assert_allclose(-camera.rotation.T @ camera.translation, eye, rtol=0,
+                                       atol=5e-15)
+            np.testing.assert_allclose(camera.rotation @ camera.rotation.T, np.eye(3), rtol=0,
+                                       atol=2e-15)
+            self.assertAlmostEqual(camera.fy, 240 / np.tan(np.radians(20)), delta=1e-12)
+            self.assertEqual(camera.near_plane, 0.01)
+        near = Camera.look_at((0, 0, 1 + 1e-9), (0, 0, 1), **SIZE)  # one point to float
+        np.testing.assert_array_equal(near.rotation, np.eye(3))
+
     def test_there_and_back(self):
         cameras = random_cameras(5)
         half = {"pixel_centre": "half"}
