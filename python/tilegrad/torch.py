@@ -271,10 +271,12 @@ def _engine(threads: int) -> _Engine:
 
 
 def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
-    """The parts of records behind each other, their leading axes broadcast."""
-    given = [value for value, _ in parts.values() if isinstance(value, torch.Tensor)]
-    dtype = functools.reduce(torch.promote_types, (tensor.dtype for tensor in given),
-                             torch.float32)
+    """The parts of records behind each other, their leading axes broadcast. In the dtype of their
+    tensors; numbers alone are kept in float64, as Camera keeps them, until a scene rounds them."""
+    given = [value.dtype for value, _ in parts.values()
+             if isinstance(value, torch.Tensor) and value.is_floating_point()]
+    dtype = functools.reduce(torch.promote_types, given,
+                             torch.float32 if given else torch.float64)
     flat = []
     for name, (value, shape) in parts.items():
         tensor = torch.as_tensor(value, dtype=dtype)

@@ -144,6 +144,14 @@ class Gradients(unittest.TestCase):
                            [[0.4, 0.5, 0.6], [0.9, 0.3, 0.2]], 6.0)]
         self.assertTrue(torch.autograd.gradcheck(color, parts, eps=1e-6, atol=1e-7, rtol=1e-5))
 
+    def test_numbers_keep_the_digits_of_float64(self):
+        numbers = [0.3, 0.5, 1.1, 0.7]
+        self.assertEqual(tg.lights(numbers[:3], numbers[3]).tolist(), numbers)
+        self.assertEqual(tg.camera(fx=70.1)[12].item(), 70.1)
+        self.assertEqual(tg.lights(torch.tensor([0, 0, 1]), 0.7)[3].item(), 0.7)
+        beside = tg.lights(torch.tensor(numbers[:3]), 0.7)  # a tensor decides
+        self.assertEqual(beside.dtype, torch.float32)
+
     def test_engine_agrees_with_reference(self):
         """float32 against float64, of all inputs at once."""
         found = {}
