@@ -98,7 +98,7 @@ class PartialAlpha {
   HWY_INLINE double SmallProduct(SoftTag d, SoftVec a, std::size_t pixel) {
     SoftVec left = hn::Sub(hn::Set(d, 1.0f), a);
     const SoftMask dark = hn::Lt(left, hn::Set(d, static_cast<float>(kLightProduct)));
-    const SoftVec rounding = hn::Set(d, static_cast<float>(kLaneRounding));
+    const SoftVec rounding = hn::Set(d, static_cast<float>(LaneRounding(hn::MaxLanes(d))));
     left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
     block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, left)));
     return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));

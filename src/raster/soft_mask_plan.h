@@ -15,8 +15,16 @@ inline constexpr double kFarZ = 3;
 // The least product in light pixels, or of each of their lanes: A <= 63/64 there for all faces, and
 // ten factors of Odds suffice. Smaller ones would cost digits, larger ones make more pixels dark.
 inline constexpr double kLightProduct = 1.0 / 64;
-// More than rounding may take from the product of a lane: 37 u (docs/numerics.md, "Rounding" 4).
-inline constexpr double kLaneRounding = 0x1p-18;
+// How many faces of a chunk a lane of vectors of so many lanes may get: those of three lists, each
+// filled up to whole vectors.
+constexpr std::size_t FacesOfLane(std::size_t lanes) {
+  return (kChunkFaces + 3 * (lanes - 1)) / lanes;
+}
+// More than rounding may take from the product of a lane: u for each face, and once for those of
+// 1 - a (docs/numerics.md, "Rounding" 4).
+constexpr double LaneRounding(std::size_t lanes) { return lanes < kSoftLanes ? 0x1p-17 : 0x1p-18; }
+static_assert(static_cast<double>(FacesOfLane(8) + 1) * 0x1p-24 < LaneRounding(8));
+static_assert(static_cast<double>(FacesOfLane(4) + 1) * 0x1p-24 < LaneRounding(4));
 // Of what may be dropped: the rest covers the rounding of products of lanes.
 inline constexpr double kUnseenShare = 0.9;
 
