@@ -44,7 +44,8 @@
 //    caller's mesh wins.
 //
 // 5. Face ids are indices into the caller's faces, int32; -1 is background. A pixel is foreground
-//    (alpha = 1) if and only if it has a face id.
+//    (alpha = 1) if and only if it has a face id. An array of a scene has less than 2^28 numbers,
+//    so a mesh has at most 89,478,485 faces; larger ones are an error of Render.
 //
 // 6. Near plane. Faces are cut at depth = near_plane and the part beyond is kept; the new vertices
 //    are computed from the two ends of the cut edge in the order visible end, hidden end, so that

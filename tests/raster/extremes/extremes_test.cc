@@ -4,6 +4,7 @@
 // its number; TILEGRAD_SCENE=<number> runs that one alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -85,6 +86,33 @@ void CheckHeap(std::size_t faces) {
 
 TEST(Extremes, FiftyThousandFacesOnOnePixel) { CheckHeap(50000); }
 TEST(ExtremesLong, AMillionFacesOnOnePixel) { CheckHeap(1000000); }
+
+// Ids are integers all the way: floats count to 2^24 only.
+TEST(ExtremesLong, FaceIdsBeyondWhatFloatsCount) {
+  const std::int32_t id = (1 << 24) + 3;  // odd, and so no float
+  TestScene<float> scene;
+  scene.camera = {.fx = 1, .fy = 1, .cx = 0, .cy = 0, .near_plane = 0.5f};  // pixels are world
+  scene.positions = {-20, 0, -1, -1, 1, -1, -1, -9, -1, 9, 1, -1};  // a point; half of the image
+  scene.channels = 1, scene.attributes.assign(scene.vertex_count(), 0.5f);
+  scene.faces.assign(3 * static_cast<std::size_t>(id), 0);
+  scene.faces.insert(scene.faces.end(), {1, 2, 3});
+  RenderOptions options;
+  options.width = options.height = 8;
+  const Workers workers;
+  Renderer renderer(workers);
+  Frame frame;
+  const SceneView views[] = {scene.View()};
+  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
+  const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), id);
+  EXPECT_GT(covered, 10);
+  EXPECT_EQ(covered + std::count(frame.face_ids.begin(), frame.face_ids.end(), -1), 64);
+  const std::vector<float> d_attributes(64, 1.0f), d_alpha(64, 1.0f);
+  std::vector<float> d_positions(scene.positions.size()), d_rows(scene.vertex_count());
+  SceneGradients d[] = {{d_positions, d_rows, false, {}}};
+  ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d).ok());
+  EXPECT_EQ(d_rows[0], 0);
+  EXPECT_NEAR(d_rows[1] + d_rows[2] + d_rows[3], static_cast<double>(covered), 1e-4);
+}
 
 // Every float that goes in, at its first and last place, is named if it is not finite.
 class NonFinite : public testing::TestWithParam<float> {
