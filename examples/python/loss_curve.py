@@ -25,9 +25,10 @@ def loss_curve_svg(title: str, x_label: str, curves: dict[str, Sequence[float]])
         share = (math.log10(value) - low) / max(high - low, 1)
         return _HEIGHT - _BOTTOM - (_HEIGHT - _TOP - _BOTTOM) * share
 
-    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" '
-             f'font-family="sans-serif" font-size="13"><rect width="100%" height="100%" '
-             f'fill="#fff"/>', _text(_LEFT, 20, title, "start", 'font-weight="bold"')]
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{_WIDTH}" height="{_HEIGHT}" '
+             f'viewBox="0 0 {_WIDTH} {_HEIGHT}" font-family="sans-serif" font-size="13">'
+             f'<rect width="100%" height="100%" fill="#fff"/>',
+             _text(_LEFT, 20, title, "start", 'font-weight="bold"')]
     for power in range(low, high + 1):
         y = y_of(10.0**power)
         parts += [_line(_LEFT, y, _WIDTH - _RIGHT, y),
