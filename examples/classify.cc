@@ -91,13 +91,8 @@ void Build(Context& context, Sequential& net, std::int64_t image_size, std::int6
   std::int64_t in = 4;
   for (const std::int64_t out : {24, 48, 96}) {
     const std::string name = std::to_string(out);
-    net.Add<Conv2dLayer>("conv" + name, context,
-                         ConvShape{.in = in,
-                                   .out = out,
-                                   .kernel = 5,
-                                   .options = {.stride = 2, .padding = 2},
-                                   .bias = false},
-                         rng);
+    const ConvShape half{in, out, /*kernel=*/5, {.stride = 2, .padding = 2}, /*bias=*/false};
+    net.Add<Conv2dLayer>("conv" + name, context, half, rng);
     net.Add<BatchNorm>("norm" + name, context, out, BatchNormOptions{.relu = true});
     in = out;
   }
