@@ -53,6 +53,7 @@ void AddFurniture(const std::vector<FurnitureMesh>& furniture) {
     SceneSpec scene{model.name.c_str(), 8, 256, 0};
     scene.mesh = &model.mesh;
     AddBoth(model.name, {scene});
+    AddParts(model.name, {scene});
   }
 }
 
