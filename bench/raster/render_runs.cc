@@ -68,6 +68,13 @@ void SetCounters(benchmark::State& state, const RunSpec& spec, Direction directi
   state.counters["share"] = share;
 }
 
+// What the last call of the renderer evaluated for alpha.
+void SetEvaluated(benchmark::State& state, const RunSpec& spec, const Renderer& renderer) {
+  if (!spec.alpha) return;
+  state.counters["evaluated_pairs"] = static_cast<double>(renderer.stats().pairs);
+  state.counters["evaluated_exps"] = static_cast<double>(renderer.stats().powers);
+}
+
 void Forward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const Workers workers(spec.workers);
@@ -79,6 +86,7 @@ void Forward(benchmark::State& state, const RunSpec& spec) {
   for (auto _ : state) {
     Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
   }
+  SetEvaluated(state, spec, renderer);
 }
 
 void Backward(benchmark::State& state, const RunSpec& spec) {
@@ -94,6 +102,7 @@ void Backward(benchmark::State& state, const RunSpec& spec) {
   for (auto _ : state) {
     Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
   }
+  SetEvaluated(state, spec, renderer);
 }
 
 void CulledForwardRun(benchmark::State& state, const RunSpec& spec) {

@@ -31,8 +31,9 @@ bool SplitName(const std::string& name, Measurement* out) {
 }
 
 // The counters that render_bench sets.
-constexpr const char* kCounters[] = {"images", "pixels", "faces",    "pairs",        "exps",
-                                     "bytes",  "share",  "limit_ms", "limit_high_ms"};
+constexpr const char* kCounters[] = {
+    "images", "pixels",   "faces",         "pairs",           "exps",          "bytes",
+    "share",  "limit_ms", "limit_high_ms", "evaluated_pairs", "evaluated_exps"};
 
 void AddSample(const ordered_json& run, Samples* samples) {
   Measurement& m = samples->result;

@@ -10,8 +10,9 @@
 namespace tilegrad::bench {
 namespace {
 
-constexpr std::array kColumns = {"images", "pixels", "faces",    "pairs",
-                                 "exps",   "bytes",  "limit_ms", "limit_high_ms"};
+constexpr std::array kColumns = {
+    "images", "pixels",   "faces",         "pairs",           "exps",
+    "bytes",  "limit_ms", "limit_high_ms", "evaluated_pairs", "evaluated_exps"};
 
 std::string Name(const std::string& axis) {
   if (axis == "pixels") return "pixels of a side";

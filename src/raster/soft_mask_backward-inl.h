@@ -192,10 +192,9 @@ class TileBackward {
 
   void MultiplyProducts(std::size_t b) {
     SoftBlock& block = scratch_->blocks[b];
-    const SoftLists& lists = scratch_->lists;
-    PartialAlpha far(lists, &block, scratch_->partial);
+    PartialAlpha far(&block, scratch_);
     far.AddVertices(), far.AddSegments(), far.Merge();
-    AppendNear(block, lists, scratch_->chunk, near_product_[b], &scratch_->near[b]);
+    AppendNear(block, near_product_[b], &scratch_->near[b], scratch_);
     // The square: a face's gradient may be as large as the root of the product
     // (docs/numerics.md).
     const double stop = plan_.stop_error * plan_.stop_error;
@@ -217,6 +216,9 @@ class TileBackward {
           2 * static_cast<double>(adjoint_.d_alpha[IndexOf(block, i)]) * product);
     };
     ForPixels(dark_[b], [&](std::size_t i) { push(i, 1 - block.alpha[i]); });
+    for (const SoftNearFaces& faces : scratch_->near[b]) {
+      NotePairs(SoftTag(), faces.bits, &scratch_->work);
+    }
     AppendNearGradients(block, scratch_->near[b], push_[b], scale_, out_);
     ForPixels(dark_[b], [&](std::size_t i) {
       push(i, ProductAt(b, i));
@@ -225,7 +227,8 @@ class TileBackward {
   }
 
   void AddWeakGradients(std::size_t b) {
-    const WeakFaces faces{scratch_->blocks[b], scratch_->lists, push_[b], {scratch_->sums}};
+    const WeakFaces faces{
+        scratch_->blocks[b], scratch_->lists, push_[b], {scratch_->sums}, &scratch_->work};
     faces.Vertices(weak_[b]), faces.Segments(weak_[b]);
     faces.Boundaries(weak_[b] & ~dark_[b]);
   }

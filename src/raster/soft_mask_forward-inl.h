@@ -26,9 +26,9 @@ HWY_INLINE SoftVec Over(SoftTag d, SoftVec a, SoftVec influence) {
 // Alpha over the members of a chunk, pixel by pixel and lane by lane, for a block.
 class PartialAlpha {
  public:
-  // `partial` is 0, and is again after Merge.
-  PartialAlpha(const SoftLists& lists, SoftBlock* block, float (*partial)[kSoftLanes])
-      : lists_(lists), block_(block), partial_(partial) {}
+  // Of scratch->lists. scratch->partial is 0, and is again after Merge.
+  PartialAlpha(SoftBlock* block, SoftMaskScratch* scratch)
+      : lists_(scratch->lists), block_(block), partial_(scratch->partial), work_(&scratch->work) {}
 
   HWY_INLINE void AddVertices() {
     const SoftTag d;
@@ -36,6 +36,7 @@ class PartialAlpha {
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const std::uint64_t bits = See(list, m);
       if (bits == 0) continue;
+      NoteVertexPairs(d, bits, work_);
       const VertexMembers members(d, list, m, *block_, bits);
       ForPixels(bits, [&](std::size_t i) HWY_ATTR { Put(d, i, members.Influence(i)); });
     }
@@ -88,6 +89,7 @@ class PartialAlpha {
   template <class Distance>
   HWY_INLINE void AddDistances(std::uint64_t bits, const Distance& z) {
     const SoftTag d;
+    NotePairs(d, bits, work_);
     alignas(64) float of_pixel[kBlockPixels][kSoftLanes];
     ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(z(i), d, of_pixel[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
@@ -111,6 +113,7 @@ class PartialAlpha {
   const SoftLists& lists_;
   SoftBlock* block_;
   float (*partial_)[kSoftLanes];
+  SoftWork* work_;
   std::uint64_t touched_ = 0;
 };
 
@@ -230,7 +233,7 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
       FindFeatures(scratch->chunk, plan, {blocks[b], blocks[b].live, reach, false},
                    &scratch->lists);
       blocks[b].whole += scratch->lists.whole;
-      PartialAlpha partial(scratch->lists, &blocks[b], scratch->partial);
+      PartialAlpha partial(&blocks[b], scratch);
       partial.AddVertices(), partial.AddSegments(), partial.AddBoundaries(), partial.Merge();
       if (next < order.size()) StopPixels(plan, stop, &blocks[b]);
     }

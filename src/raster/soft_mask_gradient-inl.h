@@ -198,6 +198,7 @@ struct WeakFaces {
   const SoftLists& lists;
   const float* push;
   ChunkSums sums;
+  SoftWork* work;
 
   void Vertices(std::uint64_t pixels) const {
     const SoftTag d;
@@ -205,6 +206,7 @@ struct WeakFaces {
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       if (bits == 0) continue;
+      NoteVertexPairs(d, bits, work);
       const VertexMembers members(d, list, m, block, bits);
       const auto add = [&](const auto& odds) HWY_ATTR {
         SoftVec d_x = hn::Zero(d), d_y = hn::Zero(d);
@@ -235,6 +237,7 @@ struct WeakFaces {
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       if (bits == 0) continue;
+      NotePairs(d, bits, work);
       const EdgeMembers edge(d, list.v[0] + m, list.kRoom);
       // Of push along n and t, and of both times the share of the second corner.
       SoftVec side = hn::Zero(d), beyond = side, second_side = side, second_beyond = side;
@@ -263,26 +266,30 @@ struct WeakFaces {
     const auto& list = lists.boundaries;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
-      const CornerSums corners = SumCorners(d, members, block, PixelsOf(d, lists, list, m, pixels),
-                                            [&](std::size_t i, SoftVec z) HWY_ATTR {
-                                              const SoftVec odds =
-                                                  Odds(d, simd::HalvingOf(d, z).power);
-                                              return hn::Mul(odds, hn::Set(d, push[i]));
-                                            });
+      const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
+      NotePairs(d, bits, work);
+      const CornerSums corners =
+          SumCorners(d, members, block, bits, [&](std::size_t i, SoftVec z) HWY_ATTR {
+            const SoftVec odds = Odds(d, simd::HalvingOf(d, z).power);
+            return hn::Mul(odds, hn::Set(d, push[i]));
+          });
       sums.Add(d, list, m, corners);
     }
   }
 };
 
-// Appends the boundaries of `lists`, which come from `chunk`, for the live pixels; `product` is
-// that of all near faces.
-inline void AppendNear(const SoftBlock& block, const SoftLists& lists, const SoftChunk& chunk,
-                       float* product, AlignedVector<SoftNearFaces>* near) {
+// Appends the boundaries of scratch->lists, which come from its chunk, for the live pixels;
+// `product` is that of all near faces.
+inline void AppendNear(const SoftBlock& block, float* product, AlignedVector<SoftNearFaces>* near,
+                       SoftMaskScratch* scratch) {
   const SoftTag d;
+  const SoftLists& lists = scratch->lists;
+  const SoftChunk& chunk = scratch->chunk;
   const auto& list = lists.boundaries;
   for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
     const std::uint64_t bits = PixelsOf(d, lists, list, m, block.live);
     if (bits == 0) continue;
+    NotePairs(d, bits, &scratch->work);
     SoftNearFaces& faces = near->emplace_back();
     faces.count = std::min(hn::Lanes(d), list.count - m), faces.bits = bits;
     for (std::size_t i = 0; i < faces.count; ++i) {

@@ -45,6 +45,18 @@ HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftLists& lists, const SoftL
   return bits & among;
 }
 
+// Notes that the members from m on are evaluated at `pixels`: by a power for each.
+HWY_INLINE void NotePairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
+  const auto pairs = static_cast<std::int64_t>(hn::Lanes(d)) * std::popcount(pixels);
+  work->pairs += pairs, work->powers += pairs;
+}
+// By powers of columns and rows.
+HWY_INLINE void NoteVertexPairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
+  const auto lanes = static_cast<std::int64_t>(hn::Lanes(d));
+  work->pairs += lanes * std::popcount(pixels);
+  work->powers += lanes * (std::popcount(ColumnsOf(pixels)) + std::popcount(RowsOf(pixels)));
+}
+
 // Squared lengths along one axis, halved that often, and the ways themselves: [column or row].
 struct AxisInfluence {
   SoftVec power[kBlockSize], way[kBlockSize], most;

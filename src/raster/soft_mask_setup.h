@@ -154,8 +154,15 @@ struct SoftNearGroups {
   std::size_t count = 0;
 };
 
+// What was evaluated, lanes without a face included.
+struct SoftWork {
+  std::int64_t pairs = 0;   // of a face and a background pixel
+  std::int64_t powers = 0;  // 2^-z: one for each pair, or one for each column and row of corners
+};
+
 // Memory of one worker. Grows to its largest use, then nothing is allocated.
 struct SoftMaskScratch {
+  SoftWork work;  // since the caller cleared it
   SoftChunk chunk;
   SoftLists lists;
   SoftBlock blocks[kTileBlocks];

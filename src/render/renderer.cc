@@ -83,7 +83,9 @@ struct Renderer::Impl {
 
   void Begin(std::size_t count) {
     if (images.size() < count) images.resize(count);
-    for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};
+    for (WorkerScratch& worker : worker_scratch) {
+      worker.stats = {}, worker.times = {}, worker.soft.work = {};
+    }
     sound = true;
   }
   void Require(bool holds) {
@@ -302,6 +304,7 @@ RenderStats Renderer::stats() const {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
     sum.interpolated += worker.stats.interpolated, sum.softened += worker.stats.softened;
     sum.merged += worker.stats.merged;
+    sum.pairs += worker.soft.work.pairs, sum.powers += worker.soft.work.powers;
   }
   return sum;
 }

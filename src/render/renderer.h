@@ -118,6 +118,10 @@ struct RenderStats {
   std::int64_t interpolated = 0;  // parts, forward or backward
   std::int64_t softened = 0;      // parts, forward or backward
   std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
+  // Of the soft mask, forward or backward, lanes of vectors that had no face included. They depend
+  // on the instruction set.
+  std::int64_t pairs = 0;   // of a face and a background pixel that were evaluated
+  std::int64_t powers = 0;  // exponentials
 };
 
 // Milliseconds in the stages of a call, summed over workers.

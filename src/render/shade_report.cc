@@ -72,6 +72,11 @@ void AddScene(const SceneParts& parts, const SceneWork& w, std::vector<StageRepo
                       parts.trilinear ? "with their levels" : "level 0 only", "none is needed"));
 }
 
+std::string Evaluated(std::string_view what, const RenderStats& stats) {
+  return fmt::format("{}: {} pairs of face and pixel, {} exponentials", what, stats.pairs,
+                     stats.powers);
+}
+
 std::int64_t Numbers(const ShadeWork& shade, const VaryingSet& set) {
   return shade.pixels * set.channels();
 }
@@ -96,8 +101,8 @@ PlanReport ReportForward(const ForwardPlan& plan, const CallWork& work) {
                      "equation 7", "no colour is computed"));
   out.push_back(Only("scatter", shade.pixels, "pixels", shade.scatter, "into images",
                      "attributes are the image"));
-  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha, "equation 6",
-                     "alpha is not wanted"));
+  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha,
+                     Evaluated("equation 6", work.stats), "alpha is not wanted"));
   return report;
 }
 
@@ -121,8 +126,8 @@ PlanReport ReportBackward(const BackwardPlan& plan, const CallWork& work) {
                      work.times.gradients,
                      plan.geometry ? "of attributes and geometry" : "of attributes",
                      "no attribute has a gradient"));
-  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha, "to geometry",
-                     "alpha pulls on nothing"));
+  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha,
+                     Evaluated("to geometry", work.stats), "alpha pulls on nothing"));
   out.push_back(Only("merge", work.stats.merged, "arrays", work.times.merge + work.scene.merge_ms,
                      "from faces to the scene", "nothing to merge"));
   return report;

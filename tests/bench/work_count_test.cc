@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <set>
 
+#include "base/simd_target.h"
 #include "raster/bench_scenes.h"
 
 namespace tilegrad::bench {
@@ -58,6 +59,40 @@ TEST(WorkCount, CountsWhatIsThere) {
   EXPECT_LE(work.soft_blocks, work.pairs);
   // Front and back each cover the pixels once, in blocks of at most 8.
   EXPECT_GE(8 * work.hard_blocks, 2 * work.covered);
+}
+
+// What the renderer evaluates beside what has to be: whole vectors of faces, at more than 2^-25.
+TEST(WorkCount, TheRendererEvaluatesLittleElse) {
+  const Workers workers(1);
+  for (const SceneSpec& spec : {SceneSpec{"S1", 4, 64, 3}, {"S3", 1, 256, 5}}) {
+    BenchBatch batch(spec);
+    batch.options.max_alpha_error = 1e-7;
+    CulledBatch culled(batch);
+    culled.Forward({});
+    WorkCount work;
+    for (std::size_t i = 0; i < culled.scenes.size(); ++i) {
+      work += CountWork(culled.scenes[i], culled.frames[i]);
+    }
+    for (const std::string& target : RunnableTargets()) {
+      ASSERT_TRUE(ForceTarget(target).ok());
+      Renderer renderer(workers);
+      Frame frame;
+      ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
+      const RenderStats forward = renderer.stats();
+      ASSERT_TRUE(renderer
+                      .Backward(batch.scenes, batch.options, frame,
+                                {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
+                      .ok());
+      const RenderStats backward = renderer.stats();
+      for (const RenderStats* stats : {&forward, &backward}) {
+        const double share = static_cast<double>(stats->pairs) / work.pairs;
+        EXPECT_GT(share, 0.5) << target << ", " << spec.name;
+        EXPECT_LT(share, 5) << target << ", " << spec.name;
+        EXPECT_LE(stats->powers, 2 * stats->pairs);  // a column and a row for one pixel
+      }
+    }
+    ASSERT_TRUE(ForceTarget("").ok());
+  }
 }
 
 // Counts and limits of a scene that were worked out by hand with the same rates.

@@ -162,6 +162,37 @@ TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
   }
 }
 
+// What the soft mask evaluates: nothing unasked, what matters, less the more may be dropped.
+TEST(RendererRequest, PairsOfAlphaAreCounted) {
+  Batch batch = Batch::Large();
+  const Workers workers(2);
+  Renderer renderer(workers);
+  Frame frame;
+  const auto forward = [&](bool alpha, double error) {
+    RenderOptions options = batch.options;
+    options.max_alpha_error = error;
+    EXPECT_TRUE(renderer.Render(batch.views, options, {true, alpha}, &frame).ok());
+    return renderer.stats();
+  };
+  EXPECT_EQ(forward(false, 0).pairs, 0);
+  EXPECT_EQ(forward(false, 0).powers, 0);
+  std::int64_t before = std::numeric_limits<std::int64_t>::max();
+  for (const double error : {0.0, 1e-7, 1e-4, 1e-2}) {
+    const RenderStats stats = forward(true, error);
+    EXPECT_GT(stats.pairs, 0);
+    EXPECT_GT(stats.powers, 0);
+    EXPECT_LE(stats.pairs, before) << error;
+    before = stats.pairs;
+  }
+  EXPECT_GT(forward(true, 1e-6).pairs, 0);
+  const auto backward = [&](const FrameGradients& d_frame) {
+    EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, batch.d_scenes).ok());
+    return renderer.stats().pairs;
+  };
+  EXPECT_EQ(backward({batch.d_attributes, {}}), 0);
+  EXPECT_GT(backward({{}, batch.d_alpha}), 0);
+}
+
 TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
   Batch batch;
   const Workers workers(1);
