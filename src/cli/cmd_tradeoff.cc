@@ -25,7 +25,11 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.md", tables));
   TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.csv", StudyCsv(results)));
   TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.svg", StudyPicture(results)));
-  fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg\n", tables, folder.string());
+  if (!training.empty()) {
+    TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
+  }
+  fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
+             folder.string(), training.empty() ? "" : ", training.csv");
   return {};
 }
 
@@ -75,7 +79,9 @@ void AddTradeoff(CLI::App& app, Action* action) {
       "Measure what max_alpha_error costs and gains: time, error of alpha and of gradients against "
       "float64, and what a network learns with it");
   command->add_option("mesh", options->mesh, "mesh file [two built-in scenes]");
-  command->add_option("--out", options->out, "folder for tradeoff.md, .csv, .svg and the runs")
+  command
+      ->add_option("--out", options->out,
+                   "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs")
       ->capture_default_str();
   command->add_option("--size", options->size, "pixels of a mesh file's image, each axis")
       ->capture_default_str()

@@ -74,6 +74,15 @@ std::string StudyCsv(const std::vector<StudyResult>& results) {
   return out;
 }
 
+std::string TrainingCsv(const std::vector<StudyTraining>& training) {
+  std::string out = "max_alpha_error,steps,training_seconds,mean_iou,f_score\n";
+  for (const StudyTraining& t : training) {
+    out += fmt::format("{:g},{},{:.6g},{:.6g},{:.6g}\n", t.max_alpha_error, t.steps, t.seconds,
+                       t.iou, t.f_score);
+  }
+  return out;
+}
+
 std::string StudyPicture(const std::vector<StudyResult>& results) {
   LogPlot plot{"CPU time, forward and backward, ms", "largest error of alpha", {}};
   for (const StudyResult& r : results) {

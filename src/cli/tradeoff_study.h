@@ -59,6 +59,7 @@ Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
 std::string StudyMarkdown(const std::vector<StudyResult>& results,
                           const std::vector<StudyTraining>& training);
 std::string StudyCsv(const std::vector<StudyResult>& results);
+std::string TrainingCsv(const std::vector<StudyTraining>& training);
 std::string StudyPicture(const std::vector<StudyResult>& results);
 
 }  // namespace tilegrad::cli

@@ -59,6 +59,31 @@ TEST_F(TradeoffCommand, MeasuresAMeshFileAndWritesTableCsvAndPicture) {
   EXPECT_GT(std::count(picture.begin(), picture.end(), '\n'), 10);
 }
 
+// The end of the line: a training for each error, scored on models that it did not see.
+TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
+  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
+  const std::string data = (folder_ / "data").string();
+  const Outcome made =
+      RunProgram("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
+  ASSERT_EQ(made.exit_code, 0) << made.output;
+  const Outcome outcome = Run(
+      (folder_ / "tent.obj").string() +
+      " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " + data +
+      " --training-errors 1e-3,1e-2 --steps 2 --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const auto rows = Cells(Out("training.csv"));
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0][3], "mean_iou");
+  EXPECT_EQ(rows[1][0], "0.001");
+  EXPECT_EQ(rows[2][0], "0.01");
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i].size(), rows[0].size());
+    EXPECT_EQ(rows[i][1], "2");
+    EXPECT_GT(std::stod(rows[i][3]), 0);
+  }
+  EXPECT_NE(Out("tradeoff.md").find("### Training"), std::string::npos);
+}
+
 TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
   const auto refused = [&](const std::string& arguments, const std::string& part) {
     const Outcome outcome = Run(arguments);
