@@ -116,7 +116,7 @@ class BoundCheck {
     const double allowed = e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(out_.faces);
     out_.spent_over = std::max(out_.spent_over, frame->alpha_error_bound - allowed);
   }
-  // Two background pixels, neither empty nor opaque if there are such.
+  // Background pixels, neither empty nor opaque if there are such: two, or more of fewer faces.
   std::vector<std::size_t> SomeBackground() {
     std::vector<std::size_t> all, between, out;
     for (std::size_t i = 0; i < first_.face_ids.size(); ++i) {
@@ -125,7 +125,11 @@ class BoundCheck {
       if (first_.alpha[i] > 1e-6f && first_.alpha[i] < 1 - 1e-6f) between.push_back(i);
     }
     if (!between.empty()) all = between;
-    for (int k = 0; k < 2 && !all.empty(); ++k) out.push_back(all[rng_.Below(all.size())]);
+    constexpr std::size_t kPairs = 20000;
+    const std::size_t most = std::clamp<std::size_t>(kPairs / (out_.faces + 1), 2, 40);
+    for (std::size_t k = 0; k < most && !all.empty(); ++k) {
+      out.push_back(all[rng_.Below(all.size())]);
+    }
     return out;
   }
   void Compare(const SoftTruth::AlphaBound& truth, std::size_t i) {
