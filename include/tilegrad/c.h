@@ -109,8 +109,7 @@ typedef struct tilegrad_options {
   int32_t color, alpha, attributes, depth, normals, uv, barycentrics;
 } tilegrad_options;
 
-/* Views of a frame, until the next render into it; NULL where not wanted. N images, row 0 on top.
- */
+/* Views of a frame, until the next render into it; NULL: not wanted. N images, row 0 on top. */
 typedef struct tilegrad_images {
   size_t struct_size;
   int32_t count, height, width, channels;
@@ -164,8 +163,7 @@ TILEGRAD_C_API tilegrad_status tilegrad_render(tilegrad_renderer* renderer,
                                                const tilegrad_options* options,
                                                tilegrad_frame* frame);
 
-/* Fills `images` with views of the frame; all NULL before the first render and after a failed one.
- */
+/* Fills `images` with views of the frame; all NULL before the first render and after an error. */
 TILEGRAD_C_API tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame,
                                                      tilegrad_images* images);
 

@@ -11,8 +11,8 @@ namespace tilegrad::TILEGRAD_ABI {
 
 // Pinhole camera: world to camera, then camera to pixels.
 //
-//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's axes in the
-//   world) x = cx + fx * p_cam.x / -p_cam.z            (pixels from the left edge of the image)
+//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's axes, world)
+//   x = cx + fx * p_cam.x / -p_cam.z            (pixels from the left edge of the image)
 //   y = cy - fy * p_cam.y / -p_cam.z            (pixels from the top edge of the image)
 //
 // Axes as OpenGL: x right, y up, looking along -z; depth = -p_cam.z. Pixel (column j, row i) has

@@ -47,10 +47,9 @@ class [[nodiscard]] Status {
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::move(value)) {}  // NOLINT: implicit by design
-  Result(Status status) : state_(std::move(status)) {
-    assert(!ok());
-  }  // NOLINT: implicit by design
+  // Implicit, so that a function returns either.
+  Result(T value) : state_(std::move(value)) {}                         // NOLINT
+  Result(Status status) : state_(std::move(status)) { assert(!ok()); }  // NOLINT
 
   bool ok() const { return std::holds_alternative<T>(state_); }
   Status status() const { return ok() ? Status() : std::get<Status>(state_); }

@@ -10,11 +10,11 @@
 
 namespace tilegrad {
 
-inline constexpr std::size_t kAlignment =
-    128;  // two cache lines: the widest vector of any target, and no false sharing
+// Two cache lines: the widest vector of any target, and no false sharing.
+inline constexpr std::size_t kAlignment = 128;
 
-// Memory aligned to kAlignment. Large blocks begin on a huge page and ask the system for such pages:
-// fewer page faults at the start, fewer TLB misses in every pass.
+// Memory aligned to kAlignment. Large blocks begin on a huge page and ask the system for such
+// pages: fewer page faults at the start, fewer TLB misses in every pass.
 void* AllocateAligned(std::size_t bytes);
 void FreeAligned(void* data, std::size_t bytes);  // `bytes` as it was allocated
 
@@ -24,9 +24,7 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT: rebinding is implicit by design
-  T* allocate(std::size_t n) {
-    return static_cast<T*>(AllocateAligned(n * sizeof(T)));
-  }
+  T* allocate(std::size_t n) { return static_cast<T*>(AllocateAligned(n * sizeof(T))); }
   void deallocate(T* p, std::size_t n) { FreeAligned(p, n * sizeof(T)); }
   bool operator==(const AlignedAllocator&) const { return true; }
 };

@@ -40,9 +40,8 @@ class Rng {
   }
 
   std::uint64_t counter() const { return counter_; }
-  void set_counter(std::uint64_t counter) {
-    counter_ = counter;
-  }  // jump; with the seed this restores a stream exactly
+  // A jump; with the seed this restores a stream exactly.
+  void set_counter(std::uint64_t counter) { counter_ = counter; }
 
  private:
   std::uint64_t key_;

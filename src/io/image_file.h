@@ -10,8 +10,8 @@
 
 namespace tilegrad::io {
 
-inline constexpr int kMaxImageSide =
-    16384;  // pixels; a larger header is refused before any memory is taken
+// Pixels; a larger header is refused before any memory is taken.
+inline constexpr int kMaxImageSide = 16384;
 
 // 1 to 4 channels as in the file (16-bit files are reduced to 8). `name` stands in error messages.
 Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);

@@ -4,7 +4,7 @@
 // gradient is itself a Var that can be differentiated again, to any order:
 //
 //   Var loss = Mean(Square(Linear(x, w, b) - y));
-//   auto [d_w, d_b] = ...Grad(loss, {w, b});
+//   auto d = Grad(loss, {w, b});  // d[0]: dL/dw, d[1]: dL/db
 //
 // Read first: Record in this file, then any file of ops/.
 #pragma once
@@ -111,8 +111,7 @@ struct ExternalOp {
 };
 std::vector<Var> External(Context& context, ExternalOp op);
 
-// ---- For those who write operations
-// --------------------------------------------------------------
+// ---- For those who write operations ----
 
 struct UncomputedAdjoint {
   std::size_t input = 0;

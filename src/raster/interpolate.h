@@ -3,8 +3,7 @@
 //
 // Over a face, b_k is linear in the pixel position, so with m_k = 1/depth_k (or 1: screen-linear)
 //
-//     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k          (Q = 1:
-//     screen-linear)
+//     I_c = N_c / Q,   N_c = sum_k m_k a_kc b_k,   Q = sum_k m_k b_k     (1: screen-linear)
 //
 // (Q is kept at or above the smallest m_k: rounding in coverage lets a pixel centre lie a hair
 // outside of its face, where a plane that varies much may cross zero)

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// One face at one pixel as PyTorch3D's rasterizer has it, and the adjoint, which PyTorch3D calls
-// fragments: barycentrics, depth, and the signed squared distance to the face's boundary.
+// One face at one pixel, which PyTorch3D calls a fragment, and its adjoint: barycentrics, depth,
+// and the signed squared distance to the face's boundary, as PyTorch3D's rasterizer has them.
 // Coordinates are its NDC, x to the left, y up, with z the depth in the camera, > 0 in front.
 //
-//     A_k = -W_k (projected_faces.h), A = sum A_k            positive where the face's front is
-//     seen b_k = A_k / (A + eps)                                   linear on the screen w_k = b_k
-//     z_l z_m / max(sum_j ..., eps)                 if perspective_correct c_k = max(w_k, 0) /
-//     max(sum_j max(w_j, 0), 1e-5)        if clip_barycentrics z = sum c_k z_k,   dist = -+ least
-//     squared distance to an edge, - inside (all w_k > 0)
+//     A_k = -W_k (projected_faces.h), A = sum A_k     positive where the face's front is seen
+//     b_k = A_k / (A + eps)                           linear on the screen
+//     w_k = b_k z_l z_m / max(sum_j ..., eps)         if perspective_correct
+//     c_k = max(w_k, 0) / max(sum_j max(w_j, 0), 1e-5)         if clip_barycentrics
+//     z = sum c_k z_k
+//     dist = the least squared distance to an edge, negative inside (all w_k > 0)
 //
 // Scalar template: float, double, std::complex<double>.
 #pragma once

@@ -60,9 +60,8 @@ enum FaceReject : std::uint8_t {
   kFaceBehind = 1,      // wholly nearer than the near plane: no pixel, no soft mask
   kFaceDegenerate = 2,  // zero area on the screen: no pixel; still takes part in the soft mask,
                         // where it is a segment or point
-  kFaceCulled =
-      4,  // faces away and culling is on: no pixel; still takes part in the soft mask (spec 1.4)
-  kFaceOverflow = 8,  // a vertex projects to infinity: no pixel, no soft mask
+  kFaceCulled = 4,      // faces away and culling is on: no pixel; still takes part in the soft mask
+  kFaceOverflow = 8,    // a vertex projects to infinity: no pixel, no soft mask
 };
 inline constexpr std::uint8_t kFaceNotInSoftMask = kFaceBehind | kFaceOverflow;
 

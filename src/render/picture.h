@@ -27,12 +27,12 @@ struct PictureRequest {
 // Planar as a Frame; what was not asked for is empty.
 struct Picture {
   int width = 0, height = 0;
-  std::vector<float> color;  // [3,H,W] in the scene's colour space, clamped to [0, 1], the mean
-                             // over the covered part of a pixel; 0 where nothing is
-  std::vector<float> alpha;            // [H,W] the covered share, or soft
-  std::vector<float> depth;            // [H,W] +infinity where nothing is
-  std::vector<float> normals;          // [3,H,W] unit, world
-  std::vector<float> uv;               // [2,H,W]
+  std::vector<float> color;    // [3,H,W] in the scene's colour space, clamped to [0, 1], the mean
+                               // over the covered part of a pixel; 0 where nothing is
+  std::vector<float> alpha;    // [H,W] the covered share, or soft
+  std::vector<float> depth;    // [H,W] +infinity where nothing is
+  std::vector<float> normals;  // [3,H,W] unit, world
+  std::vector<float> uv;       // [2,H,W]
   std::vector<std::int32_t> face_ids;  // [H,W] -1 where nothing is
   std::vector<PlanReport> plans;       // of each pass: colour and alpha, then the exact images
 };

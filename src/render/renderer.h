@@ -24,8 +24,8 @@ namespace tilegrad {
 
 enum class FaceCulling {
   kNone,
-  kBack
-};  // kBack: clockwise faces are not drawn, but take part in alpha (spec 1.4)
+  kBack,  // clockwise faces are not drawn, but take part in alpha
+};
 // Views over arrays of the caller, who keeps them alive and unchanged until Backward.
 template <class T>
 struct SceneViewT {
@@ -50,10 +50,11 @@ struct PaperSoftRule {
 };
 struct RenderOptions {
   int width = 64, height = 64;  // pixels, 1..16384
-  double delta = 1.0 / 7000;    // equation 5: A = exp(-d^2 / delta), d in NDC (the image spans [-1,
-                                // 1] in each axis); > 0
-  double max_alpha_error =
-      1e-6;  // |alpha - equation 6 over all faces| <= this, in [0, 1]; 0 drops nothing
+  // Equation 5: A = exp(-d^2 / delta), with d in NDC, in which the image spans [-1, 1] in each
+  // axis; > 0.
+  double delta = 1.0 / 7000;
+  // |alpha - equation 6 over all faces| <= this, in [0, 1]; 0 drops nothing.
+  double max_alpha_error = 1e-6;
   Interpolation interpolation = Interpolation::kPerspective;
   FaceCulling culling = FaceCulling::kNone;
   SoftRule soft_rule = SoftRule::kAllFaces;
@@ -73,13 +74,13 @@ struct RenderRequest {
 template <class T>
 struct FrameT {
   int images = 0, channels = 0, height = 0, width = 0;
-  AlignedVector<std::int32_t>
-      face_ids;                 // [N,H,W] index into the scene's faces, -1 background; always there
+  // [N,H,W] index into the scene's faces, -1 at background pixels; always there
+  AlignedVector<std::int32_t> face_ids;
   AlignedVector<T> attributes;  // [N,C,H,W]; 0 at background pixels
   AlignedVector<T> alpha;       // [N,H,W]; exactly 1 at foreground pixels
   AlignedVector<T> depth;       // [N,H,W]; +infinity at background pixels
-  AlignedVector<T> barycentrics;  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0
-                                  // at background
+  // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0 at background pixels
+  AlignedVector<T> barycentrics;
   // [N, H W] 1 - alpha with more digits, where Backward has use for it, in the order of
   // raster/soft_mask.h, SoftMaskImages; the rest is unspecified. May be emptied: Backward then
   // takes more time.

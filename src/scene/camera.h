@@ -7,14 +7,13 @@ namespace tilegrad {
 
 // Pinhole camera: world to camera, then camera to pixels.
 //
-//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's x, y, z axes in
-//                                               world coordinates)
+//   p_cam = rotation * p_world + translation    (rows of `rotation`: the camera's axes, world)
 //   x = cx + fx * p_cam.x / -p_cam.z            (pixels from the left edge of the image)
 //   y = cy - fy * p_cam.y / -p_cam.z            (pixels from the top edge of the image)
 //
-// Camera axes as OpenGL: x right, y up, the camera looks along -z, so visible points have p_cam.z <
-// 0 and depth = -p_cam.z. Pixel (column j, row i) has its centre at (j + 0.5, i + 0.5); row 0 is
-// the top.
+// Camera axes as OpenGL: x right, y up, the camera looks along -z, so visible points have a
+// negative p_cam.z and depth = -p_cam.z. Pixel (column j, row i) has its centre at (j + 0.5, i +
+// 0.5); row 0 is the top.
 template <class T>
 struct CameraT {
   T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
@@ -30,11 +29,11 @@ struct ImageSize {
   int width = 0, height = 0;  // pixels
 };
 
-// Degrees; `fov_y` is the full vertical field of view; the principal point is the image centre,
-// pixels are square.
+// The principal point is the middle of the image, pixels are square.
 struct Lens {
-  double fov_y =
-      49.13434207744484;        // Blender's default, f = 35/16, of the paper's renders (spec: 1.1)
+  // Degrees, the whole vertical field of view. Blender's default (f = 35/16 of half the image's
+  // height), with which the paper's images were rendered.
+  double fov_y = 49.13434207744484;
   int width = 64, height = 64;  // pixels
 };
 

@@ -50,8 +50,7 @@ struct Mesh {
 
   // Per corner; each is empty or has 3F entries (corner k of face f is 3f + k), so seams need no
   // doubled vertices.
-  std::vector<glm::vec2>
-      corner_uvs;  // u right, v up; (0,0) is the lower left corner of the texture
+  std::vector<glm::vec2> corner_uvs;  // u right, v up; (0, 0): the texture's lower left corner
   std::vector<glm::vec3> corner_normals;
 
   std::vector<std::int32_t> face_materials;  // empty (all 0) or [F], indices into materials

@@ -17,10 +17,10 @@ struct Edge {
 };
 
 struct Topology {
-  std::vector<Edge>
-      edges;  // each undirected edge once, sorted by (a, b); all three sides of every face count
-  int nonmanifold_edges =
-      0;  // edges with more than two faces; only the first two, in face order, are kept in `edges`
+  // Each undirected edge once, sorted by (a, b); all three sides of every face count.
+  std::vector<Edge> edges;
+  // Edges with more than two faces; `edges` keeps the first two of them, in face order.
+  int nonmanifold_edges = 0;
   int boundary_edges = 0;  // edges with one face
   // Neighbours of vertex v: neighbors[offsets[v] .. offsets[v + 1]), ascending.
   std::vector<std::int32_t> offsets;  // [V + 1]

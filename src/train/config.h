@@ -46,8 +46,8 @@ struct RenderConfig {
 
 struct OptimizerConfig {
   double learning_rate = 1e-4;
-  double final_factor =
-      1.0;  // the rate falls to this share by a half cosine over the run; 1: constant
+  // The rate falls to this share by a half cosine over the run; 1: constant.
+  double final_factor = 1.0;
   std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
   double beta1 = 0.9;
   double beta2 = 0.999;
@@ -56,8 +56,7 @@ struct OptimizerConfig {
 struct ScheduleConfig {
   std::int64_t steps = 50000;
   std::int64_t batch = 64;  // objects a step
-  std::int64_t views =
-      2;  // per object: the input's own view and views - 1 random others (section 5.1: 2)
+  std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
   std::int64_t seed = 1;
   std::int64_t log_every = 20;  // steps
   std::int64_t sample_every = 1000;

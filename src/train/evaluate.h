@@ -30,9 +30,8 @@ struct EvaluationJob {
 };
 
 struct Score {
-  double iou = 0;  // 3D IoU at 32^3, in [0, 1]
-  std::optional<double>
-      f_score;  // at kFScoreThreshold, in [0, 1]; none where the truth has no mesh
+  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]
+  std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
 };
 
 struct EvaluationRow {

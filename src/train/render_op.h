@@ -12,8 +12,7 @@ namespace tilegrad::train {
 
 struct RenderJob {
   std::span<const std::int32_t> faces;  // [F,3], shared by all meshes; must outlive the tape
-  std::vector<Camera>
-      cameras;  // [B * views]: mesh b is rendered by cameras [b * views, (b + 1) * views)
+  std::vector<Camera> cameras;  // [B * views]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options;
 };

@@ -25,8 +25,8 @@ struct TrainJob {
   Path data;  // dataset folder
   Path run;   // run folder
   ExistingRun existing = ExistingRun::kRefuse;
-  double max_minutes =
-      0;  // > 0: save and stop after this long; a resumed run goes on to the same bits
+  // > 0: save and stop after this long; a resumed run goes on to the same bits.
+  double max_minutes = 0;
 };
 
 struct TrainOutcome {

@@ -46,8 +46,7 @@ HWY_INLINE std::size_t PlaneOf(const BatchNormShape& s, std::size_t c, std::size
   return (n * s.channels + c) * s.pixels;
 }
 
-// ---- Lanes along the pixels of one channel
-// -------------------------------------------------------
+// ---- Lanes along the pixels of one channel ----
 
 HWY_INLINE float MeanOfChannel(const BatchNormForwardProblem<float>& p, std::size_t c) {
   RowSum sum{DF()};
@@ -135,8 +134,7 @@ void BackwardChannel(const BatchNormBackwardProblem<float>& p, std::size_t c) {
   }
 }
 
-// ---- One channel a lane: pixels = 1, channels [c, c + count)
-// -------------------------------------
+// ---- One channel a lane: pixels = 1, channels [c, c + count) ----
 
 void ForwardLanes(const BatchNormForwardProblem<float>& p, std::size_t c, std::size_t count) {
   const DF d;

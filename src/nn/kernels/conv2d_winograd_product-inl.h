@@ -25,8 +25,7 @@ constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half o
 constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
 constexpr std::size_t kSlotColumnPanels = 16;  // in one work item: 256 tiles
 
-// ---- Forward and input gradient: out[slot] = weights[slot] in[slot]
-// --------------------------------
+// ---- Forward and input gradient: out[slot] = weights[slot] in[slot] ----
 
 struct SlotProduct {
   const PackedWinogradWeights& weights;
@@ -84,8 +83,7 @@ void MultiplySlots(const SlotProduct& p, const Loops& loops) {
   });
 }
 
-// ---- Weight gradient: sums[slot] (+)= inputs[slot] outputs[slot]^T
-// --------------------------------
+// ---- Weight gradient: sums[slot] (+)= inputs[slot] outputs[slot]^T ----
 
 template <std::size_t R = kTileRows>
 HWY_INLINE void PlainRowsTile(const float* rows, std::size_t row_stride, std::size_t count,

@@ -62,8 +62,7 @@ inline std::size_t SlotLayoutSize(const WinogradSide& side, const TileRows& rows
   return side.total() * rows.pitch + side.plan.slots() * kTileColumns;
 }
 
-// ---- Inputs: tiles of span x span at distance `step`
-// -----------------------------------------
+// ---- Inputs: tiles of span x span at distance `step` ----
 
 // Memory of one worker: [span * span][pitch] for the places of a tile, and the image rows that a
 // tile sees, padded.
@@ -247,8 +246,8 @@ inline void ScatterTileRow(const WinogradPlan& plan, const TileRow& row, const f
   const Conv2dShape& s = plan.s;
   const SeenRows in_image(plan, row);
   const std::size_t padded_pitch = PaddedPitch(plan);
-  const std::size_t width =
-      std::min(s.in_width, plan.step * (plan.tiles_across + 1) - s.padding);  // of the padded row
+  // Of the padded row.
+  const std::size_t width = std::min(s.in_width, plan.step * (plan.tiles_across + 1) - s.padding);
   // All rows before any goes to the image: loads do not wait for what was just stored.
   for (std::size_t i = in_image.begin; i < in_image.end; ++i) {
     SumRow(plan, places + i * plan.span * pitch, pitch, padded + i * padded_pitch);
@@ -280,8 +279,7 @@ inline void ScatterInputGrad(const WinogradPlan& plan, const TileRows& rows, con
   }
 }
 
-// ---- Outputs: tiles of 2 x 2, lanes along tiles
-// -----------------------------------------------
+// ---- Outputs: tiles of 2 x 2, lanes along tiles ----
 
 // quads[i * 2 + j][t] = pixel (2 ty + i, 2 tx + j) of output channel o, 0 outside the image.
 inline void GatherOutputGrad(const WinogradPlan& plan, const TileRows& rows, const float* d_y,
@@ -350,8 +348,7 @@ HWY_INLINE void TransformOutputGrad(const TileRows& rows, const SlotLayout& layo
   }
 }
 
-// ---- Outputs: lanes along channels
-// ------------------------------------------------------------
+// ---- Outputs: lanes along channels ----
 
 inline std::size_t TileRowQuadsSize(const WinogradPlan& plan) {
   return 4 * plan.tiles_across * kTileColumns;

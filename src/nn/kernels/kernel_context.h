@@ -37,8 +37,8 @@ class KernelScratch {
 struct KernelContext {
   const Workers& workers;
   KernelScratch& scratch;
-  bool winograd =
-      true;  // convolutions may multiply less and round a little more: conv2d_winograd.h
+  // Convolutions may multiply less and round a little more: conv2d_winograd.h.
+  bool winograd = true;
 };
 
 }  // namespace tilegrad::nn

@@ -50,8 +50,7 @@ struct ModelInfo {
   Split split = Split::kTrain;
   std::string license, creator;  // empty where unknown
   int source_faces = 0;          // triangles before anything was done to it
-  std::uint64_t geometry =
-      0;  // equal for copies of one mesh in other colours; 0 if there is no mesh
+  std::uint64_t geometry = 0;    // equal for copies of one mesh in other colours; 0: no mesh
 };
 
 inline constexpr int kOccupancyResolution = 32;  // voxels a side

@@ -51,8 +51,7 @@ Camera CameraAt(int size, double azimuth, double elevation, double distance) {
 }
 
 FitScene PlainScene(const Mesh& mesh, int size) {
-  FitScene scene =
-      SceneOfMesh(mesh).value();  // built-in shapes have nothing that could not be held
+  FitScene scene = SceneOfMesh(mesh).value();  // a built-in shape always has one
   scene.cameras = {CameraAt(size, 60, 25, 4)};
   return scene;
 }

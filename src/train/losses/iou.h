@@ -7,8 +7,8 @@
 
 namespace tilegrad::train {
 
-inline constexpr double kIouEpsilon =
-    1e-10;  // on the denominator, so two empty masks give loss 1 and gradient 0 (spec 4)
+// Added to the denominator, so that two empty masks give loss 1 and gradient 0.
+inline constexpr double kIouEpsilon = 1e-10;
 
 // Of one image; sums in double, in order.
 template <class T>

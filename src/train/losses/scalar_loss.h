@@ -19,7 +19,8 @@ inline nn::Var ScalarLoss(const char* name, const nn::Var& input, double value,
       const T factor = *d_outputs[0].data<T>();
       if (factor == T(1)) return std::vector<nn::Tensor>{gradient};
       nn::Tensor scaled = context.Empty(gradient.shape(), gradient.dtype());
-      for (std::size_t i = 0; i < scaled.elements(); ++i) scaled.data<T>()[i] = factor * gradient.data<T>()[i];
+      for (std::size_t i = 0; i < scaled.elements(); ++i)
+        scaled.data<T>()[i] = factor * gradient.data<T>()[i];
       return std::vector<nn::Tensor>{scaled};
     });
   };

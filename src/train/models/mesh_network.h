@@ -10,16 +10,16 @@
 
 namespace tilegrad::train {
 
-inline constexpr std::int64_t kPaperParameters =
-    34'115'916;                                        // at 64 x 64 with NetworkConfig's defaults
+// At 64 x 64 with NetworkConfig's defaults.
+inline constexpr std::int64_t kPaperParameters = 34'115'916;
 inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, as the truth
 
 // What the network says of a batch of B images.
 struct PredictedMeshes {
-  nn::Var movement;  // [B, V, 3] offsets from the template, before normalisation: what the
-                     // Laplacian sees
-  nn::Var
-      positions;   // [B, V, 3] template + movement, bounding box centred, largest half-extent 0.45
+  // [B, V, 3] offsets from the template, before normalisation: what the Laplacian sees.
+  nn::Var movement;
+  // [B, V, 3] template + movement, bounding box centred, largest half-extent 0.45.
+  nn::Var positions;
   nn::Var colors;  // [B, V, 3] linear, not clamped
 };
 
