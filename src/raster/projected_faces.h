@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Faces that come already projected, and the weights that interpolate over them: the rule of
-// DIB-R's implementations (spec 1.3), which differs from conventions.h. Coordinates are NDC, x
+// DIB-R's implementations, which differs from conventions.h. Coordinates are NDC, x
 // right, y up; nothing is snapped, a pixel centre on an edge is inside, depth and features are
 // linear on the screen, and weights have a small eps in their denominator:
 //

@@ -69,7 +69,7 @@ struct Bounds {
 Bounds MeshBounds(const Mesh& mesh);
 
 // Moves the centre of the bounding box to the origin and scales so that the largest half-extent is
-// `half_extent` (spec 5.1: 0.45). An error for an empty mesh or one without extent.
+// `half_extent` (datasets: 0.45). An error for an empty mesh or one without extent.
 Status NormalizeToBox(Mesh& mesh, float half_extent);
 
 }  // namespace tilegrad

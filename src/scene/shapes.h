@@ -31,8 +31,8 @@ void Append(Mesh& mesh, const Mesh& other);
 // Applies p -> linear * p + offset to positions, and the inverse transpose to normals. Columns of
 // `linear` are the images of the axes.
 void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 offset);
-// Per-vertex unit normals: the area-weighted sum of the adjacent faces' normals (spec section 2);
-// (0,0,1) where that is zero.
+// Per-vertex unit normals: the area-weighted sum of the adjacent faces' normals; (0, 0, 1) where
+// that is zero.
 std::vector<glm::vec3> SmoothNormals(const Mesh& mesh);
 
 }  // namespace tilegrad

@@ -13,7 +13,7 @@
 
 namespace tilegrad::train {
 
-// The network of section 5.1 (spec 3.1); the defaults are the paper's, 34,115,916 parameters at 64
+// The network of section 5.1; the defaults are the paper's, 34,115,916 parameters at 64
 // x 64 with the 642-vertex template.
 struct NetworkConfig {
   std::int64_t channels = 64;   // of the first convolution; the next two have 2x and 4x

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How good a predictor is on models that it never saw: the paper's Table 1 with two baselines
-// (section 5.1; spec section 6).
+// (section 5.1).
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The paper's 3D metrics (section 5.1; spec section 6).
+// The paper's 3D metrics (section 5.1).
 #pragma once
 
 #include <cstdint>

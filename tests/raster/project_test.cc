@@ -43,7 +43,7 @@ TEST(Project, AgreesWithTheCamerasOfDibR) {
   constexpr int kSize = 64;
   int checked = 0;
   for (const auto& view : json["dibr_camera_info"]) {
-    // At the poles theirs breaks (spec 1.1); ours takes the limit.
+    // At the poles theirs breaks; ours takes the limit.
     if (std::abs(view["elevation_deg"].get<double>()) >= 90) continue;
     const Camera camera = OrbitCamera({49.13434207744484, kSize, kSize}, view["azimuth_deg"],
                                       view["elevation_deg"], view["distance"]);

@@ -49,7 +49,7 @@ TEST(Shapes, IcosphereIsThePapersTemplate) {
   EXPECT_EQ(mesh.positions.size(), 642u);
   EXPECT_EQ(mesh.faces.size(), 1280u);
   EXPECT_EQ(BuildTopology(mesh.faces, 642).edges.size(), 1920u);
-  EXPECT_NEAR(Volume(mesh), 0.519, 5e-4);  // spec 3.1, three digits
+  EXPECT_NEAR(Volume(mesh), 0.519, 5e-4);  // to three digits
   int zeros[3] = {};
   for (const glm::vec3& p : mesh.positions) {
     EXPECT_NEAR(glm::length(p), 0.5f, 1e-7);
@@ -185,7 +185,7 @@ TEST(Camera, LookAtEqualsOrbit) {
   const float target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
   const Camera look = LookAtCamera(Lens{}, eye, target, up);
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(look.rotation[i], orbit.rotation[i], 1e-6);
-  EXPECT_NEAR(orbit.fx, 32 * 2.1875, 1e-4);  // f = 35/16 (spec 1.1)
+  EXPECT_NEAR(orbit.fx, 32 * 2.1875, 1e-4);  // f = 35/16
 }
 
 // A few roundings of numbers up to 3.

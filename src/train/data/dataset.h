@@ -20,8 +20,8 @@
 
 namespace tilegrad::train {
 
-// The same for every model: view i is OrbitCamera(lens, azimuth_step * i, elevation, distance)
-// (spec 5.1, 5.2).
+// The same for every model: view i is OrbitCamera(lens, azimuth_step * i, elevation, distance). The
+// defaults are those of the paper's own renders.
 struct CameraRule {
   Lens lens;                    // width = height = the image size
   double azimuth_step = -15.0;  // degrees
@@ -54,7 +54,7 @@ struct ModelInfo {
 };
 
 inline constexpr int kOccupancyResolution = 32;  // voxels a side
-inline constexpr int kTruthPoints = 2500;        // spec section 6
+inline constexpr int kTruthPoints = 2500;        // as the official code takes for the F-score
 inline constexpr int kTruthFaces = 5000;
 
 struct ModelData {

@@ -53,12 +53,12 @@ Result<std::unique_ptr<ModelSource>> SweetHome3dSource(const Path& folder);
 // folder/<class>/<file>, every file whose ending io::LoadMesh knows.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
-// folder/<synset>/<model>/models/model_normalized.obj, the 13 synsets of spec 5.3; other folders
+// folder/<synset>/<model>/models/model_normalized.obj, the paper's 13 synsets; other folders
 // are not looked at. `split_list`, if not empty, is a text file of lines "<synset>/<model> <split>"
 // with train, val or test; then only the models that it lists are used.
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Path& split_list);
 
-// The renders of N3MR and SoftRas (spec 5.2): folder/<class>_<train|val|test>_images.npz, uint8
+// The renders of N3MR and SoftRas: folder/<class>_<train|val|test>_images.npz, uint8
 // [N,24,4,64,64], with _voxels.npz, bool [N,32,32,32]. One pair of files is held in memory at a
 // time.
 Result<std::unique_ptr<ModelSource>> NmrSource(const Path& folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images and voxels of N3MR and SoftRas as they are published (spec 5.2), in our frame.
+// Images and voxels of N3MR and SoftRas as they are published, in our frame.
 //
 // Their frame is left-handed: image v is seen from (d cos e sin a, d sin e, -d cos e cos a) with a
 // = -15 v degrees, e = 30, d = 2.732. With x = -z', z = -x' (primes: theirs) that is our orbit at

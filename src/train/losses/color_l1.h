@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Equation 13: the L1 loss of colours. As the official code: the sum over the channels of the mean
-// over pixels and images of |I - I'|, that is three times a plain mean for RGB (spec 4).
+// over pixels and images of |I - I'|, that is three times a plain mean for RGB.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Laplacian regulariser of section 4.1, on the movement m of the vertices (spec 4): sum over
+// The Laplacian regulariser of section 4.1, on the movement m of the vertices: sum over
 // vertices and axes of (mean of the neighbours' m - m)^2, mean over the batch. Uniform one-ring
 // weights.
 #pragma once

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smoothness regulariser of section 4.1 (spec 4, "flatten"): sum over edges of (cos(n1, n2) -
-// 1)^2 with the unit normals of the two faces, mean over the batch. Boundary edges and edges of
+// The smoothness regulariser of section 4.1 ("flatten" in SoftRas): sum over edges of (cos(n1, n2)
+// - 1)^2 with the unit normals of the two faces, mean over the batch. Boundary edges and edges of
 // faces without area take no part.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The network of section 5.1 (spec 3.1): one RGBA image in, a deformed and coloured sphere out.
+// The network of section 5.1: one RGBA image in, a deformed and coloured sphere out.
 #pragma once
 
 #include <memory>
@@ -48,7 +48,7 @@ class MeshNetwork {
 };
 
 // positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per
-// mesh of [B, V, 3]. The gradient flows through the extremes (spec 3.1, trap 17). A mesh without
+// mesh of [B, V, 3]. The gradient flows through the extremes. A mesh without
 // extent stays finite.
 nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent);
 
