@@ -36,15 +36,6 @@ HWY_INLINE FaceInt LoadSome(const std::int32_t* from, std::size_t count) {
   return hn::Load(di, values);
 }
 
-// Vertices of corner k of faces f, f + 1, ...
-struct FaceVertices {
-  FaceInt v[3];
-};
-HWY_INLINE FaceVertices LoadFaceVertices(const ScreenMesh& mesh, std::size_t f, std::size_t count) {
-  return {
-      {LoadSome(&mesh.v0[f], count), LoadSome(&mesh.v1[f], count), LoadSome(&mesh.v2[f], count)}};
-}
-
 using QuadTag = hn::FixedTag<float, 4>;
 using Quad = hn::Vec<QuadTag>;
 

@@ -79,7 +79,6 @@ struct ConvWork {
   std::size_t planes_size, phases_size;
   float* packed_weight = nullptr;
   std::size_t* offsets = nullptr;  // phase by phase: [block channel][tap]
-  float* worker_memory = nullptr;
 
   std::size_t worker_size() const { return RoundUp(planes_size + phases_size, kAlignment); }
 };
