@@ -98,7 +98,7 @@ py::array LookAt(double fov_y, Size size, const py::object& eyes, const py::obje
       up(function, "up", ups);
   return MakeAll(function, eye.count(), [&](std::size_t i) -> Result<Camera64> {
     if (eye[i] == target[i]) {
-      return InvalidArgument("eye and target are the same point, so there is no way to look");
+      return InvalidArgument("eye and target are the same point: there is no direction to look in");
     }
     return LookAtCamera(lens, eye[i].data(), target[i].data(), up[i].data());
   });

@@ -179,10 +179,10 @@ def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
     except (TypeError, ValueError, OverflowError, RuntimeError, BufferError) as error:
         if str(error).startswith(function + ": "):
             raise
-        raise TypeError(f"{function}: {argument} is no array of numbers but "
+        raise TypeError(f"{function}: {argument} is not an array of numbers but "
                         f"{type(value).__name__}: {error}") from error
     if array.dtype.kind not in "biufc":
-        raise TypeError(f"{function}: {argument} is no array of numbers but "
+        raise TypeError(f"{function}: {argument} is not an array of numbers but "
                         f"{type(value).__name__}")
     return array
 

@@ -33,8 +33,8 @@ def load_image(path: Path) -> np.ndarray:
     for names in reversed(_CHANNELS.values()):
         if set(names) <= set(layers):
             return np.stack([layers[name] for name in names], axis=-1)
-    raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} are no picture; load_layers "
-                     f"reads them")
+    raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} do not make a picture; "
+                     f"load_layers reads them")
 
 
 def load_layers(path: Path) -> dict[str, np.ndarray]:

@@ -40,7 +40,7 @@ def save_weights(path: Path, weights: Mapping[str, Any],
     """
     for name in weights:
         if not isinstance(name, str):
-            raise TypeError(f"save_weights: name {name!r} is no text")
+            raise TypeError(f"save_weights: name {name!r} is not a string")
     arrays = {name: _plain(value) for name, value in weights.items()}
     if metadata is None:
         metadata = getattr(weights, "metadata", {})

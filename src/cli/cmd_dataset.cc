@@ -139,7 +139,7 @@ void AddDataset(CLI::App& app, Action* action) {
   auto* command =
       app.add_subcommand("dataset",
                          "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
-                         "Stopped with Ctrl-C, the same command goes on where it was.");
+                         "After Ctrl-C the same command goes on where it stopped.");
   command
       ->add_option("--source", options->source,
                    "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
@@ -159,21 +159,23 @@ void AddDataset(CLI::App& app, Action* action) {
       command->add_option("--views", build.views, "views of a model")->capture_default_str();
   command
       ->add_option("--per-class", build.per_class,
-                   "at most N models of a class; 0 is all, or 100 if procedural")
+                   "at most this many models of a class; 0: all, or 100 if procedural")
       ->capture_default_str();
-  command->add_option("--limit", build.limit, "at most N models in all; 0 is all")
+  command->add_option("--limit", build.limit, "at most this many models in all; 0: all")
       ->capture_default_str();
   command
       ->add_option("--seed", build.split.seed,
-                   "of the choice of models, the split and procedural shapes")
+                   "seed of the choice of models, the split and procedural shapes")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  auto* test = command->add_option("--test-share", build.split.test_share, "of each class's models")
+  auto* test = command
+                   ->add_option("--test-share", build.split.test_share,
+                                "share of each class's models to test with")
                    ->capture_default_str();
-  auto* validation =
-      command
-          ->add_option("--validation-share", build.split.validation_share, "of each class's models")
-          ->capture_default_str();
+  auto* validation = command
+                         ->add_option("--validation-share", build.split.validation_share,
+                                      "share of each class's models to validate with")
+                         ->capture_default_str();
   command->add_option("--split-list", options->split_list,
                       "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
   AddWorkersOption(command, &options->workers);

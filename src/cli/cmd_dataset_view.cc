@@ -97,7 +97,7 @@ void AddDatasetView(CLI::App& app, Action* action) {
   auto* command = app.add_subcommand("dataset-view", "Save one image of a dataset as an RGBA PNG");
   command->add_option("--data", options->data, "dataset folder")->required();
   auto* model = command->add_option("--model", options->model,
-                                    "CLASS/ID, as the files below models/ [one of --split]");
+                                    "CLASS/ID, named as the files below models/ [one of --split]");
   command->add_option("--class", options->class_name, "choose among the models of this class")
       ->excludes(model);
   command->add_option("--split", options->split, "train or test")

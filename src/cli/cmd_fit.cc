@@ -177,13 +177,13 @@ void AddWhat(CLI::App* command, Options* o) {
                    "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
                    "dataset, with --model")
       ->required();
-  command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a dataset of tilegrad");
+  command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
       ->capture_default_str();
   command->add_option("--mesh", o->mesh, "start from this file instead of a sphere");
   command->add_option("--optimize", o->optimize,
-                      "comma list of positions, colors, texture, uv, camera, light, sh, material "
-                      "[positions and texture, or the colors that --mesh has]");
+                      "any of positions, colors, texture, uv, camera, light, sh, material; "
+                      "separated by commas [positions and texture, or the colors that --mesh has]");
   command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
       ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))
       ->capture_default_str();
@@ -217,7 +217,8 @@ void AddHow(CLI::App* command, FitConfig* c) {
   number("--edge-length", &c->regularizers.edge_length, "weight of unequal edges");
   number("--color-weight", &c->loss.color_weight, "of the L1 loss of colours");
   number("--silhouette-weight", &c->loss.silhouette_weight, "of the IoU loss of masks");
-  number("--perturb-cameras", &c->perturb_cameras, "turn each by DEG at random, to try refining");
+  number("--perturb-cameras", &c->perturb_cameras,
+         "turn each camera by this many degrees at random, to try out refining them");
   number("--seed", &c->seed, "of the choice of images")->check(CLI::NonNegativeNumber);
   number("--checkpoint-every", &c->checkpoint_every, "steps");
   number("--timelapse", &c->timelapse, "pictures of the run; 0: none");

@@ -100,13 +100,14 @@ void AddPredict(CLI::App& app, Action* action) {
   command->add_option("--run", options->run,
                       "run folder or one checkpoint [the newest below runs/]");
   command
-      ->add_option("--out", options->out,
-                   "folder for NAME.glb and NAME_turntable.png, by the image; NAME_2 for a second "
-                   "of that name")
+      ->add_option(
+          "--out", options->out,
+          "folder for NAME.glb and NAME_turntable.png, named after the image; NAME_2 for a "
+          "second image of that name")
       ->capture_default_str();
   command->add_option(
       "--mask", options->mask,
-      "image of the same size: white is the object, or what is opaque if some of it is not");
+      "image of the same size: the object is white or, in one with transparency, opaque");
   command->add_flag("--keep-framing", options->keep_framing,
                     "only resize: the image is framed like a training image already");
   AddWorkersOption(command, &options->workers);

@@ -134,8 +134,9 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
                   WritePicture(picture, settings_.scene.color_space, settings_.file, name));
   for (const Path& file : files) {
     if (files_.insert(file).second) continue;
-    return InvalidArgument("{}: is of two pictures; render these meshes into folders of their own",
-                           file.string());
+    return InvalidArgument(
+        "{}: two pictures have this name; render these meshes into folders of their own",
+        file.string());
   }
   last_ = files.back();
   if (settings_.explain) Explain(picture, name.stem.string());
@@ -225,11 +226,15 @@ Status RunRender(const RenderSettings& settings) {
   return first;
 }
 
-// name -> value, as CLI11 takes it; the names are shown in --help.
+// name -> value, as CLI11 takes it; --help shows the names, not the numbers behind them.
 template <class T>
 CLI::Option* AddChoice(CLI::App* command, const std::string& option, T* value,
                        const std::map<std::string, T>& choices, const std::string& help) {
-  return command->add_option(option, *value, help)->transform(CLI::CheckedTransformer(choices));
+  std::string names;
+  for (const auto& [name, _] : choices) names += (names.empty() ? "" : ",") + name;
+  return command->add_option(option, *value, help)
+      ->transform(CLI::CheckedTransformer(choices).description("{" + names + "}"))
+      ->type_name("TEXT");
 }
 
 void AddViewOptions(CLI::App* command, ViewSettings* view) {
@@ -274,7 +279,7 @@ void AddViewOptions(CLI::App* command, ViewSettings* view) {
       ->add_option("--distance", view->distance,
                    "from the middle of the mesh, world units; 0: so that it fills the picture")
       ->capture_default_str();
-  command->add_option("--margin", view->margin, "share of the picture that stays free around")
+  command->add_option("--margin", view->margin, "share of the picture that stays free on each side")
       ->capture_default_str();
 }
 
@@ -298,16 +303,16 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
                           {{"auto", NormalSource::kAuto},
                            {"smooth", NormalSource::kSmooth},
                            {"flat", NormalSource::kFlat}},
-                          "auto (default): the file's, flat where it has none");
+                          "auto (default): the file's own, flat where it has none");
   AddChoice<shade::Filter>(command, "--filter", &s->scene.filter,
                            {{"nearest", shade::Filter::kNearest},
                             {"bilinear", shade::Filter::kBilinear},
                             {"trilinear", shade::Filter::kTrilinear}},
-                           "of textures: nearest, bilinear, trilinear (default)");
+                           "texture lookup: nearest, bilinear or trilinear (default)");
   AddChoice<ColorSpace>(command, "--color-space", &s->scene.color_space,
                         {{"linear", ColorSpace::kLinear}, {"srgb", ColorSpace::kSrgb}},
-                        "light is computed in: linear (default), as viewers do, or in the numbers "
-                        "of the files (srgb), as training does");
+                        "light is added in linear colours (default), as viewers do, or in the "
+                        "numbers of the files (srgb), as training does");
   command->add_option("--cull", s->cull, "back faces: auto follows the file's materials")
       ->check(CLI::IsMember({"auto", "back", "none"}))
       ->capture_default_str();
@@ -320,7 +325,7 @@ void AddFileOptions(CLI::App* command, RenderSettings* s) {
       ->check(CLI::IsMember({"png", "exr", "npy"}));
   command
       ->add_option("--outputs", s->file.outputs,
-                   "any of color, alpha, depth, normals, uv, faces, with commas")
+                   "any of color, alpha, depth, normals, uv, faces; separated by commas")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--background", s->file.background, "R G B, each 0 to 1, sRGB [transparent]")

@@ -42,7 +42,8 @@ Result<Path> ChooseRun(const std::string& given) {
     return NotFound(
         "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
         "--help)");
-  PrintNote("{}: the newest run below runs/; --run names another\n", newest->second.string());
+  PrintNote("{}: taking the newest run below runs/; --run chooses another\n",
+            newest->second.string());
   return newest->second;
 }
 
@@ -59,7 +60,7 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   const Path file = run / "run.json";
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
-    return NotFound("{}: no run folder of tilegrad train: there is no run.json in it",
+    return NotFound("{}: not a run folder of tilegrad train: there is no run.json in it",
                     run.string());
   }
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));

@@ -230,7 +230,7 @@ Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
   std::error_code error;
   const bool text = std::filesystem::exists(folder / "cameras.txt", error);
   if (!text && !std::filesystem::exists(folder / "cameras.bin", error)) {
-    return NotFound("{}: neither cameras.txt nor cameras.bin is in it: no model of COLMAP",
+    return NotFound("{}: not a COLMAP model: neither cameras.txt nor cameras.bin is in it",
                     folder.string());
   }
   TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(folder / "cameras.txt")

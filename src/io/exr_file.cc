@@ -51,7 +51,7 @@ Status Check(const ExrImage& image) {
     }
     bool twice = c.name.empty();
     for (std::size_t j = 0; j < i; ++j) twice |= image.channels[j].name == c.name;
-    if (twice) return InvalidArgument("EXR channel name \"{}\" is empty or there twice", c.name);
+    if (twice) return InvalidArgument("EXR channel name \"{}\" is empty or appears twice", c.name);
   }
   return {};
 }

@@ -187,7 +187,7 @@ Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLi
   TILEGRAD_TRY(Guard(child, std::move(sockets.parent), mailbox, answer, limits).Watch());
   TILEGRAD_TRY(OfEnd(child.status(), limits));
   auto result = mailbox.Get(limits.memory_bytes);
-  if (!result) return DataLoss("returned nothing that is whole");
+  if (!result) return DataLoss("returned an incomplete result");
   return std::move(*result);
 }
 

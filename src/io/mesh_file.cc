@@ -182,8 +182,8 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   const std::string place = source.Describe(name);
   const Format* format = FindFormat(name);
   if (format == nullptr) {
-    return InvalidArgument("{}: the ending \"{}\" is of no mesh format that is read ({})", place,
-                           MeshEnding(name), MeshFileEndings());
+    return InvalidArgument("{}: \"{}\" is not the ending of a mesh format that can be read ({})",
+                           place, MeshEnding(name), MeshFileEndings());
   }
   auto loaded = format->read(source, name);
   if (!loaded.ok()) return loaded.status();

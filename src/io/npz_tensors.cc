@@ -42,7 +42,7 @@ Result<nn::Tensor> TensorFromNpy(const nn::Context& context, const NpyArray& arr
     const bool possible = extent <= static_cast<std::size_t>(nn::Shape::kMostElements);
     if (possible) shape.Append(static_cast<std::int64_t>(extent));
     if (!possible || !shape.IsPossible()) {
-      return DataLoss("{}: an extent of {} is none of a tensor", name, extent);
+      return DataLoss("{}: a tensor cannot have an extent of {}", name, extent);
     }
   }
   nn::Tensor tensor = context.Empty(shape, *dtype);

@@ -130,7 +130,7 @@ Result<PlyHeader> ParsePlyHeader(std::string_view file, const std::string& place
       return header;
     }
     if (!ParseLine(line, header))
-      return DataLoss("{}: line {}: \"{}\" is no line of a PLY header", place, lines.Number(),
+      return DataLoss("{}: line {}: \"{}\" is not a line of a PLY header", place, lines.Number(),
                       line.substr(0, 80));
   }
   return DataLoss("{}: ends before end_header", place);

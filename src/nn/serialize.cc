@@ -121,12 +121,12 @@ struct Header {
 Result<Header> ParseHeader(std::span<const std::uint8_t> bytes) {
   std::uint64_t length = 0;
   if (bytes.size() < kLengthBytes)
-    return DataLoss("safetensors: {} bytes are no file", bytes.size());
+    return DataLoss("safetensors: {} bytes are too few for a file", bytes.size());
   std::memcpy(&length, bytes.data(), kLengthBytes);
   if (length > kMaxHeader || length > bytes.size() - kLengthBytes) {
     return DataLoss(
-        "safetensors: a header of {} bytes in a file of {}: cut short, or not such a file", length,
-        bytes.size());
+        "safetensors: a header of {} bytes in a file of {}: cut short, or not a safetensors file",
+        length, bytes.size());
   }
   const auto* begin = bytes.data() + kLengthBytes;
   Header header{Json::parse(begin, begin + length, nullptr, /*allow_exceptions=*/false), {}};
@@ -194,7 +194,7 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
   if (!file.metadata.empty()) header[kMetadata] = file.metadata;
   for (const auto& [key, value] : file.metadata) {
     if (!IsUtf8(key) || !IsUtf8(value)) {
-      return InvalidArgument("safetensors: the metadata are not UTF-8");
+      return InvalidArgument("safetensors: the metadata is not UTF-8");
     }
   }
   std::size_t end = 0;

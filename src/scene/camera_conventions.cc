@@ -119,8 +119,8 @@ Status CheckRotation(const double* m) {
   }
   if (off > kRotationTolerance) {
     return InvalidArgument(
-        "the camera's rotation is none: its rows are off unit length and right angles by {:.3g}, "
-        "allowed is {} (is there scale in the matrix?)",
+        "the camera's rotation is not a rotation: its rows are off unit length and right angles by "
+        "{:.3g}, {} is allowed (is there scale in the matrix?)",
         off, kRotationTolerance);
   }
   if (Determinant(m) > 0) return {};
@@ -162,8 +162,7 @@ Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {
 Result<Camera64> FromOpenCv(const OpenCvCamera& from) {
   const Mat3Array& k = from.k;
   if (k[1] != 0 || k[3] != 0) {
-    return InvalidArgument("K has skew ({}, {}), which a pinhole with right angles has not", k[1],
-                           k[3]);
+    return InvalidArgument("K has skew ({}, {}); cameras here have none", k[1], k[3]);
   }
   if (k[6] != 0 || k[7] != 0 || k[8] != 1) {
     return InvalidArgument("the last row of K is {} {} {}, not 0 0 1 (row-major)", k[6], k[7],
@@ -261,7 +260,7 @@ Result<OpenGlCamera> ToOpenGl(const Camera64& camera, ImageSize size, double far
 Result<Camera64> FromKaolin(const KaolinCamera& from, ImageSize size) {
   TILEGRAD_TRY(CheckSize(size));
   if (from.projection[2] != -1) {
-    return InvalidArgument("the third number of camera_proj is {}; -1 is what it always is",
+    return InvalidArgument("the third number of camera_proj is {}; it must be -1",
                            from.projection[2]);
   }
   Camera64 camera;

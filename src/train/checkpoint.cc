@@ -71,7 +71,7 @@ Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& path) {
   const auto& m = file.metadata;
   // Those of earlier versions have none.
   if (m.count(kChecksum) > 0 && m.at(kChecksum) != ChecksumOf(file)) {
-    return DataLoss("{}: what is in it does not fit its checksum: the file was damaged",
+    return DataLoss("{}: its contents do not match its checksum: the file was damaged",
                     path.string());
   }
   const auto step = Number<std::int64_t>(m, "step"),

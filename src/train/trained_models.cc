@@ -56,8 +56,8 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset) {
   }
   if (seen.empty()) return {};
   return InvalidArgument(
-      "{}: {} of the {} test models of {} were trained on ({}, ...): the dataset was split anew "
-      "since; make it with the seed, shares and limits of then, or train again",
+      "{}: {} of the {} test models of {} were trained on ({}, ...): the dataset has been split "
+      "anew since; make it with the seed, shares and limits it had then, or train again",
       run.string(), seen.size(), test.size(), dataset.folder().string(),
       seen[0].substr(seen[0].find(' ') + 1));
 }

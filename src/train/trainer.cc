@@ -110,7 +110,7 @@ Status Run::CheckExisting() const {
   // Checkpoints alone are a run, too, or a fit.
   if ((started || !ListCheckpoints(job_.run).empty()) && job_.existing == ExistingRun::kRefuse) {
     return InvalidArgument(
-        "{}: there is a run already; give --resume to go on with it, or another --out",
+        "{}: already holds a run; give --resume to go on with it, or another --out",
         job_.run.string());
   }
   if (!started) return {};

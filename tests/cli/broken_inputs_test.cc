@@ -270,7 +270,7 @@ TEST_F(BrokenInputs, ExitCodesOfPlaces) {
     return outcome.exit_code;
   };
   const std::string file = (folder_ / "file").string();
-  EXPECT_EQ(code("eval --run " + file, file + ": no run folder"), 3);
+  EXPECT_EQ(code("eval --run " + file, file + ": not a run folder"), 3);
   EXPECT_EQ(code("eval --run " + folder_.string(), "no run.json"), 3);
   EXPECT_EQ(code(Train(file + "/a.toml", Data()), "a.toml"), 3);
   EXPECT_EQ(code("report --run " + RunFolder().string() + " --out /proc/a.html", "/proc/a.html: "),

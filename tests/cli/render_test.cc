@@ -150,7 +150,8 @@ TEST_F(Render, ViewsOfOneNameDoNotOverwriteEachOther) {
 TEST_F(Render, PicturesOfOneNameAreRefused) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "ball_depth.glb", Icosphere(1, 1)).ok());
   const std::string rest = "--size 8 --outputs color,depth --out " + In("out");
-  ExpectRefused(In("ball_depth.glb") + " " + rest, 2, "ball_depth.png: is of two pictures");
+  ExpectRefused(In("ball_depth.glb") + " " + rest, 2,
+                "ball_depth.png: two pictures have this name");
 }
 
 TEST_F(Render, ExplainSaysWhatWasDone) {

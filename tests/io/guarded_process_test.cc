@@ -77,7 +77,7 @@ TEST_F(GuardedProcessTest, CrashesAreErrors) {
   ExpectMessage(Guarded([](AskParent) -> Bytes { throw std::runtime_error("x"); }).status(),
                 "exception");
   ExpectMessage(Guarded([](AskParent) -> Bytes { ::_exit(3); }).status(), "code 3");
-  ExpectMessage(Guarded([](AskParent) -> Bytes { ::_exit(0); }).status(), "nothing that is whole");
+  ExpectMessage(Guarded([](AskParent) -> Bytes { ::_exit(0); }).status(), "an incomplete result");
 }
 
 TEST_F(GuardedProcessTest, WhatLoopsIsStoppedByProcessorTime) {
@@ -172,7 +172,7 @@ TEST_F(GuardedProcessTest, WorksWhereChildrenAreReapedBySomebodyElse) {
   std::signal(SIGCHLD, before);
   ASSERT_TRUE(good.ok()) << good.status().message();
   EXPECT_EQ(*good, Bytes(1, 5));
-  ExpectMessage(bad.status(), "nothing that is whole");
+  ExpectMessage(bad.status(), "an incomplete result");
 }
 
 TEST_F(GuardedProcessTest, NothingIsPrintedTwice) {

@@ -97,7 +97,7 @@ class Refused(unittest.TestCase):
 
     def test_no_arrays(self):
         for value in (None, "abc", {"a": 1}, [[1, 2, 3], [4, 5]], object()):
-            with self.assertRaisesRegex(TypeError, "^render: positions is no array of numbers"):
+            with self.assertRaisesRegex(TypeError, "^render: positions is not an array of numbers"):
                 take(value)
 
     def test_other_devices(self):

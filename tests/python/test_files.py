@@ -281,7 +281,7 @@ class Weights(FolderTest):
             files.save_weights(path, {"x": np.zeros(2, complex)})
         with self.assertRaisesRegex(TypeError, "save_weights: x has dtype int16"):
             files.save_weights(path, {"x": np.zeros(2, np.int16)})
-        with self.assertRaisesRegex(TypeError, "name 3 is no text"):
+        with self.assertRaisesRegex(TypeError, "name 3 is not a string"):
             files.save_weights(path, {3: np.zeros(2)})
         with self.assertRaisesRegex(ValueError, "save_weights: x has 6 axes"):
             files.save_weights(path, {"x": np.zeros((1,) * 6)})

@@ -504,7 +504,7 @@ class Files(unittest.TestCase):
         self.assertTrue(np.allclose(metadata["cam_transform"], transform))
         self.assertTrue(np.allclose(metadata["cam_proj"], [[0.5], [1], [-1]]))
         path.write_text("{}")
-        with self.assertRaisesRegex(ValueError, "7_metadata.json: no metadata of a view"):
+        with self.assertRaisesRegex(ValueError, "7_metadata.json: not the metadata of a view"):
             kaolin.io.render.import_synthetic_view(self.root, 7)
 
 

@@ -37,7 +37,7 @@ void ReadFileName(JsonFields& fields, const char* key, std::string* out) {
   fields.Read(key, out);
   if (fields.status().ok() &&
       (out->empty() || *out == "." || *out == ".." || out->find('/') != std::string::npos)) {
-    fields.Fail(DataLoss("{}: \"{}\" is no file name", fields.place(), key));
+    fields.Fail(DataLoss("{}: \"{}\" is not a file name", fields.place(), key));
   }
 }
 

@@ -141,7 +141,7 @@ Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   const bool has_test = std::filesystem::exists(test, error);
   if (has_test && hold_out > 0) {
     return InvalidArgument(
-        "{}: says already which views are held out: leave out --hold-out, or that file",
+        "{}: already says which views are held out: leave out --hold-out, or that file",
         test.string());
   }
   HoldOut(hold_out, &input);

@@ -86,15 +86,14 @@ Status Session::Open(FitOutcome* outcome) {
   if (!ListCheckpoints(job_.out).empty()) {
     if (!job_.resume) {
       return InvalidArgument(
-          "{}: there is a fit in it already; --resume goes on with it, or choose "
-          "another --out",
+          "{}: already holds a fit; --resume goes on with it, or choose another --out",
           job_.out.string());
     }
     TILEGRAD_ASSIGN(FoundCheckpoint found, LoadNewestCheckpoint(context_, job_.out));
     const CheckpointInfo& info = found.checkpoint.info;
     const std::string difference = FirstDifference(info.config, DescribeJob(job_));
     if (!difference.empty()) {
-      return InvalidArgument("{}: the fit in it was started otherwise: {}", job_.out.string(),
+      return InvalidArgument("{}: its fit was started with other settings: {}", job_.out.string(),
                              difference);
     }
     const Status loaded = fitter_.LoadState(found.checkpoint.tensors);

@@ -57,7 +57,7 @@ Status CheckConfig(const FitConfig& c) {
 Status CheckMasks(const FitJob& job) {
   if (job.input.masked || job.config.loss.silhouette_weight == 0) return {};
   return InvalidArgument(
-      "no image has an alpha channel or a mask, so nobody knows where the object is: add masks "
+      "no image has an alpha channel or a mask, so it is not known where the object is: add masks "
       "(\"mask_path\" in transforms.json), or fit colours only with a silhouette weight of 0");
 }
 

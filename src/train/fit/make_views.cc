@@ -80,8 +80,8 @@ Status ClearEarlierViews(const Path& folder) {
     const Path file = folder / name;
     if (!std::filesystem::exists(file, error)) continue;
     if (!ours || name == std::string_view("transforms.json")) {
-      return InvalidArgument("{}: is there already, and of other images; choose another folder",
-                             file.string());
+      return InvalidArgument(
+          "{}: already exists, and belongs to other images; choose another folder", file.string());
     }
     if (!std::filesystem::remove(file, error)) {
       return IoError("{}: cannot be replaced: {}", file.string(), error.message());

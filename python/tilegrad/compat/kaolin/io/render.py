@@ -42,7 +42,7 @@ def import_synthetic_view(root_dir: Union[str, "os.PathLike[str]"], idx: int, rg
             if is_wanted:
                 output[name] = metadata[name]
     except (KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as error:
-        raise ValueError(f"{path}: no metadata of a view: {error!r}") from error
+        raise ValueError(f"{path}: not the metadata of a view: {error!r}") from error
     return output
 
 
