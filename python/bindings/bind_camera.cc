@@ -180,63 +180,63 @@ py::array Resize(const py::object& cameras, Size from, Size to) {
   });
 }
 
+using Numbers = Result<std::vector<double>>;
+
+py::array ToOpenCvNumbers(const py::object& cameras, bool half) {
+  return ReadAll("Camera.to_opencv", cameras, 21, [half](const Camera64& c) -> Numbers {
+    const OpenCvCamera out = ToOpenCv(c, CentreOf(half));
+    return Joined(out.k, out.rotation, out.translation);
+  });
+}
+
+py::array ToColmapNumbers(const py::object& cameras) {
+  return ReadAll("Camera.to_colmap", cameras, 11, [](const Camera64& c) -> Numbers {
+    const ColmapCamera out = ToColmap(c);
+    return Joined(out.quaternion, out.translation, out.fx, out.fy, out.cx, out.cy);
+  });
+}
+
+py::array ToOpenGlNumbers(const py::object& cameras, Size size, double far_plane) {
+  return ReadAll("Camera.to_opengl", cameras, 32, [&](const Camera64& c) -> Numbers {
+    TILEGRAD_ASSIGN(const OpenGlCamera out, ToOpenGl(c, SizeOf(size), far_plane));
+    return Joined(out.projection, out.model_view);
+  });
+}
+
+py::array ToKaolinNumbers(const py::object& cameras, Size size) {
+  return ReadAll("Camera.to_kaolin", cameras, 15, [&](const Camera64& c) -> Numbers {
+    TILEGRAD_ASSIGN(const KaolinCamera out, ToKaolin(c, SizeOf(size)));
+    return Joined(out.rotation, out.position, out.projection);
+  });
+}
+
+py::array ToPyTorch3dNumbers(const py::object& cameras, Size size) {
+  return ReadAll("Camera.to_pytorch3d", cameras, 16, [&](const Camera64& c) -> Numbers {
+    TILEGRAD_ASSIGN(const PyTorch3dCamera out, ToPyTorch3d(c, SizeOf(size)));
+    return Joined(out.r, out.t, out.focal_length, out.principal_point);
+  });
+}
+
+py::array ToNerfNumbers(const py::object& cameras) {
+  return ReadAll("Camera.to_nerf", cameras, 20, [](const Camera64& c) -> Numbers {
+    const NerfCamera out = ToNerf(c);
+    return Joined(out.camera_to_world, out.fl_x, out.fl_y, out.cx, out.cy);
+  });
+}
+
 void BindTo(py::module_& m) {
-  using Numbers = Result<std::vector<double>>;
-  m.def(
-      "camera_to_opencv",
-      [](const py::object& cameras, bool half) {
-        return ReadAll("Camera.to_opencv", cameras, 21, [half](const Camera64& c) -> Numbers {
-          const OpenCvCamera out = ToOpenCv(c, CentreOf(half));
-          return Joined(out.k, out.rotation, out.translation);
-        });
-      },
-      py::arg("cameras"), py::arg("half"), "(n, 21): k, rotation, translation.");
-  m.def(
-      "camera_to_colmap",
-      [](const py::object& cameras) {
-        return ReadAll("Camera.to_colmap", cameras, 11, [](const Camera64& c) -> Numbers {
-          const ColmapCamera out = ToColmap(c);
-          return Joined(out.quaternion, out.translation, out.fx, out.fy, out.cx, out.cy);
-        });
-      },
-      py::arg("cameras"), "(n, 11): quaternion, translation, fx, fy, cx, cy.");
-  m.def(
-      "camera_to_opengl",
-      [](const py::object& cameras, Size size, double far_plane) {
-        return ReadAll("Camera.to_opengl", cameras, 32, [&](const Camera64& c) -> Numbers {
-          TILEGRAD_ASSIGN(const OpenGlCamera out, ToOpenGl(c, SizeOf(size), far_plane));
-          return Joined(out.projection, out.model_view);
-        });
-      },
-      py::arg("cameras"), py::arg("size"), py::arg("far_plane"),
-      "(n, 32): projection, model_view.");
-  m.def(
-      "camera_to_kaolin",
-      [](const py::object& cameras, Size size) {
-        return ReadAll("Camera.to_kaolin", cameras, 15, [&](const Camera64& c) -> Numbers {
-          TILEGRAD_ASSIGN(const KaolinCamera out, ToKaolin(c, SizeOf(size)));
-          return Joined(out.rotation, out.position, out.projection);
-        });
-      },
-      py::arg("cameras"), py::arg("size"), "(n, 15): rotation, position, projection.");
-  m.def(
-      "camera_to_pytorch3d",
-      [](const py::object& cameras, Size size) {
-        return ReadAll("Camera.to_pytorch3d", cameras, 16, [&](const Camera64& c) -> Numbers {
-          TILEGRAD_ASSIGN(const PyTorch3dCamera out, ToPyTorch3d(c, SizeOf(size)));
-          return Joined(out.r, out.t, out.focal_length, out.principal_point);
-        });
-      },
-      py::arg("cameras"), py::arg("size"), "(n, 16): r, t, focal_length, principal_point.");
-  m.def(
-      "camera_to_nerf",
-      [](const py::object& cameras) {
-        return ReadAll("Camera.to_nerf", cameras, 20, [](const Camera64& c) -> Numbers {
-          const NerfCamera out = ToNerf(c);
-          return Joined(out.camera_to_world, out.fl_x, out.fl_y, out.cx, out.cy);
-        });
-      },
-      py::arg("cameras"), "(n, 20): camera_to_world, fl_x, fl_y, cx, cy.");
+  m.def("camera_to_opencv", &ToOpenCvNumbers, py::arg("cameras"), py::arg("half"),
+        "(n, 21): k, rotation, translation.");
+  m.def("camera_to_colmap", &ToColmapNumbers, py::arg("cameras"),
+        "(n, 11): quaternion, translation, fx, fy, cx, cy.");
+  m.def("camera_to_opengl", &ToOpenGlNumbers, py::arg("cameras"), py::arg("size"),
+        py::arg("far_plane"), "(n, 32): projection, model_view.");
+  m.def("camera_to_kaolin", &ToKaolinNumbers, py::arg("cameras"), py::arg("size"),
+        "(n, 15): rotation, position, projection.");
+  m.def("camera_to_pytorch3d", &ToPyTorch3dNumbers, py::arg("cameras"), py::arg("size"),
+        "(n, 16): r, t, focal_length, principal_point.");
+  m.def("camera_to_nerf", &ToNerfNumbers, py::arg("cameras"),
+        "(n, 20): camera_to_world, fl_x, fl_y, cx, cy.");
 }
 
 }  // namespace

@@ -175,10 +175,7 @@ void BindMaskOptions(py::module_& m) {
           "faces, edge_eps (NDC^2) added to squared lengths.");
 }
 
-}  // namespace
-
-void BindKaolin(py::module_& m) {
-  BindMaskOptions(m);
+void BindRasterize(py::module_& m) {
   m.def(
       "rasterize_projected",
       [](const py::array& xy, py::array z, py::array features, std::optional<py::array> valid,
@@ -209,6 +206,9 @@ void BindKaolin(py::module_& m) {
       py::arg("wants_face_features"), py::arg("threads"),
       "gradient (N, H, W, C) -> gradients of face_vertices_image (N, F, 3, 2) and face_features\n"
       "(N, F, 3, C); empty where not wanted");
+}
+
+void BindSoftMask(py::module_& m) {
   m.def(
       "projected_soft_mask",
       [](const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
@@ -233,6 +233,14 @@ void BindKaolin(py::module_& m) {
       py::arg("face_vertices_image"), py::arg("selected_face_idx"), py::arg("soft_mask"),
       py::arg("gradient"), py::arg("options"), py::arg("threads"),
       "soft_mask and its gradient (N, H, W) -> the gradient of face_vertices_image (N, F, 3, 2)");
+}
+
+}  // namespace
+
+void BindKaolin(py::module_& m) {
+  BindMaskOptions(m);
+  BindRasterize(m);
+  BindSoftMask(m);
 }
 
 }  // namespace tilegrad::python

@@ -179,9 +179,7 @@ py::array MipBackward(Levels d_levels, int threads) {
   return d_levels[0];
 }
 
-}  // namespace
-
-void BindTexture(py::module_& m) {
+void BindCall(py::module_& m) {
   m.attr("TEXTURE_FILTERS") =
       py::make_tuple("nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear");
   m.attr("TEXTURE_BOUNDARIES") = py::make_tuple("wrap", "clamp", "zero", "cube");
@@ -196,6 +194,9 @@ void BindTexture(py::module_& m) {
            }),
            py::kw_only(), py::arg("uv"), py::arg("uv_da"), py::arg("mip_level_bias"),
            py::arg("filter"), py::arg("boundary"), py::arg("threads"));
+}
+
+void BindLookup(py::module_& m) {
   m.def(
       "deferred_texture",
       [](const Levels& levels, const TextureCall& call) {
@@ -214,6 +215,9 @@ void BindTexture(py::module_& m) {
       },
       py::arg("levels"), py::arg("call"), py::arg("gradient"), py::arg("wanted"),
       "The gradients of the levels (a list, empty if not wanted), uv, uv_da and mip_level_bias.");
+}
+
+void BindMip(py::module_& m) {
   m.def(
       "deferred_mip",
       [](const py::array& tex, int most, int threads) {
@@ -231,6 +235,14 @@ void BindTexture(py::module_& m) {
       },
       py::arg("d_levels"), py::arg("threads"),
       "The gradient of a texture from those of all its levels, which are overwritten.");
+}
+
+}  // namespace
+
+void BindTexture(py::module_& m) {
+  BindCall(m);
+  BindLookup(m);
+  BindMip(m);
 }
 
 }  // namespace tilegrad::python

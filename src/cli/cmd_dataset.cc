@@ -132,14 +132,7 @@ Status Make(const DatasetOptions& options) {
   return {};
 }
 
-}  // namespace
-
-void AddDataset(CLI::App& app, Action* action) {
-  auto options = std::make_shared<DatasetOptions>();
-  auto* command =
-      app.add_subcommand("dataset",
-                         "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
-                         "After Ctrl-C the same command goes on where it stopped.");
+void AddSourceOptions(CLI::App* command, DatasetOptions* options) {
   command
       ->add_option("--source", options->source,
                    "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
@@ -152,36 +145,48 @@ void AddDataset(CLI::App& app, Action* action) {
   command->add_option("--input", options->input,
                       "folder of the models; sweethome3d has a default, procedural needs none");
   command->add_option("--out", options->out, "folder to fill [datasets/SOURCE]");
-  train::BuildOptions& build = options->build;
-  auto* size =
-      command->add_option("--size", build.image_size, "pixels a side")->capture_default_str();
-  auto* views =
-      command->add_option("--views", build.views, "views of a model")->capture_default_str();
+  command->add_option("--split-list", options->split_list,
+                      "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
+}
+
+void AddBuildOptions(CLI::App* command, train::BuildOptions* build) {
+  command->add_option("--size", build->image_size, "pixels a side")->capture_default_str();
+  command->add_option("--views", build->views, "views of a model")->capture_default_str();
   command
-      ->add_option("--per-class", build.per_class,
+      ->add_option("--per-class", build->per_class,
                    "at most this many models of a class; 0: all, or 100 if procedural")
       ->capture_default_str();
-  command->add_option("--limit", build.limit, "at most this many models in all; 0: all")
+  command->add_option("--limit", build->limit, "at most this many models in all; 0: all")
       ->capture_default_str();
   command
-      ->add_option("--seed", build.split.seed,
+      ->add_option("--seed", build->split.seed,
                    "seed of the choice of models, the split and procedural shapes")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  auto* test = command
-                   ->add_option("--test-share", build.split.test_share,
-                                "share of each class's models to test with")
-                   ->capture_default_str();
-  auto* validation = command
-                         ->add_option("--validation-share", build.split.validation_share,
-                                      "share of each class's models to validate with")
-                         ->capture_default_str();
-  command->add_option("--split-list", options->split_list,
-                      "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
+  command
+      ->add_option("--test-share", build->split.test_share,
+                   "share of each class's models to test with")
+      ->capture_default_str();
+  command
+      ->add_option("--validation-share", build->split.validation_share,
+                   "share of each class's models to validate with")
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void AddDataset(CLI::App& app, Action* action) {
+  auto options = std::make_shared<DatasetOptions>();
+  auto* command =
+      app.add_subcommand("dataset",
+                         "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
+                         "After Ctrl-C the same command goes on where it stopped.");
+  AddSourceOptions(command, options.get());
+  AddBuildOptions(command, &options->build);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action, size, views, test, validation] {
-    options->fixed_size = size->count() + views->count() > 0;
-    options->shares = test->count() + validation->count() > 0;
+  command->callback([options, action, command] {
+    options->fixed_size = command->count("--size") + command->count("--views") > 0;
+    options->shares = command->count("--test-share") + command->count("--validation-share") > 0;
     *action = [options] { return Make(*options); };
   });
 }

@@ -37,12 +37,10 @@ struct CameraFileOptions {
 // the file and the line or frame. At least one camera.
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options);
 
+// Whose sizes and pixel centres need no options.
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder);
-Result<std::vector<CameraView>> LoadNerfCameras(const Path& file, const CameraFileOptions& options);
-Result<std::vector<CameraView>> LoadOpenCvCameras(const Path& file,
-                                                  const CameraFileOptions& options);
 
-// Writers for what the loaders read; numbers come back as they were.
+// Writers for what LoadCameras reads; numbers come back as they were.
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text
 Status SaveNerfCameras(const Path& file, std::span<const CameraView> views);
 Status SaveOpenCvCameras(const Path& file, std::span<const CameraView> views);

@@ -240,18 +240,6 @@ Result<std::vector<CameraView>> OpenCvViews(const json& top, const Path& file,
 
 }  // namespace
 
-Result<std::vector<CameraView>> LoadNerfCameras(const Path& file,
-                                                const CameraFileOptions& options) {
-  TILEGRAD_ASSIGN(const json top, ReadJson(file));
-  return NerfViews(top, file, options);
-}
-
-Result<std::vector<CameraView>> LoadOpenCvCameras(const Path& file,
-                                                  const CameraFileOptions& options) {
-  TILEGRAD_ASSIGN(const json top, ReadJson(file));
-  return OpenCvViews(top, file, options);
-}
-
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return LoadColmapCameras(path);

@@ -54,6 +54,74 @@ ShadeSteps ColorSteps(const SceneParts& parts) {
           .highlight = parts.model.lighting == Lighting::kPhong};
 }
 
+// Whether somebody wants a gradient that normals hand on.
+bool WantsNormals(const BackwardPlan& plan) {
+  const bool given = plan.parts.model.normals == NormalKind::kGiven;
+  return plan.geometry || (given ? plan.wishes.normals : plan.wishes.positions);
+}
+
+void SetColorTargets(BackwardPlan* plan) {
+  const SceneParts& parts = plan->parts;
+  const GradientWishes& wishes = plan->wishes;
+  const bool geometry = plan->geometry;
+  plan->to_colors = parts.colors && (geometry || wishes.colors);
+  plan->to_uv = parts.textures && parts.bilinear && (geometry || wishes.uvs);
+  plan->to_texture = parts.textures && wishes.textures;
+  plan->to_normal = parts.lit() && WantsNormals(*plan);
+  plan->to_eye = parts.model.lighting == Lighting::kPhong && geometry;
+  plan->to_light_vectors =
+      parts.uses_lights() &&
+      (wishes.lights || (parts.light_directions && (geometry || wishes.light_directions)));
+  plan->to_light = plan->to_normal || plan->to_eye || plan->to_light_vectors ||
+                   (parts.model.lighting == Lighting::kSphericalHarmonics && wishes.sh);
+  plan->to_surfaces = wishes.surfaces;
+}
+
+VaryingSet PulledVaryings(const BackwardPlan& plan) {
+  const GradientWishes& wishes = plan.wishes;
+  const bool geometry = plan.geometry;
+  VaryingSet set;
+  set[Varying::kColor] = plan.to_colors;
+  set[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes.uvs));
+  set[Varying::kNormal] = plan.to_normal || (wishes.d_normals && WantsNormals(plan));
+  set[Varying::kPosition] = plan.to_eye || (wishes.d_depth && geometry);
+  set[Varying::kLightDirection] =
+      plan.to_light_vectors && plan.parts.light_directions && (geometry || wishes.light_directions);
+  set[Varying::kUser] = wishes.d_user && (geometry || wishes.user);
+  Finish(plan.parts, &set);
+  return set;
+}
+
+// Whether the adjoint of colour needs what light or surfaces multiply.
+bool PullsOnFactors(const BackwardPlan& plan) { return plan.to_light || plan.to_surfaces; }
+bool PullsOnTexture(const BackwardPlan& plan) { return plan.to_uv || plan.to_texture; }
+
+ShadeSteps RecomputedSteps(const BackwardPlan& plan) {
+  const SceneParts& parts = plan.parts;
+  ShadeSteps steps;
+  if (plan.to_colors || PullsOnTexture(plan) || PullsOnFactors(plan)) {
+    steps = ColorSteps(parts);
+    // The highlight is a sum of its own: colours and textures do not need its value.
+    steps.highlight = steps.highlight && (parts.model.clamp || PullsOnFactors(plan));
+  }
+  if (plan.wishes.d_normals && WantsNormals(plan)) steps.normal = true;
+  return steps;
+}
+
+VaryingSet RecomputedVaryings(const BackwardPlan& plan) {
+  const SceneParts& parts = plan.parts;
+  const ShadeSteps& steps = plan.steps;
+  VaryingSet set;
+  set[Varying::kColor] = steps.color && parts.colors &&
+                         (parts.model.clamp || PullsOnTexture(plan) || PullsOnFactors(plan));
+  set[Varying::kUv] = steps.texture;
+  set[Varying::kNormal] = steps.normal;
+  set[Varying::kPosition] = steps.highlight || (plan.wishes.d_depth && plan.wishes.camera);
+  set[Varying::kLightDirection] = steps.light && parts.uses_lights() && parts.light_directions;
+  Finish(parts, &set);
+  return set;
+}
+
 }  // namespace
 
 int VaryingSet::width(Varying v) const {
@@ -98,53 +166,15 @@ BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
   BackwardPlan plan;
   wishes.d_uv = wishes.d_uv && parts.uvs;
   plan.parts = parts, plan.wishes = wishes;
-  const bool geometry = wishes.positions || wishes.camera;
-  const bool derived = parts.model.normals != NormalKind::kGiven;
-  const bool normal_wanted = geometry || (derived ? wishes.positions : wishes.normals);
-  plan.geometry = geometry;
-  VaryingSet& pulled = plan.pulled;
-  const bool phong = parts.model.lighting == Lighting::kPhong;
-  if (wishes.d_color) {
-    plan.to_colors = parts.colors && (geometry || wishes.colors);
-    plan.to_uv = parts.textures && parts.bilinear && (geometry || wishes.uvs);
-    plan.to_texture = parts.textures && wishes.textures;
-    plan.to_normal = parts.lit() && normal_wanted;
-    plan.to_eye = phong && geometry;
-    plan.to_light_vectors =
-        parts.uses_lights() &&
-        (wishes.lights || (parts.light_directions && (geometry || wishes.light_directions)));
-    plan.to_light = plan.to_normal || plan.to_eye || plan.to_light_vectors ||
-                    (parts.model.lighting == Lighting::kSphericalHarmonics && wishes.sh);
-    plan.to_surfaces = wishes.surfaces;
-  }
-  pulled[Varying::kColor] = plan.to_colors;
-  pulled[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes.uvs));
-  pulled[Varying::kNormal] = plan.to_normal || (wishes.d_normals && normal_wanted);
-  pulled[Varying::kPosition] = plan.to_eye || (wishes.d_depth && geometry);
-  pulled[Varying::kLightDirection] =
-      plan.to_light_vectors && parts.light_directions && (geometry || wishes.light_directions);
-  pulled[Varying::kUser] = wishes.d_user && (geometry || wishes.user);
-  Finish(parts, &pulled);
-  const bool any_color =
-      plan.to_colors || plan.to_uv || plan.to_texture || plan.to_light || plan.to_surfaces;
-  if (any_color) plan.steps = ColorSteps(parts);
-  // The highlight is a sum of its own: colours and textures do not need its value.
-  plan.steps.highlight =
-      any_color && phong && (parts.model.clamp || plan.to_light || plan.to_surfaces);
-  if (wishes.d_normals && normal_wanted) plan.steps.normal = true;
-  VaryingSet& again = plan.recomputed;
-  again[Varying::kColor] =
-      any_color && parts.colors &&
-      (parts.model.clamp || plan.to_texture || plan.to_uv || plan.to_light || plan.to_surfaces);
-  again[Varying::kUv] = plan.steps.texture;
-  again[Varying::kNormal] = plan.steps.normal;
-  again[Varying::kPosition] = plan.steps.highlight || (wishes.d_depth && wishes.camera);
-  again[Varying::kLightDirection] =
-      plan.steps.light && parts.uses_lights() && parts.light_directions;
-  Finish(parts, &again);
-  plan.colors_only =
-      IsPlainColor(parts) && wishes.d_color && IsOnly(pulled, Varying::kColor) && !plan.to_surfaces;
-  plan.user_only = IsOnly(pulled, Varying::kUser) && again.channels() == 0 && !wishes.d_color;
+  plan.geometry = wishes.positions || wishes.camera;
+  if (wishes.d_color) SetColorTargets(&plan);
+  plan.pulled = PulledVaryings(plan);
+  plan.steps = RecomputedSteps(plan);
+  plan.recomputed = RecomputedVaryings(plan);
+  plan.colors_only = IsPlainColor(parts) && wishes.d_color &&
+                     IsOnly(plan.pulled, Varying::kColor) && !plan.to_surfaces;
+  plan.user_only =
+      IsOnly(plan.pulled, Varying::kUser) && plan.recomputed.channels() == 0 && !wishes.d_color;
   return plan;
 }
 

@@ -139,6 +139,11 @@ struct ShadedRenderer::Impl {
   void FindSinks(std::span<ShadedGradients> d_scenes);
   void FillSink(std::span<const ShadedScene> scenes, std::span<ShadedGradients> d_scenes,
                 const Sink& sink);
+  // The renderer's own backward pass, with the stage if there is one.
+  Status RunBackward(const RenderOptions& options, const ShadedFrame& frame,
+                     const ShadedFrameGradients& d_frame);
+  // From what that pass has summed to gradients of the scenes' arrays.
+  void MergeBackward(std::span<const ShadedScene> scenes, std::span<ShadedGradients> d_scenes);
   Status Backward(std::span<const ShadedScene> scenes, const RenderOptions& options,
                   const ShadedFrame& frame, const ShadedFrameGradients& d_frame,
                   std::span<ShadedGradients> d_scenes);
@@ -397,6 +402,16 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   }
   SetViews(scenes);
   SetGradients(scenes, d_scenes);
+  TILEGRAD_TRY(RunBackward(options, frame, d_frame));
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;
+  }
+  MergeBackward(scenes, d_scenes);
+  return ValidateShadedResult(d_scenes);
+}
+
+Status ShadedRenderer::Impl::RunBackward(const RenderOptions& options, const ShadedFrame& frame,
+                                         const ShadedFrameGradients& d_frame) {
   FrameGradients d_images{{}, d_frame.alpha};
   if (backward.colors_only) d_images.attributes = d_frame.color;
   if (backward.user_only) d_images.attributes = d_frame.attributes;
@@ -407,10 +422,11 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   if (!status.ok() || unseen || (staged && !stage.sound())) {
     TILEGRAD_TRY(ValidateShadedCotangents(d_frame, frame.face_ids));
   }
-  TILEGRAD_TRY(status);
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;
-  }
+  return status;
+}
+
+void ShadedRenderer::Impl::MergeBackward(std::span<const ShadedScene> scenes,
+                                         std::span<ShadedGradients> d_scenes) {
   StageClock clock;
   ClearUniforms(d_scenes);
   if (staged) {
@@ -426,7 +442,6 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
   workers->For(sinks.size(),
                [&](std::size_t i, std::size_t) { FillSink(scenes, d_scenes, sinks[i]); });
   clock.Lap(&work.merge_ms);
-  return ValidateShadedResult(d_scenes);
 }
 
 ShadedRenderer::ShadedRenderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
