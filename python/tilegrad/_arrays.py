@@ -20,6 +20,7 @@ Sizes = dict  # name of a length -> length, as the arrays so far have it
 
 _NUMBERS = (list, tuple, int, float)  # what is no array yet: making one is no copy
 _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
+MOST_PIXELS = 16384  # of an image in each axis: kMaxImageSize of src/raster/conventions.h
 _counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
 _lock = threading.Lock()
 
@@ -62,7 +63,7 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     copy = np.require(array, dtype, ("C", "ALIGNED"))
     if not isinstance(value, _NUMBERS):
         _count_copy(copy)
-    return copy.reshape(array.shape)  # ascontiguousarray makes one axis of none
+    return copy
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
@@ -167,6 +168,14 @@ def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
                         f"{value!r} ({type(value).__name__})") from None
     if kind is int and not -2**31 <= number < 2**31:
         raise ValueError(f"{function}: {argument} is {number}, out of int32's range")
+    return number
+
+
+def as_pixels(function: str, argument: str, value: Any) -> int:
+    """`value` as a side of an image; TypeError if it is no int, ValueError if it is out of range."""
+    number = as_number(function, argument, value, int)
+    if not 1 <= number <= MOST_PIXELS:
+        raise ValueError(f"{function}: {argument} is {number}, expected 1..{MOST_PIXELS} pixels")
     return number
 
 

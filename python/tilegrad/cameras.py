@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Iterable, Optional, Union
+from typing import Any, Iterable, Optional
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
-
-Path = Union[str, "os.PathLike[str]"]
+from tilegrad._paths import Path
 
 _CENTRES = ("integer", "half")
 _FORMATS = ("opencv", "nerf", "colmap")

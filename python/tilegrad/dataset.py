@@ -13,16 +13,16 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
-from typing import Any, Iterator, Optional, Union
+from typing import Any, Iterator, Optional
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
+from tilegrad._paths import Path
 from tilegrad._threads import thread_count
 from tilegrad.meshes import Mesh, mesh_of_dict
 
-Path = Union[str, "os.PathLike[str]"]
 Item = dict[str, Any]
 
 _SPLITS = ("train", "validation", "test")
@@ -131,8 +131,7 @@ class Dataset:
                 first_step: int = 0) -> Iterator[Item]:
         """Batches of `size` items as `tilegrad train` sees them with this seed, from `first_step`
         on: every epoch shows each model once in a new order, and the last batch of an epoch runs
-        into the next. Arrays get a leading axis; class, split and model become (size,)
-        int64.
+        into the next. Arrays get a leading axis; class, split and model become (size,) int64.
 
         What a step sees depends on (seed, step) only. steps: how many; None: without end.
         """

@@ -20,4 +20,5 @@ from tilegrad.weights import Checkpoint, Weights, load_checkpoint, load_weights,
 __all__ = ["Checkpoint", "Dataset", "Material", "Mesh", "MeshCamera", "MeshTexture", "ModelInfo",
            "Predictor", "Truth", "View", "Weights", "load_cameras", "load_checkpoint",
            "load_image", "load_layers", "load_mesh", "load_weights", "mesh_endings",
-           "rotation_from_vector", "save_cameras", "save_image", "save_layers", "save_mesh", "save_weights"]
+           "rotation_from_vector", "save_cameras", "save_image", "save_layers", "save_mesh",
+           "save_weights"]

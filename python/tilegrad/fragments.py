@@ -71,11 +71,8 @@ def layered_options(function: str, height: int, width: int, faces_per_pixel: int
     """The options, checked as far as numbers go."""
     blur_radius = _arrays.as_number(function, "blur_radius", blur_radius, float)
     clip = blur_radius > 0 if clip_barycentric_coords is None else clip_barycentric_coords
-    size = {}
-    for name, value in (("height", height), ("width", width)):
-        size[name] = _arrays.as_number(function, name, value, int)
-        if not 1 <= size[name] <= 16384:
-            raise ValueError(f"{function}: {name} is {value}, expected 1..16384 pixels")
+    size = {name: _arrays.as_pixels(function, name, value)
+            for name, value in (("height", height), ("width", width))}
     layers = _arrays.as_number(function, "faces_per_pixel", faces_per_pixel, int)
     if not 1 <= layers <= 1024:
         raise ValueError(f"{function}: faces_per_pixel is {layers}, expected 1..1024")

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
-
-Path = Union[str, "os.PathLike[str]"]
+from tilegrad._paths import Path, ending_of
 
 _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}  # of EXR
 
@@ -22,7 +21,7 @@ def load_image(path: Path) -> np.ndarray:
     float32, of its channels R, G, B, A or Y, A or the only one there is. NPY: the array as it is.
     OSError, ValueError: name the file and what is wrong with it.
     """
-    ending = _ending(path)
+    ending = ending_of(path)
     if ending == ".npy":
         return _tools.load_npy(os.fspath(path))
     if ending != ".exr":
@@ -51,7 +50,7 @@ def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
     image: (H, W) or (H, W, 1 to 4); with planar (1 to 4, H, W), as renders are.
     ValueError: another ending, shape, or a number that is not finite (PNG). OSError: not written.
     """
-    ending = _ending(path)
+    ending = ending_of(path)
     if ending == ".npy":
         array = np.asarray(image)
         return _tools.save_npy(os.fspath(path), np.ascontiguousarray(array).reshape(array.shape))
@@ -72,10 +71,6 @@ def save_layers(path: Path, layers: dict[str, Any]) -> None:
     planes = [_arrays.as_array("save_layers", name, plane, np.float32, ("H", "W"), sizes)
               for name, plane in layers.items()]
     _tools.save_exr(os.fspath(path), list(layers), np.stack(planes))
-
-
-def _ending(path: Path) -> str:
-    return os.path.splitext(os.fspath(path))[1].lower()
 
 
 def _pixels(function: str, argument: str, image: Any, planar: bool = False) -> np.ndarray:

@@ -15,9 +15,8 @@ import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
+from tilegrad._paths import Path
 from tilegrad._scene import Scene, Surface, Texture
-
-Path = Union[str, "os.PathLike[str]"]
 
 _COLOR_SPACES = ("srgb", "linear")
 _NORMALS = ("auto", "smooth", "flat")
@@ -110,7 +109,8 @@ class Mesh:
     warnings: list[str] = dataclasses.field(default_factory=list)
     cameras: list[MeshCamera] = dataclasses.field(default_factory=list)
 
-    def scene_arguments(self, *, color_space: str = "srgb", normals: str = "auto") -> dict[str, Any]:
+    def scene_arguments(self, *, color_space: str = "srgb",
+                        normals: str = "auto") -> dict[str, Any]:
         """What a `Scene` has to be told beside positions, faces, camera and light, by argument:
         colours, uvs, textures, surfaces, normals.
 

@@ -9,16 +9,15 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
+from tilegrad._paths import Path
 from tilegrad._threads import thread_count
 from tilegrad.images import as_bytes
 from tilegrad.meshes import Mesh, mesh_of_dict
-
-Path = Union[str, "os.PathLike[str]"]
 
 
 class Predictor:

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Mapping, Optional, Union
+from typing import Any, Mapping, Optional
 
 import numpy as np
 
 from tilegrad import _tools
-
-Path = Union[str, "os.PathLike[str]"]
+from tilegrad._paths import Path, ending_of
 
 
 class Weights(dict[str, np.ndarray]):
@@ -76,7 +75,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
 
 
 def _ending(function: str, path: Path) -> str:
-    ending = os.path.splitext(os.fspath(path))[1].lower()
+    ending = ending_of(path)
     if ending not in (".safetensors", ".npz"):
         raise ValueError(f"{function}: {os.fspath(path)!r} must end in .safetensors or .npz")
     return ending

@@ -11,13 +11,12 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
-from tilegrad._arrays import Sizes, as_array
+from tilegrad._arrays import MOST_PIXELS, Sizes, as_array
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 from tilegrad.compat.nvdiffrast._context import RasterizeCpuContext
 
 Images = tuple  # of two tensors
-_MOST_PIXELS = 16384  # in a row or a column: kMaxImageSize of src/raster/conventions.h
 
 
 class _Call(NamedTuple):
@@ -131,9 +130,9 @@ def _checked(function: str, glctx: Any, pos: Any, tri: Any, resolution: Any, ran
 def _resolution(function: str, resolution: Any) -> tuple[int, int]:
     numbers = tuple(resolution) if isinstance(resolution, (tuple, list, torch.Size)) else ()
     try:
-        if len(numbers) == 2 and all(int(n) == n and 1 <= n <= _MOST_PIXELS for n in numbers):
+        if len(numbers) == 2 and all(int(n) == n and 1 <= n <= MOST_PIXELS for n in numbers):
             return int(numbers[0]), int(numbers[1])
     except (TypeError, ValueError, OverflowError):
         pass  # no number, NaN, infinity
     raise ValueError(f"{function}: resolution is {resolution!r}, expected (height, width), each 1 "
-                     f"to {_MOST_PIXELS}")
+                     f"to {MOST_PIXELS}")

@@ -38,7 +38,8 @@ def generate_rotate_translate_matrices(camera_position: torch.Tensor, look_at: t
                                        ) -> tuple[torch.Tensor, torch.Tensor]:
     """camera_rot [B,3,3] and camera_trans [B,3] of cameras at camera_position [B,3] that look at
     look_at [B,3], camera_up_direction [B,3] (or [1,3]) up."""
-    return torch.stack(_axes(camera_position - look_at, camera_up_direction), dim=1), camera_position
+    axes = _axes(camera_position - look_at, camera_up_direction)
+    return torch.stack(axes, dim=1), camera_position
 
 
 def generate_transformation_matrix(camera_position: torch.Tensor, look_at: torch.Tensor,

@@ -41,8 +41,8 @@ def sh9_irradiance(lights: torch.Tensor, normals: torch.Tensor) -> torch.Tensor:
 
 def sh9_diffuse(directions: torch.Tensor, normals: torch.Tensor,
                 albedo: torch.Tensor) -> torch.Tensor:
-    """Light from directions [3] that a diffuse surface with normals [N,3] and albedo [N,3] reflects.
-    Returns [N,3]."""
+    """Light from directions [3] that a diffuse surface with normals [N,3] and albedo [N,3]
+    reflects. Returns [N,3]."""
     check_floats("sh9_diffuse", "directions", directions, (3,))
     sizes: dict = {}
     check_floats("sh9_diffuse", "normals", normals, ("N", 3), sizes, directions)

@@ -9,6 +9,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
+from tilegrad._arrays import as_pixels, check_choice
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Features = Union[torch.Tensor, Sequence[torch.Tensor]]
@@ -16,7 +17,6 @@ Features = Union[torch.Tensor, Sequence[torch.Tensor]]
 DEFAULT_MULTIPLIER = 1000.
 _DEFAULT_EPS = 1e-8
 _BACKENDS = ("cuda", "nvdiffrast", "nvdiffrast_fwd")
-_MOST_PIXELS = 16384  # of an axis
 
 
 class _Rasterize(torch.autograd.Function):
@@ -70,7 +70,8 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
     """
     name = "rasterize"
     sizes: dict = {}
-    check_size(name, height, width, backend)
+    size = as_pixels(name, "height", height), as_pixels(name, "width", width)
+    check_choice(name, "backend", backend, _BACKENDS)
     check_floats(name, "face_vertices_image", face_vertices_image, ("B", "F", 3, 2), sizes)
     check_floats(name, "face_vertices_z", face_vertices_z, ("B", "F", 3), sizes,
                  face_vertices_image)
@@ -85,21 +86,11 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
     check_multiplier(name, scale)
     image, face_idx = _Rasterize.apply(
         face_vertices_image, torch.cat(features, dim=-1) if several else features[0],
-        face_vertices_z, valid_faces, (height, width),
+        face_vertices_z, valid_faces, size,
         (_DEFAULT_EPS if eps is None else eps) / scale**2)
     if not several:
         return image, face_idx
     return torch.split(image, [feature.shape[-1] for feature in features], dim=-1), face_idx
-
-
-def check_size(function: str, height: int, width: int, backend: str) -> None:
-    """ValueError unless there can be such an image, and Kaolin has such a backend."""
-    for axis, pixels in (("height", height), ("width", width)):
-        if not 1 <= pixels <= _MOST_PIXELS:
-            raise ValueError(f"{function}: {axis} is {pixels}, expected 1..{_MOST_PIXELS} pixels")
-    if backend not in _BACKENDS:
-        raise ValueError(f"{function}: backend is {backend!r}, expected one of "
-                         f"{', '.join(map(repr, _BACKENDS))}")
 
 
 def check_multiplier(function: str, multiplier: float) -> None:

@@ -7,6 +7,7 @@ from typing import Optional
 
 import torch
 
+from tilegrad._arrays import check_choice
 from tilegrad.compat.kaolin import ops
 from tilegrad.compat._tensors import check_floats
 from tilegrad.compat.kaolin.render import camera
@@ -60,9 +61,7 @@ def texture_mapping(texture_coordinates: torch.Tensor, texture_maps: torch.Tenso
                  ("B", "P", 2) if sparse else ("B", "H", "W", 2), sizes)
     check_floats(name, "texture_maps", texture_maps, ("B", "C", "Ht", "Wt"), sizes,
                  texture_coordinates)
-    if mode not in _MODES:
-        raise ValueError(f"{name}: mode is {mode!r}, expected one of "
-                         f"{', '.join(map(repr, _MODES))}")
+    check_choice(name, "mode", mode, _MODES)
     inside = texture_coordinates.clamp(0., 1.)
     u, v = (inside.unsqueeze(1) if sparse else inside).unbind(dim=-1)
     grid = torch.stack([2 * u - 1, 1 - 2 * v], dim=-1)  # torch's v runs down
