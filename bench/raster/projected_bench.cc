@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faces that come projected (render/projected_*.h) and lists of the nearest faces
-// (render/layered_raster.h), float and double, one worker, against every face for every pixel in
-// the same process. Counter: pixels a second.
+// Faces that come projected (render/projected) and lists of the nearest faces
+// (render/projected/layered_raster.h), float and double, one worker, against every face for every
+// pixel in the same process. Counter: pixels a second.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -11,9 +11,9 @@
 #include "raster/face_visibility_ref.h"
 #include "raster/project.h"
 #include "render/frame_layout.h"
-#include "render/layered_raster.h"
-#include "render/projected_raster.h"
-#include "render/projected_soft_mask.h"
+#include "render/projected/layered_raster.h"
+#include "render/projected/projected_raster.h"
+#include "render/projected/projected_soft_mask.h"
 
 namespace tilegrad::bench {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "base/rng.h"
 #include "raster/bench_scenes.h"
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 
 namespace tilegrad::bench {
 namespace {

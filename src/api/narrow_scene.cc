@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "render/shade_validate.h"
+#include "render/shaded/shade_validate.h"
 #include "render/validate.h"
 
 namespace tilegrad {

@@ -13,7 +13,7 @@
 #include "api/validate.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 
 namespace tilegrad::v0 {
 

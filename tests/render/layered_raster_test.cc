@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The K nearest faces of pixels: against every face for every pixel, sorted; the gradient against
 // differences; the same bits for any number of workers; errors.
-#include "render/layered_raster.h"
+#include "render/projected/layered_raster.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "render/projected_batch.h"
+#include "render/projected/projected_batch.h"
 
 namespace tilegrad::test {
 

@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/simd_target.h"
-#include "render/projected_raster.h"
+#include "render/projected/projected_raster.h"
+#include "render/projected/projected_soft_mask.h"
 #include "render/projected_scenes.h"
-#include "render/projected_soft_mask.h"
 #include "support/shared_data.h"
 
 namespace tilegrad {

@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 #include "render/shaded_trial.h"
 #include "support/allocation_count.h"
 

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "base/simd_target.h"
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {

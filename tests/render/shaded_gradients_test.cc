@@ -7,7 +7,7 @@
 #include <map>
 #include <string>
 
-#include "render/shaded_renderer_ref.h"
+#include "render/shaded/shaded_renderer_ref.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a scene looks like, by values that are known without a renderer.
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 #include "render/test_scenes.h"
 
 namespace tilegrad::test {

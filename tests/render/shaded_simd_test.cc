@@ -8,8 +8,8 @@
 #include <string>
 
 #include "base/simd_target.h"
-#include "render/shaded_renderer.h"
-#include "render/shaded_renderer_ref.h"
+#include "render/shaded/shaded_renderer.h"
+#include "render/shaded/shaded_renderer_ref.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {

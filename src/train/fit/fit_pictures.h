@@ -2,7 +2,7 @@
 // Pictures of what a fit renders.
 #pragma once
 
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 #include "scene/image.h"
 
 namespace tilegrad::train {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/aligned.h"
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
 

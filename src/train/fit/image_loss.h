@@ -7,7 +7,7 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 
 namespace tilegrad::train {
 

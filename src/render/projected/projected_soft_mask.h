@@ -7,7 +7,7 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "render/projected_batch.h"
+#include "render/projected/projected_batch.h"
 #include "render/renderer.h"
 
 namespace tilegrad {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 
 namespace tilegrad {
 

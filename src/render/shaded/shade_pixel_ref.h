@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 #include "shade/combine_ref.h"
 #include "shade/lambert_ref.h"
 #include "shade/normalize_ref.h"

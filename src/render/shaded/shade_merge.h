@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "render/shade_stage.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shade_stage.h"
+#include "render/shaded/shaded_scene.h"
 #include "shade/texture_levels.h"
 
 namespace tilegrad {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "render/shade_plan.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shaded_scene.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/projected_raster.h"
+#include "render/projected/projected_raster.h"
 
 #include <algorithm>
 #include <cmath>

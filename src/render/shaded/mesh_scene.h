@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "render/shaded_scene.h"
+#include "render/shaded/shaded_scene.h"
 #include "scene/mesh.h"
 
 namespace tilegrad {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/projected_soft_mask.h"
+#include "render/projected/projected_soft_mask.h"
 
 #include <algorithm>
 #include <cmath>

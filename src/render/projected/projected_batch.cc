@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/projected_batch.h"
+#include "render/projected/projected_batch.h"
 
 #include <limits>
 

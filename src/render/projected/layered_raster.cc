@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/layered_raster.h"
+#include "render/projected/layered_raster.h"
 
 #include <algorithm>
 #include <array>

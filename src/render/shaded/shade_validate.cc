@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_validate.h"
+#include "render/shaded/shade_validate.h"
 
 #include <cmath>
 #include <cstddef>

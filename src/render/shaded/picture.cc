@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/picture.h"
+#include "render/shaded/picture.h"
 
 #include <algorithm>
 

@@ -8,8 +8,8 @@
 
 #include "base/aligned.h"
 #include "raster/attributes.h"
-#include "render/shade_plan.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shaded_scene.h"
 #include "shade/mesh_normals.h"
 
 namespace tilegrad {

@@ -10,11 +10,11 @@
 #include <span>
 #include <vector>
 
-#include "render/direction_scale.h"
 #include "render/renderer_ref.h"
-#include "render/shade_pixel_ref.h"
-#include "render/shade_plan.h"
-#include "render/uv_level.h"
+#include "render/shaded/direction_scale.h"
+#include "render/shaded/shade_pixel_ref.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/uv_level.h"
 #include "shade/mesh_normals_ref.h"
 
 namespace tilegrad {

@@ -15,8 +15,8 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "render/shade_plan.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shaded_scene.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

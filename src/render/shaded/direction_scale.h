@@ -8,8 +8,8 @@
 #include <span>
 
 #include "base/scalar.h"
-#include "render/shade_plan.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shaded_scene.h"
 
 namespace tilegrad {
 

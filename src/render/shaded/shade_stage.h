@@ -11,11 +11,11 @@
 #include <span>
 #include <vector>
 
-#include "render/pixel_segments.h"
 #include "render/pixel_stage.h"
-#include "render/shade_plan.h"
-#include "render/shade_run.h"
-#include "render/shaded_scene.h"
+#include "render/shaded/pixel_segments.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shade_run.h"
+#include "render/shaded/shaded_scene.h"
 
 namespace tilegrad {
 

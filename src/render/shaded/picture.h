@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "render/mesh_scene.h"
-#include "render/shaded_renderer.h"
+#include "render/shaded/mesh_scene.h"
+#include "render/shaded/shaded_renderer.h"
 
 namespace tilegrad {
 

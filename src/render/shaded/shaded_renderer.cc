@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shaded_renderer.h"
+#include "render/shaded/shaded_renderer.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "base/stage_clock.h"
-#include "render/shade_merge.h"
-#include "render/shade_pack.h"
-#include "render/shade_report.h"
-#include "render/shade_stage.h"
-#include "render/shade_validate.h"
+#include "render/shaded/shade_merge.h"
+#include "render/shaded/shade_pack.h"
+#include "render/shaded/shade_report.h"
+#include "render/shaded/shade_stage.h"
+#include "render/shaded/shade_validate.h"
 #include "render/validate.h"
 #include "shade/normalize_ref.h"
 #include "shade/spherical_harmonics_ref.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_run.h"
+#include "render/shaded/shade_run.h"
 
 #include <algorithm>
 

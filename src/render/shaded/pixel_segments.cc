@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pixel_segments.h"
+#include "render/shaded/pixel_segments.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_plan.h"
+#include "render/shaded/shade_plan.h"
 
 namespace tilegrad {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_stage.h"
+#include "render/shaded/shade_stage.h"
 
 #include <algorithm>
 
@@ -7,8 +7,8 @@
 #include "raster/conventions.h"
 #include "raster/fragments.h"
 #include "render/quick_checks.h"
+#include "render/shaded/uv_level.h"
 #include "render/tile_backward.h"
-#include "render/uv_level.h"
 
 namespace tilegrad {
 namespace {

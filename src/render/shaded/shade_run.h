@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "render/shade_plan.h"
+#include "render/shaded/shade_plan.h"
 #include "shade/combine.h"
 #include "shade/lambert.h"
 #include "shade/pixel_run.h"

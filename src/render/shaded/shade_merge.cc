@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_merge.h"
+#include "render/shaded/shade_merge.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/mesh_scene.h"
+#include "render/shaded/mesh_scene.h"
 
 #include <algorithm>
 #include <array>

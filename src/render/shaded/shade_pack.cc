@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/shade_pack.h"
+#include "render/shaded/shade_pack.h"
 
 #include <cstddef>
 
-#include "render/direction_scale.h"
+#include "render/shaded/direction_scale.h"
 
 namespace tilegrad {
 namespace {

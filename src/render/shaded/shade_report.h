@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "render/renderer.h"
-#include "render/shade_plan.h"
-#include "render/shade_run.h"
+#include "render/shaded/shade_plan.h"
+#include "render/shaded/shade_run.h"
 
 namespace tilegrad {
 
