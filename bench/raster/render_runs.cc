@@ -59,7 +59,7 @@ void SetCounters(benchmark::State& state, const RunSpec& spec, Direction directi
   state.counters["images"] = spec.scene.images;
   state.counters["pixels"] = work.pixels;
   state.counters["faces"] = work.faces;
-  if (spec.alpha && work.pairs > 0) {  // the variation of zeros is no number, and no JSON
+  if (spec.alpha && work.pairs > 0) {  // zeros have no variation: NaN is not JSON
     state.counters["pairs"] = state.counters["exps"] = work.pairs;
   }
   state.counters["bytes"] = limit.bytes;

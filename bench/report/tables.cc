@@ -19,7 +19,8 @@ std::string Name(const std::string& axis) {
   return axis;
 }
 
-// The place on the axis of "faces-1280", "delta-1e-06"; nothing if it is no scene of this series.
+// The place on the axis of "faces-1280", "delta-1e-06"; nothing if it is not a scene of this
+// series.
 std::optional<double> PlaceOn(const std::string& axis, const std::string& scene) {
   if (scene.rfind(axis + "-", 0) != 0) return std::nullopt;
   return std::strtod(scene.c_str() + axis.size() + 1, nullptr);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The C interface of tilegrad, in float; C99 or later, and what speaks C: Rust, Julia, ctypes.
- * Meanings, shapes and conventions are those of renderer.h and scene.h; a pointer with its count
- * stands for a span, and NULL, with a count of 0, for one that is not there.
+/* The C interface of tilegrad, in float; for C99 or later, and for whatever calls C: Rust, Julia,
+ * ctypes. Meanings, shapes and conventions are those of renderer.h and scene.h; a pointer with its
+ * count stands for a span, and NULL, with a count of 0, for an empty one.
  *
- * Large structs begin with their size, by which the library knows what the caller was compiled
- * with: members are only ever added at the end, and what a caller does not know has its default.
- * Fill a struct with its tilegrad_..._init first. An array of structs has one size for all. Structs
- * without a size never change.
+ * Large structs begin with their size, which tells the library what the caller was compiled with:
+ * members are only ever added at the end, and those that a caller does not know have their
+ * defaults. Fill a struct by its tilegrad_..._init first. All structs of an array have one size.
+ * Structs without a size never change.
  *
  * Nothing here prints, aborts or throws. One call at a time for each renderer.
  */
@@ -130,8 +130,8 @@ typedef struct tilegrad_frame_gradients {
   const float *color, *alpha, *attributes, *depth, *normals, *uv;
 } tilegrad_frame_gradients;
 
-/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. What the scene does not have
- * cannot be asked for. */
+/* dL/d(scene), in the shapes of tilegrad_scene; NULL is not computed. To ask for what the scene
+ * does not have is an error. */
 typedef struct tilegrad_scene_gradients {
   size_t struct_size;
   float* positions;

@@ -8,8 +8,7 @@
 //   frame.images().color, frame.images().alpha                       // views, of the frame
 //   status = renderer.Backward(frame, {.alpha = d_alpha}, {&d_scene, 1});
 //
-// Nothing here prints, aborts or throws: every error, memory that is not there included, is a
-// Status.
+// Nothing here prints, aborts or throws: every error, running out of memory included, is a Status.
 #pragma once
 
 #include <cstdint>
@@ -52,7 +51,7 @@ struct RenderOptions {
 
 // Which images are wanted. What is not wanted is not computed and takes no memory.
 struct Outputs {
-  bool color = true;  // white where the scene has nothing that gives colour
+  bool color = true;  // faces are white in a scene that has nothing to colour them by
   bool alpha = true;
   bool attributes = true;  // where the scene has them
   bool depth = false;
@@ -88,8 +87,8 @@ struct FrameGradientsT {
 template <class T>
 class TILEGRAD_API RendererT;
 
-// The record of a Render: its images, the scenes' views, and what the way back needs. Reused by
-// the next Render into it: the same sizes again allocate nothing.
+// The record of a Render: its images, the views of its scenes, and what Backward needs. Reused by
+// the next Render into it: rendering the same sizes again allocates nothing.
 template <class T>
 class TILEGRAD_API FrameT {
  public:
@@ -143,8 +142,8 @@ class TILEGRAD_API RendererT {
 
   // The gradients of sum(d_frame * images) with respect to the scenes of `frame`, whose arrays
   // are as they were in Render. `d_scenes`: one for each scene. Any renderer may do it. Errors:
-  // those of Render, a gradient of the wrong size, alpha pulled on that was not rendered, a
-  // gradient that overflows.
+  // those of Render, a gradient of the wrong size, a gradient of alpha where alpha was not
+  // rendered, a gradient that overflows.
   Status Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
                   std::span<const SceneGradientsT<T>> d_scenes,
                   GradientMode mode = GradientMode::kOverwrite);

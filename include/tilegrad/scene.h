@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is rendered: views over arrays of the caller, who keeps them alive and unchanged until the
-// last Backward of the frame. What is left empty is not there: a scene with nothing but positions
+// last Backward of the frame. Whatever is left empty is absent: a scene with nothing but positions
 // and faces has a silhouette, one with `colors` is shaded by them, one with `textures` and `uvs` is
 // textured, and both are multiplied where both are there.
 //
@@ -21,17 +21,17 @@ enum class Rate { kVertex, kCorner };
 // Values that are interpolated over faces.
 template <class T>
 struct StreamT {
-  std::span<const T> values{};  // [V,C], or [F,3,C] with Rate::kCorner, so that seams need no
-  Rate rate = Rate::kVertex;    // doubled vertices
+  std::span<const T> values{};  // [V,C]; [F,3,C] with Rate::kCorner: seams without extra vertices
+  Rate rate = Rate::kVertex;
 };
 
 enum class Wrap {
   kRepeat,  // the texture tiles the plane
-  kClamp,   // outside [0, 1] the border texels go on
+  kClamp,   // outside [0, 1] the border texels are repeated
   kMirror,  // tiles of the texture and its mirror image alternate
 };
 enum class Filter {
-  kNearest,    // pulls nothing to uvs
+  kNearest,    // no gradient to uvs
   kBilinear,   // between the four nearest texels
   kTrilinear,  // and between two levels of a pyramid, by the size of a pixel on the texture
 };
@@ -115,7 +115,7 @@ using Scene = SceneT<float>;
 
 // dL/d(scene). An empty span (or null) is not computed and costs nothing. Scenes of a batch may
 // be given the same array, of many views of one mesh, say: it gets their sum, in the order of
-// scenes. Arrays that overlap in part are an error that is not found.
+// scenes. Arrays must not overlap in part; this is not checked.
 template <class T>
 struct SceneGradientsT {
   std::span<T> positions{};      // shapes as in the scene

@@ -21,7 +21,7 @@ namespace tilegrad::python {
 
 namespace py = pybind11;
 
-// Text that may hold names from files, which are of any bytes: what is no UTF-8 is replaced.
+// Text that may hold names from files, which are of any bytes: what is not UTF-8 is replaced.
 inline py::str Text(const std::string& bytes) {
   const auto size = static_cast<py::ssize_t>(bytes.size());
   PyObject* text = PyUnicode_DecodeUTF8(bytes.data(), size, "replace");

@@ -21,7 +21,7 @@ class GradientRecord {
   GradientRecord(GradientRecord&&) noexcept = default;
 
   const std::vector<v0::SceneGradientsT<T>>& gradients() const { return gradients_; }
-  // What is no plain array in C++, from the records to the arrays.
+  // What is not a plain array in C++, from the records to the arrays.
   void Store() const;
 
  private:

@@ -18,7 +18,7 @@ import numpy as np
 Axis = Union[int, str]  # a length, or the name of one: "V"
 Sizes = dict  # name of a length -> length, as the arrays so far have it
 
-_NUMBERS = (list, tuple, int, float)  # what is no array yet: making one is no copy
+_NUMBERS = (list, tuple, int, float)  # not yet arrays: making one is not a copy
 _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
 MOST_PIXELS = 16384  # of an image in each axis: kMaxImageSize of src/raster/conventions.h
 _counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
@@ -172,7 +172,7 @@ def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
 
 
 def as_pixels(function: str, argument: str, value: Any) -> int:
-    """`value` as a side of an image; TypeError if it is no int, ValueError if it is out of range."""
+    """`value` as a side of an image; TypeError if it is not an int, ValueError if it is out of range."""
     number = as_number(function, argument, value, int)
     if not 1 <= number <= MOST_PIXELS:
         raise ValueError(f"{function}: {argument} is {number}, expected 1..{MOST_PIXELS} pixels")
@@ -180,7 +180,7 @@ def as_pixels(function: str, argument: str, value: Any) -> int:
 
 
 def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
-    """What is no plain NumPy array as one, without a copy where the protocol allows it."""
+    """Anything but a plain NumPy array as one, without a copy where the protocol allows it."""
     try:
         if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
             return _from_dlpack(function, argument, value)

@@ -72,7 +72,7 @@ class Camera(Packed):
     near_plane: number or (N,), > 0, world units; what is nearer is cut away.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
-    for what is no array of these shapes; render refuses numbers that are not finite.
+    for what is not an array of these shapes; render refuses numbers that are not finite.
     """
 
     __slots__ = ()

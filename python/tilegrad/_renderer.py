@@ -39,7 +39,7 @@ _OPTIONS = {"width": _option("width"), "height": _option("height"), "delta": _op
             "paper_box": _option("paper_box"), "paper_faces": _option("paper_faces")}
 _D = {name: default for name, (default, _) in _OPTIONS.items()}
 _OUTPUTS = ("color", "alpha")
-# What is no plain array.
+# Names whose values are not plain arrays.
 _RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
 _NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
           "light_directions", "sh", "attributes")

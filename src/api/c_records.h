@@ -66,7 +66,7 @@ struct CGradients {
   SceneGradients gradients;
 
   void Set(const tilegrad_scene_gradients& from, const Scene& scene);
-  // What is no plain array.
+  // What is not a plain array.
   static void Clear(const tilegrad_scene_gradients& to, const Scene& scene);
   void AddTo(const tilegrad_scene_gradients& to) const;
 };

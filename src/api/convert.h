@@ -48,7 +48,7 @@ struct GradientRecords {
 template <class T>
 engine::ShadedGradientsT<T> ToEngine(const SceneGradientsT<T>& d, GradientRecords<T>* records);
 
-// The gradients that are no plain arrays: to zero, and the engine's added.
+// The gradients that are not plain arrays: to zero, and the engine's added.
 template <class T>
 void ClearRecords(const SceneGradientsT<T>& d);
 template <class T>

@@ -52,7 +52,7 @@ class Values {
         text_(encoding == PlyHeader::Encoding::kText),
         swap_(encoding == PlyHeader::Encoding::kBigEndian) {}
 
-  // False if the data ends or is no finite number.
+  // False if the data ends or is not a finite number.
   bool Next(PlyType type, double& value) {
     if (text_) return ParseNumber(NextToken(rest_), value);
     const std::size_t size = PlyTypeSize(type);

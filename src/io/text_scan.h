@@ -36,7 +36,7 @@ class Lines {
   std::size_t number_ = 0;
 };
 
-// Takes the next run of characters that are no white space off `rest`; empty at the end.
+// Takes the next run of characters other than white space off `rest`; empty at the end.
 inline std::string_view NextToken(std::string_view& rest) {
   constexpr std::string_view kSpace = " \t\r\n\v\f";
   const auto begin = rest.find_first_not_of(kSpace);

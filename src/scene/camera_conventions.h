@@ -4,7 +4,7 @@
 //
 // All matrices are row-major and act on column vectors unless said otherwise; all lengths are world
 // units. From... fails on what is not a pinhole camera: a number that is not finite, a matrix that
-// is no rotation (rows off by more than kRotationTolerance, or a mirror), a focal length that is
+// is not a rotation (rows off by more than kRotationTolerance, or a mirror), a focal length that is
 // not positive, skew. To... fails where the other convention cannot say what the camera is. A
 // camera that goes there and back keeps its numbers to a few roundings; its near plane is kept
 // only by those conventions that have one, and is the default of camera.h otherwise.

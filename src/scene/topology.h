@@ -27,7 +27,7 @@ struct Topology {
   std::vector<std::int32_t> neighbors;
 };
 
-// Indices must be in [0, vertices). Sides that join a vertex to itself are no edges.
+// Indices must be in [0, vertices). Sides that join a vertex to itself are not edges.
 Topology BuildTopology(std::span<const Face> faces, std::size_t vertices);
 
 }  // namespace tilegrad

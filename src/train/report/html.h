@@ -18,7 +18,7 @@ namespace tilegrad::train {
 std::string Base64(std::span<const std::uint8_t> bytes);
 
 // JSON for a <script> element: every '<' is written as \u003c, so nothing in it can end the
-// element. Bytes that are no UTF-8 become replacement characters.
+// element. Bytes that are not UTF-8 become replacement characters.
 std::string ScriptJson(const nlohmann::ordered_json& json);
 
 // A PNG as data: address.
