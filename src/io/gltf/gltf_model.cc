@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #define TINYGLTF_IMPLEMENTATION
-#include "io/gltf_model.h"
+#include "io/gltf/gltf_model.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/gltf/gltf_document.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace tilegrad::io {
+namespace {
+
+constexpr int kMaxJsonNesting = 64;  // tinygltf's reading of "extras" is recursive
+
+// Side files of a glTF are names relative to it.
+struct SideFiles {
+  const FileSource& source;
+  std::string folder;  // with a trailing slash, or empty
+};
+
+bool SideExists(const std::string& name, void* user) {
+  return static_cast<SideFiles*>(user)->source.Exists(name);
+}
+std::string SideExpand(const std::string& name, void*) { return name; }
+bool SideRead(std::vector<unsigned char>* out, std::string* error, const std::string& name,
+              void* user) {
+  auto bytes = static_cast<SideFiles*>(user)->source.Read(name);
+  if (!bytes.ok()) {
+    *error += bytes.status().message();
+    return false;
+  }
+  *out = std::move(bytes).value();
+  return true;
+}
+bool SideWrite(std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
+  return false;
+}
+
+// Keeps the encoded bytes of data URIs; images are decoded when a material asks for one. An image
+// in a buffer view comes with a place that tinygltf has not checked: it is left alone until then.
+bool KeepEncoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int,
+                 const unsigned char* bytes, int size, void*) {
+  if (image->bufferView < 0) image->image.assign(bytes, bytes + size);
+  return true;
+}
+
+// The JSON text: the whole of a .gltf, the first chunk of a GLB whose length tinygltf checks.
+std::string_view JsonPart(const Bytes& bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  constexpr std::size_t kGlbHeader = 20;
+  if (!text.starts_with("glTF") || text.size() < kGlbHeader) return text;
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + 12, sizeof(length));
+  return text.substr(kGlbHeader, length);
+}
+
+constexpr std::array<std::string_view, 3> kRead = {"KHR_mesh_quantization", "KHR_texture_transform",
+                                                   "KHR_materials_unlit"};
+constexpr std::array<std::string_view, 2> kCompressions = {"KHR_draco_mesh_compression",
+                                                           "EXT_meshopt_compression"};
+
+Status Compressed(const std::string& place, std::string_view extension) {
+  return DataLoss("{}: {} is not supported; save the file without compression", place, extension);
+}
+
+Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
+             tinygltf::Model* model) {
+  tinygltf::TinyGLTF loader;
+  loader.SetFsCallbacks({SideExists, SideExpand, SideRead, SideWrite, &side});
+  loader.SetImageLoader(KeepEncoded, nullptr);
+  std::string error, warning;
+  const bool binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
+  const auto size = static_cast<unsigned>(bytes.size());
+  const bool ok =
+      binary ? loader.LoadBinaryFromMemory(model, &error, &warning, bytes.data(), size, side.folder)
+             : loader.LoadASCIIFromString(model, &error, &warning,
+                                          reinterpret_cast<const char*>(bytes.data()), size,
+                                          side.folder);
+  if (ok) return {};
+  // Accessors of compressed geometry have no buffer view, about which tinygltf complains.
+  for (const std::string_view extension : kCompressions) {
+    if (JsonPart(bytes).find(extension) != std::string_view::npos)
+      return Compressed(place, extension);
+  }
+  while (!error.empty() && std::isspace(static_cast<unsigned char>(error.back()))) error.pop_back();
+  return DataLoss("{}: not valid glTF: {}", place, error.empty() ? "no reason given" : error);
+}
+
+Status CheckNesting(std::string_view json, const std::string& place) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (quoted && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (!quoted && (c == '{' || c == '[')) {
+      if (++depth > kMaxJsonNesting) {
+        return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, i,
+                        kMaxJsonNesting);
+      }
+    } else if (!quoted && (c == '}' || c == ']')) {
+      --depth;
+    }
+  }
+  return {};
+}
+
+// Compressed geometry is an error, other extensions that the file requires are warnings.
+Status CheckVersion(const std::string& place, GltfDocument* document) {
+  const tinygltf::Model& model = document->model;
+  if (!model.asset.version.starts_with("2."))
+    return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
+  for (const std::string& name : model.extensionsRequired) {
+    if (name == kCompressions[0] || name == kCompressions[1]) return Compressed(place, name);
+    if (std::find(kRead.begin(), kRead.end(), name) == kRead.end())
+      document->warnings.push_back(fmt::format("the extension {} is not read", name));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::string& name) {
+  TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
+  const std::string place = source.Describe(name);
+  if (bytes.size() > 0xFFFFFFFFu) return ResourceExhausted("{}: a glTF file above 4 GiB", place);
+  const auto slash = name.find_last_of('/');
+  SideFiles side{source, slash == std::string::npos ? "" : name.substr(0, slash)};
+  TILEGRAD_TRY(CheckNesting(JsonPart(bytes), place));
+  GltfDocument document;
+  try {
+    TILEGRAD_TRY(Parse(bytes, side, place, &document.model));
+  } catch (const std::exception& error) {  // the JSON library throws on some type errors
+    return DataLoss("{}: not valid glTF: {}", place, error.what());
+  }
+  TILEGRAD_TRY(CheckVersion(place, &document));
+  return document;
+}
+
+}  // namespace tilegrad::io

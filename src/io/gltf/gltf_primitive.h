@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to io: a primitive of a glTF file as a mesh.
+#pragma once
+
+#include <string>
+
+#include "io/gltf/gltf_model.h"
+#include "scene/mesh.h"
+
+namespace tilegrad::io {
+
+// Lists, strips and fans of triangles as faces, with normals, colours (sRGB) and the uv of the
+// material's texture (v up) where the primitive has them; no faces for other modes. DataLoss names
+// `what` and the attribute that is missing, has another length or points outside its buffer.
+Result<Mesh> ConvertGltfPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& p,
+                                  const std::string& what);
+
+}  // namespace tilegrad::io

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <charconv>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "io/gltf/gltf_document.h"
+#include "io/gltf/gltf_primitive.h"
+#include "io/image_file.h"
+#include "io/mesh_readers.h"
+#include "scene/shapes.h"
+#include "scene/srgb.h"
+
+namespace tilegrad::io {
+namespace {
+
+constexpr int kMaxNodeDepth = 256;  // the walk is recursive
+
+struct GltfWalk {
+  const tinygltf::Model& model;
+  const FileSource& source;
+  std::string name, place;
+  LoadedMesh out;
+  std::vector<std::optional<int>> textures;  // by glTF image
+  std::vector<bool> visited;                 // by node
+
+  Status AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m, const std::string& what);
+  Material ConvertMaterial(int index);
+  void AddCamera(const tinygltf::Node& node, const glm::mat4& m);
+  void SetSampler(int texture, Material* material);
+  int ImageTexture(int texture);
+  int AddImage(const tinygltf::Image& image, int index);
+  Status Visit(int node, const glm::mat4& parent, int depth);
+};
+
+// "my%20wood.png" -> "my wood.png"
+std::string DecodePercent(const std::string& uri) {
+  std::string out;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    int code = 0;
+    const char* begin = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::from_chars(begin, begin + 2, code, 16).ptr == begin + 2) {
+      out += static_cast<char>(code);
+      i += 2;
+    } else {
+      out += uri[i];
+    }
+  }
+  return out;
+}
+
+int GltfWalk::ImageTexture(int texture) {
+  if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return -1;
+  const int image = model.textures[texture].source;
+  if (image < 0 || image >= static_cast<int>(model.images.size())) return -1;
+  if (!textures[image]) textures[image] = AddImage(model.images[image], image);
+  return *textures[image];
+}
+
+int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
+  std::string label = image.name.empty() ? fmt::format("image {}", index) : image.name;
+  if (image.bufferView >= 0) {
+    const auto bytes = GltfViewBytes(model, image.bufferView, label);
+    return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
+  }
+  if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
+  return AddTexture(source, name, DecodePercent(image.uri), out);
+}
+
+void GltfWalk::SetSampler(int texture, Material* material) {
+  if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
+  const int index = model.textures[texture].sampler;
+  if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
+  const tinygltf::Sampler& sampler = model.samplers[index];
+  const int wrap = sampler.wrapS;
+  if (wrap != sampler.wrapT) {
+    out.warnings.push_back(fmt::format(
+        "material \"{}\": its texture wraps differently in u and v; u's way is taken for both",
+        material->name));
+  }
+  material->wrap = wrap == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
+                   : wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
+                                                                   : TextureWrap::kRepeat;
+  material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+}
+
+Material GltfWalk::ConvertMaterial(int index) {
+  Material material;
+  material.base_color = glm::vec4(1);  // glTF's default
+  if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
+  const tinygltf::Material& from = model.materials[index];
+  material.name = from.name;
+  const auto& factor = from.pbrMetallicRoughness.baseColorFactor;
+  for (std::size_t c = 0; c < 4 && c < factor.size(); ++c)
+    material.base_color[static_cast<int>(c)] = static_cast<float>(factor[c]);
+  material.base_color = LinearToSrgb(material.base_color);
+  material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
+                        : from.alphaMode == "BLEND" ? AlphaMode::kBlend
+                                                    : AlphaMode::kOpaque;
+  if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
+  material.double_sided = from.doubleSided;
+  material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
+  const tinygltf::TextureInfo& texture = from.pbrMetallicRoughness.baseColorTexture;
+  material.base_color_texture = ImageTexture(texture.index);
+  SetSampler(texture.index, &material);
+  return material;
+}
+
+Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m,
+                              const std::string& what) {
+  const bool triangles =
+      p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
+  if (!triangles) {
+    out.warnings.push_back(fmt::format("{}: points or lines left out", what));
+    return {};
+  }
+  TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, what));
+  if (mesh.faces.empty()) return {};
+  if (m != glm::mat4(1))
+    Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
+  const Status added = AppendWithMaterial(std::move(mesh), ConvertMaterial(p.material), out);
+  return added.Within(what);
+}
+
+glm::mat4 LocalMatrix(const tinygltf::Node& node) {
+  if (node.matrix.size() == 16) return glm::mat4(glm::make_mat4(node.matrix.data()));
+  glm::dmat4 m(1);
+  const auto& t = node.translation;
+  const auto& r = node.rotation;
+  const auto& s = node.scale;
+  if (r.size() == 4) m = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
+  if (s.size() == 3) {
+    for (int c = 0; c < 3; ++c) m[c] *= s[static_cast<std::size_t>(c)];
+  }
+  if (t.size() == 3) m[3] = glm::dvec4(t[0], t[1], t[2], 1);
+  return glm::mat4(m);
+}
+
+void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::mat4& m) {
+  if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
+  const tinygltf::Camera& from = model.cameras[node.camera];
+  const std::string label = from.name.empty() ? node.name : from.name;
+  if (from.type != "perspective") {
+    out.warnings.push_back(fmt::format("camera \"{}\" is orthographic: left out", label));
+    return;
+  }
+  MeshFileCamera camera;
+  camera.name = label;
+  for (int i = 0; i < 16; ++i) camera.camera.node_to_world[i] = m[i % 4][i / 4];
+  camera.camera.yfov = from.perspective.yfov;
+  camera.camera.aspect_ratio = from.perspective.aspectRatio;
+  camera.camera.znear = from.perspective.znear;
+  out.cameras.push_back(std::move(camera));
+}
+
+Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
+  if (depth > kMaxNodeDepth)
+    return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
+  if (index < 0 || index >= static_cast<int>(model.nodes.size()))
+    return DataLoss("{}: node {} does not exist", place, index);
+  // Nodes form trees: a second visit is a cycle, or shared children, whose number of paths may grow
+  // without bound.
+  if (visited[index])
+    return DataLoss("{}: node {} is reached twice; nodes must form a tree", place, index);
+  visited[index] = true;
+  const tinygltf::Node& node = model.nodes[index];
+  const glm::mat4 m = parent * LocalMatrix(node);
+  AddCamera(node, m);
+  if (node.mesh >= 0) {
+    if (node.mesh >= static_cast<int>(model.meshes.size()))
+      return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
+    const auto& primitives = model.meshes[node.mesh].primitives;
+    for (std::size_t i = 0; i < primitives.size(); ++i) {
+      TILEGRAD_TRY(AddPrimitive(primitives[i], m,
+                                fmt::format("{}: mesh {} primitive {}", place, node.mesh, i)));
+    }
+  }
+  for (const int child : node.children) TILEGRAD_TRY(Visit(child, m, depth + 1));
+  return {};
+}
+
+// The nodes of the default scene, or of the first one, or all that are nobody's child.
+std::vector<int> RootNodes(const tinygltf::Model& model) {
+  if (!model.scenes.empty()) {
+    const bool valid =
+        model.defaultScene >= 0 && model.defaultScene < static_cast<int>(model.scenes.size());
+    return model.scenes[valid ? model.defaultScene : 0].nodes;
+  }
+  std::vector<bool> child(model.nodes.size(), false);
+  for (const auto& node : model.nodes) {
+    for (const int c : node.children) {
+      if (c >= 0 && c < static_cast<int>(child.size())) child[c] = true;
+    }
+  }
+  std::vector<int> roots;
+  for (std::size_t i = 0; i < child.size(); ++i) {
+    if (!child[i]) roots.push_back(static_cast<int>(i));
+  }
+  return roots;
+}
+
+}  // namespace
+
+Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
+  TILEGRAD_ASSIGN(GltfDocument document, ReadGltfDocument(source, name));
+  const tinygltf::Model& model = document.model;
+  GltfWalk walk{model,
+                source,
+                name,
+                source.Describe(name),
+                {},
+                std::vector<std::optional<int>>(model.images.size()),
+                std::vector<bool>(model.nodes.size())};
+  walk.out.warnings = std::move(document.warnings);
+  for (const int root : RootNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::mat4(1), 0));
+  return std::move(walk.out);
+}
+
+}  // namespace tilegrad::io
