@@ -5,6 +5,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "train/data/dataset_files.h"
 #include "train/metrics.h"
 #include "train/single_shape.h"
 
@@ -154,9 +155,7 @@ class Evaluator {
                  Row("best single shape", single_scores_, members),
                  Row("tilegrad", predicted_scores_, members)};
     out_.predictor = job_.predictor;
-    out_.split = job_.split == Split::kTest    ? "test"
-                 : job_.split == Split::kTrain ? "train"
-                                               : "validation";
+    out_.split = SplitName(job_.split);
     out_.views_per_model = static_cast<int>(views_.size());
   }
 

@@ -157,7 +157,7 @@ struct ShadedRenderer::Impl {
   SceneWork work;
   ForwardPlan forward;
   BackwardPlan backward;
-  std::vector<StageScene> scenes_;
+  std::vector<StageScene> stage_scenes;
   std::vector<SceneView> views;
   std::vector<ScenePack> packs;
   std::vector<std::size_t> pack_of_scene, first_of_pack;
@@ -178,7 +178,7 @@ void ShadedRenderer::Impl::PrepareTextures(std::span<const ShadedScene> scenes) 
       while (i < pyramid_views.size() && !SameTexture(pyramid_views[i], view)) ++i;
       if (i == pyramid_views.size()) pyramid_views.push_back(view);
       if (i == pyramids.size()) pyramids.push_back(std::make_unique<shade::TexturePyramid>());
-      scenes_[n].textures.push_back(pyramids[i].get());
+      stage_scenes[n].textures.push_back(pyramids[i].get());
     }
   }
   StageClock clock;
@@ -192,9 +192,9 @@ void ShadedRenderer::Impl::PrepareTextures(std::span<const ShadedScene> scenes) 
 }
 
 void ShadedRenderer::Impl::PrepareScenes(std::span<const ShadedScene> scenes, bool textures) {
-  scenes_.resize(scenes.size());
+  stage_scenes.resize(scenes.size());
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    StageScene& out = scenes_[n];
+    StageScene& out = stage_scenes[n];
     out.scene = &scenes[n];
     SetSurfaces(scenes[n], &out), SetLights(scenes[n], &out);
     out.eye = EyeOf(scenes[n].camera);
@@ -233,7 +233,7 @@ void ShadedRenderer::Impl::Pack(std::span<const ShadedScene> scenes, bool normal
   });
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     const ScenePack& pack = packs[pack_of_scene[n]];
-    StageScene& out = scenes_[n];
+    StageScene& out = stage_scenes[n];
     out.varyings = {pack.varyings, set.channels(), set.rate};
     out.recomputed = out.varyings;
     if (recomputed != nullptr) {
@@ -251,9 +251,9 @@ void ShadedRenderer::Impl::Pack(std::span<const ShadedScene> scenes, bool normal
 void ShadedRenderer::Impl::UsePlain(std::span<const ShadedScene> scenes, bool colors, bool user) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     const ShadedScene& s = scenes[n];
-    scenes_[n].varyings = {};
-    if (colors) scenes_[n].varyings = {s.colors.values, 3, s.colors.rate};
-    if (user) scenes_[n].varyings = {s.attributes, s.channels, s.rate};
+    stage_scenes[n].varyings = {};
+    if (colors) stage_scenes[n].varyings = {s.colors.values, 3, s.colors.rate};
+    if (user) stage_scenes[n].varyings = {s.attributes, s.channels, s.rate};
   }
 }
 
@@ -261,8 +261,8 @@ void ShadedRenderer::Impl::SetViews(std::span<const ShadedScene> scenes) {
   views.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     SceneView view = scenes[n];
-    view.attributes = scenes_[n].varyings.values;
-    view.channels = scenes_[n].varyings.channels, view.rate = scenes_[n].varyings.rate;
+    view.attributes = stage_scenes[n].varyings.values;
+    view.channels = stage_scenes[n].varyings.channels, view.rate = stage_scenes[n].varyings.rate;
     views.push_back(view);
   }
 }
@@ -275,7 +275,7 @@ Status ShadedRenderer::Impl::RenderStaged(const RenderOptions& options, ShadedFr
   frame->color.resize(request.color ? 3 * pixels : 0);
   frame->normals.resize(request.normals ? 3 * pixels : 0);
   frame->uv.resize(request.uv ? 2 * pixels : 0);
-  stage.BeginForward(forward, scenes_, options, frame);
+  stage.BeginForward(forward, stage_scenes, options, frame);
   return renderer.Render(views, options, request, frame, &stage);
 }
 
@@ -396,7 +396,7 @@ Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
     const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
     const bool same = backward.pulled == backward.recomputed;
     Pack(scenes, normals, backward.pulled, same ? nullptr : &backward.recomputed);
-    stage.BeginBackward(backward, scenes_, options, d_frame);
+    stage.BeginBackward(backward, stage_scenes, options, d_frame);
   } else {
     UsePlain(scenes, backward.colors_only, backward.user_only);
   }
@@ -431,10 +431,10 @@ void ShadedRenderer::Impl::MergeBackward(std::span<const ShadedScene> scenes,
   ClearUniforms(d_scenes);
   if (staged) {
     NormalsBack(scenes);
-    MergeUniforms(stage, scenes_, d_scenes, &scene_sums);
+    MergeUniforms(stage, stage_scenes, d_scenes, &scene_sums);
   }
   if (staged && backward.to_texture) {
-    texture_merge.Run(stage, scenes_, *workers, d_scenes);
+    texture_merge.Run(stage, stage_scenes, *workers, d_scenes);
   } else {
     ClearTextures(d_scenes);
   }
