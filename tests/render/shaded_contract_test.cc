@@ -92,10 +92,9 @@ struct Session {
     auto d_frame = all.View();
     d_frame.uv = {}, d_frame.normals = {}, d_frame.depth = {}, d_frame.attributes = {};
     d_frame.alpha = {};
-    auto d_scene = gradients.View();
-    ShadedGradients nothing;
-    std::swap(nothing, d_scene);
-    chosen = &nothing;
+    const ShadedGradients every_gradient = gradients.View();
+    ShadedGradients d_scene;
+    chosen = &every_gradient;
     choose(d_frame, d_scene);
     const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
     EXPECT_TRUE(status.ok()) << status.message();

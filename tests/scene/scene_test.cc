@@ -170,8 +170,8 @@ TEST(Camera, RotationsAreOrthonormalAndLookAtTheOrigin) {
           EXPECT_NEAR(dot, i == j, 1e-6);
         }
       }
-      EXPECT_NEAR(c.translation[0], 0,
-                  1e-6);  // the origin projects to the middle, at the camera's distance
+      // The origin projects to the middle, at the camera's distance.
+      EXPECT_NEAR(c.translation[0], 0, 1e-6);
       EXPECT_NEAR(c.translation[1], 0, 1e-6);
       EXPECT_NEAR(c.translation[2], -1.45, 1e-6);
     }
