@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -22,8 +23,8 @@ using train::Parameter;
 constexpr double kMostRate = 1e6;
 
 struct Options {
-  std::string input, dataset_model, out, mesh, truth, optimize, lighting = "none",
-                                                                filter = "bilinear";
+  std::string input, dataset_model, out, mesh, truth, optimize;
+  std::string lighting = "none", filter = "bilinear";
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
@@ -87,9 +88,11 @@ Status SetConfig(const Options& options, FitConfig* config) {
   for (const auto& rate : options.rates) {
     TILEGRAD_TRY(ParseRate(rate, config->parameters, &config->rates));
   }
-  static const std::vector<std::string> lightings = {"none", "lambert", "phong", "sh"};
-  const auto index = std::find(lightings.begin(), lightings.end(), options.lighting);
-  config->lighting = static_cast<Lighting>(index - lightings.begin());
+  static const std::map<std::string, Lighting> lightings = {{"none", Lighting::kNone},
+                                                            {"lambert", Lighting::kLambert},
+                                                            {"phong", Lighting::kPhong},
+                                                            {"sh", Lighting::kSphericalHarmonics}};
+  config->lighting = lightings.at(options.lighting);  // CLI11 has checked it
   config->filter =
       options.filter == "trilinear" ? shade::Filter::kTrilinear : shade::Filter::kBilinear;
   if (!options.light_direction.empty()) {
