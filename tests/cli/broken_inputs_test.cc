@@ -41,8 +41,8 @@ class BrokenInputs : public TempFolderTest {
   void ExpectRefused(const std::string& arguments, const Parts&... parts) {
     const Outcome outcome = RunProgram(arguments);
     EXPECT_GT(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
-    EXPECT_LT(outcome.exit_code, 126)
-        << outcome.output;  // neither a signal nor a shell's own failure
+    // Neither a signal nor a failure of the shell itself.
+    EXPECT_LT(outcome.exit_code, 126) << outcome.output;
     for (const std::string& part : std::vector<std::string>{parts...}) {
       EXPECT_NE(outcome.output.find(part), std::string::npos)
           << "\"" << part << "\" is not in: " << outcome.output;

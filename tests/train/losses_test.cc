@@ -71,8 +71,8 @@ TEST_F(Losses, IouKnownValues) {
   const auto value = [&](std::vector<double> a) {
     return Value([&](const nn::Var& x) { return IouLoss(x, truth); }, shape, a);
   };
-  EXPECT_NEAR(value({1, 1, 0, 0, 0, 0, 0, 0}), 0.5,
-              1e-9);  // perfect; and empty against empty counts as loss 1
+  // The first image is perfect; the second, empty against empty, counts as loss 1.
+  EXPECT_NEAR(value({1, 1, 0, 0, 0, 0, 0, 0}), 0.5, 1e-9);
   EXPECT_NEAR(value({0, 1, 1, 0, 1, 0, 0, 0}), 0.5 * (2.0 / 3 + 1), 1e-9);
 }
 
