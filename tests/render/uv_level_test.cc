@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mip levels, and sides, of faces that float has trouble with: those that reach past the camera.
-#include "render/uv_level.h"
+#include "render/shaded/uv_level.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include "base/rng.h"
 #include "raster/interpolate_ref.h"
 #include "render/renderer_ref.h"
-#include "render/shaded_renderer.h"
-#include "render/shaded_renderer_ref.h"
+#include "render/shaded/shaded_renderer.h"
+#include "render/shaded/shaded_renderer_ref.h"
 
 namespace tilegrad {
 namespace {
