@@ -257,7 +257,8 @@ TEST_F(BrokenInputs, TheNewestRunIsTheOneThatWasTrainedLast) {
   const Outcome none = RunProgram("report");
   std::filesystem::current_path(before);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("runs/new: taking the newest run"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("runs/new: taking the newest run"), std::string::npos)
+      << outcome.output;
   EXPECT_EQ(none.exit_code, 3) << none.output;
 }
 
