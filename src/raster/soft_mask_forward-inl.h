@@ -102,7 +102,10 @@ class PartialAlpha {
     const SoftMask dark = hn::Lt(left, hn::Set(d, static_cast<float>(kLightProduct)));
     const SoftVec rounding = hn::Set(d, static_cast<float>(LaneRounding(hn::MaxLanes(d))));
     left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
-    block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, left)));
+    // A dark lane stays one: with that rounding its product has too few digits to be handed on.
+    const SoftVec most_dark = hn::Set(d, static_cast<float>(kLightProduct) * (1 - 0x1p-24f));
+    const SoftVec noted = hn::IfThenElse(dark, hn::Min(left, most_dark), left);
+    block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, noted)));
     return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));
   }
   HWY_INLINE void Put(SoftTag d, std::size_t pixel, SoftVec influence) {
