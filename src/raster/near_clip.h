@@ -192,6 +192,7 @@ template <class T>
 void ClipAttributes(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
                     const AttributeViewT<const T>& in, std::span<T> out) {
   const auto channels = static_cast<std::size_t>(in.channels);
+  if (channels == 0) return;  // the spans have no elements to point at
   ForEachAttributeRow(mesh, faces, in.rate,
                       [&](std::size_t row, const SourceRows<T>& from, std::ptrdiff_t) {
                         const T* a = &in.values[from.a * channels];

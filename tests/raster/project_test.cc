@@ -148,6 +148,21 @@ TEST(NearClip, FacesKeepTheirOrderAndIdentity) {
   for (const int count : pieces) EXPECT_TRUE(count == 1 || count == 2);
 }
 
+// Scenes need no attributes; empty spans have no element to refer to, which only a sanitizer sees.
+TEST(NearClip, AttributesWithoutChannelsAreNotRead) {
+  Rng rng(4, 1);
+  const Points points = RandomPoints(60, 200, 0.8, &rng);
+  ScreenMeshBuffers buffers;
+  Project(points.source(false), 80, 60, &buffers);
+  ASSERT_TRUE(buffers.View().was_clipped());
+  for (const AttributeRate rate : {AttributeRate::kVertex, AttributeRate::kCorner}) {
+    AttributeViewT<const float> none;
+    none.channels = 0, none.rate = rate;
+    ClipAttributes<float>(buffers.View(), points.faces, none, {});
+    ClipAttributesBackward<float>(buffers.View(), points.faces, none, {}, {}, {});
+  }
+}
+
 TEST(Project, CullsClockwiseFacesOnlyWhenAsked) {
   const Points points{{-1, -1, 0, 1, -1, 0, 0, 1, 0}, {0, 1, 2, 0, 2, 1}, [] {
                         return OrbitCamera({50.0, 32, 32}, 90, 0, 4);  // looks along -z
