@@ -65,10 +65,10 @@ class Workers {
   };
 
   // For where tasks are few and long, so that the last ones would leave workers idle: as long as
-  // some wait to be taken, a worker goes through the loops of its task alone; then those that have
-  // none take part in them. A worker that waits for the end of such a loop may run a part of
-  // another one, so what is to outlast a loop must be in memory of the task, not in scratch of its
-  // worker that those of other tasks use.
+  // some wait to be taken, a worker goes through the loops (Part::For) of its task alone; then
+  // workers without a task take part in them. A worker that waits for the end of such a loop may
+  // run what the loops of other tasks call. So what one loop leaves for the next must be in memory
+  // of the task, not in scratch by worker index that such calls write.
   void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task) const;
 
  private:

@@ -29,10 +29,12 @@ struct Halving {
 };
 
 // 2^-z for z >= 0, infinity included; z = 0 gives exactly 1, z >= 126.5 exactly 0. Relative error
-// at most 3 u for power, up to where it becomes denormal (z > 126), and 4 u for one_minus down to z
-// -> 0; u = 2^-24. With z = n - r, |r| <= 1/2, r is exact, 2^-z = 2^-n (1 + p), 1 - 2^-z = (1 -
-// 2^-n) - 2^-n p; and p = 2^r - 1 = r q(r) with an interpolant q of degree 5 (relative error of 1 +
-// p: 1e-8).
+// at most 3 u for power, up to where it becomes denormal (z > 126), and 4 u for one_minus, for z
+// near 0 too; u = 2^-24. With z = n - r, |r| <= 1/2, r is exact, and
+//
+//   2^-z = 2^-n (1 + p),   1 - 2^-z = (1 - 2^-n) - 2^-n p,   p = 2^r - 1 = r q(r)
+//
+// with an interpolant q of degree 5 (relative error of 1 + p: 1e-8).
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE Halving<V> HalvingOf(D d, V z) {
   const hn::RebindToSigned<D> di;

@@ -103,8 +103,7 @@ class PartialAlpha {
     const SoftVec rounding = hn::Set(d, static_cast<float>(LaneRounding(hn::MaxLanes(d))));
     left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
     // A dark lane stays one: with that rounding its product has too few digits to be handed on.
-    const SoftVec most_dark = hn::Set(d, static_cast<float>(kLightProduct) * (1 - 0x1p-24f));
-    const SoftVec noted = hn::IfThenElse(dark, hn::Min(left, most_dark), left);
+    const SoftVec noted = hn::IfThenElse(dark, hn::Min(left, hn::Set(d, kMostDark)), left);
     block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, noted)));
     return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));
   }

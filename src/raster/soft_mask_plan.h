@@ -15,6 +15,8 @@ inline constexpr double kFarZ = 3;
 // The least product in light pixels, or of each of their lanes: A <= 63/64 there for all faces, and
 // ten factors of Odds suffice. Smaller ones would cost digits, larger ones make more pixels dark.
 inline constexpr double kLightProduct = 1.0 / 64;
+// The float below it.
+inline constexpr float kMostDark = static_cast<float>(kLightProduct) * (1 - 0x1p-24f);
 // How many faces of a chunk a lane of vectors of so many lanes may get: those of three lists, each
 // filled up to whole vectors.
 constexpr std::size_t FacesOfLane(std::size_t lanes) {

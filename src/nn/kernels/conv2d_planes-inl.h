@@ -21,8 +21,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// Plane (a, b) holds at (y, x) the source pixel (y step + origin_row + a, x step + origin_column +
-// b), or 0 outside the image.
+// Plane (a, b) holds at (y, x) the source pixel in row y step + origin_row + a and column
+// x step + origin_column + b, or 0 outside the image.
 struct PlaneGrid {
   std::size_t height, width;  // of the source
   std::size_t step;

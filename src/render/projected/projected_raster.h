@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projected faces to images of interpolated features, and back (paper, equations 1 to
-// 4). Same bits for any number of workers.
+// Projected faces to images of interpolated features, and back (paper, equations 1 to 4). Same bits
+// for any number of workers.
 //
 // With b_k = W_k / S and r = S / (S + sign(S) eps), feature c of a pixel is I_c = r sum_k f_kc b_k.
 // b_k is linear in the position and db_k/dv_m = -b_m grad b_k, so the gradient of the corners
