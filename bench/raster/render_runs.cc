@@ -26,6 +26,15 @@ BenchBatch MakeBatch(const RunSpec& spec) {
 
 CulledParts PartsOf(const RunSpec& spec) { return {spec.color, spec.alpha}; }
 
+RenderRequest RequestOf(const RunSpec& spec) { return {spec.color, spec.alpha, false, false}; }
+
+FrameGradients CotangentsOf(const RunSpec& spec, const BenchBatch& batch) {
+  FrameGradients d_frame;
+  if (spec.color) d_frame.attributes = batch.d_attributes;
+  if (spec.alpha) d_frame.alpha = batch.d_alpha;
+  return d_frame;
+}
+
 // Rows of the first image: across its middle, where half of the pixels are covered.
 RowRange SampleRows(const SceneSpec& spec) {
   return {spec.size / 4, spec.size / 4 + (spec.level > 3 ? 1 : 2)};
@@ -80,7 +89,7 @@ void Forward(benchmark::State& state, const RunSpec& spec) {
   const Workers workers(spec.workers);
   Renderer renderer(workers);
   Frame frame;
-  const RenderRequest request{spec.color, spec.alpha, false, false};
+  const RenderRequest request = RequestOf(spec);
   // The first frame finds its memory: not what a steady state costs.
   Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
   for (auto _ : state) {
@@ -95,9 +104,7 @@ void Backward(benchmark::State& state, const RunSpec& spec) {
   Renderer renderer(workers);
   Frame frame;
   Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
-  FrameGradients d_frame;
-  if (spec.color) d_frame.attributes = batch.d_attributes;
-  if (spec.alpha) d_frame.alpha = batch.d_alpha;
+  const FrameGradients d_frame = CotangentsOf(spec, batch);
   Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
   for (auto _ : state) {
     Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
@@ -123,7 +130,7 @@ void NaiveForward(benchmark::State& state, const RunSpec& spec) {
   Frame frame;
   for (auto _ : state) {
     const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
-    RenderRefWithFaces<float>(batch.scenes[0], batch.options, {}, ids, rows, &frame);
+    RenderRefWithFaces<float>(batch.scenes[0], batch.options, RequestOf(spec), ids, rows, &frame);
   }
 }
 
@@ -131,9 +138,10 @@ void NaiveBackward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
   const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
+  const FrameGradients d_frame = CotangentsOf(spec, batch);
   for (auto _ : state) {
-    RenderRefBackward<float>(batch.scenes[0], batch.options, ids,
-                             {batch.d_attributes, batch.d_alpha}, rows, &batch.d_scenes[0]);
+    RenderRefBackward<float>(batch.scenes[0], batch.options, ids, d_frame, rows,
+                             &batch.d_scenes[0]);
   }
 }
 
