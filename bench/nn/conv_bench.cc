@@ -7,7 +7,7 @@
 
 #include "base/aligned.h"
 #include "base/rng.h"
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 #include "peers.h"
 #include "turns.h"
 

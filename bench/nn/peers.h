@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/gemm.h"
 
 namespace tilegrad::nn::bench {

@@ -9,8 +9,8 @@
 
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
-#include "raster/soft_mask.h"
-#include "raster/soft_mask_ref.h"
+#include "raster/soft_mask/soft_mask.h"
+#include "raster/soft_mask/soft_mask_ref.h"
 #include "render/frame_layout.h"
 
 namespace tilegrad::bench {

@@ -15,7 +15,7 @@
 #include "raster/interpolate_backward.h"
 #include "raster/project.h"
 #include "raster/screen_mesh.h"
-#include "raster/soft_mask.h"
+#include "raster/soft_mask/soft_mask.h"
 #include "raster/visibility.h"
 #include "render/renderer.h"
 

@@ -9,7 +9,7 @@
 #include "base/parallel.h"
 #include "raster/project.h"
 #include "raster/screen_mesh.h"
-#include "raster/soft_mask_paper_ref.h"
+#include "raster/soft_mask/soft_mask_paper_ref.h"
 #include "render/paper_tile.h"
 #include "render/renderer.h"
 

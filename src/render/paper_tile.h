@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tile of an image under the rule of raster/soft_mask_paper_ref.h: only faces near it are looked
-// at, in their order, so the result is that of all of them. Scalar; T: float, double.
+// A tile of an image under the rule of raster/soft_mask/soft_mask_paper_ref.h: only faces near it
+// are looked at, in their order, so the result is that of all of them. Scalar; T: float, double.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "raster/bin.h"
-#include "raster/soft_mask_paper_ref.h"
+#include "raster/soft_mask/soft_mask_paper_ref.h"
 
 namespace tilegrad {
 

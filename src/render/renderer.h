@@ -82,8 +82,8 @@ struct FrameT {
   // [N,2,H,W] weights of corners 1 and 2 (corner 0 has the rest); 0 at background pixels
   AlignedVector<T> barycentrics;
   // [N, H W] 1 - alpha with more digits, where Backward has use for it, in the order of
-  // raster/soft_mask.h, SoftMaskImages; the rest is unspecified. May be emptied: Backward then
-  // takes more time.
+  // raster/soft_mask/soft_mask.h, SoftMaskImages; the rest is unspecified. May be emptied: Backward
+  // then takes more time.
   AlignedVector<T> transmittance;
   double alpha_error_bound = 0;  // what culling really spent: no pixel is farther than this from
                                  // equation 6; infinite with SoftRule::kPaper

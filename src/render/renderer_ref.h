@@ -14,7 +14,7 @@
 #include "raster/interpolate_ref.h"
 #include "raster/near_clip.h"
 #include "raster/project_ref.h"
-#include "raster/soft_mask_ref.h"
+#include "raster/soft_mask/soft_mask_ref.h"
 #include "raster/visibility_ref.h"
 #include "render/frame_layout.h"
 #include "render/paper_alpha.h"

@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "base/rng.h"
-#include "raster/soft_mask_paper_ref.h"
+#include "raster/soft_mask/soft_mask_paper_ref.h"
 
 namespace tilegrad::raster {
 namespace {

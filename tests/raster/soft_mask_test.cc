@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The soft mask on every target against all faces in double, within E + the rounding that
 // docs/numerics.md derives; gradients likewise, and by complex step.
-#include "raster/soft_mask.h"
+#include "raster/soft_mask/soft_mask.h"
 
 #include <gtest/gtest.h>
 

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "raster/soft_mask.h"
-#include "raster/soft_mask_plan.h"
-#include "raster/soft_mask_ref.h"
+#include "raster/soft_mask/soft_mask.h"
+#include "raster/soft_mask/soft_mask_plan.h"
+#include "raster/soft_mask/soft_mask_ref.h"
 
 namespace tilegrad::raster::test {
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "base/error.h"
-#include "nn/kernels/conv2d.h"
-#include "nn/kernels/conv2d_ref.h"
+#include "nn/kernels/conv2d/conv2d.h"
+#include "nn/kernels/conv2d/conv2d_ref.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/reduce.h"
 

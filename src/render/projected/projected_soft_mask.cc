@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "raster/soft_mask.h"
+#include "raster/soft_mask/soft_mask.h"
 #include "render/paper_tile.h"
 #include "render/validate.h"
 

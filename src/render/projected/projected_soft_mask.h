@@ -23,8 +23,8 @@ struct ProjectedMaskOptions {
 
 // alpha [N,H,W] <- 1 where face_ids [N,H,W] are >= 0, the soft mask elsewhere. Returns what was
 // spent: with kAllFaces no pixel is farther than this from equation 6 over all faces, rounding
-// aside; it is infinite with kPaper. float runs the vector kernels of raster/soft_mask.h, double
-// scalar code over the faces near a tile.
+// aside; it is infinite with kPaper. float runs the vector kernels of raster/soft_mask/soft_mask.h,
+// double scalar code over the faces near a tile.
 template <class T>
 Result<double> ProjectedSoftMask(const ProjectedBatchT<T>& batch,
                                  const ProjectedMaskOptions& options,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The direct convolutions, and those that are matrix products; conv2d_winograd_test.cc has the
 // others.
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 
 #include <gtest/gtest.h>
 

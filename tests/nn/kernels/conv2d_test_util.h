@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "nn/kernels/conv2d.h"
-#include "nn/kernels/conv2d_ref.h"
+#include "nn/kernels/conv2d/conv2d.h"
+#include "nn/kernels/conv2d/conv2d_ref.h"
 #include "nn/kernels/kernel_test_util.h"
 
 namespace tilegrad::nn {

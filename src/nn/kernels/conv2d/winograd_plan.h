@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 #include "nn/kernels/panels.h"
 
 namespace tilegrad::nn {

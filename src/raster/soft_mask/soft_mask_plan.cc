@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "raster/soft_mask_plan.h"
+#include "raster/soft_mask/soft_mask_plan.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/kernels/conv2d.cc"
+#define HWY_TARGET_INCLUDE "nn/kernels/conv2d/conv2d.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 
-#include "nn/kernels/conv2d-inl.h"
-#include "nn/kernels/conv2d_weight_grad-inl.h"
+#include "nn/kernels/conv2d/conv2d-inl.h"
+#include "nn/kernels/conv2d/conv2d_weight_grad-inl.h"
 
 #if HWY_ONCE
 #include <algorithm>
 
-#include "nn/kernels/conv2d_winograd.h"
+#include "nn/kernels/conv2d/conv2d_winograd.h"
 #include "nn/kernels/gemm.h"
 
 namespace tilegrad::nn {

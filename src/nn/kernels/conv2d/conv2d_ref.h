@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 
 namespace tilegrad::nn {
 

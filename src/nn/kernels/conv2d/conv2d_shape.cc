@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/error.h"
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 
 namespace tilegrad::nn {
 

@@ -9,7 +9,7 @@
 
 #include "base/aligned.h"
 #include "raster/conventions.h"
-#include "raster/soft_mask_tree.h"
+#include "raster/soft_mask/soft_mask_tree.h"
 
 namespace tilegrad::raster {
 

@@ -13,8 +13,8 @@
 
 #include <cstddef>
 
-#include "raster/soft_mask_setup.h"
-#include "raster/soft_mask_tree-inl.h"
+#include "raster/soft_mask/soft_mask_setup.h"
+#include "raster/soft_mask/soft_mask_tree-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "raster/soft_mask_members-inl.h"
+#include "raster/soft_mask/soft_mask_members-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -2,7 +2,7 @@
 // What of the error budget is spent where (docs/numerics.md, "Budget").
 #pragma once
 
-#include "raster/soft_mask.h"
+#include "raster/soft_mask/soft_mask.h"
 
 namespace tilegrad::raster {
 

@@ -17,7 +17,7 @@
 
 #include <cstddef>
 
-#include "nn/kernels/conv2d.h"
+#include "nn/kernels/conv2d/conv2d.h"
 
 namespace tilegrad::nn {
 

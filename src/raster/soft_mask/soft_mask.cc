@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "raster/soft_mask.h"
+#include "raster/soft_mask/soft_mask.h"
 
 #include "raster/chunks.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "raster/soft_mask.cc"
+#define HWY_TARGET_INCLUDE "raster/soft_mask/soft_mask.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 
-#include "raster/soft_mask_backward-inl.h"
-#include "raster/soft_mask_forward-inl.h"
-#include "raster/soft_mask_tree-inl.h"
+#include "raster/soft_mask/soft_mask_backward-inl.h"
+#include "raster/soft_mask/soft_mask_forward-inl.h"
+#include "raster/soft_mask/soft_mask_tree-inl.h"
 
 #if HWY_ONCE
 

@@ -13,8 +13,8 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "nn/kernels/conv2d.h"
-#include "nn/kernels/conv2d_product-inl.h"
+#include "nn/kernels/conv2d/conv2d.h"
+#include "nn/kernels/conv2d/conv2d_product-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {

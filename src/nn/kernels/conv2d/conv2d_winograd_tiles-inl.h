@@ -16,10 +16,10 @@
 #include <array>
 #include <cstddef>
 
-#include "nn/kernels/conv2d_winograd_rows-inl.h"
-#include "nn/kernels/conv2d_winograd_transform-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_rows-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_transform-inl.h"
+#include "nn/kernels/conv2d/winograd_plan.h"
 #include "nn/kernels/pack-inl.h"
-#include "nn/kernels/winograd_plan.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {

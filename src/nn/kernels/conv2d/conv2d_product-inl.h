@@ -18,8 +18,8 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "nn/kernels/conv2d.h"
-#include "nn/kernels/conv2d_planes-inl.h"
+#include "nn/kernels/conv2d/conv2d.h"
+#include "nn/kernels/conv2d/conv2d_planes-inl.h"
 #include "nn/kernels/micro_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -18,8 +18,8 @@
 #include <cstddef>
 #include <numbers>
 
-#include "raster/soft_mask_forward-inl.h"
-#include "raster/soft_mask_gradient-inl.h"
+#include "raster/soft_mask/soft_mask_forward-inl.h"
+#include "raster/soft_mask/soft_mask_gradient-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -15,8 +15,8 @@
 #include <cstddef>
 
 #include "base/simd_math-inl.h"
-#include "raster/soft_mask_block-inl.h"
-#include "raster/soft_mask_features-inl.h"
+#include "raster/soft_mask/soft_mask_block-inl.h"
+#include "raster/soft_mask/soft_mask_features-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -15,8 +15,8 @@
 #include <initializer_list>
 
 #include "base/simd_math-inl.h"
-#include "raster/soft_mask_faces-inl.h"
-#include "raster/soft_mask_pixels-inl.h"
+#include "raster/soft_mask/soft_mask_faces-inl.h"
+#include "raster/soft_mask/soft_mask_pixels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -14,7 +14,7 @@
 #include <bit>
 #include <cstddef>
 
-#include "raster/soft_mask_tree-inl.h"
+#include "raster/soft_mask/soft_mask_tree-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -16,7 +16,7 @@
 #include <cstddef>
 
 #include "base/parallel.h"
-#include "nn/kernels/conv2d_winograd_tiles-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_tiles-inl.h"
 #include "nn/kernels/kernel_context.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/kernels/conv2d_winograd.h"
+#include "nn/kernels/conv2d/conv2d_winograd.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/kernels/conv2d_winograd.cc"
+#define HWY_TARGET_INCLUDE "nn/kernels/conv2d/conv2d_winograd.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 
-#include "nn/kernels/conv2d_winograd-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd-inl.h"
 
 #if HWY_ONCE
 

@@ -16,7 +16,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "nn/kernels/conv2d-inl.h"
+#include "nn/kernels/conv2d/conv2d-inl.h"
 #include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -16,7 +16,7 @@
 #include <cstddef>
 
 #include "base/simd_math-inl.h"
-#include "raster/soft_mask_compact-inl.h"
+#include "raster/soft_mask/soft_mask_compact-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

@@ -14,7 +14,7 @@
 #include <cstddef>
 
 #include "raster/face_lanes-inl.h"
-#include "raster/soft_mask_plan.h"
+#include "raster/soft_mask/soft_mask_plan.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {

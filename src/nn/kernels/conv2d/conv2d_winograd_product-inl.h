@@ -14,8 +14,8 @@
 #include <cstddef>
 
 #include "base/parallel.h"
-#include "nn/kernels/conv2d_winograd_tiles-inl.h"
-#include "nn/kernels/conv2d_winograd_weights-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_tiles-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_weights-inl.h"
 #include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -13,9 +13,9 @@
 
 #include <cstddef>
 
-#include "nn/kernels/conv2d_winograd_portions-inl.h"
-#include "nn/kernels/conv2d_winograd_product-inl.h"
-#include "nn/kernels/conv2d_winograd_tiles-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_portions-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_product-inl.h"
+#include "nn/kernels/conv2d/conv2d_winograd_tiles-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
