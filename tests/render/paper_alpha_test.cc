@@ -124,7 +124,7 @@ TEST(PaperAlpha, RendererIsTheReference) {
   const RenderOptions options = PaperOptions();
   Rng rng(4);
   const auto scene = test::TriangleSoup(40, 0.15, options.width, options.height, &rng);
-  const auto truth_scene = test::SceneCast<double>(scene);
+  const auto truth_scene = MeshCast<double>(scene);
   const Workers workers(2);
   Renderer renderer(workers);
   const SceneView views[] = {scene.View()};

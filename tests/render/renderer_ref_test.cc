@@ -96,8 +96,8 @@ TEST_P(ReferenceGradient, EqualsComplexStep) {
   Rng rng(7, 1);
   const auto base = GetParam().make(&rng);
   const RenderOptions& options = GetParam().options;
-  const auto scene = test::SceneCast<double>(base);
-  auto stepped = test::SceneCast<Complex>(base);
+  const auto scene = MeshCast<double>(base);
+  auto stepped = MeshCast<Complex>(base);
   const std::size_t pixels = static_cast<std::size_t>(options.width) * options.height;
   const Loss loss(pixels * static_cast<std::size_t>(scene.channels), pixels, &rng);
 

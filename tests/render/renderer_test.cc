@@ -104,7 +104,7 @@ TEST_P(AgainstReference, ForwardImages) {
   const RenderOptions options = OptionsOf(GetParam());
   Rng rng(11, 3);
   const auto scene = GetParam().make(options.width, options.height, &rng);
-  const auto truth_scene = test::SceneCast<double>(scene);
+  const auto truth_scene = MeshCast<double>(scene);
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     const Workers workers(1);
@@ -155,8 +155,7 @@ TEST_P(AgainstReference, FaceIds) {
     // The double reference rounds vertices to subpixels from better coordinates: a pixel may differ
     // where a coordinate sits at the boundary of rounding and a centre within 1/1024 pixel. With
     // edges of about 1/4 of the pixels' number in length, 1/1024 of those centres are that near.
-    const auto truth =
-        FaceIdsRef(test::SceneCast<double>(scene).View(), options, {0, options.height});
+    const auto truth = FaceIdsRef(MeshCast<double>(scene).View(), options, {0, options.height});
     std::size_t different = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) different += frame.face_ids[i] != truth[i];
     EXPECT_LE(different, truth.size() / 250) << target;
@@ -167,7 +166,7 @@ TEST_P(AgainstReference, Gradients) {
   const RenderOptions options = OptionsOf(GetParam());
   Rng rng(13, 3);
   const auto scene = GetParam().make(options.width, options.height, &rng);
-  const auto truth_scene = test::SceneCast<double>(scene);
+  const auto truth_scene = MeshCast<double>(scene);
   const std::size_t pixels = static_cast<std::size_t>(options.width) * options.height;
   std::vector<float> d_attributes(pixels * static_cast<std::size_t>(scene.channels));
   std::vector<float> d_alpha(pixels);

@@ -16,9 +16,6 @@ namespace tilegrad {
 namespace {
 
 using test::g_allocations;
-using test::OwnedCotangents;
-using test::OwnedGradients;
-using test::OwnedScene;
 using test::SceneRecipe;
 
 constexpr int kWidth = 150, kHeight = 100;  // several bins and bands
@@ -228,7 +225,7 @@ struct Pair {
     std::vector<float> out;
     for (int n = 0; n < 2; ++n) {
       gradients[n].TakeCamera(d[n]);
-      test::ForEachNumber(gradients[n].d, [&](const char*, float v) { out.push_back(v); });
+      ForEachNumber(gradients[n].d, [&](const char*, float v) { out.push_back(v); });
     }
     return out;
   }

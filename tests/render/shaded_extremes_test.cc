@@ -6,14 +6,11 @@
 #include <functional>
 
 #include "base/simd_target.h"
-#include "render/shaded/shaded_renderer.h"
+#include "render/shaded/owned_rendering.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {
 namespace {
-
-using test::OwnedGradients;
-using test::OwnedScene;
 
 // A sphere under Phong light with a texture.
 OwnedScene<float> Sphere(Lighting lighting = Lighting::kPhong) {
@@ -40,27 +37,14 @@ std::array<float, 3> Forward(const OwnedScene<float>& s) {
   return {-r[6], -r[7], -r[8]};
 }
 
-struct Outcome {
-  ShadedFrame frame;
-  OwnedScene<float> d;
-};
-
-Outcome RenderAll(OwnedScene<float>& scene) {
-  Outcome out;
+OwnedRendering<float> RenderAll(OwnedScene<float>& scene) {
+  OwnedRendering<float> out;
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  const ShadedScene view = scene.View();
-  Status status = renderer.Render({&view, 1}, test::TrialOptions(), test::EveryImage(), &out.frame);
-  EXPECT_TRUE(status.ok()) << status.message();
   Rng rng(9, 9);
-  const test::OwnedCotangents<float> d_frame(test::kTrialPixels, 0, &rng);
-  OwnedGradients<float> gradients(scene);
-  auto d_scene = gradients.View();
-  status =
-      renderer.Backward({&view, 1}, test::TrialOptions(), out.frame, d_frame.View(), {&d_scene, 1});
+  const OwnedCotangents<float> d_frame(test::kTrialPixels, 0, &rng);
+  const Status status =
+      RenderOwned(scene, test::TrialOptions(), test::EveryImage(), d_frame, workers, &out);
   EXPECT_TRUE(status.ok()) << status.message();
-  gradients.TakeCamera(d_scene);
-  out.d = gradients.d;
   return out;
 }
 
@@ -154,13 +138,13 @@ TEST_P(ShadedExtremes, NothingIsNaN) {
   GetParam().change(scene);
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
-    Outcome out = RenderAll(scene);
+    auto out = RenderAll(scene);
     int seen = 0;
     for (std::size_t i = 0; i < test::kTrialPixels; ++i) seen += out.frame.face_ids[i] >= 0;
     EXPECT_GT(seen, 20) << target;
     for (const float c : out.frame.color) ASSERT_TRUE(std::isfinite(c)) << target;
     for (const float n : out.frame.normals) ASSERT_TRUE(std::isfinite(n)) << target;
-    test::ForEachNumber(out.d, [&](const char* name, float d) {
+    ForEachNumber(out.d, [&](const char* name, float d) {
       EXPECT_TRUE(std::isfinite(d)) << target << " " << name;
     });
   }
@@ -174,7 +158,7 @@ TEST(ShadedExtremeValues, ShininessZeroIsAHighlightEverywhere) {
   auto scene = Sphere();
   scene.surfaces[0].shininess = 0;
   scene.surfaces[0].diffuse = {0, 0, 0};
-  const Outcome out = RenderAll(scene);
+  const auto out = RenderAll(scene);
   for (std::size_t i = 0; i < test::kTrialPixels; ++i) {
     EXPECT_FLOAT_EQ(out.frame.color[i], out.frame.face_ids[i] >= 0 ? 0.4f : 0.0f);
   }
@@ -184,7 +168,7 @@ TEST(ShadedExtremeValues, OneTexelIsOneColourAndGetsAGradient) {
   auto scene = Sphere(Lighting::kNone);
   scene.textures[0].width = scene.textures[0].height = 1;
   scene.textures[0].texels = {0.25f, 0.5f, 0.75f};
-  const Outcome out = RenderAll(scene);
+  const auto out = RenderAll(scene);
   for (std::size_t i = 0; i < test::kTrialPixels; ++i) {
     EXPECT_FLOAT_EQ(out.frame.color[i], out.frame.face_ids[i] >= 0 ? 0.25f : 0.0f);
   }

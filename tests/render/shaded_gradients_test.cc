@@ -7,16 +7,13 @@
 #include <map>
 #include <string>
 
-#include "render/shaded/shaded_renderer_ref.h"
+#include "render/shaded/owned_rendering.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {
 namespace {
 
 using Complex = std::complex<double>;
-using test::OwnedCotangents;
-using test::OwnedGradients;
-using test::OwnedScene;
 using test::SceneRecipe;
 
 constexpr double kStep = 1e-40;
@@ -51,23 +48,20 @@ using SeenKinds = std::map<std::string, int>;
 void CheckComplexStep(const SceneRecipe& recipe, std::uint64_t seed, SeenKinds* seen) {
   test::Trial trial(recipe, seed);
   if (!trial.seen) return;
-  auto scene = test::OwnedCast<double>(trial.scene);
-  OwnedGradients<double> gradients(scene);
-  auto d_scene = gradients.View();
-  ShadedRenderRefBackward<double>(scene.View(), test::TrialOptions(), trial.ids,
-                                  trial.d_frame.View(), &d_scene);
-  gradients.TakeCamera(d_scene);
+  auto scene = OwnedCast<double>(trial.scene);
+  OwnedScene<double> gradients =
+      OwnedRefBackward<double>(scene, test::TrialOptions(), trial.d_frame, trial.ids);
 
   std::map<std::string, std::vector<double>> values;  // of the gradient
-  test::ForEachNumber(gradients.d, [&](const char* name, double& d) { values[name].push_back(d); });
+  ForEachNumber(gradients, [&](const char* name, double& d) { values[name].push_back(d); });
   for (const auto& kind : values) {
     const std::string& name = kind.first;
     const std::vector<double>& d = kind.second;
     Rng rng(seed, std::hash<std::string>()(name));
-    auto moved = test::OwnedCast<Complex>(trial.scene);
+    auto moved = OwnedCast<Complex>(trial.scene);
     double expected = 0, scale = 0;
     std::size_t i = 0;
-    test::ForEachNumber(moved, [&](const char* of, Complex& x) {
+    ForEachNumber(moved, [&](const char* of, Complex& x) {
       if (of != name) return;
       const double along = rng.Uniform(-1, 1);
       x += Complex(0, along * kStep);

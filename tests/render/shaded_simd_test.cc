@@ -8,48 +8,30 @@
 #include <string>
 
 #include "base/simd_target.h"
-#include "render/shaded/shaded_renderer.h"
-#include "render/shaded/shaded_renderer_ref.h"
+#include "render/shaded/owned_rendering.h"
 #include "render/shaded_trial.h"
 
 namespace tilegrad {
 namespace {
 
-using test::OwnedGradients;
-using test::OwnedScene;
 using test::SceneRecipe;
 using test::Trial;
 
 struct Rendered {
-  ShadedFrame frame;
-  ShadedFrameT<double> truth;
-  OwnedScene<float> d;
-  OwnedScene<double> d_truth;
+  OwnedRendering<float> got;
+  OwnedRendering<double> truth;
 };
 
 Rendered RenderBoth(Trial& trial) {
   Rendered out;
   const RenderOptions options = test::TrialOptions();
   const Workers workers(2);
-  ShadedRenderer renderer(workers);
-  const ShadedScene scene = trial.scene.View();
-  Status status = renderer.Render({&scene, 1}, options, test::EveryImage(), &out.frame);
+  const Status status = RenderOwned(trial.scene, options, test::EveryImage(),
+                                    trial.d_frame.Cast<float>(), workers, &out.got);
   EXPECT_TRUE(status.ok()) << status.message();
-  auto scene64 = test::OwnedCast<double>(trial.scene);
-  const std::span<const std::int32_t> ids(out.frame.face_ids);
-  ShadedRenderRef<double>(scene64.View(), options, test::EveryImage(), ids, &out.truth);
-
-  OwnedGradients<float> gradients(trial.scene);
-  auto d_scene = gradients.View();
-  const auto d_frame = trial.d_frame.Cast<float>();
-  status = renderer.Backward({&scene, 1}, options, out.frame, d_frame.View(), {&d_scene, 1});
-  EXPECT_TRUE(status.ok()) << status.message();
-  gradients.TakeCamera(d_scene);
-  OwnedGradients<double> gradients64(scene64);
-  auto d_scene64 = gradients64.View();
-  ShadedRenderRefBackward<double>(scene64.View(), options, ids, trial.d_frame.View(), &d_scene64);
-  gradients64.TakeCamera(d_scene64);
-  out.d = gradients.d, out.d_truth = gradients64.d;
+  auto scene64 = OwnedCast<double>(trial.scene);
+  out.truth = RenderOwnedRef<double>(scene64, options, test::EveryImage(), trial.d_frame,
+                                     out.got.frame.face_ids);
   return out;
 }
 
@@ -70,9 +52,9 @@ void Compare(double got, double expected, Compared* c) {
 std::map<std::string, Compared> CompareGradients(Rendered& r) {
   std::map<std::string, Compared> out;
   std::vector<double> truth;
-  test::ForEachNumber(r.d_truth, [&](const char*, double& d) { truth.push_back(d); });
+  ForEachNumber(r.truth.d, [&](const char*, double& d) { truth.push_back(d); });
   std::size_t i = 0;
-  test::ForEachNumber(r.d, [&](const char* name, float& d) {
+  ForEachNumber(r.got.d, [&](const char* name, float& d) {
     Compare(static_cast<double>(d), truth[i++], &out[name]);
   });
   return out;
@@ -88,12 +70,12 @@ void CompareImage(const char* name, const AlignedVector<float>& got,
 
 std::map<std::string, Compared> CompareImages(const Rendered& r) {
   std::map<std::string, Compared> out;
-  CompareImage("color", r.frame.color, r.truth.color, &out);
-  CompareImage("normals", r.frame.normals, r.truth.normals, &out);
-  CompareImage("uv", r.frame.uv, r.truth.uv, &out);
-  CompareImage("alpha", r.frame.alpha, r.truth.alpha, &out);
-  CompareImage("depth", r.frame.depth, r.truth.depth, &out);
-  CompareImage("attributes", r.frame.attributes, r.truth.attributes, &out);
+  CompareImage("color", r.got.frame.color, r.truth.frame.color, &out);
+  CompareImage("normals", r.got.frame.normals, r.truth.frame.normals, &out);
+  CompareImage("uv", r.got.frame.uv, r.truth.frame.uv, &out);
+  CompareImage("alpha", r.got.frame.alpha, r.truth.frame.alpha, &out);
+  CompareImage("depth", r.got.frame.depth, r.truth.frame.depth, &out);
+  CompareImage("attributes", r.got.frame.attributes, r.truth.frame.attributes, &out);
   return out;
 }
 

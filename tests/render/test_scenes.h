@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes for the tests of raster and render: owners behind the renderer's views, in any scalar
-// type.
+// Scenes for the tests of raster and render.
 #pragma once
 
 #include <cmath>
@@ -9,33 +8,12 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "render/renderer.h"
+#include "render/shaded/owned_scene.h"
 
 namespace tilegrad::test {
 
 template <class T>
-struct TestScene {
-  std::vector<T> positions;
-  std::vector<std::int32_t> faces;
-  std::vector<T> attributes;
-  int channels = 3;
-  AttributeRate rate = AttributeRate::kVertex;
-  CameraT<T> camera;
-
-  SceneViewT<T> View() const { return {positions, faces, attributes, channels, rate, camera}; }
-  std::size_t vertex_count() const { return positions.size() / 3; }
-  std::size_t face_count() const { return faces.size() / 3; }
-};
-
-template <class T, class U>
-TestScene<T> SceneCast(const TestScene<U>& s) {
-  return {{s.positions.begin(), s.positions.end()},
-          s.faces,
-          {s.attributes.begin(), s.attributes.end()},
-          s.channels,
-          s.rate,
-          CameraCast<T>(s.camera)};
-}
+using TestScene = OwnedMesh<T>;
 
 inline void RandomAttributes(int channels, AttributeRate rate, Rng* rng, TestScene<float>* scene) {
   scene->channels = channels, scene->rate = rate;

@@ -100,7 +100,7 @@ struct PixelAdjoints {
 class Truth {
  public:
   Truth(const ExtremeScene& e, std::uint64_t number)
-      : e_(e), rng_(number, 99), scene_(SceneCast<Bounded>(e.scene)) {
+      : e_(e), rng_(number, 99), scene_(MeshCast<Bounded>(e.scene)) {
     const SceneView view = e.scene.View();
     raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
     mesh_ = buffers_.View();
