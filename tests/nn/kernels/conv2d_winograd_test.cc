@@ -32,7 +32,7 @@ double Largest(const std::vector<float>& v) {
 // 9 slots (its transform has three ones along an axis), an input gradient 9 for each of at most 4
 // tiles that overlap, a weight gradient 4.
 struct Bound {
-  Bound(const Conv2dShape& s, const Operands& o)
+  Bound(const Conv2dShape& s, const Conv2dOperands& o)
       : x(4 * Largest(o.x)),
         weight(4 * Largest(o.weight)),
         d_y(4 * Largest(o.d_y)),
@@ -58,12 +58,12 @@ TEST(Conv2dWinograd, AgreesWithReference) {
   for (const Conv2dShape& s : kShapes) {
     SCOPED_TRACE(Describe(s));
     ASSERT_TRUE(WinogradFits(s));
-    const Operands o = RandomOperands(s, 7);
-    const ReferenceResults want = RunReference(s, o, ToDouble);
+    const Conv2dOperands o = RandomConv2dOperands(s, 7);
+    const Conv2dTruth want = RunConv2dReference(s, o, ToDouble);
     const Bound bound(s, o);
     for (const std::string& target : RunnableTargets()) {
       const OnTarget on(target);
-      const Results got = RunConv2d(s, o, {.winograd = true});
+      const Conv2dResults got = RunConv2d(s, o, {.winograd = true});
       ExpectWithin(got.y, want.y, bound.y(), bound.inputs);
       ExpectWithin(got.d_x, want.d_x, bound.d_x(), bound.outputs);
       ExpectWithin(got.d_weight, want.d_weight, bound.d_weight(), bound.tiles);
@@ -74,8 +74,8 @@ TEST(Conv2dWinograd, AgreesWithReference) {
 // Both kernels are off by no more than the bound; any number of workers gives the same bits.
 void ExpectAgreesWithDirect(const Conv2dShape& s, std::uint64_t seed) {
   SCOPED_TRACE(Describe(s));
-  const Operands o = RandomOperands(s, seed);
-  const Results direct = RunConv2d(s, o, {}), winograd = RunConv2d(s, o, {.winograd = true});
+  const Conv2dOperands o = RandomConv2dOperands(s, seed);
+  const Conv2dResults direct = RunConv2d(s, o, {}), winograd = RunConv2d(s, o, {.winograd = true});
   const Bound bound(s, o);
   ExpectWithin(winograd.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
   ExpectWithin(winograd.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
@@ -97,23 +97,14 @@ TEST(Conv2dWinograd, AgreesWithDirectWhereWorkersHavePortionsOfTheirOwn) {
   ExpectAgreesWithDirect({61, 40, 14, 15, 64, 3, 3, 1, 1}, 9);
 }
 
-double RootMeanSquareError(const std::vector<float>& got, const std::vector<double>& want) {
-  double sum = 0;
-  for (std::size_t i = 0; i < got.size(); ++i) {
-    const double error = static_cast<double>(got[i]) - want[i];
-    sum += error * error;
-  }
-  return std::sqrt(sum / static_cast<double>(got.size()));
-}
-
 // The bound above is far from what happens. Next to the error of the direct kernels, measured on
 // these shapes and AVX2: y 0.7 to 1.6, d_x 0.6 to 1.4, d_weight 1.1 to 2.4 times.
 TEST(Conv2dWinograd, ErrorIsNearThatOfDirect) {
   for (const Conv2dShape& s : kShapes) {
     SCOPED_TRACE(Describe(s));
-    const Operands o = RandomOperands(s, 8);
-    const ReferenceResults want = RunReference(s, o, ToDouble);
-    const Results direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
+    const Conv2dOperands o = RandomConv2dOperands(s, 8);
+    const Conv2dTruth want = RunConv2dReference(s, o, ToDouble);
+    const Conv2dResults direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
     const double y = RootMeanSquareError(fast.y, want.y) / RootMeanSquareError(direct.y, want.y);
     const double d_x =
         RootMeanSquareError(fast.d_x, want.d_x) / RootMeanSquareError(direct.d_x, want.d_x);
@@ -129,8 +120,8 @@ TEST(Conv2dWinograd, ErrorIsNearThatOfDirect) {
 TEST(Conv2dWinograd, BitsDoNotDependOnWorkers) {
   for (const Conv2dShape& s : kShapes) {
     SCOPED_TRACE(Describe(s));
-    const Operands o = RandomOperands(s, 3);
-    const Results one = RunConv2d(s, o, {.winograd = true});
+    const Conv2dOperands o = RandomConv2dOperands(s, 3);
+    const Conv2dResults one = RunConv2d(s, o, {.winograd = true});
     EXPECT_EQ(RunConv2d(s, o, {.workers = 2, .winograd = true}), one);
     EXPECT_EQ(RunConv2d(s, o, {.workers = 7, .winograd = true}), one);
   }
