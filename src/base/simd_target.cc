@@ -59,6 +59,8 @@ Status ForceTarget(const std::string& name) {
   return {};
 }
 
+std::string ForcedTarget() { return g_forced; }
+
 Status ForceTargetFromEnvironment() {
   const char* name = std::getenv("TILEGRAD_TARGET");
   return name == nullptr ? Status() : ForceTarget(name).Within("TILEGRAD_TARGET");

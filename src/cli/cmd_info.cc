@@ -2,8 +2,6 @@
 // tilegrad info: version, SIMD targets and why one was chosen, cores.
 #include <fmt/core.h>
 
-#include <cstdlib>
-
 #include "base/parallel.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
@@ -17,7 +15,7 @@ Status PrintInfo() {
   fmt::print("cores this process may use: {}\n", AvailableCores());
   fmt::print("SIMD targets this CPU and build offer, best first:");
   for (const auto& name : RunnableTargets()) fmt::print(" {}", name);
-  const bool forced = std::getenv("TILEGRAD_TARGET") != nullptr;
+  const bool forced = !ForcedTarget().empty();
   fmt::print(
       "\nin use: {} ({})\n", ActiveTarget(),
       forced ? "forced by TILEGRAD_TARGET" : "the best; set TILEGRAD_TARGET=NAME to force another");
