@@ -68,6 +68,7 @@ int Run(int argc, char** argv) {
   AddViews(app, &action);
   AddFigure2(app, &action);
   AddInfo(app, &action);
+  AddSelftest(app, &action);
   if (argc > 1 && argv[1][0] != '-' && !IsCommand(app, argv[1])) {
     return Report({StatusCode::kInvalidArgument,
                    fmt::format("unknown command \"{}\"; see tilegrad --help", argv[1])});

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad selftest: does this program on this machine compute what formulas say?
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <exception>
+
+#include "base/error.h"
+#include "base/simd_target.h"
+#include "cli/command.h"
+#include "cli/run_folder.h"
+#include "cli/selftest/checks.h"
+#include "tilegrad/version.h"
+#include "train/machine.h"
+
+namespace tilegrad::cli {
+namespace {
+
+using selftest::Check;
+using selftest::CheckContext;
+
+struct SelftestOptions {
+  std::string only;
+  bool list = false;
+  int workers = 0;
+};
+
+std::string LowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::string Titles(const std::vector<Check>& checks) {
+  std::string out;
+  for (const Check& check : checks) out += "  " + check.title + "\n";
+  return out;
+}
+
+Result<std::vector<Check>> ChooseChecks(const std::string& only) {
+  const std::vector<Check> all = selftest::AllChecks();
+  std::vector<Check> chosen;
+  for (const Check& check : all) {
+    if (LowerCase(check.title).find(LowerCase(only)) != std::string::npos) chosen.push_back(check);
+  }
+  if (!chosen.empty()) return chosen;
+  std::string titles = Titles(all);
+  titles.pop_back();
+  return InvalidArgument("--only {}: no check has that in its title; there are:\n{}", only, titles);
+}
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& context) {
+  try {
+    return check.run(context);
+  } catch (const std::exception& error) {  // whatever it is, the next check is run
+    return InternalError("unexpected failure: {}", error.what());
+  }
+}
+
+// Whether it holds.
+bool RunCheck(const Check& check, const CheckContext& context) {
+  const Stopwatch watch;
+  const auto finding = RunGuarded(check, context);
+  fmt::print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
+             finding.ok() ? finding->text : finding.status().message(), watch.seconds());
+  std::fflush(stdout);  // a check that crashes is the one after the last line
+  return finding.ok();
+}
+
+void PrintHeader(const CheckContext& context) {
+  fmt::print("tilegrad {}", TILEGRAD_VERSION);
+  for (const auto& [name, value] : train::DescribeMachine()) {
+    if (name == "compiler" || name == "cpu") fmt::print(", {}", value);
+  }
+  const int threads = context.workers.count();
+  fmt::print(", {} thread{}\nSIMD targets:", threads, threads == 1 ? "" : "s");
+  for (const std::string& target : context.targets) fmt::print(" {}", target);
+  fmt::print("{}\n", ForcedTarget().empty() ? "" : " (forced by TILEGRAD_TARGET)");
+}
+
+Status RunSelftest(const SelftestOptions& options) {
+  TILEGRAD_ASSIGN(const auto checks, ChooseChecks(options.only));
+  if (options.list) {
+    fmt::print("{}", Titles(checks));
+    return {};
+  }
+  const Workers workers(options.workers);
+  const std::string forced = ForcedTarget();
+  const CheckContext context{workers, forced.empty() ? RunnableTargets() : std::vector{forced}};
+  PrintHeader(context);
+  const Stopwatch watch;
+  const auto failed = std::count_if(checks.begin(), checks.end(),
+                                    [&](const Check& check) { return !RunCheck(check, context); });
+  if (failed == 0) {
+    fmt::print("all {} checks hold ({:.1f} s)\n", checks.size(), watch.seconds());
+    return {};
+  }
+  fmt::print("{} of {} checks FAILED ({:.1f} s)\n", failed, checks.size(), watch.seconds());
+  return InternalError(
+      "do not trust results of this program on this machine; please report the lines above");
+}
+
+}  // namespace
+
+void AddSelftest(CLI::App& app, Action* action) {
+  auto options = std::make_shared<SelftestOptions>();
+  auto* command = app.add_subcommand(
+      "selftest",
+      "Check this program on this machine: images, gradients, networks, files, on every SIMD "
+      "target, within seconds");
+  command->add_option("--only", options->only,
+                      "run checks whose title has this in it (upper and lower case are the same)");
+  AddWorkersOption(command, &options->workers);
+  command->add_flag("--list", options->list, "print the titles of the checks, run none")
+      ->excludes("--workers");
+  command->callback([options, action] { *action = [options] { return RunSelftest(*options); }; });
+}
+
+}  // namespace tilegrad::cli

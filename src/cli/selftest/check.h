@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a check of `tilegrad selftest` is, and how its numbers are compared. A check computes with
+// the code that it checks, passes every result through CheckContext::Take, and holds it to a
+// formula or to a slower and simpler computation, within a tolerance that stands beside it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::selftest {
+
+using Numbers = std::variant<std::span<float>, std::span<double>, std::span<std::int32_t>,
+                             std::span<std::uint8_t>>;
+
+struct CheckContext {
+  const Workers& workers;
+  std::vector<std::string> targets;  // SIMD targets to check, names as RunnableTargets has them
+  // Is shown each result before a check looks at it, and may alter it: so tests see that the check
+  // then fails. The program has none.
+  std::function<void(std::string_view what, const Numbers& numbers)> tamper = {};
+
+  template <class Vector>
+  void Take(std::string_view what, Vector& result) const {
+    if (tamper) tamper(what, Numbers(std::span(result)));
+  }
+};
+
+// What a check found that holds.
+struct Finding {
+  std::string text;  // "off by 1.2e-07, allowed 6.0e-05"
+  double share = 0;  // of what is allowed, used by the number that is off the most; 0: none is
+  std::string fingerprint = {};  // 8 hexadecimal digits of the bits of all results, or empty
+};
+
+struct Check {
+  std::string title;
+  std::function<Result<Finding>(const CheckContext&)> run;  // error: what is wrong, and by how much
+};
+
+// The check on each target of the context. Finds what the target found whose numbers are off the
+// most; errors name the target.
+Check OnEveryTarget(Check check);
+
+// Compares results with what they must be, and remembers the worst. Errors name the first number
+// that is too far off; NaN is.
+class Gauge {
+ public:
+  // |got - want| <= allowed, number by number; infinities must agree.
+  template <class Got, class Want>
+  Status Expect(std::string_view what, const Got& got, const Want& want, double allowed) {
+    return ExpectEach(what, got, want, [allowed](std::size_t) { return allowed; });
+  }
+
+  // The same with `share` of the largest |want| as what is allowed. That must not be 0: a
+  // comparison of nothing but zeros proves nothing.
+  template <class Got, class Want>
+  Status ExpectOfLargest(std::string_view what, const Got& got, const Want& want, double share) {
+    double most = 0;
+    for (const auto& w : want) {
+      if (std::isfinite(w)) most = std::max(most, std::abs(static_cast<double>(w)));
+    }
+    if (most == 0) return InternalError("{}: all {} numbers are 0", what, std::size(want));
+    return Expect(what, got, want, share * most);
+  }
+
+  // The same with allowed(i) for number i.
+  template <class Got, class Want, class Allowed>
+  Status ExpectEach(std::string_view what, const Got& got, const Want& want,
+                    const Allowed& allowed) {
+    if (std::size(got) != std::size(want)) {
+      return InternalError("{} has {} numbers, expected {}", what, std::size(got), std::size(want));
+    }
+    for (std::size_t i = 0; i < std::size(want); ++i) {
+      TILEGRAD_TRY(
+          Add(what, i, static_cast<double>(got[i]), static_cast<double>(want[i]), allowed(i)));
+    }
+    return {};
+  }
+
+  Finding Found() const;
+
+ private:
+  Status Add(std::string_view what, std::size_t index, double got, double want, double allowed);
+
+  double share_ = 0, off_ = 0, allowed_ = 0;  // of the worst
+};
+
+// Errors name the first number whose bits differ: those of 0 and -0 do.
+Status ExpectSameBits(std::string_view what, std::span<const float> got,
+                      std::span<const float> want);
+
+}  // namespace tilegrad::selftest
