@@ -1,5 +1,5 @@
 # cmake -P: installs the build BUILD under WORK, then builds and runs programs that find it there, by find_package and by
-# pkg-config. Nothing of the source tree but the examples' own files is visible to them.
+# pkg-config; the program, if it was built, checks itself. Nothing of the source tree but the examples' own files is visible to them.
 set(PREFIX ${WORK}/prefix)
 
 function(run)
@@ -20,6 +20,10 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
+
+if(EXISTS ${PREFIX}/bin/tilegrad)
+  run(${PREFIX}/bin/tilegrad selftest)
+endif()
 
 build_consumer(${SOURCE}/tests/install)
 run(${WORK}/install/hello_triangle)
