@@ -199,6 +199,32 @@ TEST_F(BrokenGltfTest, ImagesBeyondTheirBufferAreWarnings) {
   }
 }
 
+// Found with a standard library that checks indices (_GLIBCXX_ASSERTIONS): tinygltf's reference to
+// the first byte ended the program.
+TEST_F(BrokenGltfTest, ImagesThatBeginBehindTheirBuffer) {
+  Json json = Triangle();
+  json["images"] = {{{"uri", "none.png"}}, {{"bufferView", 2}, {"mimeType", "image/png"}}};
+  for (const std::uint64_t offset :
+       {std::uint64_t{48}, std::uint64_t{1} << 32, ~std::uint64_t{0}}) {
+    json["bufferViews"][2] = {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", 1}};
+    ExpectMessage(Load(json), "bad.gltf", "image 1", std::to_string(offset), "of 48 bytes");
+  }
+  json["bufferViews"][2]["byteOffset"] = 47;
+  EXPECT_TRUE(Load(json).ok());
+  // References to nowhere and of other types are tinygltf's to find.
+  for (const Json& reference : {Json(3), Json(-2), Json(0.5), Json("a"), Json::array()}) {
+    Json broken = json;
+    broken["images"][1]["bufferView"] = reference;
+    ExpectMessage(Load(broken), "bad.gltf", "not valid glTF");
+    broken = json;
+    broken["bufferViews"][2]["buffer"] = reference;
+    ExpectMessage(Load(broken), "bad.gltf", "not valid glTF");
+    broken = json;
+    broken["images"] = reference;
+    EXPECT_TRUE(Load(broken).ok());
+  }
+}
+
 TEST_F(BrokenGltfTest, ImageBesideTheFileWithAPercentEncodedName) {
   ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 99)).ok());
   Json json = Triangle();

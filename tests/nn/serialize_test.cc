@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cstring>
+#include <ctime>
 
 namespace tilegrad::nn {
 namespace {
@@ -197,7 +197,8 @@ TEST_F(Safetensors, TensorsWithoutElements) {
 }
 
 // In time that grows with their number: its square, which took minutes here, is for a hostile
-// file to choose.
+// file to choose. Processor time, as other programs may have most of the machine; a sanitizer takes
+// ten times as much.
 TEST_F(Safetensors, ManyTensorsKeepTheirOrder) {
   constexpr int kCount = 100000;
   std::string header = "{";
@@ -205,14 +206,14 @@ TEST_F(Safetensors, ManyTensorsKeepTheirOrder) {
     header += fmt::format(R"({}"{}":{{"dtype":"U8","shape":[0],"data_offsets":[0,0]}})",
                           i == 0 ? "" : ",", kCount - i);
   }
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   const auto file = DecodeSafetensors(context_, File(header + "}", 0));
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  const double taken = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   ASSERT_TRUE(file.ok()) << file.status().message();
   ASSERT_EQ(file->tensors.size(), static_cast<std::size_t>(kCount));
   EXPECT_EQ(file->tensors[0].name, std::to_string(kCount));
   EXPECT_EQ(file->tensors.back().name, "1");
-  EXPECT_LT(taken.count(), 30);  // about 1
+  EXPECT_LT(taken, 30);  // about 1
 }
 
 }  // namespace

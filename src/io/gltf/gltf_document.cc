@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "base/error.h"
@@ -109,6 +110,46 @@ Status CheckNesting(std::string_view json, const std::string& place) {
   return {};
 }
 
+using Json = nlohmann::json;
+
+// The members of `list` in the document that an index of `object` names; null if there is none.
+const Json* Referred(const Json& document, const char* list, const Json& object, const char* key) {
+  const auto index = object.find(key);
+  const auto entries = document.find(list);
+  if (index == object.end() || !index->is_number_integer() || entries == document.end() ||
+      !entries->is_array()) {
+    return nullptr;
+  }
+  const int i = static_cast<int>(index->get<std::int64_t>());  // as tinygltf takes it
+  return i >= 0 && static_cast<std::size_t>(i) < entries->size() ? &(*entries)[i] : nullptr;
+}
+
+std::uint64_t CountOf(const Json& object, const char* key) {
+  const auto count = object.find(key);
+  return count != object.end() && count->is_number_unsigned() ? count->get<std::uint64_t>() : 0;
+}
+
+// tinygltf takes the address of an image's first byte in its buffer before it asks KeepEncoded,
+// also where the buffer ends before: a standard library that checks indices ends the program there.
+// Whatever else is wrong is left to tinygltf, which finds it before.
+Status CheckImages(std::string_view text, const std::string& place) {
+  if (text.find("images") == std::string_view::npos) return {};
+  const Json document = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const auto images = document.find("images");
+  if (images == document.end() || !images->is_array()) return {};
+  for (std::size_t i = 0; i < images->size(); ++i) {
+    const Json* const view = Referred(document, "bufferViews", (*images)[i], "bufferView");
+    const Json* const buffer = view ? Referred(document, "buffers", *view, "buffer") : nullptr;
+    if (buffer == nullptr) continue;
+    const std::uint64_t begin = CountOf(*view, "byteOffset"), size = CountOf(*buffer, "byteLength");
+    if (begin >= size) {
+      return DataLoss("{}: image {}: its buffer view begins at byte {} of a buffer of {} bytes",
+                      place, i, begin, size);
+    }
+  }
+  return {};
+}
+
 // Compressed geometry is an error, other extensions that the file requires are warnings.
 Status CheckVersion(const std::string& place, GltfDocument* document) {
   const tinygltf::Model& model = document->model;
@@ -131,6 +172,7 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
   const auto slash = name.find_last_of('/');
   SideFiles side{source, slash == std::string::npos ? "" : name.substr(0, slash)};
   TILEGRAD_TRY(CheckNesting(JsonPart(bytes), place));
+  TILEGRAD_TRY(CheckImages(JsonPart(bytes), place));
   GltfDocument document;
   try {
     TILEGRAD_TRY(Parse(bytes, side, place, &document.model));
