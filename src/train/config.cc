@@ -113,7 +113,9 @@ Status SetFromToml(const Field& field, const toml::node& node) {
   }
   if (!node.is_number()) return InvalidArgument("{} must be a number", field.key);
   double& number = **std::get_if<double*>(&field.target);
-  number = *node.value<double>();
+  // node.value<double>() is empty for whole numbers that double does not have.
+  const auto* whole = node.as_integer();
+  number = whole != nullptr ? static_cast<double>(whole->get()) : node.ref<double>();
   return CheckRange(field, number);
 }
 

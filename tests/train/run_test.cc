@@ -56,6 +56,15 @@ TEST_F(RunTest, ConfigErrorsNameFileLineAndKey) {
   ExpectMessage(ReadConfig(folder_ / "none.toml").status(), "none.toml");
 }
 
+TEST_F(RunTest, WholeNumbersWhereFractionsAreAllowed) {
+  const auto config = ParseConfig("[loss]\ncolor = 2\n", "a");
+  ASSERT_TRUE(config.ok()) << config.status().message();
+  EXPECT_EQ(config->loss.color, 2);
+  // 2^53 + 1 is no double: what stood here by chance was taken, in the range or not.
+  ExpectMessage(ParseConfig("[loss]\ncolor = 9007199254740993\n", "b").status(),
+                "loss.color is 9007199254740992");
+}
+
 TEST_F(RunTest, Overrides) {
   TrainConfig config;
   EXPECT_TRUE(ApplyOverrides({"schedule.steps=5", "name=me", "loss.color=0.5"}, &config).ok());
