@@ -22,6 +22,8 @@ inline Result<nlohmann::json> ParseJson(std::string_view text, const std::string
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
     const auto line = first_line + std::count(text.begin(), end, '\n');
     return DataLoss("{}: line {}: not valid JSON", place, line);
+  } catch (const nlohmann::json::exception& error) {  // a number beyond double; has no place
+    return DataLoss("{}: from line {} on: not valid JSON: {}", place, first_line, error.what());
   }
 }
 

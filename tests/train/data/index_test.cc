@@ -75,6 +75,14 @@ TEST_F(IndexTest, ModelLinesNameTheirNumber) {
   ExpectOpenError({"models.jsonl", "line 1", "JSON"});
 }
 
+// The JSON library's error about them is of another type and has no place.
+TEST_F(IndexTest, NumbersBeyondDouble) {
+  Edit("models.jsonl", "\"source_faces\":", "\"source_faces\":1e999,\"was\":");
+  ExpectOpenError({"models.jsonl", "line 1", "1e999"});
+  Edit("dataset.json", "\"views\": 1", "\"views\": 1e999");
+  ExpectOpenError({"dataset.json", "1e999"});
+}
+
 TEST_F(IndexTest, ALineCutByACrash) {
   std::string text = ReadText(root_ / "models.jsonl").value();
   text.resize(text.size() - 20);
