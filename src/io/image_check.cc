@@ -93,11 +93,36 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated JPEG: it ends without an end marker", name);
 }
 
+// Numbers in the header that stb_image's int does not hold: it would take what is left of them.
+Status CheckPnm(ByteSpan bytes, const std::string& name) {
+  constexpr int kNumbers = 3, kMost = 100'000'000;
+  int value = 0, seen = 0;
+  bool inside = false, comment = false;
+  for (std::size_t at = 2; at < bytes.size() && seen < kNumbers; ++at) {
+    const std::uint8_t c = bytes[at];
+    if (comment) {
+      comment = c != '\n' && c != '\r';
+    } else if (c >= '0' && c <= '9') {
+      value = (inside ? value * 10 : 0) + (c - '0');
+      inside = true;
+      if (value > kMost) return DataLoss("{}: corrupt PNM: a number at byte {} is huge", name, at);
+    } else {
+      seen += inside ? 1 : 0;
+      inside = false;
+      comment = c == '#';
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Status CheckImageContainer(ByteSpan bytes, const std::string& name) {
   if (StartsWith(bytes, kPngSignature)) return CheckPng(bytes, name);
   if (StartsWith(bytes, kJpegSignature)) return CheckJpeg(bytes, name);
+  if (bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == '5' || bytes[1] == '6')) {
+    return CheckPnm(bytes, name);
+  }
   return {};
 }
 

@@ -110,6 +110,16 @@ TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
   ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman");
 }
 
+// 4294967298 = 2^32 + 2 was read as 2.
+TEST_F(FormatsTest, PnmWithNumbersBeyondInt) {
+  const auto decode = [](const std::string& text) {
+    return DecodeImage(Bytes(text.begin(), text.end()), "a.ppm").status();
+  };
+  EXPECT_TRUE(decode("P6\n# 4294967298 is a comment\n2 0002\n255\n4294967298.,").ok());
+  ExpectMessage(decode("P6\n4294967298 2\n255\n0123456789ab"), "a.ppm", "huge");
+  ExpectMessage(decode("P5\n4 1#c\n4294967551\n0123"), "a.ppm", "huge");
+}
+
 TEST_F(FormatsTest, ImagesWithFlippedBytesNeverCrash) {
   for (const Bytes& whole : {EncodePng(Gradient(16, 16, 4)).value(), Jpeg(16, 16)}) {
     for (std::size_t i = 0; i < whole.size(); ++i) {
