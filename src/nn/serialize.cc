@@ -6,6 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <unordered_set>
 #include <utility>
 
 #include "base/error.h"
@@ -187,19 +188,27 @@ bool IsUtf8(const std::string& text) {
   return Json::parse(dumped).get<std::string>() == text;
 }
 
+// Appends a member to a JSON object that begins with `text`. An ordered object of the JSON library
+// would look through all members for each new one.
+void AppendMember(const std::string& name, const OrderedJson& value, std::string* text) {
+  if (text->size() > 1) *text += ',';
+  *text += OrderedJson(name).dump() + ':' + value.dump();
+}
+
 }  // namespace
 
 Result<Bytes> EncodeSafetensors(const TensorFile& file) {
-  OrderedJson header = OrderedJson::object();
-  if (!file.metadata.empty()) header[kMetadata] = file.metadata;
   for (const auto& [key, value] : file.metadata) {
     if (!IsUtf8(key) || !IsUtf8(value)) {
       return InvalidArgument("safetensors: the metadata is not UTF-8");
     }
   }
+  std::string text = "{";
+  if (!file.metadata.empty()) AppendMember(kMetadata, file.metadata, &text);
+  std::unordered_set<std::string> names = {kMetadata};
   std::size_t end = 0;
   for (const NamedTensor& t : file.tensors) {
-    if (t.value.empty() || t.name == kMetadata || header.contains(t.name)) {
+    if (t.value.empty() || !names.insert(t.name).second) {
       return InvalidArgument("safetensors: tensor \"{}\" is empty, or its name is taken", t.name);
     }
     if (!IsUtf8(t.name)) return InvalidArgument("safetensors: a tensor's name is not UTF-8");
@@ -208,11 +217,13 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
       extents.push_back(static_cast<std::uint64_t>(t.value.shape()[axis]));
     }
     const std::size_t begin = std::exchange(end, end + t.value.bytes());
-    header[t.name] = {{"dtype", NameOf(t.value.dtype())},
-                      {"shape", std::move(extents)},
-                      {"data_offsets", {begin, end}}};
+    AppendMember(t.name,
+                 {{"dtype", NameOf(t.value.dtype())},
+                  {"shape", std::move(extents)},
+                  {"data_offsets", {begin, end}}},
+                 &text);
   }
-  std::string text = header.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
+  text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
   Bytes bytes(kLengthBytes + text.size() + end);
   const std::uint64_t length = text.size();
