@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/image_file.h"
 
 namespace tilegrad::io {
 namespace {
@@ -16,13 +17,6 @@ namespace {
 using ByteSpan = std::span<const std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 8> kPngSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-constexpr std::array<std::uint8_t, 3> kJpegSignature = {0xff, 0xd8, 0xff};
-
-template <class Signature>
-bool StartsWith(ByteSpan bytes, const Signature& signature) {
-  return bytes.size() >= signature.size() &&
-         std::equal(signature.begin(), signature.end(), bytes.begin());
-}
 
 std::uint32_t BigEndian32(const std::uint8_t* p) {
   return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
@@ -48,7 +42,7 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated PNG: it ends without an end chunk", name);
 }
 
-constexpr int kHuffmanTables = 0xc4, kEndOfImage = 0xd9;
+constexpr int kHuffmanTables = 0xc4, kStartOfImage = 0xd8, kEndOfImage = 0xd9;
 
 // Tables of a class and number, 16 counts of codes by length, and as many values as the counts'
 // sum, which is at most 256 (T.81, B.2.4.2): stb_image 2.27 writes past its arrays if not.
@@ -76,7 +70,7 @@ std::size_t NextMarker(ByteSpan bytes, std::size_t at) {
 }
 
 Status CheckJpeg(ByteSpan bytes, const std::string& name) {
-  std::size_t at = NextMarker(bytes, 2);
+  std::size_t at = NextMarker(bytes, 0);
   for (; at < bytes.size(); at = NextMarker(bytes, at)) {
     const int marker = bytes[at++];
     if (marker == kEndOfImage) return {};
@@ -93,37 +87,45 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated JPEG: it ends without an end marker", name);
 }
 
-// Numbers in the header that stb_image's int does not hold: it would take what is left of them.
-Status CheckPnm(ByteSpan bytes, const std::string& name) {
-  constexpr int kNumbers = 3, kMost = 100'000'000;
-  int value = 0, seen = 0;
-  bool inside = false, comment = false;
-  for (std::size_t at = 2; at < bytes.size() && seen < kNumbers; ++at) {
-    const std::uint8_t c = bytes[at];
-    if (comment) {
-      comment = c != '\n' && c != '\r';
-    } else if (c >= '0' && c <= '9') {
-      value = (inside ? value * 10 : 0) + (c - '0');
-      inside = true;
-      if (value > kMost) return DataLoss("{}: corrupt PNM: a number at byte {} is huge", name, at);
-    } else {
-      seen += inside ? 1 : 0;
-      inside = false;
-      comment = c == '#';
-    }
-  }
+}  // namespace
+
+bool IsPng(ByteSpan bytes) {
+  return bytes.size() >= kPngSignature.size() &&
+         std::equal(kPngSignature.begin(), kPngSignature.end(), bytes.begin());
+}
+
+bool IsJpeg(ByteSpan bytes) {
+  const auto code = std::find_if(bytes.begin(), bytes.end(), [](int byte) { return byte != 0xff; });
+  return code != bytes.begin() && code != bytes.end() && *code == kStartOfImage;
+}
+
+Status CheckImageContainer(ByteSpan bytes, const std::string& name) {
+  if (IsPng(bytes)) return CheckPng(bytes, name);
+  if (IsJpeg(bytes)) return CheckJpeg(bytes, name);
   return {};
 }
 
-}  // namespace
+Status CheckImageSize(int width, int height, const std::string& name) {
+  if (width >= 1 && height >= 1 && width <= kMaxImageSide && height <= kMaxImageSide) return {};
+  return DataLoss("{}: the header says {} x {} pixels; at most {} a side are read", name, width,
+                  height, kMaxImageSide);
+}
 
-Status CheckImageContainer(ByteSpan bytes, const std::string& name) {
-  if (StartsWith(bytes, kPngSignature)) return CheckPng(bytes, name);
-  if (StartsWith(bytes, kJpegSignature)) return CheckJpeg(bytes, name);
-  if (bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == '5' || bytes[1] == '6')) {
-    return CheckPnm(bytes, name);
+std::optional<Bytes> WithFullPalette(ByteSpan bytes) {
+  constexpr std::size_t kFrame = 12, kFull = 3 * 256;
+  if (!IsPng(bytes)) return std::nullopt;
+  for (std::size_t at = kPngSignature.size();;) {  // CheckPng has seen an end
+    const std::size_t length = BigEndian32(&bytes[at]);
+    const std::string_view type(reinterpret_cast<const char*>(&bytes[at + 4]), 4);
+    if (type == "IEND" || (type == "PLTE" && length >= kFull)) return std::nullopt;
+    if (type == "PLTE") {
+      Bytes out(bytes.begin(), bytes.end());
+      out.insert(out.begin() + static_cast<std::ptrdiff_t>(at + 8 + length), kFull - length, 0);
+      out[at + 2] = kFull >> 8, out[at + 3] = kFull & 0xff;  // stb_image looks at no checksum
+      return out;
+    }
+    at += kFrame + length;
   }
-  return {};
 }
 
 }  // namespace tilegrad::io

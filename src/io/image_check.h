@@ -1,20 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 // Internal to io: what stb_image lets pass. It compares no PNG checksum, so that a changed header
-// gives a garbled picture, and fills the missing part of a cut JPEG with grey.
+// gives a garbled picture, fills the missing part of a cut JPEG with grey, and that of other
+// formats with whatever was in memory.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
+#include "base/file.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::io {
 
-// OK for anything that is neither PNG, JPEG nor PGM or PPM. PNG: every chunk lies in the file, its
-// checksum is right, and the end chunk is there. JPEG: every segment lies in the file, and the end
-// marker is there, and Huffman tables have a size that stb_image can take. PGM and PPM: the numbers
-// of the header fit into int. Errors name `name` and the byte.
+bool IsPng(std::span<const std::uint8_t> bytes);
+// Like stb_image after any number of filler bytes.
+bool IsJpeg(std::span<const std::uint8_t> bytes);
+
+// OK for anything that is neither PNG nor JPEG. PNG: every chunk lies in the file, its checksum is
+// right, and the end chunk is there. JPEG: every segment lies in the file, and the end marker is
+// there, and Huffman tables have a size that stb_image can take. Errors name `name` and the byte.
 Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
+
+// Both sides within [1, kMaxImageSide].
+Status CheckImageSize(int width, int height, const std::string& name);
+
+// A PNG that passed CheckImageContainer with its palette made 256 colours, those that are added
+// black; nothing if it has none or a full one. stb_image 2.27 takes colours beyond the palette from
+// memory that it never wrote.
+std::optional<Bytes> WithFullPalette(std::span<const std::uint8_t> bytes);
+
+// OK for anything but BMP and TGA, which stb_image fills up with what is in memory: all pixels are
+// in the file, and their colours in the palette. Expects a header that stb_image takes.
+Status CheckRawPixels(std::span<const std::uint8_t> bytes, int width, int height,
+                      const std::string& name);
 
 }  // namespace tilegrad::io

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_file.h"
 
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 
 #include "base/error.h"
 #include "io/image_check.h"
+#include "io/pnm_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -13,8 +15,13 @@
 #define STBI_NO_GIF
 #define STBI_NO_HDR
 #define STBI_NO_PIC
+#define STBI_NO_PNM
 #define STBI_NO_PSD
 #define STBI_MAX_DIMENSIONS 16384
+// Cleared: what a broken file leaves out is black, not what was in memory before.
+#define STBI_MALLOC(size) std::calloc(1, size)
+#define STBI_REALLOC(block, size) std::realloc(block, size)
+#define STBI_FREE(block) std::free(block)
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
 #define STBI_WRITE_NO_STDIO
@@ -34,27 +41,21 @@ namespace {
 // one bit a pixel and a palette unpacks each of those bytes to 8 pixels of 3 bytes: 24,768.
 constexpr std::size_t kMaxInflation = 32768;
 
-}  // namespace
-
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
-  if (bytes.size() > std::size_t{1} << 30)
-    return ResourceExhausted("{}: an image file above 1 GiB", name);
+Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& name) {
   const auto length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
-  TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
     return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM): {}", name,
                     stbi_failure_reason());
   }
-  if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide) {
-    return DataLoss("{}: the header says {} x {} pixels; at most {} a side are read", name, width,
-                    height, kMaxImageSide);
-  }
+  if (height < 0 && height >= -kMaxImageSide) height = -height;  // a BMP with its first row on top
+  TILEGRAD_TRY(CheckImageSize(width, height, name));
   const std::size_t unpacked = static_cast<std::size_t>(width) * height * channels;
   if (unpacked / kMaxInflation > bytes.size()) {
     return DataLoss("{}: the header says {} x {} pixels, more than {} bytes can hold", name, width,
                     height, bytes.size());
   }
+  TILEGRAD_TRY(CheckRawPixels(bytes, width, height, name));
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
   if (!pixels) {
@@ -64,6 +65,17 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
   ImageU8 image(width, height, channels);
   std::memcpy(image.pixels.data(), pixels.get(), image.pixels.size());
   return image;
+}
+
+}  // namespace
+
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
+  if (bytes.size() > std::size_t{1} << 30)
+    return ResourceExhausted("{}: an image file above 1 GiB", name);
+  if (IsPnm(bytes)) return DecodePnm(bytes, name);
+  TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
+  const auto padded = WithFullPalette(bytes);
+  return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
 }
 
 Result<ImageU8> LoadImage(const Path& path) {

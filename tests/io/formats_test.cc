@@ -107,7 +107,13 @@ TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
   const auto table = std::search(jpeg.begin(), jpeg.end(), marker.begin(), marker.end());
   ASSERT_NE(table, jpeg.end());
   table[5] = 255;  // codes of one bit; the other counts are added
-  ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman");
+  ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman tables");
+  // Bytes of filler before the first marker hid the file from the check, not from stb_image.
+  jpeg.insert(jpeg.begin(), 2, 0xff);
+  ExpectMessage(LoadImage(Write("codes.jpg", jpeg)).status(), "codes.jpg", "Huffman tables");
+  Bytes filled = Jpeg(16, 16);
+  filled.insert(filled.begin(), 2, 0xff);
+  EXPECT_TRUE(DecodeImage(filled, "filled.jpg").ok());
 }
 
 // 4294967298 = 2^32 + 2 was read as 2.
@@ -118,6 +124,130 @@ TEST_F(FormatsTest, PnmWithNumbersBeyondInt) {
   EXPECT_TRUE(decode("P6\n# 4294967298 is a comment\n2 0002\n255\n4294967298.,").ok());
   ExpectMessage(decode("P6\n4294967298 2\n255\n0123456789ab"), "a.ppm", "huge");
   ExpectMessage(decode("P5\n4 1#c\n4294967551\n0123"), "a.ppm", "huge");
+}
+
+Result<ImageU8> DecodeText(const std::string& text) {
+  return DecodeImage(Bytes(text.begin(), text.end()), "a.pgm");
+}
+
+// What was missing used to be whatever was in memory.
+TEST_F(FormatsTest, PnmSamplesAreScaledAndAllThere) {
+  EXPECT_EQ(DecodeText("P5 4 1 15\n" + std::string("\0\1\17\20", 4))->pixels,
+            (std::vector<std::uint8_t>{0, 17, 255, 255}));
+  EXPECT_EQ(DecodeText("P5 2 1 65535 " + std::string("\x12\x34\xff\xff", 4))->pixels,
+            (std::vector<std::uint8_t>{0x12, 255}));
+  EXPECT_EQ(DecodeText("P6#c\r1 #\n 1 255\nabc")->pixels,
+            (std::vector<std::uint8_t>{'a', 'b', 'c'}));
+  ExpectMessage(DecodeText("P5 4 1 255\nabc").status(), "a.pgm", "truncated", "need 4 bytes");
+  ExpectMessage(DecodeText("P5 2 1 256\nabc").status(), "a.pgm", "truncated", "need 4 bytes");
+  for (const char* header :
+       {"P5 ", "P5 4", "P5 4 1", "P5 4 1 ", "P5 4 1 0\nabcd", "P5 4 1 65536\nabcd", "P5 0 1 255\n",
+        "P5 16385 1 255\n", "P5 -1 1 255\n"}) {
+    ExpectMessage(DecodeText(header).status(), "a.pgm");
+  }
+}
+
+Bytes LittleEndian(std::initializer_list<std::pair<int, int>> numbers_and_sizes) {
+  Bytes out;
+  for (const auto& [number, size] : numbers_and_sizes) {
+    for (int i = 0; i < size; ++i)
+      out.push_back(i < 4 ? static_cast<std::uint8_t>(number >> 8 * i) : std::uint8_t{0});
+  }
+  return out;
+}
+
+// Two pixels wide, a palette of two colours where there are 8 bits a pixel.
+Bytes Bmp(int height, int bits, const Bytes& rows) {
+  const int colors = bits == 8 ? 2 : 0, offset = 54 + 4 * colors;
+  Bytes out = LittleEndian({{0x4d42, 2},
+                            {0, 8},
+                            {offset, 4},
+                            {40, 4},
+                            {2, 4},
+                            {height, 4},
+                            {1, 2},
+                            {bits, 2},
+                            {0, 16},
+                            {colors, 4},
+                            {0, 4}});
+  if (colors > 0) out.insert(out.end(), {1, 2, 3, 0, 4, 5, 6, 0});
+  out.insert(out.end(), rows.begin(), rows.end());
+  return out;
+}
+
+TEST_F(FormatsTest, BmpPixelsAreAllThere) {
+  const Bytes rows = {1, 2, 3, 4, 5, 6, 0, 0, 11, 12, 13, 14, 15, 16, 0, 0};
+  const std::vector<std::uint8_t> first = {3, 2, 1, 6, 5, 4}, second = {13, 12, 11, 16, 15, 14};
+  for (const bool from_top : {false, true}) {
+    const auto image = DecodeImage(Bmp(from_top ? -2 : 2, 24, rows), "a.bmp");
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    ASSERT_EQ(image->pixels.size(), 12u);
+    EXPECT_TRUE(std::equal(first.begin(), first.end(), image->at(0, from_top ? 0 : 1)));
+    EXPECT_TRUE(std::equal(second.begin(), second.end(), image->at(0, from_top ? 1 : 0)));
+  }
+  Bytes whole = Bmp(2, 24, rows);
+  whole.resize(whole.size() - 2);  // the last row's padding
+  EXPECT_TRUE(DecodeImage(whole, "a.bmp").ok());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    ExpectMessage(DecodeImage(std::span(whole).first(size), "a.bmp").status(), "a.bmp");
+  }
+  for (const int height : {0, -16385, -2147483647 - 1})
+    ExpectMessage(DecodeImage(Bmp(height, 24, rows), "a.bmp").status(), "a.bmp", "2 x");
+}
+
+TEST_F(FormatsTest, BmpColoursAreInThePalette) {
+  const auto image = DecodeImage(Bmp(1, 8, {1, 0, 99, 99}), "a.bmp");
+  ASSERT_TRUE(image.ok()) << image.status().message();
+  EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{6, 5, 4, 3, 2, 1}));
+  ExpectMessage(DecodeImage(Bmp(1, 8, {1, 2, 0, 0}), "a.bmp").status(), "a.bmp", "palette of 2");
+}
+
+Bytes Tga(int type, int bits, const Bytes& data) {
+  Bytes out = LittleEndian({{0, 2}, {type, 1}, {0, 9}, {2, 2}, {2, 2}, {bits, 1}, {0x20, 1}});
+  out.insert(out.end(), data.begin(), data.end());
+  return out;
+}
+
+TEST_F(FormatsTest, TgaPixelsAreAllThere) {
+  const Bytes raw = Tga(2, 24, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}),
+              packed = Tga(10, 24, {0x00, 1, 2, 3, 0x81, 4, 5, 6, 0x00, 7, 8, 9}),
+              grey = Tga(3, 8, {1, 2, 3, 4});
+  for (const Bytes& whole : {raw, packed, grey}) {
+    const auto image = DecodeImage(whole, "a.tga");
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    EXPECT_EQ(image->pixels[0], whole == grey ? 1 : 3);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      ExpectMessage(DecodeImage(std::span(whole).first(size), "a.tga").status(), "a.tga");
+    }
+  }
+}
+
+void AppendChunk(const std::string& type, const Bytes& data, Bytes* png) {
+  const auto big_endian = [png](std::uint64_t value) {
+    for (int i = 0; i < 4; ++i) png->push_back(static_cast<std::uint8_t>(value >> (24 - 8 * i)));
+  };
+  big_endian(data.size());
+  const std::size_t at = png->size();
+  png->insert(png->end(), type.begin(), type.end());
+  png->insert(png->end(), data.begin(), data.end());
+  big_endian(crc32(0, &(*png)[at], static_cast<uInt>(png->size() - at)));
+}
+
+// Colour 200 of a palette of two was whatever was in memory.
+TEST_F(FormatsTest, PngColoursBeyondThePaletteAreBlack) {
+  const Bytes row = {0, 1, 200, 0};  // no filter, three pixels
+  Bytes packed(64);
+  uLongf size = packed.size();
+  ASSERT_EQ(compress(packed.data(), &size, row.data(), row.size()), Z_OK);
+  packed.resize(size);
+  Bytes png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  AppendChunk("IHDR", {0, 0, 0, 3, 0, 0, 0, 1, 8, 3, 0, 0, 0}, &png);
+  AppendChunk("PLTE", {1, 2, 3, 4, 5, 6}, &png);
+  AppendChunk("IDAT", packed, &png);
+  AppendChunk("IEND", {}, &png);
+  const auto image = DecodeImage(png, "a.png");
+  ASSERT_TRUE(image.ok()) << image.status().message();
+  EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{4, 5, 6, 0, 0, 0, 1, 2, 3}));
 }
 
 TEST_F(FormatsTest, ImagesWithFlippedBytesNeverCrash) {
