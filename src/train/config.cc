@@ -140,6 +140,11 @@ Status SetTable(const std::vector<Field>& fields, const toml::table& table,
 }
 
 Status ParseInto(std::string_view text, TrainConfig* config) {
+  // A key of many parts is a table in a table in a table: toml++ uses up the stack when it frees
+  // some ten thousand. A configuration of all keys has less than a hundred dots.
+  constexpr std::ptrdiff_t kMostDots = 4096;
+  if (std::count(text.begin(), text.end(), '.') > kMostDots)
+    return InvalidArgument("more than {} dots", kMostDots);
   try {
     return SetTable(Fields(*config), toml::parse(text), "");
   } catch (const toml::parse_error& error) {
@@ -182,11 +187,13 @@ Status ApplyOverrides(const std::vector<std::string>& assignments, TrainConfig* 
     const auto field =
         std::find_if(fields.begin(), fields.end(), [&](const Field& f) { return f.key == key; });
     if (field == fields.end()) return UnknownKey(fields, key);
-    // Text needs no quotes here; what TOML cannot hold (no UTF-8) is refused like in a file.
+    // Text needs no quotes here.
     std::string text = value;
-    const bool is_text = std::holds_alternative<std::string*>(field->target);
-    TILEGRAD_TRY(
-        ParseInto(key + " = " + (is_text ? ValueText(&text) : value), config).Within(assignment));
+    auto* const* target = std::get_if<std::string*>(&field->target);
+    TILEGRAD_TRY(ParseInto(key + " = " + (target != nullptr ? ValueText(&text) : value), config)
+                     .Within(assignment));
+    if (target != nullptr && **target != value)  // toml++ takes other bytes for Latin-1
+      return InvalidArgument("{} must be UTF-8", key);
   }
   return {};
 }

@@ -56,6 +56,15 @@ TEST_F(RunTest, ConfigErrorsNameFileLineAndKey) {
   ExpectMessage(ReadConfig(folder_ / "none.toml").status(), "none.toml");
 }
 
+// toml++ frees tables in tables by recursion.
+TEST_F(RunTest, ConfigsOfDeepKeys) {
+  std::string key;
+  for (int i = 0; i < 100'000; ++i) key += "a.";
+  ExpectMessage(ParseConfig(key + "b = 1", "deep").status(), "deep", "dots");
+  ExpectMessage(ParseConfig("[" + key + "b]", "deep").status(), "deep", "dots");
+  ExpectMessage(ParseConfig(key.substr(0, 4000) + "b = 1", "less").status(), "less", "unknown key");
+}
+
 TEST_F(RunTest, WholeNumbersWhereFractionsAreAllowed) {
   const auto config = ParseConfig("[loss]\ncolor = 2\n", "a");
   ASSERT_TRUE(config.ok()) << config.status().message();
@@ -80,6 +89,7 @@ TEST_F(RunTest, Overrides) {
   ExpectMessage(ApplyOverrides({"schedule.step=5"}, &config), "schedule.steps");
   ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
+  ExpectMessage(ApplyOverrides({"name=caf\xe9"}, &config), "name", "UTF-8");
 }
 
 std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {
