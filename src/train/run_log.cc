@@ -29,8 +29,10 @@ std::string ToLine(const LogEntry& entry) {
 
 bool Parse(std::string_view line, LogEntry* entry) {
   const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("step") || !json["step"].is_number_integer())
+  if (!json.is_object() || !json.contains("step") || !json["step"].is_number_unsigned() ||
+      json["step"].get<std::uint64_t>() > INT64_MAX) {
     return false;
+  }
   entry->step = json["step"].get<std::int64_t>();
   entry->values.clear();
   for (const auto& [key, value] : json.items()) {

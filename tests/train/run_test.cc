@@ -202,6 +202,10 @@ TEST_F(RunTest, LogForgetsWhatCameAfterTheCheckpoint) {
   EXPECT_EQ(entries->at(2).step, 21);
   Write("metrics.jsonl", "{\"step\":1}\nnonsense\n");
   ExpectMessage(ReadLog(folder_).status(), "metrics.jsonl", "line 2");
+  for (const char* step : {"18446744073709551615", "-1", "1e999", "1.5", "null"}) {
+    Write("metrics.jsonl", std::string("{\"step\":") + step + "}\n");
+    ExpectMessage(ReadLog(folder_).status(), "metrics.jsonl", "line 1");
+  }
 }
 
 TEST(Tensorboard, CrcAndFraming) {
