@@ -191,6 +191,40 @@ TEST_F(ReportTest, BrokenEvaluationsAreRefused) {
   ExpectMessage(with("classes", {"a", "b"}), "eval.json", "class");
   ExpectMessage(with("class_models", {"many"}), "eval.json", "class_models");
   ExpectMessage(with("models", {{{"iou", 1}}}), "eval.json", "models");
+  for (const nlohmann::json& count : nlohmann::json::array({4294967298, -1, 1.5}))
+    ExpectMessage(with("class_models", {count}), "eval.json", "class_models");
+}
+
+// Numbers that double does not have, values nested deeply, keys that come twice.
+TEST_F(ReportTest, WildFilesOfARun) {
+  Evaluate(0.6);
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  const auto with_first = [&](const std::string& name, const std::string& field) {
+    const std::string before = ReadText(job_.run / name).value();
+    Write("run/" + name, "{" + field + "," + before.substr(before.find('{') + 1));
+    const Status status = Make().status();
+    Write("run/" + name, before);
+    return status;
+  };
+  for (const char* name : {"run.json", "eval.json"}) {
+    ExpectMessage(with_first(name, "\"x\": 1e999"), name, "1e999");
+    ExpectMessage(with_first(name, "\"x\": " + deep), name, "nested");
+    EXPECT_TRUE(with_first(name, R"("x": {"\\": "[[[\"{", "y": -0.0}, "x": 1e-999)").ok());
+  }
+  const std::string one = R"("classes": [{"iou": 1}], "mean": )";
+  ExpectMessage(with_first("eval.json", R"("rows": [{"method": "a", )" + one + deep + "}]"),
+                "eval.json", "nested");
+  ExpectMessage(with_first("run.json", "\"machine\": {\"cpu\": " + deep + "}"), "run.json",
+                "nested");
+  EXPECT_TRUE(
+      with_first("run.json", R"("machine": 7, "parameters": "x")").ok());  // the last counts
+  EXPECT_TRUE(with_first("metrics.jsonl", R"("loss": 1e-320)").ok());
+}
+
+TEST_F(ReportTest, CurvesOfNumbersNextToZero) {
+  Write("run/metrics.jsonl",
+        std::string("{\"step\":1,\"loss\":1e-320,\"iou\":-1.7976931348623157e308}\n"));
+  EXPECT_NE(Page().find("e-32"), std::string::npos);
 }
 
 TEST_F(ReportTest, StopWritesNothing) {

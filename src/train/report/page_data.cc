@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -54,6 +55,11 @@ std::string Faces(const Mesh& mesh, std::size_t index_bytes) {
 
 Json Triple(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
+// More than a pen can draw. std::stod would throw for numbers next to 0.
+double SixDigits(double value) {
+  return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
+}
+
 Json CurvesJson(const std::vector<LogEntry>& log) {
   Json curves = {{"step", Json::array()}};
   for (const char* name : kCurves) curves[name] = Json::array();
@@ -62,9 +68,7 @@ Json CurvesJson(const std::vector<LogEntry>& log) {
     for (const char* name : kCurves) {
       const auto at = std::find_if(entry.values.begin(), entry.values.end(),
                                    [&](const auto& value) { return value.first == name; });
-      // Six digits: more than a pen can draw.
-      curves[name].push_back(
-          at == entry.values.end() ? Json() : Json(std::stod(fmt::format("{:.6g}", at->second))));
+      curves[name].push_back(at == entry.values.end() ? Json() : Json(SixDigits(at->second)));
     }
   }
   return curves;

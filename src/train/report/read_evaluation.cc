@@ -55,8 +55,9 @@ Status ReadRows(const Json& json, const std::string& place, Evaluation* out) {
 Status ReadClassModels(const Json& json, const std::string& place, Evaluation* out) {
   TILEGRAD_ASSIGN(const Json* counts, Array(json, "class_models", place));
   for (const Json& count : *counts) {
-    if (!count.is_number_integer())
-      return DataLoss("{}: \"class_models\" must hold numbers", place);
+    const bool whole = count.is_number_unsigned();
+    if (!whole || count.get<std::uint64_t>() > std::numeric_limits<int>::max())
+      return DataLoss("{}: \"class_models\" must hold whole numbers from 0 on", place);
     out->class_models.push_back(count);
   }
   if (out->class_models.size() == out->classes.size()) return {};

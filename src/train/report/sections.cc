@@ -49,7 +49,7 @@ std::string Comparison(const Evaluation& evaluation) {
 std::string EvaluationSentence(const ReportFacts& facts) {
   if (!facts.evaluation) return "There is no evaluation of it yet.";
   const Evaluation& evaluation = *facts.evaluation;
-  int models = 0;
+  std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
   return fmt::format("On {} models of the {} split it reaches a mean 3D IoU of <b>{:.1f} %</b>{}",
                      WithCommas(models), EscapeHtml(evaluation.split),

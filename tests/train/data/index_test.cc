@@ -83,6 +83,13 @@ TEST_F(IndexTest, NumbersBeyondDouble) {
   ExpectOpenError({"dataset.json", "1e999"});
 }
 
+// Copies of such values used up the stack.
+TEST_F(IndexTest, ValuesNestedDeeply) {
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  Edit("dataset.json", "\"fov_y\"", "\"x\": " + deep + ", \"fov_y\"");
+  ExpectOpenError({"dataset.json", "nested"});
+}
+
 TEST_F(IndexTest, ALineCutByACrash) {
   std::string text = ReadText(root_ / "models.jsonl").value();
   text.resize(text.size() - 20);

@@ -212,6 +212,28 @@ TEST_F(Fit, ErrorsNameTheCure) {
   ExpectMessage(ReadFitFolder(folder_ / "broken", 0).status(), "frame 0", "camera_angle_x");
 }
 
+TEST_F(Fit, WildTransforms) {
+  const auto error = [this](const std::string& fields) {
+    Write("wild/transforms.json",
+          R"({"camera_angle_x": 0.7, "frames": [{"file_path": "a.png", )" + fields + "}]}");
+    const auto frames = ReadTransforms(folder_ / "wild/transforms.json");
+    return frames.ok() ? CameraOfFrame(frames->at(0), {8, 8}).status() : frames.status();
+  };
+  const auto matrix = [](const std::string& number) {
+    return R"("transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,)" + number + "],[0,0,0,1]]";
+  };
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  EXPECT_TRUE(error(matrix("4")).ok());
+  EXPECT_TRUE(error(R"("w": "x", "w": 8, )" + matrix("4")).ok());  // the last counts
+  ExpectMessage(error(matrix("1e999")), "transforms.json", "1e999");
+  ExpectMessage(error(matrix("null")), "transforms.json", "frame 0", "transform_matrix");
+  ExpectMessage(error(R"("transform_matrix": )" + deep), "transforms.json", "nested");
+  for (const std::string field : {"\"w\": 1e300", "\"h\": -1", "\"fl_x\": []", "\"k1\": 1e-320",
+                                  "\"mask_path\": 1", "\"file_path\": null"}) {
+    ExpectMessage(error(field + ", " + matrix("4")), "transforms.json", "frame 0");
+  }
+}
+
 // Black and white saved as RGBA has an alpha that says nothing; a cut-out has one that says all.
 TEST_F(Fit, MasksAreWhiteOrCutOut) {
   ImageU8 opaque(8, 8, 4, 255), cut(8, 8, 4, 0), grey(8, 8, 1, 0);
