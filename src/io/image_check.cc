@@ -42,7 +42,11 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated PNG: it ends without an end chunk", name);
 }
 
-constexpr int kHuffmanTables = 0xc4, kStartOfImage = 0xd8, kEndOfImage = 0xd9;
+constexpr int kHuffmanTables = 0xc4, kStartOfScan = 0xda, kStartOfImage = 0xd8, kEndOfImage = 0xd9;
+
+// Files have about ten. Each goes over the whole picture, even if it takes a few bytes: a file of
+// 25 kB could keep stb_image busy for a minute.
+constexpr int kMostScans = 100;
 
 // Tables of a class and number, 16 counts of codes by length, and as many values as the counts'
 // sum, which is at most 256 (T.81, B.2.4.2): stb_image 2.27 writes past its arrays if not.
@@ -70,6 +74,7 @@ std::size_t NextMarker(ByteSpan bytes, std::size_t at) {
 }
 
 Status CheckJpeg(ByteSpan bytes, const std::string& name) {
+  int scans = 0;
   std::size_t at = NextMarker(bytes, 0);
   for (; at < bytes.size(); at = NextMarker(bytes, at)) {
     const int marker = bytes[at++];
@@ -82,6 +87,8 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
     }
     if (marker == kHuffmanTables && !HuffmanTablesFit(bytes.subspan(at + 2, length - 2)))
       return DataLoss("{}: corrupt JPEG: the Huffman tables at byte {} are too long", name, at);
+    if (marker == kStartOfScan && ++scans > kMostScans)
+      return DataLoss("{}: a JPEG of more than {} scans", name, kMostScans);
     at += length;  // after a scan's header follows its data, in which NextMarker finds the end
   }
   return DataLoss("{}: truncated JPEG: it ends without an end marker", name);

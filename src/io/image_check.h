@@ -20,7 +20,8 @@ bool IsJpeg(std::span<const std::uint8_t> bytes);
 
 // OK for anything that is neither PNG nor JPEG. PNG: every chunk lies in the file, its checksum is
 // right, and the end chunk is there. JPEG: every segment lies in the file, and the end marker is
-// there, and Huffman tables have a size that stb_image can take. Errors name `name` and the byte.
+// there, and Huffman tables have a size that stb_image can take, and there are at most 100 scans.
+// Errors name `name` and the byte.
 Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
 
 // Both sides within [1, kMaxImageSide].

@@ -116,6 +116,19 @@ TEST_F(FormatsTest, JpegWithTooManyHuffmanCodes) {
   EXPECT_TRUE(DecodeImage(filled, "filled.jpg").ok());
 }
 
+TEST_F(FormatsTest, JpegOfManyScans) {
+  const Bytes jpeg = Jpeg(16, 16);
+  const std::array<std::uint8_t, 2> marker = {0xff, 0xda};
+  const auto scan = std::search(jpeg.begin(), jpeg.end(), marker.begin(), marker.end());
+  ASSERT_NE(scan, jpeg.end());
+  Bytes many(jpeg.begin(), scan);
+  for (int i = 0; i < 100; ++i) many.insert(many.end(), scan, jpeg.end() - 2);
+  many.insert(many.end(), jpeg.end() - 2, jpeg.end());
+  EXPECT_TRUE(DecodeImage(many, "many.jpg").ok());
+  many.insert(many.end() - 2, scan, jpeg.end() - 2);
+  ExpectMessage(DecodeImage(many, "many.jpg").status(), "many.jpg", "100 scans");
+}
+
 // 4294967298 = 2^32 + 2 was read as 2.
 TEST_F(FormatsTest, PnmWithNumbersBeyondInt) {
   const auto decode = [](const std::string& text) {
