@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/json_nesting.h"
 
 namespace tilegrad::io {
 namespace {
@@ -90,24 +91,9 @@ Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
 }
 
 Status CheckNesting(std::string_view json, const std::string& place) {
-  int depth = 0;
-  bool quoted = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (quoted && c == '\\') {
-      ++i;
-    } else if (c == '"') {
-      quoted = !quoted;
-    } else if (!quoted && (c == '{' || c == '[')) {
-      if (++depth > kMaxJsonNesting) {
-        return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, i,
-                        kMaxJsonNesting);
-      }
-    } else if (!quoted && (c == '}' || c == ']')) {
-      --depth;
-    }
-  }
-  return {};
+  const std::size_t at = FirstNestedDeeper(json, kMaxJsonNesting);
+  if (at == std::string_view::npos) return {};
+  return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, at, kMaxJsonNesting);
 }
 
 using Json = nlohmann::json;

@@ -9,34 +9,16 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/json_nesting.h"
 
 namespace tilegrad::train {
-
-// Whether brackets lie deeper in each other than `most`. Copying and writing such a value would use
-// up the stack.
-inline bool NestsDeeper(std::string_view json, int most) {
-  int depth = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (c == '"') in_string = !in_string;
-    if (in_string) {
-      i += c == '\\' ? 1 : 0;
-    } else if (c == '[' || c == '{') {
-      if (++depth > most) return true;
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
-  return false;
-}
 
 // An error names the line. `place` is the file's name; `first_line` the number of the text's first
 // line in it.
 inline Result<nlohmann::json> ParseJson(std::string_view text, const std::string& place,
                                         int first_line = 1) {
   constexpr int kMostDepth = 100;  // what this program writes is below 10
-  if (NestsDeeper(text, kMostDepth)) {
+  if (FirstNestedDeeper(text, kMostDepth) != std::string_view::npos) {
     return DataLoss("{}: from line {} on: nested deeper than {} levels", place, first_line,
                     kMostDepth);
   }
