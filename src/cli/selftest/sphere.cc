@@ -2,17 +2,14 @@
 // All images and gradients of a sphere: the engine beside the reference in double, and the
 // reference's gradients beside complex steps.
 #include <algorithm>
-#include <cmath>
-#include <complex>
 
 #include "cli/selftest/checks.h"
 #include "cli/selftest/sphere_scene.h"
-#include "render/shaded/owned_rendering.h"
+#include "render/shaded/complex_step.h"
 
 namespace tilegrad::selftest {
 namespace {
 
-using Complex = std::complex<double>;
 using Gradients = std::map<std::string, std::vector<double>>;
 
 // Whether numbers of the sphere have a gradient that is not 0 in some light.
@@ -104,43 +101,12 @@ Result<Finding> EngineIsTheReference(const CheckContext& context) {
   return gauge.Found();
 }
 
-// Sum of images times cotangents. Depth is infinite where nothing is, and has no cotangent there.
-Complex LossOf(OwnedScene<Complex>& scene, const RenderOptions& options,
-               std::span<const std::int32_t> ids, const OwnedCotangents<double>& d) {
-  ShadedFrameT<Complex> frame;
-  ShadedRenderRef<Complex>(scene.View(), options, ImagesWithGradients(), ids, &frame);
-  Complex sum = 0;
-  const auto add = [&](const AlignedVector<Complex>& image, const std::vector<double>& weights) {
-    for (std::size_t i = 0; i < image.size(); ++i) {
-      if (std::isfinite(image[i].real())) sum += image[i] * weights[i];
-    }
-  };
-  add(frame.color, d.color), add(frame.alpha, d.alpha), add(frame.depth, d.depth);
-  add(frame.normals, d.normals), add(frame.uv, d.uv);
-  return sum;
-}
-
-// The derivative of the loss along a random direction of the numbers of one kind, by a step of
-// 1e-40 i: nothing is subtracted, so that it is exact up to the rounding of a few hundred
-// operations on each of some thousand terms: 1e-11 of the sum of their sizes.
-Status CheckStep(const OwnedScene<float>& scene, const RenderOptions& options,
-                 std::span<const std::int32_t> ids, const OwnedCotangents<double>& d_frame,
-                 const std::string& kind, const std::vector<double>& gradient, Gauge* gauge) {
-  constexpr double kStep = 1e-40;
-  auto moved = OwnedCast<Complex>(scene);
-  Rng rng(2, 21);
-  double along = 0, size = 0;
-  std::size_t i = 0;
-  ForEachNumber(moved, [&](const char* name, Complex& x) {
-    if (name != kind) return;
-    const double direction = rng.Uniform(-1, 1);
-    x += Complex(0, direction * kStep);
-    along += gradient[i] * direction, size += std::abs(gradient[i] * direction), ++i;
-  });
-  if (size == 0) return InternalError("d_{}: all {} numbers are 0", kind, i);
-  const double got[] = {along};
-  const double want[] = {LossOf(moved, options, ids, d_frame).imag() / kStep};
-  return gauge->Expect("slope of the loss along " + kind, got, want, 1e-11 * (size + 1));
+Status CheckSlope(const SlopeProblem& problem, const std::string& kind,
+                  const std::vector<double>& gradient, Gauge* gauge) {
+  const Slope slope = SlopeAlong(problem, kind, gradient, Rng(2, 21));
+  if (slope.size == 0) return InternalError("d_{}: all {} numbers are 0", kind, slope.count);
+  const double got[] = {slope.by_gradient}, want[] = {slope.by_step};
+  return gauge->Expect("slope of the loss along " + kind, got, want, slope.rounding());
 }
 
 Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) {
@@ -152,10 +118,12 @@ Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) 
   Rng rng(3, 21);
   const OwnedCotangents<double> d_frame(ids.size(), 0, &rng);
   auto d = OwnedRefBackward<double>(scene64, options, d_frame, ids);
+  const ShadedRequest request = ImagesWithGradients();
+  const SlopeProblem problem{scene, options, request, ids, d_frame};
   for (const auto& [kind, gradient] : TakeGradients(context, d)) {
     TILEGRAD_TRY(
         HasGradient(shape.lighting, kind)
-            ? CheckStep(scene, options, ids, d_frame, kind, gradient, gauge)
+            ? CheckSlope(problem, kind, gradient, gauge)
             : gauge->Expect("d_" + kind, gradient, std::vector<double>(gradient.size()), 0));
   }
   return {};
