@@ -44,8 +44,8 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
 
 constexpr int kHuffmanTables = 0xc4, kStartOfScan = 0xda, kStartOfImage = 0xd8, kEndOfImage = 0xd9;
 
-// Files have about ten. Each goes over the whole picture, even if it takes a few bytes: a file of
-// 25 kB could keep stb_image busy for a minute.
+// Files have about ten. Each goes over the whole picture, even if it takes a few bytes: stb_image
+// took 5 s for 100 scans of 16,000 x 16,000 pixels in 25 kB.
 constexpr int kMostScans = 100;
 
 // Tables of a class and number, 16 counts of codes by length, and as many values as the counts'

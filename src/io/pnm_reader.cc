@@ -14,7 +14,7 @@ using ByteSpan = std::span<const std::uint8_t>;
 constexpr int kMostSample = 65535;
 
 bool IsSpace(std::uint8_t c) {
-  return std::string_view(" \t\n\v\f\r").find(char(c)) != std::string_view::npos;
+  return std::string_view(" \t\n\v\f\r").find(static_cast<char>(c)) != std::string_view::npos;
 }
 
 // Numbers with white space and comments before each.
@@ -24,7 +24,7 @@ class Header {
 
   Result<int> Number() {
     PassSpace();
-    constexpr int kMost = 100'000'000;
+    constexpr int kMost = 100'000'000;  // no image has as many; ten times that is still an int
     const std::size_t begin = at_;
     int value = 0;
     for (; at_ < bytes_.size() && bytes_[at_] >= '0' && bytes_[at_] <= '9'; ++at_) {

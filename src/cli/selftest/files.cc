@@ -19,7 +19,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::error_code error;
-    std::string name = std::filesystem::temp_directory_path(error) / "tilegrad-selftest-XXXXXX";
+    std::string name = std::filesystem::temp_directory_path(error) / "tilegrad-selftest-";
+    name.append(6, 'X');  // which mkdtemp replaces
     if (error || ::mkdtemp(name.data()) == nullptr) {
       status_ = IoError("no folder for temporary files ({}); set TMPDIR to one",
                         error ? error.message() : std::strerror(errno));

@@ -46,7 +46,7 @@ Status CheckProduct(const CheckContext& context, const ProductCase& c, Gauge* ga
   nn::KernelScratch scratch;
   nn::Gemm(ProblemOf(c, a, b, &got), {context.workers, scratch});
   context.Take("product", got);
-  const auto want = ProductRef(c, nn::ToDouble(a), nn::ToDouble(b));
+  const auto want = ProductRef(c, nn::AsDoubles(a), nn::AsDoubles(b));
   const auto size = ProductRef(c, nn::Magnitudes(a), nn::Magnitudes(b));
   const double gamma = nn::Gamma(c.k + c.k / 64 + 4);
   return gauge->ExpectEach("product", got, want, [&](std::size_t i) { return gamma * size[i]; });
@@ -81,7 +81,7 @@ Status CheckDirect(const CheckContext& context, const nn::Conv2dShape& s, Gauge*
   const nn::Conv2dOperands o = nn::RandomConv2dOperands(s, 7);
   nn::Conv2dResults got = nn::RunConv2d(s, o, {.workers = context.workers.count()});
   Take(context, &got);
-  const nn::Conv2dTruth want = nn::RunConv2dReference(s, o, nn::ToDouble);
+  const nn::Conv2dTruth want = nn::RunConv2dReference(s, o, nn::AsDoubles);
   const nn::Conv2dTruth size = nn::RunConv2dReference(s, o, nn::Magnitudes);
   const nn::Conv2dRoundings most(s);
   const auto check = [&](const char* what, const std::vector<float>& g,
@@ -117,7 +117,7 @@ Status CheckWinograd(const CheckContext& context, const nn::Conv2dShape& s, Gaug
   const nn::Conv2dResults direct = nn::RunConv2d(s, o, {.workers = workers});
   nn::Conv2dResults fast = nn::RunConv2d(s, o, {.workers = workers, .winograd = true});
   Take(context, &fast);
-  const nn::Conv2dTruth want = nn::RunConv2dReference(s, o, nn::ToDouble);
+  const nn::Conv2dTruth want = nn::RunConv2dReference(s, o, nn::AsDoubles);
   const auto check = [&](const std::string& what, const std::vector<float>& got,
                          const std::vector<float>& slow, const std::vector<double>& truth) {
     const double off[] = {nn::RootMeanSquareError(got, truth)}, none[] = {0.0};

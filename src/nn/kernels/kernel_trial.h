@@ -17,7 +17,7 @@ inline std::vector<float> RandomFloats(Rng& rng, std::size_t count) {
   return out;
 }
 
-inline std::vector<double> ToDouble(const std::vector<float>& v) { return {v.begin(), v.end()}; }
+inline std::vector<double> AsDoubles(const std::vector<float>& v) { return {v.begin(), v.end()}; }
 
 inline std::vector<double> Magnitudes(const std::vector<float>& v) {
   std::vector<double> out;

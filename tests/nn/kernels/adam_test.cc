@@ -17,7 +17,7 @@ TEST(Adam, EqualsReference) {
     const auto p0 = RandomFloats(rng, n), g = RandomFloats(rng, n), m0 = RandomFloats(rng, n);
     std::vector<float> v0 = RandomFloats(rng, n);
     for (float& v : v0) v = std::abs(v);
-    auto pd = ToDouble(p0), gd = ToDouble(g), md = ToDouble(m0), vd = ToDouble(v0);
+    auto pd = AsDoubles(p0), gd = AsDoubles(g), md = AsDoubles(m0), vd = AsDoubles(v0);
     AdamStepRef(AdamProblem<double>{n, pd.data(), gd.data(), md.data(), vd.data(), coefficients}, 0,
                 n);
     for (const auto& target : RunnableTargets()) {

@@ -29,7 +29,7 @@ TEST(AxisMap, EqualsReference) {
     std::vector<float> y(outer * 4 * inner);
     const AxisMapProblem<float> problem{
         outer, 5, 4, inner, begin.data(), index.data(), weight.data(), x.data(), y.data()};
-    const auto want = Reference(problem, ToDouble(x), ToDouble(weight));
+    const auto want = Reference(problem, AsDoubles(x), AsDoubles(weight));
     const auto magnitude = Reference(problem, Magnitudes(x), Magnitudes(weight));
     for (const auto& target : RunnableTargets()) {
       const OnTarget on(target);

@@ -17,7 +17,7 @@ void CheckAgainstReference(const Conv2dShape& s, std::uint64_t seed) {
   ASSERT_TRUE(s.Check().ok()) << s.Check().message();
   const Conv2dOperands o = RandomConv2dOperands(s, seed);
   const Conv2dResults got = RunConv2d(s, o, {});
-  const Conv2dTruth want = RunConv2dReference(s, o, ToDouble);
+  const Conv2dTruth want = RunConv2dReference(s, o, AsDoubles);
   const Conv2dTruth magnitude = RunConv2dReference(s, o, Magnitudes);
   const Conv2dRoundings most(s);
   ExpectWithinRounding(got.y, want.y, magnitude.y, most.y);

@@ -59,7 +59,7 @@ TEST(Conv2dWinograd, AgreesWithReference) {
     SCOPED_TRACE(Describe(s));
     ASSERT_TRUE(WinogradFits(s));
     const Conv2dOperands o = RandomConv2dOperands(s, 7);
-    const Conv2dTruth want = RunConv2dReference(s, o, ToDouble);
+    const Conv2dTruth want = RunConv2dReference(s, o, AsDoubles);
     const Bound bound(s, o);
     for (const std::string& target : RunnableTargets()) {
       const OnTarget on(target);
@@ -77,9 +77,9 @@ void ExpectAgreesWithDirect(const Conv2dShape& s, std::uint64_t seed) {
   const Conv2dOperands o = RandomConv2dOperands(s, seed);
   const Conv2dResults direct = RunConv2d(s, o, {}), winograd = RunConv2d(s, o, {.winograd = true});
   const Bound bound(s, o);
-  ExpectWithin(winograd.y, ToDouble(direct.y), 2 * bound.y(), bound.inputs);
-  ExpectWithin(winograd.d_x, ToDouble(direct.d_x), 2 * bound.d_x(), bound.outputs);
-  ExpectWithin(winograd.d_weight, ToDouble(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
+  ExpectWithin(winograd.y, AsDoubles(direct.y), 2 * bound.y(), bound.inputs);
+  ExpectWithin(winograd.d_x, AsDoubles(direct.d_x), 2 * bound.d_x(), bound.outputs);
+  ExpectWithin(winograd.d_weight, AsDoubles(direct.d_weight), 2 * bound.d_weight(), bound.tiles);
   for (const int workers : {2, 7}) {
     EXPECT_EQ(RunConv2d(s, o, {.workers = workers, .winograd = true}), winograd);
   }
@@ -103,7 +103,7 @@ TEST(Conv2dWinograd, ErrorIsNearThatOfDirect) {
   for (const Conv2dShape& s : kShapes) {
     SCOPED_TRACE(Describe(s));
     const Conv2dOperands o = RandomConv2dOperands(s, 8);
-    const Conv2dTruth want = RunConv2dReference(s, o, ToDouble);
+    const Conv2dTruth want = RunConv2dReference(s, o, AsDoubles);
     const Conv2dResults direct = RunConv2d(s, o, {}), fast = RunConv2d(s, o, {.winograd = true});
     const double y = RootMeanSquareError(fast.y, want.y) / RootMeanSquareError(direct.y, want.y);
     const double d_x =

@@ -70,7 +70,7 @@ std::vector<float> RunGemm(const GemmCase& g, Operands<float> o, int workers) {
 void CheckAgainstReference(const GemmCase& g, std::uint64_t seed) {
   SCOPED_TRACE(Describe(g));
   const Operands<float> operands = RandomOperands(g, seed);
-  Operands<double> want = Map(operands, ToDouble), magnitude = Map(operands, Magnitudes);
+  Operands<double> want = Map(operands, AsDoubles), magnitude = Map(operands, Magnitudes);
   GemmRef(want.Problem(g));
   GemmRef(magnitude.Problem(g));
   // Between the rows of C lie floats that are not ours: their magnitude is 0, so that they must be

@@ -24,7 +24,7 @@ TEST(Reduce, SumIsWithinRoundingOfTheReference) {
   for (const ReduceLayout& l : kLayouts) {
     const std::vector<float> x = RandomFloats(rng, l.outputs() * l.inputs_each());
     std::vector<double> want(l.outputs()), magnitude(l.outputs());
-    ReduceSumRef(l, ToDouble(x).data(), want.data(), 0, l.outputs());
+    ReduceSumRef(l, AsDoubles(x).data(), want.data(), 0, l.outputs());
     ReduceSumRef(l, Magnitudes(x).data(), magnitude.data(), 0, l.outputs());
     for (const auto& target : RunnableTargets()) {
       const OnTarget on(target);
@@ -131,8 +131,8 @@ TEST(AdamKernel, EqualsReferenceWithinRounding) {
     const auto p = RandomFloats(rng, n), g = RandomFloats(rng, n), m = RandomFloats(rng, n);
     auto v = RandomFloats(rng, n);
     for (float& value : v) value = 0.01f + std::abs(value);
-    auto wp = ToDouble(p), wm = ToDouble(m), wv = ToDouble(v);
-    const auto wg = ToDouble(g);
+    auto wp = AsDoubles(p), wm = AsDoubles(m), wv = AsDoubles(v);
+    const auto wg = AsDoubles(g);
     AdamStepRef(AdamProblem<double>{n, wp.data(), wg.data(), wm.data(), wv.data(), c}, 0, n);
     for (const auto& target : RunnableTargets()) {
       const OnTarget on(target);
