@@ -157,7 +157,7 @@ HWY_INLINE void MultiplyBusily(const GemmPlan& plan, std::size_t first, std::siz
 
 // How often: at least 1.
 inline std::size_t TaskRuns(std::size_t rows, const ColumnBlock& block) {
-  return std::max<std::size_t>(1, rows * block.panels() * (block.steps / kTaskSteps));
+  return std::max<std::size_t>(1, rows * block.panels() * (block.steps / kRunSteps));
 }
 
 // The same; meanwhile the tiles pack `next`.

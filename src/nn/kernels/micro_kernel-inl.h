@@ -93,9 +93,9 @@ HWY_INLINE void PrefetchLineToL2(const float* data) {
 }
 
 constexpr std::size_t kLineFloats = 16;  // in a cache line
-constexpr std::size_t kTaskSteps = 8;    // from one run of a task to the next
+constexpr std::size_t kRunSteps = 8;     // of k
 
-// A packed panel; meanwhile `task` runs every kTaskSteps steps, in the time that loads, stores and
+// A packed panel; meanwhile `task` runs every kRunSteps steps, in the time that loads, stores and
 // integer arithmetic have beside the FMAs.
 template <class Task>
 struct BusyColumns : PackedColumns {
@@ -165,18 +165,17 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   // sum += rows columns^T over `steps` steps of k.
   template <class Rows, class Columns>
   HWY_INLINE void Multiply(Rows& rows, Columns& columns, std::size_t steps) {
-    if constexpr (kPairs) {
+    constexpr bool kBusy = requires { columns.task; };
+    if constexpr (kSparesRegister && !kBusy) {
       for (; steps >= 2; steps -= 2) MultiplyStep(rows, columns), MultiplyStep(rows, columns);
-    }
-    for (std::size_t k = 0; k < steps; ++k) MultiplyStep(rows, columns);
-  }
-  template <class Rows, class Task>
-  HWY_INLINE void Multiply(Rows& rows, BusyColumns<Task>& columns, std::size_t steps) {
-    while (steps > 0) {
-      columns.task.Run();
-      const std::size_t now = std::min(steps, kTaskSteps);
-      for (std::size_t k = 0; k < now; ++k) MultiplyStep(rows, columns);
-      steps -= now;
+      if (steps > 0) MultiplyStep(rows, columns);
+    } else {
+      while (steps > 0) {
+        if constexpr (kBusy) columns.task.Run();
+        const std::size_t now = std::min(steps, kRunSteps);
+        for (std::size_t k = 0; k < now; ++k) MultiplyStep(rows, columns);
+        steps -= now;
+      }
     }
   }
   template <class Rows, class Columns>
@@ -193,10 +192,10 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 
  private:
-  // Two steps a turn of the loop, whose own instructions are an eighth of a step's and count where
-  // another thread shares the core. Its loads want a register more than the sums, V vectors and
-  // one. (Within a BusyColumns' eight steps it is slower.)
-  static constexpr bool kPairs = R * V + V + 1 < kRegisters;
+  // Beside the sums, V vectors and one. Then two steps may follow each other without a question
+  // between them, for the second one's loads have where to go. Else the compiler unrolls a run,
+  // whose length it knows the most of, each step with a way out, and mixes none with the next.
+  static constexpr bool kSparesRegister = R * V + V + 1 < kRegisters;
 
   template <std::size_t r>
   HWY_INLINE void ClearRow() {
