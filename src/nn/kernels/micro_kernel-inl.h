@@ -192,9 +192,9 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 
  private:
-  // Beside the sums, V vectors and one. Then two steps may follow each other without a question
-  // between them, for the second one's loads have where to go. Else the compiler unrolls a run,
-  // whose length it knows the most of, each step with a way out, and mixes none with the next.
+  // Is a register left beside the sums, V vectors of columns and one of a row? Then two steps
+  // follow each other at once, and the second one's loads may go first. Else they would push sums
+  // out: a run is unrolled whole, but with an exit after each step, which keeps steps apart.
   static constexpr bool kSparesRegister = R * V + V + 1 < kRegisters;
 
   template <std::size_t r>
