@@ -10,7 +10,8 @@ namespace {
 
 using ByteSpan = std::span<const std::uint8_t>;
 
-constexpr std::size_t kBmpHeader = 30, kTgaHeader = 18;
+// A TGA's header, and that of a BMP up to its bits a pixel.
+constexpr std::size_t kTgaHeader = 18, kBmpHeader = 30;
 
 std::size_t LittleEndian(ByteSpan bytes, std::size_t at, int size) {
   std::size_t value = 0;
