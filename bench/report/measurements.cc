@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string_view>
 
 #include "base/error.h"
 
@@ -70,6 +71,16 @@ Result<std::vector<Measurement>> Collect(const ordered_json& runs) {
   return out;
 }
 
+// A counter that is 0 in all repetitions has no coefficient of variation; Google Benchmark writes
+// it as NaN, which is not JSON.
+std::string NanToNull(std::string json) {
+  constexpr std::string_view kNan = ": NaN", kNull = ": null";
+  for (auto at = json.find(kNan); at != json.npos; at = json.find(kNan, at + kNull.size())) {
+    json.replace(at, kNan.size(), kNull);
+  }
+  return json;
+}
+
 }  // namespace
 
 double Measurement::counter(const std::string& name) const {
@@ -77,9 +88,9 @@ double Measurement::counter(const std::string& name) const {
   return at == counters.end() ? 0 : at->second;
 }
 
-Result<std::vector<Measurement>> ParseMeasurements(std::string_view json) {
+Result<std::vector<Measurement>> ParseMeasurements(std::string json) {
   try {
-    return Collect(ordered_json::parse(json).at("benchmarks"));
+    return Collect(ordered_json::parse(NanToNull(std::move(json))).at("benchmarks"));
   } catch (const nlohmann::json::exception& e) {
     return DataLoss("not what Google Benchmark writes: {}", e.what());
   }

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "tilegrad/status.h"
@@ -24,7 +23,7 @@ struct Measurement {
 
 // In the order of registration. Benchmarks that reported an error are left out; so are those whose
 // name has fewer parts. Errors: not JSON, or no measurement in it.
-Result<std::vector<Measurement>> ParseMeasurements(std::string_view json);
+Result<std::vector<Measurement>> ParseMeasurements(std::string json);
 
 // Null if there is none.
 const Measurement* Find(const std::vector<Measurement>& all, const Measurement& like,

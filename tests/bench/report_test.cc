@@ -44,6 +44,15 @@ TEST(BenchReport, MediansOfRepetitionsScaledToTheWholeBatch) {
   EXPECT_EQ(Find(all, all[0], "nobody"), nullptr);
 }
 
+TEST(BenchReport, CountersWithoutVariationAreRead) {
+  const std::string cv =
+      R"({"run_name":"S1/forward/both/1","run_type":"aggregate","evaluated_pairs": NaN,)"
+      R"("evaluated_exps": NaN})";
+  const auto all = Parse(Sample("S1/forward/both/1", 1, 1, R"(,"evaluated_pairs":0)") + "," + cv);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].repetitions, 1);
+}
+
 TEST(BenchReport, OrderIsThatOfRegistration) {
   const auto all = Parse(Sample("S2/forward/both/1", 1, 1, R"(,"family_index":5)") + "," +
                          Sample("S1/forward/both/1", 1, 1, R"(,"family_index":2)"));
