@@ -82,6 +82,15 @@ TEST(BenchReport, RequestTableHasRatiosToTheSilhouette) {
   EXPECT_TRUE(RequestTable(Parse(kSamples)).empty());
 }
 
+TEST(BenchReport, RequestTableLeavesCellsEmptyThatWereNotMeasured) {
+  EXPECT_NE(RequestTable(Parse(Sample("S2/forward/color/shaded", 4, 4, "")))
+                .find("| S2 | color | 4.00 |  |  |  |\n"),
+            std::string::npos);
+  EXPECT_NE(RequestTable(Parse(Sample("S2/backward/silhouette/shaded", 4, 4, "")))
+                .find("| S2 | silhouette |  |  | 4.00 | 1.00 |\n"),
+            std::string::npos);
+}
+
 TEST(BenchReport, CsvHasAllMeasurements) {
   const std::string csv = MeasurementsCsv(Parse(kSamples));
   EXPECT_EQ(csv.rfind("scene,direction,what,who,repetitions,cpu_ms,wall_ms,share,images,pixels,"
