@@ -78,7 +78,7 @@ void BM_Conv2dTwoWorkers(benchmark::State& state) {
 }
 
 void Shapes(benchmark::internal::Benchmark* b) {
-  b->ArgNames({"pass", "n", "c", "o", "h", "k", "s"})->Unit(benchmark::kMillisecond)->MinTime(0.5);
+  b->ArgNames({"pass", "n", "c", "o", "h", "k", "s"})->Unit(benchmark::kMillisecond)->MinTime(2);
   for (std::int64_t pass : {0, 1, 2}) {
     b->Args({pass, 64, 4, 64, 64, 5, 2});  // the encoder
     b->Args({pass, 64, 64, 128, 32, 5, 2});

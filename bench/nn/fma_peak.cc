@@ -7,7 +7,9 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "nn/kernels/micro_kernel-inl.h"
@@ -46,12 +48,47 @@ double RunFmaPeakTarget() {
   return 2.0 * kSteps * kRows * kTileColumns;
 }
 
+// One addition that the compiler neither drops nor joins with the next.
+HWY_INLINE void CountUp(std::uint64_t* count) {
+  ++*count;
+  asm volatile("" : "+r"(*count));
+}
+
+// Two additions for each FMA: six instructions a cycle where two of them are FMAs.
+template <std::size_t... i>
+HWY_INLINE void FullCoreStep(std::index_sequence<i...>, Vec factor, Vec* sum,
+                             std::uint64_t* count) {
+  ((sum[i] = hn::MulAdd(factor, factor, sum[i]), CountUp(&count[i % 6]),
+    CountUp(&count[(i + 3) % 6])),
+   ...);
+}
+
+double RunFullCoreTarget() {
+  constexpr std::size_t kSteps = 10000, kSums = 12;
+  float factor = 1e-3f;
+  benchmark::DoNotOptimize(factor);
+  const Vec factors = hn::Set(Tag(), factor);
+  Vec sum[kSums];
+  std::uint64_t count[6] = {};
+  for (std::size_t i = 0; i < kSums; ++i) sum[i] = hn::Set(Tag(), static_cast<float>(i));
+  for (std::size_t step = 0; step < kSteps; ++step) {
+    FullCoreStep(std::make_index_sequence<kSums>(), factors, sum, count);
+  }
+  Vec total = sum[0];
+  for (std::size_t i = 1; i < kSums; ++i) total = hn::Add(total, sum[i]);
+  float used = hn::GetLane(total);
+  benchmark::DoNotOptimize(used);
+  return 2.0 * kSteps * kSums * kLanes;
+}
+
 }  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace tilegrad::nn {
 HWY_EXPORT(RunFmaPeakTarget);
+HWY_EXPORT(RunFullCoreTarget);
 double RunFmaPeak() { return HWY_DYNAMIC_DISPATCH(RunFmaPeakTarget)(); }
+double RunFullCore() { return HWY_DYNAMIC_DISPATCH(RunFullCoreTarget)(); }
 }  // namespace tilegrad::nn
 #endif

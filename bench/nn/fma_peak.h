@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The yardstick of the NN benchmarks: what one core reaches at best, measured beside each kernel,
-// and the medians of runs that take turns.
+// The yardsticks of the NN benchmarks: what one core reaches at best, and whether it is ours alone,
+// measured beside each kernel; and the medians of runs that take turns.
 #pragma once
 
 #include <time.h>
@@ -13,6 +13,12 @@ namespace tilegrad::nn {
 // Runs independent fused multiply-adds (multiply and add where the target has none) from registers
 // for about a millisecond; returns their floating-point operations, 2 each.
 double RunFmaPeak();
+
+// As many instructions a cycle as the core takes, a third of them fused multiply-adds and the rest
+// integer additions, all from registers, for a third of a millisecond; returns the floating-point
+// operations. A second hardware thread on the core takes a share of these instructions, and nothing
+// else does; RunFmaPeak, with little more than two a cycle, leaves room for it and does not tell.
+double RunFullCore();
 
 // CPU time of this thread in seconds: others on the machine disturb it less than wall time.
 inline double ThreadSeconds() {
@@ -31,6 +37,7 @@ inline double WallSeconds() {
 class Samples {
  public:
   void Add(double value) { values_.push_back(value); }
+  std::size_t size() const { return values_.size(); }
   double Median() const {
     if (values_.empty()) return 0;
     std::vector<double> sorted = values_;
@@ -50,9 +57,10 @@ double Rate(const Clock& clock, double flop, const F& run) {
   return flop / (clock() - start);
 }
 
-inline double PeakRate() {
+// FLOP/s of a yardstick, by CPU time.
+inline double RateOf(double (*yardstick)()) {
   const double start = ThreadSeconds();
-  const double flop = RunFmaPeak();
+  const double flop = yardstick();
   return flop / (ThreadSeconds() - start);
 }
 

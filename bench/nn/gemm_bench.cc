@@ -57,7 +57,7 @@ void BM_GemmTwoWorkers(benchmark::State& state) {
 }
 
 void Shapes(benchmark::internal::Benchmark* b) {
-  b->ArgNames({"m", "n", "k", "layout"})->Unit(benchmark::kMillisecond)->MinTime(0.5);
+  b->ArgNames({"m", "n", "k", "layout"})->Unit(benchmark::kMillisecond)->MinTime(4);
   for (const auto& s : std::vector<std::vector<std::int64_t>>{{1024, 1024, 1024, kNN},
                                                               {64, 1024, 16384, kNN},
                                                               {64, 1024, 16384, kNT},

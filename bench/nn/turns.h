@@ -5,6 +5,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,23 +20,63 @@ struct Contender {
   std::function<void()> run;
 };
 
-// Counters: peak: GFLOP/s that one core reaches; `name`: the contender's rate in % of it. By CPU
-// time of this thread; `flop` is what one run has to do.
+// How much of the core this thread has, by RunFullCore. On a machine whose host others use, the
+// other hardware thread of a core may be anybody's.
+class CoreProbe {
+ public:
+  CoreProbe() {
+    for (int i = 0; i < 100; ++i) Measure();
+  }
+  double Measure() {
+    const double rate = RateOf(RunFullCore);
+    best_ = std::max(best_, rate);
+    return rate;
+  }
+  bool Alone(double rate) const { return rate >= 0.95 * best_; }
+
+ private:
+  double best_ = 0;
+};
+
+// What a contender did in one turn, and how much of the core it had before or after, the lesser.
+struct Turn {
+  double rate, core;
+};
+
+// Counters: peak: GFLOP/s that one core reaches; `name`: the contender's rate in % of it, median of
+// all turns; `name`_alone: median of those in which it had the core for itself, as far as the probe
+// before and after it tells; absent if there was none; alone: how many % of all turns those are.
+// By CPU time of this thread; `flop` is what one run has to do.
 inline void MeasureRates(benchmark::State& state, double flop,
                          const std::vector<Contender>& contenders) {
+  static CoreProbe core;  // of the process: its best is known the better the longer it runs
   Samples peak;
-  std::vector<Samples> rates(contenders.size());
+  std::vector<std::vector<Turn>> turns(contenders.size());
   for (const Contender& contender : contenders) contender.run();  // takes its memory
   for (auto _ : state) {
-    peak.Add(PeakRate());
+    peak.Add(RateOf(RunFmaPeak));
+    double before = core.Measure();
     for (std::size_t i = 0; i < contenders.size(); ++i) {
-      rates[i].Add(Rate(ThreadSeconds, flop, contenders[i].run));
+      const double rate = Rate(ThreadSeconds, flop, contenders[i].run);
+      const double after = core.Measure();
+      turns[i].push_back({rate, std::min(before, after)});
+      before = after;
     }
   }
   state.counters["peak"] = peak.Median() * 1e-9;
+  double alone_runs = 0;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    state.counters[contenders[i].name] = 100 * rates[i].Median() / peak.Median();
+    Samples all, alone;
+    for (const Turn& turn : turns[i]) {
+      all.Add(turn.rate);
+      if (core.Alone(turn.core)) alone.Add(turn.rate);
+    }
+    const std::string& name = contenders[i].name;
+    state.counters[name] = 100 * all.Median() / peak.Median();
+    if (alone.size() > 0) state.counters[name + "_alone"] = 100 * alone.Median() / peak.Median();
+    alone_runs += static_cast<double>(alone.size()) / static_cast<double>(all.size());
   }
+  state.counters["alone"] = 100 * alone_runs / static_cast<double>(contenders.size());
 }
 
 // What a kernel gains by a second worker, in wall time. Counters: speedup: one worker over two;
