@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <vector>
 
 namespace tilegrad::nn {
@@ -38,11 +39,13 @@ class Samples {
  public:
   void Add(double value) { values_.push_back(value); }
   std::size_t size() const { return values_.size(); }
-  double Median() const {
+  double Median() const { return Quantile(0.5); }
+  double Quantile(double share) const {
     if (values_.empty()) return 0;
     std::vector<double> sorted = values_;
-    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-    return sorted[sorted.size() / 2];
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(share * sorted.size());
+    std::nth_element(sorted.begin(), at, sorted.end());
+    return *at;
   }
 
  private:
