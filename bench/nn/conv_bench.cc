@@ -92,7 +92,7 @@ void Shapes(benchmark::internal::Benchmark* b) {
 }
 
 BENCHMARK(BM_Conv2d)->Apply(Shapes);
-BENCHMARK(BM_Conv2dTwoWorkers)->Apply(Shapes)->UseRealTime();
+BENCHMARK(BM_Conv2dTwoWorkers)->Apply(Shapes)->MinTime(0.5)->UseRealTime();
 
 }  // namespace
 }  // namespace tilegrad::nn::bench

@@ -72,7 +72,7 @@ void Shapes(benchmark::internal::Benchmark* b) {
 }
 
 BENCHMARK(BM_Gemm)->Apply(Shapes);
-BENCHMARK(BM_GemmTwoWorkers)->Apply(Shapes)->UseRealTime();
+BENCHMARK(BM_GemmTwoWorkers)->Apply(Shapes)->MinTime(0.5)->UseRealTime();
 
 }  // namespace
 }  // namespace tilegrad::nn::bench
