@@ -21,7 +21,7 @@ struct Contender {
 };
 
 // How much of the core this thread has, by RunFullCore. On a machine whose host others use, the
-// other hardware thread of a core may be anybody's.
+// other hardware thread of a core may be anybody's, for milliseconds to seconds at a time.
 class CoreProbe {
  public:
   CoreProbe() {
@@ -30,14 +30,22 @@ class CoreProbe {
   double Measure() {
     const double rate = RateOf(RunFullCore);
     rates_.Add(rate);
+    // Not by the best one seen: where a hypervisor takes time away, it may be taken from the
+    // thread's account once too often.
+    if (rates_.size() % 50 == 0) least_alone_ = 0.95 * rates_.Quantile(0.99);
     return rate;
   }
-  // The least rate of a core that is not shared. Not by the best one seen: where a hypervisor takes
-  // time away, it may be taken from the thread's account once too often.
-  double LeastAlone() const { return 0.95 * rates_.Quantile(0.99); }
+  // Tries for some 30 ms to have it alone; returns the last measurement.
+  double WaitUntilAlone() {
+    double rate = Measure();
+    for (int i = 0; i < 90 && rate < least_alone_; ++i) rate = Measure();
+    return rate;
+  }
+  double least_alone() const { return least_alone_; }
 
  private:
   Samples rates_;
+  double least_alone_ = 0;
 };
 
 // What a contender did in one turn, and how much of the core it had before or after, the lesser.
@@ -48,7 +56,7 @@ struct Turn {
 // Counters: peak: GFLOP/s that one core reaches; `name`: the contender's rate in % of it, median of
 // all turns; `name`_alone: median of those in which it had the core for itself, as far as the probe
 // before and after it tells; absent if there was none; alone: how many % of all turns those are.
-// By CPU time of this thread; `flop` is what one run has to do.
+// A turn waits a little for the core. By CPU time of this thread; `flop` is what one run has to do.
 inline void MeasureRates(benchmark::State& state, double flop,
                          const std::vector<Contender>& contenders) {
   static CoreProbe core;  // of the process: its best is known the better the longer it runs
@@ -57,22 +65,19 @@ inline void MeasureRates(benchmark::State& state, double flop,
   for (const Contender& contender : contenders) contender.run();  // takes its memory
   for (auto _ : state) {
     peak.Add(RateOf(RunFmaPeak));
-    double before = core.Measure();
     for (std::size_t i = 0; i < contenders.size(); ++i) {
+      const double before = core.WaitUntilAlone();
       const double rate = Rate(ThreadSeconds, flop, contenders[i].run);
-      const double after = core.Measure();
-      turns[i].push_back({rate, std::min(before, after)});
-      before = after;
+      turns[i].push_back({rate, std::min(before, core.Measure())});
     }
   }
   state.counters["peak"] = peak.Median() * 1e-9;
-  const double least_alone = core.LeastAlone();
   double alone_runs = 0;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     Samples all, alone;
     for (const Turn& turn : turns[i]) {
       all.Add(turn.rate);
-      if (turn.core >= least_alone) alone.Add(turn.rate);
+      if (turn.core >= core.least_alone()) alone.Add(turn.rate);
     }
     const std::string& name = contenders[i].name;
     state.counters[name] = 100 * all.Median() / peak.Median();
