@@ -17,10 +17,10 @@ except ImportError:
     torch = None
 
 
-def code_of(page: str) -> str:
+def code_of(page: str, language: str = "python") -> str:
     """All blocks of a page behind each other."""
     text = (SOURCE / "docs" / page).read_text(encoding="utf-8")
-    return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+    return "\n".join(re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL))
 
 
 class Docs(FolderTest):
@@ -51,6 +51,17 @@ class Docs(FolderTest):
         self.assertEqual(names["item"]["images"].shape, (2, 3, 32, 32))
         self.assertEqual(len(files.load_mesh("chair.glb").faces), 2)
         np.testing.assert_array_equal(names["batch"]["model"].shape, (64,))
+
+    def test_cameras(self) -> None:
+        """OpenCV's file has one camera in three forms, that of the table above it."""
+        with open("opencv.json", "w", encoding="utf-8") as file:
+            file.write(code_of("cameras.md", "json"))
+        views = files.load_cameras("opencv.json")
+        self.assertEqual([view.name for view in views], ["0001", "0002", "0003"])
+        for view in views:
+            np.testing.assert_allclose(view.camera.rotation, np.eye(3), atol=1e-8)
+            np.testing.assert_allclose(view.camera.translation, [-1, 0, -4], atol=1e-8)
+            np.testing.assert_allclose([view.camera.cx, view.camera.cy], [320, 240], atol=1e-12)
 
 
 if __name__ == "__main__":
