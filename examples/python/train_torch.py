@@ -190,7 +190,11 @@ def datasets(folder: str | None) -> tuple[Any, Any]:
     if folder is None:
         return Ellipsoids(2000, seed=1), Ellipsoids(64, seed=2)
     from tilegrad.files import Dataset
-    return Dataset(folder, views=VIEWS), Dataset(folder, "test", views=VIEWS)
+    data = Dataset(folder, views=VIEWS)
+    if data.image_size != SIZE:
+        raise SystemExit(f"{folder}: images are {data.image_size} pixels a side, not {SIZE}: "
+                         f"make them with `tilegrad dataset --size {SIZE}`")
+    return data, Dataset(folder, "test", views=VIEWS)
 
 
 def main() -> None:

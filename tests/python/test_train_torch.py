@@ -8,7 +8,7 @@ import unittest
 
 import numpy as np
 
-from file_samples import FolderTest, dataset
+from file_samples import FolderTest, dataset, run_program
 from support import SOURCE, long_test
 from tilegrad import files
 
@@ -60,6 +60,13 @@ class TrainTorch(FolderTest):
         _, curves, _, after = trained(3, dataset(), workers=1)
         self.assertTrue(all(np.isfinite(values).all() for values in curves.values()))
         self.assertTrue(torch.isfinite(after.mask))
+
+    def test_data_of_another_size(self):
+        folder = self.folder / "small"
+        run_program("dataset", "--source", "procedural", "--per-class", 1, "--size", 16, "--views",
+                    4, "--out", folder)
+        with self.assertRaisesRegex(SystemExit, "16 pixels a side, not 32"):
+            train_torch.datasets(str(folder))
 
     def test_fewer_objects_than_a_batch(self):
         """Full batches only would be none, and their loop would have no end."""
