@@ -114,12 +114,14 @@ def ratios(python, cpp, backward, options):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--turns", type=int, default=40)
+    parser.add_argument("--turns", type=int, default=40, help="2 or more, for quartiles")
     parser.add_argument("--steps", type=int, default=5, help="of each in a turn")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--limit", type=float, default=1.05, help="largest Python / C++")
     parser.add_argument("--server", default=str(ROOT / "build/release/bench/python/call_server"))
     options = parser.parse_args()
+    if options.turns < 2:
+        parser.error(f"--turns {options.turns}: quartiles take 2 or more")
     batch, worst = Batch(), 0.0
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "batch"

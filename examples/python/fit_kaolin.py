@@ -148,12 +148,12 @@ def fit(epochs: int = 40, views: int = 16, size: int = 256) -> tuple[Fit, Views]
 
 def save_pictures(path: str, fitted: Fit, views: Views) -> None:
     """A row of what was given, and one of what came out."""
-    from PIL import Image
+    from tilegrad import files
     with torch.no_grad():
         image, _, _ = render(fitted.vertices, fitted.texture, fitted.sphere, views.camera[:6],
                              fitted.size)
     rows = [torch.cat(list(row), dim=1) for row in (views.image[:6], image)]
-    Image.fromarray((255 * torch.cat(rows)).round().byte().numpy()).save(path)
+    files.save_image(path, torch.cat(rows).numpy())
 
 
 def main() -> None:
@@ -161,7 +161,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=int, default=40)
     parser.add_argument("--size", type=int, default=256, help="of the images, pixels")
     parser.add_argument("--svg", help="write the loss curve there")
-    parser.add_argument("--pictures", help="write images there (needs Pillow)")
+    parser.add_argument("--pictures", help="write images there, .png")
     options = parser.parse_args()
     begin = time.monotonic()
     fitted, views = fit(options.epochs, size=options.size)

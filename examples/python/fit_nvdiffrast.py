@@ -124,7 +124,7 @@ def fit(sizes: tuple[int, ...] = (8, 16, 32, 64), steps: int = 500) -> Fit:
 
 def save_pictures(path: str, fitted: Fit) -> None:
     """The cube that is right, the start and the result, from three sides."""
-    from PIL import Image
+    from tilegrad import files
     torch.manual_seed(1)
     start = Fit(fitted.cube)
     views = random_views(3)
@@ -134,7 +134,7 @@ def save_pictures(path: str, fitted: Fit) -> None:
                                         (start.corners, start.colors),
                                         (fitted.corners, fitted.colors))]
     picture = torch.cat([row.flip(0) for row in rows])  # the bottom row is the first
-    Image.fromarray((255 * picture.clamp(0, 1)).round().byte().numpy()).save(path)
+    files.save_image(path, picture.numpy())
 
 
 def means(values: list[float], count: int = 10) -> list[float]:
@@ -147,7 +147,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--steps", type=int, default=500, help="at each size of images")
     parser.add_argument("--svg", help="write the loss curve there")
-    parser.add_argument("--pictures", help="write images there (needs Pillow)")
+    parser.add_argument("--pictures", help="write images there, .png")
     options = parser.parse_args()
     begin = time.monotonic()
     fitted = fit(steps=options.steps)

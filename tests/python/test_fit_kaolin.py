@@ -3,13 +3,19 @@
 
 import contextlib
 import io
+import pathlib
 import sys
+import tempfile
 import unittest
 import warnings
 import xml.etree.ElementTree as ElementTree
 
 from support import SOURCE
 
+try:
+    from tilegrad import files
+except ImportError:  # of builds with TILEGRAD_PROGRAM=OFF
+    files = None
 try:
     import torch
 except ImportError:
@@ -33,6 +39,13 @@ class FitKaolin(unittest.TestCase):
         self.assertGreater(losses["silhouette"][0], 0.25)
         self.assertLess(losses["silhouette"][-1], 0.06)
         self.assertLess(losses["image"][-1], losses["image"][0] / 3)
+
+    @unittest.skipIf(files is None, "no tilegrad.files")
+    def test_pictures(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "pictures.png"
+            fit_kaolin.save_pictures(str(path), self.fitted, self.views)
+            self.assertEqual(files.load_image(path).shape, (2 * 64, 6 * 64, 3))
 
     def test_curve(self):
         svg = loss_curve_svg("a < b", "step", self.fitted.losses)

@@ -3,11 +3,17 @@
 
 import contextlib
 import io
+import pathlib
 import sys
+import tempfile
 import unittest
 
 from support import SOURCE
 
+try:
+    from tilegrad import files
+except ImportError:  # of builds with TILEGRAD_PROGRAM=OFF
+    files = None
 try:
     import torch
 except ImportError:
@@ -30,6 +36,15 @@ class FitNvdiffrast(unittest.TestCase):
         self.assertLess(max(losses[-10:]), losses[0] / 10)
         error = (fitted.colors - fitted.cube.colors).abs().mean()
         self.assertLess(error, 0.15)
+
+    @unittest.skipIf(files is None, "no tilegrad.files")
+    def test_pictures(self):
+        with contextlib.redirect_stdout(io.StringIO()):
+            fitted = fit_nvdiffrast.fit(sizes=(8,), steps=2)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "pictures.png"
+            fit_nvdiffrast.save_pictures(str(path), fitted)
+            self.assertEqual(files.load_image(path).shape, (3 * 256, 3 * 256, 3))
 
 
 if __name__ == "__main__":
