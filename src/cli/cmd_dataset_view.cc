@@ -20,7 +20,9 @@ struct ViewOptions {
 
 // The models of the split, and of the class if one is named.
 Result<std::vector<int>> Candidates(const train::Dataset& dataset, const ViewOptions& options) {
-  const auto split = options.split == "train" ? train::Split::kTrain : train::Split::kTest;
+  const auto split = options.split == "train"        ? train::Split::kTrain
+                     : options.split == "validation" ? train::Split::kValidation
+                                                     : train::Split::kTest;
   std::vector<int> models = dataset.Select(split);
   if (!options.class_name.empty()) {
     const auto& classes = dataset.info().classes;
@@ -100,10 +102,10 @@ void AddDatasetView(CLI::App& app, Action* action) {
                                     "CLASS/ID, named as the files below models/ [one of --split]");
   command->add_option("--class", options->class_name, "choose among the models of this class")
       ->excludes(model);
-  command->add_option("--split", options->split, "train or test")
+  command->add_option("--split", options->split, "train, validation or test")
       ->excludes(model)
       ->capture_default_str()
-      ->check(CLI::IsMember({"train", "test"}));
+      ->check(CLI::IsMember({"train", "validation", "test"}));
   command->add_option("--view", options->view, "which view")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);

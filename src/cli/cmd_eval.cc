@@ -25,6 +25,7 @@ Status RunEvaluation(const EvalOptions& options) {
   if (!options.training_models) TILEGRAD_TRY(train::CheckHeldOut(run, dataset));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
+  TILEGRAD_TRY(predictor.CheckImageSize(dataset));
   train::EvaluationJob job;
   job.dataset = &dataset;
   job.split = options.training_models ? train::Split::kTrain : train::Split::kTest;

@@ -65,7 +65,10 @@ class Evaluator {
 
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);
-    if (held_out.empty()) return InvalidArgument("the dataset has no models in this split");
+    if (held_out.empty()) {
+      return InvalidArgument("{}: no models in its {} split; `tilegrad dataset` makes the splits",
+                             data_.folder().string(), SplitName(job_.split));
+    }
     views_ =
         SpreadViews(data_.info().views, std::clamp(job_.views_per_model, 1, data_.info().views));
     TILEGRAD_ASSIGN(const Shape undeformed, ShapeOf(job_.template_mesh, /*seed=*/1));

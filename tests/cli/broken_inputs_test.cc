@@ -120,7 +120,7 @@ TEST_F(BrokenInputs, ConfigurationsAndCommandLines) {
   ExpectRefused(Train(Write("range.toml", "[schedule]\nbatch = -1\n"), Data()), "line 2",
                 "schedule.batch");
   ExpectRefused(Train(folder_ / "none.toml", Data()), "none.toml");
-  ExpectRefused(Train(Config(), folder_ / "nowhere"), "nowhere");
+  ExpectRefused(Train(Config(), folder_ / "nowhere"), "nowhere: not a folder of tilegrad dataset");
   ExpectRefused("train --config " + Config() + " --data " + Data().string() + " --out " +
                     RunFolder().string(),
                 "--resume");
@@ -183,11 +183,32 @@ TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
     ExpectRefused(command + " --run " + run.string() + " --data " + copy.string(), "trained on",
                   "split anew");
   }
+  for (std::size_t at; (at = models.find("\"test\"")) != std::string::npos;)
+    models.replace(at, 6, "\"validation\"");
+  Write("copy/models.jsonl", models);
+  ExpectRefused("eval --run " + run.string() + " --data " + copy.string(),
+                copy.string() + ": no models in its test split");
+  EXPECT_EQ(RunProgram("dataset-view --split validation --data " + copy.string() + " --out " +
+                       (folder_ / "view.png").string())
+                .exit_code,
+            0);
   const std::string json = ReadText(run / "run.json").value();
   const auto at = json.find(Data().string());
   ASSERT_NE(at, std::string::npos);
   Write("run/run.json", std::string(json).replace(at, Data().string().size(), "elsewhere"));
   ExpectRefused("eval --run " + run.string(), "elsewhere", "--data");
+}
+
+TEST_F(BrokenInputs, DatasetsOfAnotherImageSize) {
+  const std::string data = (folder_ / "large").string();
+  ASSERT_EQ(RunProgram("dataset --source procedural --per-class 2 --size 32 --views 3 --seed 9 " +
+                       ("--out " + data))
+                .exit_code,
+            0);
+  for (const std::string command : {"eval", "report"}) {
+    ExpectRefused(command + " --run " + RunFolder().string() + " --data " + data,
+                  data + ": images are 32 pixels a side, the network was trained on 16");
+  }
 }
 
 TEST_F(BrokenInputs, OutputThatCannotBePrinted) {
@@ -218,6 +239,10 @@ TEST_F(BrokenInputs, OptionsThatMeanSomethingElse) {
   ExpectRefused("dataset --source procedural --seed -1 --out " + (folder_ / "d").string(),
                 "--seed");
   ExpectRefused("fit " + Data().string() + " --seed -1", "--seed");
+  ExpectRefused("fit " + Data().string() + " --out " + (folder_ / "fit").string(), "--model");
+  ExpectRefused(
+      "fit " + (Data() / "dataset.json").string() + " --out " + (folder_ / "fit").string(),
+      "a file; a fit takes the folder");
 }
 
 TEST_F(BrokenInputs, OptionsThatWouldDoNothing) {

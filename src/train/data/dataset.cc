@@ -13,8 +13,12 @@ Camera CameraRule::View(int index) const {
 Result<Dataset> Dataset::Open(const Path& folder) {
   Dataset dataset;
   dataset.folder_ = folder;
-  TILEGRAD_ASSIGN(dataset.info_, ReadDatasetInfo(folder));
   std::error_code error;
+  if (!std::filesystem::exists(DatasetInfoPath(folder), error)) {
+    return NotFound("{}: not a folder of tilegrad dataset: there is no dataset.json in it",
+                    folder.string());
+  }
+  TILEGRAD_ASSIGN(dataset.info_, ReadDatasetInfo(folder));
   if (!std::filesystem::exists(ModelsPath(folder), error)) {
     return NotFound(
         "{}: the dataset is not complete; run the same `tilegrad dataset` command again to finish "

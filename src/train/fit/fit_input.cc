@@ -12,6 +12,7 @@
 #include "io/image_file.h"
 #include "train/cutout.h"
 #include "train/data/dataset.h"
+#include "train/data/dataset_files.h"
 #include "train/fit/transforms.h"
 
 namespace tilegrad::train {
@@ -95,6 +96,14 @@ Result<Path> FindTransforms(const Path& folder) {
   std::error_code error;
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     if (std::filesystem::exists(folder / name, error)) return folder / name;
+  }
+  if (std::filesystem::exists(DatasetInfoPath(folder), error)) {
+    return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
+                           folder.string());
+  }
+  if (std::filesystem::is_regular_file(folder, error)) {
+    return InvalidArgument("{}: a file; a fit takes the folder of transforms.json and its images",
+                           folder.string());
   }
   return NotFound(
       "{}: neither transforms.json nor transforms_train.json in it (docs/fit.md says "

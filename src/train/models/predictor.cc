@@ -69,6 +69,12 @@ const std::vector<std::string>& Predictor::warnings() const { return impl_->warn
 
 int Predictor::image_size() const { return static_cast<int>(impl_->info.image_size); }
 
+Status Predictor::CheckImageSize(const Dataset& dataset) const {
+  if (dataset.info().image_size == image_size()) return {};
+  return InvalidArgument("{}: images are {} pixels a side, the network was trained on {}",
+                         dataset.folder().string(), dataset.info().image_size, image_size());
+}
+
 std::string Predictor::description() const {
   return fmt::format("{} network, {} parameters, step {}", impl_->config.name,
                      nn::CountParameters(impl_->network->module()), impl_->info.step);

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
+#include "train/data/dataset.h"
 
 namespace tilegrad::train {
 
@@ -26,7 +27,9 @@ class Predictor {
 
   // Newer checkpoints of the run folder that could not be read.
   const std::vector<std::string>& warnings() const;
-  int image_size() const;             // pixels
+  int image_size() const;  // pixels
+  // InvalidArgument with the dataset's folder if its images are not of that size.
+  Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"
   const Mesh& template_mesh() const;  // the sphere, normalised as predictions are
 

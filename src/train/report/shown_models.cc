@@ -41,10 +41,7 @@ std::vector<int> ShownViews(const DatasetInfo& info) {
 Result<ShownModel> MakeShownModel(const Dataset& dataset, int model, const Predictor& predictor,
                                   const Workers& workers) {
   const DatasetInfo& info = dataset.info();
-  if (predictor.image_size() != info.image_size) {
-    return InvalidArgument("{}: images are {} pixels a side, the network was trained on {}",
-                           dataset.folder().string(), info.image_size, predictor.image_size());
-  }
+  TILEGRAD_TRY(predictor.CheckImageSize(dataset));
   ShownModel shown;
   shown.model = model;
   TILEGRAD_ASSIGN(ModelData data, dataset.Load(model));
