@@ -42,6 +42,9 @@ Result<std::vector<StudyScene>> ChooseScenes(const TradeoffOptions& options) {
 
 Status RunTradeoff(const TradeoffOptions& options) {
   TILEGRAD_ASSIGN(const std::vector<StudyScene> scenes, ChooseScenes(options));
+  const TrainingStudyJob study{options.data, options.config, options.out, options.training_errors,
+                               options.steps};
+  if (!options.data.empty()) TILEGRAD_TRY(CheckTrainingStudy(study));
   ProgressLine line;
   std::vector<StudyResult> results;
   for (const StudyScene& scene : scenes) {
@@ -62,9 +65,7 @@ Status RunTradeoff(const TradeoffOptions& options) {
   std::vector<StudyTraining> training;
   if (!options.data.empty()) {
     const Workers workers(options.workers);
-    const TrainingStudyJob job{options.data, options.config, options.out, options.training_errors,
-                               options.steps};
-    TILEGRAD_ASSIGN(training, RunTrainingStudy(job, workers, line.Sink(), StopOnSignals()));
+    TILEGRAD_ASSIGN(training, RunTrainingStudy(study, workers, line.Sink(), StopOnSignals()));
   }
   line.Finish();
   return WriteStudy(options.out, results, training);
@@ -78,12 +79,13 @@ void AddTradeoff(CLI::App& app, Action* action) {
       "tradeoff",
       "Measure what max_alpha_error costs and gains: time, error of alpha and of gradients against "
       "float64, and what a network learns with it");
-  command->add_option("mesh", options->mesh, "mesh file [two built-in scenes]");
+  auto* mesh = command->add_option("mesh", options->mesh, "mesh file [two built-in scenes]");
   command
       ->add_option("--out", options->out,
                    "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs")
       ->capture_default_str();
   command->add_option("--size", options->size, "pixels of a mesh file's image, each axis")
+      ->needs(mesh)
       ->capture_default_str()
       ->check(CLI::Range(1, 4096));
   command->add_option("--errors", options->errors, "values of max_alpha_error, in [0, 1]")
@@ -99,14 +101,19 @@ void AddTradeoff(CLI::App& app, Action* action) {
   command->add_option("--repetitions", options->repetitions, "timings of each setting")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  command->add_option("--training", options->data,
-                      "dataset folder: also train and evaluate with --training-errors");
+  auto* training =
+      command->add_option("--training", options->data,
+                          "dataset folder: also train and evaluate with --training-errors");
   command->add_option("--training-errors", options->training_errors, "for --training")
+      ->needs(training)
       ->delimiter(',')
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--config", options->config, "for --training")->capture_default_str();
+  command->add_option("--config", options->config, "for --training")
+      ->needs(training)
+      ->capture_default_str();
   command->add_option("--steps", options->steps, "of each training")
+      ->needs(training)
       ->capture_default_str()
       ->check(CLI::Range(1, 10000000));
   AddWorkersOption(command, &options->workers);

@@ -49,6 +49,8 @@ struct TrainingStudyJob {
   std::vector<double> errors;
   int steps = 0;
 };
+// Whether dataset and configuration can be read: measuring, which comes first, takes minutes.
+Status CheckTrainingStudy(const TrainingStudyJob& job);
 Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
                                                     const Workers& workers,
                                                     const ProgressSink& progress,

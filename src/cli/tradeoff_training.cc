@@ -40,6 +40,11 @@ Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, con
 
 }  // namespace
 
+Status CheckTrainingStudy(const TrainingStudyJob& job) {
+  if (auto dataset = train::Dataset::Open(job.data); !dataset.ok()) return dataset.status();
+  return train::ReadConfig(job.config).status();
+}
+
 Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,
                                                     const Workers& workers,
                                                     const ProgressSink& progress,

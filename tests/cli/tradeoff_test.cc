@@ -97,6 +97,13 @@ TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
   refused("--errors x", "--errors");
   refused("--deltas 0", "--deltas");
   refused("--repetitions 0", "--repetitions");
+  refused("--steps 5", "--training");
+  refused("--training-errors 0.1", "--training");
+  refused("--config quick.toml", "--training");
+  refused("--size 16", "mesh");
+  // At once: of this command the measurements alone take hours.
+  const std::string hours = "--repetitions 1000 --training ";
+  refused(hours + (folder_ / "nowhere").string(), "nowhere");
   Write("flat.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
   refused((folder_ / "flat.obj").string(), "flat.obj");
 }
