@@ -86,10 +86,17 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+std::string_view LastPart(std::string_view key) { return key.substr(key.rfind('.') + 1); }
+
+// How far a key is from a known one: letters, but a table that is missing or another counts as one.
+std::size_t KeyDistance(const std::string& known, const std::string& key) {
+  return std::min(EditDistance(known, key), EditDistance(LastPart(known), LastPart(key)) + 1);
+}
+
 Status UnknownKey(const std::vector<Field>& fields, const std::string& key) {
   const auto closest =
       std::min_element(fields.begin(), fields.end(), [&](const Field& a, const Field& b) {
-        return EditDistance(a.key, key) < EditDistance(b.key, key);
+        return KeyDistance(a.key, key) < KeyDistance(b.key, key);
       });
   return InvalidArgument("unknown key \"{}\"; the closest known one is \"{}\"", key, closest->key);
 }
