@@ -110,8 +110,8 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Pa
     }
   }
   if (entries.empty()) {
-    return NotFound("{}: no models; expected <synset>/<model>/models/model_normalized.obj",
-                    folder.string());
+    return NotFound("{}: no models{}; expected <synset>/<model>/models/model_normalized.obj",
+                    folder.string(), list.empty() ? "" : " that " + split_list.string() + " names");
   }
   return std::unique_ptr<ModelSource>(std::make_unique<FileModels>(
       "shapenet", "3D models: ShapeNetCore (Chang et al. 2015).", std::move(entries)));

@@ -110,6 +110,11 @@ TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
   const auto wrong = ShapeNetSource(root_ / "net", root_ / "split.txt");
   ASSERT_FALSE(wrong.ok());
   EXPECT_NE(wrong.status().message().find("line 2"), std::string::npos);
+
+  Write("split.txt", "03001627/d4 test\n");
+  const auto none = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.status().message().find("split.txt names"), std::string::npos);
 }
 
 TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {
