@@ -21,8 +21,10 @@ CLI::Option* AddChoice(CLI::App* command, const std::string& option, T* value,
 }
 
 void AddViewOptions(CLI::App* command, ViewSettings* view) {
-  command->add_option("--size", view->size,
-                      "pixels of the pictures, as 512 or 640x480 [what the cameras say, else 512]");
+  command->add_option(
+      "--size", view->size,
+      "pixels of the pictures, as 512 or 640x480 [what the cameras say; 512 without "
+      "--cameras]");
   auto* cameras = command->add_option(
       "--cameras", view->camera_file,
       "a picture for each camera of: a COLMAP model (folder), a NeRF transforms.json, or OpenCV's "

@@ -19,7 +19,7 @@ Status Check(const PictureRequest& r) {
                            r.height, r.supersampling);
   if (std::max(r.width, r.height) > raster::kMaxImageSize / r.supersampling) {
     return InvalidArgument(
-        "{} x {} pixels with {} samples along each side is more than {}; take fewer samples",
+        "{} x {} pixels with {} samples along each side is more than {}; take fewer of either",
         r.width, r.height, r.supersampling, raster::kMaxImageSize);
   }
   return {};
