@@ -190,7 +190,7 @@ class _Call:
     def frame(self, tensors: Sequence[torch.Tensor]) -> Frame:
         """Renders, with the memory of the tensors where the renderer can take it as it is."""
         arguments = dict(self.arguments)
-        if "textures" in arguments:
+        if arguments.get("textures") is not None:
             arguments["textures"] = list(arguments["textures"])
         for (name, index), tensor in zip(self.places, tensors):
             array = tensor.detach().numpy()

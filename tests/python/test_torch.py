@@ -296,6 +296,19 @@ class Graphs(unittest.TestCase):
         images.alpha.sum().backward()
         self.assertGreater(float(positions.grad.abs().max()), 0)
 
+    def test_mesh_of_a_file_without_textures(self):
+        """scene_arguments has None for what the mesh lacks."""
+        from tilegrad import files
+        positions, faces = tilegrad.icosphere(1, 0.5)
+        mesh = files.Mesh(positions, faces, colors=positions + 0.5)
+        self.assertIsNone(mesh.scene_arguments()["textures"])
+        positions = torch.tensor(positions, requires_grad=True)
+        images = tg.render(positions, mesh.faces, Camera(translation=(0, 0, -2), fx=12, fy=12,
+                                                         cx=8, cy=8),
+                           width=16, height=16, delta=1e-2, **mesh.scene_arguments())
+        images.alpha.sum().backward()
+        self.assertGreater(float(positions.grad.abs().max()), 0)
+
 
 @needs_torch
 class Modules(unittest.TestCase):
