@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/temporary_file.h"
 
 namespace tilegrad {
 namespace {
@@ -75,7 +76,7 @@ Status WriteTemporary(const Path& temporary, const Path& path,
 
 template <class Container>
 Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
-  FileHandle file(path, O_RDONLY);
+  FileHandle file(path, O_RDONLY | O_NONBLOCK);  // or a pipe waits for who writes into it
   if (file.fd() < 0) return CannotOpenToRead(path);
   struct stat info = {};
   if (::fstat(file.fd(), &info) != 0) return SystemError(path, "cannot stat");
@@ -137,8 +138,7 @@ Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> b
   if (IsDevice(path_or_link)) return WriteToDevice(path_or_link, bytes);
   const Path path = BehindLinks(path_or_link);
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
-  Path temporary = path;
-  temporary += fmt::format(".{}.tmp", ::getpid());
+  const Path temporary = TemporaryOf(path);
   Status status = WriteTemporary(temporary, path, bytes);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(path, "cannot be replaced");

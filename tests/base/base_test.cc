@@ -21,6 +21,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/simd_target.h"
+#include "base/temporary_file.h"
 #include "support/forked.h"
 #include "support/thread_sanitizer.h"
 
@@ -317,6 +318,9 @@ TEST_F(FileTest, ErrorsNameThePath) {
   ASSERT_TRUE(WriteTextAtomic(folder_ / "big", "12345").ok());
   EXPECT_EQ(ReadFile(folder_ / "big", 4).status().code(), StatusCode::kResourceExhausted);
   EXPECT_EQ(ReadFile(folder_).status().code(), StatusCode::kInvalidArgument);
+  // A pipe into which nobody writes is not waited for.
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_EQ(ReadFile(folder_ / "pipe").status().code(), StatusCode::kInvalidArgument);
 }
 
 TEST_F(FileTest, LinksAndPipesStayWhatTheyAre) {
@@ -335,6 +339,33 @@ TEST_F(FileTest, LinksAndPipesStayWhatTheyAre) {
   EXPECT_STREQ(text, "through");
   ::close(end);
   EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+}
+
+TEST_F(FileTest, NamesAsLongAsTheyMayBe) {
+  for (const std::size_t length : {240u, 255u}) {
+    ASSERT_TRUE(WriteTextAtomic(folder_ / std::string(length, 'n'), "x").ok()) << length;
+    EXPECT_EQ(ReadText(folder_ / std::string(length, 'n')).value(), "x");
+  }
+  // Not at once under one name, however long what they have in common.
+  EXPECT_NE(TemporaryOf(std::string(254, 'n') + "a"), TemporaryOf(std::string(254, 'n') + "b"));
+}
+
+// Of processes that are gone, and of our own number: in a container the next run may have it, too.
+TEST_F(FileTest, WhatKilledWritesLeftIsRemoved) {
+  ASSERT_TRUE(MakeFolder(folder_).ok());
+  const std::string gone = "4194305";  // beyond the kernel's largest number of a process
+  const std::string own = std::to_string(::getpid()), parent = std::to_string(::getppid());
+  for (const std::string& name : {"a." + gone + ".tmp", "b." + own + ".tmp"})
+    ASSERT_TRUE(AppendText(folder_ / name, "half", false).ok());
+  const std::vector<std::string> others = {"c." + parent + ".tmp", "notes.tmp", "d." + gone,
+                                           "e.12x.tmp", gone + ".tmp"};
+  for (const std::string& name : others)
+    ASSERT_TRUE(AppendText(folder_ / name, "whole", false).ok());
+  RemoveTemporaries(folder_);
+  RemoveTemporaries(folder_ / "none");
+  for (const std::string& name : others) EXPECT_TRUE(std::filesystem::exists(folder_ / name));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}),
+            static_cast<std::ptrdiff_t>(others.size()));
 }
 
 TEST_F(FileTest, FailedWriteLeavesTheOldFile) {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/temporary_file.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <climits>
+#include <csignal>
+#include <optional>
+
+#include "base/error.h"
+#include "base/hash.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr const char* kEnding = ".tmp";
+
+// The process that TemporaryOf() named a file after.
+std::optional<pid_t> WriterOf(const Path& file) {
+  if (file.extension() != kEnding) return std::nullopt;
+  const std::string number = file.stem().extension().string();  // ".123"
+  if (number.size() < 2) return std::nullopt;
+  pid_t writer = 0;
+  const char* end = number.data() + number.size();
+  const auto [at, error] = std::from_chars(number.data() + 1, end, writer);
+  return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
+}
+
+// A file with our own number is of one that had it before: in a container each run may have it.
+bool IsOfAnother(pid_t writer) {
+  return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
+}
+
+}  // namespace
+
+Path TemporaryOf(const Path& path) {
+  const std::string ending = fmt::format(".{}{}", ::getpid(), kEnding);
+  std::string name = path.filename().string();
+  if (name.size() + ending.size() > NAME_MAX) {
+    Hash hash;
+    hash.Add(name);
+    name = hash.Text();
+  }
+  return path.parent_path() / (name + ending);
+}
+
+void RemoveTemporaries(const Path& folder) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::optional<pid_t> writer = WriterOf(entry.path());
+    if (writer && !IsOfAnother(*writer) && entry.is_regular_file(error))
+      std::filesystem::remove(entry.path(), error);
+  }
+}
+
+}  // namespace tilegrad
