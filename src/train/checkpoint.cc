@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/hash.h"
+#include "base/temporary_file.h"
 
 namespace tilegrad::train {
 namespace {
@@ -132,9 +133,12 @@ void PruneCheckpoints(const Path& run, std::int64_t keep) {
   const std::vector<Path> files = ListCheckpoints(run);
   const auto kept = std::min(files.size(), static_cast<std::size_t>(keep));
   for (std::size_t i = 0; i + kept < files.size(); ++i) std::filesystem::remove(files[i], error);
-  for (const auto& entry : std::filesystem::directory_iterator(Folder(run), error)) {
-    if (entry.path().extension() == ".tmp") std::filesystem::remove(entry.path(), error);
-  }
+}
+
+void RemoveHalfWritten(const Path& run) {
+  for (const char* folder : {"checkpoints", "samples", "tensorboard", "timelapse"})
+    RemoveTemporaries(run / folder);
+  RemoveTemporaries(run);
 }
 
 }  // namespace tilegrad::train

@@ -196,6 +196,7 @@ Status Run::Prepare() {
   TILEGRAD_TRY(CheckExisting());
   TILEGRAD_TRY(LoadData());
   TILEGRAD_ASSIGN(lock_, FolderLock::Take(job_.run));
+  RemoveHalfWritten(job_.run);
   step_.emplace(context_, job_.config, train_.size);
   order_.emplace(train_.models, train_.views,
                  static_cast<std::uint64_t>(job_.config.schedule.seed));

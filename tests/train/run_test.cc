@@ -132,12 +132,26 @@ TEST_F(RunTest, PruneKeepsTheNewest) {
   for (const std::int64_t step : {1, 2, 3, 4}) {
     ASSERT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, SomeTensors(context_, 0)).ok());
   }
-  Write("checkpoints/step_00000009.safetensors.123.tmp", "left by a killed run");
   PruneCheckpoints(folder_, 2);
   const auto files = ListCheckpoints(folder_);
   ASSERT_EQ(files.size(), 2u);
   EXPECT_EQ(files[0].filename(), "step_00000003.safetensors");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "checkpoints"), {}), 2);
+}
+
+TEST_F(RunTest, HalfWrittenFilesOfAKilledRunGo) {
+  for (const char* name : {"checkpoints/step_00000009.safetensors", "config.toml",
+                           "samples/step_00000009.png", "tensorboard/events", "timelapse/9.png"}) {
+    Write(std::string(name) + ".4194305.tmp", "left by a killed run");
+    Write(name, "whole");
+  }
+  RemoveHalfWritten(folder_);
+  int files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_)) {
+    EXPECT_NE(entry.path().extension(), ".tmp");
+    files += entry.is_regular_file() ? 1 : 0;
+  }
+  EXPECT_EQ(files, 5);
 }
 
 TEST_F(RunTest, OneWrongBitIsFoundAnywhere) {

@@ -9,7 +9,9 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "base/rng.h"
+#include "base/temporary_file.h"
 #include "train/data/contact_sheet.h"
 #include "train/data/make_model.h"
 
@@ -94,8 +96,12 @@ class Builder {
   }
 
   Status Prepare() {
-    std::error_code error;
+    TILEGRAD_ASSIGN(lock_, FolderLock::Take(folder_));
     info_.classes = ClassesOf(source_, chosen_);
+    RemoveTemporaries(folder_);
+    for (const std::string& name : info_.classes)
+      RemoveTemporaries(ModelFilePath(folder_, name, "").parent_path());
+    std::error_code error;
     if (std::filesystem::exists(DatasetInfoPath(folder_), error)) {
       TILEGRAD_ASSIGN(const DatasetInfo there, ReadDatasetInfo(folder_));
       if (there.recipe != info_.recipe) {
@@ -235,6 +241,7 @@ class Builder {
   const Workers& workers_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
+  FolderLock lock_;
   DatasetInfo info_;
   std::vector<std::size_t> chosen_;  // entries of the source, ascending
   std::vector<Outcome> outcomes_;    // of chosen_

@@ -83,6 +83,7 @@ class Session {
 
 Status Session::Open(FitOutcome* outcome) {
   TILEGRAD_ASSIGN(lock_, FolderLock::Take(job_.out));
+  RemoveHalfWritten(job_.out);
   if (!ListCheckpoints(job_.out).empty()) {
     if (!job_.resume) {
       return InvalidArgument(

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "train/data/temp_folder.h"
@@ -88,7 +89,7 @@ TEST_F(BuildTest, WorkersDoNotChangeAByte) {
   ASSERT_TRUE(Build(*source, root_ / "two", 2).ok());
   ASSERT_TRUE(Build(*source, root_ / "seven", 7).ok());
   const auto one = Contents(root_ / "one");
-  EXPECT_EQ(one.size(), 10u + 4u);  // models; dataset.json, two lists, the sheet
+  EXPECT_EQ(one.size(), 10u + 5u);  // models; dataset.json, two lists, the sheet, the lock
   EXPECT_EQ(one, Contents(root_ / "two"));
   EXPECT_EQ(one, Contents(root_ / "seven"));
 }
@@ -112,6 +113,30 @@ TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
   EXPECT_EQ(resumed->reused, 4);
   EXPECT_EQ(Contents(root_ / "whole"), Contents(root_ / "parts"));
   EXPECT_EQ(Build(*source, root_ / "parts")->reused, 10);
+}
+
+TEST_F(BuildTest, HalfWrittenFilesOfAKilledCommandGo) {
+  const auto source = ProceduralSource(1, 3);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  const auto whole = Contents(root_ / "set");
+  for (const char* name : {"models/lamp/lamp-00000.npz", "models.jsonl"}) {
+    ASSERT_TRUE(WriteTextAtomic(root_ / "set" / (std::string(name) + ".4194305.tmp"), "x").ok());
+  }
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  EXPECT_EQ(Contents(root_ / "set"), whole);
+}
+
+TEST_F(BuildTest, OneProcessAtATime) {
+  const auto source = ProceduralSource(1, 3);
+  {
+    const auto lock = FolderLock::Take(root_ / "set");
+    ASSERT_TRUE(lock.ok());
+    const auto refused = Build(*source, root_ / "set");
+    ASSERT_FALSE(refused.ok());
+    EXPECT_NE(refused.status().message().find("another process"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(root_ / "set" / "dataset.json"));
+  }
+  EXPECT_TRUE(Build(*source, root_ / "set").ok());
 }
 
 TEST_F(BuildTest, StoppedWithOtherClassesTheIndexStillFits) {
