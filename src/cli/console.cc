@@ -20,6 +20,10 @@ extern "C" void HandleStop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+void StopOn(int signal) {
+  if (std::signal(signal, HandleStop) == SIG_IGN) std::signal(signal, SIG_IGN);
+}
+
 double Seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
 }
@@ -32,6 +36,10 @@ void OpenStandardStreams() {
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
 }
 
+void WritesFailWithoutSignals() {
+  for (const int signal : {SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_IGN);
+}
+
 std::string FormatDuration(double seconds) {
   const auto s = static_cast<long>(seconds + 0.5);
   if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
@@ -39,8 +47,7 @@ std::string FormatDuration(double seconds) {
 }
 
 const StopFlag& StopOnSignals() {
-  std::signal(SIGINT, HandleStop);
-  std::signal(SIGTERM, HandleStop);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) StopOn(signal);
   return g_stop;
 }
 

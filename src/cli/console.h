@@ -25,6 +25,10 @@ void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
 // opened would get their numbers, and the progress line would be written into a checkpoint.
 void OpenStandardStreams();
 
+// Makes writing to a pipe that nobody reads any more, and beyond the limit of a file's size, an
+// error like others instead of a signal that ends the process.
+void WritesFailWithoutSignals();
+
 // Draws "stage  12/820  1%  0:31 left  note" on stderr: rewritten in place on a terminal, a line
 // every ten seconds elsewhere. Work that ends within two seconds draws nothing. Finish() (or a new
 // stage, or the destructor) ends the line.
@@ -54,7 +58,9 @@ class ProgressLine {
 // "1:05:09", "3:07" or "0:04".
 std::string FormatDuration(double seconds);
 
-// A flag that SIGINT and SIGTERM set; installed at the first call. A second signal kills as usual.
+// A flag that SIGINT, SIGTERM and SIGHUP (the terminal is gone) set; installed at the first call. A
+// second signal kills as usual. Those that whoever started us ignores (nohup, a shell's background)
+// stay ignored.
 const StopFlag& StopOnSignals();
 
 }  // namespace tilegrad::cli

@@ -89,6 +89,7 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   tilegrad::cli::OpenStandardStreams();
+  tilegrad::cli::WritesFailWithoutSignals();
   try {
     return tilegrad::cli::Run(argc, argv);
   } catch (const std::bad_alloc&) {

@@ -3,6 +3,7 @@
 // curves are those of a run that nobody disturbed, bit for bit, whatever the number of workers.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -34,7 +35,9 @@ class KillResume : public TempFolderTest {
   }
 
   // Starts `tilegrad train` with the run folder `run`; what it prints is appended to <run>.txt.
-  pid_t Start(const std::string& run, int workers) const {
+  // `prepare` is called in the new process before the program is.
+  pid_t Start(
+      const std::string& run, int workers, void (*prepare)() = [] {}) const {
     const std::vector<std::string> words = {
         TILEGRAD_PROGRAM, "train",
         "--config",       (folder_ / "tiny.toml").string(),
@@ -42,6 +45,7 @@ class KillResume : public TempFolderTest {
         "--out",          (folder_ / run).string(),
         "--workers",      std::to_string(workers),
         "--set",          "schedule.steps=" + std::to_string(steps_),
+        "--max-minutes",  minutes_,
         "--resume"};
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -51,8 +55,19 @@ class KillResume : public TempFolderTest {
     if (child != 0) return child;
     const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
     if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(126);
+    prepare();
     ::execv(arguments[0], arguments.data());
     ::_exit(127);
+  }
+
+  void AwaitFirstStep(const std::string& run) const {
+    const Path log = folder_ / run / "metrics.jsonl";
+    std::error_code error;
+    for (int i = 0; i < 6000; ++i) {
+      const auto size = std::filesystem::file_size(log, error);
+      if (!error && size > 0) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
   }
 
   static int Wait(pid_t child) {
@@ -136,6 +151,7 @@ class KillResume : public TempFolderTest {
   Workers workers_;
   nn::Context context_;
   int steps_ = 200;
+  std::string minutes_ = "0";
 };
 
 TEST_F(KillResume, ThreeKills) { CheckKills(3); }
@@ -147,27 +163,57 @@ TEST_F(KillResume, LongTenKills) {
 
 TEST_F(KillResume, TerminationSavesAndSaysHowToGoOn) {
   steps_ = 100000;
-  const pid_t child = Start("run", 1);
-  const Path log = folder_ / "run" / "metrics.jsonl";
-  const auto first_step_logged = [&] {
-    std::error_code error;
-    const auto size = std::filesystem::file_size(log, error);
-    return !error && size > 0;
-  };
-  for (int i = 0; i < 6000 && !first_step_logged(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (const auto& [run, signal] : {std::pair("terminated", SIGTERM), {"hung_up", SIGHUP}}) {
+    const pid_t child = Start(run, 1);
+    AwaitFirstStep(run);
+    ::kill(child, signal);
+    const int status = Wait(child);
+    ASSERT_TRUE(WIFEXITED(status)) << Output(run);
+    EXPECT_EQ(WEXITSTATUS(status), 130) << Output(run);
+    EXPECT_NE(Output(run).find("--resume"), std::string::npos) << Output(run);
+    const auto found = LoadNewestCheckpoint(context_, folder_ / run);
+    ASSERT_TRUE(found.ok()) << found.status().message();
+    const auto curve = ReadLog(folder_ / run);
+    ASSERT_TRUE(curve.ok());
+    ASSERT_FALSE(curve->empty());
+    EXPECT_EQ(found->checkpoint.info.step, curve->back().step);  // nothing that was done is lost
   }
-  ::kill(child, SIGTERM);
+}
+
+// As nohup and a shell's background do.
+TEST_F(KillResume, SignalsThatWereIgnoredStayIgnored) {
+  steps_ = 100000, minutes_ = "0.03";
+  const pid_t child = Start("run", 1, [] {
+    std::signal(SIGINT, SIG_IGN);
+    std::signal(SIGHUP, SIG_IGN);
+  });
+  AwaitFirstStep("run");
+  ::kill(child, SIGINT);
+  ::kill(child, SIGHUP);
   const int status = Wait(child);
-  ASSERT_TRUE(WIFEXITED(status)) << Output("run");
-  EXPECT_EQ(WEXITSTATUS(status), 130) << Output("run");
-  EXPECT_NE(Output("run").find("--resume"), std::string::npos) << Output("run");
-  const auto found = LoadNewestCheckpoint(context_, folder_ / "run");
-  ASSERT_TRUE(found.ok()) << found.status().message();
-  const auto curve = ReadLog(folder_ / "run");
-  ASSERT_TRUE(curve.ok());
-  ASSERT_FALSE(curve->empty());
-  EXPECT_EQ(found->checkpoint.info.step, curve->back().step);  // nothing that was done is lost
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << Output("run");
+}
+
+// The progress line, after two seconds, is the first that is written there.
+TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
+  steps_ = 100000, minutes_ = "0.05";
+  const pid_t child = Start("run", 1, [] {
+    int ends[2] = {-1, -1};
+    if (::pipe(ends) != 0 || ::dup2(ends[1], 2) < 0 || ::close(ends[0]) != 0) ::_exit(126);
+  });
+  const int status = Wait(child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << Output("run");
+}
+
+TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
+  const pid_t child = Start("run", 1, [] {
+    const rlimit limit = {4096, 4096};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
+  });
+  const int status = Wait(child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << Output("run");
+  EXPECT_NE(Output("run").find("File too large"), std::string::npos) << Output("run");
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "run" / "checkpoints"));  // no temporary left
 }
 
 }  // namespace
