@@ -37,10 +37,10 @@ Status RunEvaluation(const EvalOptions& options) {
   auto evaluation = train::Evaluate(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!evaluation.ok()) return evaluation.status();
+  // Files first: printing may fail. A look at overfitting leaves them their held-out figures.
+  if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation, dataset));
   fmt::print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
-  if (options.training_models)
-    return {};  // a look at overfitting: the files keep the held-out figures
-  TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation, dataset));
+  if (options.training_models) return {};
   fmt::print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
   return {};
 }
