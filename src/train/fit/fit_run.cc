@@ -59,7 +59,8 @@ class Session {
   const TargetImages& Targets(int factor);
   Status Save();
   Status Log(const FitValues& values, const FitSchedule& schedule);
-  bool ShowsNow() const;
+  bool ShowsAt(std::int64_t step) const;
+  Path PictureOf(std::int64_t step) const;
   Status Show();
   Result<ImageU8> Sheet() const;
   Status Score(FitOutcome* outcome) const;
@@ -135,11 +136,15 @@ Status Session::Log(const FitValues& values, const FitSchedule& schedule) {
 }
 
 // Pictures are spread evenly over the run, the start and the end included.
-bool Session::ShowsNow() const {
+bool Session::ShowsAt(std::int64_t step) const {
   const std::int64_t count = job_.config.timelapse - 1, steps = job_.config.steps;
   if (job_.config.timelapse <= 0) return false;
-  if (step_ == 0 || step_ == steps || count <= 0) return step_ == 0 || step_ == steps;
-  return step_ * count / steps != (step_ - 1) * count / steps;
+  if (step == 0 || step == steps || count <= 0) return step == 0 || step == steps;
+  return step * count / steps != (step - 1) * count / steps;
+}
+
+Path Session::PictureOf(std::int64_t step) const {
+  return job_.out / "timelapse" / fmt::format("{:08}.png", step);
 }
 
 Status Session::Show() {
@@ -149,13 +154,12 @@ Status Session::Show() {
   job.alpha = false;
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return io::SavePng(job_.out / "timelapse" / fmt::format("{:08}.png", step_),
-                     OverWhite(renderer.frame(), 0));
+  return io::SavePng(PictureOf(step_), OverWhite(renderer.frame(), 0));
 }
 
 Status Session::Run(const ProgressSink& progress, const StopFlag& stop, FitOutcome* outcome) {
   const FitConfig& config = job_.config;
-  if (step_ == 0 && ShowsNow()) TILEGRAD_TRY(Show());
+  if (step_ == 0 && ShowsAt(0)) TILEGRAD_TRY(Show());
   while (step_ < config.steps) {
     if (stop) {
       TILEGRAD_TRY(Save());
@@ -169,7 +173,7 @@ Status Session::Run(const ProgressSink& progress, const StopFlag& stop, FitOutco
     ++step_;
     outcome->last = *values;
     if (step_ % kLogEvery == 0) TILEGRAD_TRY(Log(*values, schedule));
-    if (ShowsNow()) TILEGRAD_TRY(Show());
+    if (ShowsAt(step_)) TILEGRAD_TRY(Show());
     if (step_ % config.checkpoint_every == 0 || step_ == config.steps) TILEGRAD_TRY(Save());
     if (progress) {
       progress({"fitting", static_cast<std::uint64_t>(step_),
@@ -182,15 +186,16 @@ Status Session::Run(const ProgressSink& progress, const StopFlag& stop, FitOutco
   return {};
 }
 
-// All that were written, in one picture.
+// All of this fit in one picture. There may be others in the folder: of a fit that was killed
+// before its first checkpoint, so that another could begin here.
 Result<ImageU8> Session::Sheet() const {
   std::vector<Path> files;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(job_.out / "timelapse", error)) {
-    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  for (std::int64_t step = 0; step <= job_.config.steps; ++step) {
+    if (ShowsAt(step) && std::filesystem::exists(PictureOf(step), error))
+      files.push_back(PictureOf(step));
   }
   if (files.empty()) return ImageU8();
-  std::sort(files.begin(), files.end());
   std::vector<ImageU8> pictures;
   for (const Path& file : files) {
     TILEGRAD_ASSIGN(ImageU8 picture, io::LoadImage(file));

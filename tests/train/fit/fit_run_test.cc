@@ -86,6 +86,19 @@ TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
 }
 
+// Of one that was killed before its first checkpoint pictures are all that is there.
+TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
+  FitJob job = Job("whole");
+  job.config.steps = 6;
+  ASSERT_TRUE(Run(job).ok());
+  job.out = folder_ / "again";
+  for (const char* name : {"00000001.png", "00000100.png"}) {
+    ASSERT_TRUE(io::SavePng(job.out / "timelapse" / name, ImageU8(64, 64, 3)).ok());
+  }
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_EQ(Read(job.out / "timelapse.png"), Read(folder_ / "whole" / "timelapse.png"));
+}
+
 TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   FitJob job = Job("run");
   ASSERT_TRUE(Run(job).ok());
