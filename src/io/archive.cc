@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/archive.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <zip.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <map>
 #include <mutex>
 
@@ -68,7 +73,19 @@ struct ZipCloser {
 };
 using ZipHandle = std::unique_ptr<zip_t, ZipCloser>;
 
+// What libzip would wait for, a pipe without a writer, or call a damaged archive.
+Status CheckRegularFile(const Path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0 && errno == ENOENT) return {};
+  if (file < 0) return IoError("{}: cannot open: {}", path.string(), std::strerror(errno));
+  struct stat info = {};
+  const bool regular = ::fstat(file, &info) == 0 && S_ISREG(info.st_mode);
+  ::close(file);
+  return regular ? Status() : InvalidArgument("{}: not a regular file", path.string());
+}
+
 Result<ZipHandle> OpenZipHandle(const Path& path) {
+  TILEGRAD_TRY(CheckRegularFile(path));
   int code = 0;
   ZipHandle zip(zip_open(path.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
   if (zip) return zip;

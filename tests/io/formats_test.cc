@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images, npy and npz, zip archives, Java properties: round trips and broken files.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 #include <numeric>
@@ -387,6 +388,11 @@ TEST_F(FormatsTest, TruncatedZipsAreErrors) {
         "cut.zip", Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length))));
     ExpectMessage(zip.status(), "cut.zip");
   }
+}
+
+TEST_F(FormatsTest, APipeIsNoZip) {
+  ASSERT_EQ(::mkfifo((folder_ / "a.npz").c_str(), 0600), 0);
+  ExpectMessage(LoadNpz(folder_ / "a.npz").status(), "a.npz", "not a regular file");
 }
 
 TEST_F(FormatsTest, CorruptZipEntryIsAnError) {
