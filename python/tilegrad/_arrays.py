@@ -59,11 +59,21 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     _counts["arrays"] += 1
     if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
-    _check_dtype(function, argument, array, dtype)
+    if array.size or not isinstance(value, _NUMBERS):  # [] has no numbers that could be wrong
+        _check_dtype(function, argument, array, dtype)
     copy = np.require(array, dtype, ("C", "ALIGNED"))
     if not isinstance(value, _NUMBERS):
         _count_copy(copy)
     return copy
+
+
+def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
+    """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
+    be 255 times too bright, and nothing would say so."""
+    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
+    if array.dtype == np.uint8:
+        raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
+                        f"divide by 255")
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
@@ -166,9 +176,23 @@ def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
     except (TypeError, ValueError):
         raise TypeError(f"{function}: {argument} must be {kind.__name__}, got "
                         f"{value!r} ({type(value).__name__})") from None
+    except OverflowError:
+        raise ValueError(f"{function}: {argument} is out of float's range") from None
     if kind is int and not -2**31 <= number < 2**31:
         raise ValueError(f"{function}: {argument} is {number}, out of int32's range")
     return number
+
+
+def as_flag(function: str, argument: str, value: Any) -> bool:
+    """`value`, which is True or False (or 1 or 0), as a bool; TypeError if it is anything else:
+    "no" is true to Python."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    try:
+        return bool((0, 1).index(operator.index(value)))
+    except (TypeError, ValueError):
+        raise TypeError(f"{function}: {argument} must be bool, got {value!r} "
+                        f"({type(value).__name__})") from None
 
 
 def as_pixels(function: str, argument: str, value: Any) -> int:

@@ -254,9 +254,10 @@ class Renderer:
                  "normals": normals, "uv": uv}
         cotangents = {name: self._cotangent(frame, name, value)
                       for name, value in given.items() if value is not None}
+        accumulate = _arrays.as_flag("backward", "accumulate", accumulate)
         gradients = self._outputs(frame, wrt, out, accumulate)
         self._renderer.backward(frame._frame, cotangents, [g._arrays for g in gradients],
-                                bool(accumulate))
+                                accumulate)
         return gradients[0] if frame._single else gradients
 
     @staticmethod

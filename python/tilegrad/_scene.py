@@ -164,17 +164,16 @@ class Scene:
         arrays = self._core_arrays(corners)
         arrays.lighting = _arrays.check_choice("Scene", "lighting", lighting, _core.LIGHTINGS)
         arrays.normal_kind = self._normal_kind(normals)
-        arrays.two_sided, arrays.clamp = bool(two_sided), bool(clamp)
+        arrays.two_sided = _arrays.as_flag("Scene", "two_sided", two_sided)
+        arrays.clamp = _arrays.as_flag("Scene", "clamp", clamp)
         kind = _core.Scene64 if self._dtype == np.float64 else _core.Scene32
         self._record = kind(self._count, arrays)
 
     # What the constructor consists of.
 
     def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
-        # Pixels as files have them would be 255 times too bright, and nothing would say so.
-        if name.startswith(("colors", "textures")) and "uint8" in str(getattr(value, "dtype", "")):
-            raise TypeError(f"Scene: {name} has dtype uint8, expected {self._dtype} from 0 to 1: "
-                            f"divide by 255")
+        if name.startswith(("colors", "textures")):
+            _arrays.refuse_bytes("Scene", name, value, self._dtype)
         return _arrays.as_batched("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:
@@ -226,7 +225,7 @@ class Scene:
     @staticmethod
     def _normal_kind(normals: Any) -> int:
         given = len(_core.NORMAL_KINDS) - 1
-        if not isinstance(normals, str):
+        if normals is not None and not isinstance(normals, str):
             return given
         return _arrays.check_choice("Scene", "normals", normals, _core.NORMAL_KINDS[:given])
 

@@ -15,6 +15,13 @@ from tilegrad import Camera, Light, Renderer, Scene, Surface, Texture
 H, W = IMAGE["height"], IMAGE["width"]
 
 
+class Picture:
+    """An image of another library, which has its bytes without a dtype."""
+
+    def __init__(self, image):
+        self.image, self.__array_interface__ = image, image.__array_interface__
+
+
 def images(frame):
     return {name: np.array(getattr(frame, name)) for name in (*frame.outputs, "face_ids")}
 
@@ -448,6 +455,15 @@ class Errors(unittest.TestCase):
             (TypeError, "Scene: textures[1] has dtype uint8, expected float32 from 0 to 1: divide "
              "by 255", {"textures": [np.ones((2, 2, 3), np.float32),
                                      Texture(np.full((2, 2, 3), 255, np.uint8))]}),
+            (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
+             "255", {"colors": memoryview(np.full((16, 3), 255, np.uint8))}),
+            (TypeError, "Scene: textures[0] has dtype uint8, expected float32 from 0 to 1: divide "
+             "by 255", {"textures": Picture(np.full((2, 2, 3), 255, np.uint8))}),
+            (TypeError, "Scene: two_sided must be bool, got 'no' (str)", {"two_sided": "no"}),
+            (TypeError, "Scene: clamp must be bool, got 2 (int)", {"clamp": 2}),
+            (ValueError, "Scene: normals is None, expected one of 'smooth', 'flat'",
+             {"normals": None}),
+            (ValueError, "Scene: faces has shape (0,), expected (F, 3)", {"faces": []}),
         ]
         for error, text, change in cases:
             self.expect(error, text, lambda: scene.replace(**change))
@@ -474,6 +490,8 @@ class Errors(unittest.TestCase):
              lambda: render(scene, delta="soft")),
             (TypeError, "render: delta must be float, got '1' (str)",
              lambda: render(scene, delta="1")),
+            (ValueError, "render: delta is out of float's range",
+             lambda: render(scene, delta=10**400)),
             (TypeError, "render: outputs must be a name or a sequence of names, got int",
              lambda: render(scene, outputs=3)),
             (ValueError, "render: paper_faces is -1, must be >= 0",
@@ -517,6 +535,8 @@ class Errors(unittest.TestCase):
              lambda: renderer.backward(frame, alpha=ones, out=3)),
             (TypeError, "backward: wrt must be a name or a sequence of names, got int",
              lambda: renderer.backward(frame, alpha=ones, wrt=3)),
+            (TypeError, "backward: accumulate must be bool, got 'no' (str)",
+             lambda: renderer.backward(frame, alpha=ones, accumulate="no")),
         ]
         for error, text, call in cases:
             self.expect(error, text, call)
