@@ -46,6 +46,23 @@ class Surface(Packed):
                    shininess=shininess)
         self.texture = _arrays.contiguous("Surface", "texture", texture, np.int32)
 
+    @classmethod
+    def of_numbers(cls, numbers: np.ndarray) -> "Surface":
+        """Of an array (..., 13), which is not copied; without textures."""
+        surface = super().of_numbers(numbers)
+        surface.texture = np.array(-1, np.int32)
+        return surface
+
+    def __getitem__(self, index: Any) -> "Surface":
+        surface = super().__getitem__(index)
+        textures = np.array(self.textures(), np.int32).reshape(self.numbers.shape[:-1])
+        surface.texture = np.asarray(textures[index])
+        return surface
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [*super()._names(), "texture"]
+
     def textures(self) -> list[int]:
         """The texture of each surface."""
         count = self.numbers.shape[:-1] or (1,)

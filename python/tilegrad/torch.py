@@ -131,8 +131,15 @@ def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
     (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).
 
-    ValueError where the first three are 0 or the last three parallel to them.
+    TypeError if they are not real numbers, ValueError if they are not six, or where the first three
+    are 0 or the last three parallel to them.
     """
+    if not numbers.is_floating_point():
+        raise TypeError(f"rotation_6d: numbers have dtype {numbers.dtype}, expected torch.float32 "
+                        f"or torch.float64")
+    if numbers.ndim < 1 or numbers.shape[-1] != 6:
+        raise ValueError(f"rotation_6d: numbers have shape {tuple(numbers.shape)}, expected "
+                         f"(..., 6)")
     first, second = numbers[..., :3], numbers[..., 3:]
     x = torch.nn.functional.normalize(first, dim=-1)
     across = second - (x * second).sum(-1, keepdim=True) * x
@@ -161,8 +168,9 @@ class _Call:
         for name, value in options.items():
             if isinstance(value, torch.Tensor) and value.requires_grad:
                 raise ValueError(f"render: {name} has no gradient; give {name}.item()")
-        self.options, self.threads, self.surface_textures = options, threads, surface_textures
+        self.options, self.threads = options, thread_count("render", threads)
         self.arguments = dict(arguments)
+        self.surface_textures = self._surface_textures(surface_textures)
         self.places: list[tuple[str, int]] = []
         self.tensors: list[torch.Tensor] = []
         textures = self.arguments.get("textures")
@@ -174,6 +182,16 @@ class _Call:
                 self._note("textures", i, texture.texels)
         for name, value in self.arguments.items():
             self._note(name, 0, value)
+
+    def _surface_textures(self, given: Sequence[int]) -> np.ndarray:
+        """As Surface has them; one -1 for all surfaces if there are none."""
+        indices = _arrays.contiguous("render", "surface_textures", given, np.int32)
+        if not indices.size:
+            return np.array(-1, np.int32)
+        if not isinstance(self.arguments.get("surfaces"), torch.Tensor):
+            raise ValueError("render: surface_textures belong to surfaces in a tensor; a Surface "
+                             "has its own texture")
+        return indices
 
     def _note(self, name: str, index: int, value: Any) -> None:
         if not isinstance(value, torch.Tensor):
@@ -193,7 +211,7 @@ class _Call:
         if arguments.get("textures") is not None:
             arguments["textures"] = list(arguments["textures"])
         for (name, index), tensor in zip(self.places, tensors):
-            array = tensor.detach().numpy()
+            array = tensor.detach().resolve_neg().numpy()
             if name == "textures":
                 old = arguments["textures"][index]
                 arguments["textures"][index] = Texture(array, old.wrap, old.filter)
@@ -209,8 +227,7 @@ class _Call:
                              f"{_arrays.shape_text(('...', kind._SIZE))}")
         record = kind.of_numbers(array)
         if isinstance(record, Surface):
-            count = array.shape[0] if array.ndim > 1 else 1
-            record.texture = np.asarray(self.surface_textures or [-1] * count, np.int32)
+            record.texture = self.surface_textures
         return record
 
     def gradients(self, frame: Frame, wanted: Sequence[bool],
@@ -230,7 +247,7 @@ class _Call:
         return torch.from_numpy(value.numbers if name in _RECORDS else value)
 
     def _engine(self) -> _Engine:
-        return _engine(self.threads or thread_count("render", 0) or torch.get_num_threads())
+        return _engine(self.threads or torch.get_num_threads())
 
 
 class _Render(torch.autograd.Function):
@@ -255,7 +272,7 @@ class _Render(torch.autograd.Function):
     def backward(ctx: Any, *d_images: Optional[torch.Tensor]) -> tuple[Any, ...]:
         tensors = ctx.saved_tensors
         wanted = ctx.needs_input_grad[1:]
-        cotangents = {name: d_image.numpy() for name, d_image in zip(ctx.frame.outputs, d_images)
+        cotangents = {name: d_image.resolve_neg().numpy() for name, d_image in zip(ctx.frame.outputs, d_images)
                       if d_image is not None and name not in _CONSTANT}
         if not cotangents or not any(wanted):
             return (None,) * len(ctx.needs_input_grad)

@@ -402,6 +402,21 @@ class Scenes(unittest.TestCase):
         got = Renderer().render([scene, scene.replace(surfaces=joined)], **IMAGE).color
         self.assertTrue(np.array_equal(got[0], got[1]))
 
+    def test_surfaces_keep_their_textures(self):
+        pair = Surface(base_color=np.ones((2, 3)), texture=[1, 0])
+        self.assertEqual(pair.replace(shininess=3).textures(), [1, 0])
+        self.assertEqual(pair.replace(texture=-1).textures(), [-1, -1])
+        self.assertEqual([one.textures() for one in pair], [[1], [0]])
+        self.assertEqual(pair[1:].textures(), [0])
+        self.assertEqual(pair.replace(texture=1)[0].textures(), [1])
+        self.assertEqual(Surface.of_numbers(pair.numbers).textures(), [-1, -1])
+        self.assertIn("texture=[1, 0]", repr(pair))
+        scene = patch(surfaces=pair, textures=[np.full((2, 2, 3), v, np.float32) for v in (1, 2)])
+        for other in (list(pair), pair.replace(base_color=(1, 1, 1))):
+            self.assertTrue(np.array_equal(
+                Renderer().render(scene.replace(surfaces=other), **IMAGE).color,
+                Renderer().render(scene, **IMAGE).color))
+
     def test_lists_of_numbers_are_float32(self):
         scene = Scene([[0, 0, -1], [1, 0, -1], [0, 1, -1]], [[0, 1, 2]], Camera())
         self.assertEqual(scene.dtype, np.float32)

@@ -402,6 +402,36 @@ class Errors(unittest.TestCase):
                 with self.assertRaisesRegex(ValueError, "rotation_6d"):
                     tg.rotation_6d(torch.tensor([[1, 0, 0, 0, 1, 0], numbers], dtype=dtype))
 
+    def test_six_numbers_of_another_kind(self):
+        with self.assertRaisesRegex(ValueError, r"numbers have shape \(5,\), expected \(..., 6\)"):
+            tg.rotation_6d(torch.ones(5))
+        with self.assertRaisesRegex(TypeError, "numbers have dtype torch.int64"):
+            tg.rotation_6d(torch.tensor([1, 0, 0, 0, 1, 0]))
+
+    def test_surface_textures_and_threads(self):
+        given = tensors(np.float32)
+        self.assertIsInstance(given["surfaces"], torch.Tensor)
+        for bad, error in (((0.7, 0), TypeError), ((2**32, 0), ValueError)):
+            with self.assertRaisesRegex(error, "^render: surface_textures has"):
+                rendered(given, surface_textures=bad)
+        expected = rendered(given, surface_textures=(0, -1)).color
+        for same in (torch.tensor([0, -1]), np.array([0, -1])):
+            self.assertTrue(torch.equal(rendered(given, surface_textures=same).color, expected))
+        with self.assertRaisesRegex(ValueError, "^render: surface_textures belong to surfaces in"):
+            rendered({**given, "surfaces": Surface(texture=0), "face_surfaces": None},
+                     surface_textures=(0,))
+        with self.assertRaisesRegex(TypeError, "^render: threads must be int, got"):
+            rendered(given, threads=[2])
+
+    def test_lazy_negation(self):
+        """What torch has negated in name only, as the imaginary part of a conjugate."""
+        given = tensors(np.float32)
+        colors = given["colors"].detach()
+        lazy = torch.complex(colors, -colors).conj().imag
+        self.assertTrue(lazy.is_neg())
+        self.assertTrue(torch.equal(rendered({**given, "colors": lazy}).color,
+                                    rendered(given).color))
+
     def test_constants_of_the_package_are_taken(self):
         given = arguments(np.float32)
         given["positions"] = torch.tensor(given["positions"])
