@@ -272,7 +272,8 @@ class _Render(torch.autograd.Function):
     def backward(ctx: Any, *d_images: Optional[torch.Tensor]) -> tuple[Any, ...]:
         tensors = ctx.saved_tensors
         wanted = ctx.needs_input_grad[1:]
-        cotangents = {name: d_image.resolve_neg().numpy() for name, d_image in zip(ctx.frame.outputs, d_images)
+        cotangents = {name: d_image.resolve_neg().numpy()
+                      for name, d_image in zip(ctx.frame.outputs, d_images)
                       if d_image is not None and name not in _CONSTANT}
         if not cotangents or not any(wanted):
             return (None,) * len(ctx.needs_input_grad)

@@ -139,7 +139,9 @@ TEST(Workers, WithoutAPartTheyTakeThoseOfOthers) {
     } while (sharing && at_work() == 1 && std::chrono::steady_clock::now() < deadline);
   });
   EXPECT_EQ(tasks[0] + tasks[1] + tasks[2], 8 * loops);
-  if (sharing) EXPECT_GT(at_work(), 1);
+  if (sharing) {
+    EXPECT_GT(at_work(), 1);
+  }
 }
 
 // Sums of a nested loop by index, on `workers`; each worker's scratch is used by one task at a
