@@ -94,8 +94,8 @@ HWY_INLINE FaceInt AreaLanes(const SnappedLanes& s) {
 }
 
 // The records of a vector of faces as words: word w of all of them.
-inline constexpr int kWords = sizeof(DrawnFace) / 4, kEdgeWord = 4, kDepthWord = 13;
-static_assert(offsetof(DrawnFace, edge) == 4 * kEdgeWord && offsetof(DrawnFace, small) == 4 &&
+inline constexpr int kWords = sizeof(DrawnFace) / 4, kDepthWord = 4, kEdgeWord = 11;
+static_assert(offsetof(DrawnFace, edge) == 4 * kEdgeWord && offsetof(DrawnFace, pixels) == 4 &&
               offsetof(DrawnFace, column_begin) == 8 &&
               offsetof(DrawnFace, depth) == 4 * kDepthWord);
 struct FaceWords {
@@ -179,19 +179,23 @@ HWY_INLINE void SetDepth(ShapeCorners c, FaceWords* out) {
   for (int i = 0; i < 7; ++i) out->word[kDepthWord + i] = hn::BitCast(FaceIntTag(), plane[i]);
 }
 
-// Writes the records of the lanes in `keep`. Returns where the next one goes.
+// Of four words.
+inline constexpr int kPieces = kWords / 4;
+inline constexpr int kPiecesWithoutEdges = (kEdgeWord + 3) / 4;
+
+// Writes the first pieces of the records of the lanes in `keep`. Returns where the next one goes.
+template <int kCount>
 HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, DrawnFace* out) {
   const FaceIntTag di;
-  constexpr int kPieces = kWords / 4;
-  HWY_ALIGN std::int32_t piece[kPieces][4 * kMostFaceLanes];
-  for (int p = 0; p < kPieces; ++p) {
+  HWY_ALIGN std::int32_t piece[kCount][4 * kMostFaceLanes];
+  for (int p = 0; p < kCount; ++p) {
     const FaceInt* w = words.word + 4 * p;
     hn::StoreInterleaved4(w[0], w[1], w[2], w[3], di, piece[p]);
   }
   for (; keep != 0; keep &= keep - 1, ++out) {
     const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(keep);
     auto* bytes = reinterpret_cast<char*>(out);
-    for (int p = 0; p < kPieces; ++p) std::memcpy(bytes + 16 * p, piece[p] + 4 * lane, 16);
+    for (int p = 0; p < kCount; ++p) std::memcpy(bytes + 16 * p, piece[p] + 4 * lane, 16);
   }
   return out;
 }
@@ -247,25 +251,71 @@ HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& 
   return drawn;
 }
 
-HWY_INLINE FaceWords WordsOf(const ShapeCorners& corners, ShapeLanes* shapes, std::size_t f,
-                             const PixelLanes& columns, const PixelLanes& rows) {
-  const FaceIntTag di;
-  FaceWords words;
-  words.word[0] = simd::CountFrom(di, static_cast<std::int32_t>(f));
-  words.word[1] = hn::VecFromMask(di, shapes->small);
-  words.word[2] = hn::Or(columns.begin, hn::ShiftLeft<16>(columns.end));
-  words.word[3] = hn::Or(rows.begin, hn::ShiftLeft<16>(rows.end));
-  WindClockwise(shapes->area, &shapes->corners);
-  SetEdges(shapes->corners, columns.begin, rows.begin, &words);
-  SetDepth(corners, &words);
-  return words;
-}
-
 void SetWideDepths(const ScreenMesh& mesh, DrawnFace* first, DrawnFace* end) {
   for (; first != end; ++first) {
-    if (first->small != 0) continue;
+    if (first->pixels != DrawnFace::kByTiles) continue;
     first->depth = WideDepthPlane(mesh, static_cast<std::size_t>(first->face));
   }
+}
+
+// Bit kStamp * row + column: the face covers that pixel of its box.
+HWY_INLINE FaceInt CoveredOf(const FaceWords& words) {
+  const FaceIntTag di;
+  FaceInt row_edge[3], out = hn::Zero(di);
+  for (int k = 0; k < 3; ++k) row_edge[k] = words.word[kEdgeWord + k];
+  for (int row = 0; row < kStamp; ++row) {
+    FaceInt edge[3] = {row_edge[0], row_edge[1], row_edge[2]};
+    for (int column = 0; column < kStamp; ++column) {
+      const auto outside = hn::ShiftRight<31>(hn::Or(hn::Or(edge[0], edge[1]), edge[2]));
+      out = hn::Or(out, hn::AndNot(outside, hn::Set(di, 1 << (kStamp * row + column))));
+      for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], words.word[kEdgeWord + 3 + k]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      row_edge[k] = hn::Add(row_edge[k], words.word[kEdgeWord + 6 + k]);
+    }
+  }
+  return out;
+}
+
+HWY_INLINE FaceIntMask FitsStamp(const ShapeLanes& shapes, const PixelLanes& columns,
+                                 const PixelLanes& rows) {
+  const auto fits = [&](const PixelLanes& pixels) HWY_ATTR {
+    return hn::Lt(hn::Sub(pixels.end, pixels.begin), hn::Set(FaceIntTag(), kStamp + 1));
+  };
+  return hn::And(shapes.small, hn::And(fits(columns), fits(rows)));
+}
+
+// Writes the records of those faces in `keep` that may cover a pixel. Returns where the next one
+// goes.
+HWY_INLINE DrawnFace* ListFaces(const ScreenMesh& mesh, const ShapeCorners& corners,
+                                ShapeLanes* shapes, std::size_t f, std::uint32_t drawn,
+                                DrawnFace* to) {
+  const FaceIntTag di;
+  const PixelLanes columns = PixelsOf(shapes->x, mesh.width),
+                   rows = PixelsOf(shapes->y, mesh.height);
+  const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
+  std::uint32_t keep = drawn & MaskBits(covers);
+  if (keep == 0) return to;
+  FaceWords words;
+  WindClockwise(shapes->area, &shapes->corners);
+  SetEdges(shapes->corners, columns.begin, rows.begin, &words);
+  const auto stamped = FitsStamp(*shapes, columns, rows);
+  words.word[1] = hn::IfThenElseZero(shapes->small, hn::Set(di, DrawnFace::kByEdges));
+  const std::uint32_t stamps = MaskBits(stamped);
+  if ((keep & stamps) != 0) {
+    const auto covered = CoveredOf(words);
+    words.word[1] = hn::IfThenElse(stamped, covered, words.word[1]);
+    keep &= ~(stamps & MaskBits(hn::Eq(covered, hn::Zero(di))));
+    if (keep == 0) return to;
+  }
+  words.word[0] = simd::CountFrom(di, static_cast<std::int32_t>(f));
+  words.word[2] = hn::Or(columns.begin, hn::ShiftLeft<16>(columns.end));
+  words.word[3] = hn::Or(rows.begin, hn::ShiftLeft<16>(rows.end));
+  SetDepth(corners, &words);
+  if ((keep & ~stamps) == 0) return StoreRecords<kPiecesWithoutEdges>(words, keep, to);
+  DrawnFace* const end = StoreRecords<kPieces>(words, keep, to);
+  if ((keep & ~MaskBits(shapes->small)) != 0) SetWideDepths(mesh, to, end);
+  return end;
 }
 
 // Faces [begin, end). `out` null, or room for all of them. Returns how many were written.
@@ -278,16 +328,7 @@ std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t en
     const ShapeCorners corners = LoadShapeCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);
-    if (out == nullptr || drawn == 0) continue;
-    const PixelLanes columns = PixelsOf(shapes.x, mesh.width),
-                     rows = PixelsOf(shapes.y, mesh.height);
-    const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
-    const std::uint32_t keep = drawn & MaskBits(covers);
-    if (keep == 0) continue;
-    DrawnFace* const first = to;
-    const std::uint32_t small = MaskBits(shapes.small);
-    to = StoreRecords(WordsOf(corners, &shapes, f, columns, rows), keep, to);
-    if ((keep & ~small) != 0) SetWideDepths(mesh, first, to);
+    if (out != nullptr && drawn != 0) to = ListFaces(mesh, corners, &shapes, f, drawn, to);
   }
   return static_cast<std::size_t>(to - out);
 }

@@ -14,17 +14,27 @@
 
 namespace tilegrad::raster {
 
-// A face that has a pixel centre of the image in its box. Edge k at pixel (column, row) is
+// Faces with a box up to so many pixels wide and high know from the start which of a square of that
+// size they cover.
+inline constexpr int kStamp = 4;
+
+// A face that has a pixel centre of the image in its box, and covers one if `pixels` says so. Edge
+// k at pixel (column, row) is
 // edge[k] + step_x[k] * (column - column_begin) + step_y[k] * (row - row_begin), and the pixel is
 // covered if none is negative: the exact edge functions, divided by kSubpixels and rounded down,
 // which keeps their sign because a step of one pixel is a multiple of kSubpixels.
 struct DrawnFace {
-  std::int32_t face;   // index into the ScreenMesh
-  std::int32_t small;  // SnappedFace::small; 0: edge and steps are not set (TileFaceSetup makes
-                       // them per tile)
+  static constexpr std::int32_t kByTiles = 0;   // not SnappedFace::small; neither pixels nor edges
+                                                // are set (TileFaceSetup makes them per tile)
+  static constexpr std::int32_t kByEdges = -1;  // small, the box exceeds a stamp: edges are set
+
+  std::int32_t face;  // index into the ScreenMesh
+  // Those two, or else bit kStamp * row + column, from (column_begin, row_begin) on: it covers that
+  // pixel. Edges may not be set then.
+  std::int32_t pixels;
   std::int16_t column_begin, column_end, row_begin, row_end;  // pixels, within the image
-  std::int32_t edge[3], step_x[3], step_y[3];
   DepthPlane<float> depth;
+  std::int32_t edge[3], step_x[3], step_y[3];
 };
 static_assert(sizeof(DrawnFace) == 80);
 

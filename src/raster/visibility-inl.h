@@ -42,10 +42,6 @@ struct OneRow {
   }
 };
 
-// A box up to kStamp wide and high is drawn as one square of that size, without a branch: what lies
-// outside the box is not covered.
-inline constexpr int kStamp = 4;
-
 #if HWY_MAX_BYTES >= 32 && !HWY_HAVE_SCALABLE
 // Two rows of kStamp pixels.
 struct TwoRows {
@@ -105,10 +101,61 @@ struct EdgesAt {
   int columns, rows;  // from that pixel to the first that is drawn
 };
 
-// Mul and Add are kept apart (no fused MulAdd): the same bits on every instruction set.
+// 1/depth of a face at the rows of a vector of columns. Mul and Add are kept apart (no fused
+// MulAdd): the same bits on every instruction set.
+template <class Layout>
+class DepthRows {
+ public:
+  using Tag = typename Layout::Tag;
+  using V = hn::Vec<Tag>;
+
+  // From pixel (column, row) of the image on.
+  HWY_INLINE DepthRows(const DepthPlane<float>& plane, int column, int row)
+      : py_(Centre(Layout::Rows(), row)),
+        y0_(hn::Set(Tag(), plane.y0)),
+        gy_(hn::Set(Tag(), plane.gy)),
+        base_(hn::Set(Tag(), plane.base)),
+        low_(hn::Set(Tag(), plane.low)),
+        high_(hn::Set(Tag(), plane.high)) {
+    const V px = Centre(Layout::Columns(), column);
+    dx_ = hn::Mul(hn::Set(Tag(), plane.gx), hn::Sub(px, hn::Set(Tag(), plane.x0)));
+  }
+  // At the next Layout::kRows rows.
+  HWY_INLINE V Next() {
+    const V dy = hn::Mul(gy_, hn::Sub(py_, y0_));
+    py_ = hn::Add(py_, hn::Set(Tag(), static_cast<float>(Layout::kRows)));
+    return hn::Min(hn::Max(hn::Add(base_, hn::Add(dx_, dy)), low_), high_);
+  }
+
+ private:
+  HWY_INLINE static V Centre(hn::Vec<typename Layout::IntTag> inner, int first) {
+    const typename Layout::IntTag di;
+    return hn::Add(hn::ConvertTo(Tag(), hn::Add(inner, hn::Set(di, first))), hn::Set(Tag(), 0.5f));
+  }
+
+  V dx_, py_, y0_, gy_, base_, low_, high_;
+};
+
+// Draws `face` where it is `inside` and nearer than what is there: a vector at row i of `rows`.
+template <Layer kLayer, class Layout, class Inside>
+HWY_INLINE void DrawNearer(const DrawnRows& rows, int i, Inside inside,
+                           hn::Vec<typename Layout::IntTag> face, hn::Vec<typename Layout::Tag> z) {
+  const typename Layout::Tag d;
+  const typename Layout::IntTag di;
+  float* nearest = rows.inverse_depth + i * kBinSize + rows.column;
+  std::int32_t* ids = rows.face + i * kBinSize + rows.column;
+  const auto old = Layout::Load(nearest);
+  auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
+  if constexpr (kLayer == Layer::kPeel) {
+    const float* behind = rows.behind + i * kBinSize + rows.column;
+    seen = hn::And(seen, hn::Lt(z, Layout::Load(behind)));
+  }
+  Layout::Store(hn::IfThenElse(seen, z, old), nearest);
+  Layout::Store(hn::IfThenElse(hn::RebindMask(di, seen), face, Layout::Load(ids)), ids);
+}
+
 template <Layer kLayer, class Layout, class Face>
 HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, const DrawnRows& rows) {
-  const typename Layout::Tag d;
   const typename Layout::IntTag di;
   const auto columns = Layout::Columns(), inner_rows = Layout::Rows();
   hn::Vec<typename Layout::IntTag> edge[3], step[3];
@@ -120,33 +167,12 @@ HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, cons
         hn::Add(hn::Set(di, edges.from.edge[k]), hn::Add(hn::Mul(across, x), hn::Mul(down, y)));
     step[k] = Layout::kRows == 1 ? down : hn::Add(down, down);
   }
-  const DepthPlane<float>& plane = face.depth;
-  const auto half = hn::Set(d, 0.5f), next = hn::Set(d, static_cast<float>(Layout::kRows));
-  const auto centre = [&](hn::Vec<typename Layout::IntTag> inner, int first) HWY_ATTR {
-    return hn::Add(hn::ConvertTo(d, hn::Add(inner, hn::Set(di, first))), half);
-  };
-  const auto px = centre(columns, rows.x0 + rows.column);
-  auto py = centre(inner_rows, rows.y0 + rows.begin);
-  const auto dx = hn::Mul(hn::Set(d, plane.gx), hn::Sub(px, hn::Set(d, plane.x0)));
-  const auto y0 = hn::Set(d, plane.y0), gy = hn::Set(d, plane.gy), base = hn::Set(d, plane.base);
-  const auto low = hn::Set(d, plane.low), high = hn::Set(d, plane.high);
+  DepthRows<Layout> depth(face.depth, rows.x0 + rows.column, rows.y0 + rows.begin);
   const auto id = hn::Set(di, face.face);
   for (int i = rows.begin; i < rows.end; i += Layout::kRows) {
     const auto inside = hn::Gt(hn::Or(hn::Or(edge[0], edge[1]), edge[2]), hn::Set(di, -1));
     for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], step[k]);
-    const auto dy = hn::Mul(gy, hn::Sub(py, y0));
-    py = hn::Add(py, next);
-    const auto z = hn::Min(hn::Max(hn::Add(base, hn::Add(dx, dy)), low), high);
-    float* nearest = rows.inverse_depth + i * kBinSize + rows.column;
-    std::int32_t* ids = rows.face + i * kBinSize + rows.column;
-    const auto old = Layout::Load(nearest);
-    auto seen = hn::And(hn::RebindMask(d, inside), hn::Gt(z, old));
-    if constexpr (kLayer == Layer::kPeel) {
-      const float* behind = rows.behind + i * kBinSize + rows.column;
-      seen = hn::And(seen, hn::Lt(z, Layout::Load(behind)));
-    }
-    Layout::Store(hn::IfThenElse(seen, z, old), nearest);
-    Layout::Store(hn::IfThenElse(hn::RebindMask(di, seen), id, Layout::Load(ids)), ids);
+    DrawNearer<kLayer, Layout>(rows, i, inside, id, depth.Next());
   }
 }
 
@@ -156,14 +182,37 @@ HWY_INLINE TileRect BoxIn(const TileRect& rect, const DrawnFace& face) {
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
 
+// Pixels of a stamp, moved that many columns to the right and rows down, each less than kStamp;
+// what leaves it is lost.
+HWY_INLINE std::int32_t MovedStamp(std::int32_t pixels, int columns, int rows) {
+  constexpr std::int32_t kRow = (1 << kStamp) - 1, kAll = (1 << kStamp * kStamp) - 1;
+  constexpr std::int32_t kEachRow = kAll / kRow;
+  pixels = columns >= 0 ? pixels << columns & kEachRow * (kRow << columns & kRow)
+                        : pixels >> -columns & kEachRow * (kRow >> -columns);
+  return rows >= 0 ? pixels << kStamp * rows & kAll : pixels >> -kStamp * rows;
+}
+
+// A face of which the covered pixels are known. Without a branch on where they are: the stamp lies
+// in the bin as a whole.
 template <Layer kLayer>
-HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& box, const TileRect& rect,
-                          const BinTarget& out) {
-  const int column = HWY_MIN(box.x0, kBinSize - kStamp), row = HWY_MIN(box.y0, kBinSize - kStamp);
-  DrawRows<kLayer, StampLayout>(
-      EdgesAt<DrawnFace>{face, rect.x0 + column - face.column_begin,
-                         rect.y0 + row - face.row_begin},
-      face, {column, row, row + kStamp, rect.x0, rect.y0, out.face, out.inverse_depth, out.behind});
+HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
+  using Layout = StampLayout;
+  const Layout::IntTag di;
+  const int x = face.column_begin - rect.x0, y = face.row_begin - rect.y0;
+  const int column = HWY_MAX(0, HWY_MIN(x, kBinSize - kStamp));
+  const int row = HWY_MAX(0, HWY_MIN(y, kBinSize - kStamp));
+  std::int32_t pixels = face.pixels;
+  if (HWY_UNLIKELY(column != x || row != y)) pixels = MovedStamp(pixels, x - column, y - row);
+  const DrawnRows rows{column,  row,      row + kStamp,      rect.x0,
+                       rect.y0, out.face, out.inverse_depth, out.behind};
+  DepthRows<Layout> depth(face.depth, rect.x0 + column, rect.y0 + row);
+  const auto id = hn::Set(di, face.face);
+  const auto bits = hn::Shl(
+      hn::Set(di, 1), hn::Add(Layout::Columns(), hn::Mul(hn::Set(di, kStamp), Layout::Rows())));
+  for (int i = 0; i < kStamp; i += Layout::kRows) {
+    const auto inside = hn::Eq(hn::And(hn::Set(di, pixels >> kStamp * i), bits), bits);
+    DrawNearer<kLayer, Layout>(rows, row + i, inside, id, depth.Next());
+  }
 }
 
 // No overflow in the edge functions: they are below 2^21 in a small face's box, and steps are up to
@@ -172,10 +221,6 @@ template <Layer kLayer>
 HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
   const int lanes = static_cast<int>(hn::Lanes(VisibilityTag()));
   const TileRect box = BoxIn(rect, face);
-  if (box.x1 - box.x0 <= kStamp && box.y1 - box.y0 <= kStamp) {
-    DrawStamp<kLayer>(face, box, rect, out);
-    return;
-  }
   for (int at = HWY_MIN(box.x0, kBinSize - lanes); at < box.x1; at += lanes) {
     const int column = HWY_MIN(at, kBinSize - lanes);
     DrawRows<kLayer, OneRow<VisibilityTag>>(
@@ -275,7 +320,9 @@ HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const
     hwy::Prefetch(&ahead), hwy::Prefetch(&ahead.depth.high);
     const DrawnFace& face = record(i);
     if (face.depth.high <= floors.bin) continue;
-    if (face.small != 0) {
+    if (face.pixels > 0) {
+      DrawStamp<kLayer>(face, rect, out);
+    } else if (face.pixels == DrawnFace::kByEdges) {
       DrawSmall<kLayer>(face, rect, out);
     } else {
       DrawLarge<kLayer>(mesh, face, rect, &floors, out);

@@ -177,6 +177,39 @@ TEST_P(VisibilityOnEveryTarget, EqualsTheReferenceBitForBit) {
   }
 }
 
+// Faces of a few pixels, of which it is known from the start what they cover: across the borders of
+// bins and of the image, and by themselves.
+TEST_P(VisibilityOnEveryTarget, SmallFacesEqualTheReferenceAcrossBins) {
+  Rng rng(8, 4);
+  for (const auto& [width, height] : {std::pair{150, 131}, {64, 64}, {3, 70}, {66, 2}, {1, 1}}) {
+    Flat flat(width, height);
+    const int count = 40 + width * height / 4;
+    for (int f = 0; f < count; ++f) {
+      const double cx = rng.Uniform(-2, width + 2), cy = rng.Uniform(-2, height + 2);
+      const double size = rng.Uniform(0.1, 3.5);
+      std::int32_t v[3];
+      for (auto& index : v) {
+        index = flat.Vertex(cx + rng.Uniform(-size, size), cy + rng.Uniform(-size, size),
+                            rng.Uniform(1, 3));
+      }
+      flat.AddFace(v[0], v[1], v[2]);
+    }
+    const ScreenMesh mesh = flat.Finish();
+    EXPECT_EQ(Visible(mesh), VisibleRef(mesh)) << width << " x " << height;
+  }
+}
+
+// A face that has pixel centres in its box, but covers none, is not listed.
+TEST_P(VisibilityOnEveryTarget, SmallFacesWithoutAPixelAreNotDrawn) {
+  Flat flat(8, 8);
+  const auto a = flat.Vertex(1.6, 2.4), b = flat.Vertex(3.4, 4.3), c = flat.Vertex(3.45, 4.3);
+  flat.AddFace(a, b, c);
+  flat.AddFace(a, flat.Vertex(4, 2), b);
+  const DrawnFaces drawn = DrawnFacesOf(flat.Finish());
+  ASSERT_EQ(drawn.counts[0], 1u);
+  EXPECT_EQ(drawn.list(0)[0].face, 1);
+}
+
 // What a pixel shows, layer by layer, by sorting all faces that cover it.
 std::vector<std::int32_t> LayersAt(const std::vector<VisibilitySetup<float>>& faces, int x, int y) {
   std::vector<std::pair<float, std::int32_t>> covering;
