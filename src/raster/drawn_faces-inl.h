@@ -258,23 +258,28 @@ void SetWideDepths(const ScreenMesh& mesh, DrawnFace* first, DrawnFace* end) {
   }
 }
 
-// Bit kStamp * row + column: the face covers that pixel of its box.
+// Bit kStamp * row + column: the face covers that pixel of its box. From the last pixel to the
+// first: what is known then moves up by a bit each time, which takes no constants.
 HWY_INLINE FaceInt CoveredOf(const FaceWords& words) {
   const FaceIntTag di;
-  FaceInt row_edge[3], out = hn::Zero(di);
-  for (int k = 0; k < 3; ++k) row_edge[k] = words.word[kEdgeWord + k];
-  for (int row = 0; row < kStamp; ++row) {
-    FaceInt edge[3] = {row_edge[0], row_edge[1], row_edge[2]};
-    for (int column = 0; column < kStamp; ++column) {
-      const auto outside = hn::ShiftRight<31>(hn::Or(hn::Or(edge[0], edge[1]), edge[2]));
-      out = hn::Or(out, hn::AndNot(outside, hn::Set(di, 1 << (kStamp * row + column))));
-      for (int k = 0; k < 3; ++k) edge[k] = hn::Add(edge[k], words.word[kEdgeWord + 3 + k]);
-    }
-    for (int k = 0; k < 3; ++k) {
-      row_edge[k] = hn::Add(row_edge[k], words.word[kEdgeWord + 6 + k]);
-    }
+  static_assert(kStamp == 4);
+  FaceInt across[3], down[3], row_edge[3];
+  for (int k = 0; k < 3; ++k) {
+    across[k] = words.word[kEdgeWord + 3 + k], down[k] = words.word[kEdgeWord + 6 + k];
+    const auto both = hn::Add(across[k], down[k]);
+    row_edge[k] = hn::Add(words.word[kEdgeWord + k], hn::Add(both, hn::Add(both, both)));
   }
-  return out;
+  FaceInt outside = hn::Zero(di);  // minus the bits
+  for (int row = kStamp - 1; row >= 0; --row) {
+    FaceInt edge[3] = {row_edge[0], row_edge[1], row_edge[2]};
+    for (int column = kStamp - 1; column >= 0; --column) {
+      const auto here = hn::ShiftRight<31>(hn::Or(hn::Or(edge[0], edge[1]), edge[2]));
+      outside = hn::Add(hn::Add(outside, outside), here);
+      for (int k = 0; k < 3; ++k) edge[k] = hn::Sub(edge[k], across[k]);
+    }
+    for (int k = 0; k < 3; ++k) row_edge[k] = hn::Sub(row_edge[k], down[k]);
+  }
+  return hn::Add(outside, hn::Set(di, (1 << kStamp * kStamp) - 1));
 }
 
 HWY_INLINE FaceIntMask FitsStamp(const ShapeLanes& shapes, const PixelLanes& columns,
