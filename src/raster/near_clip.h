@@ -4,9 +4,12 @@
 // are rare, by the fast path too.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 
 #include "raster/attributes.h"
 #include "raster/coverage.h"
@@ -89,6 +92,42 @@ void AppendFace(const FaceSource<T>& source, std::int32_t source_face, std::int3
   out->reject.push_back(reject);
 }
 
+// Turns a quadrilateral so that it begins with that of its two corners which the scene has first:
+// by x, then y, then z. Wherever coinciding faces start and however they are wound, they then have
+// the same pieces, and the tie rule decides between them. By given positions, not by those on the
+// screen, which float and double round differently.
+template <class T>
+void StartAtFirstCorner(const FaceSource<T>& source, std::int32_t (&polygon)[4]) {
+  const auto key = [&](std::int32_t v) {
+    const T* p = &source.positions[3 * static_cast<std::size_t>(v)];
+    return std::tuple(RealPart(p[0]), RealPart(p[1]), RealPart(p[2]));
+  };
+  const auto vertices = static_cast<std::int32_t>(source.positions.size() / 3);
+  std::int32_t* first = nullptr;
+  for (std::int32_t& v : polygon) {
+    if (v < vertices && (first == nullptr || key(v) < key(*first))) first = &v;
+  }
+  std::rotate(polygon, first, polygon + 4);
+}
+
+// Appends a piece of a cut face. It begins with the face's first corner, or else with one that
+// cutting made. Kernels give a piece's first corner the weight that the others leave, so a small
+// one has no digits: that of the face's first corner is no output, and on the near plane weights
+// are large.
+template <class T>
+void AppendPiece(const FaceSource<T>& source, std::int32_t face,
+                 std::array<std::int32_t, 3> corners, ScreenMeshBuffersT<T>* out) {
+  const auto vertices = static_cast<std::int32_t>(source.positions.size() / 3);
+  auto start =
+      std::find(corners.begin(), corners.end(), source.faces[3 * static_cast<std::size_t>(face)]);
+  if (start == corners.end()) {
+    start =
+        std::find_if(corners.begin(), corners.end(), [&](std::int32_t v) { return v >= vertices; });
+  }
+  std::rotate(corners.begin(), start, corners.end());
+  AppendFace(source, face, corners[0], corners[1], corners[2], 0, out);
+}
+
 // Appends what remains of a face with one or two hidden corners: a triangle or a quadrilateral.
 template <class T>
 void AppendCutFace(const FaceSource<T>& source, std::int32_t face, ScreenMeshBuffersT<T>* out) {
@@ -104,8 +143,9 @@ void AppendCutFace(const FaceSource<T>& source, std::int32_t face, ScreenMeshBuf
     if (a_in && !b_in) polygon[n++] = AppendClipVertex(source, a, b, out);
     if (!a_in && b_in) polygon[n++] = AppendClipVertex(source, b, a, out);
   }
+  if (n == 4) StartAtFirstCorner(source, polygon);
   for (int k = 2; k < n; ++k) {
-    AppendFace(source, face, polygon[0], polygon[k - 1], polygon[k], 0, out);
+    AppendPiece(source, face, {polygon[0], polygon[k - 1], polygon[k]}, out);
   }
 }
 

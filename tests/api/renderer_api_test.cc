@@ -3,6 +3,7 @@
 // added, shared or refused, errors, threads.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -110,6 +111,34 @@ struct CutWall {
     scene.camera.near_plane = static_cast<T>(0.01f);
   }
 };
+
+// Wherever faces start and however they are wound, all of them cut at the near plane.
+template <class T>
+void ExpectTheLowerIdOfCoincidingWalls() {
+  test::Numbers numbers;
+  RenderOptions options;
+  options.width = 48, options.height = 40;
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  int pixels = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    CutWall<T> wall(&numbers);
+    wall.faces = {0, 1, 2, 1, 2, 0, 0, 2, 1, 2, 1, 0};
+    std::rotate(wall.faces.begin(), wall.faces.begin() + 3 * (trial % 4), wall.faces.end());
+    wall.scene.faces = wall.faces;
+    ASSERT_TRUE(renderer.Render({&wall.scene, 1}, options, {}, &frame).ok());
+    for (const std::int32_t id : frame.images().face_ids) {
+      ASSERT_LE(id, 0) << trial;
+      pixels += id == 0;
+    }
+  }
+  EXPECT_GT(pixels, 1000);
+}
+
+TEST(ApiImages, CoincidingFacesCutAtTheNearPlaneShowTheLowerId) {
+  ExpectTheLowerIdOfCoincidingWalls<float>();
+  ExpectTheLowerIdOfCoincidingWalls<double>();
+}
 
 // Relative to depth 1e-5 is 170 roundings; weights are 1 at most, and amplify what is rounded of a
 // face's 1/depth, which varies by up to 500 in these.
