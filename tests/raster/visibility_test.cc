@@ -183,7 +183,7 @@ TEST_P(VisibilityOnEveryTarget, SmallFacesEqualTheReferenceAcrossBins) {
   Rng rng(8, 4);
   for (const auto& [width, height] : {std::pair{150, 131}, {64, 64}, {3, 70}, {66, 2}, {1, 1}}) {
     Flat flat(width, height);
-    const int count = 40 + width * height / 4;
+    const int count = 40 + width * height / 15;
     for (int f = 0; f < count; ++f) {
       const double cx = rng.Uniform(-2, width + 2), cy = rng.Uniform(-2, height + 2);
       const double size = rng.Uniform(0.1, 3.5);
