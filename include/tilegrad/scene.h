@@ -115,7 +115,7 @@ using Scene = SceneT<float>;
 
 // dL/d(scene). An empty span (or null) is not computed and costs nothing. Scenes of a batch may
 // be given the same array, of many views of one mesh, say: it gets their sum, in the order of
-// scenes. Arrays must not overlap in part; this is not checked.
+// scenes. Arrays that overlap in part, or are of two kinds or sizes, are an error.
 template <class T>
 struct SceneGradientsT {
   std::span<T> positions{};      // shapes as in the scene

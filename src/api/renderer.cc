@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/convert.h"
+#include "api/gradient_arrays.h"
 #include "api/guarded.h"
 #include "api/prior_values.h"
 #include "api/reference_renderer.h"
@@ -41,6 +42,7 @@ struct RendererT<T>::Impl {
   Engine renderer;
   std::vector<GradientRecords<T>> gradient_records;
   std::vector<engine::ShadedGradientsT<T>> gradients;
+  GradientArrays<T> gradient_arrays;
   PriorValues<T> prior;
 };
 
@@ -67,6 +69,7 @@ Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
                                     const FrameGradientsT<T>& d_frame,
                                     std::span<const SceneGradientsT<T>> d_scenes,
                                     GradientMode mode) {
+  TILEGRAD_TRY(gradient_arrays.Check(frame.scenes, d_scenes));
   const bool add = mode == GradientMode::kAdd;
   if (gradient_records.size() < d_scenes.size()) gradient_records.resize(d_scenes.size());
   gradients.clear();

@@ -302,6 +302,77 @@ TEST(ApiBackward, ScenesThatShareAnArrayGetTheSum) {
   ExpectSharedArraysGetTheSum<double>();
 }
 
+// One array for meshes of two sizes, or for two things: either would be written beyond its end, or
+// hold one of them only.
+template <class T>
+void ExpectArraysThatMeetAreRefused() {
+  const TestScene<T> s(Lighting::kNone);
+  std::vector<SceneT<T>> scenes(2, s.scene);
+  scenes[1].positions = s.scene.positions.first(45), scenes[1].faces = s.scene.faces.first(36);
+  for (SceneT<T>& scene : scenes) {
+    scene.uvs = {}, scene.textures = {}, scene.surfaces = {};
+    scene.colors.values = scene.colors.values.first(scene.positions.size());
+    scene.attributes.values = scene.attributes.values.first(2 * scene.positions.size() / 3);
+  }
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const std::vector<T> d_color(frame.images().color.size(), T(1));
+  std::vector<T> one(48, T(3)), two(48);
+  const auto message = [&](const SceneGradientsT<T>& a, const SceneGradientsT<T>& b,
+                           GradientMode mode) {
+    const std::vector<SceneGradientsT<T>> d = {a, b};
+    return renderer.Backward(frame, {.color = d_color}, d, mode).message();
+  };
+  const std::span<T> all(one), some = all.first(45);
+  const std::string shared = ": only whole arrays of the same kind and size may be shared";
+  for (const GradientMode mode : {GradientMode::kOverwrite, GradientMode::kAdd}) {
+    EXPECT_EQ(message({.positions = all}, {.positions = some}, mode),
+              "d_scene.positions of scene 0 (48 numbers) and d_scene.positions of scene 1 (45 "
+              "numbers) overlap" +
+                  shared);
+    EXPECT_EQ(message({.positions = all, .colors = all}, {}, mode),
+              "d_scene.positions of scene 0 (48 numbers) and d_scene.colors of scene 0 (48 "
+              "numbers) overlap" +
+                  shared);
+    EXPECT_EQ(
+        message({.positions = two}, {.positions = some, .attributes = all.subspan(7, 30)}, mode),
+        "d_scene.positions of scene 1 (45 numbers) and d_scene.attributes of scene 1 (30 "
+        "numbers) overlap" +
+            shared);
+  }
+  EXPECT_EQ(one, std::vector<T>(48, T(3)));
+  EXPECT_EQ(message({.positions = all}, {.positions = std::span(two).first(45)},
+                    GradientMode::kOverwrite),
+            "");
+}
+TEST(ApiBackward, ArraysOfGradientsThatMeetAreRefused) {
+  ExpectArraysThatMeetAreRefused<float>();
+  ExpectArraysThatMeetAreRefused<double>();
+}
+
+// Without mip levels in one scene, with them in the next: there is room for those of both.
+TEST(ApiBackward, TexturesOfTwoFiltersShareAGradient) {
+  const TestScene<float> s(Lighting::kNone);
+  std::vector<std::vector<Texture>> textures(2, s.textures);
+  textures[1][0].filter = Filter::kTrilinear;
+  std::vector<Scene> scenes(2, s.scene);
+  std::vector<float> uvs(s.uvs);
+  for (float& x : uvs) x *= 40;  // coarse levels
+  for (std::size_t n : {0, 1}) scenes[n].textures = textures[n], scenes[n].uvs.values = uvs;
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> first(s), second(s), both(s);
+  const std::vector<SceneGradients> apart = {first.d, second.d}, shared = {both.d, both.d};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, apart).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, shared).ok());
+  for (std::size_t i = 0; i < both.texels.size(); ++i) {
+    EXPECT_NEAR(both.texels[i], first.texels[i] + second.texels[i], 1e-3) << i;
+  }
+}
+
 TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
   const TestScene<float> s(Lighting::kNone);
   Renderer renderer;

@@ -131,10 +131,16 @@ void TextureMerge::FindTargets(std::span<const StageScene> scenes,
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     for (std::size_t t = 0; t < d_scenes[n].textures.size(); ++t) {
       const std::span<float> out = d_scenes[n].textures[t];
-      const bool known = std::any_of(targets_.begin(), targets_.end(), [&](const Target& target) {
+      if (out.empty()) continue;
+      const auto known = std::find_if(targets_.begin(), targets_.end(), [&](const Target& target) {
         return target.out.data() == out.data();
       });
-      if (!out.empty() && !known) targets_.push_back({out, scenes[n].textures[t]});
+      const shade::TexturePyramid* pyramid = scenes[n].textures[t];
+      if (known == targets_.end()) {
+        targets_.push_back({out, pyramid});
+      } else if (pyramid->sizes().size() > known->pyramid->sizes().size()) {
+        known->pyramid = pyramid;  // one is mip-mapped: there is room for all of its levels
+      }
     }
   }
   while (gradients_.size() < targets_.size()) {
