@@ -52,7 +52,7 @@ bool IsSoundScene(const SceneView& scene, const Unchanged& unchanged) {
   const auto vertices = static_cast<std::int32_t>(scene.positions.size() / 3);
   return (unchanged.faces || AllWithin(scene.faces, 0, vertices)) &&
          (unchanged.positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
-         IsFiniteCamera(scene.camera) && scene.camera.near_plane > 0;
+         IsSoundCamera(scene.camera);
 }
 
 bool IsPrepared(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,

@@ -8,4 +8,8 @@ bool IsFiniteCamera(const Camera& camera) {
   return AllFinite(camera.rotation) && AllFinite(camera.translation) && AllFinite(numbers);
 }
 
+bool IsSoundCamera(const Camera& camera) {
+  return IsFiniteCamera(camera) && camera.fx > 0 && camera.fy > 0 && camera.near_plane > 0;
+}
+
 }  // namespace tilegrad

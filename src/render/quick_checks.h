@@ -8,5 +8,7 @@
 namespace tilegrad {
 
 bool IsFiniteCamera(const Camera& camera);  // all of its numbers
+// Focal lengths and near plane are above 0, too.
+bool IsSoundCamera(const Camera& camera);
 
 }  // namespace tilegrad

@@ -33,13 +33,6 @@ Status CheckFaces(std::span<const std::int32_t> faces, std::size_t vertices) {
   return {};
 }
 
-Status CheckCameraNumbers(const Camera& camera) {
-  TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
-  TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
-  const float numbers[5] = {camera.fx, camera.fy, camera.cx, camera.cy, camera.near_plane};
-  return CheckFinite("camera.{fx, fy, cx, cy, near_plane}", numbers);
-}
-
 Status CheckCameraGradient(const Camera& d_camera) {
   TILEGRAD_TRY(CheckFinite("d_scene.d_camera.rotation", d_camera.rotation));
   TILEGRAD_TRY(CheckFinite("d_scene.d_camera.translation", d_camera.translation));
@@ -48,9 +41,21 @@ Status CheckCameraGradient(const Camera& d_camera) {
 }
 
 Status CheckCamera(const Camera& camera) {
-  TILEGRAD_TRY(CheckCameraNumbers(camera));
-  if (!(camera.near_plane > 0)) {
-    return InvalidArgument("camera.near_plane is {}, must be > 0", camera.near_plane);
+  TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
+  TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
+  const struct {
+    const char* name;
+    float value;
+  } positive[] = {{"fx", camera.fx}, {"fy", camera.fy}, {"near_plane", camera.near_plane}},
+    others[] = {{"cx", camera.cx}, {"cy", camera.cy}};
+  for (const auto& n : positive) {
+    if (n.value > 0 && std::isfinite(n.value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite and > 0", n.name, n.value);
+  }
+  for (const auto& n : others) {
+    if (!std::isfinite(n.value)) {
+      return InvalidArgument("camera.{} is {}, must be finite", n.name, n.value);
+    }
   }
   return {};
 }
