@@ -86,13 +86,15 @@ void WriteSized(S value, std::size_t size, S* to) {
 
 Status ReadScenes(const tilegrad_scene* scenes, std::size_t count, tilegrad_frame* frame) {
   frame->count = 0;
-  if (frame->scenes.size() < count) frame->scenes.resize(count);
   frame->views.clear();
+  TILEGRAD_TRY(api::CheckCount("count", count));
   for (std::size_t n = 0; n < count; ++n) {
     tilegrad_scene scene = DefaultScene();
-    Status status = api::ReadSized("scene", api::EntryOf(scenes, n), &scene);
+    Status status = api::ReadEntry("scene", scenes, n, &scene);
     if (status.ok()) status = api::CheckCounts(scene);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
+    // One by one: a wrong count is found by what is there, before it takes memory.
+    if (frame->scenes.size() <= n) frame->scenes.emplace_back();
     frame->scenes[n].Set(scene);
     frame->views.push_back(frame->scenes[n].scene);
   }
@@ -113,7 +115,7 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
   if (r->gradients.size() < count) r->gradients.resize(count);
   r->views.clear();
   for (std::size_t n = 0; n < count; ++n) {
-    Status status = api::ReadSized("d_scene", api::EntryOf(d_scenes, n), &r->wanted[n]);
+    Status status = api::ReadEntry("d_scene", d_scenes, n, &r->wanted[n]);
     if (status.ok()) status = api::CheckWanted(r->wanted[n], frame->views[n]);
     if (!status.ok()) return status.Within(fmt::format("scene {}", n));
     r->gradients[n].Set(r->wanted[n], frame->views[n]);
@@ -182,11 +184,11 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
 }
 
 tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame, tilegrad_images* images) {
-  if (frame == nullptr || images == nullptr || images->struct_size < sizeof(size_t)) {
-    return TILEGRAD_INVALID_ARGUMENT;
-  }
-  WriteSized(ImagesOf(frame->frame.images()), images->struct_size, images);
-  return TILEGRAD_OK;
+  if (frame == nullptr || images == nullptr) return TILEGRAD_INVALID_ARGUMENT;
+  const std::size_t size = images->struct_size;
+  const Status status = api::Guarded([&] { return api::CheckStructSize("images", size); });
+  if (status.ok()) WriteSized(ImagesOf(frame->frame.images()), size, images);
+  return CodeOf(status);
 }
 
 tilegrad_status tilegrad_backward(tilegrad_renderer* renderer, const tilegrad_frame* frame,

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "api/c_records.h"
 
+#include <cstdint>
+#include <limits>
+
 #include "api/convert.h"
 
 namespace tilegrad::v0 {
@@ -54,9 +57,27 @@ void AddCamera(const Camera& from, tilegrad_camera* to) {
   to->fx += from.fx, to->fy += from.fy, to->cx += from.cx, to->cy += from.cy;
 }
 
+// NULL of an empty list, whatever memory it has.
+template <class Item>
+const Item* ItemsOf(std::span<const Item> list) {
+  return list.empty() ? nullptr : list.data();
+}
+
 const float* DataOf(std::span<const float> image) { return image.empty() ? nullptr : image.data(); }
 
 }  // namespace
+
+Status CheckStructSize(const char* name, std::size_t size) {
+  constexpr std::size_t kMost = 65536;
+  if (size >= sizeof(std::size_t) && size <= kMost) return {};
+  return InvalidArgument("{}.struct_size is {}: tilegrad_..._init comes first", name, size);
+}
+
+Status CheckCount(const char* name, std::size_t count) {
+  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
+  if (count <= kMost) return {};
+  return InvalidArgument("{} is {}, must be in 0..{}", name, count, kMost);
+}
 
 Status CheckCounts(const tilegrad_scene& scene) {
   const struct {
@@ -70,6 +91,7 @@ Status CheckCounts(const tilegrad_scene& scene) {
              {"surfaces", scene.surfaces != nullptr, "surface_count", scene.surface_count},
              {"lights", scene.lights != nullptr, "light_count", scene.light_count}};
   for (const auto& a : all) {
+    TILEGRAD_TRY(CheckCount(a.name, a.count));
     if (a.given || a.count == 0) continue;
     return InvalidArgument("{} is NULL, but {} is {}", a.array, a.name, a.count);
   }
@@ -79,13 +101,15 @@ Status CheckCounts(const tilegrad_scene& scene) {
 Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
   const struct {
     const char* array;
-    const float *wanted, *given;
+    const void *wanted, *given;
   } all[] = {{"colors", wanted.colors, scene.colors.values.data()},
              {"uvs", wanted.uvs, scene.uvs.values.data()},
              {"normals", wanted.normals, scene.normals.values.data()},
              {"attributes", wanted.attributes, scene.attributes.values.data()},
              {"light_directions", wanted.light_directions, scene.light_directions.data()},
-             {"sh", wanted.sh, scene.sh.data()}};
+             {"sh", wanted.sh, scene.sh.data()},
+             {"textures", wanted.textures, ItemsOf(scene.textures)},
+             {"lights", wanted.lights, ItemsOf(scene.lights)}};
   for (const auto& a : all) {
     if (a.wanted == nullptr || a.given != nullptr) continue;
     return InvalidArgument("d_scene.{} is wanted, but the scene has none", a.array);

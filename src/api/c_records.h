@@ -14,16 +14,21 @@
 
 namespace tilegrad::v0 {
 
+// Of a struct or an array of structs, which may stand anywhere.
+inline std::size_t StructSize(const void* from) {
+  std::size_t size;
+  std::memcpy(&size, from, sizeof size);
+  return size;
+}
+Status CheckStructSize(const char* name, std::size_t size);
+
 // A struct of the caller, whose size may be that of an older or a newer version: `to` keeps its
 // defaults where the caller's ends. A newer one may not say anything that we do not know.
 template <class S>
 Status ReadSized(const char* name, const S* from, S* to) {
   if (from == nullptr) return InvalidArgument("{} is NULL", name);
-  const std::size_t size = from->struct_size;
-  constexpr std::size_t kMost = 65536;
-  if (size < sizeof(std::size_t) || size > kMost) {
-    return InvalidArgument("{}.struct_size is {}: tilegrad_..._init comes first", name, size);
-  }
+  const std::size_t size = StructSize(from);
+  TILEGRAD_TRY(CheckStructSize(name, size));
   const auto* bytes = reinterpret_cast<const char*>(from);
   for (std::size_t i = sizeof(S); i < size; ++i) {
     if (bytes[i] != 0) {
@@ -35,13 +40,21 @@ Status ReadSized(const char* name, const S* from, S* to) {
   return {};
 }
 
-// Entry n of an array of structs of the caller's size.
+// Entry n, all before which were read, of an array of structs of the caller's size.
 template <class S>
-const S* EntryOf(const S* array, std::size_t n) {
-  if (array == nullptr) return nullptr;
-  return reinterpret_cast<const S*>(reinterpret_cast<const char*>(array) + n * array->struct_size);
+Status ReadEntry(const char* name, const S* array, std::size_t n, S* to) {
+  if (array == nullptr) return InvalidArgument("{} is NULL", name);
+  const std::size_t size = StructSize(array);
+  const auto* entry = reinterpret_cast<const S*>(reinterpret_cast<const char*>(array) + n * size);
+  if (n > 0 && StructSize(entry) != size) {
+    return InvalidArgument("{}.struct_size is {}, that of the first is {}", name, StructSize(entry),
+                           size);
+  }
+  return ReadSized(name, entry, to);
 }
 
+// A negative number that became a size is none.
+Status CheckCount(const char* name, std::size_t count);
 // An array that is NULL has no entries: a count says otherwise where a pointer was forgotten.
 Status CheckCounts(const tilegrad_scene& scene);
 // A gradient of an array that the scene does not have would be left as it is.

@@ -194,6 +194,56 @@ TEST_F(CApi, GradientsOfWhatIsNotThereAreRefused) {
             "scene 0: d_scene.normals is wanted, but the scene has none");
 }
 
+TEST_F(CApi, TexturesAndLightsThatAreNotThereHaveNoGradients) {
+  c.scene.textures = nullptr, c.scene.texture_count = 0, c.surface.texture = -1;
+  c.scene.lights = nullptr, c.scene.light_count = 0, c.scene.lighting = 0;
+  ASSERT_EQ(Render(), TILEGRAD_OK) << tilegrad_last_error(renderer);
+  tilegrad_frame_gradients d_frame;
+  tilegrad_frame_gradients_init(&d_frame);
+  tilegrad_scene_gradients d_scene;
+  tilegrad_scene_gradients_init(&d_scene);
+  float* textures[1] = {};
+  d_scene.textures = textures;
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+            "scene 0: d_scene.textures is wanted, but the scene has none");
+  tilegrad_light d_light = {};
+  d_scene.textures = nullptr, d_scene.lights = &d_light;
+  EXPECT_EQ(ErrorOf(tilegrad_backward(renderer, frame, &d_frame, &d_scene, 1, 0)),
+            "scene 0: d_scene.lights is wanted, but the scene has none");
+}
+
+// -1 as a size, for one.
+TEST_F(CApi, CountsBeyondAnyArrayAreNamed) {
+  const std::size_t none = static_cast<std::size_t>(-1);
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, none, &options, frame)),
+            "count is 18446744073709551615, must be in 0..2147483647");
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 2147483647, &options, frame)),
+            "scene 0: scene is NULL");
+  const tilegrad_scene sound = c.scene;
+  c.scene.light_count = none;
+  EXPECT_EQ(ErrorOf(Render()),
+            "scene 0: light_count is 18446744073709551615, must be in 0..2147483647");
+  c.scene = sound, c.scene.vertices = none / 2;
+  EXPECT_EQ(ErrorOf(Render()),
+            "scene 0: vertices is 9223372036854775807, must be in 0..2147483647");
+}
+
+TEST_F(CApi, StructsOfAnArrayHaveOneSize) {
+  tilegrad_scene scenes[2] = {c.scene, c.scene};
+  scenes[1].struct_size = offsetof(tilegrad_scene, sh);
+  EXPECT_EQ(ErrorOf(tilegrad_render(renderer, scenes, 2, &options, frame)),
+            "scene 1: scene.struct_size is " + std::to_string(offsetof(tilegrad_scene, sh)) +
+                ", that of the first is " + std::to_string(sizeof(tilegrad_scene)));
+}
+
+TEST_F(CApi, ImagesWithoutInitAreNotWritten) {
+  tilegrad_images images;
+  std::memset(&images, 0x55, sizeof images);
+  EXPECT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_INVALID_ARGUMENT);
+  images.struct_size = 0;
+  EXPECT_EQ(tilegrad_frame_images(frame, &images), TILEGRAD_INVALID_ARGUMENT);
+}
+
 TEST_F(CApi, SaysWhatIsWrong) {
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, &c.scene, 1, nullptr, frame)), "options is NULL");
   EXPECT_EQ(ErrorOf(tilegrad_render(renderer, nullptr, 1, &options, frame)),
