@@ -4,7 +4,8 @@ and counted, what is wrong is refused with the function's name, the argument, an
 and got. The one home of these checks in Python.
 
 Accepted: NumPy arrays, anything with the buffer protocol, `__array_interface__`, `__dlpack__` (on
-the CPU) or `__array__`, numbers, and nested sequences of numbers.
+the CPU) or `__array__`, numbers, and nested sequences of numbers. Masked arrays only if nothing in
+them is masked: rendering has no place for numbers that do not count.
 """
 
 from __future__ import annotations
@@ -203,8 +204,16 @@ def as_pixels(function: str, argument: str, value: Any) -> int:
     return number
 
 
+def refuse_masked(function: str, argument: str, value: Any) -> None:
+    """TypeError if numbers of `value` are masked: NumPy would take what is behind the mask."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise TypeError(f"{function}: {argument} is a masked array, and {np.ma.count_masked(value)} "
+                        f"of its numbers are masked; put numbers there first, by filled()")
+
+
 def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
     """Anything but a plain NumPy array as one, without a copy where the protocol allows it."""
+    refuse_masked(function, argument, value)
     try:
         if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
             return _from_dlpack(function, argument, value)

@@ -139,7 +139,7 @@ class Scene:
     sh: (9,), orthonormal real spherical harmonics 1, -y, z, -x, xy, -yz, 3z^2-1, -xz, x^2-y^2.
     attributes: (V, C), anything else to interpolate.
     per_corner: names of those of colors, uvs, normals, attributes that are given for the corners of
-        faces, (F, 3, C), so that seams need no doubled vertices.
+        faces, (F, 3, C), so that seams need no doubled vertices; an error if there are none.
 
     Errors: TypeError and ValueError with the argument's name, what was expected and got. Numbers
     that are not finite and indices out of range are found by render.
@@ -166,6 +166,8 @@ class Scene:
                   "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes),
                   "camera": self._camera(camera, sizes)}
         for name, value in values:
+            if value is None and name in corners:
+                raise ValueError(f"Scene: per_corner has {name!r}, but the scene has no {name}")
             if value is not None:
                 shape = _CORNER_SHAPES[name] if name in corners else _SHAPES[name]
                 fields[name] = self._take(name, value, shape, sizes)
@@ -279,11 +281,12 @@ class Scene:
         return self._fields.get(name)
 
     def replace(self, **changes: Any) -> "Scene":
-        """The same scene with some arguments changed: scene.replace(positions=moved)."""
+        """The same scene with some arguments changed: scene.replace(positions=moved). What becomes
+        None leaves per_corner, too."""
         unknown = sorted(set(changes) - set(self._arguments))
         if unknown:
             raise TypeError(f"Scene.replace: no argument is called {unknown[0]!r}")
-        return Scene(**{**self._arguments, **changes})
+        return Scene(**changed(self._arguments, changes))
 
     def __reduce__(self) -> tuple:
         return _scene_of, (self._arguments,)
@@ -291,6 +294,17 @@ class Scene:
     def __repr__(self) -> str:
         v, f = self.positions.shape[-2], len(self.faces)
         return f"<tilegrad.Scene: {len(self)} images, {v} vertices, {f} faces, {self.dtype}>"
+
+
+def changed(arguments: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a scene with changes. `per_corner`, unless it is among these, loses the names of
+    what they take away."""
+    merged = {**arguments, **changes}
+    if "per_corner" not in changes:
+        gone = [name for name, value in changes.items() if value is None or isinstance(value, str)]
+        merged["per_corner"] = tuple(
+            name for name in Scene._corners(merged.get("per_corner", ())) if name not in gone)
+    return merged
 
 
 def _scene_of(arguments: dict) -> Scene:

@@ -16,7 +16,7 @@ import numpy as np
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
 from tilegrad._paths import Path
-from tilegrad._scene import Scene, Surface, Texture
+from tilegrad._scene import Scene, Surface, Texture, changed
 
 _COLOR_SPACES = ("srgb", "linear")
 _NORMALS = ("auto", "smooth", "flat")
@@ -137,7 +137,7 @@ class Mesh:
         """A scene of this mesh. color_space, normals: as of `scene_arguments`; further arguments
         are the Scene's own (lighting, lights, ...) and go before the mesh's."""
         own = self.scene_arguments(color_space=color_space, normals=normals)
-        return Scene(self.positions, self.faces, camera, **{**own, **arguments})
+        return Scene(self.positions, self.faces, camera, **changed(own, arguments))
 
     def __repr__(self) -> str:
         parts = [name for name in ("normals", "colors", "corner_uvs", "corner_normals")

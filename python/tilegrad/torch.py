@@ -13,6 +13,7 @@ may ask for a gradient; what does not is not computed. The first derivative only
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -296,12 +297,18 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     dtype = functools.reduce(torch.promote_types, given,
                              torch.float32 if given else torch.float64)
     flat = []
+    lead = torch.Size()
     for name, (value, shape) in parts.items():
         tensor = torch.as_tensor(value, dtype=dtype)
         split = tensor.ndim - len(shape)
         if split < 0 or tensor.shape[split:] != shape:
             raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected "
                              f"{_arrays.shape_text(('...', *shape))}")
-        flat.append(tensor.reshape(*tensor.shape[:split], -1))
-    lead = torch.broadcast_shapes(*(tensor.shape[:-1] for tensor in flat))
+        try:
+            lead = torch.broadcast_shapes(lead, tensor.shape[:split])
+        except RuntimeError:
+            raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected "
+                             f"{tuple((*lead, *shape))}, as the arguments before it have it, or "
+                             f"leading axes that broadcast with that") from None
+        flat.append(tensor.reshape(*tensor.shape[:split], math.prod(shape)))
     return torch.cat([tensor.expand(*lead, -1) for tensor in flat], dim=-1)

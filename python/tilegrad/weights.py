@@ -9,7 +9,7 @@ from typing import Any, Mapping, Optional
 
 import numpy as np
 
-from tilegrad import _tools
+from tilegrad import _arrays, _tools
 from tilegrad._paths import Path, ending_of
 
 
@@ -40,7 +40,7 @@ def save_weights(path: Path, weights: Mapping[str, Any],
     for name in weights:
         if not isinstance(name, str):
             raise TypeError(f"save_weights: name {name!r} is not a string")
-    arrays = {name: _plain(value) for name, value in weights.items()}
+    arrays = {name: _plain(name, value) for name, value in weights.items()}
     if metadata is None:
         metadata = getattr(weights, "metadata", {})
     if _ending("save_weights", path) == ".npz":
@@ -81,6 +81,7 @@ def _ending(function: str, path: Path) -> str:
     return ending
 
 
-def _plain(value: Any) -> np.ndarray:
+def _plain(name: str, value: Any) -> np.ndarray:
+    _arrays.refuse_masked("save_weights", name, value)
     array = np.asarray(value)
     return np.ascontiguousarray(array).reshape(array.shape)  # keeps arrays without axes

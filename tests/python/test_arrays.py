@@ -2,12 +2,13 @@
 """What callers give as arrays: shared where it may be, copied once where not, refused precisely."""
 
 import array
+import tempfile
 import unittest
 
 import numpy as np
 
 import tilegrad
-from tilegrad import _arrays
+from tilegrad import _arrays, files
 
 
 class DlpackOnly:
@@ -99,6 +100,22 @@ class Refused(unittest.TestCase):
         for value in (None, "abc", {"a": 1}, [[1, 2, 3], [4, 5]], object()):
             with self.assertRaisesRegex(TypeError, "^render: positions is not an array of numbers"):
                 take(value)
+
+    def test_masked_numbers(self):
+        positions = np.ma.masked_invalid(np.full((4, 3), np.nan))
+        positions[1:] = 1
+        for dtype in (np.float32, np.float64):
+            self.expect(TypeError, "render: positions is a masked array, and 3 of its numbers are "
+                        "masked; put numbers there first, by filled()", positions, dtype)
+        self.assertTrue((take(positions.filled(2))[0] == 2).all())
+        whole = np.ma.masked_array(np.ones((4, 3), np.float32), mask=False)
+        self.assertTrue(np.shares_memory(take(whole), whole.data))
+        with tempfile.TemporaryDirectory() as folder:
+            for save in (lambda: files.save_image(f"{folder}/a.png", positions),
+                         lambda: files.save_image(f"{folder}/a.npy", positions),
+                         lambda: files.save_weights(f"{folder}/a.npz", {"a": positions})):
+                with self.assertRaisesRegex(TypeError, "is a masked array"):
+                    save()
 
     def test_other_devices(self):
         with self.assertRaisesRegex(TypeError, "^render: positions is on another device"):

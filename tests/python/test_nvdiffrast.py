@@ -2,6 +2,7 @@
 """tilegrad.compat.nvdiffrast: conventions, gradients, modes, errors."""
 
 import concurrent.futures
+import math
 import multiprocessing
 import unittest
 import warnings
@@ -426,7 +427,18 @@ class Errors(unittest.TestCase):
                    dr.texture, tex, uv, da, mip=[torch.ones(1, 3, 3, 3)])
         self.check(ValueError, "mip was made of a texture", dr.texture, tex, uv, da,
                    mip=dr.texture_construct_mip(torch.ones(1, 4, 4, 3)))
-        self.check(ValueError, "max_mip_level is -1", dr.texture, tex, uv, da, max_mip_level=-1)
+        for level in (-1, 0.5, math.nan, math.inf, "2"):
+            self.check(ValueError, f"max_mip_level is {level!r}, must be a whole number, 0 or more",
+                       dr.texture, tex, uv, da, max_mip_level=level)
+
+    def test_texture_of_more_levels_than_there_are(self):
+        tex, uv = torch.rand(1, 4, 8, 3), torch.rand(1, 4, 4, 2)
+        bias = torch.full((1, 4, 4), 1.7)
+        all_levels = dr.texture(tex, uv, mip_level_bias=bias)
+        for most in (3, 31, 2**31, 2**70):
+            self.assertTrue(torch.equal(
+                dr.texture(tex, uv, mip_level_bias=bias, max_mip_level=most), all_levels))
+            self.assertEqual(len(dr.texture_construct_mip(tex, most).levels), 3)
 
     def test_antialias(self):
         color = torch.ones(1, 4, 4, 3)

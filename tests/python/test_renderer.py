@@ -101,6 +101,17 @@ class Images(unittest.TestCase):
             self.assertFalse(all(np.array_equal(base[name], other[name]) for name in base), change)
         self.assertTrue(np.isinf(renderer.render(scene, alpha_rule="paper").alpha_error_bound))
 
+    def test_what_is_taken_away_is_not_per_corner(self):
+        scene = patch()
+        plain = scene.replace(uvs=None, textures=None, surfaces=None, face_surfaces=None)
+        self.assertIsNone(plain["uvs"])
+        self.assertIsNotNone(plain.replace(uvs=scene["uvs"], per_corner="uvs")["uvs"])
+        mesh = tilegrad.files.Mesh(scene.positions, scene.faces,
+                                   corner_uvs=np.zeros((18, 3, 2), np.float32))
+        camera = Camera()
+        self.assertIsNotNone(mesh.scene(camera)["uvs"])
+        self.assertIsNone(mesh.scene(camera, uvs=None)["uvs"])
+
     def test_textures(self):
         """Four texels, seen straight on: where they land, how they wrap."""
         positions = [(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)]
@@ -465,6 +476,10 @@ class Errors(unittest.TestCase):
              "surface", {"surfaces": Surface(base_color=np.ones((2, 3)), texture=[0, 0, 0])}),
             (TypeError, "Scene: per_corner must be a name or a sequence of names, got int",
              {"per_corner": 3}),
+            (ValueError, "Scene: per_corner has 'normals', but the scene has no normals",
+             {"per_corner": ("uvs", "normals")}),
+            (ValueError, "Scene: per_corner has 'uvs', but the scene has no uvs",
+             {"uvs": None, "textures": None, "per_corner": "uvs"}),
             (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
              "255", {"colors": np.full((16, 3), 255, np.uint8)}),
             (TypeError, "Scene: textures[1] has dtype uint8, expected float32 from 0 to 1: divide "

@@ -390,6 +390,11 @@ class Errors(unittest.TestCase):
             rendered(given, outputs=("rgb",))
         with self.assertRaisesRegex(ValueError, r"rotation has shape \(3,\)"):
             tg.camera(rotation=torch.zeros(3))
+        with self.assertRaisesRegex(ValueError, r"fx has shape \(3,\), expected \(2,\), as the "
+                                    "arguments before it have it"):
+            tg.camera(rotation=torch.eye(3).expand(2, 3, 3), fx=torch.ones(3))
+        with self.assertRaisesRegex(ValueError, r"intensity has shape \(3, 2\), expected \(4,\)"):
+            tg.lights(torch.ones(4, 3), torch.ones(3, 2))
         with self.assertRaisesRegex(ValueError, "delta has no gradient"):
             rendered(given, delta=torch.tensor(1e-3, requires_grad=True))
         given["positions"][3, 1] = float("nan")

@@ -15,6 +15,7 @@ from tilegrad.compat.nvdiffrast import _inputs
 
 _FILTERS = ("auto", *_core.TEXTURE_FILTERS)
 _BOUNDARIES = _core.TEXTURE_BOUNDARIES
+_MOST_LEVELS = 32  # more than any texture has
 _MIPMAPPED = ("linear-mipmap-nearest", "linear-mipmap-linear")
 
 
@@ -147,9 +148,14 @@ def _most(function: str, max_mip_level: Any) -> int:
     """The last level, -1 for all there are."""
     if max_mip_level is None:
         return -1
-    if int(max_mip_level) != max_mip_level or max_mip_level < 0:
-        raise ValueError(f"{function}: max_mip_level is {max_mip_level!r}, must be 0 or more")
-    return int(max_mip_level)
+    try:
+        most = int(max_mip_level)
+    except (TypeError, ValueError, OverflowError):
+        most = -1
+    if most != max_mip_level or most < 0:
+        raise ValueError(f"{function}: max_mip_level is {max_mip_level!r}, must be a whole number, "
+                         f"0 or more")
+    return min(most, _MOST_LEVELS)
 
 
 def _levels(tex: torch.Tensor, mip: Any, max_mip_level: Any, cube: bool) -> tuple:
