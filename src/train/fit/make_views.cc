@@ -2,11 +2,13 @@
 #include "train/fit/make_views.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
 #include "base/error.h"
+#include "base/temporary_file.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "render/lit_renderer.h"
@@ -71,11 +73,32 @@ bool IsHeldOut(const ViewsOptions& o, int index) {
   return (index + 1) * o.held_out / all != index * o.held_out / all;
 }
 
+std::string ImageName(int index) { return fmt::format("images/{:03}.png", index); }
+
+// Those images beyond `count` that the files of cameras of an earlier call name as ours are named.
+std::vector<Path> EarlierImages(const Path& folder, int count) {
+  std::vector<Path> out;
+  for (const char* name : {kTrainName, kTestName}) {
+    const auto frames = ReadTransforms(folder / name);
+    if (!frames.ok()) continue;
+    for (const TransformsFrame& frame : *frames) {
+      const std::string stem = frame.image.stem().string();
+      int index = -1;
+      const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), index);
+      if (error != std::errc() || end != stem.data() + stem.size() || index < count) continue;
+      if (frame.image == folder / ImageName(index)) out.push_back(frame.image);
+    }
+  }
+  return out;
+}
+
 // Takes away the cameras that an earlier call left: views of another mesh that stay would be fitted
-// or judged by. Those of somebody else are left alone; transforms.json is what a fit reads first.
-Status ClearEarlierViews(const Path& folder) {
+// or judged by. Then its images that none of the `count` new ones will replace. What is somebody
+// else's is left alone; transforms.json is what a fit reads first.
+Status ClearEarlierViews(const Path& folder, int count) {
   std::error_code error;
   const bool ours = std::filesystem::exists(folder / kTruthName, error);
+  const std::vector<Path> images = ours ? EarlierImages(folder, count) : std::vector<Path>();
   for (const char* name : {"transforms.json", kTrainName, kTestName}) {
     const Path file = folder / name;
     if (!std::filesystem::exists(file, error)) continue;
@@ -87,6 +110,7 @@ Status ClearEarlierViews(const Path& folder) {
       return IoError("{}: cannot be replaced: {}", file.string(), error.message());
     }
   }
+  for (const Path& image : images) std::filesystem::remove(image, error);
   return {};
 }
 
@@ -97,7 +121,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   TILEGRAD_TRY(Check(options));
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
-  TILEGRAD_TRY(ClearEarlierViews(folder));
+  TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out));
   TILEGRAD_TRY(io::SaveGlb(folder / kTruthName, mesh));
   LitRenderer renderer;
   std::vector<TransformsView> train, test;
@@ -106,7 +130,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
     if (stop) return Cancelled("stopped; {} is not complete", folder.string());
     const Camera camera = SpiralCamera(options, i);
     TILEGRAD_ASSIGN(const auto planar, renderer.Render(mesh, {&camera, 1}, options.size));
-    const std::string name = fmt::format("images/{:03}.png", i);
+    const std::string name = ImageName(i);
     TILEGRAD_TRY(io::SavePng(folder / name, Straight(planar, options.size)));
     (IsHeldOut(options, i) ? test : train).push_back({name, camera});
     if (progress) {
@@ -118,7 +142,9 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   if (!test.empty()) {
     TILEGRAD_TRY(WriteTextAtomic(folder / kTestName, WriteTransforms(test, size)));
   }
-  return WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size));
+  TILEGRAD_TRY(WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size)));
+  for (const Path& own : {folder, folder / "images"}) RemoveTemporaries(own);
+  return {};
 }
 
 }  // namespace tilegrad::train
