@@ -21,6 +21,9 @@ struct Progress {
 // draws.
 using ProgressSink = std::function<void(const Progress&)>;
 
+// Told at once of what went wrong and was got over: the work may be stopped before it ends.
+using WarningSink = std::function<void(const std::string&)>;
+
 // Set from a signal handler or another thread; long work looks at it between units, saves, and
 // returns StatusCode::kCancelled.
 using StopFlag = std::atomic<bool>;

@@ -144,7 +144,6 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  for (const auto& warning : o.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   fmt::print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
@@ -158,7 +157,7 @@ void PrintOutcome(const Options& options, const train::FitOutcome& o) {
 }
 
 Status Run(const Options& options) {
-  TILEGRAD_ASSIGN(const train::FitJob job, MakeJob(options));
+  TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   if (options.doctor) {
     TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));
@@ -166,6 +165,7 @@ Status Run(const Options& options) {
     return {};
   }
   ProgressLine line;
+  job.warn = line.Warnings();
   auto outcome = train::RunFit(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!outcome.ok()) return outcome.status();

@@ -20,7 +20,6 @@ struct TrainOptions {
 };
 
 void PrintOutcome(const train::TrainOutcome& outcome, const TrainOptions& options) {
-  for (const auto& warning : outcome.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   if (outcome.first_step == outcome.last_step) {
     fmt::print("{}: the run is complete at step {}; nothing to do\n", options.out,
                outcome.last_step);
@@ -42,6 +41,7 @@ Status RunTraining(const TrainOptions& options) {
   job.max_minutes = options.max_minutes;
   const Workers workers(options.workers);
   ProgressLine line;
+  job.warn = line.Warnings();
   auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!outcome.ok()) return outcome.status();

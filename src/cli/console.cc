@@ -58,6 +58,13 @@ ProgressSink ProgressLine::Sink() {
   return [this](const Progress& progress) { Show(progress); };
 }
 
+WarningSink ProgressLine::Warnings() {
+  return [this](const std::string& warning) {
+    Finish();
+    PrintNote("tilegrad: warning: {}\n", warning);
+  };
+}
+
 void ProgressLine::Show(const Progress& progress) {
   const auto now = Clock::now();
   if (progress.stage != last_.stage) {

@@ -39,7 +39,8 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  ProgressSink Sink();  // valid while this lives
+  ProgressSink Sink();     // valid while this lives
+  WarningSink Warnings();  // likewise; ends the line and prints
   void Finish();
 
  private:

@@ -157,7 +157,9 @@ Status Run::Restore() {
   auto found = LoadNewestCheckpoint(context_, job_.run);
   if (!found.ok())
     return found.status().code() == StatusCode::kNotFound ? Status() : found.status();
-  for (auto& warning : found->warnings) outcome_.warnings.push_back("passed over: " + warning);
+  for (const auto& warning : found->warnings) {
+    if (job_.warn) job_.warn("passed over: " + warning);
+  }
   const Checkpoint& checkpoint = found->checkpoint;
   const std::string file = found->file.string();
   TILEGRAD_ASSIGN(const TrainConfig before, ParseConfig(checkpoint.info.config, file));

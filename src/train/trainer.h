@@ -27,13 +27,13 @@ struct TrainJob {
   ExistingRun existing = ExistingRun::kRefuse;
   // > 0: save and stop after this long; a resumed run goes on to the same bits.
   double max_minutes = 0;
+  WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };
 
 struct TrainOutcome {
   std::int64_t first_step = 0, last_step = 0;  // steps done before and after
   double seconds = 0;                          // of all sessions of this run
   bool finished = false;                       // last_step is the configuration's
-  std::vector<std::string> warnings;           // broken checkpoints that were passed over, ...
 };
 
 // Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled

@@ -139,12 +139,25 @@ TEST_F(TrainerTest, HalfACheckpointFallsBackToTheOneBefore) {
   StopAfter(8);
   CutInHalf(ListCheckpoints(job_.run).back());
   job_.existing = ExistingRun::kContinue;
+  std::vector<std::string> warnings;
+  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
   const auto outcome = Run();
   ASSERT_TRUE(outcome.ok()) << outcome.status().message();
   EXPECT_EQ(outcome->first_step, 6);
-  ASSERT_EQ(outcome->warnings.size(), 1u);
-  EXPECT_NE(outcome->warnings[0].find("step_00000008"), std::string::npos);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("step_00000008"), std::string::npos);
   ExpectSameBits("whole", "run");
+}
+
+TEST_F(TrainerTest, ABrokenCheckpointIsToldOfEvenIfTheRunIsStopped) {
+  StopAfter(8);
+  CutInHalf(ListCheckpoints(job_.run).back());
+  job_.existing = ExistingRun::kContinue;
+  std::vector<std::string> warnings;
+  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  StopAfter(7);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("passed over: "), std::string::npos) << warnings[0];
 }
 
 TEST_F(TrainerTest, ABrokenCheckpointDoesNotPushOutNewOnes) {

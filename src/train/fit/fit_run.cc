@@ -102,7 +102,9 @@ Status Session::Open(FitOutcome* outcome) {
     if (!loaded.ok()) return loaded.Within(found.file.string());
     SetAside(found.broken);
     step_ = info.step, seconds_before_ = info.seconds;
-    outcome->warnings = std::move(found.warnings);
+    for (const auto& warning : found.warnings) {
+      if (job_.warn) job_.warn("passed over: " + warning);
+    }
   }
   TILEGRAD_ASSIGN(log_, RunLog::Open(job_.out, step_));
   outcome->first_step = step_;

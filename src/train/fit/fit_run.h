@@ -28,7 +28,8 @@ struct FitJob {
   std::optional<Mesh> start;  // none: a sphere about as large as the object
   std::optional<Mesh> truth;  // to compare with
   Path out;
-  bool resume = false;  // goes on from the newest whole checkpoint; starts if there is none
+  bool resume = false;         // goes on from the newest whole checkpoint; starts if there is none
+  WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };
 
 struct FitOutcome {
@@ -39,7 +40,6 @@ struct FitOutcome {
   std::vector<ViewScore> training, held_out;
   std::optional<double> voxel_iou;  // at 32 voxels a side, where a truth is known
   std::optional<double> camera_error_before, camera_error_after;  // degrees, means; if perturbed
-  std::vector<std::string> warnings;
 };
 
 // Saves before it returns, also when asked to stop (then kCancelled, with how to go on). A resumed

@@ -4,12 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
+#include "train/checkpoint.h"
 #include "train/fit/make_views.h"
 #include "train/fit/transforms.h"
 
@@ -86,6 +88,25 @@ TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
 }
 
+TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
+  FitJob job = Job("run");
+  job.config.checkpoint_every = 5;
+  const Workers workers(2);
+  const auto stop_at = [&](std::uint64_t step) {
+    return RunFit(
+        job, workers, [&, step](const Progress& p) { stop_ = p.done == step; }, stop_);
+  };
+  EXPECT_EQ(stop_at(12).status().code(), StatusCode::kCancelled);
+  const Path newest = ListCheckpoints(job.out).back();
+  std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);
+  std::vector<std::string> warnings;
+  job.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  job.resume = true, stop_ = false;
+  EXPECT_EQ(stop_at(13).status().code(), StatusCode::kCancelled);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
+}
+
 // Of one that was killed before its first checkpoint pictures are all that is there.
 TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
   FitJob job = Job("whole");
@@ -141,6 +162,29 @@ TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
     ExpectMessage(make(1, file.parent_path()), name, "another folder");
     EXPECT_EQ(ReadText(file).value(), "{}");
   }
+}
+
+// Those of a longer call would be taken for views of the new mesh, by whoever looks. What no call
+// wrote, or none says that it did, stays.
+TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
+  const auto make = [&](int views) {
+    return MakeViews(Icosphere(1, 1), {.views = views, .held_out = 1, .size = 16}, folder_ / "few",
+                     {}, stop_);
+  };
+  ASSERT_TRUE(make(6).ok());
+  const Path images = folder_ / "few" / "images";
+  Write("few/images/photo.png", std::string("mine"));
+  Write("few/images/007.png", std::string("mine"));
+  Write("few/images/001.png.99999999.tmp", std::string("half"));  // no process has that number
+  ASSERT_TRUE(make(2).ok());
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(images)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  const std::vector<std::string> expected = {"000.png", "001.png", "002.png", "007.png",
+                                             "photo.png"};
+  EXPECT_EQ(names, expected);
 }
 
 TEST_F(Fit, RefinesCameras) {
