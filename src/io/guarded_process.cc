@@ -2,6 +2,7 @@
 #include "io/guarded_process.h"
 
 #include <poll.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -151,10 +152,20 @@ Status TooMuchMemory(const GuardLimits& limits) {
   return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
 }
 
+// The mailbox is a file to the system: whoever started this process may have limited its size.
+Status TooLargeAResult(const GuardLimits& limits) {
+  rlimit own = {};
+  if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes) {
+    return TooMuchMemory(limits);
+  }
+  return IoError("could not hand over its result: files may have {} bytes here (ulimit -f)",
+                 own.rlim_max);
+}
+
 Status OfSignal(int signal, const GuardLimits& limits) {
   if (signal == SIGXCPU)
     return DataLoss("took more than {} s of processor time", limits.cpu_seconds);
-  if (signal == SIGXFSZ) return TooMuchMemory(limits);
+  if (signal == SIGXFSZ) return TooLargeAResult(limits);
   const char* name = ::sigdescr_np(signal);
   return DataLoss("crashed ({})", name == nullptr ? "unknown signal" : name);
 }

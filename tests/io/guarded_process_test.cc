@@ -4,6 +4,7 @@
 #include "io/guarded_process.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,6 +17,7 @@
 #include <stdexcept>
 
 #include "base/parallel.h"
+#include "support/forked.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io {
@@ -121,6 +123,18 @@ TEST_F(GuardedProcessTest, MemoryHasALimit) {
   ExpectMessage(status, "more than 200 MB of memory");
 }
 #endif
+
+// Of `ulimit -f 1`: the memory is there.
+TEST_F(GuardedProcessTest, ALimitOfFilesIsNotCalledOneOfMemory) {
+  EXPECT_TRUE(test::TrueInChild([] {
+    const rlimit limit{1024, 1024};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return false;
+    const Status status = Guarded([](AskParent) { return Bytes(5000, 1); }).status();
+    return status.code() == StatusCode::kIo &&
+           status.message() ==
+               "could not hand over its result: files may have 1024 bytes here (ulimit -f)";
+  }));
+}
 
 TEST_F(GuardedProcessTest, ResultsHaveALimit) {
   GuardLimits limits;
