@@ -2,6 +2,7 @@
 // tilegrad tradeoff: what accuracy costs, measured.
 #include <fmt/core.h>
 
+#include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -28,6 +29,7 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   if (!training.empty()) {
     TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
   }
+  RemoveTemporaries(folder);  // of killed calls
   fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
              folder.string(), training.empty() ? "" : ", training.csv");
   return {};

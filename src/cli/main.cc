@@ -9,7 +9,9 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <system_error>
 
+#include "base/error.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -50,6 +52,18 @@ bool IsCommand(const CLI::App& app, const std::string& name) {
               .empty();
 }
 
+// An empty value is a variable that was not set: a folder of that name would be the current one.
+Status CheckValues(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& value : option->results()) {
+        if (value.empty()) return InvalidArgument("{}: its value is empty", option->get_name());
+      }
+    }
+  }
+  return {};
+}
+
 int Run(int argc, char** argv) {
   CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
                "tilegrad");
@@ -79,6 +93,7 @@ int Run(int argc, char** argv) {
     const int code = app.exit(error);
     return code == 0 ? 0 : 2;
   }
+  if (const Status status = CheckValues(app); !status.ok()) return Report(status);
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
   if (const Status status = action(); !status.ok()) return Report(status);
   return Report(FlushOutput());
@@ -95,6 +110,10 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     tilegrad::cli::PrintNote(
         "tilegrad: not enough memory; smaller images, batches or networks take less\n");
+    return 1;
+  } catch (const std::system_error& error) {  // what was printed has nowhere to go, for one
+    const char* place = std::ferror(stdout) != 0 ? "standard output" : "the system refuses";
+    tilegrad::cli::PrintNote("tilegrad: {}: {}\n", place, error.code().message());
     return 1;
   } catch (const std::exception& error) {  // a library that throws: still a sentence and a code
     tilegrad::cli::PrintNote("tilegrad: unexpected failure: {}\n", error.what());

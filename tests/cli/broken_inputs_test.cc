@@ -306,6 +306,39 @@ TEST_F(BrokenInputs, ExitCodesOfPlaces) {
       2);
 }
 
+// A variable that was not set is neither the current folder nor the newest run.
+TEST_F(BrokenInputs, EmptyValues) {
+  const Path before = std::filesystem::current_path();
+  std::filesystem::current_path(Data());
+  const auto expect = [](const std::string& arguments, const std::string& message) {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_EQ(outcome.output, "tilegrad: " + message + ": its value is empty\n");
+  };
+  expect("train --config " + Config() + " --data '' --out " + (folder_ / "new").string() + kTiny,
+         "--data");
+  expect("eval --run " + RunFolder().string() + " --data ''", "--data");
+  expect("eval --run ''", "--run");
+  expect("views '' --out " + folder_.string(), "mesh");
+  std::filesystem::current_path(before);
+}
+
+// The files of an evaluation are there even if its table goes nowhere: nothing is kept in memory
+// here until the end, so that the first words fail.
+TEST_F(BrokenInputs, AnEvaluationThatCannotBePrintedIsWritten) {
+  std::filesystem::copy(RunFolder(), folder_ / "run", std::filesystem::copy_options::recursive);
+  const auto options = " --run " + (folder_ / "run").string() + " --views-per-model 1";
+  const Outcome outcome = RunProgram("--version > /dev/null; stdbuf -o0 " TILEGRAD_PROGRAM " eval" +
+                                     options + " 2>&1 > /dev/full; exit $?");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_NE(outcome.output.find("tilegrad: standard output: No space left"), std::string::npos)
+      << outcome.output;
+  for (const char* name : {"eval.json", "eval.md"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / name)) << name;
+  }
+  EXPECT_EQ(RunProgram("report" + (" --run " + (folder_ / "run").string())).exit_code, 0);
+}
+
 TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   Write("file", "in the way");
   ExpectRefused("dataset --source procedural --per-class 1 --size 16 --views 1 --out " +
