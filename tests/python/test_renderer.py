@@ -10,7 +10,7 @@ import numpy as np
 
 import tilegrad
 from scenes import ALL, IMAGE, LIGHTINGS, cotangents, patch
-from tilegrad import Camera, Light, Renderer, Scene, Surface, Texture
+from tilegrad import Camera, Light, Renderer, Scene, Surface, Texture, files
 
 H, W = IMAGE["height"], IMAGE["width"]
 
@@ -106,11 +106,14 @@ class Images(unittest.TestCase):
         plain = scene.replace(uvs=None, textures=None, surfaces=None, face_surfaces=None)
         self.assertIsNone(plain["uvs"])
         self.assertIsNotNone(plain.replace(uvs=scene["uvs"], per_corner="uvs")["uvs"])
-        mesh = tilegrad.files.Mesh(scene.positions, scene.faces,
-                                   corner_uvs=np.zeros((18, 3, 2), np.float32))
+        image = files.MeshTexture("one", np.full((2, 2, 3), 255, np.uint8))
+        mesh = files.Mesh(scene.positions, scene.faces, textures=[image],
+                          corner_uvs=np.zeros((18, 3, 2), np.float32),
+                          materials=[files.Material(texture=0)])
         camera = Camera()
         self.assertIsNotNone(mesh.scene(camera)["uvs"])
-        self.assertIsNone(mesh.scene(camera, uvs=None)["uvs"])
+        plain = mesh.scene(camera, uvs=None, textures=None, surfaces=None, face_surfaces=None)
+        self.assertIsNone(plain["uvs"])
 
     def test_textures(self):
         """Four texels, seen straight on: where they land, how they wrap."""
