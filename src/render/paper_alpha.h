@@ -3,6 +3,7 @@
 // comparisons, so scalar code. Independent of the renderer's own soft mask.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -15,8 +16,12 @@
 
 namespace tilegrad {
 
+// 1 / delta, but no more than float can multiply by: the kernel is as sharp as pixels are long
+// before, and infinity times the distance 0 is no number.
+inline double InverseDelta(double delta) { return std::min(1 / delta, 1e30); }
+
 inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
-  return {.inverse_delta = 1 / options.delta,
+  return {.inverse_delta = InverseDelta(options.delta),
           .box = options.paper.box,
           .max_faces = options.paper.max_faces};
 }

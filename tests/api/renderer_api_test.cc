@@ -373,6 +373,30 @@ TEST(ApiBackward, TexturesOfTwoFiltersShareAGradient) {
   }
 }
 
+// Normals that positions have, in a scene that was given others, do not go to those: their arrays
+// are of another size.
+template <class T>
+void ExpectNoGradientOfNormalsThatAreNotUsed() {
+  const TestScene<T> s(Lighting::kLambert);
+  SceneT<T> scene = s.scene;
+  const std::vector<T> normals(9, T(1));
+  scene.faces = scene.faces.first(3), scene.uvs.values = scene.uvs.values.first(6);
+  scene.normals = {normals, Rate::kCorner};
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<T> cotangents(frame.images());
+  std::vector<T> d_normals(9, T(5)), d_positions(48);
+  const SceneGradientsT<T> d{.positions = d_positions, .normals = d_normals};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&d, 1}).ok());
+  EXPECT_EQ(d_normals, std::vector<T>(9, T(0)));
+  EXPECT_NE(d_positions, std::vector<T>(48, T(0)));
+}
+TEST(ApiBackward, NormalsThatAreNotUsedHaveNoGradient) {
+  ExpectNoGradientOfNormalsThatAreNotUsed<float>();
+  ExpectNoGradientOfNormalsThatAreNotUsed<double>();
+}
+
 TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
   const TestScene<float> s(Lighting::kNone);
   Renderer renderer;
@@ -445,6 +469,11 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
        }},
       {"scene 1: attributes must be [16,3], got 32 numbers",
        [](Scene& s, RenderOptions&) { s.channels = 3; }},
+      {"scene 1: normals must be [16,3], got 7 numbers",  // of a scene that does not use them
+       [](Scene& s, RenderOptions&) { s.normals.values = seven; }},
+      {"scene 1: light_directions must be [16,3], got 7 numbers",
+       [](Scene& s, RenderOptions&) { s.light_directions = seven; }},
+      {"scene 1: sh has 7 numbers, expected 9", [](Scene& s, RenderOptions&) { s.sh = seven; }},
       {"scene 1: camera.near_plane", [](Scene& s, RenderOptions&) { s.camera.near_plane = 0; }},
       {"scene 1: camera.fx is 0, must be finite and > 0",
        [](Scene& s, RenderOptions&) { s.camera.fx = 0; }},
@@ -478,6 +507,45 @@ TEST(ApiErrors, SayWhatIsWrongAndWhere) {
     EXPECT_NE(status.message().find(call.expected), std::string::npos)
         << "got: " << status.message() << "\nexpected: " << call.expected;
     EXPECT_EQ(frame.images().width, 0);
+  }
+}
+
+// Vertices that no face has are packed with the others.
+TEST(ApiErrors, VerticesWithoutFacesHaveNormalsToo) {
+  const TestScene<float> s(Lighting::kLambert);
+  Scene scene;
+  scene.positions = s.positions, scene.lights = s.lights;
+  scene.shading.lighting = Lighting::kLambert, scene.shading.normals = Normals::kGiven;
+  Renderer renderer;
+  Frame frame;
+  EXPECT_NE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).message().find("no normals"),
+            std::string::npos);
+  scene.normals = {s.positions, Rate::kVertex};
+  EXPECT_TRUE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).ok());
+  scene.normals = {{}, Rate::kCorner};
+  EXPECT_TRUE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).ok());
+}
+
+// On an edge the distance is 0, and infinity times 0 is no number.
+TEST(ApiImages, TheSharpestKernelIsAHardMask) {
+  const TestScene<float> s(Lighting::kNone);
+  Renderer renderer;
+  Frame frame;
+  RenderOptions options = kTestOptions;
+  for (const AlphaRule rule : {AlphaRule::kAllFaces, AlphaRule::kPaper}) {
+    options.delta = 1e-320, options.alpha_rule = rule, options.culling = FaceCulling::kBack;
+    // A face that is drawn to a line through pixel centres.
+    std::vector<float> positions = s.positions;
+    for (std::size_t v = 0; v < 16; ++v) positions[3 * v + 1] = 0.5f / 30 * positions[3 * v + 2];
+    Scene scene = s.scene;
+    scene.positions = positions;
+    ASSERT_TRUE(renderer.Render({&scene, 1}, options, {}, &frame).ok());
+    const std::vector<float> d_alpha(frame.images().alpha.size(), 1.0f);
+    for (const float alpha : frame.images().alpha) ASSERT_TRUE(alpha == 0 || alpha == 1) << alpha;
+    std::vector<float> d_positions(48);
+    const SceneGradients d{.positions = d_positions};
+    const Status status = renderer.Backward(frame, {.alpha = d_alpha}, {&d, 1});
+    EXPECT_TRUE(status.ok()) << status.message();
   }
 }
 

@@ -97,6 +97,10 @@ void ShadeGradients::FillSink(const Batch& batch, const Sink& sink) const {
     }
     if (TargetOf(d, sink.what).data() != sink.out.data()) continue;
     if (!batch.plan.pulled[sink.what]) continue;
+    // Normals of positions are pulled; those that the scene has besides are not used.
+    if (sink.what == Varying::kNormal && batch.plan.parts.model.normals != NormalKind::kGiven) {
+      continue;
+    }
     AddStream(batch.scenes[n], batch.plan.pulled, sink.what, s.d_varyings, sink.out);
   }
 }

@@ -86,7 +86,7 @@ void AddCamera(const StageScene& scene, const SceneSums& sums, Camera* d_camera)
 }
 
 void AddSh(const StageScene& scene, const SceneSums& sums, std::span<float> d_sh) {
-  if (d_sh.empty()) return;
+  if (d_sh.empty() || scene.scene->model.lighting != Lighting::kSphericalHarmonics) return;
   std::array<double, 9> d = {};
   shade::ShPolynomialAdjoint<double>(scene.scene->model.sh_basis, sums.sh, d);
   for (std::size_t i = 0; i < 9; ++i) d_sh[i] += static_cast<float>(d[i]);

@@ -26,12 +26,18 @@ bool SameArray(std::span<T> a, std::span<T> b) {
   return a.data() == b.data() && a.size() == b.size();
 }
 
-Status CheckStream(const char* array, const AttributeStreamT<float>& stream, std::size_t width,
-                   const ShadedScene& scene, const AttributeStreamT<float>& known) {
+Status CheckStreamShape(const char* array, const AttributeStreamT<float>& stream, std::size_t width,
+                        const ShadedScene& scene) {
   if (stream.values.empty()) return {};
   const std::size_t rows =
       stream.rate == AttributeRate::kVertex ? scene.positions.size() / 3 : scene.faces.size();
-  TILEGRAD_TRY(CheckShape(array, stream.values.size(), rows, width));
+  return CheckShape(array, stream.values.size(), rows, width);
+}
+
+Status CheckStream(const char* array, const AttributeStreamT<float>& stream, std::size_t width,
+                   const ShadedScene& scene, const AttributeStreamT<float>& known) {
+  if (stream.values.empty()) return {};
+  TILEGRAD_TRY(CheckStreamShape(array, stream, width, scene));
   return SameArray(stream.values, known.values) ? Status() : CheckFinite(array, stream.values);
 }
 
@@ -123,16 +129,27 @@ Status CheckMesh(const ShadedScene& scene, const ShadedScene& known) {
   return ValidateSceneNumbers(view);
 }
 
+// What shading does not use may hold any numbers, but gradients of it have its shape.
+Status CheckUnusedShapes(const ShadedScene& scene) {
+  TILEGRAD_TRY(CheckStreamShape("normals", scene.normals, 3, scene));
+  TILEGRAD_TRY(CheckStreamShape("light_directions",
+                                {scene.light_directions, AttributeRate::kVertex}, 3, scene));
+  return scene.sh.empty() ? Status() : CheckSize("sh", scene.sh.size(), 9);
+}
+
 // `known`: the scene before, or an empty one.
 Status CheckScene(const ShadedScene& scene, const ShadedScene& known) {
   TILEGRAD_TRY(CheckMesh(scene, known));
   if (!SameArray(scene.attributes, known.attributes)) {
     TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
   }
+  TILEGRAD_TRY(CheckUnusedShapes(scene));
   TILEGRAD_TRY(CheckStream("colors", scene.colors, 3, scene, known.colors));
   TILEGRAD_TRY(CheckStream("uvs", scene.uvs, 2, scene, known.uvs));
   if (scene.model.normals == NormalKind::kGiven) {
-    if (scene.normals.values.empty() && !scene.faces.empty()) {
+    const bool corners = scene.normals.rate == AttributeRate::kCorner;
+    if (scene.normals.values.empty() &&
+        !(corners ? scene.faces.empty() : scene.positions.empty())) {
       return InvalidArgument("model.normals is kGiven, but the scene has no normals");
     }
     TILEGRAD_TRY(CheckStream("normals", scene.normals, 3, scene, known.normals));
