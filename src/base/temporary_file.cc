@@ -8,6 +8,7 @@
 #include <climits>
 #include <csignal>
 #include <optional>
+#include <unordered_set>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -46,13 +47,29 @@ Path TemporaryOf(const Path& path) {
   return path.parent_path() / (name + ending);
 }
 
-void RemoveTemporaries(const Path& folder) {
+namespace {
+
+template <class IsWanted>  // (name of the file that was to be)
+void RemoveAll(const Path& folder, const IsWanted& is_wanted) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::optional<pid_t> writer = WriterOf(entry.path());
-    if (writer && !IsOfAnother(*writer) && entry.is_regular_file(error))
+    if (!writer || IsOfAnother(*writer) || !entry.is_regular_file(error)) continue;
+    if (is_wanted(entry.path().stem().stem().string())) {
       std::filesystem::remove(entry.path(), error);
+    }
   }
+}
+
+}  // namespace
+
+void RemoveTemporaries(const Path& folder) {
+  RemoveAll(folder, [](const std::string&) { return true; });
+}
+
+void RemoveTemporaries(const Path& folder, std::span<const std::string> names) {
+  const std::unordered_set<std::string> wanted(names.begin(), names.end());
+  RemoveAll(folder, [&](const std::string& name) { return wanted.contains(name); });
 }
 
 }  // namespace tilegrad

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/file.h"
+#include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/file_ending.h"
@@ -28,6 +29,9 @@ Status Run(const Options& options) {
   line.Finish();
   TILEGRAD_ASSIGN(const std::string svg, train::Figure2Svg(results));
   TILEGRAD_TRY(WriteTextAtomic(options.out, svg));
+  const Path out = options.out;
+  const std::string names[] = {out.filename().string()};
+  RemoveTemporaries(out.has_parent_path() ? out.parent_path() : ".", names);  // of killed calls
   fmt::print("{}look at {}\n", train::Figure2Table(results), options.out);
   return {};
 }

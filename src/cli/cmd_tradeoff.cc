@@ -29,7 +29,8 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   if (!training.empty()) {
     TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
   }
-  RemoveTemporaries(folder);  // of killed calls
+  const std::string names[] = {"tradeoff.md", "tradeoff.csv", "tradeoff.svg", "training.csv"};
+  RemoveTemporaries(folder, names);  // of killed calls
   fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
              folder.string(), training.empty() ? "" : ", training.csv");
   return {};

@@ -370,6 +370,17 @@ TEST_F(FileTest, WhatKilledWritesLeftIsRemoved) {
             static_cast<std::ptrdiff_t>(others.size()));
 }
 
+TEST_F(FileTest, HalfWrittenFilesOfOtherNamesStay) {
+  ASSERT_TRUE(MakeFolder(folder_).ok());
+  for (const std::string name : {"a.png", "b.png", "a.png.old", "a"}) {
+    ASSERT_TRUE(AppendText(folder_ / (name + ".4194305.tmp"), "half", false).ok());
+  }
+  const std::string names[] = {"a.png", "c.png"};
+  RemoveTemporaries(folder_, names);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.png.4194305.tmp"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 3);
+}
+
 TEST_F(FileTest, FailedWriteLeavesTheOldFile) {
   const Path path = folder_ / "f";
   ASSERT_TRUE(WriteTextAtomic(path, "old").ok());

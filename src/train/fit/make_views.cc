@@ -114,6 +114,15 @@ Status ClearEarlierViews(const Path& folder, int count) {
   return {};
 }
 
+// What killed calls left of files that are whole now.
+void RemoveHalfWritten(const Path& folder, int count) {
+  const std::string names[] = {kTrainName, kTestName, kTruthName};
+  RemoveTemporaries(folder, names);
+  std::vector<std::string> images;
+  for (int i = 0; i < count; ++i) images.push_back(Path(ImageName(i)).filename().string());
+  RemoveTemporaries(folder / "images", images);
+}
+
 }  // namespace
 
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
@@ -143,7 +152,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
     TILEGRAD_TRY(WriteTextAtomic(folder / kTestName, WriteTransforms(test, size)));
   }
   TILEGRAD_TRY(WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size)));
-  for (const Path& own : {folder, folder / "images"}) RemoveTemporaries(own);
+  RemoveHalfWritten(folder, all);
   return {};
 }
 

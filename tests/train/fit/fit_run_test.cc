@@ -175,15 +175,23 @@ TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
   const Path images = folder_ / "few" / "images";
   Write("few/images/photo.png", std::string("mine"));
   Write("few/images/007.png", std::string("mine"));
-  Write("few/images/001.png.99999999.tmp", std::string("half"));  // no process has that number
+  // No process has that number.
+  for (const std::string name : {"001.png", "photo.png", "copy"}) {
+    Write("few/images/" + name + ".99999999.tmp", std::string("half"));
+  }
   ASSERT_TRUE(make(2).ok());
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(images)) {
     names.push_back(entry.path().filename().string());
   }
   std::sort(names.begin(), names.end());
-  const std::vector<std::string> expected = {"000.png", "001.png", "002.png", "007.png",
-                                             "photo.png"};
+  const std::vector<std::string> expected = {"000.png",
+                                             "001.png",
+                                             "002.png",
+                                             "007.png",
+                                             "copy.99999999.tmp",
+                                             "photo.png",
+                                             "photo.png.99999999.tmp"};
   EXPECT_EQ(names, expected);
 }
 
