@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 
 #include "base/inline_vector.h"
 #include "raster/conventions.h"
@@ -75,6 +76,16 @@ void CutPolygon(const Frustum& frustum, int plane, Polygon* polygon) {
   }
 }
 
+// By x, then y, z and w.
+std::size_t LeastCorner(const Polygon& polygon) {
+  const auto key = [](const ClipPoint& p) { return std::tie(p.x, p.y, p.z, p.w); };
+  std::size_t least = 0;
+  for (std::size_t i = 1; i < polygon.size(); ++i) {
+    if (key(polygon[i]) < key(polygon[least])) least = i;
+  }
+  return least;
+}
+
 // Fills the arrays of a screen mesh.
 class ScreenWriter {
  public:
@@ -96,14 +107,17 @@ class ScreenWriter {
     out_.source_face.push_back(static_cast<std::int32_t>(source));
     out_.reject.push_back(raster::kFaceDrawn);
   }
-  // A cut face, as a fan. Nothing where it has no area in front of the eye.
+  // A cut face, as a fan from its least corner: of coinciding faces, whatever corner they start
+  // with and however they are wound, the same pieces. Nothing where it has no area in front of the
+  // eye.
   void AppendPolygon(const Polygon& polygon, std::size_t source) {
     for (const ClipPoint& p : polygon) {
       if (!(p.w > 0)) return;
     }
     std::array<std::int32_t, kMostCorners> v;
-    for (std::size_t i = 0; i < polygon.size(); ++i) v[i] = Append(polygon[i]);
-    for (std::size_t i = 2; i < polygon.size(); ++i) AppendFace(v[0], v[i - 1], v[i], source);
+    const std::size_t count = polygon.size(), first = LeastCorner(polygon);
+    for (std::size_t i = 0; i < count; ++i) v[i] = Append(polygon[(first + i) % count]);
+    for (std::size_t i = 2; i < count; ++i) AppendFace(v[0], v[i - 1], v[i], source);
   }
   // The other arrays, from `packed`.
   void Unpack() {

@@ -49,8 +49,9 @@
 //
 // 6. Near plane. Faces are cut at depth = near_plane and the part beyond is kept; the new vertices
 //    are computed from the two ends of the cut edge in the order visible end, hidden end, so that
-//    faces that share the edge get the same vertex. Pieces keep the id of their source face, and
-//    gradients flow through the cut.
+//    faces that share the edge get the same vertex. A quadrilateral is divided from that of its two
+//    old corners whose position is less (x, then y, then z, as given), so that coinciding faces get
+//    the same pieces. Pieces keep the id of their source face, and gradients flow through the cut.
 //
 //            visible   |near|   hidden          v = (1 - t) a + t b,
 //              a-------v- - - - -b              t = (near - depth_a) / (depth_b - depth_a)

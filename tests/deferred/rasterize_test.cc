@@ -156,6 +156,26 @@ TEST(Rasterize, OfCoincidingFacesTheFirstIsSeen) {
   EXPECT_EQ(out.rast[3], 1);
 }
 
+// Also of faces that are cut, by any of the planes, wherever they start and however they are wound;
+// and then there is nothing to peel.
+TEST(Rasterize, OfCoincidingFacesThatAreCutTheFirstIsSeen) {
+  std::size_t seen = 0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    Scene<float> scene = AsScene<float>(Soup(1, seed, 40, 48));
+    scene.faces = {0, 1, 2, 1, 2, 0, 0, 2, 1, 2, 1, 0};
+    std::rotate(scene.faces.begin(), scene.faces.begin() + 3 * (seed % 4), scene.faces.end());
+    Numbers<float> peeled(scene.grid().pixels(), std::numeric_limits<float>::infinity());
+    const auto first = Rasterize(scene, Workers(1), &peeled);
+    const auto second = Rasterize(scene, Workers(1), &peeled);
+    for (std::size_t p = 3; p < first.rast.size(); p += 4) {
+      ASSERT_LE(first.rast[p], 1) << "seed " << seed << " pixel " << p / 4;
+      ASSERT_EQ(second.rast[p], 0) << "seed " << seed << " pixel " << p / 4;
+      seen += first.rast[p] == 1;
+    }
+  }
+  EXPECT_GT(seen, 50000u);
+}
+
 TEST(Rasterize, RangesChooseFacesAndKeepTheirNumbers) {
   Scene<double> all = WavyGrid(4, 1, 20, 24);
   Scene<double> ranged = all;
