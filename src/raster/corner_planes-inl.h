@@ -100,9 +100,19 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
 }
 
 // Faces on which 1/depth varies by more than this are set up in double. Of such a face, cut at the
-// near plane for instance, the image holds a far end, where attributes are the quotient of two
-// small remainders: what float loses beside the near end is lost beside them.
+// near plane for instance, the image holds a far end, where attributes in perspective are the
+// quotient of two small remainders: what float loses beside the near end is lost beside them.
+// Whatever the mode, the near corners weigh little there, but move far on the screen with the
+// vertices: the gradient of these needs the digits of small weights.
 inline constexpr float kSteepDepth = 8;
+
+// Where m, of which LeastQ tells, is 1.
+HWY_INLINE hn::Mask<LaneTag> IsSteep(const Lane (&inverse_depth)[3]) {
+  const auto& z = inverse_depth;
+  const auto least = hn::Min(hn::Min(z[0], z[1]), z[2]);
+  const auto largest = hn::Max(hn::Max(z[0], z[1]), z[2]);
+  return hn::Lt(hn::Mul(least, hn::Set(LaneTag(), kSteepDepth)), largest);
+}
 
 struct WeightLanes {
   float value[kMostFaceLanes], dx[kMostFaceLanes], dy[kMostFaceLanes];
@@ -184,7 +194,7 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   const bool perspective = input.mode == Interpolation::kPerspective;
   out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
   for (int k = 0; k < 3; ++k) out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
-  const auto steep = hn::Lt(LeastQ(out), hn::Set(d, 1 / kSteepDepth));
+  const auto steep = perspective ? hn::Lt(LeastQ(out), hn::Set(d, 1 / kSteepDepth)) : IsSteep(z);
   if (HWY_UNLIKELY(!hn::AllFalse(d, steep))) {
     SetSteepWeights(corners, origin_x, origin_y, steep, out.weight);
   }
