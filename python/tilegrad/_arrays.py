@@ -207,8 +207,9 @@ def as_pixels(function: str, argument: str, value: Any) -> int:
 def refuse_masked(function: str, argument: str, value: Any) -> None:
     """TypeError if numbers of `value` are masked: NumPy would take what is behind the mask."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise TypeError(f"{function}: {argument} is a masked array, and {np.ma.count_masked(value)} "
-                        f"of its numbers are masked; put numbers there first, by filled()")
+        count = np.ma.count_masked(value)
+        raise TypeError(f"{function}: {argument} is a masked array, and {count} of its numbers are "
+                        f"masked; put numbers there first, by filled()")
 
 
 def _foreign(function: str, argument: str, value: Any) -> np.ndarray:

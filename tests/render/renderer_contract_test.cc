@@ -286,7 +286,7 @@ TEST(RendererErrors, NameSceneArrayAndIndex) {
   EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[0].camera.rotation[3] = nan; }),
             "scene 0: camera.rotation[3] is nan");
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[0].camera.near_plane = 0; }),
-            "scene 0: camera.near_plane is 0, must be > 0");
+            "scene 0: camera.near_plane is 0, must be finite and > 0");
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = 120; }),
             "scene 1: faces[5] is 120, outside of [0, 120)");
   EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = -1; }),

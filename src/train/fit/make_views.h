@@ -24,9 +24,9 @@ struct ViewsOptions {
 //   <folder>/truth.glb                 the mesh as it was rendered
 // What an earlier call wrote there is replaced: files of cameras first, so that those of a call
 // that was stopped belong to nothing else. Images that they name, and that are not written again,
-// are removed, as is what killed calls left half-written. Errors: options out of range; cameras
-// that no such call wrote. Cameras lie on a spiral that spreads evenly over the sphere between the
-// two elevations.
+// are removed, as is what killed calls left half-written. Cameras lie on a spiral that spreads
+// evenly over the sphere between the two elevations. Errors: options out of range; cameras that no
+// such call wrote.
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
                  const ProgressSink& progress, const StopFlag& stop);
 
