@@ -46,7 +46,7 @@ TILEGRAD_C_API const char* tilegrad_last_error(const tilegrad_renderer* renderer
 typedef struct tilegrad_camera {
   float rotation[9];    /* row-major, world to camera: x right, y up, looking along -z */
   float translation[3]; /* world units */
-  float fx, fy, cx, cy; /* pixels; fx, fy > 0 */
+  float fx, fy, cx, cy; /* pixels; fx, fy not 0, negative ones mirror */
   float near_plane;     /* world units, > 0 */
 } tilegrad_camera;
 

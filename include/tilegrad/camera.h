@@ -19,14 +19,14 @@ namespace tilegrad::TILEGRAD_ABI {
 // its centre at (j + 0.5, i + 0.5); row 0 is the top.
 //
 // Render checks the numbers, but not that `rotation` is one: any 3 x 3 matrix is applied as it
-// stands. A mirror (determinant -1) shows the mirror image, and turns front faces to back faces;
-// with scale or shear the eye of specular light is at -rotation^T * translation all the same, which
-// is then not where p_cam is 0.
+// stands. A mirror (determinant -1, or one negative focal length) shows the mirror image, and turns
+// front faces to back faces; with scale or shear the eye of specular light is at -rotation^T *
+// translation all the same, which is then not where p_cam is 0.
 template <class T>
 struct CameraT {
   T rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major, orthonormal
   T translation[3] = {0, 0, 0};                 // world units
-  T fx = 64, fy = 64;                           // focal lengths, > 0, pixels
+  T fx = 64, fy = 64;                           // focal lengths, pixels; not 0, < 0 mirrors
   T cx = 32, cy = 32;                           // principal point, pixels
   T near_plane = T(1e-2);                       // > 0, world units; nearer geometry is cut away
 };

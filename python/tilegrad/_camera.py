@@ -68,15 +68,15 @@ class Camera(Packed):
 
     rotation: (3, 3) or (N, 3, 3), orthonormal; its rows are the camera's axes in the world.
     translation: (3,) or (N, 3), world units.
-    fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, > 0, and principal point.
+    fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, not 0, and principal point.
     near_plane: number or (N,), > 0, world units; what is nearer is cut away.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
-    for what is not an array of these shapes; render refuses numbers that are not finite, and focal
-    lengths and near planes that are not above 0.
+    for what is not an array of these shapes; render refuses numbers that are not finite, focal
+    lengths of 0, and near planes that are not above 0.
 
     That `rotation` is one is not checked: any matrix is applied as it stands. A mirror (determinant
-    -1) shows the mirror image, and its front faces are back faces here; with scale or shear
+    -1, or one negative focal length) shows the mirror image, and its front faces are back faces here; with scale or shear
     specular light takes -rotation.T @ translation for the place of the eye, which it then is not.
     Camera.from_... and files.save_cameras refuse such matrices.
     """

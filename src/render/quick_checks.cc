@@ -9,7 +9,7 @@ bool IsFiniteCamera(const Camera& camera) {
 }
 
 bool IsSoundCamera(const Camera& camera) {
-  return IsFiniteCamera(camera) && camera.fx > 0 && camera.fy > 0 && camera.near_plane > 0;
+  return IsFiniteCamera(camera) && camera.fx != 0 && camera.fy != 0 && camera.near_plane > 0;
 }
 
 }  // namespace tilegrad

@@ -8,7 +8,7 @@
 namespace tilegrad {
 
 bool IsFiniteCamera(const Camera& camera);  // all of its numbers
-// Focal lengths and near plane are above 0, too.
+// No focal length is 0, and the near plane is above it, too.
 bool IsSoundCamera(const Camera& camera);
 
 }  // namespace tilegrad

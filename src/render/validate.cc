@@ -46,11 +46,14 @@ Status CheckCamera(const Camera& camera) {
   const struct {
     const char* name;
     float value;
-  } positive[] = {{"fx", camera.fx}, {"fy", camera.fy}, {"near_plane", camera.near_plane}},
+  } lengths[] = {{"fx", camera.fx}, {"fy", camera.fy}},
     others[] = {{"cx", camera.cx}, {"cy", camera.cy}};
-  for (const auto& n : positive) {
-    if (n.value > 0 && std::isfinite(n.value)) continue;
-    return InvalidArgument("camera.{} is {}, must be finite and > 0", n.name, n.value);
+  for (const auto& n : lengths) {
+    if (n.value != 0 && std::isfinite(n.value)) continue;
+    return InvalidArgument("camera.{} is {}, must be finite and not 0", n.name, n.value);
+  }
+  if (!(camera.near_plane > 0) || !std::isfinite(camera.near_plane)) {
+    return InvalidArgument("camera.near_plane is {}, must be finite and > 0", camera.near_plane);
   }
   for (const auto& n : others) {
     if (!std::isfinite(n.value)) {
