@@ -13,6 +13,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/simd_target.h"
@@ -159,12 +160,14 @@ TEST_P(NonFinite, InputIsNamed) {
   ExpectNamed("scene 0: camera.translation", c.translation);
   ExpectNamed("d_frame.attributes", d_attributes_);
   ExpectNamed("d_frame.alpha", d_alpha_);
-  float* const lens[] = {&c.fx, &c.fy, &c.cx, &c.cy, &c.near_plane};
-  for (std::size_t i = 0; i < std::size(lens); ++i) {
-    const float kept = *lens[i];
-    *lens[i] = GetParam();
-    EXPECT_NE(Run().find("near_plane}[" + std::to_string(i) + "] is "), std::string::npos) << Run();
-    *lens[i] = kept;
+  const std::pair<const char*, float*> lens[] = {
+      {"fx", &c.fx}, {"fy", &c.fy}, {"cx", &c.cx}, {"cy", &c.cy}, {"near_plane", &c.near_plane}};
+  for (const auto& [name, number] : lens) {
+    const float kept = *number;
+    *number = GetParam();
+    const std::string expected = "scene 0: camera." + std::string(name) + " is ";
+    EXPECT_NE(Run().find(expected), std::string::npos) << Run();
+    *number = kept;
   }
   const double kept = e_.options.delta;
   for (double* option : {&e_.options.delta, &e_.options.max_alpha_error}) {
