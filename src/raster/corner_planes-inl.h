@@ -106,7 +106,6 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
 // vertices: the gradient of these needs the digits of small weights.
 inline constexpr float kSteepDepth = 8;
 
-// Where m, of which LeastQ tells, is 1.
 HWY_INLINE hn::Mask<LaneTag> IsSteep(const Lane (&inverse_depth)[3]) {
   const auto& z = inverse_depth;
   const auto least = hn::Min(hn::Min(z[0], z[1]), z[2]);
@@ -194,7 +193,7 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   const bool perspective = input.mode == Interpolation::kPerspective;
   out.scale = perspective ? hn::Div(one, hn::Max(hn::Max(z[0], z[1]), z[2])) : one;
   for (int k = 0; k < 3; ++k) out.m[k] = perspective ? hn::Mul(z[k], out.scale) : one;
-  const auto steep = perspective ? hn::Lt(LeastQ(out), hn::Set(d, 1 / kSteepDepth)) : IsSteep(z);
+  const auto steep = IsSteep(z);
   if (HWY_UNLIKELY(!hn::AllFalse(d, steep))) {
     SetSteepWeights(corners, origin_x, origin_y, steep, out.weight);
   }

@@ -18,8 +18,8 @@ namespace tilegrad::raster {
 // size they cover.
 inline constexpr int kStamp = 4;
 
-// A face that has a pixel centre of the image in its box, and covers one if `pixels` says so. Edge
-// k at pixel (column, row) is
+// A face that has a pixel centre of the image in its box; one that fits a stamp covers one, too.
+// Edge k at pixel (column, row) is
 // edge[k] + step_x[k] * (column - column_begin) + step_y[k] * (row - row_begin), and the pixel is
 // covered if none is negative: the exact edge functions, divided by kSubpixels and rounded down,
 // which keeps their sign because a step of one pixel is a multiple of kSubpixels.
