@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// Arrays that gradients go to, which are the caller's: added to, shared by scenes, refused, left as
+// they were after an error.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/test_scene.h"
+
+namespace tilegrad {
+namespace {
+
+using test::kAll;
+using test::kTestOptions;
+using test::TestCotangents;
+using test::TestGradients;
+using test::TestScene;
+
+TEST(ApiBackward, AddsToWhatIsThere) {
+  const TestScene<float> s(Lighting::kPhong);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> plain(s), added(s, 3.0f);
+  added.camera.fx = 3, added.lights[0].intensity = 3, added.surfaces[0].shininess = 3;
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&plain.d, 1}).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&added.d, 1}, GradientMode::kAdd).ok());
+  const auto expect = [](const std::vector<float>& a, const std::vector<float>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(b[i], a[i] + 3) << i;
+  };
+  expect(plain.positions, added.positions), expect(plain.colors, added.colors);
+  expect(plain.uvs, added.uvs), expect(plain.texels, added.texels);
+  expect(plain.attributes, added.attributes);
+  EXPECT_EQ(added.camera.fx, plain.camera.fx + 3);
+  EXPECT_EQ(added.lights[0].intensity, plain.lights[0].intensity + 3);
+  EXPECT_EQ(plain.surfaces[0].texture, -1);  // is no number that has a gradient
+}
+
+// Scenes that share an array get their sum; those that do not, their own. T = double exists for its
+// own loop over scenes.
+template <class T>
+void ExpectSharedArraysGetTheSum() {
+  const TestScene<T> s(Lighting::kLambert);
+  std::vector<SceneT<T>> scenes(2, s.scene);
+  scenes[1].camera.cx += 2;
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const TestCotangents<T> cotangents(frame.images());
+  TestGradients<T> first(s), second(s), both(s);
+  const std::vector<SceneGradientsT<T>> apart = {first.d, second.d}, shared = {both.d, both.d};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, apart).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, shared).ok());
+  const auto expect = [](const std::vector<T>& a, const std::vector<T>& b,
+                         const std::vector<T>& sum) {
+    T most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i]));
+    EXPECT_GT(most, 0);
+    // Sums of about a hundred pixels' shares in another order: their roundings.
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(sum[i], a[i] + b[i], 1e-5 * most) << i;
+  };
+  expect(first.positions, second.positions, both.positions);
+  expect(first.texels, second.texels, both.texels);
+  expect(first.colors, second.colors, both.colors);
+  EXPECT_EQ(both.camera.fx, first.camera.fx + second.camera.fx);
+  EXPECT_EQ(both.lights[0].intensity, first.lights[0].intensity + second.lights[0].intensity);
+}
+
+TEST(ApiBackward, ScenesThatShareAnArrayGetTheSum) {
+  ExpectSharedArraysGetTheSum<float>();
+  ExpectSharedArraysGetTheSum<double>();
+}
+
+// One array for meshes of two sizes, or for two things: either would be written beyond its end, or
+// hold one of them only.
+template <class T>
+void ExpectArraysThatMeetAreRefused() {
+  const TestScene<T> s(Lighting::kNone);
+  std::vector<SceneT<T>> scenes(2, s.scene);
+  scenes[1].positions = s.scene.positions.first(45), scenes[1].faces = s.scene.faces.first(36);
+  for (SceneT<T>& scene : scenes) {
+    scene.uvs = {}, scene.textures = {}, scene.surfaces = {};
+    scene.colors.values = scene.colors.values.first(scene.positions.size());
+    scene.attributes.values = scene.attributes.values.first(2 * scene.positions.size() / 3);
+  }
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const std::vector<T> d_color(frame.images().color.size(), T(1));
+  std::vector<T> one(48, T(3)), two(48);
+  const auto message = [&](const SceneGradientsT<T>& a, const SceneGradientsT<T>& b,
+                           GradientMode mode) {
+    const std::vector<SceneGradientsT<T>> d = {a, b};
+    return renderer.Backward(frame, {.color = d_color}, d, mode).message();
+  };
+  const std::span<T> all(one), some = all.first(45);
+  const std::string shared = ": only whole arrays of the same kind and size may be shared";
+  for (const GradientMode mode : {GradientMode::kOverwrite, GradientMode::kAdd}) {
+    EXPECT_EQ(message({.positions = all}, {.positions = some}, mode),
+              "d_scene.positions of scene 0 (48 numbers) and d_scene.positions of scene 1 (45 "
+              "numbers) overlap" +
+                  shared);
+    EXPECT_EQ(message({.positions = all, .colors = all}, {}, mode),
+              "d_scene.positions of scene 0 (48 numbers) and d_scene.colors of scene 0 (48 "
+              "numbers) overlap" +
+                  shared);
+    EXPECT_EQ(
+        message({.positions = two}, {.positions = some, .attributes = all.subspan(7, 30)}, mode),
+        "d_scene.positions of scene 1 (45 numbers) and d_scene.attributes of scene 1 (30 "
+        "numbers) overlap" +
+            shared);
+  }
+  EXPECT_EQ(one, std::vector<T>(48, T(3)));
+  EXPECT_EQ(message({.positions = all}, {.positions = std::span(two).first(45)},
+                    GradientMode::kOverwrite),
+            "");
+}
+
+TEST(ApiBackward, ArraysOfGradientsThatMeetAreRefused) {
+  ExpectArraysThatMeetAreRefused<float>();
+  ExpectArraysThatMeetAreRefused<double>();
+}
+
+// Without mip levels in one scene, with them in the next: there is room for those of both.
+TEST(ApiBackward, TexturesOfTwoFiltersShareAGradient) {
+  const TestScene<float> s(Lighting::kNone);
+  std::vector<std::vector<Texture>> textures(2, s.textures);
+  textures[1][0].filter = Filter::kTrilinear;
+  std::vector<Scene> scenes(2, s.scene);
+  std::vector<float> uvs(s.uvs);
+  for (float& x : uvs) x *= 40;  // coarse levels
+  for (std::size_t n : {0, 1}) scenes[n].textures = textures[n], scenes[n].uvs.values = uvs;
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render(scenes, kTestOptions, {}, &frame).ok());
+  const TestCotangents<float> cotangents(frame.images());
+  TestGradients<float> first(s), second(s), both(s);
+  const std::vector<SceneGradients> apart = {first.d, second.d}, shared = {both.d, both.d};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, apart).ok());
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, shared).ok());
+  for (std::size_t i = 0; i < both.texels.size(); ++i) {
+    EXPECT_NEAR(both.texels[i], first.texels[i] + second.texels[i], 1e-3) << i;
+  }
+}
+
+// Normals that positions have, in a scene that was given others, do not go to those: their arrays
+// are of another size.
+template <class T>
+void ExpectNoGradientOfNormalsThatAreNotUsed() {
+  const TestScene<T> s(Lighting::kLambert);
+  SceneT<T> scene = s.scene;
+  const std::vector<T> normals(9, T(1));
+  scene.faces = scene.faces.first(3), scene.uvs.values = scene.uvs.values.first(6);
+  scene.normals = {normals, Rate::kCorner};
+  RendererT<T> renderer;
+  FrameT<T> frame;
+  ASSERT_TRUE(renderer.Render({&scene, 1}, kTestOptions, kAll, &frame).ok());
+  const TestCotangents<T> cotangents(frame.images());
+  std::vector<T> d_normals(9, T(5)), d_positions(48);
+  const SceneGradientsT<T> d{.positions = d_positions, .normals = d_normals};
+  ASSERT_TRUE(renderer.Backward(frame, cotangents.d, {&d, 1}).ok());
+  EXPECT_EQ(d_normals, std::vector<T>(9, T(0)));
+  EXPECT_NE(d_positions, std::vector<T>(48, T(0)));
+}
+
+TEST(ApiBackward, NormalsThatAreNotUsedHaveNoGradient) {
+  ExpectNoGradientOfNormalsThatAreNotUsed<float>();
+  ExpectNoGradientOfNormalsThatAreNotUsed<double>();
+}
+
+TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
+  const TestScene<float> s(Lighting::kNone);
+  Renderer renderer;
+  Frame frame;
+  ASSERT_TRUE(renderer.Render({&s.scene, 1}, kTestOptions, {}, &frame).ok());
+  std::vector<float> d_color(frame.images().color.size(), 1.0f);
+  TestGradients<float> g(s, 2.0f);
+  const std::vector<float> before = g.positions;
+  d_color[7] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(renderer.Backward(frame, {.color = d_color}, {&g.d, 1}, GradientMode::kAdd).ok());
+  EXPECT_EQ(g.positions, before);
+  d_color[7] = 1;
+  g.colors.assign(g.colors.size(), std::numeric_limits<float>::max());  // + about 1e2: rounds off
+  g.texels.assign(g.texels.size(), std::numeric_limits<float>::max());
+  d_color.assign(d_color.size(), 1e36f);
+  const Status status = renderer.Backward(frame, {.color = d_color}, {&g.d, 1}, GradientMode::kAdd);
+  EXPECT_EQ(status.message(), "a sum of gradients overflows");
+  EXPECT_EQ(g.positions, before);
+}
+
+}  // namespace
+}  // namespace tilegrad

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What scenes and the renderer refuse, and what they say of it."""
+
+import unittest
+
+import numpy as np
+
+import tilegrad
+from scenes import IMAGE, patch
+from tilegrad import Camera, Light, Renderer, Surface, Texture
+
+
+class Picture:
+    """An image of another library, which has its bytes without a dtype."""
+
+    def __init__(self, image):
+        self.image, self.__array_interface__ = image, image.__array_interface__
+
+
+class Errors(unittest.TestCase):
+    """Each names the function, the argument, what was expected and got."""
+
+    def expect(self, error, text, call):
+        with self.assertRaises(error) as caught:
+            call()
+        self.assertEqual(str(caught.exception), text)
+
+    def test_scenes(self):
+        scene = patch()
+        cases = [
+            (ValueError, "Scene: positions has shape (16, 2), expected (V, 3)",
+             {"positions": scene.positions[:, :2]}),
+            (ValueError, "Scene: colors has shape (15, 3), expected (V, 3) with V = 16",
+             {"colors": scene["colors"][:15]}),
+            (ValueError, "Scene: colors has shape (3,), expected (V, 3) or (N, V, 3) with V = 16",
+             {"colors": scene["colors"][0]}),
+            (ValueError, "Scene: uvs has shape (18, 3, 2), expected (N, V, 2) with V = 16",
+             {"per_corner": ()}),
+            (ValueError, "Scene: camera has shape (3, 17), expected (N, 17) with N = 2",
+             {"positions": np.stack([scene.positions] * 2), "camera": Camera(fx=[1, 2, 3])}),
+            (TypeError, "Scene: faces has dtype float32, expected int32",
+             {"faces": scene.faces.astype(np.float32)}),
+            (TypeError, "Scene: camera must be a Camera, got list", {"camera": []}),
+            (TypeError, "Scene: lights must be a Light or a sequence of them, got float",
+             {"lights": 1.0}),
+            (ValueError, "Scene: lighting is 'blinn', expected one of 'none', 'lambert', 'phong', "
+             "'spherical_harmonics'", {"lighting": "blinn"}),
+            (ValueError, "Scene: normals is 'hard', expected one of 'smooth', 'flat'",
+             {"normals": "hard"}),
+            (ValueError, "Scene: per_corner is 'uv', expected one of 'colors', 'uvs', 'normals', "
+             "'attributes'", {"per_corner": "uv"}),
+            (ValueError, "Scene: textures[0] has shape (5, 3), expected (Ht, Wt, 3) or "
+             "(N, Ht, Wt, 3)", {"textures": np.zeros((5, 3), np.float32)}),
+            (TypeError, "Scene.replace: no argument is called 'colour'", {"colour": 1}),
+            (ValueError, "Scene: lights is an empty sequence; None stands for none",
+             {"lights": []}),
+            (ValueError, "Scene: lights has records of leading axes () and (2,): they must be "
+             "alike", {"lights": [Light(), Light(intensity=[1, 2])]}),
+            (ValueError, "Surface: texture has shape (3,), expected () or (2,), one for each "
+             "surface", {"surfaces": Surface(base_color=np.ones((2, 3)), texture=[0, 0, 0])}),
+            (TypeError, "Scene: per_corner must be a name or a sequence of names, got int",
+             {"per_corner": 3}),
+            (ValueError, "Scene: per_corner has 'normals', but the scene has no normals",
+             {"per_corner": ("uvs", "normals")}),
+            (ValueError, "Scene: per_corner has 'uvs', but the scene has no uvs",
+             {"uvs": None, "textures": None, "per_corner": "uvs"}),
+            (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
+             "255", {"colors": np.full((16, 3), 255, np.uint8)}),
+            (TypeError, "Scene: textures[1] has dtype uint8, expected float32 from 0 to 1: divide "
+             "by 255", {"textures": [np.ones((2, 2, 3), np.float32),
+                                     Texture(np.full((2, 2, 3), 255, np.uint8))]}),
+            (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
+             "255", {"colors": memoryview(np.full((16, 3), 255, np.uint8))}),
+            (TypeError, "Scene: textures[0] has dtype uint8, expected float32 from 0 to 1: divide "
+             "by 255", {"textures": Picture(np.full((2, 2, 3), 255, np.uint8))}),
+            (TypeError, "Scene: two_sided must be bool, got 'no' (str)", {"two_sided": "no"}),
+            (TypeError, "Scene: clamp must be bool, got 2 (int)", {"clamp": 2}),
+            (ValueError, "Scene: normals is None, expected one of 'smooth', 'flat'",
+             {"normals": None}),
+            (ValueError, "Scene: faces has shape (0,), expected (F, 3)", {"faces": []}),
+        ]
+        for error, text, change in cases:
+            self.expect(error, text, lambda: scene.replace(**change))
+        self.expect(ValueError, "Texture: wrap is 'tile', expected one of 'repeat', 'clamp', "
+                    "'mirror'", lambda: Texture(np.zeros((2, 2, 3)), "tile"))
+
+    def test_render(self):
+        scene, render = patch(), Renderer().render
+        bad = np.array(scene.positions)
+        bad[4, 1] = np.nan
+        cases = [
+            (TypeError, "render: scenes must be a Scene or a list of them, got ndarray",
+             lambda: render(scene.positions)),
+            (TypeError, "render: scenes[1] must be a Scene, got int", lambda: render([scene, 1])),
+            (TypeError, "render: scenes[1] is float64, expected float32 as scenes[0]",
+             lambda: render([scene, patch(np.float64)])),
+            (TypeError, "render: width must be int, got 3.5 (float)",
+             lambda: render(scene, width=3.5)),
+            (ValueError, "render: width is 0, must be in 1..16384 pixels",
+             lambda: render(scene, width=0)),
+            (ValueError, f"render: height is {2**40}, out of int32's range",
+             lambda: render(scene, height=2**40)),
+            (TypeError, "render: delta must be float, got 'soft' (str)",
+             lambda: render(scene, delta="soft")),
+            (TypeError, "render: delta must be float, got '1' (str)",
+             lambda: render(scene, delta="1")),
+            (ValueError, "render: delta is out of float's range",
+             lambda: render(scene, delta=10**400)),
+            (TypeError, "render: outputs must be a name or a sequence of names, got int",
+             lambda: render(scene, outputs=3)),
+            (ValueError, "render: paper_faces is -1, must be >= 0",
+             lambda: render(scene, paper_faces=-1)),
+            (ValueError, "render: outputs is 'colour', expected one of 'color', 'alpha', "
+             "'attributes', 'depth', 'normals', 'uv', 'barycentrics'",
+             lambda: render(scene, outputs=("colour",))),
+            (ValueError, "render: outputs has 'attributes', but a scene has none",
+             lambda: render(scene.replace(attributes=None), outputs="attributes")),
+        ]
+        for error, text, call in cases:
+            self.expect(error, text, call)
+        for text, change in ((r"^render: scene 0: faces\[2\] is 99", {"faces": [[0, 1, 99]]}),
+                             (r"^render: scene 0: positions\[13\]", {"positions": bad})):
+            moved = {"uvs": None, "textures": None, "surfaces": None, "face_surfaces": None,
+                     "per_corner": ()}
+            with self.assertRaisesRegex(ValueError, text):
+                render(scene.replace(**moved, **change))
+
+    def test_backward(self):
+        renderer = Renderer()
+        frame = renderer.render(patch(), **IMAGE)
+        ones = np.ones_like(frame.alpha)
+        cases = [
+            (TypeError, "backward: frame must be a Frame, got NoneType",
+             lambda: renderer.backward(None)),
+            (ValueError, "backward: alpha has shape (3, 3), expected (1, 29, 34)",
+             lambda: renderer.backward(frame, alpha=np.ones((3, 3)))),
+            (ValueError, "backward: depth was not rendered: outputs=('color', 'alpha')",
+             lambda: renderer.backward(frame, depth=ones)),
+            (ValueError, "backward: wrt has 'sh', but a scene has none",
+             lambda: renderer.backward(frame, alpha=ones, wrt="sh")),
+            (ValueError, "backward: wrt is 'vertices', expected one of 'positions', 'camera', "
+             "'colors', 'uvs', 'normals', 'textures', 'surfaces', 'lights', 'light_directions', "
+             "'sh', 'attributes'", lambda: renderer.backward(frame, alpha=ones, wrt="vertices")),
+            (ValueError, "backward: accumulate=True needs out",
+             lambda: renderer.backward(frame, alpha=ones, accumulate=True)),
+            (TypeError, "backward: out[0] must be Gradients, got int",
+             lambda: renderer.backward(frame, alpha=ones, out=[3])),
+            (TypeError, "backward: out must be Gradients or a list of them, got int",
+             lambda: renderer.backward(frame, alpha=ones, out=3)),
+            (TypeError, "backward: wrt must be a name or a sequence of names, got int",
+             lambda: renderer.backward(frame, alpha=ones, wrt=3)),
+            (TypeError, "backward: accumulate must be bool, got 'no' (str)",
+             lambda: renderer.backward(frame, alpha=ones, accumulate="no")),
+        ]
+        for error, text, call in cases:
+            self.expect(error, text, call)
+        with self.assertRaisesRegex(ValueError, "^backward: .*alpha"):
+            renderer.backward(frame, alpha=np.full_like(ones, np.nan))
+        small = renderer.backward(renderer.render(patch(positions=np.zeros((16, 3), "f4")),
+                                                  **IMAGE), alpha=ones)
+        small._arrays["positions"] = np.zeros((4, 3), np.float32)
+        self.expect(ValueError, "backward: positions has shape (4, 3), expected (16, 3)",
+                    lambda: renderer.backward(frame, alpha=ones, out=small))
+        fixed = np.zeros((16, 3), np.float32)
+        fixed.flags.writeable = False
+        small._arrays["positions"] = fixed
+        self.expect(ValueError, "backward: positions is read-only",
+                    lambda: renderer.backward(frame, alpha=ones, out=small))
+
+    def test_icosphere(self):
+        for radius in (float("nan"), float("inf"), 0.0, -1.0):
+            self.expect(ValueError, f"icosphere: radius is {radius:g}, must be finite and > 0",
+                        lambda: tilegrad.icosphere(1, radius))
+
+    def test_renderer(self):
+        self.expect(ValueError, "Renderer: threads is -1, must be in 0..1024",
+                    lambda: Renderer(-1))
+        self.expect(TypeError, "Renderer: threads must be int, got 'all' (str)",
+                    lambda: Renderer("all"))
+
+    def test_the_engine_goes_on_after_an_error(self):
+        renderer, scene = Renderer(), patch()
+        expected = np.array(renderer.render(scene, **IMAGE).color)
+        with self.assertRaises(ValueError):
+            renderer.render(scene, width=-1)
+        self.assertTrue(np.array_equal(renderer.render(scene, **IMAGE).color, expected))
+
+
+if __name__ == "__main__":
+    unittest.main()
