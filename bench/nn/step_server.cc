@@ -12,6 +12,7 @@
 #include <string>
 
 #include "base/parallel.h"
+#include "base/simd_target.h"
 #include "training_steps.h"
 
 namespace tilegrad::nn::bench {
@@ -68,5 +69,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: nn_step_server reconstruction|unet|critic WORKERS\n");
     return 2;
   }
+  const tilegrad::Status status = tilegrad::ForceTargetFromEnvironment();
+  if (!status.ok()) return std::fprintf(stderr, "%s\n", status.message().c_str()), 2;
   return tilegrad::nn::bench::Serve(argv[1], std::atoi(argv[2]));
 }

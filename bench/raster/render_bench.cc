@@ -11,6 +11,7 @@
 
 #include "raster/furniture.h"
 #include "raster/render_runs.h"
+#include "start.h"
 
 namespace tilegrad::bench {
 namespace {
@@ -64,8 +65,7 @@ void AddFurniture(const std::vector<FurnitureMesh>& furniture) {
 
 int main(int argc, char** argv) {
   using namespace tilegrad::bench;
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  if (!Start(&argc, argv)) return 1;
   for (const SceneSpec& scene : kScenes) AddSphere(scene);
   const auto furniture = LoadFurniture();
   if (furniture.ok()) {

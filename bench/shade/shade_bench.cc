@@ -13,6 +13,7 @@
 #include "base/rng.h"
 #include "raster/bench_scenes.h"
 #include "render/shaded/shaded_renderer.h"
+#include "start.h"
 
 namespace tilegrad::bench {
 namespace {
@@ -124,8 +125,7 @@ void Run(benchmark::State& state, const SceneSpec& scene, const RequestSpec& req
 
 int main(int argc, char** argv) {
   using namespace tilegrad::bench;
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  if (!Start(&argc, argv)) return 1;
   for (const SceneSpec& scene : kScenes) {
     if (scene.name != std::string("S1") && scene.name != std::string("S2")) continue;
     for (const RequestSpec& request : kRequests) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matrix product, blocked after Goto and van de Geijn: Anatomy of high-performance matrix
 // multiplication, ACM TOMS 34(3), 2008. A is packed once for all; every work item packs the slice
-// of B that it needs and keeps a panel of it in L1 while panels of A stream past from L2.
+// of B that it needs, a block at a time that stays in L2. A panel of A stays in L1 while the panels
+// of that block pass by.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_INL_H_
@@ -23,12 +24,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-constexpr std::size_t kDepth = 256;  // steps of k in one block: a B panel takes half of L1
-// Of B in one block: the best of 64 to 256 columns.
-constexpr std::size_t kBlockPanels = std::max<std::size_t>(256 / kTileColumns, 4);
+// Steps of k in one block, for which C is read and written once. With vectors of 16 floats the tile
+// is so large that panels of B need not stay in L1, and more steps gain.
+constexpr std::size_t kDepth = kLanes > 8 ? 512 : 256;
+constexpr std::size_t kBlockFloats = 65536;  // of B in one block; the next one shares L2 with it
+constexpr std::size_t kBlockPanels = kBlockFloats / (kDepth * kTileColumns);
 // Of a transposed B, as it lies in memory and packed: both stay in L2.
-constexpr std::size_t kFetchedPanels = std::max<std::size_t>(64 / kTileColumns, 4);
-constexpr std::size_t kGroupFloats = 24576;  // of A beside that block in L2: the best of 18 to 48 K
+constexpr std::size_t kFetchedPanels = std::max<std::size_t>(64 / kTileColumns, kLanes > 8 ? 2 : 4);
 constexpr std::size_t kItemRows = 4096;  // many: each work item packs its columns of B for itself
 constexpr std::size_t kPackedFloats = std::size_t{2} << 20;  // of A packed at a time, about
 
@@ -72,7 +74,10 @@ struct GemmPlan {
     return {begin * kTileColumns, std::min(p.n, end * kTileColumns), 0, p.k};
   }
   std::size_t packed_a_size() const { return p.m * passes.largest() * depths.largest(); }
-  std::size_t block_panels() const { return p.transpose_b ? kFetchedPanels : kBlockPanels; }
+  // The fewer steps, the more columns: a panel of A passes by once for each block.
+  std::size_t block_panels() const {
+    return p.transpose_b ? kFetchedPanels : kBlockPanels * (kDepth / depths.largest());
+  }
   std::size_t packed_b_size() const {
     return std::min(column_blocks.largest(), block_panels()) * PackedPanelStride(depths.largest());
   }
@@ -122,17 +127,12 @@ HWY_INLINE void MultiplyTile(const GemmPlan& plan, const float* packed_a, std::s
                  TargetOf(plan.p, row, block.begin + j * kTileColumns, block.k == 0));
 }
 
-// Runs `tile(panel, j)` for row panels [first, first + rows) and all column panels j of a block:
-// for as many row panels as stay in L2, one column panel after the other.
+// Runs `tile(panel, j)` for row panels [first, first + rows) and all column panels j of a block.
 template <class F>
 HWY_INLINE void ForTiles(std::size_t first, std::size_t rows, const ColumnBlock& block,
                          const F& tile) {
-  const Panels groups(rows, DivideUp(kGroupFloats, kTileRows * block.steps));
-  for (std::size_t group = 0; group < groups.count(); ++group) {
-    const std::size_t begin = first + groups.begin(group), end = begin + groups.size(group);
-    for (std::size_t j = 0; j < block.panels(); ++j) {
-      for (std::size_t panel = begin; panel < end; ++panel) tile(panel, j);
-    }
+  for (std::size_t panel = first; panel < first + rows; ++panel) {
+    for (std::size_t j = 0; j < block.panels(); ++j) tile(panel, j);
   }
 }
 

@@ -67,10 +67,11 @@ class PanelCopier {
   }
 
  private:
-  static constexpr std::size_t kAhead = 16;  // rows of panels between asking and copying
+  static constexpr std::size_t kAhead = 64;  // rows of panels between asking and copying
 
   HWY_INLINE void Copy() {
-    for (std::size_t v = 0; v < kTileColumns; v += kLineFloats) PrefetchLine(from_ + ahead_ + v);
+    for (std::size_t v = 0; v < kTileColumns; v += kLineFloats)
+      PrefetchLineToL2(from_ + ahead_ + v);
     for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
       hn::StoreU(hn::LoadU(Tag(), from_ + v), Tag(), to_ + v);
     }

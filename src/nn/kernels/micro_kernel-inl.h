@@ -93,7 +93,8 @@ HWY_INLINE void PrefetchLineToL2(const float* data) {
 }
 
 constexpr std::size_t kLineFloats = 16;  // in a cache line
-constexpr std::size_t kRunSteps = 8;     // of k: from one run of a task to the next
+// Of k, from one run of a task to the next: some 50 to 100 cycles.
+constexpr std::size_t kRunSteps = kLanes > 8 ? 4 : 8;
 
 // A packed panel; meanwhile `task` runs every kRunSteps steps, in the time that loads, stores and
 // integer arithmetic have beside the FMAs.
@@ -227,16 +228,21 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 };
 
-// Asks for the lines that Store will read and write.
-HWY_INLINE void FetchTarget(const TileTarget& t, std::size_t rows) {
-  for (std::size_t r = 0; r < rows; ++r) PrefetchLine(t.c + r * t.ldc + t.offset[0]);
+// Asks for the lines that Store will write. Past L1: rows of C may be a power of two apart, so that
+// L1 has room for a few of them only.
+template <std::size_t R, std::size_t V>
+HWY_INLINE void FetchTarget(const TileTarget& t) {
+  constexpr std::size_t kVectorsOfLine = std::max<std::size_t>(1, kLineFloats / kLanes);
+  for (std::size_t v = 0; v < V; v += kVectorsOfLine) {
+    for (std::size_t r = 0; r < R; ++r) PrefetchLineToL2(t.c + r * t.ldc + t.offset[v]);
+  }
 }
 
 template <class Rows, class Columns>
 HWY_INLINE void RunTile(Rows rows, Columns columns, std::size_t steps, const TileTarget& target) {
   Tile<Rows::kRows, Columns::kVectors> tile;
   tile.Clear();
-  if (target.accumulate) FetchTarget(target, Rows::kRows);
+  FetchTarget<Rows::kRows, Columns::kVectors>(target);
   tile.Multiply(rows, columns, steps);
   tile.Store(target);
 }
