@@ -70,8 +70,9 @@ class PanelCopier {
   static constexpr std::size_t kAhead = 64;  // rows of panels between asking and copying
 
   HWY_INLINE void Copy() {
-    for (std::size_t v = 0; v < kTileColumns; v += kLineFloats)
+    for (std::size_t v = 0; v < kTileColumns; v += kLineFloats) {
       PrefetchLineToL2(from_ + ahead_ + v);
+    }
     for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
       hn::StoreU(hn::LoadU(Tag(), from_ + v), Tag(), to_ + v);
     }
