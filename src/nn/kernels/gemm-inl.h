@@ -26,7 +26,7 @@ namespace tilegrad::nn::HWY_NAMESPACE {
 
 // Steps of k in one block, for which C is read and written once. With vectors of 16 floats the tile
 // is so large that panels of B need not stay in L1, and more steps gain.
-constexpr std::size_t kDepth = kLanes > 8 ? 512 : 256;
+constexpr std::size_t kDepth = kLanes > 8 ? 512 : 256;  // the best of 128 to 512 there
 constexpr std::size_t kBlockFloats = 65536;  // of B in one block; the next one shares L2 with it
 constexpr std::size_t kBlockPanels = kBlockFloats / (kDepth * kTileColumns);
 // Of a transposed B, as it lies in memory and packed: both stay in L2.

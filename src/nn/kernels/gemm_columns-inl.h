@@ -67,7 +67,8 @@ class PanelCopier {
   }
 
  private:
-  static constexpr std::size_t kAhead = 64;  // rows of panels between asking and copying
+  // Rows of panels between asking and copying: the best of 16 to 256 for lines past L1.
+  static constexpr std::size_t kAhead = 64;
 
   HWY_INLINE void Copy() {
     for (std::size_t v = 0; v < kTileColumns; v += kLineFloats) {
