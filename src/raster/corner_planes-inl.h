@@ -7,6 +7,7 @@
 #define TILEGRAD_RASTER_CORNER_PLANES_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
@@ -58,6 +59,16 @@ HWY_INLINE CornerIndices VerticesOf(const ScreenMesh& mesh, const std::int32_t* 
     for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) out.at[k][i] = corners[k][faces[i]];
   }
   return out;
+}
+
+// Asks for the vertices of a vector of faces.
+HWY_INLINE void PrefetchCorners(const ScreenMesh& mesh, const std::int32_t* faces) {
+  const CornerIndices vertices = VerticesOf(mesh, faces);
+  for (const auto& corner : vertices.at) {
+    for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) {
+      hwy::Prefetch(&mesh.packed[static_cast<std::size_t>(corner[i])]);
+    }
+  }
 }
 
 struct CornerLanes {

@@ -284,7 +284,9 @@ HWY_INLINE void FinishLanes(const InterpolateInput& input, const BandSums& sums,
 
 void Finish(const InterpolateInput& input, const BandSums& sums, const BackwardRequest& request,
             float* d_faces) {
-  for (std::size_t s = 0; s < sums.stride(); s += hn::Lanes(LaneTag())) {
+  const std::size_t lanes = hn::Lanes(LaneTag());
+  for (std::size_t s = 0; s < sums.stride(); s += lanes) {
+    if (s + lanes < sums.stride()) PrefetchCorners(*input.mesh, sums.face.data() + s + lanes);
     FinishLanes(input, sums, s, request, d_faces + 4 * s);
   }
 }

@@ -23,8 +23,7 @@ HWY_EXPORT(SoftMaskBackwardTarget);
 void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* workers) {
   constexpr std::size_t kChunkGroups = 16;  // that a worker takes at a time
   const std::size_t groups = (mesh.faces() + kGroupFaces - 1) / kGroupFaces;
-  tree->stride = groups * kGroupFaces;
-  tree->corners.resize(6 * tree->stride);
+  tree->corners.resize(groups * kGroupFaces * kNodeCorners);
   tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
   ForChunks(workers, groups, kChunkGroups, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(BuildSoftGroupsTarget)(mesh, begin, end, tree);

@@ -270,6 +270,9 @@ inline void SoftMaskBackwardTarget(const SoftTree& tree, const SoftMaskPlan& pla
                                    SoftMaskScratch* scratch, AlignedVector<SoftFaceGradient>* out) {
   FindNearGroups(tree, plan, region.rect, &scratch->groups);
   ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
+    const TileRect next = NextTile(region.rect, tile);
+    PrefetchTile(plan, next, region.face_ids.data());
+    PrefetchTile(plan, next, adjoint.alpha.data());
     TileBackward(tree, plan, {tile, region.face_ids}, adjoint, scratch, out).Run();
   });
 }

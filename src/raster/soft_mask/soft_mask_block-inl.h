@@ -8,6 +8,7 @@
 #define TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -28,6 +29,22 @@ HWY_INLINE std::size_t PixelIndex(const SoftMaskPlan& plan, int x, int y) {
 HWY_INLINE std::size_t TransmittanceIndex(const SoftMaskPlan& plan, const SoftBlock& block) {
   return static_cast<std::size_t>(block.y0) * static_cast<std::size_t>(plan.width) +
          static_cast<std::size_t>(block.x0) * static_cast<std::size_t>(block.height);
+}
+
+// The tile after `tile` in `region`, as ForTiles goes; empty behind the last one.
+HWY_INLINE TileRect NextTile(const TileRect& region, const TileRect& tile) {
+  const bool right = tile.x1 < region.x1;
+  const int x = right ? tile.x1 : region.x0, y = right ? tile.y0 : tile.y1;
+  return {x, y, HWY_MIN(x + kTileSize, region.x1), HWY_MIN(y + kTileSize, region.y1)};
+}
+
+// Asks for a tile of an image, which is in as many places as it has rows.
+template <class T>
+HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const TileRect& tile, const T* image) {
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    hwy::Prefetch(image + PixelIndex(plan, tile.x0, y));
+    hwy::Prefetch(image + PixelIndex(plan, tile.x1 - 1, y));
+  }
 }
 
 // Calls visit(pixel of the image, pixel of the block) for the first pixel of each row.

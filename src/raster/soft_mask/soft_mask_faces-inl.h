@@ -8,6 +8,7 @@
 #define TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
@@ -33,9 +34,9 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
                            float z, SoftChunk* chunk) {
   const SoftIntTag di;
   const SoftVec limit = hn::Set(d, z), long_edge = hn::Set(d, kLongEdge);
-  for (std::size_t f = node * kNodeFaces; f < (node + 1) * kNodeFaces; f += hn::Lanes(d)) {
+  for (std::size_t f = 0; f < kNodeFaces; f += hn::Lanes(d)) {
     SoftVec v[SoftFaceArrays::kTx];
-    for (std::size_t a = 0; a < 6; ++a) v[a] = hn::Load(d, tree.corner(a) + f);
+    for (std::size_t a = 0; a < kNodeCorners; ++a) v[a] = hn::Load(d, tree.corner(node, a) + f);
     const SoftVec left = v[SoftFaceArrays::kLeft] = hn::Min(hn::Min(v[0], v[1]), v[2]);
     const SoftVec top = v[SoftFaceArrays::kTop] = hn::Min(hn::Min(v[3], v[4]), v[5]);
     const SoftVec right = v[SoftFaceArrays::kRight] = hn::Max(hn::Max(v[0], v[1]), v[2]);
@@ -43,7 +44,7 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
     const auto near = hn::Le(BoxDistance(d, left, top, right, bottom, box), limit);
     if (hn::AllFalse(d, near)) continue;
     const auto is_long = hn::Gt(hn::Max(hn::Sub(right, left), hn::Sub(bottom, top)), long_edge);
-    const SoftInt face = simd::CountFrom(di, static_cast<std::int32_t>(f));
+    const SoftInt face = simd::CountFrom(di, static_cast<std::int32_t>(node * kNodeFaces + f));
     AppendFaces(d, v, face, hn::AndNot(is_long, near), &chunk->shorts);
     if (hn::AllFalse(d, hn::And(is_long, near))) continue;
     AppendFaces(d, v, face, hn::And(is_long, near), &chunk->longs);
@@ -104,13 +105,25 @@ HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
   }
 }
 
+HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
+  constexpr std::size_t kLineFloats = 16;
+  const float* corners = tree.corner(node, 0);
+  for (std::size_t i = 0; i < kNodeCorners * kNodeFaces; i += kLineFloats) {
+    hwy::Prefetch(corners + i);
+  }
+}
+
 // The next faces of a tile: fills the chunk from nodes[*next] on.
 inline void FillChunk(const SoftTree& tree, std::span<const std::int32_t> nodes, const SoftBox& box,
                       float z, std::size_t* next, SoftChunk* chunk) {
   const SoftTag d;
+  constexpr std::size_t kAhead = 4;  // nodes lie anywhere
   chunk->shorts.count = chunk->longs.count = 0;
   while (*next < nodes.size() &&
          chunk->shorts.count + chunk->longs.count + kNodeFaces <= kChunkFaces) {
+    if (*next + kAhead < nodes.size()) {
+      PrefetchNode(tree, static_cast<std::size_t>(nodes[*next + kAhead]));
+    }
     AppendNode(d, tree, static_cast<std::size_t>(nodes[(*next)++]), box, z, chunk);
   }
   SetUpDirections(d, box.unit_x, box.unit_y, &chunk->shorts);

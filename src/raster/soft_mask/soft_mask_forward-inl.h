@@ -279,6 +279,7 @@ inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& pl
   FindNearGroups(tree, plan, region.rect, &scratch->groups);
   double spent = 0;
   ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
+    PrefetchTile(plan, NextTile(region.rect, tile), images.alpha.data());
     spent = std::max(spent, TileForward(tree, plan, {tile, region.face_ids}, images, scratch));
   });
   return spent;

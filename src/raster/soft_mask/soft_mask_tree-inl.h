@@ -100,7 +100,7 @@ HWY_INLINE void StoreCorners(SoftTag d, const ScreenMesh& mesh, std::size_t f, S
         0, numbers);
     for (std::size_t axis = 0; axis < 2; ++axis) {
       hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), numbers[axis]), d,
-                tree->corners.data() + (3 * axis + k) * tree->stride + f);
+                tree->corner(f / kNodeFaces, 3 * axis + k) + f % kNodeFaces);
     }
   }
 }
@@ -120,10 +120,9 @@ HWY_INLINE void StoreBox(SoftTag d, std::size_t n, const Load& load, std::size_t
 }
 
 HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
-  const std::size_t first = node * kNodeFaces;
   std::size_t faces = 0;
-  for (std::size_t f = first; f < first + kNodeFaces; f += hn::Lanes(d)) {
-    const SoftVec corner = hn::Load(d, tree->corner(0) + f);
+  for (std::size_t f = 0; f < kNodeFaces; f += hn::Lanes(d)) {
+    const SoftVec corner = hn::Load(d, tree->corner(node, 0) + f);
     faces += hn::CountTrue(d, hn::Lt(corner, hn::Set(d, kNowhere)));
   }
   tree->nodes.array(SoftBoxes::kFaces)[node] = static_cast<float>(faces);
@@ -132,7 +131,7 @@ HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
       [&](std::size_t i, std::size_t a) HWY_ATTR {
         const std::size_t axis = a == SoftBoxes::kLeft || a == SoftBoxes::kRight ? 0 : 3;
         const auto corner = [&](std::size_t k) HWY_ATTR {
-          const SoftVec at = hn::Load(d, tree->corner(axis + k) + first + i);
+          const SoftVec at = hn::Load(d, tree->corner(node, axis + k) + i);
           // On the far side, too, a face that is nowhere widens no box.
           return a < SoftBoxes::kRight
                      ? at

@@ -15,6 +15,7 @@ namespace tilegrad::raster {
 
 inline constexpr std::size_t kNodeFaces = 16;
 inline constexpr std::size_t kGroupNodes = 16;
+inline constexpr std::size_t kNodeCorners = 6;  // numbers of a face
 inline constexpr std::size_t kGroupFaces = kNodeFaces * kGroupNodes;
 
 // Coordinate of faces that do not take part: beyond the reach of every kernel.
@@ -36,11 +37,17 @@ struct SoftBoxes {
 
 struct SoftTree {
   std::size_t faces = 0;         // that take part
-  AlignedVector<float> corners;  // [6][stride] x of corners 0, 1, 2, then y; pixels
-  std::size_t stride = 0;        // faces of the mesh, rounded up to whole groups
+  // [node][6][kNodeFaces] x of corners 0, 1, 2, then y; pixels. A node is read as a whole.
+  AlignedVector<float> corners;
   SoftBoxes nodes, groups;
 
-  const float* corner(std::size_t a) const { return corners.data() + a * stride; }
+  // The first face of a node.
+  float* corner(std::size_t node, std::size_t a) {
+    return corners.data() + (kNodeCorners * node + a) * kNodeFaces;
+  }
+  const float* corner(std::size_t node, std::size_t a) const {
+    return const_cast<SoftTree*>(this)->corner(node, a);
+  }
 };
 
 // Reuses the memory of `tree`. `workers` null: the calling thread.
