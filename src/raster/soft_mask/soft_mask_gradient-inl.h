@@ -60,10 +60,14 @@ HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
 // For A <= kSmallInfluence: lacks A^8, relatively.
 inline constexpr float kSmallInfluence = 0.125f;
 HWY_INLINE SoftVec SmallOdds(SoftTag d, SoftVec a) { return OddsSeries<3>(d, a); }
+// For A <= 2^-kMediumZ: lacks A^32.
+inline constexpr float kSmallZ = 3, kMediumZ = 0.75f;
+HWY_INLINE SoftVec MediumOdds(SoftTag d, SoftVec a) { return OddsSeries<5>(d, a); }
 // For A <= 63/64: lacks A^1024.
+HWY_INLINE SoftVec LargeOdds(SoftTag d, SoftVec a) { return OddsSeries<10>(d, a); }
 HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
   const bool small = hn::AllTrue(d, hn::Le(a, hn::Set(d, kSmallInfluence)));
-  return small ? SmallOdds(d, a) : OddsSeries<10>(d, a);
+  return small ? SmallOdds(d, a) : LargeOdds(d, a);
 }
 
 // The nearest of the faces' three edges: the way to the pixel, and the share of the edge's second
@@ -96,7 +100,14 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
 // The same for the pixels of a block.
 class NearestOfPixels {
  public:
+  // In each pixel of these, all faces have z >= kSmallZ, or kMediumZ.
+  std::uint64_t small = 0, medium = 0;
+
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
+    const auto beyond = [&](float z) HWY_ATTR {
+      return std::uint64_t{hn::AllTrue(d, hn::Ge(n.z, hn::Set(d, z)))} << i;
+    };
+    small |= beyond(kSmallZ), medium |= beyond(kMediumZ);
     hn::Store(n.z, d, v_[0][i]), hn::Store(n.way_x, d, v_[1][i]), hn::Store(n.way_y, d, v_[2][i]);
     hn::Store(n.second, d, v_[3][i]);
     hn::Store(hn::VecFromMask(d, n.on1), d, v_[4][i]);
@@ -131,17 +142,19 @@ struct CornerSums {
   }
 };
 
-// Of the pixels `bits`, pushed by push(pixel, z). Three loops, so that what is under way at a time
-// is not one chain from the edges to the sums.
-template <class Push>
+// By pixels.
+using Pushes = float[kBlockPixels][kSoftLanes];
+
+// Of the pixels `bits`, pushed by what push_all(nearest, pushes) finds for each. Loops apart, so
+// that what is under way at a time is not one chain from the edges to the sums.
+template <class PushAll>
 HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
-                                 std::uint64_t bits, const Push& push) {
+                                 std::uint64_t bits, const PushAll& push_all) {
   NearestOfPixels nearest;
-  alignas(64) float pushed[kBlockPixels][kSoftLanes];
+  alignas(64) Pushes pushed;
   ForPixels(bits,
             [&](std::size_t i) HWY_ATTR { nearest.Store(d, i, NearestOf(d, faces, block, i)); });
-  ForPixels(bits,
-            [&](std::size_t i) HWY_ATTR { hn::Store(push(i, nearest.Z(d, i)), d, pushed[i]); });
+  push_all(nearest, pushed);
   CornerSums sums(d);
   ForPixels(bits,
             [&](std::size_t i) HWY_ATTR { sums.Add(d, nearest.At(d, i), hn::Load(d, pushed[i])); });
@@ -268,13 +281,28 @@ struct WeakFaces {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       NotePairs(d, bits, work);
-      const CornerSums corners =
-          SumCorners(d, members, block, bits, [&](std::size_t i, SoftVec z) HWY_ATTR {
-            const SoftVec odds = Odds(d, simd::HalvingOf(d, z).power);
-            return hn::Mul(odds, hn::Set(d, push[i]));
-          });
+      const CornerSums corners = SumCorners(d, members, block, bits,
+                                            [&](const NearestOfPixels& nearest, Pushes& pushed)
+                                                HWY_ATTR { PushAll(bits, nearest, pushed); });
       sums.Add(d, list, m, corners);
     }
+  }
+
+ private:
+  // Loops apart by how many factors the odds need: which pixel needs how many is hard to foretell.
+  HWY_INLINE void PushAll(std::uint64_t bits, const NearestOfPixels& nearest,
+                          Pushes& pushed) const {
+    const SoftTag d;
+    const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
+      ForPixels(some, [&](std::size_t i) HWY_ATTR {
+        const SoftVec a = simd::HalvingOf(d, nearest.Z(d, i)).power;
+        hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushed[i]);
+      });
+    };
+    push_some(bits & nearest.small, [&](SoftVec a) HWY_ATTR { return SmallOdds(d, a); });
+    push_some(bits & nearest.medium & ~nearest.small,
+              [&](SoftVec a) HWY_ATTR { return MediumOdds(d, a); });
+    push_some(bits & ~nearest.medium, [&](SoftVec a) HWY_ATTR { return LargeOdds(d, a); });
   }
 };
 
@@ -322,14 +350,16 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
   for (std::size_t n = near.size(); n-- > 0;) {
     const SoftNearFaces& faces = near[n];
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
-    const CornerSums corners =
-        SumCorners(d, members, block, faces.bits, [&](std::size_t i, SoftVec z) HWY_ATTR {
-          const auto a = simd::HalvingOf(d, z);
-          const LaneProducts outside(d, a.one_minus);
-          const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
-          behind[i] *= hn::GetLane(outside.all);
-          return hn::Mul(hn::Mul(a.power, rest), outside.others);
-        });
+    const auto push_all = [&](const NearestOfPixels& nearest, Pushes& pushed) HWY_ATTR {
+      ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
+        const auto a = simd::HalvingOf(d, nearest.Z(d, i));
+        const LaneProducts outside(d, a.one_minus);
+        const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
+        behind[i] *= hn::GetLane(outside.all);
+        hn::Store(hn::Mul(hn::Mul(a.power, rest), outside.others), d, pushed[i]);
+      });
+    };
+    const CornerSums corners = SumCorners(d, members, block, faces.bits, push_all);
     const SumRows rows(d, corners);
     AppendGradients(
         faces.face, faces.count,
