@@ -84,9 +84,11 @@ TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListB
   return buffers->View();
 }
 
-// All faces into the only tile.
+// All faces into the only tile. Room for as many as there can be: which image comes to which worker
+// is not determined, and nothing shall be allocated once every size has been seen.
 TileLists ListAll(const DrawnFaces& faces, TileListBuffers* buffers) {
   buffers->faces.clear();
+  buffers->faces.reserve(faces.storage.size());
   for (std::size_t chunk = 0; chunk < faces.counts.size(); ++chunk) {
     const std::size_t before = buffers->faces.size();
     buffers->faces.resize(before + faces.counts[chunk]);

@@ -41,6 +41,7 @@ struct FaceSource {
   std::span<const std::int32_t> faces;  // [F,3]
   const CameraT<T>* camera;
   bool cull_back = false;
+  const FaceCorners* corners = nullptr;  // of `faces`, if somebody has split them
 };
 
 template <class T>
@@ -153,6 +154,7 @@ void AppendCutFace(const FaceSource<T>& source, std::int32_t face, ScreenMeshBuf
 // appends the vertices that cutting makes.
 template <class T>
 void AssembleFaces(const FaceSource<T>& source, ScreenMeshBuffersT<T>* out) {
+  out->whole = nullptr;
   out->v0.clear(), out->v1.clear(), out->v2.clear();
   out->source_face.clear(), out->reject.clear(), out->clipped.clear();
   for (std::size_t f = 0; f < source.faces.size() / 3; ++f) {

@@ -19,7 +19,7 @@ namespace tilegrad::raster {
 namespace {
 
 HWY_EXPORT(ProjectVertices);
-HWY_EXPORT(SplitFaces);
+HWY_EXPORT(SplitSomeFaces);
 HWY_EXPORT(ProjectVerticesBackward);
 
 constexpr std::size_t kVertexChunk = 8192;
@@ -39,15 +39,10 @@ bool ProjectSource(const FaceSource<float>& source, ScreenMeshBuffers* out,
 // from shapes to the caller.
 void AssembleWholeFaces(const FaceSource<float>& source, ScreenMeshBuffers* out,
                         const Workers* workers) {
-  const std::size_t n = source.faces.size() / 3;
-  for (auto* array : {&out->v0, &out->v1, &out->v2, &out->source_face}) array->resize(n);
-  out->reject.resize(n);
+  if (source.corners == nullptr) SplitFaces(source.faces, out, workers);
+  out->whole = source.corners;
+  out->reject.assign(source.faces.size() / 3, kFaceDrawn);
   out->clipped.clear();
-  ForChunks(workers, n, DrawnFaces::kChunk, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(SplitFaces)(source.faces, begin, end, out);
-    std::fill(out->reject.begin() + static_cast<std::ptrdiff_t>(begin),
-              out->reject.begin() + static_cast<std::ptrdiff_t>(end), kFaceDrawn);
-  });
 }
 
 bool AllVisible(const ScreenMesh& mesh) {
@@ -68,6 +63,14 @@ ScreenGradients Deinterleave(const VertexGradients& d_mesh, ProjectBackwardScrat
 }
 
 }  // namespace
+
+void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out, const Workers* workers) {
+  const std::size_t n = faces.size() / 3;
+  for (auto* array : {&out->v0, &out->v1, &out->v2, &out->source_face}) array->resize(n);
+  ForChunks(workers, n, DrawnFaces::kChunk, [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(SplitSomeFaces)(faces, begin, end, out);
+  });
+}
 
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
              DrawnFaces* drawn, const Workers* workers) {

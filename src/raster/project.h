@@ -11,9 +11,14 @@
 
 namespace tilegrad::raster {
 
+// Corners of `faces` [F,3], each in an array of its own, and the faces' numbers:
+// FaceSource::corners. Allocates only to grow `out`. `workers` null: the calling thread.
+void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out,
+                const Workers* workers = nullptr);
+
 // Fills `out` with the screen mesh of a validated, finite source, and `drawn`, if not null, with
-// the faces that may cover a pixel. Deterministic; allocates only to grow them. Not thread-safe for
-// one `out`. `workers` null: the calling thread.
+// the faces that may cover a pixel. `out` then looks at source.corners, if given. Deterministic;
+// allocates only to grow them. Not thread-safe for one `out`. `workers` null: the calling thread.
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
              DrawnFaces* drawn = nullptr, const Workers* workers = nullptr);
 

@@ -65,20 +65,28 @@ enum FaceReject : std::uint8_t {
 };
 inline constexpr std::uint8_t kFaceNotInSoftMask = kFaceBehind | kFaceOverflow;
 
-// Owns what a ScreenMesh looks at. Reused from frame to frame.
+// The faces of a ScreenMesh, [F] each.
+struct FaceCorners {
+  AlignedVector<std::int32_t> v0, v1, v2, source_face;
+};
+
+// Owns what a ScreenMesh looks at, but for the faces where none was cut and somebody else has them.
+// Reused from frame to frame.
 template <class T>
-struct ScreenMeshBuffersT {
+struct ScreenMeshBuffersT : FaceCorners {
   AlignedVector<T> x, y, depth, inverse_depth;
   AlignedVector<PackedVertexT<T>> packed;
-  AlignedVector<std::int32_t> v0, v1, v2, source_face;
+  const FaceCorners* whole = nullptr;  // instead of the own
   AlignedVector<ClipVertexT<T>> clipped;
   AlignedVector<std::uint8_t> reject;
   std::int32_t source_vertices = 0, source_faces = 0;
   int width = 0, height = 0;
 
   ScreenMeshT<T> View() const {
-    return {x,           y,       depth,  inverse_depth,   packed,       v0,    v1,    v2,
-            source_face, clipped, reject, source_vertices, source_faces, width, height};
+    const FaceCorners& f = whole != nullptr ? *whole : *this;
+    return {
+        x,       y,      depth,           inverse_depth, packed, f.v0,  f.v1, f.v2, f.source_face,
+        clipped, reject, source_vertices, source_faces,  width,  height};
   }
   // Fills vertices [begin, end) of `packed` from the other arrays.
   void Pack(std::size_t begin, std::size_t end) {

@@ -18,6 +18,7 @@
 #include "raster/soft_mask/soft_mask.h"
 #include "raster/visibility.h"
 #include "render/renderer.h"
+#include "render/topologies.h"
 
 namespace tilegrad {
 
@@ -26,7 +27,7 @@ namespace tilegrad {
 struct PreparedFrom {
   bool valid = false, drawn_bins = false, soft_tree = false;
   AlignedVector<float> positions;
-  AlignedVector<std::int32_t> faces;  // all in [0, V) for the V of `positions`
+  TopologyId topology;
   CameraT<float> camera;
   int width = 0, height = 0;
   double delta = 0, max_alpha_error = 0;
@@ -83,6 +84,7 @@ struct WorkerScratch {
   AlignedVector<std::int32_t> block_faces;
   // Of an image that is small enough to be one task: it stays in the worker's cache.
   raster::DrawnFaces drawn_faces;
+  raster::TileListBuffers drawn_buffers;
   BandGradients band_gradients;
   BinGradients bin_gradients;
 };

@@ -35,50 +35,37 @@ bool SameCamera(const Camera& a, const Camera& b) {
   return std::memcmp(&a, &b, sizeof(Camera)) == 0;
 }
 
-// Which arrays of a scene are, bit by bit, those that were prepared. Bits, not hashes: what was
-// kept is what would be computed again.
-struct Unchanged {
-  bool positions, faces;
-};
-
-// Positions are compared only if that may save something: they change from frame to frame.
-Unchanged CompareScene(const SceneView& scene, const PrepareRequest& request,
-                       const PreparedFrom& from) {
-  return {request.reuse && SameBits(scene.positions, from.positions),
-          scene.positions.size() == from.positions.size() && SameBits(scene.faces, from.faces)};
-}
-
-bool IsSoundScene(const SceneView& scene, const Unchanged& unchanged) {
-  const auto vertices = static_cast<std::int32_t>(scene.positions.size() / 3);
-  return (unchanged.faces || AllWithin(scene.faces, 0, vertices)) &&
-         (unchanged.positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
+bool IsSoundScene(const SceneView& scene, bool same_positions) {
+  return (same_positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
          IsSoundCamera(scene.camera);
 }
 
-bool IsPrepared(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
-                const Unchanged& unchanged, const PreparedFrom& from) {
-  return request.reuse && from.valid && unchanged.positions && unchanged.faces &&
+bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
+                const PrepareRequest& request, const PreparedFrom& from) {
+  return from.valid && in.topology.id == from.topology &&
          (from.drawn_bins || !request.drawn_bins) && (from.soft_tree || !request.soft_tree) &&
          from.width == options.width && from.height == options.height &&
          from.delta == options.delta && from.max_alpha_error == options.max_alpha_error &&
-         from.culling == options.culling && SameCamera(scene.camera, from.camera);
+         from.culling == options.culling && SameCamera(in.scene.camera, from.camera);
 }
 
-void RememberPrepared(const SceneView& scene, const RenderOptions& options,
-                      const PrepareRequest& request, const Unchanged& unchanged,
-                      PreparedFrom* from) {
+void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
+                      const PrepareRequest& request, PreparedFrom* from) {
+  const SceneView& scene = in.scene;
   from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_tree = request.soft_tree;
-  if (!unchanged.positions) from->positions.assign(scene.positions.begin(), scene.positions.end());
-  if (!unchanged.faces) from->faces.assign(scene.faces.begin(), scene.faces.end());
+  from->positions.assign(scene.positions.begin(), scene.positions.end());
+  from->topology = in.topology.id;
   from->camera = scene.camera;
   from->width = options.width, from->height = options.height;
   from->delta = options.delta, from->max_alpha_error = options.max_alpha_error;
   from->culling = options.culling;
 }
 
-void PrepareMesh(const SceneView& scene, const RenderOptions& options,
+void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
                  const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
-  raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image->buffers,
+  raster::FaceSource<float> source = FaceSourceOf(in.scene, options);
+  source.corners = &in.topology.corners;
+  raster::Project(source, options.width, options.height, &image->buffers,
                   request.drawn_bins ? &image->drawn_faces : nullptr, &workers);
   image->mesh = image->buffers.View();
   if (request.drawn_bins) {
@@ -95,16 +82,19 @@ void PrepareMesh(const SceneView& scene, const RenderOptions& options,
 
 }  // namespace
 
-bool PrepareImage(const SceneView& scene, const RenderOptions& options,
+bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats) {
-  const Unchanged unchanged = CompareScene(scene, request, image->prepared);
-  if (!IsSoundScene(scene, unchanged)) return false;
-  if (!IsPrepared(scene, options, request, unchanged, image->prepared)) {
+  const SceneView& scene = in.scene;
+  // Compared only if that may save something: positions change from frame to frame. By bits, not
+  // hashes: what was kept is what would be computed again.
+  const bool same_positions = request.reuse && SameBits(scene.positions, image->prepared.positions);
+  if (!IsSoundScene(scene, same_positions)) return false;
+  if (!same_positions || !IsPrepared(in, options, request, image->prepared)) {
     ++stats->prepared;
     image->prepared.valid = false;
-    PrepareMesh(scene, options, request, workers, image);
-    RememberPrepared(scene, options, request, unchanged, &image->prepared);
+    PrepareMesh(in, options, request, workers, image);
+    RememberPrepared(in, options, request, &image->prepared);
   }
   image->attributes =
       InMeshLayout(scene, image->mesh, AttributesOf(scene), &image->clipped_attributes);

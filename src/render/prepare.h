@@ -16,8 +16,13 @@ struct PrepareRequest {
   bool reuse = false;      // what was prepared last, if it was for the same scene and options
 };
 
+struct SceneToPrepare {
+  const SceneView& scene;
+  const Topology& topology;  // of its faces
+};
+
 // Returns false, and prepares nothing, if a number of the scene is not finite or out of range.
-bool PrepareImage(const SceneView& scene, const RenderOptions& options,
+bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats);
 

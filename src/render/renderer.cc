@@ -58,7 +58,8 @@ Status FindError(const BackwardCall& call) {
 }  // namespace
 
 // How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
-// cache of its worker from beginning to end; the stages of larger ones are shared, part by part.
+// cache of its worker from beginning to end; so are larger ones as long as there are enough of them
+// for all workers, who share the parts of the last ones.
 struct Renderer::Impl {
   explicit Impl(const Workers& w)
       : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {
@@ -68,25 +69,29 @@ struct Renderer::Impl {
   Status Render(const ForwardCall& call);
   Status Backward(const BackwardCall& call);
 
-  bool Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
-               const PrepareRequest& request);
+  bool Prepare(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
+               std::size_t n, WorkerScratch* worker);
   void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
+  void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
   void RenderOneBin(const ForwardCall& call, const TileTask& bin, WorkerScratch* worker);
 
   void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
-  bool BackwardParts(const BackwardCall& call);
-  bool Merge(const BackwardCall& call);
+  void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
                     BandGradients* out);
   void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
                    BinGradients* out);
 
-  void Begin(std::size_t count) {
+  // Returns whether the indices of all scenes are in range.
+  bool Begin(std::span<const SceneView> scenes) {
+    const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
     for (WorkerScratch& worker : worker_scratch) {
       worker.stats = {}, worker.times = {}, worker.soft.work = {};
     }
-    sound = true;
+    sound = topologies.Update(scenes, *workers);
+    return sound;
   }
   void Require(bool holds) {
     if (!holds) sound = false;
@@ -94,6 +99,7 @@ struct Renderer::Impl {
 
   const Workers* workers;
   std::atomic<bool> sound = true;  // false: some task met a number that is an error
+  Topologies topologies;
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
   std::vector<double> bin_errors;             // of alpha, [image][bin]
@@ -101,16 +107,14 @@ struct Renderer::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-// Projects and bins every scene of the batch.
-bool Renderer::Impl::Prepare(std::span<const SceneView> scenes, const RenderOptions& options,
-                             const PrepareRequest& request) {
-  workers->For(scenes.size(), [&](std::size_t n, std::size_t w) {
-    WorkerScratch& worker = worker_scratch[w];
-    StageClock clock;
-    Require(PrepareImage(scenes[n], options, request, *workers, &images[n], &worker.stats));
-    clock.Lap(&worker.times.prepare);
-  });
-  return sound;
+bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& options,
+                             const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
+  StageClock clock;
+  const bool done = PrepareImage({scene, topologies.of(n)}, options, request, *workers, &images[n],
+                                 &worker->stats);
+  Require(done);
+  clock.Lap(&worker->times.prepare);
+  return done;
 }
 
 void Renderer::Impl::RenderOneBin(const ForwardCall& call, const TileTask& bin,
@@ -126,33 +130,37 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
-  StageClock clock;
-  const bool done =
-      PrepareImage(call.scenes[n], call.options, call.request, *workers, &image, &worker->stats);
-  clock.Lap(&worker->times.prepare);
-  if (done) {
+  std::swap(image.drawn_buffers, worker->drawn_buffers);
+  if (Prepare(call.scenes[n], call.options, call.request, n, worker)) {
     RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
-  } else {
-    sound = false;
   }
   image.prepared.drawn_bins = false;
   std::swap(image.drawn_faces, worker->drawn_faces);
+  std::swap(image.drawn_buffers, worker->drawn_buffers);
+}
+
+void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
+                                 const Workers::Part& part) {
+  WorkerScratch* const own = &worker_scratch[part.worker()];
+  if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
+  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  part.For(bins.tiles(), [&](std::size_t bin, std::size_t worker) {
+    RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
+  });
 }
 
 Status Renderer::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  Begin(count);
+  if (!Begin(call.scenes)) return ValidateSceneNumbers(call.scenes);
   bin_errors.assign(count * bins.tiles(), 0.0);
   if (bins.tiles() == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
       RenderWholeImage(call, n, &worker_scratch[worker]);
     });
-  } else if (Prepare(call.scenes, call.options, call.request)) {
-    workers->For(count * bins.tiles(), [&](std::size_t task, std::size_t worker) {
-      const std::size_t bin = task % bins.tiles();
-      RenderOneBin(call, {task / bins.tiles(), bin, bins.rect(bin)}, &worker_scratch[worker]);
-    });
+  } else {
+    workers->ForParts(
+        count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
   }
   if (!sound) return ValidateSceneNumbers(call.scenes);
   for (const double error : bin_errors) {
@@ -180,55 +188,48 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
   const SceneView& scene = call.scenes[n];
-  StageClock clock;
-  if (!PrepareImage(scene, call.input.options, call.request, *workers, &image, &worker->stats)) {
-    sound = false;
-    return;
-  }
+  if (!Prepare(scene, call.input.options, call.request, n, worker)) return;
   PrepareRecomputed(call.input.stage, scene, n, &image);
-  clock.Lap(&worker->times.prepare);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
   if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
   const ImageGradients gradients{{&worker->band_gradients, 1},
                                  {&worker->bin_gradients, call.bins},
                                  call.request_of(n, image.mesh)};
   SceneGradients* d_scene = &call.d_scenes[n];
-  clock = {};
+  StageClock clock;
   Require(MergeGeometry(scene, call.input.options, image, gradients, worker, d_scene));
   Require(MergeAttributes(image, gradients, worker, d_scene));
   clock.Lap(&worker->times.merge);
 }
 
-// Bands and bins of all images together.
-bool Renderer::Impl::BackwardParts(const BackwardCall& call) {
-  for (std::size_t n = 0; n < call.scenes.size(); ++n) {
-    PrepareRecomputed(call.input.stage, call.scenes[n], n, &images[n]);
-  }
-  const std::size_t bands = call.scenes.size() * call.bands, bins = call.scenes.size() * call.bins;
-  if (band_gradients.size() < bands) band_gradients.resize(bands);
-  if (bin_gradients.size() < bins) bin_gradients.resize(bins);
-  workers->For(bands + bins, [&](std::size_t task, std::size_t w) {
-    WorkerScratch* worker = &worker_scratch[w];
-    if (task < bands) {
-      BackwardBand(call, {task / call.bands, task % call.bands}, worker, &band_gradients[task]);
-      return;
+// Bands and bins together.
+void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
+                                   const Workers::Part& part) {
+  WorkerScratch* const own = &worker_scratch[part.worker()];
+  if (!Prepare(call.scenes[n], call.input.options, call.request, n, own)) return;
+  PrepareRecomputed(call.input.stage, call.scenes[n], n, &images[n]);
+  BandGradients* const bands = &band_gradients[n * call.bands];
+  BinGradients* const bins = bin_gradients.data() + n * call.bins;
+  part.For(call.bands + call.bins, [&](std::size_t i, std::size_t worker) {
+    if (i < call.bands) {
+      BackwardBand(call, {n, i}, &worker_scratch[worker], &bands[i]);
+    } else {
+      const std::size_t bin = i - call.bands;
+      BackwardBin(call, n, bin, &worker_scratch[worker], &bins[bin]);
     }
-    task -= bands;
-    BackwardBin(call, task / call.bins, task % call.bins, worker, &bin_gradients[task]);
   });
-  return sound;
+  if (sound) Merge(call, n, part);
 }
 
 // Positions and attributes are two tasks, for the sake of a batch of one.
-bool Renderer::Impl::Merge(const BackwardCall& call) {
-  workers->For(2 * call.scenes.size(), [&](std::size_t task, std::size_t w) {
-    const std::size_t n = task / 2;
-    const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
-                                   std::span(bin_gradients).subspan(n * call.bins, call.bins),
-                                   call.request_of(n, images[n].mesh)};
+void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+  const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
+                                 std::span(bin_gradients).subspan(n * call.bins, call.bins),
+                                 call.request_of(n, images[n].mesh)};
+  part.For(2, [&](std::size_t i, std::size_t w) {
     WorkerScratch* worker = &worker_scratch[w];
     StageClock clock;
-    if (task % 2 == 0) {
+    if (i == 0) {
       Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, worker,
                             &call.d_scenes[n]));
     } else {
@@ -236,20 +237,22 @@ bool Renderer::Impl::Merge(const BackwardCall& call) {
     }
     clock.Lap(&worker->times.merge);
   });
-  return sound;
 }
 
 Status Renderer::Impl::Backward(const BackwardCall& call) {
-  Begin(call.scenes.size());
+  if (!Begin(call.scenes)) return FindError(call);
+  const std::size_t count = call.scenes.size();
   if (call.grid.tiles() == 1 && call.bands == 1) {
-    workers->For(call.scenes.size(), [&](std::size_t n, std::size_t worker) {
+    workers->For(count, [&](std::size_t n, std::size_t worker) {
       BackwardWholeImage(call, n, &worker_scratch[worker]);
     });
-    return sound ? Status() : FindError(call);
+  } else {
+    if (band_gradients.size() < count * call.bands) band_gradients.resize(count * call.bands);
+    if (bin_gradients.size() < count * call.bins) bin_gradients.resize(count * call.bins);
+    workers->ForParts(
+        count, [&](std::size_t n, const Workers::Part& part) { BackwardImage(call, n, part); });
   }
-  const bool done =
-      Prepare(call.scenes, call.input.options, call.request) && BackwardParts(call) && Merge(call);
-  return done ? Status() : FindError(call);
+  return sound ? Status() : FindError(call);
 }
 
 Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
