@@ -101,7 +101,7 @@ bool ProjectVertices(const FaceSource<float>& source, std::size_t begin, std::si
 
 // Corners of faces [begin, end), each in an array of its own; the faces' numbers.
 void SplitSomeFaces(std::span<const std::int32_t> faces, std::size_t begin, std::size_t end,
-                FaceCorners* out) {
+                    FaceCorners* out) {
   const hn::RebindToSigned<ProjectTag> di;
   const std::size_t lanes = hn::Lanes(di);
   std::size_t f = begin;
