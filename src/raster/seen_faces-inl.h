@@ -52,19 +52,25 @@ HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
   const auto number = [&](int j) HWY_ATTR {
     NumberPixel(row[j], static_cast<float>(rows.x0 + j) + 0.5f, y, seen);
   };
+  if (rows.width <= lanes) {
+    for (int j = 0; j < rows.width; ++j) number(j);
+    return;
+  }
   number(0);
-  int j = 1;
-  while (j + lanes <= rows.width) {
+  for (int j = 1; j < rows.width;) {
     // As many pixels as bits at a time: where the loop over bits ends is hard to foretell.
     const int first = j;
     std::uint64_t bits = 0;
-    for (; j + lanes <= rows.width && j < first + 64; j += lanes) {
-      const std::uint64_t here = NewFaceBits(row + j, above == nullptr ? nullptr : above + j);
-      bits |= here << (j - first);
+    while (j < rows.width && j - first <= 64 - lanes) {
+      // The last vector begins within the one before it: pixels one by one would wait for each
+      // other.
+      const int at = HWY_MIN(j, rows.width - lanes);
+      const std::uint64_t here = NewFaceBits(row + at, above == nullptr ? nullptr : above + at);
+      bits |= here >> (j - at) << (j - first);
+      j = at + lanes;
     }
     for (; bits != 0; bits &= bits - 1) number(first + std::countr_zero(bits));
   }
-  for (; j < rows.width; ++j) number(j);
 }
 
 // The arrays by slot have room for one slot more than there can be.
