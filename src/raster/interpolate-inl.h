@@ -8,6 +8,7 @@
 #define TILEGRAD_RASTER_INTERPOLATE_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
@@ -127,9 +128,10 @@ struct InterpolateJob {
 
 // One row of the outputs of a group.
 struct QuadRow {
-  float* to[4];  // the row's pixels of each output
-  int outputs;   // how many there are
-  int count;     // pixels
+  float* to[4];            // the row's pixels of each output
+  std::ptrdiff_t step[4];  // to the next row
+  int outputs;             // how many there are
+  int count;               // pixels
 
   HWY_INLINE QuadRow(const InterpolateJob& job, int group, int i) {
     const int first = FirstOutput(group), channels = job.input.attributes.channels;
@@ -140,6 +142,14 @@ struct QuadRow {
       const auto& view = o < channels ? job.out.attributes : job.out.barycentrics;
       to[k] = view.data + (o < channels ? o : o - channels) * view.plane +
               (i - job.rows.row_begin) * view.row;
+      step[k] = view.row;
+    }
+  }
+  // Asks for the row that is so many rows below.
+  HWY_INLINE void Prefetch(int rows) const {
+    constexpr int kLineFloats = 16;
+    for (int k = 0; k < outputs; ++k) {
+      for (int j = 0; j < count; j += kLineFloats) hwy::Prefetch(to[k] + rows * step[k] + j);
     }
   }
   HWY_INLINE void Store(int k, int j, Quad v) const {
@@ -160,6 +170,8 @@ HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, floa
   const QuadTag d;
   const QuadRow row(job, group, i);
   const std::int32_t* const faces = job.rows.row(i);
+  constexpr int kRowsAhead = 2;
+  if (i + kRowsAhead < job.rows.row_end) row.Prefetch(kRowsAhead);
   const float py = static_cast<float>(i) + 0.5f;
   for (int j = 0; j < row.count; j += kQuadPixels) {
     if (AllBackground(faces + j)) {
