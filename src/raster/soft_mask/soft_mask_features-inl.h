@@ -155,13 +155,14 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
                          const FeatureSearch& search, SoftLists* lists) {
   const SoftTag d;
   const SoftIntTag di;
+  const BlockAxes axes(search.block, search.reach);
   lists->vertices.count = lists->segments.count = lists->boundaries.count = lists->whole = 0;
   const auto append = [&](const SoftFaceArrays& faces, std::size_t first_slot,
                           const auto& edges) HWY_ATTR {
     const NearVectors near(d, faces, search);
     for (std::size_t n = 0; n < near.count; ++n) {
       const auto i = static_cast<std::size_t>(near.first[n]), slot = first_slot + i;
-      const FacePixels pixels = PixelsOfFaces(d, faces, i, search.block, search.reach);
+      const FacePixels pixels = PixelsOfFaces(d, faces, i, axes);
       const SoftMask seen =
           hn::AndNot(pixels.UnseenBy(search.pixels), hn::LoadMaskBits(d, near.lanes + n));
       if (hn::AllFalse(d, seen)) continue;

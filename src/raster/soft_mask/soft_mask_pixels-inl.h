@@ -25,10 +25,42 @@ using SoftBitsTag = hn::Repartition<std::uint64_t, SoftTag>;
 using SoftBits = hn::Vec<SoftBitsTag>;  // pixels of a block, for half of the faces
 
 // The pixels of a block in one direction: columns, rows, or the diagonals of equal x + y or x - y.
-// In pixels: where the first one lies, and how far a kernel reaches.
+// What brings the low or high end of a face, in pixels, to the index of the first one within reach
+// or the first one behind; how many there are.
 struct PixelAxis {
-  float first, reach;
-  float count;
+  float low, high, count;
+
+  // In pixels: where the first one lies, and how far a kernel reaches. 1/64 covers rounding, of
+  // which that relative to `reach` is in `reach`, and ties, which may become the even neighbour.
+  PixelAxis(float first, float reach, float pixels)
+      : low((0.5f - kRounding) - (first + reach)),
+        high((0.5f + kRounding) + (reach - first)),
+        count(pixels) {}
+
+ private:
+  static constexpr float kRounding = 1.0f / 64;
+};
+
+// Those of a block. Found once: compilers would do it again for each vector of faces, after which
+// lists are written.
+struct BlockAxes {
+  PixelAxis columns, rows, sums, differences;
+
+  BlockAxes(const SoftBlock& block, const SoftReach& reach) : BlockAxes(At(block), reach) {}
+
+ private:
+  static constexpr float kLast = kBlockSize - 1, kStraight = kBlockSize, kDiagonals = 2 * kLast + 1;
+  struct Corner {
+    float x, y;  // of the first pixel
+  };
+  static Corner At(const SoftBlock& block) {
+    return {static_cast<float>(block.x0) + 0.5f, static_cast<float>(block.y0) + 0.5f};
+  }
+  BlockAxes(const Corner& at, const SoftReach& reach)
+      : columns(at.x, reach.columns, kStraight),
+        rows(at.y, reach.rows, kStraight),
+        sums(at.x + at.y, reach.diagonals, kDiagonals),
+        differences(at.x - at.y - kLast, reach.diagonals, kDiagonals) {}
 };
 
 // The first and the one behind the last, in the lowest byte of each face's four.
@@ -36,16 +68,13 @@ struct PixelRange {
   SoftBytes begin, end;
 
   HWY_INLINE PixelRange(SoftTag d, const float* low, const float* high, const PixelAxis& axis) {
-    // A number as the last digits of a much larger one. 1/64 covers rounding, of which that
-    // relative to `reach` is in `reach`, and ties, which may become the even neighbour.
-    constexpr float kRounding = 1.0f / 64, kLarge = 0x1p23f;
+    constexpr float kLarge = 0x1p23f;  // a number as the last digits of a much larger one
     const auto nearest = [&](const float* at, float shift) HWY_ATTR {
       const SoftVec index = hn::Add(hn::Load(d, at), hn::Set(d, shift));
       const SoftVec clamped = hn::Min(hn::Max(index, hn::Zero(d)), hn::Set(d, axis.count));
       return hn::BitCast(SoftByteTag(), hn::Add(clamped, hn::Set(d, kLarge)));
     };
-    begin = nearest(low, (0.5f - kRounding) - (axis.first + axis.reach));
-    end = nearest(high, (0.5f + kRounding) + (axis.reach - axis.first));
+    begin = nearest(low, axis.low), end = nearest(high, axis.high);
   }
 };
 
@@ -139,18 +168,15 @@ struct FacePixels {
 
 // The pixels of a block that see faces i, i + 1, ...
 HWY_INLINE FacePixels PixelsOfFaces(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
-                                    const SoftBlock& block, const SoftReach& reach) {
+                                    const BlockAxes& axes) {
   using A = SoftFaceArrays;
   const auto range = [&](A::Array low, A::Array high, const PixelAxis& axis) HWY_ATTR {
     return PixelRange(d, faces.v[low] + i, faces.v[high] + i, axis);
   };
-  const auto x = static_cast<float>(block.x0) + 0.5f, y = static_cast<float>(block.y0) + 0.5f;
-  constexpr float kLast = kBlockSize - 1, kStraight = kBlockSize, kDiagonals = 2 * kLast + 1;
-  return FacePixels({range(A::kLeft, A::kRight, {x, reach.columns, kStraight}),
-                     range(A::kTop, A::kBottom, {y, reach.rows, kStraight}),
-                     range(A::kLeastSum, A::kMostSum, {x + y, reach.diagonals, kDiagonals}),
-                     range(A::kLeastDifference, A::kMostDifference,
-                           {x - y - kLast, reach.diagonals, kDiagonals})});
+  return FacePixels({range(A::kLeft, A::kRight, axes.columns),
+                     range(A::kTop, A::kBottom, axes.rows),
+                     range(A::kLeastSum, A::kMostSum, axes.sums),
+                     range(A::kLeastDifference, A::kMostDifference, axes.differences)});
 }
 
 }  // namespace tilegrad::raster::HWY_NAMESPACE

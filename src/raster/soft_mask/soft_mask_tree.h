@@ -36,7 +36,7 @@ struct SoftBoxes {
 };
 
 struct SoftTree {
-  std::size_t faces = 0;         // that take part
+  std::size_t faces = 0;  // that take part
   // [node][6][kNodeFaces] x of corners 0, 1, 2, then y; pixels. A node is read as a whole.
   AlignedVector<float> corners;
   SoftBoxes nodes, groups;
