@@ -20,11 +20,13 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 namespace simd = tilegrad::HWY_NAMESPACE;
 
-// `v`: corners and boxes, as in SoftFaceArrays.
-HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&v)[SoftFaceArrays::kTx], SoftInt face,
+// Corners and boxes, the first of SoftFaceArrays.
+inline constexpr std::size_t kCornersAndBoxes = SoftFaceArrays::kLeastSum;
+
+HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&v)[kCornersAndBoxes], SoftInt face,
                             SoftMask keep, SoftFaceArrays* to) {
   const Compactor compact(d, keep);
-  for (std::size_t a = 0; a < SoftFaceArrays::kTx; ++a) compact.Store(v[a], to->v[a] + to->count);
+  for (std::size_t a = 0; a < kCornersAndBoxes; ++a) compact.Store(v[a], to->v[a] + to->count);
   compact.Store(face, to->face + to->count);
   to->count += compact.count();
 }
@@ -35,7 +37,7 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   const SoftIntTag di;
   const SoftVec limit = hn::Set(d, z), long_edge = hn::Set(d, kLongEdge);
   for (std::size_t f = 0; f < kNodeFaces; f += hn::Lanes(d)) {
-    SoftVec v[SoftFaceArrays::kTx];
+    SoftVec v[kCornersAndBoxes];
     for (std::size_t a = 0; a < kNodeCorners; ++a) v[a] = hn::Load(d, tree.corner(node, a) + f);
     const SoftVec left = v[SoftFaceArrays::kLeft] = hn::Min(hn::Min(v[0], v[1]), v[2]);
     const SoftVec top = v[SoftFaceArrays::kTop] = hn::Min(hn::Min(v[3], v[4]), v[5]);
