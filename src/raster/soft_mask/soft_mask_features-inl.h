@@ -11,6 +11,7 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cstddef>
 #include <initializer_list>
 
@@ -132,11 +133,16 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
   for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
 }
 
+HWY_INLINE SoftMask MaskOf(SoftTag d, std::uint32_t bits) {
+  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits)};  // as many are read
+  return hn::LoadMaskBits(d, bytes);
+}
+
 // Vectors of faces of which one is near: their first faces, and which lanes are near.
 struct NearVectors {
   std::size_t count = 0;
   std::int32_t first[kChunkRoom];
-  std::uint8_t lanes[kChunkRoom + 8];  // bits; hn::LoadMaskBits may read eight bytes from each on
+  std::uint8_t lanes[kChunkRoom];  // bits
 
   // No branch, which would be hard to foretell.
   HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {
@@ -163,11 +169,12 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
     for (std::size_t n = 0; n < near.count; ++n) {
       const auto i = static_cast<std::size_t>(near.first[n]), slot = first_slot + i;
       const FacePixels pixels = PixelsOfFaces(d, faces, i, axes);
-      const SoftMask seen =
-          hn::AndNot(pixels.UnseenBy(search.pixels), hn::LoadMaskBits(d, near.lanes + n));
-      if (hn::AllFalse(d, seen)) continue;
+      const std::uint32_t seen_bits = near.lanes[n] & ~pixels.UnseenBy(search.pixels);
+      if (seen_bits == 0) continue;
       pixels.Store(lists->pixels + slot);
-      lists->whole += hn::CountTrue(d, hn::And(seen, pixels.SeenByAll(search.block.bits)));
+      lists->whole +=
+          static_cast<std::size_t>(std::popcount(seen_bits & pixels.SeenByAll(search.block.bits)));
+      const SoftMask seen = MaskOf(d, seen_bits);
       SoftMask far = seen;
       if (search.split) {
         far = hn::AndNot(BoxesNear(d, faces, i, search.block, search.reach.near), seen);

@@ -144,25 +144,22 @@ struct FacePixels {
     const SoftBitsTag d;
     hn::Store(first, d, to), hn::Store(second, d, to + hn::Lanes(d));
   }
-  // The faces that none of `pixels` sees.
-  HWY_INLINE SoftMask UnseenBy(std::uint64_t pixels) const {
+  // Bits of the faces that none of `pixels` sees.
+  HWY_INLINE std::uint32_t UnseenBy(std::uint64_t pixels) const {
     const SoftBits among = hn::Set(SoftBitsTag(), pixels);
     return Zeros(hn::And(first, among), hn::And(second, among));
   }
-  // The faces that all of `pixels` see.
-  HWY_INLINE SoftMask SeenByAll(std::uint64_t pixels) const {
+  // Bits of the faces that all of `pixels` see.
+  HWY_INLINE std::uint32_t SeenByAll(std::uint64_t pixels) const {
     const SoftBits among = hn::Set(SoftBitsTag(), pixels);
     return Zeros(hn::AndNot(first, among), hn::AndNot(second, among));
   }
 
  private:
-  static HWY_INLINE SoftMask Zeros(SoftBits a, SoftBits b) {
-    const SoftTag d;
-    const SoftBitsTag d_bits;
-    const auto half = [&](SoftBits v) HWY_ATTR {
-      return hn::BitCast(d, hn::VecFromMask(d_bits, hn::Eq(v, hn::Zero(d_bits))));
-    };
-    return hn::MaskFromVec(hn::ConcatEven(d, half(b), half(a)));
+  static HWY_INLINE std::uint32_t Zeros(SoftBits a, SoftBits b) {
+    const SoftBitsTag d;
+    const auto half = [&](SoftBits v) HWY_ATTR { return BitsOf(d, hn::Eq(v, hn::Zero(d))); };
+    return half(a) | half(b) << hn::Lanes(d);
   }
 };
 

@@ -26,8 +26,9 @@ using SoftMask = hn::Mask<SoftTag>;
 using SoftIntTag = hn::RebindToSigned<SoftTag>;
 using SoftInt = hn::Vec<SoftIntTag>;
 
-// Bit i: lane i.
-HWY_INLINE std::uint32_t BitsOf(SoftTag d, SoftMask mask) {
+// Bit i: lane i, of up to eight.
+template <class D>
+HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(d, mask, bytes);
   return bytes[0];
