@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 
 #include "raster/soft_mask/soft_mask_forward-inl.h"
@@ -48,8 +49,8 @@ class TileBackward {
       weak_[b] = scratch_->blocks[b].bits, scratch_->blocks[b].live = dark_[b];
     }
     std::size_t next = 0;
-    FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
-    if (next == Order().size()) {
+    Fill(&next);
+    if (next == nodes_.count) {
       OneChunk();
     } else {
       ManyChunks();
@@ -57,8 +58,15 @@ class TileBackward {
   }
 
  private:
-  std::span<const std::int32_t> Order() const {
-    return std::span(scratch_->nodes).first(nodes_.count);
+  // The chunk from a node on, unless it is there.
+  void Fill(std::size_t* next) {
+    if (*next != chunk_begin_) {
+      chunk_begin_ = chunk_end_ = *next;
+      FillChunk({tree_, std::span(scratch_->nodes).first(nodes_.count), box_, reach_.z,
+                 kBackwardChunkFaces},
+                &chunk_end_, &scratch_->chunk);
+    }
+    *next = chunk_end_;
   }
   std::size_t IndexOf(const SoftBlock& block, std::size_t i) const {
     return PixelIndex(plan_, block.x0 + static_cast<int>(i % kBlockSize),
@@ -154,8 +162,8 @@ class TileBackward {
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (dark_[b] != 0) DarkGradients(b);
     }
-    for (std::size_t next = 0; next < Order().size();) {
-      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+    for (std::size_t next = 0; next < nodes_.count;) {
+      Fill(&next);
       ClearSums();
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
         if (weak_[b] != 0) FindMembers(b), AddWeakGradients(b);
@@ -176,8 +184,8 @@ class TileBackward {
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (dark_[b] != 0) StartProducts(b);
     }
-    for (std::size_t next = 0; next < Order().size() && AnyLive(blocks);) {
-      FillChunk(tree_, Order(), box_, reach_.z, &next, &scratch_->chunk);
+    for (std::size_t next = 0; next < nodes_.count && AnyLive(blocks);) {
+      Fill(&next);
       for (std::size_t b = 0; b < kTileBlocks; ++b) {
         if (blocks[b].live != 0) FindMembers(b), MultiplyProducts(b);
       }
@@ -193,7 +201,7 @@ class TileBackward {
   void MultiplyProducts(std::size_t b) {
     SoftBlock& block = scratch_->blocks[b];
     PartialAlpha far(&block, scratch_);
-    far.AddVertices(), far.AddSegments(), far.Merge();
+    far.AddVertices(), far.Merge(), far.AddSegments(), far.Merge();
     AppendNear(block, near_product_[b], &scratch_->near[b], scratch_);
     // The square: a face's gradient may be as large as the root of the product
     // (docs/numerics.md).
@@ -258,6 +266,7 @@ class TileBackward {
   SoftBox box_;
   SoftNodes nodes_;
   SoftReach reach_;
+  std::size_t chunk_begin_ = std::numeric_limits<std::size_t>::max(), chunk_end_ = 0;
   PixelScale scale_;
   std::uint64_t dark_[kTileBlocks] = {};  // pixels whose product is to be found
   std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter

@@ -115,14 +115,22 @@ HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
   }
 }
 
-// The next faces of a tile: fills the chunk from nodes[*next] on.
-inline void FillChunk(const SoftTree& tree, std::span<const std::int32_t> nodes, const SoftBox& box,
-                      float z, std::size_t* next, SoftChunk* chunk) {
+// Which faces a tile looks at: those of `nodes` within z of the box, up to `most` at a time.
+struct TileFaces {
+  const SoftTree& tree;
+  std::span<const std::int32_t> nodes;
+  const SoftBox& box;
+  float z;
+  std::size_t most;
+};
+
+// The next of them: fills the chunk from nodes[*next] on.
+inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chunk) {
+  const auto& [tree, nodes, box, z, most] = faces;
   const SoftTag d;
   constexpr std::size_t kAhead = 4;  // nodes lie anywhere
   chunk->shorts.count = chunk->longs.count = 0;
-  while (*next < nodes.size() &&
-         chunk->shorts.count + chunk->longs.count + kNodeFaces <= kChunkFaces) {
+  while (*next < nodes.size() && chunk->shorts.count + chunk->longs.count + kNodeFaces <= most) {
     if (*next + kAhead < nodes.size()) {
       PrefetchNode(tree, static_cast<std::size_t>(nodes[*next + kAhead]));
     }

@@ -34,6 +34,7 @@ class PartialAlpha {
     const SoftTag d;
     const auto& list = lists_.vertices;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      MergeBefore(m);
       const std::uint64_t bits = See(list, m);
       if (bits == 0) continue;
       NoteVertexPairs(d, bits, work_);
@@ -46,6 +47,7 @@ class PartialAlpha {
     const SoftTag d;
     const auto& list = lists_.segments;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      MergeBefore(m);
       const EdgeMembers members(d, list.v[0] + m, list.kRoom);
       AddDistances(See(list, m), [&](std::size_t i)
                                      HWY_ATTR { return SquaredLength(members.At(d, *block_, i)); });
@@ -56,6 +58,7 @@ class PartialAlpha {
     const SoftTag d;
     const auto& list = lists_.boundaries;
     for (std::size_t m = 0; m < list.count; m += hn::Lanes(d)) {
+      MergeBefore(m);
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
       AddDistances(See(list, m), [&](std::size_t i) HWY_ATTR { return members.Z(d, *block_, i); });
     }
@@ -79,6 +82,11 @@ class PartialAlpha {
   }
 
  private:
+  // Member m is next: after kChunkFaces of them, which only the way back may have in one list, the
+  // lanes have enough.
+  HWY_INLINE void MergeBefore(std::size_t m) {
+    if (m != 0 && m % kChunkFaces == 0) Merge();
+  }
   // The pixels that see a vector of members.
   HWY_INLINE std::uint64_t See(const SoftList& list, std::size_t m) {
     const std::uint64_t bits = PixelsOf(SoftTag(), lists_, list, m, block_->live);
@@ -227,9 +235,10 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
     if (blocks[b].bits != 0) ClearAlpha(&blocks[b]);
   }
   const double stop = StopProduct(plan);
-  const std::span<const std::int32_t> order = std::span(scratch->nodes).first(nodes.count);
-  for (std::size_t next = 0; next < order.size() && AnyLive(blocks);) {
-    FillChunk(tree, order, box, reach.z, &next, &scratch->chunk);
+  const TileFaces faces{tree, std::span(scratch->nodes).first(nodes.count), box, reach.z,
+                        kChunkFaces};
+  for (std::size_t next = 0; next < nodes.count && AnyLive(blocks);) {
+    FillChunk(faces, &next, &scratch->chunk);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       if (blocks[b].live == 0) continue;
       FindFeatures(scratch->chunk, plan, {blocks[b], blocks[b].live, reach, false},
@@ -237,7 +246,7 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
       blocks[b].whole += scratch->lists.whole;
       PartialAlpha partial(&blocks[b], scratch);
       partial.AddVertices(), partial.AddSegments(), partial.AddBoundaries(), partial.Merge();
-      if (next < order.size()) StopPixels(plan, stop, &blocks[b]);
+      if (next < nodes.count) StopPixels(plan, stop, &blocks[b]);
     }
   }
 }

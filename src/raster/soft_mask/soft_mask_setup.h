@@ -20,7 +20,11 @@ inline constexpr std::size_t kSoftLanes = 8;  // the most that vectors of this k
 // Faces that a tile looks at before its blocks merge what they have in double, and look whether
 // they may stop. Bounds rounding independently of the number of faces.
 inline constexpr std::size_t kChunkFaces = 256;
-inline constexpr std::size_t kChunkRoom = kChunkFaces + kSoftLanes;
+// Of the way back, which where there are several chunks has to find the members of blocks twice,
+// for the products and for the gradients.
+inline constexpr std::size_t kBackwardChunkFaces = 1024;
+// Not a power of two: arrays would compete for the same lines of a cache.
+inline constexpr std::size_t kChunkRoom = kBackwardChunkFaces + 6 * kSoftLanes;
 // Faces with an edge that spans more than this in x or y are set up in double.
 inline constexpr float kLongEdge = 32;  // pixels
 
