@@ -235,7 +235,7 @@ class AttributeQuads {
 // Channels `first` to first + 3 at corner k; those that do not exist hold anything finite.
 HWY_INLINE void CornerAttributes(const InterpolateInput& input, const CornerPlanes& corners, int k,
                                  int first, Lane (&out)[4]) {
-  LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, corners.attributes.at[k], first), 0,
+  LoadQuads(LaneTag(), AttributeQuads(input.attributes.values, corners.attributes.at[k], first),
             out);
 }
 

@@ -39,37 +39,42 @@ HWY_INLINE FaceInt LoadSome(const std::int32_t* from, std::size_t count) {
 using QuadTag = hn::FixedTag<float, 4>;
 using Quad = hn::Vec<QuadTag>;
 
-// From four numbers of four to four of number 0, of number 1, and so on, in place.
-HWY_INLINE void Transpose(Quad (&q)[4]) {
-  const QuadTag d;
-  const Quad a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
-  const Quad e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
+// In each block of four lanes: from four numbers of four to four of number 0, of number 1, and so
+// on, in place.
+template <class D>
+HWY_INLINE void Transpose(D d, hn::Vec<D> (&q)[4]) {
+  const auto a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
+  const auto e = hn::InterleaveUpper(d, q[0], q[2]), f = hn::InterleaveUpper(d, q[1], q[3]);
   q[0] = hn::InterleaveLower(d, a, b), q[1] = hn::InterleaveUpper(d, a, b);
   q[2] = hn::InterleaveLower(d, e, f), q[3] = hn::InterleaveUpper(d, e, f);
 }
 
+#if !HWY_HAVE_SCALABLE
+// Four numbers of lanes i, i + 4, i + 8, ..., a block of the vector each.
+template <class D, class At>
+HWY_INLINE hn::Vec<D> LoadBlocks(D d, const At& at, std::size_t i) {
+  if constexpr (std::is_same_v<D, QuadTag>) {
+    return hn::LoadU(d, at(i));
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, LoadBlocks(half, at, i + hn::MaxLanes(half)), LoadBlocks(half, at, i));
+  }
+}
+#endif
+
 // Four numbers from at(i) on for each lane i, transposed: out[c] holds number c of all lanes.
 // Several times faster than gathers.
 template <class D, class At>
-HWY_INLINE void LoadQuads(D d, const At& at, std::size_t first, hn::Vec<D> (&out)[4]) {
+HWY_INLINE void LoadQuads(D d, const At& at, hn::Vec<D> (&out)[4]) {
 #if HWY_HAVE_SCALABLE
-  (void)first;
   HWY_ALIGN float numbers[4 * kMostFaceLanes];
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     hn::Store(hn::LoadU(QuadTag(), at(i)), QuadTag(), numbers + 4 * i);
   }
   hn::LoadInterleaved4(d, numbers, out[0], out[1], out[2], out[3]);
 #else
-  if constexpr (std::is_same_v<D, QuadTag>) {
-    for (std::size_t i = 0; i < 4; ++i) out[i] = hn::LoadU(d, at(first + i));
-    Transpose(out);
-  } else {
-    const hn::Half<D> half;
-    hn::Vec<decltype(half)> lower[4], upper[4];
-    LoadQuads(half, at, first, lower);
-    LoadQuads(half, at, first + hn::MaxLanes(half), upper);
-    for (int c = 0; c < 4; ++c) out[c] = hn::Combine(d, upper[c], lower[c]);
-  }
+  for (std::size_t i = 0; i < 4; ++i) out[i] = LoadBlocks(d, at, i);
+  Transpose(d, out);
 #endif
 }
 
@@ -78,7 +83,7 @@ HWY_INLINE void LoadVertices(const ScreenMesh& mesh, const std::int32_t* vertex,
                              FaceVec (&out)[4]) {
   const auto at = [&](std::size_t i)
                       HWY_ATTR { return &mesh.packed[static_cast<std::size_t>(vertex[i])].x; };
-  LoadQuads(FaceTag(), at, 0, out);
+  LoadQuads(FaceTag(), at, out);
 }
 
 // Four pixels.

@@ -113,7 +113,7 @@ struct QuadPixels {
                           hn::MulAdd(hn::Load(d, dy + at[p]), y[p], hn::Load(d, value + at[p])));
       if (kPerspective && group == 0) out[p] = hn::Max(out[p], hn::Load(d, quads->least() + at[p]));
     }
-    Transpose(out);
+    Transpose(d, out);
   }
 };
 

@@ -163,7 +163,7 @@ HWY_INLINE void SumRow(const InterpolateInput& input, const BackwardBand& band, 
                              row * band.d_out.row;
   const float y = static_cast<float>(i) + 0.5f;
   const auto add = [&](PixelQuad* pixels) HWY_ATTR {
-    Transpose(pixels->d_out);
+    Transpose(d, pixels->d_out);
     AddMoments<kPerspective>(*pixels, group, stride, sums);
   };
   int j = 0;

@@ -98,7 +98,7 @@ HWY_INLINE void StoreCorners(SoftTag d, const ScreenMesh& mesh, std::size_t f, S
         d,
         [&](std::size_t i)
             HWY_ATTR { return &mesh.packed[static_cast<std::size_t>(faces.vertex[k][i])].x; },
-        0, numbers);
+        numbers);
     for (std::size_t axis = 0; axis < 2; ++axis) {
       hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), numbers[axis]), d,
                 tree->corner(f / kNodeFaces, 3 * axis + k) + f % kNodeFaces);
