@@ -144,7 +144,7 @@ inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chun
 // lies relative to it ("The distance to a boundary").
 struct FaceEdges {
   SoftVec x[3], y[3];
-  SoftVec tx[3], ty[3], side[3], along[3], past[3], inverse[3];
+  SoftVec tx[3], ty[3], side[3], first[3], last[3], inverse[3];
 };
 
 HWY_INLINE void LoadCorners(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
@@ -166,8 +166,8 @@ HWY_INLINE void ShortEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i
     const SoftVec tx = f->tx[k] = hn::Load(d, faces.v[SoftFaceArrays::kTx + k] + i);
     const SoftVec ty = f->ty[k] = hn::Load(d, faces.v[SoftFaceArrays::kTy + k] + i);
     f->side[k] = hn::MulSub(ty, f->x[k], hn::Mul(tx, f->y[k]));
-    f->along[k] = hn::NegMulSub(tx, f->x[k], hn::Mul(ty, f->y[k]));
-    f->past[k] = hn::NegMulSub(tx, f->x[next], hn::Mul(ty, f->y[next]));
+    f->first[k] = hn::MulAdd(tx, f->x[k], hn::Mul(ty, f->y[k]));
+    f->last[k] = hn::MulAdd(tx, f->x[next], hn::Mul(ty, f->y[next]));
     f->inverse[k] = hn::Load(d, faces.v[SoftFaceArrays::kInverse + k] + i);
   }
 }
@@ -203,8 +203,8 @@ HWY_INLINE void LongEdge(const SoftDouble (&x)[3], const SoftDouble (&y)[3], std
   const SoftDouble tx = hn::IfThenElse(real, hn::Mul(ex, inverse), one);
   const SoftDouble ty = hn::Mul(ey, inverse);
   const SoftDouble side = hn::MulSub(ty, x[k], hn::Mul(tx, y[k]));
-  const SoftDouble along = hn::NegMulSub(tx, x[k], hn::Mul(ty, y[k]));
-  const SoftDouble edge[] = {tx, ty, side, along, hn::Sub(along, length), inverse};
+  const SoftDouble first = hn::MulAdd(tx, x[k], hn::Mul(ty, y[k]));
+  const SoftDouble edge[] = {tx, ty, side, first, hn::Add(first, length), inverse};
   for (std::size_t a = 0; a < 6; ++a) {
     StoreNarrow(edge[a], out->v[LongFaces::kEdges + 6 * k + a] + at);
   }
@@ -237,7 +237,7 @@ HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size
     f.x[k] = hn::Load(d, lanes.v[LongFaces::kX + k]);
     f.y[k] = hn::Load(d, lanes.v[LongFaces::kY + k]);
     f.tx[k] = edge(0), f.ty[k] = edge(1), f.side[k] = edge(2);
-    f.along[k] = edge(3), f.past[k] = edge(4), f.inverse[k] = edge(5);
+    f.first[k] = edge(3), f.last[k] = edge(4), f.inverse[k] = edge(5);
   }
   return f;
 }

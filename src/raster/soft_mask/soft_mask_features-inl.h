@@ -58,7 +58,7 @@ HWY_INLINE void AppendEdges(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMas
     compact.Store(Pick(v, only[0], only[1]), to->v[a] + to->count);
   };
   append(SoftLists::kTx, f.tx), append(SoftLists::kTy, f.ty), append(SoftLists::kSide, f.side);
-  append(SoftLists::kAlong, f.along), append(SoftLists::kPast, f.past);
+  append(SoftLists::kFirst, f.first), append(SoftLists::kLast, f.last);
   append(SoftLists::kInverse, f.inverse);
   AppendTags(slot, PartOf(only[0], only[1]), compact, to);
 }
@@ -77,7 +77,7 @@ HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, SoftInt slot, So
   if (hn::AllFalse(d, keep)) return;
   const Compactor compact(d, keep);
   for (std::size_t k = 0; k < 3; ++k) {
-    const SoftVec edge[] = {f.tx[k], f.ty[k], f.side[k], f.along[k], f.past[k], f.inverse[k]};
+    const SoftVec edge[] = {f.tx[k], f.ty[k], f.side[k], f.first[k], f.last[k], f.inverse[k]};
     for (std::size_t a = 0; a < SoftLists::kEdgeArrays; ++a) {
       compact.Store(edge[a], to->v[k * SoftLists::kEdgeArrays + a] + to->count);
     }
@@ -104,11 +104,10 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces
                                const SoftBlock& block, SoftLists* lists) {
   SoftMask start[3], end[3];
   for (std::size_t k = 0; k < 3; ++k) {
-    const SoftVec zero = hn::Zero(d);
     const SoftVec half = hn::MulAdd(hn::Abs(f.tx[k]), hn::Set(d, block.half_x),
                                     hn::Mul(hn::Abs(f.ty[k]), hn::Set(d, block.half_y)));
-    start[k] = hn::Le(hn::Add(f.along[k], half), zero);
-    end[k] = hn::Ge(hn::Sub(f.past[k], half), zero);
+    start[k] = hn::Le(half, f.first[k]);
+    end[k] = hn::Le(half, hn::Neg(f.last[k]));
   }
   const SoftMask corner[3] = {hn::And(start[0], end[2]), hn::And(start[1], end[0]),
                               hn::And(start[2], end[1])};

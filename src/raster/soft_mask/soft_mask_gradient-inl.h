@@ -93,7 +93,7 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
   const auto pick = [&](const SoftVec(&v)[3]) HWY_ATTR {
     return hn::IfThenElse(on2, v[2], hn::IfThenElse(closer1, v[1], v[0]));
   };
-  const SoftVec share = hn::Min(hn::Max(pick(second), hn::Zero(d)), hn::Set(d, 1.0f));
+  const SoftVec share = hn::Min(pick(second), hn::Set(d, 1.0f));
   return {hn::Min(z01, z[2]), pick(x), pick(y), share, hn::AndNot(on2, closer1), on2};
 }
 
@@ -258,8 +258,7 @@ struct WeakFaces {
         const EdgeOffset o = edge.At(d, block, i);
         const SoftVec odds = Odds(d, simd::HalvingOf(d, SquaredLength(o)).power);
         const SoftVec w = hn::Mul(odds, hn::Set(d, push[i]));
-        const SoftVec second =
-            hn::Min(hn::Max(hn::Mul(o.along, edge.inverse), hn::Zero(d)), hn::Set(d, 1.0f));
+        const SoftVec second = hn::Min(hn::Mul(o.along, edge.inverse), hn::Set(d, 1.0f));
         const SoftVec s = hn::Mul(w, o.side), b = hn::Mul(w, o.beyond);
         side = hn::Add(side, s), beyond = hn::Add(beyond, b);
         second_side = hn::MulAdd(s, second, second_side);

@@ -92,7 +92,7 @@ struct VertexMembers {
 };
 
 // Where a pixel lies relative to edges; (side, beyond) is the way from the nearest point, in the
-// frame (n, t) of the edge.
+// frame (n, t) of the edge, and `along` the way to that point from the first corner.
 struct EdgeOffset {
   SoftVec side, beyond, along;
 };
@@ -102,24 +102,25 @@ HWY_INLINE SoftVec SquaredLength(const EdgeOffset& o) {
 
 // A vector of edges.
 struct EdgeMembers {
-  SoftVec tx, ty, side, along, past, inverse;
+  SoftVec tx, ty, side, first, last, inverse;
 
   // From arrays `stride` apart.
   HWY_INLINE EdgeMembers(SoftTag d, const float* v, std::size_t stride)
       : tx(hn::Load(d, v + SoftLists::kTx * stride)),
         ty(hn::Load(d, v + SoftLists::kTy * stride)),
         side(hn::Load(d, v + SoftLists::kSide * stride)),
-        along(hn::Load(d, v + SoftLists::kAlong * stride)),
-        past(hn::Load(d, v + SoftLists::kPast * stride)),
+        first(hn::Load(d, v + SoftLists::kFirst * stride)),
+        last(hn::Load(d, v + SoftLists::kLast * stride)),
         inverse(hn::Load(d, v + SoftLists::kInverse * stride)) {}
   HWY_INLINE EdgeOffset At(SoftTag d, const SoftBlock& block, std::size_t pixel) const {
     const SoftVec x = hn::Set(d, block.x[pixel % kBlockSize]);
-    const SoftVec y = hn::Set(d, block.y[pixel / kBlockSize]), zero = hn::Zero(d);
+    const SoftVec y = hn::Set(d, block.y[pixel / kBlockSize]);
     EdgeOffset o;
     o.side = hn::MulAdd(tx, y, hn::NegMulAdd(ty, x, side));
     const SoftVec step = hn::MulAdd(tx, x, hn::Mul(ty, y));
-    o.along = hn::Add(step, along);
-    o.beyond = hn::Add(hn::Max(hn::Add(step, past), zero), hn::Min(o.along, zero));
+    // Not before the first corner, even where rounding puts the last one there.
+    const SoftVec nearest = hn::Max(hn::Min(step, last), first);
+    o.beyond = hn::Sub(step, nearest), o.along = hn::Sub(nearest, first);
     return o;
   }
 };

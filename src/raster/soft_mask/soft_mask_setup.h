@@ -117,7 +117,7 @@ struct SoftListOf : SoftList {
   alignas(64) float v[kArrays][kRoom];
 };
 struct SoftLists {
-  enum Edge { kTx, kTy, kSide, kAlong, kPast, kInverse, kEdgeArrays };
+  enum Edge { kTx, kTy, kSide, kFirst, kLast, kInverse, kEdgeArrays };
   SoftListOf<2> vertices;                  // the nearest point is one corner: x, y
   SoftListOf<kEdgeArrays> segments;        // ... is on one edge
   SoftListOf<3 * kEdgeArrays> boundaries;  // ... is anywhere; edge after edge
