@@ -38,7 +38,7 @@ class PartialAlpha {
       const std::uint64_t bits = See(list, m);
       if (bits == 0) continue;
       NoteVertexPairs(d, bits, work_);
-      const VertexMembers members(d, list, m, *block_, bits);
+      const VertexMembers<false> members(d, list, m, *block_, bits);
       ForPixels(bits, [&](std::size_t i) HWY_ATTR { Put(d, i, members.Influence(i)); });
     }
   }

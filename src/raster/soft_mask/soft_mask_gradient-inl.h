@@ -220,7 +220,7 @@ struct WeakFaces {
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       if (bits == 0) continue;
       NoteVertexPairs(d, bits, work);
-      const VertexMembers members(d, list, m, block, bits);
+      const VertexMembers<true> members(d, list, m, block, bits);
       const auto add = [&](const auto& odds) HWY_ATTR {
         SoftVec d_x = hn::Zero(d), d_y = hn::Zero(d);
         ForRowsOf(bits, [&](std::size_t row, std::uint64_t columns) HWY_ATTR {

@@ -57,26 +57,30 @@ HWY_INLINE void NoteVertexPairs(SoftTag d, std::uint64_t pixels, SoftWork* work)
   work->powers += lanes * (std::popcount(ColumnsOf(pixels)) + std::popcount(RowsOf(pixels)));
 }
 
-// Squared lengths along one axis, halved that often, and the ways themselves: [column or row].
+// Squared lengths along one axis, halved that often; where kWays, the ways themselves and the
+// largest power, too: [column or row].
+template <bool kWays>
 struct AxisInfluence {
-  SoftVec power[kBlockSize], way[kBlockSize], most;
+  SoftVec power[kBlockSize], way[kWays ? kBlockSize : 1], most;
 
   // For the bits of `pixels`, columns or rows at `at`.
-  HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels)
-      : most(hn::Zero(d)) {
+  HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels) {
+    SoftVec largest = hn::Zero(d);  // a member would be in memory, as the arrays are
     for (; pixels != 0; pixels &= pixels - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
-      way[i] = hn::Sub(hn::Set(d, at[i]), vertex);
-      power[i] = simd::HalvingOf(d, hn::Mul(way[i], way[i])).power;
-      most = hn::Max(most, power[i]);
+      const SoftVec offset = hn::Sub(hn::Set(d, at[i]), vertex);
+      power[i] = simd::HalvingOf(d, hn::Mul(offset, offset)).power;
+      if constexpr (kWays) way[i] = offset, largest = hn::Max(largest, power[i]);
     }
+    most = largest;
   }
 };
 
 // A vector of corners: A = 2^-(x - vx)^2 2^-(y - vy)^2, so the powers are those of columns and
 // rows.
+template <bool kWays>
 struct VertexMembers {
-  AxisInfluence columns, rows;
+  AxisInfluence<kWays> columns, rows;
 
   HWY_INLINE VertexMembers(SoftTag d, const SoftListOf<2>& list, std::size_t m,
                            const SoftBlock& block, std::uint64_t bits)
