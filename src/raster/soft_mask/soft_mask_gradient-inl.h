@@ -100,14 +100,7 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
 // The same for the pixels of a block.
 class NearestOfPixels {
  public:
-  // In each pixel of these, all faces have z >= kSmallZ, or kMediumZ.
-  std::uint64_t small = 0, medium = 0;
-
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
-    const auto beyond = [&](float z) HWY_ATTR {
-      return std::uint64_t{hn::AllTrue(d, hn::Ge(n.z, hn::Set(d, z)))} << i;
-    };
-    small |= beyond(kSmallZ), medium |= beyond(kMediumZ);
     hn::Store(n.z, d, v_[0][i]), hn::Store(n.way_x, d, v_[1][i]), hn::Store(n.way_y, d, v_[2][i]);
     hn::Store(n.second, d, v_[3][i]);
     hn::Store(hn::VecFromMask(d, n.on1), d, v_[4][i]);
@@ -121,6 +114,18 @@ class NearestOfPixels {
 
  private:
   alignas(64) float v_[6][kBlockPixels][kSoftLanes];
+};
+
+// Pixels in which all faces have z >= kSmallZ, or kMediumZ.
+struct FarPixels {
+  std::uint64_t small = 0, medium = 0;
+
+  HWY_INLINE void Note(SoftTag d, std::size_t i, SoftVec z) {
+    const auto beyond = [&](float least) HWY_ATTR {
+      return std::uint64_t{hn::AllTrue(d, hn::Ge(z, hn::Set(d, least)))} << i;
+    };
+    small |= beyond(kSmallZ), medium |= beyond(kMediumZ);
+  }
 };
 
 // Sums of corner gradients, by faces.
@@ -145,16 +150,19 @@ struct CornerSums {
 // By pixels.
 using Pushes = float[kBlockPixels][kSoftLanes];
 
-// Of the pixels `bits`, pushed by what push_all(nearest, pushes) finds for each. Loops apart, so
-// that what is under way at a time is not one chain from the edges to the sums.
+// Of the pixels `bits`, pushed by what push_all(nearest, far, pushes) finds for each. Loops apart,
+// so that what is under way at a time is not one chain from the edges to the sums.
 template <class PushAll>
 HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
                                  std::uint64_t bits, const PushAll& push_all) {
   NearestOfPixels nearest;
+  FarPixels far;  // not in memory, as the others are
+  ForPixels(bits, [&](std::size_t i) HWY_ATTR {
+    const Nearest n = NearestOf(d, faces, block, i);
+    nearest.Store(d, i, n), far.Note(d, i, n.z);
+  });
   alignas(64) Pushes pushed;
-  ForPixels(bits,
-            [&](std::size_t i) HWY_ATTR { nearest.Store(d, i, NearestOf(d, faces, block, i)); });
-  push_all(nearest, pushed);
+  push_all(nearest, far, pushed);
   CornerSums sums(d);
   ForPixels(bits,
             [&](std::size_t i) HWY_ATTR { sums.Add(d, nearest.At(d, i), hn::Load(d, pushed[i])); });
@@ -280,16 +288,17 @@ struct WeakFaces {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       NotePairs(d, bits, work);
-      const CornerSums corners = SumCorners(d, members, block, bits,
-                                            [&](const NearestOfPixels& nearest, Pushes& pushed)
-                                                HWY_ATTR { PushAll(bits, nearest, pushed); });
+      const CornerSums corners =
+          SumCorners(d, members, block, bits,
+                     [&](const NearestOfPixels& nearest, const FarPixels& far, Pushes& pushed)
+                         HWY_ATTR { PushAll(bits, nearest, far, pushed); });
       sums.Add(d, list, m, corners);
     }
   }
 
  private:
   // Loops apart by how many factors the odds need: which pixel needs how many is hard to foretell.
-  HWY_INLINE void PushAll(std::uint64_t bits, const NearestOfPixels& nearest,
+  HWY_INLINE void PushAll(std::uint64_t bits, const NearestOfPixels& nearest, const FarPixels& far,
                           Pushes& pushed) const {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
@@ -298,10 +307,9 @@ struct WeakFaces {
         hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushed[i]);
       });
     };
-    push_some(bits & nearest.small, [&](SoftVec a) HWY_ATTR { return SmallOdds(d, a); });
-    push_some(bits & nearest.medium & ~nearest.small,
-              [&](SoftVec a) HWY_ATTR { return MediumOdds(d, a); });
-    push_some(bits & ~nearest.medium, [&](SoftVec a) HWY_ATTR { return LargeOdds(d, a); });
+    push_some(bits & far.small, [&](SoftVec a) HWY_ATTR { return SmallOdds(d, a); });
+    push_some(bits & far.medium & ~far.small, [&](SoftVec a) HWY_ATTR { return MediumOdds(d, a); });
+    push_some(bits & ~far.medium, [&](SoftVec a) HWY_ATTR { return LargeOdds(d, a); });
   }
 };
 
@@ -349,7 +357,8 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
   for (std::size_t n = near.size(); n-- > 0;) {
     const SoftNearFaces& faces = near[n];
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
-    const auto push_all = [&](const NearestOfPixels& nearest, Pushes& pushed) HWY_ATTR {
+    const auto push_all = [&](const NearestOfPixels& nearest, const FarPixels&,
+                              Pushes& pushed) HWY_ATTR {
       ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
         const auto a = simd::HalvingOf(d, nearest.Z(d, i));
         const LaneProducts outside(d, a.one_minus);
