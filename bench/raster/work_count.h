@@ -26,10 +26,10 @@ WorkCount CountWork(const CulledScene& scene, const CulledFrame& frame);
 
 // Rates of one core. The defaults are those measured on the machine of docs/benchmarks.md.
 struct MachineRates {
-  double lane_ops = 50e9;              // multiplications, sums, comparisons and so on of one float
-  double loads = 6.3e9;                // scalar or of a vector: two a cycle
-  double horizontal_sums = 1.05e9;     // three dependent steps
-  double read = 20e9, write = 20.6e9;  // bytes, main memory
+  double lane_ops = 59e9;              // multiplications, sums, comparisons and so on of one float
+  double loads = 7.4e9;                // scalar or of a vector: two a cycle
+  double horizontal_sums = 1.5e9;      // three dependent steps
+  double read = 28e9, write = 24.5e9;  // bytes, main memory
 };
 
 // low: every lane is used, arithmetic and memory overlap perfectly. high: whole blocks in the soft

@@ -95,12 +95,15 @@ TEST(WorkCount, TheRendererEvaluatesLittleElse) {
   }
 }
 
+// Round numbers, whatever machine the defaults are those of.
+constexpr MachineRates kRates{50e9, 6.3e9, 1.05e9, 20e9, 20.6e9};
+
 // Counts and limits of a scene that were worked out by hand with the same rates.
 TEST(WorkCount, LimitsByHand) {
   WorkCount work;
   work.pixels = 262144, work.faces = 81920, work.covered = 99090, work.seen = 28784;
   work.hard_blocks = 193704, work.soft_blocks = 92892, work.pairs = 207475;
-  const Limit forward = ForwardLimit(work, {}), backward = BackwardLimit(work, {});
+  const Limit forward = ForwardLimit(work, {}, kRates), backward = BackwardLimit(work, {}, kRates);
   // Set-up 0.254, cover 0.372, shading 0.132, soft 0.124 (blocks: 0.446), memory 0.255.
   EXPECT_NEAR(forward.low, 0.254 + 0.372 + 0.132 + 0.124, 0.002);
   EXPECT_NEAR(forward.high, 0.254 + 0.372 + 0.132 + 0.446 + 0.255, 0.002);
@@ -114,8 +117,9 @@ TEST(WorkCount, LimitsByHand) {
 TEST(WorkCount, WhatIsNotAskedForCostsNothing) {
   WorkCount work;
   work.pixels = 1000, work.faces = 1000, work.pairs = 1e6, work.soft_blocks = 2e5;
-  const Limit both = ForwardLimit(work, {}), color = ForwardLimit(work, {true, false});
-  EXPECT_NEAR(both.low - color.low, 1e3 * 30 * 1e6 / 50e9, 1e-9);
+  const Limit both = ForwardLimit(work, {}, kRates);
+  const Limit color = ForwardLimit(work, {true, false}, kRates);
+  EXPECT_NEAR(both.low - color.low, 1e3 * 30 * 1e6 / kRates.lane_ops, 1e-9);
   EXPECT_EQ(color.bytes, 16 * work.pixels);
   EXPECT_EQ(ForwardLimit(work, {false, true}).bytes, 8 * work.pixels);
 }
