@@ -7,7 +7,6 @@
 #define TILEGRAD_RASTER_CORNER_PLANES_INL_H_
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
@@ -15,6 +14,7 @@
 #include <cstring>
 #include <span>
 
+#include "base/prefetch.h"
 #include "raster/face_lanes-inl.h"
 #include "raster/face_plane.h"
 #include "raster/interpolate.h"
@@ -66,7 +66,7 @@ HWY_INLINE void PrefetchCorners(const ScreenMesh& mesh, const std::int32_t* face
   const CornerIndices vertices = VerticesOf(mesh, faces);
   for (const auto& corner : vertices.at) {
     for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) {
-      hwy::Prefetch(&mesh.packed[static_cast<std::size_t>(corner[i])]);
+      PrefetchLine(&mesh.packed[static_cast<std::size_t>(corner[i])]);
     }
   }
 }

@@ -8,13 +8,13 @@
 #define TILEGRAD_RASTER_INTERPOLATE_INL_H_
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
 #include <cstring>
 #include <limits>
 
+#include "base/prefetch.h"
 #include "raster/corner_planes-inl.h"
 #include "raster/interpolate.h"
 
@@ -147,9 +147,9 @@ struct QuadRow {
   }
   // Asks for the row that is so many rows below.
   HWY_INLINE void Prefetch(int rows) const {
-    constexpr int kLineFloats = 16;
     for (int k = 0; k < outputs; ++k) {
-      for (int j = 0; j < count; j += kLineFloats) hwy::Prefetch(to[k] + rows * step[k] + j);
+      for (int j = 0; j < count; j += static_cast<int>(kLineFloats))
+        PrefetchLine(to[k] + rows * step[k] + j);
     }
   }
   HWY_INLINE void Store(int k, int j, Quad v) const {
@@ -170,7 +170,7 @@ HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, floa
   const QuadTag d;
   const QuadRow row(job, group, i);
   const std::int32_t* const faces = job.rows.row(i);
-  constexpr int kRowsAhead = 2;
+  constexpr int kRowsAhead = 2;  // a row takes about as long as memory does
   if (i + kRowsAhead < job.rows.row_end) row.Prefetch(kRowsAhead);
   const float py = static_cast<float>(i) + 0.5f;
   for (int j = 0; j < row.count; j += kQuadPixels) {

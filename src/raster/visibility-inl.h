@@ -8,11 +8,11 @@
 #define TILEGRAD_RASTER_VISIBILITY_INL_H_
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
 
+#include "base/prefetch.h"
 #include "raster/tile_face_setup.h"
 #include "raster/visibility.h"
 
@@ -317,7 +317,7 @@ HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const
       return list.faces[static_cast<std::size_t>(list.indices[at])];
     };
     const DrawnFace& ahead = record(HWY_MIN(i + kAhead, list.indices.size() - 1));
-    hwy::Prefetch(&ahead), hwy::Prefetch(&ahead.depth.high);
+    PrefetchLine(&ahead), PrefetchLine(&ahead.depth.high);
     const DrawnFace& face = record(i);
     if (face.depth.high <= floors.bin) continue;
     if (face.pixels > 0) {

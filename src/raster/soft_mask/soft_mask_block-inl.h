@@ -8,13 +8,13 @@
 #define TILEGRAD_RASTER_SOFT_MASK_BLOCK_INL_H_
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 
+#include "base/prefetch.h"
 #include "raster/soft_mask/soft_mask_nodes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -42,8 +42,8 @@ HWY_INLINE TileRect NextTile(const TileRect& region, const TileRect& tile) {
 template <class T>
 HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const TileRect& tile, const T* image) {
   for (int y = tile.y0; y < tile.y1; ++y) {
-    hwy::Prefetch(image + PixelIndex(plan, tile.x0, y));
-    hwy::Prefetch(image + PixelIndex(plan, tile.x1 - 1, y));
+    PrefetchLine(image + PixelIndex(plan, tile.x0, y));
+    PrefetchLine(image + PixelIndex(plan, tile.x1 - 1, y));
   }
 }
 

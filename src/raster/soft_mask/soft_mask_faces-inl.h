@@ -8,11 +8,11 @@
 #define TILEGRAD_RASTER_SOFT_MASK_FACES_INL_H_
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstddef>
 
+#include "base/prefetch.h"
 #include "base/simd_math-inl.h"
 #include "raster/soft_mask/soft_mask_compact-inl.h"
 
@@ -108,10 +108,9 @@ HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
 }
 
 HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
-  constexpr std::size_t kLineFloats = 16;
   const float* corners = tree.corner(node, 0);
   for (std::size_t i = 0; i < kNodeCorners * kNodeFaces; i += kLineFloats) {
-    hwy::Prefetch(corners + i);
+    PrefetchLine(corners + i);
   }
 }
 

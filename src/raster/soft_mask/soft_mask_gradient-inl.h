@@ -57,11 +57,11 @@ HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
   }
   return odds;
 }
-// For A <= kSmallInfluence: lacks A^8, relatively.
-inline constexpr float kSmallInfluence = 0.125f;
+// For z >= kSmallZ, which is A <= kSmallInfluence: lacks A^8, relatively, at most 2^-24.
+inline constexpr float kSmallZ = 3, kSmallInfluence = 0.125f;
 HWY_INLINE SoftVec SmallOdds(SoftTag d, SoftVec a) { return OddsSeries<3>(d, a); }
-// For A <= 2^-kMediumZ: lacks A^32.
-inline constexpr float kSmallZ = 3, kMediumZ = 0.75f;
+// For z >= kMediumZ: lacks A^32, at most 2^-24.
+inline constexpr float kMediumZ = 0.75f;
 HWY_INLINE SoftVec MediumOdds(SoftTag d, SoftVec a) { return OddsSeries<5>(d, a); }
 // For A <= 63/64: lacks A^1024.
 HWY_INLINE SoftVec LargeOdds(SoftTag d, SoftVec a) { return OddsSeries<10>(d, a); }

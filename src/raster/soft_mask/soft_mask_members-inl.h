@@ -90,7 +90,7 @@ struct VertexMembers {
     return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);
   }
   // All within `limit`.
-  HWY_INLINE bool AllWithin(SoftTag d, float limit) const {
+  HWY_INLINE bool AllWithin(SoftTag d, float limit) const requires kWays {
     return hn::AllTrue(d, hn::Le(hn::Mul(columns.most, rows.most), hn::Set(d, limit)));
   }
 };

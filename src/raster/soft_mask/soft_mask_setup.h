@@ -21,9 +21,9 @@ inline constexpr std::size_t kSoftLanes = 8;  // the most that vectors of this k
 // they may stop. Bounds rounding independently of the number of faces.
 inline constexpr std::size_t kChunkFaces = 256;
 // Of the way back, which where there are several chunks has to find the members of blocks twice,
-// for the products and for the gradients.
+// for the products and for the gradients (docs/benchmarks.md has what that costs).
 inline constexpr std::size_t kBackwardChunkFaces = 1024;
-// Not a power of two: arrays would compete for the same lines of a cache.
+// Room for a vector more, and 67 cache lines: of arrays a power of two apart, few fit into a cache.
 inline constexpr std::size_t kChunkRoom = kBackwardChunkFaces + 6 * kSoftLanes;
 // Faces with an edge that spans more than this in x or y are set up in double.
 inline constexpr float kLongEdge = 32;  // pixels

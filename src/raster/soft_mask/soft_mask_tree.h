@@ -42,11 +42,14 @@ struct SoftTree {
   SoftBoxes nodes, groups;
 
   // The first face of a node.
-  float* corner(std::size_t node, std::size_t a) {
-    return corners.data() + (kNodeCorners * node + a) * kNodeFaces;
-  }
+  float* corner(std::size_t node, std::size_t a) { return corners.data() + At(node, a); }
   const float* corner(std::size_t node, std::size_t a) const {
-    return const_cast<SoftTree*>(this)->corner(node, a);
+    return corners.data() + At(node, a);
+  }
+
+ private:
+  static std::size_t At(std::size_t node, std::size_t a) {
+    return (kNodeCorners * node + a) * kNodeFaces;
   }
 };
 
