@@ -11,6 +11,7 @@
 #include <string>
 
 #include "base/simd_target.h"
+#include "raster/soft_mask/soft_mask_plan.h"
 #include "raster/soft_mask_checks.h"
 #include "raster/soft_mask_test_util.h"
 
@@ -218,6 +219,45 @@ TEST(SoftMask, FaintFacesAddUp) {
   ASSERT_GT(truth.Alpha(0), 4e-4);
   EXPECT_NEAR(static_cast<double>(RunSoftMask(scene, scene.d_alpha, &scratch).alpha[0]),
               truth.Alpha(0), truth.Rounding(0));
+}
+
+// E = 1e-7 lets the way back drop each of them, but not so many: the gradient of all together lacks
+// no more than 2 sqrt(z) 2^-17.
+TEST(SoftMask, GradientsOfFaintFacesAddUp) {
+  SoftScene scene;
+  scene.Resize(4, 4);
+  scene.options.delta = 0.1, scene.options.max_alpha_error = 1e-7;
+  const auto x = static_cast<float>(0.5 + 2 * std::sqrt(1.8));  // A = 1.5e-8 < E/4
+  for (int f = 0; f < 20000; ++f) scene.AddFace({x, x, x}, {0.5f, 0.5f, 0.5f});
+  scene.d_alpha[0] = 1;
+  std::vector<double> exact, tolerance;
+  SoftTruth(scene).Gradient(scene.d_alpha, &exact, &tolerance);
+  SoftMaskScratch scratch;
+  const SoftResult result = RunSoftMask(scene, scene.d_alpha, &scratch);
+  double sum = 0, truth = 0;
+  for (std::size_t i = 0; i < exact.size(); i += 2) {
+    sum += static_cast<double>(result.d_corners[i]), truth += exact[i];
+  }
+  const double unit = 0.5 / std::sqrt(scene.options.delta);  // of exp(-z), z = 18, per pixel
+  EXPECT_GT(std::abs(truth), 3e-3);
+  EXPECT_NEAR(sum, truth, 2 * std::sqrt(18.0) * unit * 0x1p-17);
+}
+
+// Beyond its reach a face has no more than a quarter of E and of what rounding takes from 1 - A,
+// and all of a pixel have little; or else the forward pass drops it, too.
+TEST(SoftMask, GradientsReachNoFartherThanTheyMatter) {
+  for (const double e : {0.0, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2}) {
+    const SoftMaskPlan plan = PlanSoftMask({256, 256, 1e-4, e, 1000000});
+    for (const std::size_t n : {1u, 20u, 700u, 100000u}) {
+      const SoftReach alpha = ReachOf(plan, n), gradient = GradientReachOf(plan, n);
+      EXPECT_LE(gradient.z, alpha.z);
+      if (gradient.z == alpha.z) continue;
+      EXPECT_LE(gradient.share, std::min(e / 4, 0x1p-25)) << e << ' ' << n;
+      EXPECT_LE(gradient.share * static_cast<double>(n), 0x1p-17) << e << ' ' << n;
+    }
+  }
+  const SoftMaskPlan plan = PlanSoftMask({256, 256, 1e-4, 1e-7, 1000000});
+  EXPECT_LT(GradientReachOf(plan, 700).z, ReachOf(plan, 700).z - 6);
 }
 
 TEST(SoftMask, PixelOnTheBoundaryIsOpaqueAndStill) {

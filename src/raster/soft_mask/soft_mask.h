@@ -33,8 +33,10 @@ struct SoftMaskOptions {
 // A = 2^-z with z = d^2.
 struct SoftMaskPlan {
   int width = 0, height = 0;
-  double unit_x = 0, unit_y = 0;                          // kernel units per pixel
-  double node_error = 0, face_error = 0, stop_error = 0;  // the shares of E; they sum to E
+  double unit_x = 0, unit_y = 0;  // kernel units per pixel
+  // Of E: what nodes and faces that are dropped may have, and the product at which a pixel stops,
+  // whatever was dropped before.
+  double node_error = 0, face_error = 0, stop_error = 0;
   double group_z = 0;          // squared distance at which a tile drops a group of the tree
   double group_influence = 0;  // A there
 };

@@ -44,7 +44,7 @@ class TileBackward {
     if (!AnyLive(scratch_->blocks)) return;
     nodes_ = FindSoftNodes(tree_, plan_, box_, scratch_);
     if (nodes_.count == 0) return;
-    reach_ = ReachOf(plan_, nodes_.faces);
+    reach_ = GradientReachOf(plan_, nodes_.faces);
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
       weak_[b] = scratch_->blocks[b].bits, scratch_->blocks[b].live = dark_[b];
     }

@@ -155,6 +155,10 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
   double near_faces = 0;
   const std::size_t count =
       FindNodesOfGroups(tree, plan, box, far, scratch, &out.dropped, &near_faces);
+  if (count == 0) {  // as most tiles that lie in the background have it
+    out.dropped += std::ldexp(near_faces, -far);
+    return out;
+  }
   const SoftNodesAt& found = scratch->found;
   // All faces at group_z together are within the budget.
   const SoftHistogram histogram(tree.nodes, found, count, far, near_faces);

@@ -9,7 +9,9 @@ namespace tilegrad::raster {
 
 double DropZ(std::size_t n, double share) {
   const double count = static_cast<double>(std::max<std::size_t>(n, 1));
-  return share > 0 ? std::clamp<double>(std::log2(count / share), 0.0, kEndZ) : kEndZ;
+  // A little more, which covers the rounding of the logarithm and of the power that is booked.
+  const double z = std::log2(count / share) + 0x1p-30;
+  return share > 0 ? std::clamp<double>(z, 0.0, kEndZ) : kEndZ;
 }
 
 SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
@@ -22,7 +24,7 @@ SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options) {
       std::clamp(std::sqrt(options.delta * std::numbers::ln2), 2e-15 / longer, 1e37 / longer);
   plan.unit_x = 2.0 / options.width / root, plan.unit_y = 2.0 / options.height / root;
   const double error = options.max_alpha_error;
-  plan.node_error = plan.stop_error = error / 4, plan.face_error = error / 2;
+  plan.node_error = plan.stop_error = error / 4, plan.face_error = error * 3 / 4;
   plan.group_z = DropZ(options.faces, plan.node_error / 2);
   plan.group_influence = std::exp2(-plan.group_z);
   return plan;
@@ -35,13 +37,14 @@ bool IsUnseen(const SoftMaskPlan& plan, double product, double least) {
 }
 
 float TransmittanceOf(const SoftMaskPlan& plan, float alpha) {
-  const double spent = plan.node_error + plan.face_error + plan.stop_error;
+  const double spent = plan.node_error + plan.face_error;
   const float product = 1 - alpha;
   return static_cast<double>(product) < kLightProduct + spent ? kUnknownTransmittance : product;
 }
 
-SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
-  const double z = DropZ(faces, plan.face_error);
+namespace {
+
+SoftReach ReachAt(double z, const SoftMaskPlan& plan) {
   const double pixel = std::hypot(plan.unit_x, plan.unit_y);
   // Covers the rounding of distances ("Rounding" 2), and of z to float.
   const auto with_rounding = [&](double root) {
@@ -56,6 +59,18 @@ SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
           in_pixels(1 / plan.unit_x),
           in_pixels(1 / plan.unit_y),
           in_pixels(std::hypot(1 / plan.unit_x, 1 / plan.unit_y))};
+}
+
+}  // namespace
+
+SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces) {
+  return ReachAt(DropZ(faces, plan.face_error), plan);
+}
+
+SoftReach GradientReachOf(const SoftMaskPlan& plan, std::size_t faces) {
+  const double own = std::min(plan.stop_error, kVanishingInfluence);
+  const double vanishing = std::max(DropZ(1, own), DropZ(faces, kVanishingSum));
+  return ReachAt(std::min(DropZ(faces, plan.face_error), vanishing), plan);
 }
 
 }  // namespace tilegrad::raster

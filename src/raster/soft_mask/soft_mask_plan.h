@@ -30,6 +30,10 @@ static_assert(static_cast<double>(FacesOfLane(4) + 1) * 0x1p-24 < LaneRounding(4
 // Of what may be dropped: the rest covers the rounding of products of lanes.
 inline constexpr double kUnseenShare = 0.9;
 
+// The way back may also drop a face of so little A that 1 - A is 1 in float, as long as those that a
+// pixel drops have no more than kVanishingSum together (docs/numerics.md, "Gradients").
+inline constexpr double kVanishingInfluence = 0x1p-25, kVanishingSum = 0x1p-17;
+
 // z from which on `n` faces have A <= share / n each, and together no more than `share`.
 double DropZ(std::size_t n, double share);
 
@@ -43,7 +47,8 @@ bool IsUnseen(const SoftMaskPlan& plan, double product, double least);
 // SoftMaskImages::transmittance of a background pixel of which only alpha is known.
 float TransmittanceOf(const SoftMaskPlan& plan, float alpha);
 
-// What the faces of nodes may drop, `faces` of them.
+// Where alpha may drop faces of nodes, `faces` of them; and where its gradient may.
 SoftReach ReachOf(const SoftMaskPlan& plan, std::size_t faces);
+SoftReach GradientReachOf(const SoftMaskPlan& plan, std::size_t faces);
 
 }  // namespace tilegrad::raster
