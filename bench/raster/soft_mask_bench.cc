@@ -33,7 +33,8 @@ struct SoftBench {
     alpha.resize(frame.face_ids.size()), transmittance.resize(alpha.size());
   }
   void Build() {
-    raster::BuildSoftTree(mesh, &tree);
+    raster::SetUpFaces(mesh, /*cull_back=*/false, buffers.reject, {.corners = &tree.corners});
+    raster::BuildSoftTree(&tree);
     plan = raster::PlanSoftMask(
         {grid.width, grid.height, batch.options.delta, batch.options.max_alpha_error, tree.faces});
   }

@@ -42,7 +42,8 @@ void Prepare(const RasterizeInput<T>& input, std::size_t image, const Workers* w
   }
   MakeClipScreen(input.positions, input.faces, range, image, input.grid, &out->screen);
   raster::ScreenMeshBuffers& mesh = out->screen.mesh;
-  raster::SetUpDrawnFaces(mesh.View(), /*cull_back=*/false, mesh.reject, &out->drawn, workers);
+  raster::SetUpFaces(mesh.View(), /*cull_back=*/false, mesh.reject, {.drawn = &out->drawn},
+                     workers);
   raster::BinDrawnFaces(out->drawn, raster::BinGrid(input.grid.width, input.grid.height),
                         &out->lists, workers);
 }

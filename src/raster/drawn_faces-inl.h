@@ -10,6 +10,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 
@@ -323,16 +324,43 @@ HWY_INLINE DrawnFace* ListFaces(const ScreenMesh& mesh, const ShapeCorners& corn
   return end;
 }
 
-// Faces [begin, end). `out` null, or room for all of them. Returns how many were written.
-std::size_t SetUpFaces(const ScreenMesh& mesh, std::size_t begin, std::size_t end, bool cull_back,
-                       std::uint8_t* reject, DrawnFace* out) {
+static_assert(kMostFaceLanes <= kBlockFaces);
+
+// Faces f to f + count - 1; nowhere those that do not take part in the soft mask, and lanes beyond.
+HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t count,
+                             const std::uint8_t* reject, CornerBlocks* to) {
+  const FaceTag d;
+  const FaceIntTag di;
+  const hn::Rebind<std::uint8_t, FaceTag> bytes;
+  HWY_ALIGN std::uint8_t some[kMostFaceLanes];
+  if (count < hn::Lanes(d)) {
+    std::fill(std::copy_n(reject, count, some), some + kMostFaceLanes, kFaceNotInSoftMask);
+    reject = some;
+  }
+  const auto why = hn::PromoteTo(di, hn::LoadU(bytes, reject));
+  const auto out_of_it = hn::And(why, hn::Set(di, std::int32_t{kFaceNotInSoftMask}));
+  const auto nowhere = hn::RebindMask(d, hn::Gt(out_of_it, hn::Zero(di)));
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto store = [&](FaceVec v, std::size_t number) HWY_ATTR {
+      hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), v), d,
+                to->at(f / kBlockFaces, number) + f % kBlockFaces);
+    };
+    store(c.x[k], k), store(c.y[k], 3 + k);
+  }
+}
+
+// `corner_blocks` may be null. `out` null, or room for all of the faces. Returns how many were
+// written.
+std::size_t SetUpSomeFaces(const ScreenMesh& mesh, const SomeFaces& range, std::uint8_t* reject,
+                           CornerBlocks* corner_blocks, DrawnFace* out) {
   const std::size_t lanes = hn::Lanes(FaceIntTag());
   DrawnFace* to = out;
-  for (std::size_t f = begin; f < end; f += lanes) {
-    const std::size_t count = HWY_MIN(lanes, end - f);
+  for (std::size_t f = range.begin; f < range.end; f += lanes) {
+    const std::size_t count = HWY_MIN(lanes, range.end - f);
     const ShapeCorners corners = LoadShapeCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
-    const std::uint32_t drawn = RejectShapes(mesh, shapes, cull_back, f, count, reject + f);
+    const std::uint32_t drawn = RejectShapes(mesh, shapes, range.cull_back, f, count, reject + f);
+    if (corner_blocks != nullptr) StoreCorners(corners, f, count, reject + f, corner_blocks);
     if (out != nullptr && drawn != 0) to = ListFaces(mesh, corners, &shapes, f, drawn, to);
   }
   return static_cast<std::size_t>(to - out);

@@ -9,29 +9,44 @@
 #include "raster/drawn_faces-inl.h"
 
 #if HWY_ONCE
+#include <algorithm>
+
 #include "raster/chunks.h"
 
 namespace tilegrad::raster {
 namespace {
 
-HWY_EXPORT(SetUpFaces);
+HWY_EXPORT(SetUpSomeFaces);
+
+// Where there is no face.
+void FillUp(std::size_t faces, CornerBlocks* corners) {
+  for (std::size_t block = faces / kBlockFaces; block < corners->blocks(); ++block) {
+    const std::size_t from = block == faces / kBlockFaces ? faces % kBlockFaces : 0;
+    for (std::size_t number = 0; number < kCornerNumbers; ++number) {
+      std::fill(corners->at(block, number) + from, corners->at(block, number) + kBlockFaces,
+                kNowhere);
+    }
+  }
+}
 
 }  // namespace
 
-void SetUpDrawnFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
-                     DrawnFaces* out, const Workers* workers) {
+void SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
+                const FaceSetUp& out, const Workers* workers) {
   constexpr std::size_t kChunk = DrawnFaces::kChunk;
   const std::size_t n = mesh.faces();
-  if (out != nullptr) {
-    if (out->storage.size() < n) out->storage.resize(n);
-    out->counts.assign((n + kChunk - 1) / kChunk, 0);
+  if (out.drawn != nullptr) {
+    if (out.drawn->storage.size() < n) out.drawn->storage.resize(n);
+    out.drawn->counts.assign((n + kChunk - 1) / kChunk, 0);
   }
+  if (out.corners != nullptr) out.corners->Resize(n);
   ForChunks(workers, n, kChunk, [&](std::size_t begin, std::size_t end) {
-    DrawnFace* to = out == nullptr ? nullptr : out->storage.data() + begin;
-    const std::size_t count =
-        HWY_DYNAMIC_DISPATCH(SetUpFaces)(mesh, begin, end, cull_back, reject.data(), to);
-    if (out != nullptr) out->counts[begin / kChunk] = count;
+    DrawnFace* to = out.drawn == nullptr ? nullptr : out.drawn->storage.data() + begin;
+    const std::size_t count = HWY_DYNAMIC_DISPATCH(SetUpSomeFaces)(mesh, {begin, end, cull_back},
+                                                                   reject.data(), out.corners, to);
+    if (out.drawn != nullptr) out.drawn->counts[begin / kChunk] = count;
   });
+  if (out.corners != nullptr) FillUp(n, out.corners);
 }
 
 }  // namespace tilegrad::raster

@@ -8,6 +8,7 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
+#include "raster/corner_blocks.h"
 #include "raster/coverage.h"
 #include "raster/face_plane.h"
 #include "raster/screen_mesh.h"
@@ -51,10 +52,22 @@ struct DrawnFaces {
   }
 };
 
+// Faces [begin, end) of a mesh.
+struct SomeFaces {
+  std::size_t begin, end;
+  bool cull_back;
+};
+
+// What is to be set up of the faces of an image; null is not wanted.
+struct FaceSetUp {
+  DrawnFaces* drawn = nullptr;      // those that are drawn and may cover a pixel of the image
+  CornerBlocks* corners = nullptr;  // of those that take part in the soft mask
+};
+
 // Sets the bits of `reject` [F] that follow from the shape on the screen (degenerate, culled);
-// bits that are set on entry stay, and such faces are not looked at. Where `out` is not null, lists
-// the faces that are drawn and may cover a pixel of the image. `workers` null: the calling thread.
-void SetUpDrawnFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
-                     DrawnFaces* out, const Workers* workers = nullptr);
+// bits that are set on entry stay, and such faces are not drawn. `workers` null: the calling
+// thread.
+void SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> reject,
+                const FaceSetUp& out, const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

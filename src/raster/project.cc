@@ -73,7 +73,7 @@ void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out, const Wor
 }
 
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
-             DrawnFaces* drawn, const Workers* workers) {
+             const FaceSetUp& faces, const Workers* workers) {
   const std::size_t n = source.positions.size() / 3;
   for (auto* array : {&out->x, &out->y, &out->depth, &out->inverse_depth}) array->resize(n);
   out->packed.resize(n);
@@ -87,7 +87,7 @@ void Project(const FaceSource<float>& source, int width, int height, ScreenMeshB
     out->packed.resize(out->x.size());
     out->Pack(n, out->x.size());
   }
-  SetUpDrawnFaces(out->View(), source.cull_back, out->reject, drawn, workers);
+  SetUpFaces(out->View(), source.cull_back, out->reject, faces, workers);
 }
 
 void ProjectBackward(const FaceSource<float>& source, const ScreenMesh& mesh,

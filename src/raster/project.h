@@ -16,11 +16,11 @@ namespace tilegrad::raster {
 void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out,
                 const Workers* workers = nullptr);
 
-// Fills `out` with the screen mesh of a validated, finite source, and `drawn`, if not null, with
-// the faces that may cover a pixel. `out` then looks at source.corners, if given. Deterministic;
-// allocates only to grow them. Not thread-safe for one `out`. `workers` null: the calling thread.
+// Fills `out` with the screen mesh of a validated, finite source, and sets up its `faces`. `out`
+// then looks at source.corners, if given. Deterministic; allocates only to grow them. Not
+// thread-safe for one `out`. `workers` null: the calling thread.
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
-             DrawnFaces* drawn = nullptr, const Workers* workers = nullptr);
+             const FaceSetUp& faces = {}, const Workers* workers = nullptr);
 
 // What the adjoint of Project is asked for.
 struct ProjectGradients {

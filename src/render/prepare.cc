@@ -66,7 +66,9 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
   raster::FaceSource<float> source = FaceSourceOf(in.scene, options);
   source.corners = &in.topology.corners;
   raster::Project(source, options.width, options.height, &image->buffers,
-                  request.drawn_bins ? &image->drawn_faces : nullptr, &workers);
+                  {request.drawn_bins ? &image->drawn_faces : nullptr,
+                   request.soft_tree ? &image->soft.corners : nullptr},
+                  &workers);
   image->mesh = image->buffers.View();
   if (request.drawn_bins) {
     image->drawn =
@@ -74,7 +76,7 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
                               &image->drawn_buffers, &workers);
   }
   if (request.soft_tree) {
-    raster::BuildSoftTree(image->mesh, &image->soft, &workers);
+    raster::BuildSoftTree(&image->soft, &workers);
     image->soft_plan = raster::PlanSoftMask(
         {options.width, options.height, options.delta, options.max_alpha_error, image->soft.faces});
   }

@@ -315,7 +315,9 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
                               SoftMaskScratch* scratch, const SoftRun& run = {}) {
   const ScreenMesh mesh = scene.mesh.View();
   SoftTree tree;
-  BuildSoftTree(mesh, &tree);
+  std::vector<std::uint8_t> reject(mesh.reject.begin(), mesh.reject.end());
+  SetUpFaces(mesh, /*cull_back=*/false, reject, {.corners = &tree.corners});
+  BuildSoftTree(&tree);
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
   const TileGrid grid(scene.options.width, scene.options.height, run.region_bits);
   SoftResult out;

@@ -57,7 +57,7 @@ struct Flat {
 DrawnFaces DrawnFacesOf(const ScreenMesh& mesh) {
   std::vector<std::uint8_t> reject(mesh.reject.begin(), mesh.reject.end());
   DrawnFaces out;
-  SetUpDrawnFaces(mesh, /*cull_back=*/false, reject, &out);
+  SetUpFaces(mesh, /*cull_back=*/false, reject, {.drawn = &out});
   return out;
 }
 

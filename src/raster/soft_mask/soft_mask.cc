@@ -20,13 +20,12 @@ HWY_EXPORT(SoftMaskForwardTarget);
 HWY_EXPORT(SoftMaskBackwardTarget);
 }  // namespace
 
-void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* workers) {
+void BuildSoftTree(SoftTree* tree, const Workers* workers) {
   constexpr std::size_t kChunkGroups = 16;  // that a worker takes at a time
-  const std::size_t groups = (mesh.faces() + kGroupFaces - 1) / kGroupFaces;
-  tree->corners.resize(groups * kGroupFaces * kNodeCorners);
+  const std::size_t groups = tree->corners.blocks() / kGroupNodes;
   tree->nodes.Resize(groups * kGroupNodes), tree->groups.Resize(groups);
   ForChunks(workers, groups, kChunkGroups, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(BuildSoftGroupsTarget)(mesh, begin, end, tree);
+    HWY_DYNAMIC_DISPATCH(BuildSoftGroupsTarget)(begin, end, tree);
   });
   const float* faces = tree->groups.array(SoftBoxes::kFaces);
   tree->faces = 0;

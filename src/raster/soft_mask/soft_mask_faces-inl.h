@@ -38,7 +38,8 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   const SoftVec limit = hn::Set(d, z), long_edge = hn::Set(d, kLongEdge);
   for (std::size_t f = 0; f < kNodeFaces; f += hn::Lanes(d)) {
     SoftVec v[kCornersAndBoxes];
-    for (std::size_t a = 0; a < kNodeCorners; ++a) v[a] = hn::Load(d, tree.corner(node, a) + f);
+    for (std::size_t a = 0; a < kCornerNumbers; ++a)
+      v[a] = hn::Load(d, tree.corners.at(node, a) + f);
     const SoftVec left = v[SoftFaceArrays::kLeft] = hn::Min(hn::Min(v[0], v[1]), v[2]);
     const SoftVec top = v[SoftFaceArrays::kTop] = hn::Min(hn::Min(v[3], v[4]), v[5]);
     const SoftVec right = v[SoftFaceArrays::kRight] = hn::Max(hn::Max(v[0], v[1]), v[2]);
@@ -108,8 +109,8 @@ HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
 }
 
 HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
-  const float* corners = tree.corner(node, 0);
-  for (std::size_t i = 0; i < kNodeCorners * kNodeFaces; i += kLineFloats) {
+  const float* corners = tree.corners.at(node, 0);
+  for (std::size_t i = 0; i < kCornerNumbers * kNodeFaces; i += kLineFloats) {
     PrefetchLine(corners + i);
   }
 }

@@ -55,57 +55,6 @@ HWY_INLINE SoftVec BoxDistance(SoftTag d, const SoftBoxes& boxes, std::size_t i,
                      side(SoftBoxes::kBottom), box);
 }
 
-// A vector of faces of the mesh: their vertices, and why they may not take part. Behind the last
-// face come such that do not.
-struct TreeFaces {
-  const std::int32_t* vertex[3];
-  const std::uint8_t* reject;
-
-  HWY_INLINE TreeFaces(const ScreenMesh& mesh, std::size_t f, std::size_t lanes) {
-    const std::size_t from = std::min(f, mesh.faces());
-    vertex[0] = mesh.v0.data() + from, vertex[1] = mesh.v1.data() + from;
-    vertex[2] = mesh.v2.data() + from, reject = mesh.reject.data() + from;
-    if (from + lanes > mesh.faces()) Copy(mesh.faces() - from);
-  }
-  TreeFaces(const TreeFaces&) = delete;  // it may point into itself
-  TreeFaces& operator=(const TreeFaces&) = delete;
-
- private:
-  void Copy(std::size_t count) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::fill(std::copy_n(vertex[k], count, some_[k]), some_[k] + kSoftLanes, 0);
-      vertex[k] = some_[k];
-    }
-    std::fill(std::copy_n(reject, count, some_reject_), some_reject_ + kSoftLanes,
-              std::uint8_t{kFaceNotInSoftMask});
-    reject = some_reject_;
-  }
-  std::int32_t some_[3][kSoftLanes];
-  std::uint8_t some_reject_[kSoftLanes];
-};
-
-// Corners of faces f, f + 1, ...; kNowhere where there is none that takes part.
-HWY_INLINE void StoreCorners(SoftTag d, const ScreenMesh& mesh, std::size_t f, SoftTree* tree) {
-  const SoftIntTag di;
-  const hn::Rebind<std::uint8_t, SoftTag> bytes;
-  const TreeFaces faces(mesh, f, hn::Lanes(d));
-  const auto reject = hn::PromoteTo(di, hn::LoadU(bytes, faces.reject));
-  const auto out_of_it = hn::And(reject, hn::Set(di, std::int32_t{kFaceNotInSoftMask}));
-  const SoftMask nowhere = hn::RebindMask(d, hn::Gt(out_of_it, hn::Zero(di)));
-  for (std::size_t k = 0; k < 3; ++k) {
-    SoftVec numbers[4];  // x, y, 1 / depth, depth
-    LoadQuads(
-        d,
-        [&](std::size_t i)
-            HWY_ATTR { return &mesh.packed[static_cast<std::size_t>(faces.vertex[k][i])].x; },
-        numbers);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), numbers[axis]), d,
-                tree->corner(f / kNodeFaces, 3 * axis + k) + f % kNodeFaces);
-    }
-  }
-}
-
 // The box around boxes [from, from + n).
 template <class Load>
 HWY_INLINE void StoreBox(SoftTag d, std::size_t n, const Load& load, std::size_t at,
@@ -123,7 +72,7 @@ HWY_INLINE void StoreBox(SoftTag d, std::size_t n, const Load& load, std::size_t
 HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
   std::size_t faces = 0;
   for (std::size_t f = 0; f < kNodeFaces; f += hn::Lanes(d)) {
-    const SoftVec corner = hn::Load(d, tree->corner(node, 0) + f);
+    const SoftVec corner = hn::Load(d, tree->corners.at(node, 0) + f);
     faces += hn::CountTrue(d, hn::Lt(corner, hn::Set(d, kNowhere)));
   }
   tree->nodes.array(SoftBoxes::kFaces)[node] = static_cast<float>(faces);
@@ -132,7 +81,7 @@ HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
       [&](std::size_t i, std::size_t a) HWY_ATTR {
         const std::size_t axis = a == SoftBoxes::kLeft || a == SoftBoxes::kRight ? 0 : 3;
         const auto corner = [&](std::size_t k) HWY_ATTR {
-          const SoftVec at = hn::Load(d, tree->corner(node, axis + k) + i);
+          const SoftVec at = hn::Load(d, tree->corners.at(node, axis + k) + i);
           // On the far side, too, a face that is nowhere widens no box.
           return a < SoftBoxes::kRight
                      ? at
@@ -159,12 +108,8 @@ HWY_INLINE void StoreGroup(SoftTag d, std::size_t group, SoftTree* tree) {
 }
 
 // Groups [begin, end) with all that is in them.
-inline void BuildSoftGroupsTarget(const ScreenMesh& mesh, std::size_t begin, std::size_t end,
-                                  SoftTree* tree) {
+inline void BuildSoftGroupsTarget(std::size_t begin, std::size_t end, SoftTree* tree) {
   const SoftTag d;
-  for (std::size_t f = begin * kGroupFaces; f < end * kGroupFaces; f += hn::Lanes(d)) {
-    StoreCorners(d, mesh, f, tree);
-  }
   for (std::size_t n = begin * kGroupNodes; n < end * kGroupNodes; ++n) StoreNode(d, n, tree);
   for (std::size_t g = begin; g < end; ++g) StoreGroup(d, g, tree);
 }

@@ -9,17 +9,13 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "raster/screen_mesh.h"
+#include "raster/corner_blocks.h"
 
 namespace tilegrad::raster {
 
-inline constexpr std::size_t kNodeFaces = 16;
-inline constexpr std::size_t kGroupNodes = 16;
-inline constexpr std::size_t kNodeCorners = 6;  // numbers of a face
+inline constexpr std::size_t kNodeFaces = kBlockFaces;
+inline constexpr std::size_t kGroupNodes = kTogether;
 inline constexpr std::size_t kGroupFaces = kNodeFaces * kGroupNodes;
-
-// Coordinate of faces that do not take part: beyond the reach of every kernel.
-inline constexpr float kNowhere = 3e38f;
 
 // Boxes and how many faces are in them, as structure of arrays.
 struct SoftBoxes {
@@ -37,23 +33,12 @@ struct SoftBoxes {
 
 struct SoftTree {
   std::size_t faces = 0;  // that take part
-  // [node][6][kNodeFaces] x of corners 0, 1, 2, then y; pixels. A node is read as a whole.
-  AlignedVector<float> corners;
+  CornerBlocks corners;   // a node is a block
   SoftBoxes nodes, groups;
-
-  // The first face of a node.
-  float* corner(std::size_t node, std::size_t a) { return corners.data() + At(node, a); }
-  const float* corner(std::size_t node, std::size_t a) const {
-    return corners.data() + At(node, a);
-  }
-
- private:
-  static std::size_t At(std::size_t node, std::size_t a) {
-    return (kNodeCorners * node + a) * kNodeFaces;
-  }
 };
 
-// Reuses the memory of `tree`. `workers` null: the calling thread.
-void BuildSoftTree(const ScreenMesh& mesh, SoftTree* tree, const Workers* workers = nullptr);
+// The tree over `tree->corners`, which SetUpFaces has filled. Reuses its memory. `workers`
+// null: the calling thread.
+void BuildSoftTree(SoftTree* tree, const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

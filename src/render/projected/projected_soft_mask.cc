@@ -36,7 +36,9 @@ struct SoftImage {
 
   void Build(const raster::ProjectedFacesT<float>& faces, const ProjectedMaskOptions& options) {
     Place(faces, options.size);
-    raster::BuildSoftTree(buffers.View(), &tree);
+    raster::SetUpFaces(buffers.View(), /*cull_back=*/false, buffers.reject,
+                       {.corners = &tree.corners});
+    raster::BuildSoftTree(&tree);
     plan = raster::PlanSoftMask({options.size.width, options.size.height, options.delta,
                                  options.max_alpha_error, tree.faces});
   }
