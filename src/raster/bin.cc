@@ -9,39 +9,30 @@
 namespace tilegrad::raster {
 namespace {
 
-// The tiles of a face. Most have one.
+// Calls emit(bin) for the bins of a face. Most have one.
 template <class Emit>
-void ForEachTile(const TileRange& range, int columns, const Emit& emit) {
+void ForEachBin(const BinRange& range, int bin_columns, const Emit& emit) {
   if ((range.columns | range.rows) == 1) {
     emit(static_cast<std::size_t>(range.first));
     return;
   }
   for (int row = 0; row < range.rows; ++row) {
     for (int column = 0; column < range.columns; ++column) {
-      emit(static_cast<std::size_t>(range.first + row * columns + column));
+      emit(static_cast<std::size_t>(range.first + row * bin_columns + column));
     }
   }
 }
 
-TileRange RangeOf(const DrawnFace& face, const TileGrid& grid) {
-  const int up = (1 << grid.bits) - 1;
-  const int column = face.column_begin >> grid.bits, row = face.row_begin >> grid.bits;
-  return {row * grid.columns + column,
-          static_cast<std::int16_t>(((face.column_end + up) >> grid.bits) - column),
-          static_cast<std::int16_t>(((face.row_end + up) >> grid.bits) - row)};
-}
-
-// Sets the ranges of the faces of lists [begin, end), and counts them by tile.
-void FindRanges(const DrawnFaces& faces, const TileGrid& grid, std::size_t begin, std::size_t end,
-                AlignedVector<TileRange>* ranges, std::int32_t* counts) {
+// Calls emit(index of the face, bin) for all faces of lists [begin, end).
+template <class Emit>
+void ForEachFaceAndBin(const DrawnFaces& faces, int bin_columns, std::size_t begin, std::size_t end,
+                       const Emit& emit) {
   for (std::size_t list = begin; list < end; ++list) {
-    TileRange* to = ranges->data() + list * DrawnFaces::kChunk;
-    for (const DrawnFace& face : faces.list(list)) {
-      *to = RangeOf(face, grid);
-      ForEachTile(*to++, grid.columns, [&](std::size_t tile) { ++counts[tile]; });
+    std::size_t face = list * DrawnFaces::kChunk;
+    for (const BinRange& range : faces.bins_of_list(list)) {
+      ForEachBin(range, bin_columns, [&](std::size_t bin) { emit(face, bin); });
+      ++face;
     }
-    const std::size_t next = std::min((list + 1) * DrawnFaces::kChunk, ranges->size());
-    std::fill(to, ranges->data() + next, TileRange{0, 0, 0});
   }
 }
 
@@ -63,23 +54,22 @@ void PlaceChunks(std::size_t tiles, TileListBuffers* buffers) {
 TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
                         const Workers* workers) {
   constexpr std::size_t kList = DrawnFaces::kChunk;
-  const std::size_t n = buffers->ranges.size(), tiles = grid.tiles();
-  const std::size_t lists = faces.counts.size(), share = (tiles + kList - 1) / kList;
+  const std::size_t tiles = grid.tiles(), lists = faces.counts.size();
+  const std::size_t share = (tiles + kList - 1) / kList;
   buffers->begin.resize(tiles + 1);
   buffers->cursor.assign((lists + share - 1) / share * tiles, 0);
-  const auto cursors = [&](std::size_t chunk) { return buffers->cursor.data() + chunk * tiles; };
-  ForChunks(workers, lists, share, [&](std::size_t begin, std::size_t end) {
-    FindRanges(faces, grid, begin, end, &buffers->ranges, cursors(begin / share));
-  });
+  const auto for_each_bin = [&](const auto& emit) {
+    ForChunks(workers, lists, share, [&](std::size_t begin, std::size_t end) {
+      std::int32_t* const cursor = buffers->cursor.data() + begin / share * tiles;
+      ForEachFaceAndBin(faces, grid.columns, begin, end,
+                        [&](std::size_t face, std::size_t bin) { emit(face, &cursor[bin]); });
+    });
+  };
+  for_each_bin([](std::size_t, std::int32_t* count) { ++*count; });
   PlaceChunks(tiles, buffers);
   buffers->faces.resize(static_cast<std::size_t>(buffers->begin.back()));
-  ForChunks(workers, n, share * kList, [&](std::size_t begin, std::size_t end) {
-    std::int32_t* const cursor = cursors(begin / (share * kList));
-    for (std::size_t f = begin; f < end; ++f) {
-      ForEachTile(buffers->ranges[f], grid.columns, [&](std::size_t tile) {
-        buffers->faces[static_cast<std::size_t>(cursor[tile]++)] = static_cast<std::int32_t>(f);
-      });
-    }
+  for_each_bin([&](std::size_t face, std::int32_t* next) {
+    buffers->faces[static_cast<std::size_t>((*next)++)] = static_cast<std::int32_t>(face);
   });
   return buffers->View();
 }
@@ -101,13 +91,10 @@ TileLists ListAll(const DrawnFaces& faces, TileListBuffers* buffers) {
 
 }  // namespace
 
-TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
+TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& bins, TileListBuffers* buffers,
                         const Workers* workers) {
-  if (grid.tiles() == 1) return ListAll(faces, buffers);
-  const std::size_t lists = faces.counts.size();
-  const std::size_t before_last = lists == 0 ? 0 : (lists - 1) * DrawnFaces::kChunk;
-  buffers->ranges.resize(lists == 0 ? 0 : before_last + faces.counts.back());
-  return SortIntoTiles(faces, grid, buffers, workers);
+  if (bins.tiles() == 1) return ListAll(faces, buffers);
+  return SortIntoTiles(faces, bins, buffers, workers);
 }
 
 }  // namespace tilegrad::raster

@@ -68,23 +68,16 @@ struct TileGrid {
 // Faces are drawn by bins.
 inline TileGrid BinGrid(int width, int height) { return {width, height, kBinBits}; }
 
-// Tiles of a face: `columns` x `rows` from tile `first` on; none of a face that is not drawn.
-struct TileRange {
-  std::int32_t first;
-  std::int16_t columns, rows;
-};
-
 // Owns the memory of a TileLists; reused from frame to frame.
 struct TileListBuffers {
   AlignedVector<std::int32_t> begin, faces;
   AlignedVector<std::int32_t> cursor;  // [chunks of faces][tiles] where a chunk's next face goes
-  AlignedVector<TileRange> ranges;
   TileLists View() const { return {begin, faces}; }
 };
 
-// Lists every drawn face (its index in `faces.storage`) for each tile in which its box holds a
-// pixel centre. `workers` null: the calling thread.
-TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
+// Lists every drawn face (its index in `faces.storage`) for each bin in which its box holds a pixel
+// centre. `bins`: BinGrid of the faces' image. `workers` null: the calling thread.
+TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& bins, TileListBuffers* buffers,
                         const Workers* workers = nullptr);
 
 }  // namespace tilegrad::raster

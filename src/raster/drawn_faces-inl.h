@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 
@@ -184,6 +185,32 @@ HWY_INLINE void SetDepth(ShapeCorners c, FaceWords* out) {
 inline constexpr int kPieces = kWords / 4;
 inline constexpr int kPiecesWithoutEdges = (kEdgeWord + 3) / 4;
 
+// BinRange as two words.
+struct BinWords {
+  FaceInt first, size;
+
+  HWY_INLINE BinWords(const PixelLanes& columns, const PixelLanes& rows, int width) {
+    const FaceIntTag di;
+    const auto x = hn::ShiftRight<kBinBits>(columns.begin),
+               y = hn::ShiftRight<kBinBits>(rows.begin);
+    const auto behind = [&](FaceInt end) HWY_ATTR {
+      return hn::ShiftRight<kBinBits>(hn::Add(end, hn::Set(di, kBinSize - 1)));
+    };
+    const int bin_columns = (width + kBinSize - 1) >> kBinBits;
+    first = hn::Add(hn::Mul(y, hn::Set(di, bin_columns)), x);
+    size = hn::Or(hn::Sub(behind(columns.end), x), hn::ShiftLeft<16>(hn::Sub(behind(rows.end), y)));
+  }
+};
+static_assert(sizeof(BinRange) == 8 && offsetof(BinRange, columns) == 4);
+
+HWY_INLINE void StoreBins(const BinWords& words, std::uint32_t keep, BinRange* out) {
+  HWY_ALIGN std::int32_t lanes[2 * kMostFaceLanes];
+  hn::StoreInterleaved2(words.first, words.size, FaceIntTag(), lanes);
+  for (; keep != 0; keep &= keep - 1, ++out) {
+    std::memcpy(out, lanes + 2 * hwy::Num0BitsBelowLS1Bit_Nonzero32(keep), sizeof(BinRange));
+  }
+}
+
 // Writes the first pieces of the records of the lanes in `keep`. Returns where the next one goes.
 template <int kCount>
 HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, DrawnFace* out) {
@@ -291,17 +318,16 @@ HWY_INLINE FaceIntMask FitsStamp(const ShapeLanes& shapes, const PixelLanes& col
   return hn::And(shapes.small, hn::And(fits(columns), fits(rows)));
 }
 
-// Writes the records of those faces in `keep` that may cover a pixel. Returns where the next one
-// goes.
-HWY_INLINE DrawnFace* ListFaces(const ScreenMesh& mesh, const ShapeCorners& corners,
-                                ShapeLanes* shapes, std::size_t f, std::uint32_t drawn,
-                                DrawnFace* to) {
+// Writes the records of those faces in `keep` that may cover a pixel. Returns how many.
+HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& corners,
+                                 ShapeLanes* shapes, std::size_t f, std::uint32_t drawn,
+                                 const FaceList& to) {
   const FaceIntTag di;
   const PixelLanes columns = PixelsOf(shapes->x, mesh.width),
                    rows = PixelsOf(shapes->y, mesh.height);
   const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
   std::uint32_t keep = drawn & MaskBits(covers);
-  if (keep == 0) return to;
+  if (keep == 0) return 0;
   FaceWords words;
   WindClockwise(shapes->area, &shapes->corners);
   SetEdges(shapes->corners, columns.begin, rows.begin, &words);
@@ -312,16 +338,20 @@ HWY_INLINE DrawnFace* ListFaces(const ScreenMesh& mesh, const ShapeCorners& corn
     const auto covered = CoveredOf(words);
     words.word[1] = hn::IfThenElse(stamped, covered, words.word[1]);
     keep &= ~(stamps & MaskBits(hn::Eq(covered, hn::Zero(di))));
-    if (keep == 0) return to;
+    if (keep == 0) return 0;
   }
   words.word[0] = simd::CountFrom(di, static_cast<std::int32_t>(f));
   words.word[2] = hn::Or(columns.begin, hn::ShiftLeft<16>(columns.end));
   words.word[3] = hn::Or(rows.begin, hn::ShiftLeft<16>(rows.end));
   SetDepth(corners, &words);
-  if ((keep & ~stamps) == 0) return StoreRecords<kPiecesWithoutEdges>(words, keep, to);
-  DrawnFace* const end = StoreRecords<kPieces>(words, keep, to);
-  if ((keep & ~MaskBits(shapes->small)) != 0) SetWideDepths(mesh, to, end);
-  return end;
+  StoreBins(BinWords(columns, rows, mesh.width), keep, to.bins);
+  if ((keep & ~stamps) == 0) {
+    StoreRecords<kPiecesWithoutEdges>(words, keep, to.face);
+  } else {
+    DrawnFace* const end = StoreRecords<kPieces>(words, keep, to.face);
+    if ((keep & ~MaskBits(shapes->small)) != 0) SetWideDepths(mesh, to.face, end);
+  }
+  return static_cast<std::size_t>(std::popcount(keep));
 }
 
 static_assert(kMostFaceLanes <= kBlockFaces);
@@ -349,21 +379,22 @@ HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t c
   }
 }
 
-// `corner_blocks` may be null. `out` null, or room for all of the faces. Returns how many were
+// `corner_blocks` may be null. `out` has null, or room for all of the faces. Returns how many were
 // written.
 std::size_t SetUpSomeFaces(const ScreenMesh& mesh, const SomeFaces& range, std::uint8_t* reject,
-                           CornerBlocks* corner_blocks, DrawnFace* out) {
+                           CornerBlocks* corner_blocks, const FaceList& out) {
   const std::size_t lanes = hn::Lanes(FaceIntTag());
-  DrawnFace* to = out;
+  std::size_t listed = 0;
   for (std::size_t f = range.begin; f < range.end; f += lanes) {
     const std::size_t count = HWY_MIN(lanes, range.end - f);
     const ShapeCorners corners = LoadShapeCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, range.cull_back, f, count, reject + f);
     if (corner_blocks != nullptr) StoreCorners(corners, f, count, reject + f, corner_blocks);
-    if (out != nullptr && drawn != 0) to = ListFaces(mesh, corners, &shapes, f, drawn, to);
+    if (out.face == nullptr || drawn == 0) continue;
+    listed += ListFaces(mesh, corners, &shapes, f, drawn, {out.face + listed, out.bins + listed});
   }
-  return static_cast<std::size_t>(to - out);
+  return listed;
 }
 
 }  // namespace HWY_NAMESPACE

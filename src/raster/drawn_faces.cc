@@ -36,12 +36,13 @@ void SetUpFaces(const ScreenMesh& mesh, bool cull_back, std::span<std::uint8_t> 
   constexpr std::size_t kChunk = DrawnFaces::kChunk;
   const std::size_t n = mesh.faces();
   if (out.drawn != nullptr) {
-    if (out.drawn->storage.size() < n) out.drawn->storage.resize(n);
+    if (out.drawn->storage.size() < n) out.drawn->storage.resize(n), out.drawn->bins.resize(n);
     out.drawn->counts.assign((n + kChunk - 1) / kChunk, 0);
   }
   if (out.corners != nullptr) out.corners->Resize(n);
   ForChunks(workers, n, kChunk, [&](std::size_t begin, std::size_t end) {
-    DrawnFace* to = out.drawn == nullptr ? nullptr : out.drawn->storage.data() + begin;
+    FaceList to{nullptr, nullptr};
+    if (out.drawn != nullptr) to = {&out.drawn->storage[begin], &out.drawn->bins[begin]};
     const std::size_t count = HWY_DYNAMIC_DISPATCH(SetUpSomeFaces)(mesh, {begin, end, cull_back},
                                                                    reject.data(), out.corners, to);
     if (out.drawn != nullptr) out.drawn->counts[begin / kChunk] = count;

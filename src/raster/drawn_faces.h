@@ -39,16 +39,26 @@ struct DrawnFace {
 };
 static_assert(sizeof(DrawnFace) == 80);
 
+// The bins of a face (BinGrid): `columns` x `rows` from bin `first` on.
+struct BinRange {
+  std::int32_t first;
+  std::int16_t columns, rows;
+};
+
 // Faces are set up in chunks, which workers share; each lists its own, from the place in `storage`
 // that the chunk's first face has in the mesh. Reused from frame to frame: grows to the largest
 // mesh seen.
 struct DrawnFaces {
   static constexpr std::size_t kChunk = 8192;  // faces
   AlignedVector<DrawnFace> storage;            // between the lists: anything
+  AlignedVector<BinRange> bins;                // of each
   AlignedVector<std::size_t> counts;           // [chunks] how many each has listed
 
   std::span<const DrawnFace> list(std::size_t chunk) const {  // face ascends
     return std::span(storage).subspan(chunk * kChunk, counts[chunk]);
+  }
+  std::span<const BinRange> bins_of_list(std::size_t chunk) const {
+    return std::span(bins).subspan(chunk * kChunk, counts[chunk]);
   }
 };
 
@@ -62,6 +72,12 @@ struct SomeFaces {
 struct FaceSetUp {
   DrawnFaces* drawn = nullptr;      // those that are drawn and may cover a pixel of the image
   CornerBlocks* corners = nullptr;  // of those that take part in the soft mask
+};
+
+// Where records go.
+struct FaceList {
+  DrawnFace* face;
+  BinRange* bins;
 };
 
 // Sets the bits of `reject` [F] that follow from the shape on the screen (degenerate, culled);

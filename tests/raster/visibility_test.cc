@@ -150,10 +150,10 @@ TEST_P(VisibilityOnEveryTarget, EveryPixelOfATriangulatedRectangleIsCoveredExact
 }
 
 // Triangles of every size, some far off-screen, many overlapping.
-Flat RandomTriangles(int count, double spread, Rng* rng) {
-  Flat flat(45, 39);
+Flat RandomTriangles(int count, double spread, Rng* rng, int width = 45, int height = 39) {
+  Flat flat(width, height);
   for (int f = 0; f < count; ++f) {
-    const double cx = rng->Uniform(-5, 50), cy = rng->Uniform(-5, 45);
+    const double cx = rng->Uniform(-5, width + 5), cy = rng->Uniform(-5, height + 6);
     const double size = spread * std::pow(10, rng->Uniform(-2, 0));
     std::int32_t v[3];
     for (auto& index : v) {
@@ -316,9 +316,9 @@ INSTANTIATE_TEST_SUITE_P(Targets, VisibilityOnEveryTarget, testing::ValuesIn(Run
 
 TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   Rng rng(8, 4);
-  Flat flat = RandomTriangles(200, 40, &rng);
+  Flat flat = RandomTriangles(400, 150, &rng, 300, 200);
   const ScreenMesh mesh = flat.Finish();
-  const TileGrid grid(mesh.width, mesh.height);
+  const TileGrid grid = BinGrid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
   TileListBuffers buffers;
   const TileLists bins = BinDrawnFaces(drawn, grid, &buffers);
