@@ -124,7 +124,7 @@ HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, c
     block.width = std::clamp(rect.x1 - block.x0, 0, static_cast<int>(kBlockSize));
     block.height = std::clamp(rect.y1 - block.y0, 0, static_cast<int>(kBlockSize));
     block.bits = block.width == 0 ? 0 : bits_of(block);
-    block.live = 0;
+    block.live = 0, block.clear = true;
     if (block.bits == 0) continue;
     const TileRect own = BoxOf(block);
     PlaceBlock(plan, own, &block);
@@ -140,6 +140,7 @@ HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
 
 // Alpha of a block over no faces: 0 for the pixels to compute.
 HWY_INLINE void ClearAlpha(SoftBlock* block) {
+  block->clear = false;
   std::fill_n(block->alpha, kBlockPixels, 0.0);
   std::fill_n(block->product, kBlockPixels, 1.0);
   std::fill_n(block->least, kBlockPixels, 1.0f);

@@ -122,11 +122,12 @@ HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces
                    &lists->boundaries);
 }
 
-// Fills a list up to whole vectors at least: `far` are its arrays of distances.
+// Fills a list up to whole vectors: `far` are its arrays of distances.
 template <std::size_t kArrays>
 HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArrays>* list) {
   const SoftTag d;
   const SoftIntTag di;
+  if (list->count % hn::Lanes(d) == 0) return;
   for (auto& array : list->v) hn::StoreU(hn::Zero(d), d, array + list->count);
   hn::StoreU(hn::Set(di, SoftList::kNoSlot), di, list->slot + list->count);
   for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);

@@ -231,9 +231,6 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
                           const SoftNodes& nodes, const SoftReach& reach,
                           SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
-  for (std::size_t b = 0; b < kTileBlocks; ++b) {
-    if (blocks[b].bits != 0) ClearAlpha(&blocks[b]);
-  }
   const double stop = StopProduct(plan);
   const TileFaces faces{tree, std::span(scratch->nodes).first(nodes.count), box, reach.z,
                         kChunkFaces};
@@ -243,6 +240,8 @@ HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const 
       if (blocks[b].live == 0) continue;
       FindFeatures(scratch->chunk, plan, {blocks[b], blocks[b].live, reach, false},
                    &scratch->lists);
+      if (scratch->lists.empty()) continue;
+      if (blocks[b].clear) ClearAlpha(&blocks[b]);
       blocks[b].whole += scratch->lists.whole;
       PartialAlpha partial(&blocks[b], scratch);
       partial.AddVertices(), partial.AddSegments(), partial.AddBoundaries(), partial.Merge();
@@ -270,7 +269,7 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
   double spent = 0;
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
-    if (blocks[b].bits != 0 && nodes.count > 0) {
+    if (!blocks[b].clear) {
       WriteAlpha(plan, blocks[b], images.alpha.data());
       if (!images.transmittance.empty()) {
         WriteTransmittance(plan, blocks[b], images.transmittance.data());

@@ -86,7 +86,8 @@ struct SoftBlock {
   float half_x, half_y;                            // half of it
   alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
   std::size_t whole;                               // faces that all pixels have seen
-  alignas(64) double alpha[kBlockPixels];          // 1 where there is nothing to compute
+  bool clear;  // no pixel has seen a face yet, and what follows is not set
+  alignas(64) double alpha[kBlockPixels];  // 1 where there is nothing to compute
   // 1 - alpha to relative precision as long as no lane of a chunk leaves less than kLightProduct;
   // else not less. The least that a lane leaves.
   alignas(64) double product[kBlockPixels];
@@ -123,6 +124,8 @@ struct SoftLists {
   SoftListOf<3 * kEdgeArrays> boundaries;  // ... is anywhere; edge after edge
   alignas(64) std::uint64_t pixels[SoftList::kNoSlot + 1] = {};  // that see a face, by slot
   std::size_t whole;  // members that all pixels to compute see
+
+  bool empty() const { return vertices.count + segments.count + boundaries.count == 0; }
 };
 
 // dL/d(corners) of a face, pixels.
