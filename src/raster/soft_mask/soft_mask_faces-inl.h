@@ -54,11 +54,21 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   }
 }
 
+// The sine of the turn from edge 0 to edge 1, of which rounding makes less than 2^-20.
+HWY_INLINE SoftVec TurnOf(SoftTag d, const SoftVec (&tx)[3], const SoftVec (&ty)[3],
+                          const SoftVec (&inverse)[3]) {
+  const SoftVec sine = hn::MulSub(tx[0], ty[1], hn::Mul(ty[0], tx[1]));
+  const SoftMask sure = hn::Gt(hn::Abs(sine), hn::Set(d, 0x1p-20f));
+  const SoftMask real = hn::Gt(hn::Min(inverse[0], inverse[1]), hn::Zero(d));
+  return hn::IfThenElseZero(hn::And(sure, real), sine);
+}
+
 // Directions of the edges of faces that are not long.
 HWY_INLINE void SetUpDirections(SoftTag d, float unit_x, float unit_y, SoftFaceArrays* faces) {
   const SoftVec zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   const SoftVec ux = hn::Set(d, unit_x), uy = hn::Set(d, unit_y);
   for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
+    SoftVec tx[3], ty[3], inverse[3];
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t next = k == 2 ? 0 : k + 1;
       const auto span = [&](std::size_t a) HWY_ATTR {
@@ -68,12 +78,14 @@ HWY_INLINE void SetUpDirections(SoftTag d, float unit_x, float unit_y, SoftFaceA
       const SoftVec ey = hn::Mul(span(SoftFaceArrays::kY), uy);
       const SoftVec length = hn::Sqrt(hn::MulAdd(ex, ex, hn::Mul(ey, ey)));
       const SoftMask real = hn::Gt(length, zero);
-      const SoftVec inverse = hn::IfThenElseZero(real, hn::Div(one, length));
-      hn::Store(hn::IfThenElse(real, hn::Mul(ex, inverse), one), d,
-                faces->v[SoftFaceArrays::kTx + k] + i);
-      hn::Store(hn::Mul(ey, inverse), d, faces->v[SoftFaceArrays::kTy + k] + i);
-      hn::Store(inverse, d, faces->v[SoftFaceArrays::kInverse + k] + i);
+      inverse[k] = hn::IfThenElseZero(real, hn::Div(one, length));
+      tx[k] = hn::IfThenElse(real, hn::Mul(ex, inverse[k]), one);
+      ty[k] = hn::Mul(ey, inverse[k]);
+      hn::Store(tx[k], d, faces->v[SoftFaceArrays::kTx + k] + i);
+      hn::Store(ty[k], d, faces->v[SoftFaceArrays::kTy + k] + i);
+      hn::Store(inverse[k], d, faces->v[SoftFaceArrays::kInverse + k] + i);
     }
+    hn::Store(TurnOf(d, tx, ty, inverse), d, faces->v[SoftFaceArrays::kTurn] + i);
   }
 }
 
@@ -145,6 +157,7 @@ inline void FillChunk(const TileFaces& faces, std::size_t* next, SoftChunk* chun
 struct FaceEdges {
   SoftVec x[3], y[3];
   SoftVec tx[3], ty[3], side[3], first[3], last[3], inverse[3];
+  SoftVec turn;
 };
 
 HWY_INLINE void LoadCorners(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
@@ -170,6 +183,7 @@ HWY_INLINE void ShortEdges(SoftTag d, const SoftFaceArrays& faces, std::size_t i
     f->last[k] = hn::MulAdd(tx, f->x[next], hn::Mul(ty, f->y[next]));
     f->inverse[k] = hn::Load(d, faces.v[SoftFaceArrays::kInverse + k] + i);
   }
+  f->turn = hn::Load(d, faces.v[SoftFaceArrays::kTurn] + i);
 }
 
 using SoftDoubleTag = hn::CappedTag<double, kSoftLanes / 2>;
@@ -239,6 +253,7 @@ HWY_INLINE FaceEdges LongEdges(SoftTag d, const SoftFaceArrays& faces, std::size
     f.tx[k] = edge(0), f.ty[k] = edge(1), f.side[k] = edge(2);
     f.first[k] = edge(3), f.last[k] = edge(4), f.inverse[k] = edge(5);
   }
+  f.turn = TurnOf(d, f.tx, f.ty, f.inverse);
   return f;
 }
 

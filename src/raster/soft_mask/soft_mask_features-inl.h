@@ -92,6 +92,11 @@ struct FeatureSearch {
   std::uint64_t pixels;
   const SoftReach& reach;
   bool split;
+  // Whether edges behind a face are looked for: where a block is larger than what faces reach, they
+  // lie all around its pixels. Beyond the rounding of a distance to an edge's line.
+  bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
+  float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
+                               kLongEdge * (block.box.unit_x + block.box.unit_y));
 };
 
 // Some faces: all, and those that are not near ones; where they are in the chunk.
@@ -100,19 +105,48 @@ struct FeatureFaces {
   SoftInt slot;
 };
 
+// Edges with the pixels of a block on their inner side, where none can lie within the face: nearest
+// points that are on them are on another edge, too.
+HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
+                            SoftMask (&behind)[3]) {
+  const SoftBlock& block = search.block;
+  SoftMask ahead[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftVec half = hn::MulAdd(hn::Abs(f.ty[k]), hn::Set(d, block.half_x),
+                                    hn::Mul(hn::Abs(f.tx[k]), hn::Set(d, block.half_y)));
+    const SoftVec least = hn::Add(half, hn::Set(d, search.rounding));
+    const SoftVec inner = hn::CopySign(f.side[k], hn::Xor(f.side[k], f.turn));
+    behind[k] = hn::Lt(least, inner), ahead[k] = hn::Lt(inner, hn::Neg(least));
+  }
+  const SoftMask sure = hn::Ne(f.turn, hn::Zero(d));
+  const SoftMask outside = hn::And(sure, hn::Or(hn::Or(ahead[0], ahead[1]), ahead[2]));
+  for (SoftMask& b : behind) b = hn::And(b, outside);
+}
+
 HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces& faces,
-                               const SoftBlock& block, SoftLists* lists) {
-  SoftMask start[3], end[3];
+                               const FeatureSearch& search, SoftLists* lists) {
+  const SoftBlock& block = search.block;
+  SoftMask start[3], end[3], behind[3];
   for (std::size_t k = 0; k < 3; ++k) {
     const SoftVec half = hn::MulAdd(hn::Abs(f.tx[k]), hn::Set(d, block.half_x),
                                     hn::Mul(hn::Abs(f.ty[k]), hn::Set(d, block.half_y)));
     start[k] = hn::Le(half, f.first[k]);
     end[k] = hn::Le(half, hn::Neg(f.last[k]));
+    behind[k] = hn::FirstN(d, 0);
+  }
+  if (search.looks_behind) EdgesBehind(d, f, search, behind);
+  // Edges of which the nearest point is a corner that another edge has too, or that are behind.
+  SoftMask gone[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftMask at_start = hn::AndNot(behind[(k + 2) % 3], start[k]);
+    const SoftMask at_end = hn::AndNot(behind[(k + 1) % 3], end[k]);
+    gone[k] = hn::Or(behind[k], hn::Or(at_start, at_end));
   }
   const SoftMask corner[3] = {hn::And(start[0], end[2]), hn::And(start[1], end[0]),
                               hn::And(start[2], end[1])};
-  const SoftMask edge[3] = {hn::And(start[1], end[2]), hn::And(start[2], end[0]),
-                            hn::And(start[0], end[1])};
+  const SoftMask edge[3] = {hn::AndNot(gone[0], hn::And(gone[1], gone[2])),
+                            hn::AndNot(gone[1], hn::And(gone[2], gone[0])),
+                            hn::AndNot(gone[2], hn::And(gone[0], gone[1]))};
   const SoftMask vertex = hn::And(faces.far, hn::Or(hn::Or(corner[0], corner[1]), corner[2]));
   const SoftMask segment =
       hn::AndNot(vertex, hn::And(faces.far, hn::Or(hn::Or(edge[0], edge[1]), edge[2])));
@@ -180,7 +214,7 @@ inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
         far = hn::AndNot(BoxesNear(d, faces, i, search.block, search.reach.near), seen);
       }
       const SoftInt slots = simd::CountFrom(di, static_cast<std::int32_t>(slot));
-      AppendFeatures(d, edges(i), {seen, far, slots}, search.block, lists);
+      AppendFeatures(d, edges(i), {seen, far, slots}, search, lists);
     }
   };
   append(chunk.shorts, 0, [&](std::size_t i) HWY_ATTR {

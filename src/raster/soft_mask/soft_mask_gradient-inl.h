@@ -73,12 +73,13 @@ HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
 // The nearest of the faces' three edges: the way to the pixel, and the share of the edge's second
 // corner.
 struct Nearest {
-  SoftVec z, way_x, way_y, second;
+  SoftVec way_x, way_y, second;
   SoftMask on1, on2;  // edge 1, edge 2; else edge 0
 };
 
+// Of a pixel; *nearest_z: the squared distance.
 HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
-                             std::size_t pixel) {
+                             std::size_t pixel, SoftVec* nearest_z) {
   SoftVec z[3], x[3], y[3], second[3];
   for (std::size_t k = 0; k < 3; ++k) {
     const EdgeMembers& edge = faces.edge[k];
@@ -94,26 +95,41 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
     return hn::IfThenElse(on2, v[2], hn::IfThenElse(closer1, v[1], v[0]));
   };
   const SoftVec share = hn::Min(pick(second), hn::Set(d, 1.0f));
-  return {hn::Min(z01, z[2]), pick(x), pick(y), share, hn::AndNot(on2, closer1), on2};
+  *nearest_z = hn::Min(z01, z[2]);
+  return {pick(x), pick(y), share, hn::AndNot(on2, closer1), on2};
 }
 
 // The same for the pixels of a block.
 class NearestOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
-    hn::Store(n.z, d, v_[0][i]), hn::Store(n.way_x, d, v_[1][i]), hn::Store(n.way_y, d, v_[2][i]);
-    hn::Store(n.second, d, v_[3][i]);
-    hn::Store(hn::VecFromMask(d, n.on1), d, v_[4][i]);
-    hn::Store(hn::VecFromMask(d, n.on2), d, v_[5][i]);
+    hn::Store(n.way_x, d, v_[0][i]), hn::Store(n.way_y, d, v_[1][i]);
+    hn::Store(n.second, d, v_[2][i]);
+    hn::Store(hn::VecFromMask(d, n.on1), d, v_[3][i]);
+    hn::Store(hn::VecFromMask(d, n.on2), d, v_[4][i]);
   }
-  HWY_INLINE SoftVec Z(SoftTag d, std::size_t i) const { return hn::Load(d, v_[0][i]); }
   HWY_INLINE Nearest At(SoftTag d, std::size_t i) const {
     const auto load = [&](std::size_t a) HWY_ATTR { return hn::Load(d, v_[a][i]); };
-    return {load(0), load(1), load(2), load(3), hn::MaskFromVec(load(4)), hn::MaskFromVec(load(5))};
+    return {load(0), load(1), load(2), hn::MaskFromVec(load(3)), hn::MaskFromVec(load(4))};
   }
 
  private:
-  alignas(64) float v_[6][kBlockPixels][kSoftLanes];
+  alignas(64) float v_[5][kBlockPixels][kSoftLanes];
+};
+
+// Where the pixels of a block lie relative to edges.
+class OffsetsOfPixels {
+ public:
+  HWY_INLINE void Store(SoftTag d, std::size_t i, const EdgeOffset& o) {
+    hn::Store(o.side, d, v_[0][i]), hn::Store(o.beyond, d, v_[1][i]);
+    hn::Store(o.along, d, v_[2][i]);
+  }
+  HWY_INLINE EdgeOffset At(SoftTag d, std::size_t i) const {
+    return {hn::Load(d, v_[0][i]), hn::Load(d, v_[1][i]), hn::Load(d, v_[2][i])};
+  }
+
+ private:
+  alignas(64) float v_[3][kBlockPixels][kSoftLanes];
 };
 
 // Pixels in which all faces have z >= kSmallZ, or kMediumZ.
@@ -147,25 +163,26 @@ struct CornerSums {
   }
 };
 
-// By pixels.
+// By pixels: squared distances first, then what they make of the push.
 using Pushes = float[kBlockPixels][kSoftLanes];
 
-// Of the pixels `bits`, pushed by what push_all(nearest, far, pushes) finds for each. Loops apart,
-// so that what is under way at a time is not one chain from the edges to the sums.
+// Of the pixels `bits`, pushed by what push_all(far, pushes) finds for each. Loops apart, so that
+// what is under way at a time is not one chain from the edges to the sums.
 template <class PushAll>
 HWY_INLINE CornerSums SumCorners(SoftTag d, const BoundaryMembers& faces, const SoftBlock& block,
                                  std::uint64_t bits, const PushAll& push_all) {
   NearestOfPixels nearest;
+  alignas(64) Pushes pushes;
   FarPixels far;  // not in memory, as the others are
   ForPixels(bits, [&](std::size_t i) HWY_ATTR {
-    const Nearest n = NearestOf(d, faces, block, i);
-    nearest.Store(d, i, n), far.Note(d, i, n.z);
+    SoftVec z;
+    nearest.Store(d, i, NearestOf(d, faces, block, i, &z));
+    hn::Store(z, d, pushes[i]), far.Note(d, i, z);
   });
-  alignas(64) Pushes pushed;
-  push_all(nearest, far, pushed);
+  push_all(far, pushes);
   CornerSums sums(d);
   ForPixels(bits,
-            [&](std::size_t i) HWY_ATTR { sums.Add(d, nearest.At(d, i), hn::Load(d, pushed[i])); });
+            [&](std::size_t i) HWY_ATTR { sums.Add(d, nearest.At(d, i), hn::Load(d, pushes[i])); });
   return sums;
 }
 
@@ -260,12 +277,20 @@ struct WeakFaces {
       if (bits == 0) continue;
       NotePairs(d, bits, work);
       const EdgeMembers edge(d, list.v[0] + m, list.kRoom);
+      OffsetsOfPixels offsets;
+      alignas(64) Pushes pushes;
+      FarPixels far;
+      ForPixels(bits, [&](std::size_t i) HWY_ATTR {
+        const EdgeOffset o = edge.At(d, block, i);
+        const SoftVec z = SquaredLength(o);
+        offsets.Store(d, i, o), hn::Store(z, d, pushes[i]), far.Note(d, i, z);
+      });
+      PushAll(bits, far, pushes);
       // Of push along n and t, and of both times the share of the second corner.
       SoftVec side = hn::Zero(d), beyond = side, second_side = side, second_beyond = side;
       ForPixels(bits, [&](std::size_t i) HWY_ATTR {
-        const EdgeOffset o = edge.At(d, block, i);
-        const SoftVec odds = Odds(d, simd::HalvingOf(d, SquaredLength(o)).power);
-        const SoftVec w = hn::Mul(odds, hn::Set(d, push[i]));
+        const EdgeOffset o = offsets.At(d, i);
+        const SoftVec w = hn::Load(d, pushes[i]);
         const SoftVec second = hn::Min(hn::Mul(o.along, edge.inverse), hn::Set(d, 1.0f));
         const SoftVec s = hn::Mul(w, o.side), b = hn::Mul(w, o.beyond);
         side = hn::Add(side, s), beyond = hn::Add(beyond, b);
@@ -288,23 +313,21 @@ struct WeakFaces {
       const BoundaryMembers members(d, list.v[0] + m, list.kRoom);
       const std::uint64_t bits = PixelsOf(d, lists, list, m, pixels);
       NotePairs(d, bits, work);
-      const CornerSums corners =
-          SumCorners(d, members, block, bits,
-                     [&](const NearestOfPixels& nearest, const FarPixels& far, Pushes& pushed)
-                         HWY_ATTR { PushAll(bits, nearest, far, pushed); });
+      const CornerSums corners = SumCorners(d, members, block, bits,
+                                            [&](const FarPixels& far, Pushes& pushes)
+                                                HWY_ATTR { PushAll(bits, far, pushes); });
       sums.Add(d, list, m, corners);
     }
   }
 
  private:
   // Loops apart by how many factors the odds need: which pixel needs how many is hard to foretell.
-  HWY_INLINE void PushAll(std::uint64_t bits, const NearestOfPixels& nearest, const FarPixels& far,
-                          Pushes& pushed) const {
+  HWY_INLINE void PushAll(std::uint64_t bits, const FarPixels& far, Pushes& pushes) const {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
       ForPixels(some, [&](std::size_t i) HWY_ATTR {
-        const SoftVec a = simd::HalvingOf(d, nearest.Z(d, i)).power;
-        hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushed[i]);
+        const SoftVec a = simd::HalvingOf(d, hn::Load(d, pushes[i])).power;
+        hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushes[i]);
       });
     };
     push_some(bits & far.small, [&](SoftVec a) HWY_ATTR { return SmallOdds(d, a); });
@@ -357,14 +380,13 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
   for (std::size_t n = near.size(); n-- > 0;) {
     const SoftNearFaces& faces = near[n];
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
-    const auto push_all = [&](const NearestOfPixels& nearest, const FarPixels&,
-                              Pushes& pushed) HWY_ATTR {
+    const auto push_all = [&](const FarPixels&, Pushes& pushes) HWY_ATTR {
       ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
-        const auto a = simd::HalvingOf(d, nearest.Z(d, i));
+        const auto a = simd::HalvingOf(d, hn::Load(d, pushes[i]));
         const LaneProducts outside(d, a.one_minus);
         const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
         behind[i] *= hn::GetLane(outside.all);
-        hn::Store(hn::Mul(hn::Mul(a.power, rest), outside.others), d, pushed[i]);
+        hn::Store(hn::Mul(hn::Mul(a.power, rest), outside.others), d, pushes[i]);
       });
     };
     const CornerSums corners = SumCorners(d, members, block, faces.bits, push_all);

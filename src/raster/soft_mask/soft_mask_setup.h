@@ -50,7 +50,8 @@ struct SoftBox {
 
 // A tile's faces, some at a time: corners and the octagon around them in pixels, which is the box
 // and the least and largest x + y and x - y; unit direction t of edge k, from corner k to the next,
-// and 1 / its length. An edge of no length has t = (1, 0) and inverse 0.
+// and 1 / its length. An edge of no length has t = (1, 0) and inverse 0. The sine of the turn from
+// edge 0 to edge 1, 0 where its sign is not certain.
 struct SoftFaceArrays {
   enum Array {
     kX = 0,
@@ -66,7 +67,8 @@ struct SoftFaceArrays {
     kTx,
     kTy = kTx + 3,
     kInverse = kTy + 3,
-    kArrays = kInverse + 3
+    kTurn = kInverse + 3,
+    kArrays
   };
   alignas(64) float v[kArrays][kChunkRoom];
   alignas(64) std::int32_t face[kChunkRoom];  // of the mesh
