@@ -15,6 +15,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <limits>
 #include <numbers>
@@ -25,15 +26,34 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
+// The background of a tile where alpha is not so small that all faces may be dropped: together they
+// have A <= about alpha.
+HWY_INLINE TilePixels SoftPixelsOf(const SoftMaskPlan& plan, const SoftMaskRegion& tile,
+                                   std::span<const float> alpha) {
+  const std::int32_t* ids = tile.face_ids.data();
+  const auto least = static_cast<float>(plan.stop_error);
+  return TilePixels(
+      plan, tile.rect,
+      [&](std::size_t i) HWY_ATTR {
+        const TileTag d;
+        const TileIntTag di;
+        const auto soft = hn::Gt(hn::LoadU(d, alpha.data() + i), hn::Set(d, least));
+        return hn::And(hn::RebindMask(d, hn::Lt(hn::LoadU(di, ids + i), hn::Zero(di))), soft);
+      },
+      [&](std::size_t i) { return ids[i] < 0 && alpha[i] > least; });
+}
+
 // Backward through one tile, after FindNearGroups.
 class TileBackward {
  public:
-  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& tile,
-               const SoftMaskAdjoint& adjoint, SoftMaskScratch* scratch,
+  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& tile,
+               const TilePixels& soft, const SoftMaskAdjoint& adjoint, SoftMaskScratch* scratch,
                AlignedVector<SoftFaceGradient>* out)
       : tree_(tree), plan_(plan), adjoint_(adjoint), scratch_(scratch), out_(out) {
     box_ = SetUpBlocks(
-        plan, tile.rect, [&](const SoftBlock& b) HWY_ATTR { return TakePixels(tile, b); },
+        plan, tile,
+        [&](const SoftBlock& block, std::size_t b)
+            HWY_ATTR { return TakePixels(block, soft.of(b), b); },
         scratch->blocks);
     // dz / d(pixel) has the unit, dA / dz has ln 2.
     scale_ = {static_cast<float>(plan.unit_x * std::numbers::ln2),
@@ -73,39 +93,17 @@ class TileBackward {
                       block.y0 + static_cast<int>(i / kBlockSize));
   }
 
-  // Bits of the pixels that have a gradient to hand on. Sets their push, 2 d_alpha times the
-  // product over all faces: moving the nearest point along the way to the pixel lowers z. Dark
-  // ones, whose product is not known, have none yet.
-  HWY_INLINE std::uint64_t TakePixels(const SoftMaskRegion& tile, const SoftBlock& block) {
-    const auto b = static_cast<std::size_t>(&block - scratch_->blocks);
+  // Those of the pixels `soft` of block b that have a gradient to hand on. Sets their push, 2
+  // d_alpha times the product over all faces: moving the nearest point along the way to the pixel
+  // lowers z. Dark ones, whose product is not known, have none yet.
+  HWY_INLINE std::uint64_t TakePixels(const SoftBlock& block, std::uint64_t soft, std::size_t b) {
     std::uint64_t bits = 0;
-    ForRows(plan_, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
-      const std::uint64_t row = SoftPixels(tile, from, block.width);
-      if (row != 0) bits |= TakeRow(from, to, row, b);
-    });
+    for (std::uint32_t rows = RowsOf(soft); rows != 0; rows &= rows - 1) {
+      const int y = std::countr_zero(rows);
+      const std::size_t to = static_cast<std::size_t>(y) * kBlockSize;
+      bits |= TakeRow(PixelIndex(plan_, block.x0, block.y0 + y), to, soft >> to & 0xff, b);
+    }
     return bits;
-  }
-
-  // Bits of a row's background pixels where alpha is not so small that all faces may be dropped:
-  // together they have A <= about alpha.
-  HWY_INLINE std::uint64_t SoftPixels(const SoftMaskRegion& tile, std::size_t from,
-                                      int width) const {
-    const SoftTag d;
-    const SoftIntTag di;
-    const std::int32_t* ids = tile.face_ids.data() + from;
-    const float* alpha = adjoint_.alpha.data() + from;
-    const auto least = static_cast<float>(plan_.stop_error);
-    std::uint64_t row = 0;
-    if (width < static_cast<int>(kBlockSize)) {
-      for (int x = 0; x < width; ++x) row |= std::uint64_t{ids[x] < 0 && alpha[x] > least} << x;
-      return row;
-    }
-    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      const auto background = hn::RebindMask(d, hn::Lt(hn::LoadU(di, ids + x), hn::Zero(di)));
-      const auto soft = hn::Gt(hn::LoadU(d, alpha + x), hn::Set(d, least));
-      row |= std::uint64_t{BitsOf(d, hn::And(background, soft))} << x;
-    }
-    return row;
   }
 
   // The push of the pixels `row` of a row of block b; returns the bits of those that have one.
@@ -282,7 +280,8 @@ inline void SoftMaskBackwardTarget(const SoftTree& tree, const SoftMaskPlan& pla
     const TileRect next = NextTile(region.rect, tile);
     PrefetchTile(plan, next, region.face_ids.data());
     PrefetchTile(plan, next, adjoint.alpha.data());
-    TileBackward(tree, plan, {tile, region.face_ids}, adjoint, scratch, out).Run();
+    const TilePixels soft = SoftPixelsOf(plan, {tile, region.face_ids}, adjoint.alpha);
+    if (!soft.none()) TileBackward(tree, plan, tile, soft, adjoint, scratch, out).Run();
   });
 }
 

@@ -55,27 +55,64 @@ HWY_INLINE void ForRows(const SoftMaskPlan& plan, const SoftBlock& block, const 
   }
 }
 
-// Bits of the background pixels.
-HWY_INLINE std::uint64_t BackgroundOf(const SoftMaskPlan& plan, const SoftBlock& block,
-                                      const std::int32_t* face_ids) {
-  const SoftTag d;
-  const SoftIntTag di;
-  std::uint64_t bits = 0;
-  ForRows(plan, block, [&](std::size_t from, std::size_t to) HWY_ATTR {
-    std::uint64_t row = 0;
-    if (block.width == static_cast<int>(kBlockSize)) {
-      for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(di)) {
-        const auto ids = hn::LoadU(di, face_ids + from + x);
-        row |= std::uint64_t{BitsOf(d, hn::RebindMask(d, hn::Lt(ids, hn::Zero(di))))} << x;
+// Lanes are the pixels of a row of a tile.
+using TileTag = hn::CappedTag<float, kTileSize>;
+using TileIntTag = hn::RebindToSigned<TileTag>;
+
+// Some pixels of a tile, as bits of its blocks.
+class TilePixels {
+ public:
+  // Those in whose lanes chosen(index in the image) is true, which is asked for whole vectors, and
+  // at the right side of the image for one(index in the image).
+  template <class Chosen, class One>
+  HWY_INLINE TilePixels(const SoftMaskPlan& plan, const TileRect& rect, const Chosen& chosen,
+                        const One& one) {
+    const TileTag d;
+    for (int y = 0; y < rect.y1 - rect.y0; ++y) {
+      const std::size_t from = PixelIndex(plan, rect.x0, rect.y0 + y);
+      const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
+      std::uint64_t row = 0;
+      if (width == static_cast<std::size_t>(kTileSize)) {
+        for (std::size_t x = 0; x < width; x += hn::Lanes(d)) {
+          row |= std::uint64_t{BitsOf(d, chosen(from + x))} << x;
+        }
+      } else {
+        for (std::size_t x = 0; x < width; ++x) row |= std::uint64_t{one(from + x)} << x;
       }
-    } else {
-      for (int x = 0; x < block.width; ++x) {
-        row |= std::uint64_t{face_ids[from + static_cast<std::size_t>(x)] < 0} << x;
-      }
+      AddRow(static_cast<std::size_t>(y), row);
     }
-    bits |= row << to;
-  });
-  return bits;
+  }
+
+  bool none() const { return (bits_[0] | bits_[1] | bits_[2] | bits_[3]) == 0; }
+  // Bits of block b.
+  std::uint64_t of(std::size_t b) const { return bits_[b]; }
+  // Bits of row y.
+  std::uint32_t row(std::size_t y) const {
+    const std::size_t b = y / kBlockSize * 2, from = y % kBlockSize * kBlockSize;
+    return static_cast<std::uint32_t>((bits_[b] >> from & 0xff) | (bits_[b + 1] >> from & 0xff)
+                                                                      << kBlockSize);
+  }
+
+ private:
+  HWY_INLINE void AddRow(std::size_t y, std::uint64_t row) {
+    const std::size_t b = y / kBlockSize * 2, to = y % kBlockSize * kBlockSize;
+    bits_[b] |= (row & 0xff) << to, bits_[b + 1] |= row >> kBlockSize << to;
+  }
+
+  static_assert(kTileBlocks == 4);
+  std::uint64_t bits_[kTileBlocks] = {};
+};
+
+// The background of a tile.
+HWY_INLINE TilePixels BackgroundOf(const SoftMaskPlan& plan, const SoftMaskRegion& tile) {
+  const std::int32_t* ids = tile.face_ids.data();
+  return TilePixels(
+      plan, tile.rect,
+      [&](std::size_t i) HWY_ATTR {
+        const TileIntTag di;
+        return hn::RebindMask(TileTag(), hn::Lt(hn::LoadU(di, ids + i), hn::Zero(di)));
+      },
+      [&](std::size_t i) { return ids[i] < 0; });
 }
 
 // Bit x: some row has column x. Bit y: row y has a pixel.
@@ -112,7 +149,8 @@ HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const TileRect& rect, SoftB
   }
 }
 
-// The blocks of a tile, and the box around all pixels to compute. `bits_of` says which.
+// The blocks of a tile, and the box around all pixels to compute. bits_of(block, its number) says
+// which.
 template <class Bits>
 HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, const Bits& bits_of,
                                SoftBlock* blocks) {
@@ -123,7 +161,7 @@ HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, c
     block.y0 = rect.y0 + static_cast<int>(b / 2 * kBlockSize);
     block.width = std::clamp(rect.x1 - block.x0, 0, static_cast<int>(kBlockSize));
     block.height = std::clamp(rect.y1 - block.y0, 0, static_cast<int>(kBlockSize));
-    block.bits = block.width == 0 ? 0 : bits_of(block);
+    block.bits = block.width == 0 ? 0 : bits_of(block, b);
     block.live = 0, block.clear = true;
     if (block.bits == 0) continue;
     const TileRect own = BoxOf(block);

@@ -167,11 +167,6 @@ HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArra
   for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
 }
 
-HWY_INLINE SoftMask MaskOf(SoftTag d, std::uint32_t bits) {
-  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits)};  // as many are read
-  return hn::LoadMaskBits(d, bytes);
-}
-
 // Vectors of faces of which one is near: their first faces, and which lanes are near.
 struct NearVectors {
   std::size_t count = 0;

@@ -168,22 +168,32 @@ HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float
 HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* image) {
   const SoftTag d;
   const auto size = static_cast<std::size_t>(block.width);
-  alignas(64) float alpha[kBlockSize];
-  if (block.bits == 0) {  // most blocks that have not seen a face are all face, or all background
-    std::fill_n(alpha, kBlockSize, 1.0f);
-    ForRows(plan, block,
-            [&](std::size_t to, std::size_t) HWY_ATTR { CopyRow(alpha, size, image + to); });
-    return;
-  }
   ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
-    const std::uint64_t row = block.bits >> from;
+    alignas(64) float alpha[kBlockSize];
     for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      const std::uint8_t bits[8] = {static_cast<std::uint8_t>(row >> x)};
-      const SoftMask background = hn::LoadMaskBits(d, bits);
+      const SoftMask background = MaskOf(d, static_cast<std::uint32_t>(block.bits >> from >> x));
       hn::Store(hn::IfThenZeroElse(background, hn::Set(d, 1.0f)), d, alpha + x);
     }
     CopyRow(alpha, size, image + to);
   });
+}
+
+// The same for a tile.
+HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const TileRect& rect,
+                           const TilePixels& background, float* image) {
+  const TileTag d;
+  const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
+  for (int y = rect.y0; y < rect.y1; ++y) {
+    const std::uint32_t row = background.row(static_cast<std::size_t>(y - rect.y0));
+    float* to = image + PixelIndex(plan, rect.x0, y);
+    if (width < static_cast<std::size_t>(kTileSize)) {
+      for (std::size_t x = 0; x < width; ++x) to[x] = static_cast<float>(~row >> x & 1);
+      continue;
+    }
+    for (std::size_t x = 0; x < width; x += hn::Lanes(d)) {
+      hn::StoreU(hn::IfThenZeroElse(MaskOf(d, row >> x), hn::Set(d, 1.0f)), d, to + x);
+    }
+  }
 }
 
 // The transmittance of background pixels: see SoftBlock.
@@ -255,17 +265,20 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
                           const SoftMaskRegion& tile, const SoftMaskImages& images,
                           SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
-  const SoftBox box = SetUpBlocks(
-      plan, tile.rect,
-      [&](const SoftBlock& b) HWY_ATTR { return BackgroundOf(plan, b, tile.face_ids.data()); },
-      blocks);
-  SoftNodes nodes;
-  SoftReach reach{};
-  if (AnyLive(blocks)) nodes = FindSoftNodes(tree, plan, box, scratch);
-  if (nodes.count > 0) {
-    reach = ReachOf(plan, nodes.faces);
-    FindAlpha(tree, plan, box, nodes, reach, scratch);
+  const TilePixels background = BackgroundOf(plan, tile);
+  if (background.none()) {
+    WriteClear(plan, tile.rect, background, images.alpha.data());
+    return 0;
   }
+  const SoftBox box = SetUpBlocks(
+      plan, tile.rect, [&](const SoftBlock&, std::size_t b) { return background.of(b); }, blocks);
+  const SoftNodes nodes = FindSoftNodes(tree, plan, box, scratch);
+  if (nodes.count == 0) {
+    WriteClear(plan, tile.rect, background, images.alpha.data());
+    return std::min(nodes.dropped, 1.0);
+  }
+  const SoftReach reach = ReachOf(plan, nodes.faces);
+  FindAlpha(tree, plan, box, nodes, reach, scratch);
   double spent = 0;
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
