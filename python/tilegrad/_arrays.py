@@ -204,12 +204,23 @@ def as_pixels(function: str, argument: str, value: Any) -> int:
     return number
 
 
+def _count_masked(value: Any, depth: int = 0) -> int:
+    """How many numbers of an array, or of arrays in nested sequences, are masked."""
+    if isinstance(value, np.ma.MaskedArray):
+        return int(np.ma.count_masked(value)) if np.ma.is_masked(value) else 0
+    if not isinstance(value, (list, tuple)) or depth > 64:  # more than an array can have dimensions
+        return 0
+    nested = (list, tuple, np.ma.MaskedArray)
+    return sum(_count_masked(part, depth + 1) for part in value if isinstance(part, nested))
+
+
 def refuse_masked(function: str, argument: str, value: Any) -> None:
     """TypeError if numbers of `value` are masked: NumPy would take what is behind the mask."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        count = np.ma.count_masked(value)
-        raise TypeError(f"{function}: {argument} is a masked array, and {count} of its numbers are "
-                        f"masked; put numbers there first, by filled()")
+    count = _count_masked(value)
+    if count:
+        what = "is a masked array" if isinstance(value, np.ndarray) else "holds masked arrays"
+        raise TypeError(f"{function}: {argument} {what}, and {count} of its numbers are masked; "
+                        f"put numbers there first, by filled()")
 
 
 def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
