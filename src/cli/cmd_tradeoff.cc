@@ -2,6 +2,8 @@
 // tilegrad tradeoff: what accuracy costs, measured.
 #include <fmt/core.h>
 
+#include <filesystem>
+
 #include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -33,6 +35,9 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   RemoveTemporaries(folder, names);  // of killed calls
   fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
              folder.string(), training.empty() ? "" : ", training.csv");
+  if (training.empty() && std::filesystem::exists(folder / "training.csv")) {
+    fmt::print("training.csv there is of an earlier call\n");
+  }
   return {};
 }
 
@@ -45,10 +50,10 @@ Result<std::vector<StudyScene>> ChooseScenes(const TradeoffOptions& options) {
 
 Status RunTradeoff(const TradeoffOptions& options) {
   TILEGRAD_ASSIGN(const std::vector<StudyScene> scenes, ChooseScenes(options));
-  const TrainingStudyJob study{options.data, options.config, options.out, options.training_errors,
-                               options.steps};
-  if (!options.data.empty()) TILEGRAD_TRY(CheckTrainingStudy(study));
   ProgressLine line;
+  const TrainingStudyJob study{options.data,  options.config, options.out, options.training_errors,
+                               options.steps, line.Warnings()};
+  if (!options.data.empty()) TILEGRAD_TRY(CheckTrainingStudy(study));
   std::vector<StudyResult> results;
   for (const StudyScene& scene : scenes) {
     for (const double delta : options.deltas) {

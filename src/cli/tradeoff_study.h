@@ -48,6 +48,7 @@ struct TrainingStudyJob {
   Path data, config, out;  // a run for each error is made below `out`, or continued
   std::vector<double> errors;
   int steps = 0;
+  WarningSink warn = nullptr;  // as of train::TrainJob
 };
 // Whether dataset and configuration can be read: measuring, which comes first, takes minutes.
 Status CheckTrainingStudy(const TrainingStudyJob& job);

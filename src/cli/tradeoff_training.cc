@@ -30,6 +30,7 @@ Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, con
   job.data = study.data;
   job.run = study.out / fmt::format("training_{:g}", error);
   job.existing = train::ExistingRun::kContinue;
+  job.warn = study.warn;
   TILEGRAD_ASSIGN(const train::TrainOutcome outcome, train::Train(job, workers, progress, stop));
   TILEGRAD_ASSIGN(const train::Evaluation evaluation,
                   EvaluateRun(job.run, study.data, workers, progress, stop));

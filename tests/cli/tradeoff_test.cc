@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <sstream>
 
 #include "support/run_program.h"
@@ -82,6 +83,41 @@ TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
     EXPECT_GT(std::stod(rows[i][3]), 0);
   }
   EXPECT_NE(Out("tradeoff.md").find("### Training"), std::string::npos);
+  // Without trainings, the table of these is told from what is new.
+  const Outcome again = Run((folder_ / "tent.obj").string() +
+                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1");
+  ASSERT_EQ(again.exit_code, 0) << again.output;
+  EXPECT_NE(again.output.find("training.csv there is of an earlier call"), std::string::npos);
+}
+
+// They pass over a broken checkpoint aloud, as `tilegrad train` does, and go on from the one
+// before.
+TEST_F(TradeoffCommand, TrainingsWarnOfBrokenCheckpoints) {
+  Write("tent.obj", "v -1 0 0\nv 1 0 0\nv 0 1 1\nv 0 -1 1\nf 1 2 3\nf 2 1 4\n");
+  auto config = ReadText(TILEGRAD_SOURCE_DIR "/configs/quick.toml");
+  ASSERT_TRUE(config.ok());
+  const std::string every = "checkpoint_every = ";
+  ASSERT_NE(config->find(every), std::string::npos);
+  Write("often.toml", config->replace(config->find(every), every.size() + 3, every + "1"));
+  const std::string data = (folder_ / "data").string();
+  const Outcome made =
+      RunProgram("dataset --source procedural --per-class 2 --views 3 --size 32 --out " + data);
+  ASSERT_EQ(made.exit_code, 0) << made.output;
+  const std::string study = (folder_ / "tent.obj").string() +
+                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --training " +
+                            data + " --training-errors 1e-2 --steps 2 --config " +
+                            (folder_ / "often.toml").string();
+  const Outcome first = Run(study);
+  ASSERT_EQ(first.exit_code, 0) << first.output;
+  const std::string scores = Out("training.csv");
+  std::filesystem::resize_file(folder_ / "out/training_0.01/checkpoints/step_00000002.safetensors",
+                               1000);
+  const Outcome again = Run(study);
+  ASSERT_EQ(again.exit_code, 0) << again.output;
+  EXPECT_NE(again.output.find("step_00000002.safetensors"), std::string::npos) << again.output;
+  // But for the seconds, the same.
+  const auto before = Cells(scores), after = Cells(Out("training.csv"));
+  for (const std::size_t column : {0u, 1u, 3u, 4u}) EXPECT_EQ(before[1][column], after[1][column]);
 }
 
 TEST_F(TradeoffCommand, RefusesWhatItCannotMeasure) {
