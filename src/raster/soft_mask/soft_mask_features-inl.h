@@ -123,30 +123,47 @@ HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& 
   for (SoftMask& b : behind) b = hn::And(b, outside);
 }
 
+// Edges of which all pixels of a block have the first corner, or the last one, as nearest point.
+struct EdgeEnds {
+  SoftMask start[3], end[3];
+};
+
+// Faces of which the nearest point is on one edge, by edge, unless it is a corner ("Nearest
+// features").
+HWY_INLINE void FindOnlyEdges(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
+                              const EdgeEnds& at, SoftMask (&only)[3]) {
+  if (!search.looks_behind) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      only[k] = hn::And(at.start[(k + 1) % 3], at.end[(k + 2) % 3]);
+    }
+    return;
+  }
+  SoftMask behind[3], gone[3];
+  EdgesBehind(d, f, search, behind);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftMask at_start = hn::AndNot(behind[(k + 2) % 3], at.start[k]);
+    const SoftMask at_end = hn::AndNot(behind[(k + 1) % 3], at.end[k]);
+    gone[k] = hn::Or(behind[k], hn::Or(at_start, at_end));
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    only[k] = hn::AndNot(gone[k], hn::And(gone[(k + 1) % 3], gone[(k + 2) % 3]));
+  }
+}
+
 HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces& faces,
                                const FeatureSearch& search, SoftLists* lists) {
   const SoftBlock& block = search.block;
-  SoftMask start[3], end[3], behind[3];
+  EdgeEnds at;
   for (std::size_t k = 0; k < 3; ++k) {
     const SoftVec half = hn::MulAdd(hn::Abs(f.tx[k]), hn::Set(d, block.half_x),
                                     hn::Mul(hn::Abs(f.ty[k]), hn::Set(d, block.half_y)));
-    start[k] = hn::Le(half, f.first[k]);
-    end[k] = hn::Le(half, hn::Neg(f.last[k]));
-    behind[k] = hn::FirstN(d, 0);
+    at.start[k] = hn::Le(half, f.first[k]);
+    at.end[k] = hn::Le(half, hn::Neg(f.last[k]));
   }
-  if (search.looks_behind) EdgesBehind(d, f, search, behind);
-  // Edges of which the nearest point is a corner that another edge has too, or that are behind.
-  SoftMask gone[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    const SoftMask at_start = hn::AndNot(behind[(k + 2) % 3], start[k]);
-    const SoftMask at_end = hn::AndNot(behind[(k + 1) % 3], end[k]);
-    gone[k] = hn::Or(behind[k], hn::Or(at_start, at_end));
-  }
-  const SoftMask corner[3] = {hn::And(start[0], end[2]), hn::And(start[1], end[0]),
-                              hn::And(start[2], end[1])};
-  const SoftMask edge[3] = {hn::AndNot(gone[0], hn::And(gone[1], gone[2])),
-                            hn::AndNot(gone[1], hn::And(gone[2], gone[0])),
-                            hn::AndNot(gone[2], hn::And(gone[0], gone[1]))};
+  const SoftMask corner[3] = {hn::And(at.start[0], at.end[2]), hn::And(at.start[1], at.end[0]),
+                              hn::And(at.start[2], at.end[1])};
+  SoftMask edge[3];
+  FindOnlyEdges(d, f, search, at, edge);
   const SoftMask vertex = hn::And(faces.far, hn::Or(hn::Or(corner[0], corner[1]), corner[2]));
   const SoftMask segment =
       hn::AndNot(vertex, hn::And(faces.far, hn::Or(hn::Or(edge[0], edge[1]), edge[2])));
