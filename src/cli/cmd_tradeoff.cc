@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <system_error>
 
 #include "base/temporary_file.h"
 #include "cli/command.h"
@@ -35,7 +36,8 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   RemoveTemporaries(folder, names);  // of killed calls
   fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
              folder.string(), training.empty() ? "" : ", training.csv");
-  if (training.empty() && std::filesystem::exists(folder / "training.csv")) {
+  std::error_code error;
+  if (training.empty() && std::filesystem::exists(folder / "training.csv", error)) {
     fmt::print("training.csv there is of an earlier call\n");
   }
   return {};

@@ -228,12 +228,6 @@ HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, D
   return out;
 }
 
-HWY_INLINE std::uint32_t MaskBits(FaceIntMask mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(FaceIntTag(), mask, bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
-
 // What the shapes of a vector of faces say.
 struct ShapeLanes {
   SnappedLanes corners;
@@ -259,9 +253,10 @@ HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& 
                                       bool cull_back, std::size_t f, std::size_t count,
                                       std::uint8_t* reject) {
   const FaceIntTag di;
-  const std::uint32_t small = MaskBits(shapes.small);
-  const std::uint32_t flat = MaskBits(hn::Eq(shapes.area, hn::Zero(di)));
-  const std::uint32_t back = cull_back ? MaskBits(hn::Gt(shapes.area, hn::Zero(di))) : 0;
+  const std::uint32_t small = BitsOf(FaceIntTag(), shapes.small);
+  const std::uint32_t flat = BitsOf(FaceIntTag(), hn::Eq(shapes.area, hn::Zero(di)));
+  const std::uint32_t back =
+      cull_back ? BitsOf(FaceIntTag(), hn::Gt(shapes.area, hn::Zero(di))) : 0;
   // Mostly there is nothing to say about any of them.
   const std::uint32_t all = static_cast<std::uint32_t>((std::uint64_t{1} << count) - 1);
   std::uint8_t before = 0;
@@ -326,18 +321,18 @@ HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& cor
   const PixelLanes columns = PixelsOf(shapes->x, mesh.width),
                    rows = PixelsOf(shapes->y, mesh.height);
   const auto covers = hn::And(hn::Lt(columns.begin, columns.end), hn::Lt(rows.begin, rows.end));
-  std::uint32_t keep = drawn & MaskBits(covers);
+  std::uint32_t keep = drawn & BitsOf(FaceIntTag(), covers);
   if (keep == 0) return 0;
   FaceWords words;
   WindClockwise(shapes->area, &shapes->corners);
   SetEdges(shapes->corners, columns.begin, rows.begin, &words);
   const auto stamped = FitsStamp(*shapes, columns, rows);
   words.word[1] = hn::IfThenElseZero(shapes->small, hn::Set(di, DrawnFace::kByEdges));
-  const std::uint32_t stamps = MaskBits(stamped);
+  const std::uint32_t stamps = BitsOf(FaceIntTag(), stamped);
   if ((keep & stamps) != 0) {
     const auto covered = CoveredOf(words);
     words.word[1] = hn::IfThenElse(stamped, covered, words.word[1]);
-    keep &= ~(stamps & MaskBits(hn::Eq(covered, hn::Zero(di))));
+    keep &= ~(stamps & BitsOf(FaceIntTag(), hn::Eq(covered, hn::Zero(di))));
     if (keep == 0) return 0;
   }
   words.word[0] = simd::CountFrom(di, static_cast<std::int32_t>(f));
@@ -349,7 +344,7 @@ HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& cor
     StoreRecords<kPiecesWithoutEdges>(words, keep, to.face);
   } else {
     DrawnFace* const end = StoreRecords<kPieces>(words, keep, to.face);
-    if ((keep & ~MaskBits(shapes->small)) != 0) SetWideDepths(mesh, to.face, end);
+    if ((keep & ~BitsOf(FaceIntTag(), shapes->small)) != 0) SetWideDepths(mesh, to.face, end);
   }
   return static_cast<std::size_t>(std::popcount(keep));
 }

@@ -27,6 +27,22 @@ using FaceVec = hn::Vec<FaceTag>;
 using FaceInt = hn::Vec<FaceIntTag>;
 using FaceIntMask = hn::Mask<FaceIntTag>;
 
+// Bit i: lane i, of up to 16.
+template <class D>
+HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  if constexpr (hn::MaxLanes(D()) <= 8) return bytes[0];
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+// The other way.
+template <class D>
+HWY_INLINE hn::Mask<D> MaskOf(D d, std::uint32_t bits) {
+  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
+                                 static_cast<std::uint8_t>(bits >> 8)};  // all of them are read
+  return hn::LoadMaskBits(d, bytes);
+}
+
 // The first `count` lanes; the first of them again where there are more.
 HWY_INLINE FaceInt LoadSome(const std::int32_t* from, std::size_t count) {
   const FaceIntTag di;

@@ -39,9 +39,7 @@ HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32
   const auto here = hn::LoadU(di, faces);
   auto known = hn::Or(hn::Lt(here, hn::Zero(di)), hn::Eq(here, hn::LoadU(di, faces - 1)));
   if (above != nullptr) known = hn::Or(known, hn::Eq(here, hn::LoadU(di, above)));
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(di, hn::Not(known), bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+  return BitsOf(di, hn::Not(known));
 }
 
 HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {

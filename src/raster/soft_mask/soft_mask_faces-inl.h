@@ -54,7 +54,8 @@ HWY_INLINE void AppendNode(SoftTag d, const SoftTree& tree, std::size_t node, co
   }
 }
 
-// The sine of the turn from edge 0 to edge 1, of which rounding makes less than 2^-20.
+// The sine of the turn from edge 0 to edge 1, 0 where it is within its rounding, at most 14 u of 16
+// ("Nearest features"), or where one of them is a point.
 HWY_INLINE SoftVec TurnOf(SoftTag d, const SoftVec (&tx)[3], const SoftVec (&ty)[3],
                           const SoftVec (&inverse)[3]) {
   const SoftVec sine = hn::MulSub(tx[0], ty[1], hn::Mul(ty[0], tx[1]));

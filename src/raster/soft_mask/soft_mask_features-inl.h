@@ -92,11 +92,12 @@ struct FeatureSearch {
   std::uint64_t pixels;
   const SoftReach& reach;
   bool split;
-  // Whether edges behind a face are looked for: where a block is larger than what faces reach, they
-  // lie all around its pixels. Beyond the rounding of a distance to an edge's line.
-  bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
-  float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
-                               kLongEdge * (block.box.unit_x + block.box.unit_y));
+  // What follows from these, once for all faces ("Nearest features"). Whether edges behind are
+  // looked for: where a block is larger than faces reach, faces lie all around its pixels.
+  const bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
+  // More than the rounding of distances to lines of edges: 32 u of the largest they are made of.
+  const float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
+                                     kLongEdge * (block.box.unit_x + block.box.unit_y));
 };
 
 // Some faces: all, and those that are not near ones; where they are in the chunk.

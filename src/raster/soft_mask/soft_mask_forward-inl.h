@@ -164,21 +164,7 @@ HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float
   }
 }
 
-// Before any face: 0 for the pixels to compute, else 1.
-HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const SoftBlock& block, float* image) {
-  const SoftTag d;
-  const auto size = static_cast<std::size_t>(block.width);
-  ForRows(plan, block, [&](std::size_t to, std::size_t from) HWY_ATTR {
-    alignas(64) float alpha[kBlockSize];
-    for (std::size_t x = 0; x < kBlockSize; x += hn::Lanes(d)) {
-      const SoftMask background = MaskOf(d, static_cast<std::uint32_t>(block.bits >> from >> x));
-      hn::Store(hn::IfThenZeroElse(background, hn::Set(d, 1.0f)), d, alpha + x);
-    }
-    CopyRow(alpha, size, image + to);
-  });
-}
-
-// The same for a tile.
+// Alpha of a tile before any face: 0 for the background, else 1.
 HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const TileRect& rect,
                            const TilePixels& background, float* image) {
   const TileTag d;
@@ -266,29 +252,21 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
                           SoftMaskScratch* scratch) {
   SoftBlock* blocks = scratch->blocks;
   const TilePixels background = BackgroundOf(plan, tile);
-  if (background.none()) {
-    WriteClear(plan, tile.rect, background, images.alpha.data());
-    return 0;
-  }
+  WriteClear(plan, tile.rect, background, images.alpha.data());
+  if (background.none()) return 0;
   const SoftBox box = SetUpBlocks(
       plan, tile.rect, [&](const SoftBlock&, std::size_t b) { return background.of(b); }, blocks);
   const SoftNodes nodes = FindSoftNodes(tree, plan, box, scratch);
-  if (nodes.count == 0) {
-    WriteClear(plan, tile.rect, background, images.alpha.data());
-    return std::min(nodes.dropped, 1.0);
-  }
+  if (nodes.count == 0) return std::min(nodes.dropped, 1.0);
   const SoftReach reach = ReachOf(plan, nodes.faces);
   FindAlpha(tree, plan, box, nodes, reach, scratch);
   double spent = 0;
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     if (blocks[b].bits != 0) spent = std::max(spent, SpentBy(blocks[b], nodes, reach.share));
-    if (!blocks[b].clear) {
-      WriteAlpha(plan, blocks[b], images.alpha.data());
-      if (!images.transmittance.empty()) {
-        WriteTransmittance(plan, blocks[b], images.transmittance.data());
-      }
-    } else if (blocks[b].width > 0) {
-      WriteClear(plan, blocks[b], images.alpha.data());
+    if (blocks[b].clear) continue;
+    WriteAlpha(plan, blocks[b], images.alpha.data());
+    if (!images.transmittance.empty()) {
+      WriteTransmittance(plan, blocks[b], images.transmittance.data());
     }
   }
   return spent;

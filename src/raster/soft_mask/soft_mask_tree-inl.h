@@ -26,24 +26,6 @@ using SoftMask = hn::Mask<SoftTag>;
 using SoftIntTag = hn::RebindToSigned<SoftTag>;
 using SoftInt = hn::Vec<SoftIntTag>;
 
-// Bit i: lane i, of up to 16.
-template <class D>
-HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, mask, bytes);
-  if constexpr (hn::MaxLanes(D()) <= 8) return bytes[0];
-  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
-
-// The other way.
-template <class D>
-HWY_INLINE hn::Mask<D> MaskOf(D d, std::uint32_t bits) {
-  // As many bytes are read.
-  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
-                                 static_cast<std::uint8_t>(bits >> 8)};
-  return hn::LoadMaskBits(d, bytes);
-}
-
 // A lower bound of the squared distance between lanes of boxes and one box, kernel units. Sides are
 // subtracted with one rounding, so it is relatively exact to 8 u, which the last factor covers.
 HWY_INLINE SoftVec BoxDistance(SoftTag d, SoftVec left, SoftVec top, SoftVec right, SoftVec bottom,
