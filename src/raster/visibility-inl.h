@@ -239,7 +239,7 @@ template <Layer kLayer>
 HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
   constexpr int kNarrow = 8;
   const TileRect box = BoxIn(rect, face);
-  if (box.x1 - box.x0 <= kNarrow) {
+  if (hn::MaxLanes(VisibilityTag()) > kNarrow && box.x1 - box.x0 <= kNarrow) {
     DrawInRows<kLayer>(HWY_CAPPED(float, kNarrow)(), face, rect, box, out);
   } else {
     DrawInRows<kLayer>(VisibilityTag(), face, rect, box, out);
