@@ -82,40 +82,39 @@ HWY_INLINE void SetUpQuads(const InterpolateInput& input, const SeenFaces& seen,
   }
 }
 
-// Four pixels of a row: where their faces' quads are, and where they lie from the faces' origins.
-struct QuadPixels {
-  std::size_t at[kQuadPixels];
-  Quad x[kQuadPixels], y[kQuadPixels];
-  hn::Mask<QuadTag> seen;
+// What pixels read of the faces seen, by slot. As a copy: compilers would take stores of vectors
+// for changes of the original.
+struct SlotArrays {
+  const std::int32_t* slot_of_face;
+  const float *origin_x, *origin_y;
+  const float *value, *dx, *dy, *least;  // quads of a group
 
-  // `faces`: of the four; (px, py): the centre of the first.
-  HWY_INLINE QuadPixels(const SeenFaces& known, const std::int32_t* faces, float px, float py) {
-    const QuadTag d;
-    const QuadIntTag di;
-    seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, faces), hn::Set(di, -1)));
-    for (int p = 0; p < kQuadPixels; ++p) {
-      const auto slot =
-          static_cast<std::size_t>(known.slot_of_face[static_cast<std::size_t>(1 + faces[p])]);
-      at[p] = 4 * slot;
-      x[p] = hn::Sub(hn::Set(d, px + static_cast<float>(p)), hn::Set(d, known.origin_x[slot]));
-      y[p] = hn::Sub(hn::Set(d, py), hn::Set(d, known.origin_y[slot]));
-    }
-  }
-
-  // The four planes of a group at the four pixels, as planes.
-  template <bool kPerspective>
-  HWY_INLINE void Evaluate(PlaneQuads* quads, int group, Quad (&out)[4]) const {
-    const QuadTag d;
-    const float *value = quads->quads(group, 0), *dx = quads->quads(group, 1);
-    const float* dy = quads->quads(group, 2);
-    for (int p = 0; p < kQuadPixels; ++p) {
-      out[p] = hn::MulAdd(hn::Load(d, dx + at[p]), x[p],
-                          hn::MulAdd(hn::Load(d, dy + at[p]), y[p], hn::Load(d, value + at[p])));
-      if (kPerspective && group == 0) out[p] = hn::Max(out[p], hn::Load(d, quads->least() + at[p]));
-    }
-    Transpose(d, out);
-  }
+  HWY_INLINE SlotArrays(InterpolateScratch* scratch, int group)
+      : slot_of_face(scratch->seen.slot_of_face.data()),
+        origin_x(scratch->seen.origin_x.data()),
+        origin_y(scratch->seen.origin_y.data()),
+        value(scratch->quads.quads(group, 0)),
+        dx(scratch->quads.quads(group, 1)),
+        dy(scratch->quads.quads(group, 2)),
+        least(scratch->quads.least()) {}
 };
+
+// The planes of a group at four pixels of a row, as planes. `faces`: of the four; (px, py): the
+// centre of the first.
+template <bool kWithQ>
+HWY_INLINE void EvaluateQuads(const SlotArrays& slots, const std::int32_t* faces, float px,
+                              float py, Quad (&out)[4]) {
+  const QuadTag d;
+  for (int p = 0; p < kQuadPixels; ++p) {
+    const auto slot = static_cast<std::size_t>(slots.slot_of_face[1 + faces[p]]), at = 4 * slot;
+    const Quad x = hn::Set(d, px + static_cast<float>(p) - slots.origin_x[slot]);
+    const Quad y = hn::Set(d, py - slots.origin_y[slot]);
+    out[p] = hn::MulAdd(hn::Load(d, slots.dx + at), x,
+                        hn::MulAdd(hn::Load(d, slots.dy + at), y, hn::Load(d, slots.value + at)));
+    if (kWithQ) out[p] = hn::Max(out[p], hn::Load(d, slots.least + at));
+  }
+  Transpose(d, out);
+}
 
 // What pixels are made of and where they go.
 struct InterpolateJob {
@@ -164,40 +163,54 @@ struct QuadRow {
   }
 };
 
-// One row of a group. inverse_q [kBinSize] of the row is set by group 0, for the others.
-template <bool kPerspective>
-HWY_INLINE void InterpolateRow(const InterpolateJob& job, int group, int i, float* inverse_q) {
+// One row of a group, of kOutputs outputs if that is not 0. inverse_q [kBinSize] of the row is set
+// by group 0, for the others.
+template <bool kPerspective, int kOutputs>
+HWY_INLINE void InterpolateRow(const InterpolateJob& job, const QuadRow& row, int group, int i,
+                               float* inverse_q) {
   const QuadTag d;
-  const QuadRow row(job, group, i);
+  const QuadIntTag di;
   const std::int32_t* const faces = job.rows.row(i);
-  constexpr int kRowsAhead = 2;  // a row takes about as long as memory does
-  if (i + kRowsAhead < job.rows.row_end) row.Prefetch(kRowsAhead);
+  const SlotArrays slots(job.scratch, group);
+  const int outputs = kOutputs == 0 ? row.outputs : kOutputs;
   const float py = static_cast<float>(i) + 0.5f;
-  for (int j = 0; j < row.count; j += kQuadPixels) {
-    if (AllBackground(faces + j)) {
-      for (int k = 0; k < row.outputs; ++k) row.Store(k, j, hn::Zero(d));
+  float px = static_cast<float>(job.rows.x0) + 0.5f;
+  for (int j = 0; j < row.count; j += kQuadPixels, px += kQuadPixels) {
+    const auto seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, faces + j), hn::Set(di, -1)));
+    if (hn::AllFalse(d, seen)) {
+      for (int k = 0; k < outputs; ++k) row.Store(k, j, hn::Zero(d));
       continue;
     }
-    const QuadPixels pixels(job.scratch->seen, faces + j,
-                            static_cast<float>(job.rows.x0 + j) + 0.5f, py);
     Quad values[4];
-    pixels.Evaluate<kPerspective>(&job.scratch->quads, group, values);
     auto scale = hn::Set(d, 1.0f);
-    if (kPerspective && group == 0) hn::Store(hn::Div(scale, values[3]), d, inverse_q + j);
+    if (kPerspective && group == 0) {
+      EvaluateQuads<true>(slots, faces + j, px, py, values);
+      hn::Store(hn::Div(scale, values[3]), d, inverse_q + j);
+    } else {
+      EvaluateQuads<false>(slots, faces + j, px, py, values);
+    }
     if (kPerspective) scale = hn::Load(d, inverse_q + j);
-    for (int k = 0; k < row.outputs; ++k) {
+    for (int k = 0; k < outputs; ++k) {
       const auto value = kPerspective ? hn::Mul(values[k], scale) : values[k];
-      row.Store(k, j, hn::IfThenElseZero(pixels.seen, value));
+      row.Store(k, j, hn::IfThenElseZero(seen, value));
     }
   }
 }
 
 template <bool kPerspective>
 HWY_INLINE void InterpolateRows(const InterpolateJob& job) {
+  constexpr int kRowsAhead = 2;  // a row takes about as long as memory does
+  constexpr int kColors = 3;     // outputs that most images have
   for (int i = job.rows.row_begin; i < job.rows.row_end; ++i) {
     HWY_ALIGN float inverse_q[kBinSize];
     for (int g = 0; g < job.scratch->quads.groups(); ++g) {
-      InterpolateRow<kPerspective>(job, g, i, inverse_q);
+      const QuadRow row(job, g, i);
+      if (i + kRowsAhead < job.rows.row_end) row.Prefetch(kRowsAhead);
+      if (row.outputs == kColors) {
+        InterpolateRow<kPerspective, kColors>(job, row, g, i, inverse_q);
+      } else {
+        InterpolateRow<kPerspective, 0>(job, row, g, i, inverse_q);
+      }
     }
   }
 }
