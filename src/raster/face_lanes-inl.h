@@ -9,8 +9,10 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <type_traits>
 
 #include "raster/screen_mesh.h"
@@ -33,6 +35,11 @@ HWY_INLINE std::uint32_t BitsOf(D d, hn::Mask<D> mask) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(d, mask, bytes);
   if constexpr (hn::MaxLanes(D()) <= 8) return bytes[0];
+  if constexpr (std::endian::native == std::endian::little) {
+    std::uint16_t both;
+    std::memcpy(&both, bytes, sizeof(both));  // compilers see one number
+    return both;
+  }
   return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
 }
 // The other way.

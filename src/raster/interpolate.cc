@@ -30,11 +30,16 @@ void Interpolate(const InterpolateInput& input, const FaceRows& rows, const Inte
   scratch->quads.Reserve(InterpolateOutputs(input), SeenFaces::MostSlots(faces, rows.pixels()));
   NumberFaces(rows, faces, &scratch->seen);
   if (scratch->seen.faces() == 0) {
-    HWY_DYNAMIC_DISPATCH(ClearPixels)(input, rows, out);
+    InterpolateBackground(input, rows, out);
     return;
   }
   HWY_DYNAMIC_DISPATCH(InterpolateFaces)(input, rows, out, scratch);
   ForgetFaces(&scratch->seen);
+}
+
+void InterpolateBackground(const InterpolateInput& input, const FaceRows& rows,
+                           const InterpolateOutput& out) {
+  HWY_DYNAMIC_DISPATCH(ClearPixels)(input, rows, out);
 }
 
 }  // namespace tilegrad::raster

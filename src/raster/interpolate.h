@@ -84,5 +84,8 @@ struct InterpolateOutput {
 // Writes pixels of `rows`, which are kBinSize wide; 0 at background pixels.
 void Interpolate(const InterpolateInput& input, const FaceRows& rows, const InterpolateOutput& out,
                  InterpolateScratch* scratch);
+// The same where all pixels are background; of `rows`, `faces` is not read.
+void InterpolateBackground(const InterpolateInput& input, const FaceRows& rows,
+                           const InterpolateOutput& out);
 
 }  // namespace tilegrad::raster

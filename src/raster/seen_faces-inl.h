@@ -37,9 +37,11 @@ HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen
 HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32_t* above) {
   const FaceIntTag di;
   const auto here = hn::LoadU(di, faces);
-  auto known = hn::Or(hn::Lt(here, hn::Zero(di)), hn::Eq(here, hn::LoadU(di, faces - 1)));
-  if (above != nullptr) known = hn::Or(known, hn::Eq(here, hn::LoadU(di, above)));
-  return BitsOf(di, hn::Not(known));
+  const auto is_not = [&](const std::int32_t* other)
+                          HWY_ATTR { return hn::Ne(here, hn::LoadU(di, other)); };
+  auto fresh = hn::And(hn::Gt(here, hn::Set(di, -1)), is_not(faces - 1));
+  if (above != nullptr) fresh = hn::And(fresh, is_not(above));
+  return BitsOf(di, fresh);
 }
 
 HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {

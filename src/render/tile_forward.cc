@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/prefetch.h"
 #include "base/stage_clock.h"
 #include "raster/fragments.h"
 #include "render/frame_layout.h"
@@ -27,9 +28,12 @@ void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
 void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
                   const std::int32_t* faces, std::int32_t* ids) {
   if (!mesh.was_clipped()) {
+    constexpr int kRowsAhead = 4;
+    const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
     for (int i = rect.y0; i < rect.y1; ++i, faces += raster::kBinSize) {
-      std::copy(faces, faces + rect.x1 - rect.x0,
-                ids + static_cast<std::ptrdiff_t>(i) * mesh.width + rect.x0);
+      std::int32_t* to = ids + static_cast<std::ptrdiff_t>(i) * mesh.width + rect.x0;
+      if (i + kRowsAhead < rect.y1) PrefetchNumbers(to + kRowsAhead * mesh.width, width);
+      std::copy_n(faces, width, to);
     }
     return;
   }
@@ -37,6 +41,16 @@ void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
     const std::int32_t face = faces[from];
     ids[to] = face >= 0 ? mesh.source_face[static_cast<std::size_t>(face)] : face;
   });
+}
+
+// Where no face is drawn.
+void WriteBackground(const raster::TileRect& rect, int width, std::int32_t* ids, float* depth) {
+  for (int i = rect.y0; i < rect.y1; ++i) {
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i) * width;
+    std::fill(ids + row + rect.x0, ids + row + rect.x1, raster::kNoFace);
+    if (depth == nullptr) continue;
+    std::fill(depth + row + rect.x0, depth + row + rect.x1, std::numeric_limits<float>::infinity());
+  }
 }
 
 void WriteDepth(const raster::TileRect& rect, int width, const float* inverse, float* depth) {
@@ -73,6 +87,27 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
   return all != raster::kNoFace;
 }
 
+// Face ids and depth of a bin, to `worker` and the frame. False if no face is listed: then only the
+// frame's are written.
+bool DrawBin(const BinInput& input, const TileTask& task, const ImageOfFrame& part,
+             WorkerScratch* worker, Frame* frame) {
+  const raster::TileRect& rect = task.rect;
+  const ImageScratch& image = input.image;
+  const int width = input.options.width;
+  std::int32_t* const ids = part.plane(frame->face_ids, 1);
+  float* const depth = part.plane(frame->depth, 1);
+  ++worker->stats.drawn;
+  const std::span<const std::int32_t> listed = image.drawn[task.tile];
+  if (listed.empty()) {
+    WriteBackground(rect, width, ids, depth);
+    return false;
+  }
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, listed}, rect, &worker->bin);
+  WriteFaceIds(image.mesh, rect, worker->bin.face, ids);
+  if (depth != nullptr) WriteDepth(rect, width, worker->bin.inverse_depth, depth);
+  return true;
+}
+
 // Where a bin's attributes go: into the frame, or to the stage.
 raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask& task,
                                           const ImageOfFrame& part, WorkerScratch* worker,
@@ -89,7 +124,7 @@ raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask&
   return {attributes, static_cast<std::ptrdiff_t>(part.pixels), row};
 }
 
-void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFrame& part,
+void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFrame& part, bool drawn,
                     WorkerScratch* worker, Frame* frame) {
   const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
   const raster::TileRect& rect = task.rect;
@@ -99,12 +134,17 @@ void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFram
                                  barycentrics != nullptr};
   if (target.data == nullptr) input.attributes.channels = 0;
   ++worker->stats.interpolated;
-  raster::Interpolate(input, {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
-                      {target,
-                       {barycentrics == nullptr ? nullptr : barycentrics + rect.y0 * row + rect.x0,
-                        static_cast<std::ptrdiff_t>(part.pixels), row},
-                       rect.x1 - rect.x0},
-                      &worker->interpolate);
+  const raster::FaceRows rows{worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1};
+  const raster::InterpolateOutput out{
+      target,
+      {barycentrics == nullptr ? nullptr : barycentrics + rect.y0 * row + rect.x0,
+       static_cast<std::ptrdiff_t>(part.pixels), row},
+      rect.x1 - rect.x0};
+  if (!drawn) {
+    raster::InterpolateBackground(input, rows, out);
+    return;
+  }
+  raster::Interpolate(input, rows, out, &worker->interpolate);
   if (barycentrics != nullptr && bin.image.mesh.was_clipped()) {
     MixCutWeights(bin.scene, bin.image.mesh, rect, worker->bin.face, barycentrics,
                   barycentrics + part.pixels);
@@ -141,26 +181,19 @@ double SoftAlpha(const ImageScratch& image, const TileTask& task, const ImageOfF
 }  // namespace
 
 double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame) {
-  const raster::TileRect& rect = task.rect;
   const ImageScratch& image = input.image;
   RenderTimes* const times = &worker->times;
   StageClock clock;
-  ++worker->stats.drawn;
-  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.tile]}, rect,
-                            &worker->bin);
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
-  WriteFaceIds(image.mesh, rect, worker->bin.face, part.plane(frame->face_ids, 1));
-  if (float* depth = part.plane(frame->depth, 1)) {
-    WriteDepth(rect, input.options.width, worker->bin.inverse_depth, depth);
-  }
+  const bool drawn = DrawBin(input, task, part, worker, frame);
   clock.Lap(&times->visibility);
-  const auto pixels = static_cast<std::size_t>(raster::kBinSize * (rect.y1 - rect.y0));
-  const bool to_stage = input.stage != nullptr && AnyFace(worker->bin.face, pixels);
+  const auto pixels = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
+  const bool to_stage = input.stage != nullptr && drawn && AnyFace(worker->bin.face, pixels);
   const bool to_frame = input.stage == nullptr && !frame->attributes.empty();
   if (to_stage || to_frame || !frame->barycentrics.empty()) {
-    InterpolateBin(input, task, part, worker, frame);
+    InterpolateBin(input, task, part, drawn, worker, frame);
   }
   clock.Lap(&times->interpolate);
   if (input.stage != nullptr) RunStage(input, task, to_stage, worker);

@@ -222,6 +222,15 @@ HWY_INLINE void WriteTransmittance(const SoftMaskPlan& plan, const SoftBlock& bl
   });
 }
 
+HWY_INLINE void PrefetchTransmittance(const SoftMaskPlan& plan, const SoftBlock* blocks,
+                                      std::span<const float> transmittance) {
+  for (std::size_t b = 0; b < kTileBlocks; ++b) {
+    if (blocks[b].bits == 0) continue;
+    PrefetchNumbers(transmittance.data() + TransmittanceIndex(plan, blocks[b]),
+                    static_cast<std::size_t>(blocks[b].width * blocks[b].height));
+  }
+}
+
 // Alpha of the blocks of a tile over the faces of `nodes`.
 HWY_INLINE void FindAlpha(const SoftTree& tree, const SoftMaskPlan& plan, const SoftBox& box,
                           const SoftNodes& nodes, const SoftReach& reach,
@@ -259,6 +268,7 @@ inline double TileForward(const SoftTree& tree, const SoftMaskPlan& plan,
   const SoftNodes nodes = FindSoftNodes(tree, plan, box, scratch);
   if (nodes.count == 0) return std::min(nodes.dropped, 1.0);
   const SoftReach reach = ReachOf(plan, nodes.faces);
+  if (!images.transmittance.empty()) PrefetchTransmittance(plan, blocks, images.transmittance);
   FindAlpha(tree, plan, box, nodes, reach, scratch);
   double spent = 0;
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
