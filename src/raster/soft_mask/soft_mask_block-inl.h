@@ -68,9 +68,9 @@ class TilePixels {
   HWY_INLINE TilePixels(const SoftMaskPlan& plan, const TileRect& rect, const Chosen& chosen,
                         const One& one) {
     const TileTag d;
-    for (int y = 0; y < rect.y1 - rect.y0; ++y) {
-      const std::size_t from = PixelIndex(plan, rect.x0, rect.y0 + y);
-      const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
+    const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
+    const auto row_at = [&](int y) HWY_ATTR {
+      const std::size_t from = PixelIndex(plan, rect.x0, y);
       std::uint64_t row = 0;
       if (width == static_cast<std::size_t>(kTileSize)) {
         for (std::size_t x = 0; x < width; x += hn::Lanes(d)) {
@@ -79,7 +79,17 @@ class TilePixels {
       } else {
         for (std::size_t x = 0; x < width; ++x) row |= std::uint64_t{one(from + x)} << x;
       }
-      AddRow(static_cast<std::size_t>(y), row);
+      return row;
+    };
+    for (std::size_t b = 0; b < kTileBlocks; b += 2) {
+      std::uint64_t left = 0, right = 0;  // not in memory, as the array is
+      const int y0 = rect.y0 + static_cast<int>(b / 2 * kBlockSize);
+      const int rows = HWY_MIN(rect.y1 - y0, static_cast<int>(kBlockSize));
+      for (int y = 0; y < rows; ++y) {
+        const std::uint64_t row = row_at(y0 + y);
+        left |= (row & 0xff) << y * kBlockSize, right |= row >> kBlockSize << y * kBlockSize;
+      }
+      bits_[b] = left, bits_[b + 1] = right;
     }
   }
 
@@ -94,11 +104,6 @@ class TilePixels {
   }
 
  private:
-  HWY_INLINE void AddRow(std::size_t y, std::uint64_t row) {
-    const std::size_t b = y / kBlockSize * 2, to = y % kBlockSize * kBlockSize;
-    bits_[b] |= (row & 0xff) << to, bits_[b + 1] |= row >> kBlockSize << to;
-  }
-
   static_assert(kTileBlocks == 4);
   std::uint64_t bits_[kTileBlocks] = {};
 };
