@@ -26,9 +26,10 @@ inline constexpr std::size_t kCornersAndBoxes = SoftFaceArrays::kLeastSum;
 HWY_INLINE void AppendFaces(SoftTag d, const SoftVec (&v)[kCornersAndBoxes], SoftInt face,
                             SoftMask keep, SoftFaceArrays* to) {
   const Compactor compact(d, keep);
-  for (std::size_t a = 0; a < kCornersAndBoxes; ++a) compact.Store(v[a], to->v[a] + to->count);
-  compact.Store(face, to->face + to->count);
-  to->count += compact.count();
+  const std::size_t at = to->count;  // in a register
+  for (std::size_t a = 0; a < kCornersAndBoxes; ++a) compact.Store(v[a], to->v[a] + at);
+  compact.Store(face, to->face + at);
+  to->count = at + compact.count();
 }
 
 // Appends the faces of a node that are within `z` of the box.

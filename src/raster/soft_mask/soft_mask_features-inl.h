@@ -38,9 +38,12 @@ HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
   return hn::IfThenElse(first, v[0], hn::IfThenElse(second, v[1], v[2]));
 }
 
-HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, SoftList* to) {
-  compact.Store(slot, to->slot + to->count), compact.Store(part, to->part + to->count);
-  to->count += compact.count();
+// Members are appended at `at`, which is the list's count: compilers would load that again after
+// each store of a vector.
+HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, std::size_t at,
+                           SoftList* to) {
+  compact.Store(slot, to->slot + at), compact.Store(part, to->part + at);
+  to->count = at + compact.count();
 }
 
 // 0, 1 or 2 by lanes.
@@ -54,35 +57,38 @@ HWY_INLINE void AppendEdges(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMas
                             const SoftMask (&only)[3], SoftListOf<SoftLists::kEdgeArrays>* to) {
   if (hn::AllFalse(d, keep)) return;
   const Compactor compact(d, keep);
+  const std::size_t at = to->count;
   const auto append = [&](SoftLists::Edge a, const SoftVec(&v)[3]) HWY_ATTR {
-    compact.Store(Pick(v, only[0], only[1]), to->v[a] + to->count);
+    compact.Store(Pick(v, only[0], only[1]), to->v[a] + at);
   };
   append(SoftLists::kTx, f.tx), append(SoftLists::kTy, f.ty), append(SoftLists::kSide, f.side);
   append(SoftLists::kFirst, f.first), append(SoftLists::kLast, f.last);
   append(SoftLists::kInverse, f.inverse);
-  AppendTags(slot, PartOf(only[0], only[1]), compact, to);
+  AppendTags(slot, PartOf(only[0], only[1]), compact, at, to);
 }
 
 HWY_INLINE void AppendVertices(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMask keep,
                                const SoftMask (&only)[3], SoftListOf<2>* to) {
   if (hn::AllFalse(d, keep)) return;
   const Compactor compact(d, keep);
-  compact.Store(Pick(f.x, only[0], only[1]), to->v[0] + to->count);
-  compact.Store(Pick(f.y, only[0], only[1]), to->v[1] + to->count);
-  AppendTags(slot, PartOf(only[0], only[1]), compact, to);
+  const std::size_t at = to->count;
+  compact.Store(Pick(f.x, only[0], only[1]), to->v[0] + at);
+  compact.Store(Pick(f.y, only[0], only[1]), to->v[1] + at);
+  AppendTags(slot, PartOf(only[0], only[1]), compact, at, to);
 }
 
 HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMask keep,
                                  SoftListOf<3 * SoftLists::kEdgeArrays>* to) {
   if (hn::AllFalse(d, keep)) return;
   const Compactor compact(d, keep);
+  const std::size_t at = to->count;
   for (std::size_t k = 0; k < 3; ++k) {
     const SoftVec edge[] = {f.tx[k], f.ty[k], f.side[k], f.first[k], f.last[k], f.inverse[k]};
     for (std::size_t a = 0; a < SoftLists::kEdgeArrays; ++a) {
-      compact.Store(edge[a], to->v[k * SoftLists::kEdgeArrays + a] + to->count);
+      compact.Store(edge[a], to->v[k * SoftLists::kEdgeArrays + a] + at);
     }
   }
-  AppendTags(slot, hn::Zero(SoftIntTag()), compact, to);
+  AppendTags(slot, hn::Zero(SoftIntTag()), compact, at, to);
 }
 
 // Who looks: `pixels` of a block. Faces nearer than `reach.near` go to the boundaries if `split`,
