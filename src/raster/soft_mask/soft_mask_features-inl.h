@@ -58,9 +58,8 @@ HWY_INLINE void AppendEdges(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMas
   if (hn::AllFalse(d, keep)) return;
   const Compactor compact(d, keep);
   const std::size_t at = to->count;
-  const auto append = [&](SoftLists::Edge a, const SoftVec(&v)[3]) HWY_ATTR {
-    compact.Store(Pick(v, only[0], only[1]), to->v[a] + at);
-  };
+  const auto append = [&](SoftLists::Edge a, const SoftVec(&v)[3])
+                          HWY_ATTR { compact.Store(Pick(v, only[0], only[1]), to->v[a] + at); };
   append(SoftLists::kTx, f.tx), append(SoftLists::kTy, f.ty), append(SoftLists::kSide, f.side);
   append(SoftLists::kFirst, f.first), append(SoftLists::kLast, f.last);
   append(SoftLists::kInverse, f.inverse);
