@@ -15,6 +15,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "raster/fragments.h"
 #include "raster/screen_mesh.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -112,9 +113,10 @@ HWY_INLINE void LoadVertices(const ScreenMesh& mesh, const std::int32_t* vertex,
 // Four pixels.
 using QuadIntTag = hn::RebindToSigned<QuadTag>;
 
-HWY_INLINE bool AllBackground(const std::int32_t* faces) {
+// Which of them see a face.
+HWY_INLINE hn::Mask<QuadTag> SeesFace(const std::int32_t* faces) {
   const QuadIntTag di;
-  return hn::AllTrue(di, hn::Lt(hn::LoadU(di, faces), hn::Zero(di)));
+  return hn::RebindMask(QuadTag(), hn::Gt(hn::LoadU(di, faces), hn::Set(di, kNoFace)));
 }
 
 }  // namespace HWY_NAMESPACE

@@ -168,14 +168,13 @@ template <bool kPerspective, int kOutputs>
 HWY_INLINE void InterpolateRow(const InterpolateJob& job, const QuadRow& row, int group, int i,
                                float* inverse_q) {
   const QuadTag d;
-  const QuadIntTag di;
   const std::int32_t* const faces = job.rows.row(i);
   const SlotArrays slots(job.scratch, group);
   const int outputs = kOutputs == 0 ? row.outputs : kOutputs;
   const float py = static_cast<float>(i) + 0.5f;
   float px = static_cast<float>(job.rows.x0) + 0.5f;
   for (int j = 0; j < row.count; j += kQuadPixels, px += kQuadPixels) {
-    const auto seen = hn::RebindMask(d, hn::Gt(hn::LoadU(di, faces + j), hn::Set(di, -1)));
+    const auto seen = SeesFace(faces + j);
     if (hn::AllFalse(d, seen)) {
       for (int k = 0; k < outputs; ++k) row.Store(k, j, hn::Zero(d));
       continue;

@@ -168,7 +168,7 @@ HWY_INLINE void SumRow(const InterpolateInput& input, const BackwardBand& band, 
   };
   int j = 0;
   for (; j + kQuadPixels <= band.rows.width; j += kQuadPixels) {
-    if (AllBackground(faces + j)) continue;
+    if (hn::AllFalse(d, SeesFace(faces + j))) continue;
     PixelQuad pixels{faces + j, {}, static_cast<float>(band.rows.x0 + j) + 0.5f, y};
     for (int c = 0; c < 4; ++c) {
       pixels.d_out[c] = c < channels ? hn::LoadU(d, d_row + c * band.d_out.plane + j) : hn::Zero(d);

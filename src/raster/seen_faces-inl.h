@@ -39,7 +39,7 @@ HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32
   const auto here = hn::LoadU(di, faces);
   const auto is_not = [&](const std::int32_t* other)
                           HWY_ATTR { return hn::Ne(here, hn::LoadU(di, other)); };
-  auto fresh = hn::And(hn::Gt(here, hn::Set(di, -1)), is_not(faces - 1));
+  auto fresh = hn::And(hn::Gt(here, hn::Set(di, kNoFace)), is_not(faces - 1));
   if (above != nullptr) fresh = hn::And(fresh, is_not(above));
   return BitsOf(di, fresh);
 }

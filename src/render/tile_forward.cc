@@ -28,7 +28,7 @@ void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
 void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
                   const std::int32_t* faces, std::int32_t* ids) {
   if (!mesh.was_clipped()) {
-    constexpr int kRowsAhead = 4;
+    constexpr int kRowsAhead = 4;  // copying a row is faster than memory
     const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
     for (int i = rect.y0; i < rect.y1; ++i, faces += raster::kBinSize) {
       std::int32_t* to = ids + static_cast<std::ptrdiff_t>(i) * mesh.width + rect.x0;
@@ -87,10 +87,10 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
   return all != raster::kNoFace;
 }
 
-// Face ids and depth of a bin, to `worker` and the frame. False if no face is listed: then only the
-// frame's are written.
-bool DrawBin(const BinInput& input, const TileTask& task, const ImageOfFrame& part,
-             WorkerScratch* worker, Frame* frame) {
+// Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
+// then only the frame's are written.
+bool WriteVisibility(const BinInput& input, const TileTask& task, const ImageOfFrame& part,
+                     WorkerScratch* worker, Frame* frame) {
   const raster::TileRect& rect = task.rect;
   const ImageScratch& image = input.image;
   const int width = input.options.width;
@@ -187,7 +187,7 @@ double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* wor
   const ImageOfFrame part{
       static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
       static_cast<std::size_t>(frame->channels), task.image};
-  const bool drawn = DrawBin(input, task, part, worker, frame);
+  const bool drawn = WriteVisibility(input, task, part, worker, frame);
   clock.Lap(&times->visibility);
   const auto pixels = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
   const bool to_stage = input.stage != nullptr && drawn && AnyFace(worker->bin.face, pixels);

@@ -123,10 +123,7 @@ HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
 }
 
 HWY_INLINE void PrefetchNode(const SoftTree& tree, std::size_t node) {
-  const float* corners = tree.corners.at(node, 0);
-  for (std::size_t i = 0; i < kCornerNumbers * kNodeFaces; i += kLineFloats) {
-    PrefetchLine(corners + i);
-  }
+  PrefetchNumbers(tree.corners.at(node, 0), kCornerNumbers * kNodeFaces);
 }
 
 // Which faces a tile looks at: those of `nodes` within z of the box, up to `most` at a time.

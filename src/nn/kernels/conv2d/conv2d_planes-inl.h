@@ -115,8 +115,7 @@ inline void CopyPlaneRow(const PlaneGrid& g, const PlaneRowSpan& span, const flo
 // to see them coming.
 inline void FetchRow(const PlaneGrid& g, const float* row) {
   constexpr std::size_t kChannels = 4;  // a few hundred cycles
-  const float* later = row + kChannels * g.height * g.width;
-  for (std::size_t x = 0; x < g.width; x += kLineFloats) PrefetchLine(later + x);
+  PrefetchNumbers(row + kChannels * g.height * g.width, g.width);
 }
 
 // One plane of one channel, its row 0 being source row `first_row`.

@@ -109,8 +109,7 @@ inline void PrefetchRows(const WinogradPlan& plan, std::size_t index, const floa
   const TileRow row(plan, std::min(index, plan.tile_rows() - 1));
   const std::size_t top = std::min(row.down * plan.step, s.in_height);
   const float* first = x + (row.image * s.in_channels + c) * s.in_pixels() + top * s.in_width;
-  const std::size_t count = std::min(plan.step, s.in_height - top) * s.in_width;
-  for (std::size_t i = 0; i < count; i += kLineFloats) PrefetchLine(first + i);
+  PrefetchNumbers(first, std::min(plan.step, s.in_height - top) * s.in_width);
 }
 
 // All places of channel c of the input. What a row writes beyond its tiles, the next one
