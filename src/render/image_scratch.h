@@ -47,6 +47,7 @@ struct ImageScratch {
   raster::TileLists drawn;
   raster::SoftTree soft;
   raster::SoftMaskPlan soft_plan;
+  AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, as MergeScratch's
   PreparedFrom prepared;
 };
 

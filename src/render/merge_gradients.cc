@@ -113,9 +113,20 @@ void MergeClippedAttributes(const SceneView& scene, const ImageScratch& image,
 
 }  // namespace
 
+void SumGeometry(const ImageScratch& image, const ImageGradients& gradients,
+                 AlignedVector<float>* d_vertices) {
+  d_vertices->assign(4 * image.mesh.vertices(), 0.0f);
+  for (const BandGradients& band : gradients.bands) {
+    AddBandGeometry(image.mesh, band, d_vertices->data());
+  }
+  for (const BinGradients& bin : gradients.bins) {
+    AddBinGeometry(image.mesh, bin, d_vertices->data());
+  }
+}
+
 bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                   const ImageGradients& gradients, WorkerScratch* worker,
-                   SceneGradients* d_scene) {
+                   const ImageGradients& gradients, std::span<const float> d_vertices,
+                   WorkerScratch* worker, SceneGradients* d_scene) {
   MergeScratch* const scratch = &worker->merge;
   bool finite = true;
   if (image.mesh.was_clipped() && gradients.request.attributes) {
@@ -125,15 +136,8 @@ bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const I
   }
   if (!gradients.request.geometry) return finite;
   ++worker->stats.merged;
-  scratch->d_vertices.assign(4 * image.mesh.vertices(), 0.0f);
-  for (const BandGradients& band : gradients.bands) {
-    AddBandGeometry(image.mesh, band, scratch->d_vertices.data());
-  }
-  for (const BinGradients& bin : gradients.bins) {
-    AddBinGeometry(image.mesh, bin, scratch->d_vertices.data());
-  }
-  raster::ProjectBackward(FaceSourceOf(scene, options), image.mesh,
-                          {scratch->d_vertices, scratch->d_clip_t}, &scratch->project,
+  raster::ProjectBackward(FaceSourceOf(scene, options), image.mesh, {d_vertices, scratch->d_clip_t},
+                          &scratch->project,
                           {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
   return finite && AllFinite(d_scene->positions) &&
          (!d_scene->camera || IsFiniteCamera(d_scene->d_camera));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -77,6 +78,8 @@ struct Renderer::Impl {
 
   void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
   void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
+                SceneGradients* d_scene);
   void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
                     BandGradients* out);
@@ -196,8 +199,10 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                  {&worker->bin_gradients, call.bins},
                                  call.request_of(n, image.mesh)};
   SceneGradients* d_scene = &call.d_scenes[n];
+  AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
   StageClock clock;
-  Require(MergeGeometry(scene, call.input.options, image, gradients, worker, d_scene));
+  if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
+  Require(MergeGeometry(scene, call.input.options, image, gradients, *d_vertices, worker, d_scene));
   Require(MergeAttributes(image, gradients, worker, d_scene));
   clock.Lap(&worker->times.merge);
 }
@@ -221,22 +226,40 @@ void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
   if (sound) Merge(call, n, part);
 }
 
-// Positions and attributes are two tasks, for the sake of a batch of one.
+// Three sums that can be made at once, for the sake of a batch of one: the longest first.
+void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
+                              const Workers::Part& part, SceneGradients* d_scene) {
+  ImageScratch& image = images[n];
+  const bool geometry = gradients.request.geometry;
+  part.For(3, [&](std::size_t i, std::size_t w) {
+    StageClock clock;
+    if (i == 0 && geometry && !gradients.bins.empty()) {
+      SumGeometry(image, {{}, gradients.bins, gradients.request}, &image.d_bin_vertices);
+    } else if (i == 1 && geometry) {
+      SumGeometry(image, {gradients.bands, {}, gradients.request}, &image.d_band_vertices);
+    } else if (i == 2) {
+      Require(MergeAttributes(image, gradients, &worker_scratch[w], d_scene));
+    }
+    clock.Lap(&worker_scratch[w].times.merge);
+  });
+}
+
 void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+  ImageScratch& image = images[n];
+  WorkerScratch* const worker = &worker_scratch[part.worker()];
+  SceneGradients* const d_scene = &call.d_scenes[n];
   const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
                                  std::span(bin_gradients).subspan(n * call.bins, call.bins),
-                                 call.request_of(n, images[n].mesh)};
-  part.For(2, [&](std::size_t i, std::size_t w) {
-    WorkerScratch* worker = &worker_scratch[w];
-    StageClock clock;
-    if (i == 0) {
-      Require(MergeGeometry(call.scenes[n], call.input.options, images[n], gradients, worker,
-                            &call.d_scenes[n]));
-    } else {
-      Require(MergeAttributes(images[n], gradients, worker, &call.d_scenes[n]));
-    }
-    clock.Lap(&worker->times.merge);
-  });
+                                 call.request_of(n, image.mesh)};
+  SumParts(gradients, n, part, d_scene);
+  StageClock clock;
+  if (gradients.request.geometry && !gradients.bins.empty()) {
+    std::transform(image.d_band_vertices.begin(), image.d_band_vertices.end(),
+                   image.d_bin_vertices.begin(), image.d_band_vertices.begin(), std::plus());
+  }
+  Require(MergeGeometry(call.scenes[n], call.input.options, image, gradients, image.d_band_vertices,
+                        worker, d_scene));
+  clock.Lap(&worker->times.merge);
 }
 
 Status Renderer::Impl::Backward(const BackwardCall& call) {
