@@ -6,7 +6,7 @@
 
 #include "base/rng.h"
 #include "raster/project.h"
-#include "render/frame_layout.h"
+#include "render/pipeline/frame_layout.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::bench {

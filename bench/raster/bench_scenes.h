@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "raster/culled.h"
-#include "render/renderer.h"
+#include "render/pipeline/pipeline.h"
 #include "scene/mesh.h"
 
 namespace tilegrad::bench {

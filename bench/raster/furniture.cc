@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "train/data/model_source.h"
+#include "train/data/sources/model_source.h"
 
 namespace tilegrad::bench {
 namespace {

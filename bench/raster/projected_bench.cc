@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Faces that come projected (render/projected) and lists of the nearest faces
-// (render/projected/layered_raster.h), float and double, one worker, against every face for every
+// (compat/pytorch3d/layered_raster.h), float and double, one worker, against every face for every
 // pixel in the same process. Counter: pixels a second.
 #include <benchmark/benchmark.h>
 
@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "raster/bench_scenes.h"
-#include "raster/face_visibility_ref.h"
+#include "compat/kaolin/face_visibility_ref.h"
 #include "raster/project.h"
-#include "render/frame_layout.h"
-#include "render/projected/layered_raster.h"
-#include "render/projected/projected_raster.h"
-#include "render/projected/projected_soft_mask.h"
+#include "render/pipeline/frame_layout.h"
+#include "compat/pytorch3d/layered_raster.h"
+#include "compat/kaolin/projected_raster.h"
+#include "compat/kaolin/projected_soft_mask.h"
 
 namespace tilegrad::bench {
 namespace {

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "raster/work_count.h"
-#include "render/renderer_ref.h"
+#include "render/pipeline/pipeline_ref.h"
 
 namespace tilegrad::bench {
 namespace {

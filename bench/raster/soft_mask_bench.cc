@@ -11,7 +11,7 @@
 #include "raster/project.h"
 #include "raster/soft_mask/soft_mask.h"
 #include "raster/soft_mask/soft_mask_ref.h"
-#include "render/frame_layout.h"
+#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad::bench {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "base/rng.h"
 #include "raster/bench_scenes.h"
-#include "render/shaded/shaded_renderer.h"
+#include "render/renderer.h"
 #include "start.h"
 
 namespace tilegrad::bench {

@@ -9,9 +9,9 @@
 
 #include "bindings/calls.h"
 #include "bindings/shared_workers.h"
-#include "deferred/antialias.h"
-#include "deferred/interpolate.h"
-#include "deferred/rasterize.h"
+#include "compat/nvdiffrast/antialias.h"
+#include "compat/nvdiffrast/interpolate.h"
+#include "compat/nvdiffrast/rasterize.h"
 
 namespace tilegrad::python {
 

@@ -6,7 +6,7 @@
 
 #include "bindings/calls.h"
 #include "bindings/shared_workers.h"
-#include "render/projected/layered_raster.h"
+#include "compat/pytorch3d/layered_raster.h"
 
 namespace tilegrad::python {
 

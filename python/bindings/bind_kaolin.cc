@@ -8,8 +8,8 @@
 
 #include "bindings/calls.h"
 #include "bindings/shared_workers.h"
-#include "render/projected/projected_raster.h"
-#include "render/projected/projected_soft_mask.h"
+#include "compat/kaolin/projected_raster.h"
+#include "compat/kaolin/projected_soft_mask.h"
 
 namespace tilegrad::python {
 

@@ -7,7 +7,7 @@
 #include "bindings/to_python.h"
 #include "io/glb_writer.h"
 #include "io/mesh_file.h"
-#include "render/shaded/mesh_scene.h"
+#include "render/picture/mesh_scene.h"
 
 namespace tilegrad::python {
 

@@ -7,7 +7,7 @@
 
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
-#include "train/cutout.h"
+#include "train/data/cutout.h"
 #include "train/models/predictor.h"
 
 namespace tilegrad::python {

@@ -6,8 +6,8 @@
 
 #include "bindings/calls.h"
 #include "bindings/shared_workers.h"
-#include "deferred/mip.h"
-#include "deferred/texture.h"
+#include "compat/nvdiffrast/mip.h"
+#include "compat/nvdiffrast/texture.h"
 
 namespace tilegrad::python {
 

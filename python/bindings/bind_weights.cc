@@ -8,7 +8,7 @@
 #include "bindings/npy_arrays.h"
 #include "bindings/to_python.h"
 #include "nn/serialize.h"
-#include "train/checkpoint.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::python {
 

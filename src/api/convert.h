@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "render/shaded/shaded_scene.h"
+#include "render/scene.h"
 #include "tilegrad/renderer.h"
 
 namespace tilegrad::v0 {

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <limits>
 
-#include "render/shaded/shade_validate.h"
-#include "render/validate.h"
+#include "render/shading/validate.h"
+#include "render/pipeline/validate.h"
 
 namespace tilegrad {
 namespace {

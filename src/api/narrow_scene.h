@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "render/shaded/shaded_scene.h"
+#include "render/scene.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

@@ -10,7 +10,7 @@
 
 #include "api/narrow_scene.h"
 #include "base/error.h"
-#include "render/shaded/shaded_renderer_ref.h"
+#include "render/renderer_ref.h"
 
 namespace tilegrad {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive renderer in double (render/shaded/shaded_renderer_ref.h) behind the same calls as the
+// The naive renderer in double (render/renderer_ref.h) behind the same calls as the
 // ShadedRenderer: batches, checked inputs, arrays that scenes share. Images are its units of work.
 #pragma once
 
 #include <span>
 
 #include "base/parallel.h"
-#include "render/shaded/shaded_scene.h"
+#include "render/scene.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

@@ -14,7 +14,7 @@
 #include "api/validate.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "render/shaded/shaded_renderer.h"
+#include "render/renderer.h"
 
 namespace tilegrad::v0 {
 

@@ -13,7 +13,7 @@
 #include "cli/console.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
-#include "train/data/build.h"
+#include "train/data/build/build.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -5,9 +5,9 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "train/evaluate.h"
+#include "train/eval/evaluate.h"
 #include "train/models/predictor.h"
-#include "train/trained_models.h"
+#include "train/run/trained_models.h"
 
 namespace tilegrad::cli {
 namespace {

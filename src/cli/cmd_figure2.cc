@@ -10,7 +10,7 @@
 #include "cli/console.h"
 #include "cli/file_ending.h"
 #include "cli/run_folder.h"
-#include "train/fit/figure2.h"
+#include "fit/figure2.h"
 
 namespace tilegrad::cli {
 namespace {

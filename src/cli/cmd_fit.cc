@@ -12,7 +12,7 @@
 #include "cli/console.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
-#include "train/fit/fit_run.h"
+#include "fit/run.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include "cli/unique_names.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
-#include "train/cutout.h"
+#include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/models/predictor.h"
 #include "train/pictures.h"

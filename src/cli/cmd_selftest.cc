@@ -11,9 +11,9 @@
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/run_folder.h"
-#include "cli/selftest/checks.h"
+#include "proof/selftest/checks.h"
 #include "tilegrad/version.h"
-#include "train/machine.h"
+#include "train/run/machine.h"
 
 namespace tilegrad::cli {
 namespace {

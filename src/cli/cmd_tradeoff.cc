@@ -9,7 +9,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "cli/tradeoff_study.h"
+#include "proof/tradeoff_study.h"
 
 namespace tilegrad::cli {
 namespace {

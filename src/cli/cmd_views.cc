@@ -7,7 +7,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "io/mesh_file.h"
-#include "train/fit/make_views.h"
+#include "fit/make_views.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "io/camera_file.h"
 #include "io/mesh_file.h"
-#include "render/shaded/picture.h"
+#include "render/picture/picture.h"
 
 namespace tilegrad::cli {
 

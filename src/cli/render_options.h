@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/render_job.h"
-#include "render/shaded/mesh_scene.h"
+#include "render/picture/mesh_scene.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::cli {

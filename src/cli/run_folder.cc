@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "cli/console.h"
-#include "train/checkpoint.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::cli {
 

@@ -1,253 +1,302 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive renderer: every face for every pixel, scalar, made of the reference kernels. It is the
-// truth that tests hold the Renderer to, with T = double or std::complex<double> (complex step),
-// and the yardstick of the benchmarks with T = float. One scene at a time; inputs are not checked.
+// The naive shaded renderer: renderer_ref.h with every attribute interpolated at every corner, and
+// shade_pixel_ref.h at every pixel. It is the truth that tests hold the ShadedRenderer to, with T =
+// double or std::complex<double> (complex step). One scene at a time; inputs are not checked.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
-#include "raster/fragments.h"
-#include "raster/interpolate_ref.h"
-#include "raster/near_clip.h"
-#include "raster/project_ref.h"
-#include "raster/soft_mask/soft_mask_ref.h"
-#include "raster/visibility_ref.h"
-#include "render/frame_layout.h"
-#include "render/paper_alpha.h"
-#include "render/renderer.h"
+#include "render/pipeline/pipeline_ref.h"
+#include "render/shading/direction_scale.h"
+#include "render/shading/pixel_ref.h"
+#include "render/shading/plan.h"
+#include "render/shading/scene_ref.h"
+#include "render/shading/uv_level.h"
+#include "shade/mesh_normals_ref.h"
 
 namespace tilegrad {
 
-// A scene on the screen: the mesh after near clipping, and attributes in its layout.
+// A foreground pixel: where it is, and what is interpolated there.
 template <class T>
-struct PreparedScene {
-  raster::ScreenMeshBuffersT<T> buffers;
-  raster::ScreenMeshT<T> mesh;
-  AlignedVector<T> clipped_attributes;  // empty where nothing was clipped
-  raster::AttributeViewT<const T> attributes;
-  std::vector<std::int32_t> soft_faces;  // that take part in alpha
-  raster::SoftScale<T> scale;
-  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, where SoftRule::kPaper asks for them
+struct RefPixel {
+  std::size_t face, index;  // face of the prepared mesh; pixel of the image
+  T px, py;
+  raster::FacePlane<T> plane;
+  raster::PixelWeights<T> weights;
+  std::vector<T> values;
 };
 
 template <class T>
-void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, PreparedScene<T>* out) {
-  raster::ProjectRef(FaceSourceOf(scene, options), options.width, options.height, &out->buffers);
-  out->mesh = out->buffers.View();
-  out->attributes = AttributesOf(scene);
-  out->scale = {T(2.0 / options.width), T(2.0 / options.height), T(1.0 / options.delta)};
-  for (std::size_t f = 0; f < out->mesh.faces(); ++f) {
-    if ((out->mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
-    out->soft_faces.push_back(static_cast<std::int32_t>(f));
-    if (options.soft_rule == SoftRule::kPaper) out->paper_faces.push_back(NdcFaceOf(out->mesh, f));
-  }
-  if (!out->mesh.was_clipped()) return;
-  out->clipped_attributes.resize(raster::AttributeRows(out->mesh, scene.rate) *
-                                 static_cast<std::size_t>(scene.channels));
-  raster::ClipAttributes<T>(out->mesh, scene.faces, out->attributes, out->clipped_attributes);
-  out->attributes.values = out->clipped_attributes;
+RefPixel<T> InterpolatePixelRef(const ShadedRefScene<T>& s, const RenderOptions& options, int j,
+                                int i, std::int32_t face) {
+  RefPixel<T> out;
+  out.face = static_cast<std::size_t>(face);
+  out.index = static_cast<std::size_t>(i) * static_cast<std::size_t>(options.width) +
+              static_cast<std::size_t>(j);
+  out.px = T(j) + T(0.5), out.py = T(i) + T(0.5);
+  out.plane = raster::MakeFacePlane(s.prepared.mesh, out.face);
+  out.weights = raster::PixelWeightsRef(s.prepared.mesh, out.plane, out.face, options.interpolation,
+                                        out.px, out.py);
+  out.values.resize(static_cast<std::size_t>(s.set.channels()));
+  raster::InterpolateRef<T>(s.prepared.mesh, s.prepared.attributes, out.face, out.weights,
+                            out.values);
+  return out;
 }
 
-// Alpha of a background pixel by the rule that the options ask for.
-template <class T>
-T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& options, const T& px,
-                     const T& py) {
-  if (options.soft_rule == SoftRule::kPaper) {
-    return raster::PaperAlphaRef<T>(prepared.paper_faces, NdcX(px, options.width),
-                                    NdcY(py, options.height), PaperRuleOf(options));
-  }
-  return raster::SoftAlphaRef<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale);
-}
-
-// One pixel of the smooth images, given its face of the prepared mesh. `frame` holds one image.
-template <class T>
-void ShadePixelRef(const SceneViewT<T>& scene, const PreparedScene<T>& prepared,
-                   const RenderOptions& options, int column, int row, std::int32_t face,
-                   FrameT<T>* frame) {
-  const auto width = static_cast<std::size_t>(options.width);
-  const std::size_t plane = width * static_cast<std::size_t>(options.height);
-  const std::size_t pixel =
-      static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-  const T px = T(column) + T(0.5), py = T(row) + T(0.5);
-  const bool background = face == raster::kNoFace;
-  if (!frame->alpha.empty()) {
-    frame->alpha[pixel] = background ? BackgroundAlphaRef(prepared, options, px, py) : T(1);
-  }
-  std::vector<T> values(static_cast<std::size_t>(frame->channels), T(0));
-  T source[3] = {T(0), T(0), T(0)};
-  T depth = T(std::numeric_limits<double>::infinity());
-  if (!background) {
-    const auto f = static_cast<std::size_t>(face);
-    const auto weights = raster::PixelWeightsRef(
-        prepared.mesh, raster::MakeFacePlane(prepared.mesh, f), f, options.interpolation, px, py);
-    raster::InterpolateRef<T>(prepared.mesh, prepared.attributes, f, weights, values);
-    raster::SourceWeights<T>(prepared.mesh, scene.faces, f, weights.w, source);
-    depth = T(1) / raster::MakeDepthPlane(prepared.mesh, f).At(px, py);
-  }
-  for (std::size_t c = 0; c < values.size(); ++c) frame->attributes[c * plane + pixel] = values[c];
-  if (!frame->depth.empty()) frame->depth[pixel] = depth;
-  for (std::size_t k = 0; k < 2 && !frame->barycentrics.empty(); ++k) {
-    frame->barycentrics[k * plane + pixel] = source[k + 1];
+// Calls visit(varying's first channel, its numbers) for the parts of a ShadePixel.
+template <class T, class Visit>
+void ForEachPixelPart(const VaryingSet& set, ShadePixel<T>* p, const Visit& visit) {
+  if (set[Varying::kColor]) visit(set.first(Varying::kColor), std::span<T>(p->color));
+  if (set[Varying::kUv]) visit(set.first(Varying::kUv), std::span<T>(p->uv));
+  visit(set.first(Varying::kNormal), std::span<T>(p->normal));
+  visit(set.first(Varying::kPosition), std::span<T>(p->position));
+  if (set[Varying::kLightDirection]) {
+    visit(set.first(Varying::kLightDirection), std::span<T>(p->light_direction));
   }
 }
 
-struct RowRange {
-  int begin, end;
-};
-
-// The smooth images of rows [begin, end), with visibility given as ids of the scene's faces [H,W].
 template <class T>
-void RenderRefWithFaces(const SceneViewT<T>& scene, const RenderOptions& options,
-                        const RenderRequest& request, std::span<const std::int32_t> face_ids,
-                        RowRange rows, FrameT<T>* frame) {
-  PreparedScene<T> prepared;
-  PrepareRef(scene, options, &prepared);
+ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& options,
+                           const RefPixel<T>& at) {
+  ShadePixel<T> p;
+  ForEachPixelPart(s.set, &p, [&](int first, std::span<T> part) {
+    std::copy_n(at.values.begin() + first, part.size(), part.begin());
+  });
+  const auto& mesh = s.prepared.mesh;
+  const auto source = static_cast<std::size_t>(mesh.source_face[at.face]);
+  const auto& surfaces = s.scene->face_surfaces;
+  p.surface = surfaces.empty() ? 0 : static_cast<std::size_t>(surfaces[source]);
+  if (s.scene->model.two_sided) {
+    const auto c = raster::CornersOf(mesh, at.face);
+    const T area = (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]);
+    p.side = RealPart(area) <= 0 ? 1.0f : -1.0f;
+  }
+  const int texture = s.uniforms.surfaces[p.surface].texture;
+  if (texture < 0) return p;
+  const auto& view = s.pyramids[static_cast<std::size_t>(texture)].texture;
+  const double uv[2] = {static_cast<double>(RealPart(p.uv[0])),
+                        static_cast<double>(RealPart(p.uv[1]))};
+  const int size[2] = {view.width, view.height};
+  const UvPlanes planes = UvPlanesOf(mesh, s.prepared.attributes, s.set.first(Varying::kUv),
+                                     at.face, options.interpolation);
+  p.level = UvLevel<decltype(p.level)>(planes, RealPart(at.px), RealPart(at.py), uv, size);
+  return p;
+}
+
+// Calls visit(pixel) for each foreground pixel.
+template <class T, class Visit>
+void ForEachPixelRef(const ShadedRefScene<T>& s, const RenderOptions& options,
+                     std::span<const std::int32_t> face_ids, const Visit& visit) {
+  for (int i = 0; i < options.height; ++i) {
+    for (int j = 0; j < options.width; ++j) {
+      const std::int32_t id = face_ids[static_cast<std::size_t>(i * options.width + j)];
+      const std::int32_t face = raster::PieceAt(s.prepared.mesh, id, j, i);
+      if (face != raster::kNoFace) visit(InterpolatePixelRef(s, options, j, i, face));
+    }
+  }
+}
+
+template <class T>
+void ShadePixelIntoFrame(const ShadedRefScene<T>& s, const RenderOptions& options,
+                         const RefPixel<T>& at, ShadedFrameT<T>* frame) {
+  const ShadePixel<T> p = ShadePixelOf(s, options, at);
+  const PixelValues<T> v = PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids).Forward(p);
+  const std::size_t plane = frame->face_ids.size();
+  const auto write = [&](AlignedVector<T>& image, std::span<const T> values) {
+    for (std::size_t c = 0; c < values.size() && !image.empty(); ++c) {
+      image[c * plane + at.index] = values[c];
+    }
+  };
+  write(frame->color, v.color), write(frame->normals, v.normal.unit), write(frame->uv, p.uv);
+  const auto user = static_cast<std::size_t>(s.set.first(Varying::kUser));
+  write(frame->attributes, std::span<const T>(at.values).subspan(user));
+  if (!frame->depth.empty()) {
+    frame->depth[at.index] =
+        T(1) / raster::MakeDepthPlane(s.prepared.mesh, at.face).At(at.px, at.py);
+  }
+}
+
+// All images that `request` asks for, with visibility given as ids of the scene's faces [H,W].
+template <class T>
+void ShadedRenderRef(const ShadedSceneT<T>& scene, const RenderOptions& options,
+                     const ShadedRequest& request, std::span<const std::int32_t> face_ids,
+                     ShadedFrameT<T>* frame) {
+  ShadedRefScene<T> s;
+  PrepareShadedRef(scene, options, &s);
   SizeFrame(1, scene.channels, options, request, frame);
   frame->face_ids.assign(face_ids.begin(), face_ids.end());
-  for (int i = rows.begin; i < rows.end; ++i) {
-    for (int j = 0; j < options.width; ++j) {
-      const std::int32_t id = face_ids[static_cast<std::size_t>(i) * options.width + j];
-      ShadePixelRef(scene, prepared, options, j, i, raster::PieceAt(prepared.mesh, id, j, i),
-                    frame);
+  const std::size_t plane = face_ids.size();
+  frame->color.assign(request.color ? 3 * plane : 0, T(0));
+  frame->normals.assign(request.normals ? 3 * plane : 0, T(0));
+  frame->uv.assign(request.uv ? 2 * plane : 0, T(0));
+  std::fill(frame->attributes.begin(), frame->attributes.end(), T(0));
+  std::fill(frame->depth.begin(), frame->depth.end(), T(std::numeric_limits<double>::infinity()));
+  ForEachPixelRef(s, options, face_ids,
+                  [&](const RefPixel<T>& at) { ShadePixelIntoFrame(s, options, at, frame); });
+  for (std::size_t k = 0; k < plane && !frame->alpha.empty(); ++k) {
+    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
+    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
+    frame->alpha[k] = face_ids[k] >= 0 ? T(1) : BackgroundAlphaRef(s.prepared, options, px, py);
+  }
+}
+
+// Gradients of a scene before they are brought back to its arrays.
+template <class T>
+struct ShadedRefGradients {
+  PreparedGradients<T> prepared;
+  ShadeUniforms<T> uniforms;
+  shade::Vec3<T> depth_axis = {};
+  T depth_shift = T(0);
+
+  explicit ShadedRefGradients(const ShadedRefScene<T>& s) : prepared(s.view, s.prepared) {
+    uniforms.surfaces.resize(s.uniforms.surfaces.size());
+    for (auto& surface : uniforms.surfaces) {
+      surface.base_color = surface.ambient = surface.diffuse = surface.specular = {};
+      surface.shininess = T(0);
     }
-  }
-}
-
-// Ids of the scene's faces [H,W] seen in rows [begin, end); -1 elsewhere.
-template <class T>
-std::vector<std::int32_t> FaceIdsRef(const SceneViewT<T>& scene, const RenderOptions& options,
-                                     RowRange rows) {
-  PreparedScene<T> prepared;
-  PrepareRef(scene, options, &prepared);
-  std::vector<std::int32_t> ids(static_cast<std::size_t>(options.width) * options.height,
-                                raster::kNoFace);
-  raster::VisibilityRef<T>(prepared.mesh, rows.begin, rows.end, ids);
-  for (std::int32_t& id : ids) {
-    if (id >= 0) id = prepared.mesh.source_face[static_cast<std::size_t>(id)];
-  }
-  return ids;
-}
-
-template <class T>
-void RenderRef(const SceneViewT<T>& scene, const RenderOptions& options,
-               const RenderRequest& request, FrameT<T>* frame) {
-  const RowRange all{0, options.height};
-  RenderRefWithFaces<T>(scene, options, request, FaceIdsRef(scene, options, all), all, frame);
-}
-
-// Gradients of a prepared scene, before projection's adjoint.
-template <class T>
-struct PreparedGradients {
-  std::vector<T> storage[4];
-  raster::ScreenGradientsT<T> screen;
-  std::vector<T> attribute_storage;
-  raster::AttributeViewT<T> attributes;
-
-  PreparedGradients(const SceneViewT<T>& scene, const PreparedScene<T>& prepared) {
-    for (auto& array : storage) array.assign(prepared.mesh.vertices(), T(0));
-    screen = {storage[0], storage[1], storage[2],
-              std::span<T>(storage[3]).first(prepared.mesh.clipped.size())};
-    attribute_storage.assign(
-        raster::AttributeRows(prepared.mesh, scene.rate) * static_cast<std::size_t>(scene.channels),
-        T(0));
-    attributes = {attribute_storage, scene.channels, scene.rate};
+    uniforms.lights.resize(s.uniforms.lights.size());
+    for (const auto& pyramid : s.pyramids) {
+      uniforms.texels.emplace_back(pyramid.texels.size(), T(0));
+    }
   }
 };
 
+// Adds the adjoint of one foreground pixel.
 template <class T>
-void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOptions& options,
-                                const T& px, const T& py, const T& d_alpha,
-                                PreparedGradients<T>* d) {
-  const auto add = [&](std::size_t n, int corner, const T& d_x, const T& d_y) {
-    const auto f = static_cast<std::size_t>(prepared.soft_faces[n]);
-    const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
-    d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
+void ShadePixelBackward(const ShadedRefScene<T>& s, const RenderOptions& options,
+                        const ShadedFrameGradientsT<T>& d_frame, const RefPixel<T>& at,
+                        ShadedRefGradients<T>* d) {
+  const std::size_t plane =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  const auto read = [&](std::span<const T> image, std::span<T> out) {
+    for (std::size_t c = 0; c < out.size(); ++c) {
+      out[c] = image.empty() ? T(0) : image[c * plane + at.index];
+    }
   };
-  if (options.soft_rule == SoftRule::kAllFaces) {
-    raster::SoftAlphaRefBackward<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale,
-                                    d_alpha, add);
-    return;
+  std::vector<T> d_values(at.values.size(), T(0));
+  read(d_frame.attributes,
+       std::span(d_values).subspan(static_cast<std::size_t>(s.set.first(Varying::kUser))));
+  shade::Vec3<T> d_color, d_normal;
+  std::array<T, 2> d_uv;
+  std::array<T, 1> d_depth;
+  read(d_frame.color, d_color), read(d_frame.normals, d_normal), read(d_frame.uv, d_uv);
+  read(d_frame.depth, d_depth);
+  const ShadePixel<T> p = ShadePixelOf(s, options, at);
+  ShadePixel<T> d_p;
+  d_p.color = {}, d_p.uv = d_uv;
+  PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids)
+      .Backward(p, d_color, d_normal, &d_p, &d->uniforms);
+  for (std::size_t c = 0; c < 3; ++c) {
+    d_p.position[c] -= s.scene->camera.rotation[6 + c] * d_depth[0];
+    d->depth_axis[c] -= p.position[c] * d_depth[0];
   }
-  std::vector<raster::NdcFace<T>> d_faces(prepared.paper_faces.size());
-  raster::PaperAlphaRefBackward<T>(prepared.paper_faces, NdcX(px, options.width),
-                                   NdcY(py, options.height), PaperRuleOf(options), d_alpha,
-                                   d_faces);
-  for (std::size_t n = 0; n < d_faces.size(); ++n) {
-    for (int k = 0; k < 3; ++k) {
-      add(n, k, d_faces[n].x[k] * prepared.scale.x, -d_faces[n].y[k] * prepared.scale.y);
+  d->depth_shift -= d_depth[0];
+  ForEachPixelPart(s.set, &d_p, [&](int first, std::span<T> part) {
+    for (std::size_t c = 0; c < part.size(); ++c) {
+      d_values[static_cast<std::size_t>(first) + c] += part[c];
+    }
+  });
+  raster::InterpolateRefBackward<T>(s.prepared.mesh, s.prepared.attributes, at.plane, at.face,
+                                    options.interpolation, at.weights, d_values, d->prepared.screen,
+                                    d->prepared.attributes);
+}
+
+// From packed attributes to the scene's arrays; d_positions is complete.
+template <class T>
+void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::span<T> d_positions,
+               ShadedGradientsT<T>* d_scene) {
+  const ShadedSceneT<T>& scene = *s.scene;
+  const auto channels = static_cast<std::size_t>(s.set.channels());
+  for (const auto stream : {d_scene->colors, d_scene->uvs, d_scene->normals,
+                            d_scene->light_directions, d_scene->attributes}) {
+    std::fill(stream.begin(), stream.end(), T(0));
+  }
+  const RefStreams<T> streams{d_positions,      d_scene->colors,           d_scene->uvs,
+                              d_scene->normals, d_scene->light_directions, d_scene->attributes};
+  ForEachRefStream(scene, streams, [&](Varying v, AttributeRate rate, std::span<T> stream) {
+    const auto width = static_cast<std::size_t>(s.set.width(v));
+    const T scale = T(StreamScale(scene, v));
+    for (std::size_t i = 0; i < scene.faces.size() && !stream.empty(); ++i) {
+      for (std::size_t c = 0; c < width; ++c) {
+        stream[StreamRow(scene, rate, i) * width + c] +=
+            scale * d_packed[i * channels + static_cast<std::size_t>(s.set.first(v)) + c];
+      }
+    }
+  });
+  if (scene.model.normals == NormalKind::kGiven) return;
+  std::vector<shade::Vec3<T>> d_units(s.normals.size());
+  const auto first = static_cast<std::size_t>(s.set.first(Varying::kNormal));
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      d_units[RefNormalRow(scene, i)][c] += d_packed[i * channels + first + c];
     }
   }
-}
-
-// Adds the adjoint of one pixel; `d_frame` holds one image.
-template <class T>
-void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions& options,
-                           int column, int row, std::int32_t face,
-                           const FrameGradientsT<T>& d_frame, PreparedGradients<T>* d) {
-  const auto width = static_cast<std::size_t>(options.width);
-  const std::size_t plane = width * static_cast<std::size_t>(options.height);
-  const std::size_t pixel =
-      static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-  const T px = T(column) + T(0.5), py = T(row) + T(0.5);
-  if (face == raster::kNoFace) {
-    if (d_frame.alpha.empty()) return;
-    BackgroundAlphaRefBackward(prepared, options, px, py, d_frame.alpha[pixel], d);
-    return;
+  const shade::TriangleMeshT<T> mesh{scene.positions, scene.faces};
+  if (scene.model.normals == NormalKind::kSmooth) {
+    shade::SmoothNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
+  } else {
+    shade::FlatNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
   }
-  if (d_frame.attributes.empty()) return;
-  std::vector<T> d_out(static_cast<std::size_t>(prepared.attributes.channels));
-  for (std::size_t c = 0; c < d_out.size(); ++c) d_out[c] = d_frame.attributes[c * plane + pixel];
-  const auto f = static_cast<std::size_t>(face);
-  const auto face_plane = raster::MakeFacePlane(prepared.mesh, f);
-  const auto weights =
-      raster::PixelWeightsRef(prepared.mesh, face_plane, f, options.interpolation, px, py);
-  raster::InterpolateRefBackward<T>(prepared.mesh, prepared.attributes, face_plane, f,
-                                    options.interpolation, weights, d_out, d->screen,
-                                    d->attributes);
 }
 
-// From the screen back to the scene; overwrites what `d_scene` asks for.
 template <class T>
-void PrepareRefBackward(const SceneViewT<T>& scene, const RenderOptions& options,
-                        const PreparedScene<T>& prepared, const PreparedGradients<T>& d,
-                        SceneGradientsT<T>* d_scene) {
-  if (prepared.mesh.was_clipped()) {
-    for (T& x : d_scene->attributes) x = T(0);
-    raster::ClipAttributesBackward<T>(prepared.mesh, scene.faces, AttributesOf(scene),
-                                      d.attribute_storage, d_scene->attributes, d.screen.d_clip_t);
-  } else if (!d_scene->attributes.empty()) {
-    std::copy(d.attribute_storage.begin(), d.attribute_storage.end(), d_scene->attributes.begin());
+void UniformsBackRef(const ShadedRefScene<T>& s, const ShadedRefGradients<T>& d,
+                     ShadedGradientsT<T>* d_scene) {
+  const ShadeUniforms<T>& u = d.uniforms;
+  std::copy_n(u.surfaces.begin(), d_scene->surfaces.size(), d_scene->surfaces.begin());
+  for (std::size_t k = 0; k < d_scene->lights.size(); ++k) {
+    d_scene->lights[k] = {{}, u.lights[k].intensity};
+    shade::NormalizeAdjointRef<T>({s.uniforms.lights[k].direction, s.inverse_lengths[k]},
+                                  u.lights[k].direction, d_scene->lights[k].direction);
   }
-  std::vector<T> d_positions(scene.positions.size(), T(0));
-  CameraT<T> d_camera = raster::ZeroCamera<T>();
-  std::vector<raster::CameraPoint<T>> d_points(scene.positions.size() / 3, {T(0), T(0), T(0)});
-  raster::ProjectRefBackward<T>(FaceSourceOf(scene, options), prepared.mesh, d.screen, d_points,
-                                d_positions, &d_camera);
-  if (d_scene->camera) d_scene->d_camera = d_camera;
-  if (d_scene->positions.empty()) return;
-  std::copy(d_positions.begin(), d_positions.end(), d_scene->positions.begin());
-}
-
-// As Renderer::Backward, for rows [begin, end) of one image.
-template <class T>
-void RenderRefBackward(const SceneViewT<T>& scene, const RenderOptions& options,
-                       std::span<const std::int32_t> face_ids, const FrameGradientsT<T>& d_frame,
-                       RowRange rows, SceneGradientsT<T>* d_scene) {
-  PreparedScene<T> prepared;
-  PrepareRef(scene, options, &prepared);
-  PreparedGradients<T> d(scene, prepared);
-  for (int i = rows.begin; i < rows.end; ++i) {
-    for (int j = 0; j < options.width; ++j) {
-      const std::int32_t id = face_ids[static_cast<std::size_t>(i) * options.width + j];
-      ShadePixelRefBackward(prepared, options, j, i, raster::PieceAt(prepared.mesh, id, j, i),
-                            d_frame, &d);
+  std::fill(d_scene->sh.begin(), d_scene->sh.end(), T(0));
+  if (!d_scene->sh.empty()) {
+    shade::ShPolynomialAdjoint<T>(s.scene->model.sh_basis, u.sh, d_scene->sh);
+  }
+  for (std::size_t t = 0; t < d_scene->textures.size(); ++t) {
+    std::vector<T> texels = u.texels[t];
+    s.pyramids[t].Fold(texels);
+    std::copy_n(texels.begin(), d_scene->textures[t].size(), d_scene->textures[t].begin());
+  }
+  const CameraT<T>& camera = s.scene->camera;
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      d_scene->d_camera.rotation[3 * r + c] -= camera.translation[r] * u.eye[c];
+      d_scene->d_camera.translation[r] -= camera.rotation[3 * r + c] * u.eye[c];
     }
+    d_scene->d_camera.rotation[6 + r] += d.depth_axis[r];
   }
-  PrepareRefBackward(scene, options, prepared, d, d_scene);
+  d_scene->d_camera.translation[2] += d.depth_shift;
+}
+
+// As ShadedRenderer::Backward, for one image. d_scene->d_camera is always filled.
+template <class T>
+void ShadedRenderRefBackward(const ShadedSceneT<T>& scene, const RenderOptions& options,
+                             std::span<const std::int32_t> face_ids,
+                             const ShadedFrameGradientsT<T>& d_frame,
+                             ShadedGradientsT<T>* d_scene) {
+  ShadedRefScene<T> s;
+  PrepareShadedRef(scene, options, &s);
+  ShadedRefGradients<T> d(s);
+  ForEachPixelRef(s, options, face_ids,
+                  [&](const RefPixel<T>& at) { ShadePixelBackward(s, options, d_frame, at, &d); });
+  for (std::size_t k = 0; k < face_ids.size() && !d_frame.alpha.empty(); ++k) {
+    if (face_ids[k] >= 0) continue;
+    const T px = T(static_cast<int>(k) % options.width) + T(0.5);
+    const T py = T(static_cast<int>(k) / options.width) + T(0.5);
+    BackgroundAlphaRefBackward(s.prepared, options, px, py, d_frame.alpha[k], &d.prepared);
+  }
+  std::vector<T> d_positions(scene.positions.size(), T(0)), d_packed(s.packed.size(), T(0));
+  SceneGradientsT<T> d_view{d_positions, d_packed, true, {}};
+  PrepareRefBackward(s.view, options, s.prepared, d.prepared, &d_view);
+  d_scene->d_camera = d_view.d_camera;
+  UnpackRef<T>(s, d_packed, d_positions, d_scene);
+  std::copy_n(d_positions.begin(), d_scene->positions.size(), d_scene->positions.begin());
+  UniformsBackRef(s, d, d_scene);
 }
 
 }  // namespace tilegrad

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "render/renderer.h"
+#include "render/pipeline/pipeline.h"
 
 namespace tilegrad::train {
 namespace {

@@ -9,13 +9,13 @@
 #include "base/folder_lock.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
-#include "train/checkpoint.h"
-#include "train/first_difference.h"
-#include "train/machine.h"
-#include "train/run_log.h"
-#include "train/sample_images.h"
-#include "train/step.h"
-#include "train/trained_models.h"
+#include "train/run/checkpoint.h"
+#include "train/run/first_difference.h"
+#include "train/run/machine.h"
+#include "train/run/log.h"
+#include "train/tasks/single_image/sample_images.h"
+#include "train/tasks/single_image/step.h"
+#include "train/run/trained_models.h"
 
 namespace tilegrad::train {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "raster/bench_scenes.h"
 #include "raster/project.h"
-#include "render/frame_layout.h"
+#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad::bench {
 namespace {

@@ -10,6 +10,7 @@
 #include "scene/shapes.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
+#include "support/source_dir.h"
 
 namespace tilegrad {
 namespace {

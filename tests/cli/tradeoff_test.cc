@@ -8,6 +8,7 @@
 
 #include "support/run_program.h"
 #include "support/temp_folder.h"
+#include "support/source_dir.h"
 
 namespace tilegrad {
 namespace {

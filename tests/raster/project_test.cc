@@ -14,6 +14,7 @@
 #include "base/rng.h"
 #include "base/simd_target.h"
 #include "raster/project_ref.h"
+#include "support/source_dir.h"
 
 namespace tilegrad::raster {
 namespace {

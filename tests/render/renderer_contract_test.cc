@@ -1,440 +1,450 @@
 // SPDX-License-Identifier: Apache-2.0
-// What renderer.h promises besides numbers: errors, same bits, no allocation, only what is asked
-// for.
+// What shaded_renderer.h promises besides numbers: only what is asked for, same bits, no
+// allocation, sums over scenes that share an array, errors.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
-#include <limits>
-#include <utility>
+#include <string>
 
 #include "render/renderer.h"
-#include "render/test_batch.h"
+#include "render/trial.h"
 #include "support/allocation_count.h"
-#include "support/thread_sanitizer.h"
 
 namespace tilegrad {
 namespace {
 
-using test::Batch;
 using test::g_allocations;
-using test::kHeight;
-using test::kWidth;
-using test::Options;
-using test::TestScene;
+using test::SceneRecipe;
 
-// With several workers the scratch of each grows until it has met the largest tile.
-bool IsSteadySoon(const std::function<void()>& step) {
-  for (int i = 0, quiet = 0; i < 100; ++i) {
-    const long before = g_allocations;
-    step();
-    quiet = g_allocations == before ? quiet + 1 : 0;
-    if (quiet == 10) return true;
+constexpr int kWidth = 150, kHeight = 100;  // several bins and bands
+constexpr std::size_t kPixels = kWidth * kHeight;
+
+RenderOptions Options() {
+  RenderOptions options;
+  options.width = kWidth, options.height = kHeight;
+  return options;
+}
+
+// A textured sphere with colours, under `lighting`.
+OwnedScene<float> Sphere(Lighting lighting, std::uint64_t seed = 3) {
+  Rng rng(seed, 1);
+  OwnedScene<float> s;
+  s.mesh = test::BumpySphere(12, 16, kWidth, kHeight, &rng);
+  test::RandomAttributes(2, AttributeRate::kVertex, &rng, &s.mesh);
+  test::RandomVectors(s.mesh.vertex_count(), 0, 1, 3, &rng, &s.colors);
+  test::RandomVectors(s.mesh.faces.size(), 0, 1, 2, &rng, &s.uvs);
+  s.textures.resize(1);
+  auto& t = s.textures[0];
+  t.width = 16, t.height = 8, t.filter = shade::Filter::kTrilinear;
+  test::RandomVectors(128, 0, 1, 3, &rng, &t.texels);
+  s.surfaces.push_back({{1, 1, 1}, 0, {0.1f, 0.1f, 0.1f}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
+  s.model.lighting = lighting;
+  if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
+  if (lighting == Lighting::kPhong || lighting == Lighting::kLambert) {
+    s.lights = {{{1, 1, 1}, 0.7f}, {{-1, 0.5f, 1}, 0.3f}};
   }
-  return false;
+  return s;
 }
 
-void ExpectSteadyStateAllocatesNothing(Batch batch, int count) {
-  const Workers workers(count);
-  Renderer renderer(workers);
-  Frame frame;
-  const auto step = [&] {
-    ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
-    ASSERT_TRUE(renderer
-                    .Backward(batch.views, batch.options, frame,
-                              {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
-                    .ok());
-  };
-  const long before_first = g_allocations;
-  step();
-  EXPECT_GT(g_allocations, before_first);  // the counter counts
-  if (count > 1) {
-    EXPECT_TRUE(IsSteadySoon(step));
-    return;
+// Nothing but geometry.
+OwnedScene<float> Bare() {
+  OwnedScene<float> s = Sphere(Lighting::kNone);
+  s.colors.clear(), s.uvs.clear(), s.textures.clear(), s.surfaces.clear();
+  return s;
+}
+
+ShadedRequest Request(bool color, bool alpha) {
+  ShadedRequest request;
+  request.color = color, request.alpha = alpha, request.attributes = false;
+  return request;
+}
+
+std::int64_t Foreground(const Frame& frame) {
+  std::int64_t seen = 0;
+  for (const std::int32_t id : frame.face_ids) seen += id >= 0;
+  return seen;
+}
+
+// A renderer with one scene.
+struct Session {
+  Workers workers{2};
+  ShadedRenderer renderer{workers};
+  OwnedScene<float> scene;
+  ShadedScene view;
+  ShadedFrame frame;
+
+  explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
+  PlanReport Render(const ShadedRequest& request) {
+    const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
+    EXPECT_TRUE(status.ok()) << status.message();
+    return renderer.Explain();
   }
-  const long before = g_allocations;
-  for (int i = 0; i < 3; ++i) step();
-  EXPECT_EQ(g_allocations - before, 0);
-}
-
-TEST(RendererMemory, SteadyStateAllocatesNothing) {
-  for (int workers = 1; workers <= (test::kThreadSanitizer ? 1 : 3); ++workers) {
-    ExpectSteadyStateAllocatesNothing(Batch(), workers);
-    ExpectSteadyStateAllocatesNothing(Batch::Large(), workers);
+  // With the cotangents and gradients that are left after `choose`.
+  PlanReport Backward(const std::function<void(ShadedFrameGradients&, ShadedGradients&)>& choose) {
+    Rng rng(4, 4);
+    const OwnedCotangents<float> all(kPixels, 2, &rng);
+    OwnedGradients<float> gradients(scene);
+    auto d_frame = all.View();
+    d_frame.uv = {}, d_frame.normals = {}, d_frame.depth = {}, d_frame.attributes = {};
+    d_frame.alpha = {};
+    const ShadedGradients every_gradient = gradients.View();
+    ShadedGradients d_scene;
+    chosen = &every_gradient;
+    choose(d_frame, d_scene);
+    const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+    EXPECT_TRUE(status.ok()) << status.message();
+    return renderer.Explain();
   }
+  const ShadedGradients* chosen = nullptr;  // all gradients there are, to choose from
+};
+
+TEST(ShadedPlan, SilhouetteTouchesNoAttribute) {
+  Session session(Sphere(Lighting::kPhong));
+  const PlanReport report = session.Render(Request(false, true));
+  for (const char* stage : {"normals", "textures", "pack", "interpolate", "gather", "normalise",
+                            "texture", "light", "combine", "scatter"}) {
+    EXPECT_EQ(report.count(stage), 0) << stage;
+  }
+  EXPECT_EQ(report.count("visibility"), 6);
+  EXPECT_EQ(report.count("alpha"), 6);
+  EXPECT_TRUE(session.frame.color.empty());
 }
 
-// What a caller must keep from Render to Backward: at most 16 bytes a pixel, whatever was rendered.
-TEST(RendererMemory, BackwardNeedsFaceIdsAndWhatAlphaLeaves) {
-  Batch batch = Batch::Large();
-  const Workers workers(1);
-  Frame frame;
-  const auto backward = [&] {  // by a renderer that has not seen the batch before
-    Renderer renderer(workers);
-    return renderer.Backward(batch.views, batch.options, frame, {batch.d_attributes, batch.d_alpha},
-                             batch.d_scenes);
-  };
-  Renderer renderer(workers);
-  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
-  ASSERT_TRUE(backward().ok());
-  const auto positions = batch.positions, attributes = batch.attributes;
-  frame.attributes.clear(), frame.depth.clear(), frame.barycentrics.clear();
-  ASSERT_TRUE(backward().ok());
-  EXPECT_EQ(batch.positions, positions);
-  EXPECT_EQ(batch.attributes, attributes);
-  const std::size_t bytes = frame.face_ids.size() * sizeof(frame.face_ids[0]) +
-                            frame.alpha.size() * sizeof(frame.alpha[0]) +
-                            frame.transmittance.size() * sizeof(frame.transmittance[0]);
-  EXPECT_LE(bytes, 16 * batch.d_alpha.size());
+TEST(ShadedPlan, ColoursAloneAreInterpolatedAndNothingElse) {
+  Session session(Bare());
+  session.scene.colors = Sphere(Lighting::kNone).colors;
+  session.view = session.scene.View();
+  const PlanReport report = session.Render(Request(true, false));
+  for (const char* stage : {"normals", "textures", "pack", "gather", "light", "alpha"}) {
+    EXPECT_EQ(report.count(stage), 0) << stage;
+  }
+  EXPECT_EQ(report.count("interpolate"), 6);
+  EXPECT_EQ(session.frame.color.size(), 3 * kPixels);
 }
 
-// Both ways round at every pixel and face by some 1e-6 of the largest gradients.
-TEST(RendererMemory, BackwardWithoutTransmittanceIsTheSame) {
-  Batch batch = Batch::Large();
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const auto backward = [&] {
-    EXPECT_TRUE(renderer
-                    .Backward(batch.views, batch.options, frame,
-                              {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
-                    .ok());
-    return batch.positions;
-  };
-  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true}, &frame).ok());
-  ASSERT_EQ(frame.transmittance.size(), frame.alpha.size());
-  const auto with = backward();
-  frame.transmittance.clear();
-  const auto without = backward();
-  for (std::size_t n = 0; n < with.size(); ++n) {
-    float largest = 0;
-    for (const float d : with[n]) largest = std::max(largest, std::abs(d));
-    for (std::size_t i = 0; i < with[n].size(); ++i) {
-      EXPECT_NEAR(with[n][i], without[n][i], 1e-5f * largest) << "scene " << n << " number " << i;
+TEST(ShadedPlan, UnlitSceneComputesNoNormal) {
+  Session session(Sphere(Lighting::kNone));
+  const PlanReport report = session.Render(Request(true, true));
+  const std::int64_t seen = Foreground(session.frame);
+  EXPECT_GT(seen, 1000);
+  EXPECT_EQ(report.count("normals"), 0);
+  EXPECT_EQ(report.count("normalise"), 0);
+  EXPECT_EQ(report.count("light"), 0);
+  EXPECT_EQ(report.count("texture"), seen);
+  EXPECT_EQ(report.count("combine"), seen);
+}
+
+TEST(ShadedPlan, EveryForegroundPixelIsShadedOnce) {
+  for (const auto lighting :
+       {Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    Session session(Sphere(lighting));
+    const PlanReport report = session.Render(Request(true, false));
+    const std::int64_t seen = Foreground(session.frame);
+    for (const char* stage : {"gather", "normalise", "texture", "light", "combine", "scatter"}) {
+      EXPECT_EQ(report.count(stage), seen) << stage;
     }
+    EXPECT_EQ(report.count("normals"), static_cast<std::int64_t>(session.scene.mesh.face_count()));
+    EXPECT_EQ(report.count("textures"), 128 + 32 + 8 + 2 + 1);
   }
-  frame.transmittance.resize(3);
-  const Status status =
-      renderer.Backward(batch.views, batch.options, frame, {{}, batch.d_alpha}, batch.d_scenes);
-  EXPECT_NE(status.message().find("frame.transmittance"), std::string::npos);
 }
 
-bool operator==(const RenderStats& a, const RenderStats& b) {
-  return a.prepared == b.prepared && a.drawn == b.drawn && a.interpolated == b.interpolated &&
-         a.softened == b.softened && a.merged == b.merged;
+TEST(ShadedPlan, NothingIsPulledThatDoesNotRequireIt) {
+  Session session(Sphere(Lighting::kPhong));
+  session.Render(Request(true, true));
+  const std::int64_t seen = Foreground(session.frame);
+  const auto& chosen = session.chosen;
+  // A texture pulls on no attribute, and needs all of them again, and the light.
+  PlanReport report = session.Backward([&](auto&, auto& d) { d.textures = chosen->textures; });
+  EXPECT_EQ(report.count("scatter"), 0);
+  EXPECT_EQ(report.count("gradients"), 0);
+  EXPECT_EQ(report.count("merge"), 0);
+  EXPECT_EQ(report.count("texture"), seen);
+  EXPECT_EQ(report.count("recompute"), seen * 8);  // colour, uv, normal; no highlight
+  // Colours pull on themselves alone.
+  report = session.Backward([&](auto&, auto& d) { d.colors = chosen->colors; });
+  EXPECT_EQ(report.count("scatter"), seen * 3);
+  EXPECT_EQ(report.count("recompute"), seen * 5);
+  // Positions pull on all that is interpolated.
+  report = session.Backward([&](auto&, auto& d) { d.positions = chosen->positions; });
+  EXPECT_EQ(report.count("scatter"), seen * 11);
+  EXPECT_EQ(report.count("recompute"), seen * 11);
+  // Alpha alone visits no foreground pixel.
+  report = session.Backward([&](auto& d_frame, auto& d) {
+    d_frame.color = {}, d.positions = chosen->positions;
+    static const std::vector<float> d_alpha(kPixels, 1.0f);
+    d_frame.alpha = d_alpha;
+  });
+  EXPECT_EQ(report.count("gather"), 0);
+  EXPECT_EQ(report.count("recompute"), 0);
+  EXPECT_EQ(report.count("alpha"), 6);
+  // No gradient at all.
+  report = session.Backward([](auto&, auto&) {});
+  EXPECT_EQ(report.count("gather"), 0);
+  EXPECT_EQ(report.count("merge"), 0);
 }
 
-// Only what is asked for runs. Images of 150 x 139: 3 x 3 bins, 3 bands.
-TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
-  Batch batch = Batch::Large();
-  for (const int count : {1, 3}) {
-    const Workers workers(count);
-    Renderer renderer(workers);
-    Frame frame;
-    const auto forward = [&](const RenderRequest& request) {
-      EXPECT_TRUE(renderer.Render(batch.views, batch.options, request, &frame).ok());
-      return renderer.stats();
-    };
-    EXPECT_TRUE(forward({false, false, false, false}) == (RenderStats{3, 27, 0, 0, 0}));
-    EXPECT_TRUE(forward({false, false, true, false}) == (RenderStats{3, 27, 0, 0, 0}));
-    EXPECT_TRUE(forward({true, false, false, false}) == (RenderStats{3, 27, 27, 0, 0}));
-    EXPECT_TRUE(forward({false, true, false, false}) == (RenderStats{3, 27, 0, 27, 0}));
-    EXPECT_TRUE(forward({true, true, true, true}) == (RenderStats{3, 27, 27, 27, 0}));
-    const auto backward = [&](const FrameGradients& d_frame, bool positions, bool attributes) {
-      std::vector<SceneGradients> wanted(3);
-      for (std::size_t n = 0; n < 3; ++n) {
-        if (positions) wanted[n].positions = batch.positions[n];
-        if (attributes) wanted[n].attributes = batch.attributes[n];
+TEST(ShadedPlan, LinesNameEveryStageWithItsCount) {
+  Session session(Sphere(Lighting::kPhong));
+  const PlanReport report = session.Render(Request(true, true));
+  const auto lines = ExplainLines(report);
+  ASSERT_EQ(lines.size(), report.stages.size() + 1);
+  EXPECT_EQ(lines[0], "forward");
+  for (std::size_t i = 0; i < report.stages.size(); ++i) {
+    const auto& stage = report.stages[i];
+    EXPECT_NE(lines[i + 1].find(stage.name), std::string::npos);
+    EXPECT_NE(lines[i + 1].find(std::to_string(stage.count)), std::string::npos);
+    EXPECT_GE(stage.milliseconds, 0);
+    EXPECT_FALSE(stage.what.empty());
+  }
+}
+
+// Two scenes, all images, all gradients; each with its own arrays, or sharing those of the first.
+struct Pair {
+  OwnedScene<float> scenes[2];
+  OwnedCotangents<float> d_frame;
+
+  explicit Pair(Lighting lighting) {
+    scenes[0] = Sphere(lighting);
+    scenes[1] = scenes[0];
+    scenes[1].mesh.camera = OrbitCamera({45.0, kWidth, kHeight}, 200, 10, 2.2);
+    Rng rng(8, 8);
+    d_frame = OwnedCotangents<float>(2 * kPixels, 2, &rng);
+  }
+
+  // All numbers of the gradients, of scene 0 then 1; `shared`: all go to those of scene 0.
+  std::vector<float> Run(ShadedRenderer* renderer, bool shared, ShadedFrame* frame) {
+    ShadedScene views[2] = {scenes[0].View(), scenes[shared ? 0 : 1].View()};
+    views[1].camera = scenes[1].mesh.camera;
+    EXPECT_TRUE(renderer->Render(views, Options(), test::EveryImage(), frame).ok());
+    OwnedGradients<float> gradients[2] = {OwnedGradients<float>(scenes[0]),
+                                          OwnedGradients<float>(scenes[1])};
+    ShadedGradients d[2] = {gradients[0].View(), gradients[shared ? 0 : 1].View()};
+    EXPECT_TRUE(renderer->Backward(views, Options(), *frame, d_frame.View(), d).ok());
+    std::vector<float> out;
+    for (int n = 0; n < 2; ++n) {
+      gradients[n].TakeCamera(d[n]);
+      ForEachNumber(gradients[n].d, [&](const char*, float v) { out.push_back(v); });
+    }
+    return out;
+  }
+};
+
+template <class T>
+bool SameBits(const T& a, const T& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+}
+
+TEST(ShadedBits, SameForAnyWorkerCountAndRun) {
+  for (const auto lighting : {Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    Pair pair(lighting);
+    ShadedFrame first;
+    std::vector<float> first_gradients;
+    for (const int count : {1, 2, 7}) {
+      const Workers workers(count);
+      ShadedRenderer renderer(workers);
+      for (int run = 0; run < 2; ++run) {
+        ShadedFrame frame;
+        const auto gradients = pair.Run(&renderer, true, &frame);
+        if (first.color.empty()) first = frame, first_gradients = gradients;
+        EXPECT_TRUE(SameBits(frame.color, first.color)) << count;
+        EXPECT_TRUE(SameBits(frame.normals, first.normals)) << count;
+        EXPECT_TRUE(SameBits(gradients, first_gradients)) << count;
       }
-      EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, wanted).ok());
-      return renderer.stats();
-    };
-    const FrameGradients colour{batch.d_attributes, {}}, alpha{{}, batch.d_alpha};
-    const FrameGradients both{batch.d_attributes, batch.d_alpha};
-    EXPECT_TRUE(backward(colour, true, true) == (RenderStats{0, 0, 9, 0, 6}));
-    EXPECT_TRUE(backward(colour, false, true) == (RenderStats{0, 0, 9, 0, 3}));
-    EXPECT_TRUE(backward(alpha, true, false).interpolated == 0);
-    EXPECT_TRUE(backward(alpha, true, false).softened == 27);
-    EXPECT_TRUE(backward(both, true, true) == (RenderStats{0, 0, 9, 27, 6}));
-    EXPECT_TRUE(backward(both, false, false) == (RenderStats{0, 0, 0, 0, 0}));
+    }
   }
 }
 
-// What the soft mask evaluates: nothing unasked, what matters, less the more may be dropped.
-TEST(RendererRequest, PairsOfAlphaAreCounted) {
-  Batch batch = Batch::Large();
+TEST(ShadedGradientArrays, ScenesThatShareAnArrayGetTheSum) {
+  Pair pair(Lighting::kPhong);
   const Workers workers(2);
-  Renderer renderer(workers);
-  Frame frame;
-  const auto forward = [&](bool alpha, double error) {
-    RenderOptions options = batch.options;
-    options.max_alpha_error = error;
-    EXPECT_TRUE(renderer.Render(batch.views, options, {true, alpha}, &frame).ok());
-    return renderer.stats();
-  };
-  EXPECT_EQ(forward(false, 0).pairs, 0);
-  EXPECT_EQ(forward(false, 0).powers, 0);
-  std::int64_t before = std::numeric_limits<std::int64_t>::max();
-  for (const double error : {0.0, 1e-7, 1e-4, 1e-2}) {
-    const RenderStats stats = forward(true, error);
-    EXPECT_GT(stats.pairs, 0);
-    EXPECT_GT(stats.powers, 0);
-    EXPECT_LE(stats.pairs, before) << error;
-    before = stats.pairs;
-  }
-  EXPECT_GT(forward(true, 1e-6).pairs, 0);
-  const auto backward = [&](const FrameGradients& d_frame) {
-    EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, batch.d_scenes).ok());
-    return renderer.stats().pairs;
-  };
-  EXPECT_EQ(backward({batch.d_attributes, {}}), 0);
-  EXPECT_GT(backward({{}, batch.d_alpha}), 0);
-}
-
-TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const std::size_t pixels = batch.d_alpha.size();
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, false, false}, &frame).ok());
-  EXPECT_EQ(frame.face_ids.size(), pixels);
-  EXPECT_TRUE(frame.attributes.empty() && frame.alpha.empty() && frame.depth.empty() &&
-              frame.barycentrics.empty());
-  EXPECT_EQ(frame.channels, 0);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &frame).ok());
-  EXPECT_EQ(frame.attributes.size(), 3 * pixels);
-  EXPECT_EQ(frame.alpha.size(), pixels);
-  EXPECT_EQ(frame.depth.size(), pixels);
-  EXPECT_EQ(frame.barycentrics.size(), 2 * pixels);
-}
-
-TEST(RendererRequest, ImagesDoNotDependOnWhatElseIsWanted) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame all, one;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &all).ok());
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, false, false, false}, &one).ok());
-  EXPECT_EQ(one.attributes, all.attributes);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, true, false, false}, &one).ok());
-  EXPECT_EQ(one.alpha, all.alpha);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, true, true}, &one).ok());
-  EXPECT_EQ(one.depth, all.depth);
-  EXPECT_EQ(one.barycentrics, all.barycentrics);
-}
-
-TEST(RendererRequest, GradientsThatAreNotWantedAreLeftAlone) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  const FrameGradients d_frame{batch.d_attributes, batch.d_alpha};
-  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
-  const auto positions = batch.positions;
-  const auto attributes = batch.attributes;
-  for (auto& d : batch.d_scenes) d = {{}, d.attributes, false, {}}, d.d_camera.fx = 123;
-  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
-  EXPECT_EQ(batch.attributes, attributes);
-  EXPECT_EQ(batch.d_scenes[0].d_camera.fx, 123);
-  for (std::size_t n = 0; n < 3; ++n) batch.d_scenes[n] = {batch.positions[n], {}, false, {}};
-  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
-  EXPECT_EQ(batch.positions, positions);
-}
-
-TEST(RendererRequest, AnEmptyImageGradientIsZero) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  for (auto& d : batch.positions) std::fill(d.begin(), d.end(), 5.0f);
-  ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, {}, batch.d_scenes).ok());
-  for (const auto& array : {batch.positions, batch.attributes}) {
-    for (const auto& d : array) {
-      for (const float x : d) EXPECT_EQ(x, 0);
-    }
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const auto apart = pair.Run(&renderer, false, &frame);
+  const auto together = pair.Run(&renderer, true, &frame);
+  const std::size_t count = apart.size() / 2, camera = 16;  // cameras are never shared
+  double largest = 0;
+  for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, std::abs(1.0 * apart[i]));
+  ASSERT_GT(largest, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool own = i >= count - camera;
+    const float expected = own ? apart[i] : apart[i] + apart[count + i];
+    // Texels are summed over both scenes without a stop between them.
+    EXPECT_NEAR(together[i], expected, 1e-5 * (std::abs(expected) + 1)) << i;
   }
 }
 
-// What Render says about a scene that `spoil` has touched.
-template <class Spoil>
-std::string ErrorOf(const Spoil& spoil) {
-  Batch batch;
-  RenderOptions options = Options();
-  spoil(&batch, &options);
-  std::vector<SceneView> views;
-  for (const auto& scene : batch.scenes) views.push_back(scene.View());
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const Status status = renderer.Render(views, options, {}, &frame);
-  return status.ok() ? "ok" : status.message();
-}
-
-TEST(RendererErrors, NameSceneArrayAndIndex) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  const float inf = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions*) {}), "ok");
-  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[1].positions[7] = nan; }),
-            "scene 1: positions[7] is nan");
-  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[2].attributes[4] = inf; }),
-            "scene 2: attributes[4] is inf");
-  EXPECT_EQ(ErrorOf([&](Batch* b, RenderOptions*) { b->scenes[0].camera.rotation[3] = nan; }),
-            "scene 0: camera.rotation[3] is nan");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[0].camera.near_plane = 0; }),
-            "scene 0: camera.near_plane is 0, must be finite and > 0");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = 120; }),
-            "scene 1: faces[5] is 120, outside of [0, 120)");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces[5] = -1; }),
-            "scene 1: faces[5] is -1, outside of [0, 120)");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].faces.pop_back(); }),
-            "scene 1: faces must be [F,3], got 119 indices");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].positions.pop_back(); }),
-            "scene 1: positions must be [V,3], got 359 numbers");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) { b->scenes[1].attributes.pop_back(); }),
-            "scene 1: attributes must be [120,3], got 359 numbers");
-  EXPECT_EQ(ErrorOf([](Batch* b, RenderOptions*) {
-              b->scenes[2].channels = 0, b->scenes[2].attributes.clear();
-            }),
-            "scene 2 has 0 channels, scene 0 has 3: a batch must agree");
-  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->width = 0; }),
-            "options.width is 0, must be in 1..16384 pixels");
-  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->delta = 0; }),
-            "options.delta is 0, must be finite and > 0");
-  EXPECT_EQ(ErrorOf([](Batch*, RenderOptions* o) { o->max_alpha_error = 2; }),
-            "options.max_alpha_error is 2, must be in [0, 1]");
-}
-
-TEST(RendererErrors, BackwardChecksTheFrame) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  const auto error = [&](const FrameGradients& d_frame) {
-    return renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).message();
-  };
-  EXPECT_EQ(error({std::span(batch.d_attributes).first(3), {}}),
-            "d_frame.attributes has 3 numbers, expected 12960");
-  batch.d_alpha[9] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(error({{}, batch.d_alpha}), "d_frame.alpha[9] is nan");
-  batch.d_alpha[9] = 0;
-  frame.face_ids[kWidth * kHeight + 2] = 40;
-  EXPECT_EQ(error({{}, batch.d_alpha}),
-            "scene 1: frame.face_ids[2] is 40, but the scene has 40 faces");
-  frame.face_ids.pop_back();
-  EXPECT_EQ(error({{}, batch.d_alpha}), "frame.face_ids has 4319 numbers, expected 4320");
-}
-
-TEST(RendererErrors, AnOverflowingGradientIsNotReturnedSilently) {
-  Batch batch;
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  for (float& d : batch.d_attributes) d = std::numeric_limits<float>::max();
-  const Status status =
-      renderer.Backward(batch.views, Options(), frame, {batch.d_attributes, {}}, batch.d_scenes);
-  EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
-  EXPECT_NE(status.message().find("the gradient overflows: d_scene."), std::string::npos)
-      << status.message();
-}
-
-TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
-  const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  ASSERT_TRUE(renderer.Render({}, Options(), {}, &frame).ok());
-  EXPECT_TRUE(frame.face_ids.empty());
-  const SceneView empty[] = {SceneView{}};
-  ASSERT_TRUE(renderer.Render(empty, Options(), {true, true, true, true}, &frame).ok());
-  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
-  for (const float alpha : frame.alpha) EXPECT_EQ(alpha, 0);
-  for (const float depth : frame.depth) EXPECT_TRUE(std::isinf(depth));
-  SceneGradients d[] = {{{}, {}, true, {}}};
-  const std::vector<float> d_alpha(frame.alpha.size(), 1.0f);
-  ASSERT_TRUE(renderer.Backward(empty, Options(), frame, {{}, d_alpha}, d).ok());
-  EXPECT_EQ(d[0].d_camera.fx, 0);
-}
-
-// Weights sum to one, so the gradients of a channel at all vertices sum to those at all pixels that
-// are covered.
-TEST(RendererEdgeCases, TheSmallestAndTheLongestImages) {
-  const std::vector<float> positions = {-50, -50, 0, 50, -50, 0.1f, 0, 80, -0.1f};
-  const std::vector<std::int32_t> faces = {0, 1, 2};
-  const std::vector<float> attributes = {0.1f, 0.5f, 0.9f};
-  const Workers workers(3);
-  Renderer renderer(workers);
-  for (const auto& [width, height] : {std::pair{1, 1}, {16384, 1}, {1, 16384}, {16384, 5}}) {
-    const Camera camera = OrbitCamera({40.0, width, height}, 90, 0, 3);
-    const SceneView scenes[] = {{positions, faces, attributes, 1, AttributeRate::kVertex, camera}};
-    const RenderOptions options = Options(width, height);
-    Frame frame;
-    ASSERT_TRUE(renderer.Render(scenes, options, {}, &frame).ok());
-    const std::vector<float> d_attributes(frame.face_ids.size(), 0.25f);
-    std::vector<float> d_positions(9), d_rows(3);
-    SceneGradients d[] = {{d_positions, d_rows, false, {}}};
-    ASSERT_TRUE(renderer.Backward(scenes, options, frame, {d_attributes, {}}, d).ok());
-    const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), 0);
-    EXPECT_GT(covered, 0);
-    const double expected = 0.25 * static_cast<double>(covered);
-    EXPECT_NEAR(d_rows[0] + d_rows[1] + d_rows[2], expected, 1e-4 * expected)
-        << width << " x " << height;
+TEST(ShadedMemory, SteadyStateAllocatesNothing) {
+  for (const auto lighting :
+       {Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
+    OwnedScene<float> scene = Sphere(lighting);
+    const ShadedScene view = scene.View();
+    Rng rng(1, 2);
+    const OwnedCotangents<float> d_frame(kPixels, 2, &rng);
+    OwnedGradients<float> gradients(scene);
+    ShadedGradients d_scene = gradients.View();
+    const Workers workers(1);
+    ShadedRenderer renderer(workers);
+    ShadedFrame frame;
+    const auto step = [&] {
+      ASSERT_TRUE(renderer.Render({&view, 1}, Options(), test::EveryImage(), &frame).ok());
+      ASSERT_TRUE(
+          renderer.Backward({&view, 1}, Options(), frame, d_frame.View(), {&d_scene, 1}).ok());
+    };
+    const long before_first = g_allocations;
+    step();
+    EXPECT_GT(g_allocations, before_first);  // the counter counts
+    const long before = g_allocations;
+    for (int i = 0; i < 3; ++i) step();
+    EXPECT_EQ(g_allocations - before, 0);
   }
 }
 
-TEST(RendererEdgeCases, BehindOffScreenAndDegenerateFacesAreFiniteBackground) {
-  TestScene<float> scene;
-  scene.channels = 1;
-  scene.positions = {0,    0, 5,  1,    0,    5,  0,    1, 5,    // behind
-                     99,   0, -1, 99,   1,    -1, 98,   0, -1,   // beside
-                     0,    0, -2, 0.5f, 0.5f, -2, 1,    1, -2,   // a line
-                     0.2f, 0, -2, 0.2f, 0,    -2, 0.2f, 0, -2};  // a point
-  for (int v = 0; v < 12; ++v) scene.faces.push_back(v);
-  scene.attributes.assign(12, 1.0f);
+struct BadScene {
+  const char* name;
+  std::function<void(OwnedScene<float>&)> spoil;
+  const char* says;
+};
+
+const BadScene kBadScenes[] = {
+    {"short_colors", [](auto& s) { s.colors.pop_back(); }, "colors must be"},
+    {"nan_color", [](auto& s) { s.colors[4] = NAN; }, "colors[4] is nan"},
+    {"short_uvs", [](auto& s) { s.uvs.pop_back(); }, "uvs must be"},
+    {"no_uvs", [](auto& s) { s.uvs.clear(); }, "no uvs"},
+    {"short_texture", [](auto& s) { s.textures[0].texels.pop_back(); }, "textures[0]: texels"},
+    {"no_texels", [](auto& s) { s.textures[0].width = 0; }, "textures[0]: is 0 x 8"},
+    {"texture_index", [](auto& s) { s.surfaces[0].texture = 3; }, "surfaces[0]: texture is 3"},
+    {"shininess", [](auto& s) { s.surfaces[0].shininess = -1; }, "shininess is -1"},
+    {"face_surfaces", [](auto& s) { s.face_surfaces.assign(s.mesh.face_count(), 1); },
+     "face_surfaces[0] is 1"},
+    {"no_lights", [](auto& s) { s.lights.clear(); }, "neither"},
+    {"inf_light", [](auto& s) { s.lights[1].direction[2] = INFINITY; }, "lights[1]"},
+    {"face", [](auto& s) { s.mesh.faces[7] = 100000; }, "faces[7] is 100000"},
+    {"no_normals", [](auto& s) { s.model.normals = NormalKind::kGiven; }, "no normals"},
+    {"sh",
+     [](auto& s) {
+       s.model.lighting = Lighting::kSphericalHarmonics;
+       s.sh.assign(4, 1.0f);
+     },
+     "sh has 4"},
+};
+
+TEST(ShadedErrors, NameWhatIsWrong) {
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const SceneView views[] = {scene.View()};
-  ASSERT_TRUE(renderer.Render(views, Options(), {true, true, true, true}, &frame).ok());
-  float most = 0;
-  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
-  for (const float alpha : frame.alpha) most = std::max(most, alpha);
-  EXPECT_GT(most, 0.1f);  // lines and points are in the soft mask
-  std::vector<float> d_positions(scene.positions.size()), d_alpha(frame.alpha.size(), 1.0f);
-  SceneGradients d[] = {{d_positions, {}, true, {}}};
-  ASSERT_TRUE(renderer.Backward(views, Options(), frame, {{}, d_alpha}, d).ok());
-  for (std::size_t i = 0; i < d_positions.size(); ++i) {
-    EXPECT_TRUE(std::isfinite(d_positions[i])) << i;
-    if (i < 18) {
-      EXPECT_EQ(d_positions[i], 0) << i;
-    }
+  ShadedRenderer renderer(workers);
+  for (const BadScene& bad : kBadScenes) {
+    OwnedScene<float> scene = Sphere(Lighting::kPhong);
+    bad.spoil(scene);
+    const ShadedScene view = scene.View();
+    ShadedFrame frame;
+    const Status status = renderer.Render({&view, 1}, Options(), {}, &frame);
+    ASSERT_FALSE(status.ok()) << bad.name;
+    EXPECT_NE(status.message().find(bad.says), std::string::npos)
+        << bad.name << ": " << status.message();
+    EXPECT_NE(status.message().find("scene 0"), std::string::npos) << status.message();
   }
 }
 
-TEST(RendererEdgeCases, CulledFacesAreBackgroundWithAlpha) {
-  TestScene<float> scene;
-  scene.channels = 0;
-  scene.positions = {-0.1f, -0.1f, -2, 0, 0.1f, -2, 0.1f, -0.1f, -2};  // clockwise
-  scene.faces = {0, 1, 2};
-  RenderOptions options = Options();
-  options.culling = FaceCulling::kBack;
+TEST(ShadedErrors, ScenesOfABatchMustAgree) {
+  OwnedScene<float> a = Sphere(Lighting::kPhong), b = Sphere(Lighting::kLambert);
+  const ShadedScene views[] = {a.View(), b.View()};
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const SceneView views[] = {scene.View()};
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  float most = 0;
-  for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
-  for (const float alpha : frame.alpha) most = std::max(most, alpha);
-  EXPECT_GT(most, 0.1f);
-  options.culling = FaceCulling::kNone;
-  ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-  EXPECT_GT(std::count(frame.face_ids.begin(), frame.face_ids.end(), 0), 0);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const Status status = renderer.Render(views, Options(), {}, &frame);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("scene 1"), std::string::npos) << status.message();
+}
+
+// A sphere under Phong's light, and the frame of what is asked of it.
+class ShadedErrorsOfPhong : public ::testing::Test {
+ protected:
+  Status Render(const ShadedScene& view, const ShadedRequest& request = {}) {
+    return renderer_.Render({&view, 1}, Options(), request, &frame_);
+  }
+  Status Backward(const ShadedScene& view, const ShadedFrameGradients& d_frame,
+                  ShadedGradients* d_scene) {
+    return renderer_.Backward({&view, 1}, Options(), frame_, d_frame, {d_scene, 1});
+  }
+
+  OwnedScene<float> scene_ = Sphere(Lighting::kPhong);
+  const Workers workers_ = Workers(1);
+  ShadedRenderer renderer_ = ShadedRenderer(workers_);
+  ShadedFrame frame_;
+};
+
+TEST_F(ShadedErrorsOfPhong, CotangentsAreChecked) {
+  const ShadedScene view = scene_.View();
+  ASSERT_TRUE(Render(view).ok());
+  OwnedGradients<float> gradients(scene_);
+  ShadedGradients d_scene = gradients.View();
+  std::vector<float> d_color(3 * kPixels, 1.0f);
+  d_color[70] = NAN;
+  ShadedFrameGradients d_frame;
+  d_frame.color = d_color;
+  Status status = Backward(view, d_frame, &d_scene);
+  EXPECT_NE(status.message().find("d_frame.color[70]"), std::string::npos) << status.message();
+  d_frame.color = std::span(d_color).first(5);
+  status = Backward(view, d_frame, &d_scene);
+  EXPECT_NE(status.message().find("d_frame.color has 5"), std::string::npos) << status.message();
+}
+
+// The depth of background pixels is infinite, and what a loss makes of that is often NaN.
+TEST_F(ShadedErrorsOfPhong, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
+  const ShadedScene view = scene_.View();
+  ShadedRequest request;
+  request.depth = true;
+  ASSERT_TRUE(Render(view, request).ok());
+  std::vector<float> nan(kPixels, NAN), zero(kPixels, 0.0f);
+  std::size_t seen = kPixels;
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (frame_.face_ids[i] < 0) continue;
+    nan[i] = zero[i] = 0.25f;
+    seen = i;
+  }
+  ASSERT_LT(seen, kPixels);
+  OwnedGradients<float> gradients(scene_), expected(scene_);
+  ShadedGradients d_scene = gradients.View(), d_expected = expected.View();
+  ShadedFrameGradients d_frame;
+  d_frame.depth = zero;
+  ASSERT_TRUE(Backward(view, d_frame, &d_expected).ok());
+  d_frame.depth = nan;
+  Status status = Backward(view, d_frame, &d_scene);
+  ASSERT_TRUE(status.ok()) << status.message();
+  EXPECT_TRUE(
+      std::equal(d_scene.positions.begin(), d_scene.positions.end(), d_expected.positions.begin()));
+  nan[seen] = INFINITY;
+  status = Backward(view, d_frame, &d_scene);
+  EXPECT_EQ(status.message(), "d_frame.depth[" + std::to_string(seen) + "] is inf");
+}
+
+// White has no gradient, but its cotangent is an error as any other.
+TEST_F(ShadedErrorsOfPhong, CotangentsThatPullNothingAreChecked) {
+  ShadedScene view;
+  view.positions = scene_.mesh.positions, view.faces = scene_.mesh.faces;
+  view.camera = scene_.mesh.camera;
+  ASSERT_TRUE(Render(view).ok());
+  std::vector<float> d_color(3 * kPixels, 1.0f), d_positions(view.positions.size());
+  d_color[70] = NAN;
+  ShadedFrameGradients d_frame;
+  d_frame.color = d_color;
+  ShadedGradients d_scene;
+  d_scene.positions = d_positions;
+  const Status status = Backward(view, d_frame, &d_scene);
+  EXPECT_EQ(status.message(), "d_frame.color[70] is nan");
+}
+
+// Numbers that nobody asked for are looked at, too.
+TEST_F(ShadedErrorsOfPhong, AttributesAreCheckedWhateverIsWanted) {
+  ShadedScene view = scene_.View();
+  std::vector<float> attributes(view.positions.size() / 3, 0.5f);
+  attributes[2] = NAN;
+  view.attributes = attributes, view.channels = 1, view.rate = AttributeRate::kVertex;
+  ShadedRequest request;
+  request.attributes = false;
+  const Status status = Render(view, request);
+  EXPECT_EQ(status.message(), "scene 0: attributes[2] is nan");
 }
 
 }  // namespace

@@ -1,212 +1,162 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tiled SIMD renderer, held to the naive reference in double on every instruction set.
+// What a scene looks like, by values that are known without a renderer.
 #include "render/renderer.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
-
-#include "base/simd_target.h"
-#include "render/renderer_ref.h"
-#include "render/test_scenes.h"
+#include <vector>
 
 namespace tilegrad {
 namespace {
 
-using test::TestScene;
+constexpr int kSize = 16;
+constexpr std::size_t kPixels = kSize * kSize;
 
-constexpr double kEps = std::numeric_limits<float>::epsilon();
+// A square in z = 0, one unit to each side, that fills the image of a camera in front of it; the
+// lower left triangle is face 0.
+struct Square {
+  std::vector<float> positions = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+  std::vector<std::int32_t> faces = {0, 1, 3, 1, 2, 3};
+  std::vector<float> uvs = {0, 0, 1, 0, 1, 1, 0, 1};
+  std::vector<float> colors = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
 
-struct Case {
-  const char* name;
-  TestScene<float> (*make)(int width, int height, Rng*);
-  int width, height;
-  Interpolation mode;
-  double delta;
+  ShadedScene Scene() const {
+    ShadedScene scene;
+    scene.positions = positions, scene.faces = faces;
+    const float eye[3] = {0, 0, 2}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
+    scene.camera = LookAtCamera({2 * std::atan(0.5) * 180 / M_PI, kSize, kSize}, eye, target, up);
+    return scene;
+  }
 };
 
-TestScene<float> CornerSoup(int w, int h, Rng* r) {
-  auto scene = test::TriangleSoup(30, 0.3, w, h, r);
-  test::RandomAttributes(5, AttributeRate::kCorner, r, &scene);
-  return scene;
-}
-TestScene<float> Soup(int w, int h, Rng* r) { return test::TriangleSoup(60, 0.25, w, h, r); }
-TestScene<float> Sphere(int w, int h, Rng* r) { return test::BumpySphere(14, 20, w, h, r); }
-TestScene<float> ClippedSoup(int w, int h, Rng* r) { return test::SoupAroundCamera(30, w, h, r); }
-TestScene<float> ClippedCorners(int w, int h, Rng* r) {
-  auto scene = test::SoupAroundCamera(30, w, h, r);
-  test::RandomAttributes(2, AttributeRate::kCorner, r, &scene);
-  return scene;
-}
-TestScene<float> ManyChannels(int w, int h, Rng* r) {
-  auto scene = test::BumpySphere(8, 10, w, h, r);
-  test::RandomAttributes(17, AttributeRate::kVertex, r, &scene);
-  return scene;
-}
-
-const Case kCases[] = {
-    {"sphere64", Sphere, 64, 64, Interpolation::kPerspective, 1.0 / 7000},
-    {"sphere_linear", Sphere, 50, 33, Interpolation::kScreenLinear, 1e-3},
-    {"soup", Soup, 37, 61, Interpolation::kPerspective, 1e-3},
-    {"corners", CornerSoup, 48, 40, Interpolation::kPerspective, 1e-3},
-    {"clipped", ClippedSoup, 40, 40, Interpolation::kPerspective, 1e-3},
-    {"clipped_corners", ClippedCorners, 33, 40, Interpolation::kScreenLinear, 1e-3},
-    {"many_channels", ManyChannels, 40, 24, Interpolation::kPerspective, 1e-3},
-    {"one_pixel", Sphere, 1, 1, Interpolation::kPerspective, 1e-3},
-    {"one_row", Sphere, 70, 1, Interpolation::kPerspective, 1e-3},
-};
-
-RenderOptions OptionsOf(const Case& c) {
+RenderOptions Options() {
   RenderOptions options;
-  options.width = c.width, options.height = c.height;
-  options.interpolation = c.mode, options.delta = c.delta;
-  options.max_alpha_error = 1e-7;
+  options.width = options.height = kSize;
   return options;
 }
 
-constexpr RenderRequest kEverything{true, true, true, true};
-
-double MaxAbs(const auto& values) {
-  double most = 0;
-  for (const auto v : values) most = std::max(most, std::abs(static_cast<double>(v)));
-  return most;
+ShadedFrame Draw(const ShadedScene& scene, const ShadedRequest& request = {}) {
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedFrame frame;
+  const Status status = renderer.Render({&scene, 1}, Options(), request, &frame);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return frame;
 }
 
-class OnTarget : public testing::TestWithParam<Case> {
- protected:
-  void TearDown() override { ASSERT_TRUE(ForceTarget("").ok()); }
-};
-
-class AgainstReference : public OnTarget {};
-
-// Screen coordinates are sums and products of a handful of floats of the size of the image, W: they
-// err by about 4 eps W pixels. Over a face of height h pixels that moves a weight by 4 eps W / h.
-// This is for h = 1/4; what is thinner (down to kFlatHeight, below which faces are flat) may err
-// more, and tests say how many pixels may. 1e-5 is for the few operations on weights of up to 64
-// (the distance of the corners of a tile's face from its first pixel).
-double WeightTolerance(const RenderOptions& options) {
-  return 16 * kEps * std::max(options.width, options.height) + 1e-5;
+std::array<float, 3> ColorAt(const ShadedFrame& frame, int x, int y) {
+  const auto pixel = static_cast<std::size_t>(y * kSize + x);
+  return {frame.color[pixel], frame.color[kPixels + pixel], frame.color[2 * kPixels + pixel]};
 }
 
-// Attributes are in [0, 1] and mix three weights.
-double ImageTolerance(const RenderOptions& options) { return 4 * WeightTolerance(options); }
+// A few roundings of numbers of the size of 1.
+constexpr float kTolerance = 1e-5f;
 
-// Relative to the largest entry: the position gradient has one weight and one 1/height more.
-double GradientTolerance(const RenderOptions& options) { return 8 * WeightTolerance(options); }
+void ExpectColor(const ShadedFrame& frame, int x, int y, std::array<float, 3> expected) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(ColorAt(frame, x, y)[c], expected[c], kTolerance) << x << " " << y << " " << c;
+  }
+}
 
-// Distances err by 4 eps W pixels = 8 eps in NDC, so A = exp(-z), z = d^2 / delta, errs by at most
-// max(2 sqrt(z) exp(-z)) 8 eps / sqrt(delta) = 0.86 * 8 eps * 84 = 7e-5 for delta >= 1/7000.
-constexpr double kAlphaTolerance = 1e-4;
+TEST(ShadedRenderer, VertexColoursAreInterpolated) {
+  const Square square;
+  ShadedScene scene = square.Scene();
+  scene.colors = {square.colors, AttributeRate::kVertex};
+  const ShadedFrame frame = Draw(scene);
+  // Pixel (0, 15) has its centre at (1/32, 1/32) of the square, from its lower left corner.
+  ExpectColor(frame, 0, 15, {15.0f / 16, 1.0f / 32, 0});
+}
 
-TEST_P(AgainstReference, ForwardImages) {
-  const RenderOptions options = OptionsOf(GetParam());
-  Rng rng(11, 3);
-  const auto scene = GetParam().make(options.width, options.height, &rng);
-  const auto truth_scene = MeshCast<double>(scene);
-  for (const auto& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
-    const Workers workers(1);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
-    ASSERT_TRUE(renderer.Render(views, options, kEverything, &frame).ok());
-    FrameT<double> truth;
-    RenderRefWithFaces<double>(truth_scene.View(), options, kEverything, frame.face_ids,
-                               {0, options.height}, &truth);
-    // A pixel on a sliver may be off by much more than others: those are counted.
-    std::size_t far_off = 0;
-    const double tolerance = ImageTolerance(options);
-    for (std::size_t i = 0; i < truth.attributes.size(); ++i) {
-      far_off += !(std::abs(frame.attributes[i] - truth.attributes[i]) <= tolerance);
-    }
-    EXPECT_LE(far_off, truth.attributes.size() / 200) << target;
-    for (std::size_t i = 0; i < truth.alpha.size(); ++i) {
-      EXPECT_NEAR(frame.alpha[i], truth.alpha[i], kAlphaTolerance) << target << " pixel " << i;
-    }
-    for (std::size_t i = 0; i < truth.depth.size(); ++i) {
-      if (std::isinf(truth.depth[i])) {
-        EXPECT_TRUE(std::isinf(frame.depth[i])) << target << " pixel " << i;
-      } else {
-        EXPECT_NEAR(frame.depth[i] / truth.depth[i], 1, tolerance) << target << " pixel " << i;
+// Texels are as large as pixels, so pixel centres are texel centres; row 0 is the top, v = 1.
+TEST(ShadedRenderer, TexelCentresAreWhereTheConventionSays) {
+  const Square square;
+  std::vector<float> texels;
+  for (std::size_t i = 0; i < 3 * kPixels; ++i) texels.push_back(static_cast<float>(i % 97) / 97);
+  for (const auto filter :
+       {shade::Filter::kNearest, shade::Filter::kBilinear, shade::Filter::kTrilinear}) {
+    const shade::TextureView texture{texels, kSize, kSize, 3, shade::Wrap::kRepeat, filter};
+    ShadedScene scene = square.Scene();
+    scene.uvs = {square.uvs, AttributeRate::kVertex};
+    scene.textures = {&texture, 1};
+    const ShadedFrame frame = Draw(scene);
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        const float* t = &texels[static_cast<std::size_t>(3 * (y * kSize + x))];
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_NEAR(ColorAt(frame, x, y)[c], t[c], 1e-4f) << x << " " << y;  // 16 texels of 1
+        }
       }
     }
-    far_off = 0;
-    for (std::size_t i = 0; i < truth.barycentrics.size(); ++i) {
-      far_off += !(std::abs(frame.barycentrics[i] - truth.barycentrics[i]) <= tolerance);
+  }
+}
+
+TEST(ShadedRenderer, LightFromTheSideGivesItsCosine) {
+  const Square square;
+  ShadedScene scene = square.Scene();
+  const shade::DirectionalLight light{{3, 0, 4}, 1};  // of length 5: cosine 0.8
+  scene.lights = {&light, 1};
+  scene.model.lighting = Lighting::kLambert;
+  ExpectColor(Draw(scene), 8, 8, {0.8f, 0.8f, 0.8f});
+  scene.model.normals = NormalKind::kFlat;
+  ExpectColor(Draw(scene), 3, 12, {0.8f, 0.8f, 0.8f});
+}
+
+// Normals that are sums over tiny faces, and light directions, need not be near 1: their lengths
+// are powers of two here, so that nothing is rounded, and the gradient is as much larger as they
+// are smaller.
+TEST(ShadedRenderer, DirectionsThatAreGivenMayHaveAnyLength) {
+  const Square square;
+  const std::vector<float> normals = {0, 0, 1, 0.25f, 0, 1, 0, 0.5f, 1, 0.5f, 0.5f, 0.75f};
+  const std::vector<float> lights = {1, 0, 1, 0, 1, 1, 0.5f, 0, 1, 0, 0, 1};
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  std::vector<float> color, d_normals, d_lights;
+  for (const int power : {0, -20, -60, -100, 20, 60, 100}) {
+    std::vector<float> n = normals, l = lights, d_n(12), d_l(12);
+    for (float& x : n) x = std::ldexp(x, power);
+    for (float& x : l) x = std::ldexp(x, -power);
+    ShadedScene scene = square.Scene();
+    scene.normals = {n, AttributeRate::kVertex}, scene.light_directions = l;
+    scene.model.normals = NormalKind::kGiven, scene.model.lighting = Lighting::kLambert;
+    const ShadedFrame frame = Draw(scene);
+    const std::vector<float> d_color(3 * kPixels, 0x1p-10f);
+    ShadedFrameGradients d_frame;
+    d_frame.color = d_color;
+    ShadedGradients d_scene;
+    d_scene.normals = d_n, d_scene.light_directions = d_l;
+    const Status status = renderer.Backward({&scene, 1}, Options(), frame, d_frame, {&d_scene, 1});
+    ASSERT_TRUE(status.ok()) << status.message();
+    for (float& x : d_n) x = std::ldexp(x, power);
+    for (float& x : d_l) x = std::ldexp(x, -power);
+    if (power == 0) {
+      color.assign(frame.color.begin(), frame.color.end()), d_normals = d_n, d_lights = d_l;
+      EXPECT_GT(color[0], 0.5f);
+      EXPECT_NE(d_normals[0], 0.0f);
+      continue;
     }
-    EXPECT_LE(far_off, truth.barycentrics.size() / 200) << target;
+    EXPECT_TRUE(std::equal(color.begin(), color.end(), frame.color.begin())) << power;
+    EXPECT_EQ(d_n, d_normals) << power;
+    EXPECT_EQ(d_l, d_lights) << power;
   }
 }
 
-// Bit for bit against the reference in float: tests/raster/visibility_test.cc. Here in double.
-TEST_P(AgainstReference, FaceIds) {
-  const RenderOptions options = OptionsOf(GetParam());
-  Rng rng(12, 3);
-  const auto scene = GetParam().make(options.width, options.height, &rng);
-  for (const auto& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
-    const Workers workers(1);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
-    ASSERT_TRUE(renderer.Render(views, options, {false, false, false, false}, &frame).ok());
-    // The double reference rounds vertices to subpixels from better coordinates: a pixel may differ
-    // where a coordinate sits at the boundary of rounding and a centre within 1/1024 pixel. With
-    // edges of about 1/4 of the pixels' number in length, 1/1024 of those centres are that near.
-    const auto truth = FaceIdsRef(MeshCast<double>(scene).View(), options, {0, options.height});
-    std::size_t different = 0;
-    for (std::size_t i = 0; i < truth.size(); ++i) different += frame.face_ids[i] != truth[i];
-    EXPECT_LE(different, truth.size() / 250) << target;
-  }
+TEST(ShadedRenderer, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
+  Square square;
+  for (float& p : square.positions) p *= 0.5f;
+  std::swap(square.faces[0], square.faces[1]), std::swap(square.faces[3], square.faces[4]);
+  ShadedScene scene = square.Scene();
+  const shade::DirectionalLight light{{0, 0, 1}, 1};
+  scene.lights = {&light, 1};
+  scene.model.lighting = Lighting::kLambert;
+  ExpectColor(Draw(scene), 8, 8, {0, 0, 0});
+  scene.model.two_sided = true;
+  const ShadedFrame frame = Draw(scene, {});
+  ExpectColor(frame, 8, 8, {1, 1, 1});
+  ExpectColor(frame, 1, 1, {0, 0, 0});
 }
-
-TEST_P(AgainstReference, Gradients) {
-  const RenderOptions options = OptionsOf(GetParam());
-  Rng rng(13, 3);
-  const auto scene = GetParam().make(options.width, options.height, &rng);
-  const auto truth_scene = MeshCast<double>(scene);
-  const std::size_t pixels = static_cast<std::size_t>(options.width) * options.height;
-  std::vector<float> d_attributes(pixels * static_cast<std::size_t>(scene.channels));
-  std::vector<float> d_alpha(pixels);
-  for (float& d : d_attributes) d = static_cast<float>(rng.Uniform(-1, 1));
-  for (float& d : d_alpha) d = static_cast<float>(rng.Uniform(-1, 1));
-  const std::vector<double> td_attributes(d_attributes.begin(), d_attributes.end());
-  const std::vector<double> td_alpha(d_alpha.begin(), d_alpha.end());
-  for (const auto& target : RunnableTargets()) {
-    ASSERT_TRUE(ForceTarget(target).ok());
-    const Workers workers(2);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
-    ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
-    std::vector<float> positions(scene.positions.size()), attributes(scene.attributes.size());
-    SceneGradients d[] = {{positions, attributes, true, {}}};
-    ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d).ok());
-    std::vector<double> t_positions(positions.size()), t_attributes(attributes.size());
-    SceneGradientsT<double> t{t_positions, t_attributes, true, {}};
-    RenderRefBackward<double>(truth_scene.View(), options, frame.face_ids,
-                              {td_attributes, td_alpha}, {0, options.height}, &t);
-    const auto check = [&](const char* what, const auto& got, const auto& expected, double bound) {
-      const double scale = MaxAbs(expected);
-      for (std::size_t i = 0; i < std::size(got); ++i) {
-        EXPECT_NEAR(got[i], expected[i], bound * scale + 1e-6) << target << " " << what << " " << i;
-      }
-    };
-    const double bound = GradientTolerance(options);
-    check("positions", positions, t_positions, bound);
-    check("attributes", attributes, t_attributes, bound);
-    check("rotation", d[0].d_camera.rotation, t.d_camera.rotation, bound);
-    check("translation", d[0].d_camera.translation, t.d_camera.translation, bound);
-    const float lens[] = {d[0].d_camera.fx, d[0].d_camera.fy, d[0].d_camera.cx, d[0].d_camera.cy};
-    const double t_lens[] = {t.d_camera.fx, t.d_camera.fy, t.d_camera.cx, t.d_camera.cy};
-    check("lens", lens, t_lens, bound);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Scenes, AgainstReference, testing::ValuesIn(kCases),
-                         [](const auto& param) { return std::string(param.param.name); });
 
 }  // namespace
 }  // namespace tilegrad

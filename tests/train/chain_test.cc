@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "nn/nn.h"
-#include "train/step.h"
+#include "train/tasks/single_image/step.h"
 
 namespace tilegrad::train {
 namespace {

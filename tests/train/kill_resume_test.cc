@@ -16,8 +16,8 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
-#include "train/checkpoint.h"
-#include "train/run_log.h"
+#include "train/run/checkpoint.h"
+#include "train/run/log.h"
 
 namespace tilegrad::train {
 namespace {

@@ -12,9 +12,9 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
-#include "train/checkpoint.h"
-#include "train/run_log.h"
-#include "train/trained_models.h"
+#include "train/run/checkpoint.h"
+#include "train/run/log.h"
+#include "train/run/trained_models.h"
 
 namespace tilegrad::train {
 namespace {

@@ -7,9 +7,9 @@
 #define HWY_TARGET_INCLUDE "raster/soft_mask/soft_mask.cc"
 #include <hwy/foreach_target.h>  // must come before highway.h
 
-#include "raster/soft_mask/soft_mask_backward-inl.h"
-#include "raster/soft_mask/soft_mask_forward-inl.h"
-#include "raster/soft_mask/soft_mask_tree-inl.h"
+#include "raster/soft_mask/backward-inl.h"
+#include "raster/soft_mask/forward-inl.h"
+#include "raster/soft_mask/tree-inl.h"
 
 #if HWY_ONCE
 

@@ -17,8 +17,8 @@
 
 #include "base/aligned.h"
 #include "raster/bin.h"
-#include "raster/soft_mask/soft_mask_setup.h"
-#include "raster/soft_mask/soft_mask_tree.h"
+#include "raster/soft_mask/setup.h"
+#include "raster/soft_mask/tree.h"
 
 namespace tilegrad::raster {
 

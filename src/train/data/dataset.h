@@ -62,7 +62,7 @@ struct ModelData {
   // by the anti-aliased alpha).
   std::vector<std::uint8_t> images;
   // [32][32][32] as [x][y][z], 0 or 1: solid occupancy of the mesh scaled to fill the cube
-  // (train/metrics.h says the rule).
+  // (train/metrics/metrics.h says the rule).
   std::vector<std::uint8_t> occupancy;
   // kTruthPoints area-weighted samples of the surface; largest half-extent 0.45. Empty where the
   // source has no meshes ("nmr").

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/checkpoint.h"
+#include "train/run/checkpoint.h"
 #include "train/config.h"
 #include "train/models/mesh_network.h"
 

@@ -8,7 +8,7 @@
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/report/sections.h"
-#include "train/trained_models.h"
+#include "train/run/trained_models.h"
 
 namespace tilegrad::train {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "base/file.h"
 #include "train/config.h"
-#include "train/evaluate.h"
-#include "train/run_log.h"
+#include "train/eval/evaluate.h"
+#include "train/run/log.h"
 
 namespace tilegrad::train {
 

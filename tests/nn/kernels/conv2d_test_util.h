@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "nn/kernels/conv2d/conv2d_trial.h"
+#include "nn/kernels/conv2d/trial.h"
 #include "nn/kernels/kernel_test_util.h"
 
 namespace tilegrad::nn {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/kernels/conv2d/conv2d_winograd.h"
+#include "nn/kernels/conv2d/winograd.h"
 
 #include <gtest/gtest.h>
 

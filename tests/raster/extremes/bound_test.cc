@@ -15,8 +15,8 @@
 #include "base/simd_target.h"
 #include "raster/extremes/soft_scene.h"
 #include "raster/project.h"
-#include "render/frame_layout.h"
-#include "render/test_scenes.h"
+#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/test_scenes.h"
 
 namespace tilegrad::test {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/test_scenes.h"
+#include "render/pipeline/test_scenes.h"
 
 namespace tilegrad::test {
 

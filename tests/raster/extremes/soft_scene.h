@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "raster/soft_mask_test_util.h"
-#include "render/renderer.h"
+#include "raster/soft_mask/test_util.h"
+#include "render/pipeline/pipeline.h"
 
 namespace tilegrad::test {
 

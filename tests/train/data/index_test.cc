@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "io/npz.h"
-#include "train/data/build.h"
+#include "train/data/build/build.h"
 #include "train/data/temp_folder.h"
 
 namespace tilegrad::train {

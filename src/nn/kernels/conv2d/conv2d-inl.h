@@ -14,7 +14,7 @@
 #include <cstddef>
 
 #include "nn/kernels/conv2d/conv2d.h"
-#include "nn/kernels/conv2d/conv2d_product-inl.h"
+#include "nn/kernels/conv2d/product-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {

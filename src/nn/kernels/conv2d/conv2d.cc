@@ -6,12 +6,12 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 
 #include "nn/kernels/conv2d/conv2d-inl.h"
-#include "nn/kernels/conv2d/conv2d_weight_grad-inl.h"
+#include "nn/kernels/conv2d/weight_grad-inl.h"
 
 #if HWY_ONCE
 #include <algorithm>
 
-#include "nn/kernels/conv2d/conv2d_winograd.h"
+#include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/gemm.h"
 
 namespace tilegrad::nn {

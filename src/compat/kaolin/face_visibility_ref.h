@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// The truth of face_visibility.h: every face for every pixel.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "compat/kaolin/face_visibility.h"
+#include "raster/fragments.h"
+
+namespace tilegrad::raster {
+
+// Whether corners [3,2] cover the centre (px, py).
+template <class T>
+bool CoversCentre(const T* v, const T& px, const T& py) {
+  const auto [left, right] = std::minmax({v[0], v[2], v[4]});
+  const auto [bottom, top] = std::minmax({v[1], v[3], v[5]});
+  if (!(px >= left && px < right && py >= bottom && py < top)) return false;
+  const auto w = CornerAreas(v, px, py);
+  const T area = (w[0] + w[1]) + w[2];
+  if (!std::isfinite(area) || area == 0) return false;
+  return (w[0] >= 0 && w[1] >= 0 && w[2] >= 0) || (w[0] <= 0 && w[1] <= 0 && w[2] <= 0);
+}
+
+template <class T>
+std::int32_t FaceSeenRef(const ProjectedFacesT<T>& faces, const T& px, const T& py, const T& eps) {
+  T nearest = -std::numeric_limits<T>::infinity();
+  std::int32_t best = kNoFace;
+  for (std::size_t f = 0; f < faces.count(); ++f) {
+    if (!faces.is_valid(f) || !CoversCentre(faces.corners(f), px, py)) continue;
+    const auto w = ScreenWeights(faces.corners(f), px, py, eps);
+    const T* depth = faces.z.data() + 3 * f;
+    const T z = (w[0] * depth[0] + w[1] * depth[1]) + w[2] * depth[2];
+    if (z > nearest) nearest = z, best = static_cast<std::int32_t>(f);
+  }
+  return best;
+}
+
+// All rows.
+template <class T>
+std::vector<std::int32_t> FaceVisibilityRef(const ProjectedFacesT<T>& faces,
+                                            const PixelCentresT<T>& pixels, const T& eps) {
+  std::vector<std::int32_t> ids;
+  for (const T& y : pixels.y) {
+    for (std::size_t j = 0; j < pixels.width; ++j) {
+      ids.push_back(FaceSeenRef(faces, pixels.x[j], y, eps));
+    }
+  }
+  return ids;
+}
+
+}  // namespace tilegrad::raster

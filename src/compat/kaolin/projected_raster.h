@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Projected faces to images of interpolated features, and back (paper, equations 1 to 4). Same bits
+// for any number of workers.
+//
+// With b_k = W_k / S and r = S / (S + sign(S) eps), feature c of a pixel is I_c = r sum_k f_kc b_k.
+// b_k is linear in the position and db_k/dv_m = -b_m grad b_k, so the gradient of the corners
+// follows from that of the features, D_kc = dL/df_kc = sum over pixels of w_k dL/dI_c, alone:
+//
+//     dL/dv_m = -sum_c D_mc sum_k f_kc grad b_k + (sum_kc f_kc D_kc) / r dr/dS dS/dv_m
+//
+// The last term is that of eps: it is exact here, where other implementations leave it out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/parallel.h"
+#include "compat/projected/projected_batch.h"
+
+namespace tilegrad {
+
+struct ProjectedRasterOptions {
+  ImageSize size;      // pixels, 1..16384
+  double eps = 1e-14;  // NDC^2, >= 0: in the denominator of weights
+};
+
+// Which face each pixel shows: face_ids [N,H,W], -1 is background; and, where `channels` > 0, its
+// features [N,F,3,C] there, [N,H,W,C], 0 at background pixels. Errors name the array, the index and
+// what was expected.
+template <class T>
+Status RasterizeProjected(const ProjectedBatchT<T>& batch, const ProjectedRasterOptions& options,
+                          std::span<const T> features, std::size_t channels, const Workers& workers,
+                          std::span<std::int32_t> face_ids, std::span<T> image);
+
+// dL/d(image) in, gradients out; they are overwritten, and not computed where empty. Visibility is
+// held fixed, and z has no gradient. A gradient that overflows T is an error.
+template <class T>
+struct ProjectedRasterAdjoint {
+  std::span<const std::int32_t> face_ids;  // [N,H,W]
+  std::span<const T> d_image;              // [N,H,W,C]
+  std::span<T> d_xy;                       // [N,F,3,2]
+  std::span<T> d_features;                 // [N,F,3,C]
+};
+template <class T>
+Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
+                                  const ProjectedRasterOptions& options,
+                                  std::span<const T> features, std::size_t channels,
+                                  const Workers& workers, const ProjectedRasterAdjoint<T>& adjoint);
+
+}  // namespace tilegrad

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compat/nvdiffrast/antialias.h"
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "base/error.h"
+#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/edge_crossing.h"
+
+namespace tilegrad::deferred {
+namespace {
+
+// Pixel `to` takes `weight` of what `from` shows beyond itself. The pixels are those of the batch.
+struct Blend {
+  std::size_t to, from;
+  double weight, t;
+  double d_weight;  // d(weight)/dt
+  PixelStep step;
+  std::int32_t ends[2];  // vertices of the edge
+};
+
+// Two pixels next to each other, the one that shows the nearer face first.
+struct PixelPair {
+  std::size_t front, back;
+  PixelStep step;
+};
+
+struct PixelAt {
+  int x, y;
+};
+
+// The pair of a pixel and the next one along an axis, unless both show the same.
+template <class T>
+std::optional<PixelPair> PairAt(const AntialiasInput<T>& input, std::size_t pixel,
+                                const PixelAt& at, int axis) {
+  const std::size_t next = pixel + (axis == 0 ? 1 : input.grid.row());
+  const T* here = &input.rast[4 * pixel];
+  const T* there = &input.rast[4 * next];
+  if (here[3] == there[3]) return std::nullopt;
+  const std::int32_t face = FaceOf(here), other = FaceOf(there);
+  const bool forwards = other < 0 || (face >= 0 && here[2] <= there[2]);
+  const double scale[2] = {0.5 * input.grid.width, 0.5 * input.grid.height};
+  const int past = forwards ? 0 : 1;
+  const PixelCentre from =
+      CentreOf(input.grid, at.x + (axis == 0 ? past : 0), at.y + (axis == 1 ? past : 0));
+  return PixelPair{forwards ? pixel : next,
+                   forwards ? next : pixel,
+                   {from, axis, forwards ? 1 : -1, {scale[0], scale[1]}}};
+}
+
+template <class T>
+WayPoint<double> VertexOnWay(const AntialiasInput<T>& input, std::size_t image, std::int32_t vertex,
+                             const PixelStep& step) {
+  const T* p = input.positions.at(image, vertex);
+  const double point[4] = {static_cast<double>(p[0]), static_cast<double>(p[1]),
+                           static_cast<double>(p[2]), static_cast<double>(p[3])};
+  return PointOnWay(step, point);
+}
+
+// On which side of the line through a and b a face lies whose third corner is c: the sign. In
+// homogeneous coordinates, so that it holds for corners behind the eye.
+double SideOf(const WayPoint<double>& a, const WayPoint<double>& b, const WayPoint<double>& c) {
+  return (a.q * b.r - b.q * a.r) * c.w + (b.q * a.w - a.q * b.w) * c.r +
+         (a.r * b.w - b.r * a.w) * c.q;
+}
+
+// Whether no face of the edge's ring goes on beyond it, as side `side` of the mesh sees it.
+template <class T>
+bool IsSilhouette(const AntialiasInput<T>& input, std::size_t image, std::int32_t side,
+                  const PixelStep& step, const WayPoint<double> (&corner)[3], int k) {
+  const WayPoint<double>&a = corner[k], &b = corner[(k + 1) % 3];
+  const double own = SideOf(a, b, corner[(k + 2) % 3]);
+  const auto next = [&](std::int32_t s) { return input.rings->next[static_cast<std::size_t>(s)]; };
+  for (std::int32_t other = next(side); other != side; other = next(other)) {
+    const std::int32_t opposite =
+        input.faces[static_cast<std::size_t>(other - other % 3 + (other + 2) % 3)];
+    if (own * SideOf(a, b, VertexOnWay(input, image, opposite, step)) < 0) return false;
+  }
+  return true;
+}
+
+// What the edge that the nearer face of a pair ends at does to the two pixels.
+template <class T>
+std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
+                             const PixelPair& pair) {
+  const std::int32_t face = FaceOf(&input.rast[4 * pair.front]);
+  const std::int32_t* v = &input.faces[3 * static_cast<std::size_t>(face)];
+  WayPoint<double> corner[3];
+  for (int k = 0; k < 3; ++k) corner[k] = VertexOnWay(input, image, v[k], pair.step);
+  for (int k = 0; k < 3; ++k) {
+    double t;
+    const int n = (k + 1) % 3;
+    if (!CrossesWay(pair.step, corner[k], corner[n], &t)) continue;
+    if (!IsSilhouette(input, image, 3 * face + k, pair.step, corner, k)) continue;
+    const bool own = t < 0.5;
+    return Blend{own ? pair.front : pair.back,
+                 own ? pair.back : pair.front,
+                 own ? 0.5 - t : t - 0.5,
+                 t,
+                 own ? -1.0 : 1.0,
+                 pair.step,
+                 {v[k], v[n]}};
+  }
+  return std::nullopt;
+}
+
+using BlendLists = std::vector<std::vector<Blend>>;  // of bands
+
+template <class T>
+BlendLists FindBlends(const AntialiasInput<T>& input, const Workers& workers) {
+  const PixelGrid& grid = input.grid;
+  BlendLists out(grid.bands());
+  workers.For(grid.bands(), [&](std::size_t index, std::size_t) {
+    const Band band = grid.band(index);
+    for (int y = band.row_begin; y < band.row_end; ++y) {
+      for (int x = 0; x < grid.width; ++x) {
+        const std::size_t pixel = grid.first(band.image, y) + static_cast<std::size_t>(x);
+        for (int axis = 0; axis < 2; ++axis) {
+          if (axis == 0 ? x + 1 == grid.width : y + 1 == grid.height) continue;
+          const auto pair = PairAt(input, pixel, {x, y}, axis);
+          if (!pair.has_value()) continue;
+          if (const auto blend = BlendOf(input, band.image, *pair)) out[index].push_back(*blend);
+        }
+      }
+    }
+  });
+  return out;
+}
+
+// Calls visit(blend) for those of an image, in order.
+template <class Visit>
+void ForBlendsOf(const BlendLists& blends, const PixelGrid& grid, std::size_t image,
+                 const Visit& visit) {
+  const std::size_t count = grid.bands_of_image();
+  for (std::size_t b = image * count; b < (image + 1) * count; ++b) {
+    for (const Blend& blend : blends[b]) visit(blend);
+  }
+}
+
+template <class T>
+Status CheckInput(const AntialiasInput<T>& input) {
+  if (input.rings->next.size() != input.faces.size()) {
+    return InvalidArgument("the topology hash is that of {} triangles, but tri has {}",
+                           input.rings->next.size() / 3, input.faces.size() / 3);
+  }
+  TILEGRAD_TRY(CheckFaces(input.faces, input.positions.vertices));
+  return CheckFaceIds(input.rast, input.faces.size() / 3);
+}
+
+// dL/dt of a blend.
+template <class T>
+double PullCrossing(const AntialiasInput<T>& input, const Blend& blend, const T* d_out) {
+  const T* to = &input.color[blend.to * input.channels];
+  const T* from = &input.color[blend.from * input.channels];
+  double sum = 0;
+  for (std::size_t c = 0; c < input.channels; ++c) {
+    sum +=
+        static_cast<double>(d_out[c]) * (static_cast<double>(from[c]) - static_cast<double>(to[c]));
+  }
+  return sum * blend.d_weight;
+}
+
+template <class T>
+void PullEdge(const AntialiasInput<T>& input, std::size_t image, const Blend& blend, double d_t,
+              BandSums::Adder* adder) {
+  double d[2][4] = {};
+  CrossingAdjoint(blend.step, VertexOnWay(input, image, blend.ends[0], blend.step),
+                  VertexOnWay(input, image, blend.ends[1], blend.step), blend.t, d_t, d[0], d[1]);
+  for (int end = 0; end < 2; ++end) {
+    double* row = adder->Row(input.positions.row(image, blend.ends[end]));
+    for (int i = 0; i < 4; ++i) row[i] += d[end][i];
+  }
+}
+
+template <class T>
+void PullColor(const AntialiasInput<T>& input, const Blend& blend, const T* d_out,
+               std::span<T> d_color) {
+  for (std::size_t c = 0; c < input.channels; ++c) {
+    const T share = static_cast<T>(blend.weight) * d_out[c];
+    d_color[blend.to * input.channels + c] -= share;
+    d_color[blend.from * input.channels + c] += share;
+  }
+}
+
+}  // namespace
+
+template <class T>
+Status Antialias(const AntialiasInput<T>& input, const Workers& workers, std::span<T> out) {
+  TILEGRAD_TRY(CheckInput(input));
+  const BlendLists blends = FindBlends(input, workers);
+  std::copy(input.color.begin(), input.color.end(), out.begin());
+  workers.For(input.grid.images, [&](std::size_t image, std::size_t) {
+    ForBlendsOf(blends, input.grid, image, [&](const Blend& blend) {
+      for (std::size_t c = 0; c < input.channels; ++c) {
+        const T to = input.color[blend.to * input.channels + c];
+        const T from = input.color[blend.from * input.channels + c];
+        out[blend.to * input.channels + c] += static_cast<T>(blend.weight) * (from - to);
+      }
+    });
+  });
+  return {};
+}
+
+template <class T>
+Status AntialiasBackward(const AntialiasInput<T>& input, std::span<const T> d_out,
+                         const Workers& workers, const AntialiasGradients<T>& out) {
+  TILEGRAD_TRY(CheckInput(input));
+  const BlendLists blends = FindBlends(input, workers);
+  if (!out.d_color.empty()) std::copy(d_out.begin(), d_out.end(), out.d_color.begin());
+  BandSums sums(input.positions.rows(), 4, input.grid.images, workers);
+  workers.For(input.grid.images, [&](std::size_t image, std::size_t worker) {
+    BandSums::Adder adder(&sums, image, worker);
+    ForBlendsOf(blends, input.grid, image, [&](const Blend& blend) {
+      const T* d = &d_out[blend.to * input.channels];
+      if (!out.d_color.empty()) PullColor(input, blend, d, out.d_color);
+      if (out.d_positions.empty()) return;
+      PullEdge(input, image, blend, PullCrossing(input, blend, d), &adder);
+    });
+  });
+  if (out.d_positions.empty()) return {};
+  std::fill(out.d_positions.begin(), out.d_positions.end(), T(0));
+  sums.AddTo(out.d_positions, workers);
+  return {};
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                                   \
+  template Status Antialias(const AntialiasInput<T>&, const Workers&, std::span<T>);              \
+  template Status AntialiasBackward(const AntialiasInput<T>&, std::span<const T>, const Workers&, \
+                                    const AntialiasGradients<T>&);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad::deferred

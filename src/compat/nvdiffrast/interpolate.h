@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// The second of the deferred operations (rasterize.h): attributes of vertices over the pixels.
+//
+//     out_c = u a_0c + v a_1c + (1 - u - v) a_2c                 a_k: the attributes of corner k
+//     out_da = (dA/dX, dA/dY) of the selected channels A, by the chain rule from rast_db
+//
+// Zeros where rast names no face. Attributes have gradients, and so have u, v and rast_db.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/parallel.h"
+#include "compat/nvdiffrast/clip_mesh.h"
+#include "compat/nvdiffrast/pixel_grid.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::deferred {
+
+template <class T>
+struct InterpolateInput {
+  VertexRows<T> attributes;  // [N,V,A], or [V,A] for all images
+  FaceList faces;            // [F,3]
+  PixelGrid grid;
+  std::span<const T> rast, rast_db;          // [N,H,W,4] of rasterize; rast_db empty: no out_da
+  std::span<const std::int32_t> diff_attrs;  // [D] channels that out_da holds, each in [0, A)
+};
+
+template <class T>
+struct InterpolateOutput {
+  std::span<T> out;     // [N,H,W,A]
+  std::span<T> out_da;  // [N,H,W,2 D]
+};
+
+// Errors: an index outside of its array.
+template <class T>
+Status Interpolate(const InterpolateInput<T>& input, const Workers& workers,
+                   const InterpolateOutput<T>& out);
+
+template <class T>
+struct InterpolateCotangents {
+  std::span<const T> d_out, d_out_da;  // d_out_da may be empty
+};
+
+// Overwritten; what is empty is not computed.
+template <class T>
+struct InterpolateGradients {
+  std::span<T> d_attributes;       // [N,V,A] or [V,A]
+  std::span<T> d_rast, d_rast_db;  // [N,H,W,4]; d_rast in channels u and v only
+};
+
+template <class T>
+Status InterpolateBackward(const InterpolateInput<T>& input,
+                           const InterpolateCotangents<T>& cotangents, const Workers& workers,
+                           const InterpolateGradients<T>& out);
+
+}  // namespace tilegrad::deferred

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compat/nvdiffrast/mip.h"
+
+#include "base/error.h"
+
+namespace tilegrad::deferred {
+namespace {
+
+// How a level follows from the finer one: steps of 2, or 1 where a side is one texel.
+struct Halving {
+  std::size_t fine_row, fine_rows, coarse_row;  // numbers of a row; rows of a texture
+  std::size_t step_x, step_y, channels;
+
+  Halving(const MipSize& fine, std::size_t c)
+      : fine_row(static_cast<std::size_t>(fine.width) * c),
+        fine_rows(static_cast<std::size_t>(fine.height)),
+        step_x(fine.width > 1 ? 2 : 1),
+        step_y(fine.height > 1 ? 2 : 1),
+        channels(c) {
+    coarse_row = fine_row / step_x;
+  }
+  // Calls visit(coarse number, fine number, its neighbour to the right) for the numbers that belong
+  // together of one row of the coarse level, counted over all textures, and one of the fine rows
+  // that it is made of. Both fine numbers are the same where there is no neighbour.
+  template <class Visit>
+  void ForRow(std::size_t row, std::size_t fine, const Visit& visit) const {
+    const std::size_t rows = fine_rows / step_y;
+    std::size_t from = (row / rows * fine_rows + row % rows * step_y + fine) * fine_row;
+    const std::size_t beside = (step_x - 1) * channels, end = (row + 1) * coarse_row;
+    for (std::size_t to = row * coarse_row; to < end; from += beside) {
+      for (std::size_t c = 0; c < channels; ++c, ++to, ++from) visit(to, from, from + beside);
+    }
+  }
+};
+
+constexpr std::size_t kRowGrain = 16;
+
+}  // namespace
+
+Result<std::vector<MipSize>> MipSizes(const MipSize& base, int most) {
+  std::vector<MipSize> sizes = {base};
+  while (static_cast<int>(sizes.size()) != most + 1) {
+    const auto [height, width] = sizes.back();
+    if (height == 1 && width == 1) break;
+    if ((height > 1 && height % 2 != 0) || (width > 1 && width % 2 != 0)) {
+      return InvalidArgument(
+          "a texture of {} x {} texels cannot be halved below {} x {}: make its sides powers of "
+          "two, or set max_mip_level to {}",
+          base.height, base.width, height, width, sizes.size() - 1);
+    }
+    sizes.push_back({height > 1 ? height / 2 : 1, width > 1 ? width / 2 : 1});
+  }
+  return sizes;
+}
+
+template <class T>
+void HalveTexture(const TextureLevel<T>& fine, std::size_t channels, const Workers& workers,
+                  std::span<T> coarse) {
+  const Halving halving(fine.size, channels);
+  const T share = T(0.5) / static_cast<T>(halving.step_y);
+  const T* from = fine.texels.data();
+  T* to = coarse.data();
+  workers.ForRanges(coarse.size() / halving.coarse_row, kRowGrain,
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t row = begin; row < end; ++row) {
+                        halving.ForRow(row, 0, [&](std::size_t c, std::size_t a, std::size_t b) {
+                          to[c] = share * (from[a] + from[b]);
+                        });
+                        if (halving.step_y == 1) continue;
+                        halving.ForRow(row, 1, [&](std::size_t c, std::size_t a, std::size_t b) {
+                          to[c] += share * (from[a] + from[b]);
+                        });
+                      }
+                    });
+}
+
+template <class T>
+void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
+                          std::size_t channels, const Workers& workers, std::span<T> d_fine) {
+  const Halving halving(fine, channels);
+  const T share = T(0.5) / static_cast<T>(halving.step_y);
+  const T* from = d_coarse.texels.data();
+  T* to = d_fine.data();
+  const auto pull = [&](std::size_t c, std::size_t a, std::size_t b) {
+    to[a] += share * from[c], to[b] += share * from[c];
+  };
+  workers.ForRanges(d_coarse.texels.size() / halving.coarse_row, kRowGrain,
+                    [&](std::size_t begin, std::size_t end, std::size_t) {
+                      for (std::size_t row = begin; row < end; ++row) {
+                        for (std::size_t y = 0; y < halving.step_y; ++y) {
+                          halving.ForRow(row, y, pull);
+                        }
+                      }
+                    });
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                                  \
+  template void HalveTexture(const TextureLevel<T>&, std::size_t, const Workers&, std::span<T>); \
+  template void HalveTextureBackward(const TextureLevel<T>&, const MipSize&, std::size_t,        \
+                                     const Workers&, std::span<T>);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad::deferred

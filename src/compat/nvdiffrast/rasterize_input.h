@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the two passes of rasterize.h have in common.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "compat/nvdiffrast/barycentrics_ref.h"
+#include "compat/nvdiffrast/rasterize.h"
+#include "raster/fragments.h"
+
+namespace tilegrad::deferred {
+
+template <class T>
+Status CheckInput(const RasterizeInput<T>& input);
+
+template <class T>
+ClipCorners<double> CornersOf(const RasterizeInput<T>& input, std::size_t image,
+                              std::int32_t face) {
+  ClipCorners<double> out;
+  for (int k = 0; k < 3; ++k) {
+    const T* p = input.positions.at(image, input.faces[3 * static_cast<std::size_t>(face) + k]);
+    out.x[k] = static_cast<double>(p[0]), out.y[k] = static_cast<double>(p[1]);
+    out.z[k] = static_cast<double>(p[2]), out.w[k] = static_cast<double>(p[3]);
+  }
+  return out;
+}
+
+// The corners of the face at hand; pixels of a row mostly show one after the other.
+template <class T>
+class LastFace {
+ public:
+  LastFace(const RasterizeInput<T>& input, std::size_t image) : input_(input), image_(image) {}
+
+  const ClipCorners<double>& operator()(std::int32_t face) {
+    if (face != face_) corners_ = CornersOf(input_, image_, face), face_ = face;
+    return corners_;
+  }
+
+ private:
+  const RasterizeInput<T>& input_;
+  std::size_t image_;
+  std::int32_t face_ = raster::kNoFace;
+  ClipCorners<double> corners_;
+};
+
+}  // namespace tilegrad::deferred

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// The third of the deferred operations (rasterize.h): filtered lookups into textures and cube maps.
+//
+// Textures are [N|1,H,W,C], row 0 at t = 0: the texel in column j and row i has its centre at
+// s = (j + 0.5) / W, t = (i + 0.5) / H. Cube maps are [N|1,6,S,S,C], faces +x, -x, +y, -y, +z, -z
+// with the axes of OpenGL; a linear filter reaches over the edge to the next face, and at a corner,
+// where three faces meet, the missing texel is the mean of the other three.
+//
+// The level of the pyramid is that at which a texel is as large as the longer axis of the pixel's
+// footprint: with J = d(s W, t H)/d(X, Y), level = log2 of the largest singular value of J, plus
+// the bias, kept within the levels that exist. Where there is no footprint, the bias alone is the
+// level.
+//
+// Coordinates that are not finite, and the zero vector in a cube map, give zeros and pull nothing.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "base/parallel.h"
+#include "compat/nvdiffrast/mip.h"
+#include "compat/nvdiffrast/pixel_grid.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad::deferred {
+
+enum class TextureFilter {
+  kNearest,
+  kLinear,
+  kLinearMipmapNearest,  // linear within the nearest level
+  kLinearMipmapLinear,   // and between two levels
+};
+
+enum class TextureBoundary {
+  kWrap,   // the texture tiles the plane
+  kClamp,  // coordinates are kept within the centres of the outer texels
+  kZero,   // zeros all around
+  kCube,   // a cube map
+};
+
+template <class T>
+struct TextureInput {
+  // The finest first, as MipSizes says; one level if the filter needs no more.
+  std::span<const TextureLevel<T>> levels;
+  std::size_t textures = 1;  // 1: the same one for all images; or N
+  std::size_t channels = 0;
+  TextureFilter filter = TextureFilter::kLinear;
+  TextureBoundary boundary = TextureBoundary::kWrap;
+  PixelGrid grid;
+  std::span<const T> uv;              // [N,H,W,2], of a cube map [N,H,W,3]
+  std::span<const T> uv_da;           // [N,H,W,4|6] (ds/dX, ds/dY, dt/dX, ...), or empty
+  std::span<const T> mip_level_bias;  // [N,H,W], or empty
+
+  std::size_t coordinates() const { return boundary == TextureBoundary::kCube ? 3 : 2; }
+  std::size_t faces() const { return boundary == TextureBoundary::kCube ? 6 : 1; }
+};
+
+// out [N,H,W,C].
+template <class T>
+void SampleTexture(const TextureInput<T>& input, const Workers& workers, std::span<T> out);
+
+// Overwritten; what is empty is not computed.
+template <class T>
+struct TextureGradients {
+  std::span<const std::span<T>> d_levels;  // as the texels of the levels; empty, or one for each
+  std::span<T> d_uv, d_uv_da, d_mip_level_bias;
+};
+
+template <class T>
+void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_out,
+                           const Workers& workers, const TextureGradients<T>& out);
+
+}  // namespace tilegrad::deferred

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/config.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/rng.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr double kDeltaShare = 0.7;                    // of the run, until delta is what it ends at
+constexpr double kFinalPixels = 0.7;                   // of the default delta
+constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
+
+double FinalDelta(const FitConfig& config, ImageSize size) {
+  if (config.delta > 0) return config.delta;
+  const double ndc = kFinalPixels * 2 / std::max(size.width, size.height);
+  return ndc * ndc;
+}
+
+// The coarsest level that the sizes allow.
+int LevelsOf(const FitConfig& config, ImageSize size) {
+  int levels = 1;
+  while (levels < config.levels && size.width % (1 << levels) == 0 &&
+         size.height % (1 << levels) == 0) {
+    ++levels;
+  }
+  return levels;
+}
+
+}  // namespace
+
+std::string DescribeConfig(const FitConfig& c) {
+  std::string names;
+  for (const Parameter p : kParameters) {
+    if (c.parameters[p]) names += fmt::format("{}{}", names.empty() ? "" : ",", NameOf(p));
+  }
+  std::string out;
+  const auto line = [&out](const char* key, const auto& value) {
+    out += fmt::format("{} = {}\n", key, value);
+  };
+  line("parameters", names);
+  line("lighting", static_cast<int>(c.lighting));
+  line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
+  line("filter", static_cast<int>(c.filter));
+  line("template_level", c.template_level);
+  line("vertex_colors", c.vertex_colors);
+  line("texture_size", c.texture_size);
+  line("steps", c.steps);
+  line("views_per_step", c.views_per_step);
+  line("seed", c.seed);
+  line("levels", c.levels);
+  line("delta_start", c.delta_start);
+  line("delta", c.delta);
+  line("max_alpha_error", c.max_alpha_error);
+  line("rates", fmt::format("{}", fmt::join(c.rates.of, ",")));
+  line("final_rate", c.final_rate);
+  line("smoothing", c.smoothing);
+  line("color_weight", c.loss.color_weight);
+  line("silhouette_weight", c.loss.silhouette_weight);
+  line("color_region", static_cast<int>(c.loss.region));
+  line("silhouette_loss", static_cast<int>(c.loss.silhouette));
+  line("laplacian", c.regularizers.laplacian);
+  line("flatness", c.regularizers.flatness);
+  line("edge_length", c.regularizers.edge_length);
+  line("perturb_cameras", c.perturb_cameras);
+  return out;
+}
+
+FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size) {
+  const double t = static_cast<double>(step) / static_cast<double>(config.steps);
+  FitSchedule out;
+  const int levels = LevelsOf(config, size);
+  if (levels > 1 && t < 1 - kFullShare) out.factor = 2;
+  const double coarse = 1 - kFullShare - kHalfShare;
+  if (levels > 2 && t < coarse) {
+    // The coarser levels share what is left evenly.
+    const int left = static_cast<int>((coarse - t) / coarse * (levels - 2));
+    out.factor = 4 << std::min(left, levels - 3);
+  }
+  const double end = FinalDelta(config, size), start = std::max(config.delta_start, end);
+  out.delta = start * std::pow(end / start, std::min(1.0, t / kDeltaShare));
+  out.rate =
+      config.final_rate + (1 - config.final_rate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+  return out;
+}
+
+std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from) {
+  std::vector<int> views(from.begin(), from.end());
+  const std::size_t count = std::min(static_cast<std::size_t>(config.views_per_step), views.size());
+  Rng rng(config.seed, static_cast<std::uint64_t>(step));
+  for (std::size_t i = 0; i < count; ++i) {
+    std::swap(views[i], views[i + rng.Below(views.size() - i)]);
+  }
+  views.resize(count);
+  std::sort(views.begin(), views.end());
+  return views;
+}
+
+}  // namespace tilegrad::train

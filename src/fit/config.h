@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a fit does, apart from its input: plain defaults that work for a textured object in the
+// middle of masked images.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "fit/fitter.h"
+
+namespace tilegrad::train {
+
+struct FitConfig {
+  ParameterSet parameters;  // none: positions, and the texture or colours that the start has
+  Lighting lighting = Lighting::kNone;
+  std::array<float, 3> light_direction = {0.3f, 1.0f, 0.5f};  // towards it, world
+  shade::Filter filter = shade::Filter::kBilinear;
+
+  // The start, if no mesh is given.
+  int template_level = 4;      // subdivisions of the icosahedron: 4 has 2,562 vertices
+  bool vertex_colors = false;  // instead of a texture
+  int texture_size = 512;      // texels around; half of it from pole to pole
+
+  std::int64_t steps = 1000;
+  int views_per_step = 4;
+  std::uint64_t seed = 1;
+  int levels = 3;             // of resolution, each half of the next; the last is the images' own
+  double delta_start = 3e-3;  // of equation 5; falls geometrically to `delta` over 70 % of the run
+  double delta = 0;           // 0: 0.7 pixels of the whole image
+  double max_alpha_error = 1e-4;
+
+  LearningRates rates;       // positions and cameras' translation: times the object's radius
+  double final_rate = 0.05;  // of the first; rates fall by a half cosine
+  double smoothing = 10;
+  ImageLoss loss;
+  RegularizerTerms regularizers;
+  double perturb_cameras = 0;  // degrees, each by a random turn about the object: for experiments
+
+  std::int64_t checkpoint_every = 100;
+  int timelapse = 24;  // pictures; 0: none
+};
+
+// One line "key = value" for each that shapes the result; two runs with the same lines and input
+// do the same.
+std::string DescribeConfig(const FitConfig& config);
+
+// The state of the schedules at a step.
+struct FitSchedule {
+  int factor = 1;  // pixels of the images for a pixel of this step
+  double delta = 0, rate = 1;
+};
+// Levels that the sizes do not divide by are left out.
+FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size);
+
+// The views of a step: different ones, a pure function of seed and step.
+std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/figure2.h"
+
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "fit/pictures.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::array kOneView = {0};
+constexpr double kFinalRate = 0.005;  // of the first
+
+FitRenderer::Job JobOf(const Figure2Case& one, const Figure2Options& options) {
+  FitRenderer::Job job;
+  job.views = kOneView;
+  job.options.width = job.options.height = options.size;
+  job.options.delta = one.delta;
+  return job;
+}
+
+Result<TargetImages> RenderTarget(const Figure2Case& one, const FitRenderer::Job& job,
+                                  const Workers& workers, ImageU8* picture) {
+  FitRenderer renderer(workers);
+  TILEGRAD_TRY(renderer.Render(one.target, job));
+  *picture = OverWhite(renderer.frame(), 0);
+  return TargetImages{job.options.width, job.options.height, renderer.frame().color,
+                      renderer.frame().alpha};
+}
+
+// A half cosine from 1 to kFinalRate.
+double RateAt(int step, int steps) {
+  const double t = static_cast<double>(step) / steps;
+  return kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+}
+
+FitterOptions OptionsOf(const Figure2Case& one) {
+  FitterOptions options;
+  options.parameters[one.parameter] = true;
+  options.rates[one.parameter] = one.learning_rate;
+  options.smoothing = one.smoothing;
+  options.loss.region = ColorRegion::kEverywhere;
+  options.loss.silhouette = SilhouetteLoss::kL1;
+  return options;
+}
+
+// Steps, and the picture before the first and after the last.
+Status Descend(Fitter* fitter, FitStep step, int steps, Figure2Result* result) {
+  for (int i = 0; i < steps; ++i) {
+    step.rate_factor = RateAt(i, steps);
+    TILEGRAD_ASSIGN(const FitValues values, fitter->Step(step));
+    result->losses.push_back(values.image.total);
+    if (i == 0) result->start = OverWhite(fitter->frame(), 0);
+  }
+  TILEGRAD_ASSIGN(const FitValues last, fitter->Evaluate(step));
+  result->losses.push_back(last.image.total);
+  result->result = OverWhite(fitter->frame(), 0);
+  return {};
+}
+
+}  // namespace
+
+Result<Figure2Result> RunFigure2Case(const Figure2Case& one, const Figure2Options& options,
+                                     const Workers& workers) {
+  const auto began = std::chrono::steady_clock::now();
+  Figure2Result result;
+  result.label = one.label, result.what = one.what, result.model = one.model;
+  FitStep step;
+  step.views = kOneView, step.job = JobOf(one, options);
+  TILEGRAD_ASSIGN(const TargetImages target, RenderTarget(one, step.job, workers, &result.target));
+  step.targets = &target;
+  TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(one.start, OptionsOf(one), workers));
+  TILEGRAD_TRY(Descend(&fitter, step, options.steps, &result));
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return result;
+}
+
+Result<std::vector<Figure2Result>> RunFigure2(const Figure2Options& options, const Workers& workers,
+                                              const ProgressSink& progress, const StopFlag& stop) {
+  if (options.size < 8 || options.size > 2048 || options.steps < 1) {
+    return InvalidArgument("size is {} (8 to 2048 pixels), steps {} (1 or more)", options.size,
+                           options.steps);
+  }
+  const std::vector<Figure2Case> cases = Figure2Cases(options.size);
+  std::vector<Figure2Result> results;
+  for (const Figure2Case& one : cases) {
+    if (stop) return Cancelled("stopped; nothing was written");
+    if (progress) {
+      progress({"optimising", results.size(), cases.size(),
+                fmt::format("({}) {}, {}", one.label, one.what, one.model)});
+    }
+    auto result = RunFigure2Case(one, options, workers);
+    if (!result.ok()) return result.status().Within(fmt::format("({})", one.label));
+    results.push_back(std::move(*result));
+  }
+  return results;
+}
+
+}  // namespace tilegrad::train

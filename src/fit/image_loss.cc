@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/image_loss.h"
+
+#include <cmath>
+
+#include "train/losses/color_l1.h"
+#include "train/losses/iou.h"
+
+namespace tilegrad::train {
+namespace {
+
+// One image; color is [3,H,W].
+struct OneImage {
+  std::span<const float> truth, truth_alpha, color, alpha;
+  std::span<const std::int32_t> faces;
+  std::span<float> d_color, d_alpha;
+};
+
+// Mean of weight * |difference|; the gradient times `scale`.
+double WeightedL1(const OneImage& image, double scale) {
+  const std::size_t plane = image.faces.size();
+  const double step = scale / static_cast<double>(3 * plane);
+  double sum = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t p = 0; p < plane; ++p) {
+      const std::size_t i = c * plane + p;
+      const float weight = image.faces[p] >= 0 ? image.truth_alpha[p] : 0.0f;
+      const float gap = image.color[i] - image.truth[i];
+      sum += static_cast<double>(weight * std::abs(gap));
+      const float sign = gap > 0 ? 1.0f : gap < 0 ? -1.0f : 0.0f;
+      image.d_color[i] = static_cast<float>(step) * weight * sign;
+    }
+  }
+  return sum / static_cast<double>(3 * plane);
+}
+
+double MeanL1(std::span<const float> truth, std::span<const float> predicted, double scale,
+              std::span<float> d_predicted) {
+  const auto count = static_cast<double>(truth.size());
+  AbsoluteDifferenceBackward<float>(truth, predicted, scale / count, d_predicted);
+  return AbsoluteDifference<float>(truth, predicted) / count;
+}
+
+double Iou(const OneImage& image, double scale) {
+  const IouSums<float> sums(image.truth_alpha, image.alpha);
+  IouBackward<float>(sums, image.truth_alpha, scale, image.d_alpha);
+  return sums.loss();
+}
+
+ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double share) {
+  ImageLossValue value;
+  if (loss.color_weight > 0) {
+    const double scale = share * loss.color_weight;
+    value.color = loss.region == ColorRegion::kOnObject
+                      ? WeightedL1(image, scale)
+                      : MeanL1(image.truth, image.color, scale, image.d_color);
+  }
+  if (loss.silhouette_weight > 0) {
+    const double scale = share * loss.silhouette_weight;
+    value.silhouette = loss.silhouette == SilhouetteLoss::kIou
+                           ? Iou(image, scale)
+                           : MeanL1(image.truth_alpha, image.alpha, scale, image.d_alpha);
+  }
+  value.total = loss.color_weight * value.color + loss.silhouette_weight * value.silhouette;
+  return value;
+}
+
+}  // namespace
+
+ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages& targets,
+                                       std::span<const int> views, const ShadedFrame& frame,
+                                       const Workers& workers) {
+  const std::size_t plane = targets.pixels(), images = views.size();
+  d_color_.resize(loss.color_weight > 0 ? 3 * plane * images : 0);
+  d_alpha_.resize(loss.silhouette_weight > 0 ? plane * images : 0);
+  parts_.resize(images);
+  const double share = 1.0 / static_cast<double>(images);
+  workers.For(images, [&](std::size_t i, std::size_t) {
+    const auto v = static_cast<std::size_t>(views[i]);
+    const auto part = [&](auto& array, std::size_t n, std::size_t size) {
+      return array.empty() ? std::span(array) : std::span(array).subspan(n * size, size);
+    };
+    const OneImage image{part(targets.color, v, 3 * plane), part(targets.alpha, v, plane),
+                         part(frame.color, i, 3 * plane),   part(frame.alpha, i, plane),
+                         part(frame.face_ids, i, plane),    part(d_color_, i, 3 * plane),
+                         part(d_alpha_, i, plane)};
+    parts_[i] = EvaluateOne(loss, image, share);
+  });
+  ImageLossValue mean;
+  for (const ImageLossValue& p : parts_) {
+    mean.color += share * p.color, mean.silhouette += share * p.silhouette;
+    mean.total += share * p.total;
+  }
+  return mean;
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// What renders are held to, and how far they are from it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "base/parallel.h"
+#include "render/scene.h"
+
+namespace tilegrad::train {
+
+// N images of one size, planar.
+struct TargetImages {
+  int width = 0, height = 0;
+  AlignedVector<float> color;  // [N,3,H,W]
+  AlignedVector<float> alpha;  // [N,H,W] in [0, 1]
+
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
+};
+
+enum class ColorRegion {
+  kEverywhere,  // targets are 0 where there is nothing, as renders are
+  kOnObject,    // where a face is drawn, weighted by the target's alpha
+};
+enum class SilhouetteLoss { kL1, kIou };  // mean |difference|, or equation 12
+
+struct ImageLoss {
+  double color_weight = 1, silhouette_weight = 1;
+  ColorRegion region = ColorRegion::kOnObject;
+  SilhouetteLoss silhouette = SilhouetteLoss::kIou;
+};
+
+struct ImageLossValue {
+  double color = 0;       // L1: mean over pixels and channels of |difference|, unweighted
+  double silhouette = 0;  // unweighted
+  double total = 0;       // weighted
+};
+
+// Means over the views. Keeps its arrays: the same sizes allocate nothing.
+class ImageLossRule {
+ public:
+  // Image i of the frame is held to image views[i] of `targets`. Fills d_color and d_alpha with
+  // the gradient of the total.
+  ImageLossValue Evaluate(const ImageLoss& loss, const TargetImages& targets,
+                          std::span<const int> views, const ShadedFrame& frame,
+                          const Workers& workers);
+  const AlignedVector<float>& d_color() const { return d_color_; }
+  const AlignedVector<float>& d_alpha() const { return d_alpha_; }
+
+ private:
+  AlignedVector<float> d_color_, d_alpha_;
+  std::vector<ImageLossValue> parts_;  // of each view
+};
+
+}  // namespace tilegrad::train

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/make_views.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "base/error.h"
+#include "base/temporary_file.h"
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "render/picture/lit_renderer.h"
+#include "train/data/build/glass.h"
+#include "fit/transforms.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr float kHalfExtent = 0.45f;
+constexpr const char* kTrainName = "transforms_train.json";
+constexpr const char* kTestName = "transforms_test.json";
+constexpr const char* kTruthName = "truth.glb";
+
+Status Check(const ViewsOptions& o) {
+  if (o.views < 1 || o.held_out < 0 || o.views + o.held_out > 100000) {
+    return InvalidArgument("{} views and {} held out: needs 1 or more, and not over 100000 in all",
+                           o.views, o.held_out);
+  }
+  if (o.size < 8 || o.size > 4096) return InvalidArgument("size is {}, must be 8 to 4096", o.size);
+  if (!(o.distance > 0 && o.distance < 1e6)) {
+    return InvalidArgument("distance is {}, must be positive", o.distance);
+  }
+  if (!(o.fov_y > 0 && o.fov_y < 180)) {
+    return InvalidArgument("fov is {}, must be in (0, 180) degrees", o.fov_y);
+  }
+  if (!(o.lowest > -90 && o.lowest <= o.highest && o.highest < 90)) {
+    return InvalidArgument("elevations {} to {} must rise and be in (-90, 90) degrees", o.lowest,
+                           o.highest);
+  }
+  return {};
+}
+
+// Equal steps of height, golden angles around.
+Camera SpiralCamera(const ViewsOptions& o, int index) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const double low = std::sin(o.lowest / kDegrees), high = std::sin(o.highest / kDegrees);
+  const double height = low + (high - low) * (index + 0.5) / (o.views + o.held_out);
+  const double golden = 180 * (3 - std::sqrt(5.0));
+  return OrbitCamera({o.fov_y, o.size, o.size}, std::fmod(golden * index, 360),
+                     std::asin(height) * kDegrees, o.distance);
+}
+
+// Planar, colours times alpha -> interleaved, straight.
+ImageU8 Straight(const std::vector<std::uint8_t>& planar, int size) {
+  ImageU8 out(size, size, 4);
+  const std::size_t plane = planar.size() / 4;
+  for (std::size_t p = 0; p < plane; ++p) {
+    const int alpha = planar[3 * plane + p];
+    for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
+      out.pixels[4 * p + c] = static_cast<std::uint8_t>(
+          std::min(255, (255 * planar[c * plane + p] + alpha / 2) / alpha));
+    }
+    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
+  }
+  return out;
+}
+
+// Whether image `index` of all is held out: evenly spread.
+bool IsHeldOut(const ViewsOptions& o, int index) {
+  const int all = o.views + o.held_out;
+  return (index + 1) * o.held_out / all != index * o.held_out / all;
+}
+
+std::string ImageName(int index) { return fmt::format("images/{:03}.png", index); }
+
+// Those images beyond `count` that the files of cameras of an earlier call name as ours are named.
+std::vector<Path> EarlierImages(const Path& folder, int count) {
+  std::vector<Path> out;
+  for (const char* name : {kTrainName, kTestName}) {
+    const auto frames = ReadTransforms(folder / name);
+    if (!frames.ok()) continue;
+    for (const TransformsFrame& frame : *frames) {
+      const std::string stem = frame.image.stem().string();
+      int index = -1;
+      const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), index);
+      if (error != std::errc() || end != stem.data() + stem.size() || index < count) continue;
+      if (frame.image == folder / ImageName(index)) out.push_back(frame.image);
+    }
+  }
+  return out;
+}
+
+// Takes away the cameras that an earlier call left: views of another mesh that stay would be fitted
+// or judged by. Then its images that none of the `count` new ones will replace. What is somebody
+// else's is left alone; transforms.json is what a fit reads first.
+Status ClearEarlierViews(const Path& folder, int count) {
+  std::error_code error;
+  const bool ours = std::filesystem::exists(folder / kTruthName, error);
+  const std::vector<Path> images = ours ? EarlierImages(folder, count) : std::vector<Path>();
+  for (const char* name : {"transforms.json", kTrainName, kTestName}) {
+    const Path file = folder / name;
+    if (!std::filesystem::exists(file, error)) continue;
+    if (!ours || name == std::string_view("transforms.json")) {
+      return InvalidArgument(
+          "{}: already exists, and belongs to other images; choose another folder", file.string());
+    }
+    if (!std::filesystem::remove(file, error)) {
+      return IoError("{}: cannot be replaced: {}", file.string(), error.message());
+    }
+  }
+  for (const Path& image : images) std::filesystem::remove(image, error);
+  return {};
+}
+
+// What killed calls left of files that are whole now.
+void RemoveHalfWritten(const Path& folder, int count) {
+  const std::string names[] = {kTrainName, kTestName, kTruthName};
+  RemoveTemporaries(folder, names);
+  std::vector<std::string> images;
+  for (int i = 0; i < count; ++i) images.push_back(Path(ImageName(i)).filename().string());
+  RemoveTemporaries(folder / "images", images);
+}
+
+}  // namespace
+
+Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
+                 const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_TRY(Check(options));
+  RemoveGlass(&mesh);
+  TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
+  TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out));
+  TILEGRAD_TRY(io::SaveGlb(folder / kTruthName, mesh));
+  LitRenderer renderer;
+  std::vector<TransformsView> train, test;
+  const int all = options.views + options.held_out;
+  for (int i = 0; i < all; ++i) {
+    if (stop) return Cancelled("stopped; {} is not complete", folder.string());
+    const Camera camera = SpiralCamera(options, i);
+    TILEGRAD_ASSIGN(const auto planar, renderer.Render(mesh, {&camera, 1}, options.size));
+    const std::string name = ImageName(i);
+    TILEGRAD_TRY(io::SavePng(folder / name, Straight(planar, options.size)));
+    (IsHeldOut(options, i) ? test : train).push_back({name, camera});
+    if (progress) {
+      progress(
+          {"rendering", static_cast<std::uint64_t>(i + 1), static_cast<std::uint64_t>(all), ""});
+    }
+  }
+  const ImageSize size{options.size, options.size};
+  if (!test.empty()) {
+    TILEGRAD_TRY(WriteTextAtomic(folder / kTestName, WriteTransforms(test, size)));
+  }
+  TILEGRAD_TRY(WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size)));
+  RemoveHalfWritten(folder, all);
+  return {};
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between meshes of files and scenes that are fitted.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "base/error.h"
+#include "fit/scene.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Corners of one vertex with the same coordinates share them.
+void SetUvs(const Mesh& mesh, FitScene* scene) {
+  std::map<std::pair<std::int32_t, std::pair<float, float>>, std::int32_t> known;
+  for (std::size_t i = 0; i < mesh.corner_uvs.size(); ++i) {
+    const glm::vec2 uv = mesh.corner_uvs[i];
+    const std::int32_t vertex = mesh.faces[i / 3][i % 3];
+    const auto [at, added] =
+        known.try_emplace({vertex, {uv.x, uv.y}}, static_cast<std::int32_t>(scene->uvs.size() / 2));
+    if (added) scene->uvs.insert(scene->uvs.end(), {uv.x, uv.y});
+    scene->uv_indices.push_back(at->second);
+  }
+}
+
+glm::vec3 FactorOf(const Mesh& mesh) {
+  return mesh.materials.empty() ? glm::vec3(1) : glm::vec3(mesh.materials[0].base_color);
+}
+
+void SetTexture(const Mesh& mesh, FitScene* scene) {
+  const ImageU8& image =
+      mesh.textures[static_cast<std::size_t>(mesh.materials[0].base_color_texture)].image;
+  const glm::vec3 factor = FactorOf(mesh);
+  scene->texture = Image(image.width, image.height, 3);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        scene->texture.at(x, y)[c] = static_cast<float>(image.at(x, y)[c]) / 255 * factor[c];
+      }
+    }
+  }
+}
+
+void SetColors(const Mesh& mesh, bool textured, FitScene* scene) {
+  const glm::vec3 factor = textured ? glm::vec3(1) : FactorOf(mesh);
+  if (mesh.colors.empty() && textured) return;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const glm::vec3 own = mesh.colors.empty() ? glm::vec3(1) : glm::vec3(mesh.colors[v]);
+    for (int c = 0; c < 3; ++c) scene->colors.push_back(own[c] * factor[c]);
+  }
+}
+
+ImageU8 ToBytes(const Image& image) {
+  ImageU8 out(image.width, image.height, image.channels);
+  std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float v) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0f, 1.0f)));
+  });
+  return out;
+}
+
+}  // namespace
+
+Result<FitScene> SceneOfMesh(const Mesh& mesh) {
+  TILEGRAD_TRY(Validate(mesh));
+  if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
+  if (mesh.materials.size() > 1) {
+    return InvalidArgument("the mesh has {} materials; fitting handles one: join them first",
+                           mesh.materials.size());
+  }
+  FitScene scene;
+  for (const glm::vec3& p : mesh.positions) {
+    scene.positions.insert(scene.positions.end(), {p.x, p.y, p.z});
+  }
+  for (const Face& f : mesh.faces) scene.faces.insert(scene.faces.end(), f.begin(), f.end());
+  if (!mesh.corner_uvs.empty()) SetUvs(mesh, &scene);
+  const bool textured = !mesh.corner_uvs.empty() && !mesh.materials.empty() &&
+                        mesh.materials[0].base_color_texture >= 0;
+  if (textured) SetTexture(mesh, &scene);
+  SetColors(mesh, textured, &scene);
+  return scene;
+}
+
+Mesh MeshOfScene(const FitScene& scene) {
+  Mesh mesh;
+  for (std::size_t i = 0; i < scene.positions.size(); i += 3) {
+    mesh.positions.emplace_back(scene.positions[i], scene.positions[i + 1], scene.positions[i + 2]);
+  }
+  for (std::size_t i = 0; i < scene.faces.size(); i += 3) {
+    mesh.faces.push_back({scene.faces[i], scene.faces[i + 1], scene.faces[i + 2]});
+  }
+  for (std::size_t i = 0; i < scene.colors.size(); i += 3) {
+    mesh.colors.emplace_back(scene.colors[i], scene.colors[i + 1], scene.colors[i + 2], 1.0f);
+  }
+  if (scene.texture.empty()) return mesh;
+  for (const std::int32_t u : scene.uv_indices) {
+    const auto at = 2 * static_cast<std::size_t>(u);
+    mesh.corner_uvs.emplace_back(scene.uvs[at], scene.uvs[at + 1]);
+  }
+  mesh.textures.push_back({"fitted", ToBytes(scene.texture)});
+  mesh.materials.push_back({.name = "fitted", .base_color = glm::vec4(1), .base_color_texture = 0});
+  return mesh;
+}
+
+}  // namespace tilegrad::train

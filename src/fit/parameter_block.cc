@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/parameter_block.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "scene/camera_parameters.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr float kMostShininess = 1e5f;
+constexpr std::size_t kMaterialNumbers = 10, kCameraNumbers = 9;
+
+void PutCamera(const CameraParameters& p, float* to) {
+  std::copy(p.rotation.begin(), p.rotation.end(), to);
+  std::copy(p.translation.begin(), p.translation.end(), to + 6);
+}
+
+// Intrinsics stay those of `camera`.
+CameraParameters CameraOf(const Camera& camera, const float* from) {
+  CameraParameters p = ParametersOf(camera);
+  std::copy_n(from, 6, p.rotation.begin());
+  std::copy_n(from + 6, 3, p.translation.begin());
+  return p;
+}
+
+void PutSurface(const Surface& s, float* to) {
+  to = std::copy(s.ambient.begin(), s.ambient.end(), to);
+  to = std::copy(s.diffuse.begin(), s.diffuse.end(), to);
+  std::copy(s.specular.begin(), s.specular.end(), to);
+}
+
+void TakeSurface(const float* from, Surface* s) {
+  std::copy_n(from, 3, s->ambient.begin());
+  std::copy_n(from + 3, 3, s->diffuse.begin());
+  std::copy_n(from + 6, 3, s->specular.begin());
+  s->shininess = std::clamp(std::exp(from[9]) - 1, 0.0f, kMostShininess);
+}
+
+void PutMaterial(const Surface& s, float* to) {
+  PutSurface(s, to);
+  to[9] = std::log(s.shininess + 1);
+}
+
+template <class Numbers>
+void Put(const Numbers& from, AlignedVector<float>* to) {
+  to->assign(from.begin(), from.end());
+}
+
+void ReadValues(const FitScene& scene, ParameterBlock* block) {
+  AlignedVector<float>& x = block->values;
+  switch (block->what) {
+    case Parameter::kPositions:
+      return Put(scene.positions, &x);
+    case Parameter::kColors:
+      return Put(scene.colors, &x);
+    case Parameter::kTexture:
+      return Put(scene.texture.pixels, &x);
+    case Parameter::kUv:
+      return Put(scene.uvs, &x);
+    case Parameter::kSh:
+      return Put(scene.sh, &x);
+    case Parameter::kCamera:
+      x.resize(kCameraNumbers);
+      return PutCamera(ParametersOf(scene.cameras[static_cast<std::size_t>(block->view)]),
+                       x.data());
+    case Parameter::kLight:
+      x.resize(3 * scene.lights.size());
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = scene.lights[i / 3].direction[i % 3];
+      return;
+    case Parameter::kMaterial:
+      x.resize(kMaterialNumbers);
+      return PutMaterial(scene.surface, x.data());
+  }
+}
+
+void Clamp(float low, float high, AlignedVector<float>* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) (*values)[i] = std::clamp((*values)[i], low, high);
+}
+
+Status WriteCamera(const ParameterBlock& block, FitScene* scene) {
+  Camera& camera = scene->cameras[static_cast<std::size_t>(block.view)];
+  auto moved = CameraFromParameters(CameraOf(camera, block.values.data()), camera.near_plane);
+  if (!moved.ok()) return moved.status().Within(fmt::format("camera {}", block.view));
+  camera = *moved;
+  return {};
+}
+
+}  // namespace
+
+std::string ParameterBlock::name() const {
+  return view < 0 ? NameOf(what) : fmt::format("{}/{}", NameOf(what), view);
+}
+
+ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate, int view) {
+  ParameterBlock block;
+  block.what = what, block.learning_rate = learning_rate, block.view = view;
+  ReadValues(scene, &block);
+  for (auto* array : {&block.gradient, &block.m, &block.v}) array->resize(block.values.size());
+  return block;
+}
+
+Status WriteBlock(ParameterBlock* block, FitScene* scene) {
+  AlignedVector<float>& x = block->values;
+  const auto copy = [&](auto to) { std::copy(x.begin(), x.end(), to); };
+  switch (block->what) {
+    case Parameter::kPositions:
+      copy(scene->positions.begin());
+      break;
+    case Parameter::kColors:
+      Clamp(0, 1, &x, x.size()), copy(scene->colors.begin());
+      break;
+    case Parameter::kTexture:
+      Clamp(0, 1, &x, x.size()), copy(scene->texture.pixels.begin());
+      break;
+    case Parameter::kUv:
+      copy(scene->uvs.begin());
+      break;
+    case Parameter::kSh:
+      copy(scene->sh.begin());
+      break;
+    case Parameter::kLight:
+      for (std::size_t i = 0; i < x.size(); ++i) scene->lights[i / 3].direction[i % 3] = x[i];
+      break;
+    case Parameter::kMaterial:
+      Clamp(0, std::log(kMostShininess), &x, x.size());
+      TakeSurface(x.data(), &scene->surface);
+      break;
+    case Parameter::kCamera:
+      return WriteCamera(*block, scene);
+  }
+  return {};
+}
+
+void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t rendered,
+               ParameterBlock* block) {
+  AlignedVector<float>& d = block->gradient;
+  switch (block->what) {
+    case Parameter::kPositions:
+      return Put(gradients.positions, &d);
+    case Parameter::kColors:
+      return Put(gradients.colors, &d);
+    case Parameter::kTexture:
+      return Put(gradients.texture, &d);
+    case Parameter::kUv:
+      return Put(gradients.uvs, &d);
+    case Parameter::kSh:
+      return Put(gradients.sh, &d);
+    case Parameter::kLight:
+      for (std::size_t i = 0; i < d.size(); ++i) d[i] = gradients.lights[i / 3].direction[i % 3];
+      return;
+    case Parameter::kMaterial:
+      PutSurface(gradients.surface, d.data());
+      d[9] = gradients.surface.shininess * (scene.surface.shininess + 1);
+      return;
+    case Parameter::kCamera: {
+      CameraParameters d_camera;
+      PullBack(CameraOf(scene.cameras[static_cast<std::size_t>(block->view)], block->values.data()),
+               gradients.cameras[rendered], &d_camera);
+      return PutCamera(d_camera, d.data());
+    }
+  }
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// One array of numbers of a scene as an optimiser sees it: values without constraints, their
+// gradient, and Adam's moments.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/aligned.h"
+#include "fit/scene.h"
+
+namespace tilegrad::train {
+
+struct ParameterBlock {
+  Parameter what = Parameter::kPositions;
+  int view = -1;             // of kCamera: each camera is a block of its own
+  double learning_rate = 0;  // in the values' units
+  AlignedVector<float> values, gradient, m, v;
+  std::int64_t steps = 0;  // taken so far
+
+  std::string name() const;  // "positions", "camera/3"
+};
+
+// kPositions, kColors, kTexture, kUv: as they are. kCamera: the six numbers of rotation, then the
+// translation (scene/camera_parameters.h). kLight: directions. kMaterial: ambient, diffuse,
+// specular, and the logarithm of shininess + 1.
+ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate,
+                         int view = -1);
+
+// From the block into the scene. Colours and texels are held to [0, 1], materials to >= 0, in the
+// block too. Writing twice changes nothing. An error if a camera has lost its rotation.
+Status WriteBlock(ParameterBlock* block, FitScene* scene);
+
+// block->gradient from what the renderer gave; of kCamera, from entry `rendered` of its cameras.
+void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t rendered,
+               ParameterBlock* block);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// A fit from start, or from where it stopped, to its end.
+//
+//   <out>/mesh.glb                the fitted mesh with its texture or colours
+//   <out>/transforms_fitted.json  the cameras of all views, as they are at the end
+//   <out>/report.html             pictures, scores, curves
+//   <out>/timelapse/, timelapse.png
+//   <out>/metrics.jsonl, tensorboard/, checkpoints/
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "fit/doctor.h"
+#include "fit/config.h"
+#include "fit/input.h"
+#include "fit/score.h"
+
+namespace tilegrad::train {
+
+struct FitJob {
+  FitConfig config;
+  FitInput input;
+  std::optional<Mesh> start;  // none: a sphere about as large as the object
+  std::optional<Mesh> truth;  // to compare with
+  Path out;
+  bool resume = false;         // goes on from the newest whole checkpoint; starts if there is none
+  WarningSink warn = nullptr;  // broken checkpoints that were passed over
+};
+
+struct FitOutcome {
+  std::int64_t first_step = 0, last_step = 0;
+  double seconds = 0;             // of all sessions, with checkpoints and timelapse
+  FitValues last;                 // of the last step taken
+  std::vector<Finding> findings;  // of the doctor, at the start
+  std::vector<ViewScore> training, held_out;
+  std::optional<double> voxel_iou;  // at 32 voxels a side, where a truth is known
+  std::optional<double> camera_error_before, camera_error_after;  // degrees, means; if perturbed
+};
+
+// Saves before it returns, also when asked to stop (then kCancelled, with how to go on). A resumed
+// fit ends in the bits of one that was not interrupted, for any number of workers. Errors say what
+// in the configuration or the input does not fit.
+Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
+                          const StopFlag& stop);
+
+// The doctor alone, on all training views at the first step.
+Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers);
+
+// The scene that a job starts from, and what its steps need.
+struct FitStart {
+  FitScene scene;
+  FitterOptions options;
+};
+Result<FitStart> PrepareFit(const FitJob& job);
+
+// What shapes the result, as DescribeConfig says it, and the input's size.
+std::string DescribeJob(const FitJob& job);
+
+// Means over views; 0 for none.
+double MeanPsnr(std::span<const ViewScore> scores);
+double MeanIou(std::span<const ViewScore> scores);
+
+// The page. `sheet` is the timelapse in one picture, or empty.
+Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const ImageU8& sheet);
+
+}  // namespace tilegrad::train

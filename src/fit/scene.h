@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scene that fitting changes: everything that pictures of one object depend on, in arrays that
+// an optimiser may write, and its renderer.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "render/renderer.h"
+#include "scene/image.h"
+#include "scene/mesh.h"
+
+namespace tilegrad::train {
+
+// V vertices, F faces, U texture coordinates. What is empty is not there.
+struct FitScene {
+  std::vector<float> positions;          // [V,3] world
+  std::vector<std::int32_t> faces;       // [F,3]
+  std::vector<float> colors;             // [V,3]
+  std::vector<float> uvs;                // [U,2]
+  std::vector<std::int32_t> uv_indices;  // [F,3]: corners that share one move together
+  Image texture;                         // of 3 channels
+  shade::Filter filter = shade::Filter::kBilinear;
+  shade::Wrap wrap = shade::Wrap::kRepeat;
+  Surface surface;  // of the whole mesh; read under Lambert and Phong light
+  std::vector<shade::DirectionalLight> lights;
+  std::array<float, 9> sh = {};
+  ShadingModel model;
+  std::vector<Camera> cameras;  // one for each view
+
+  std::size_t vertices() const { return positions.size() / 3; }
+  bool uses_lights() const {
+    return model.lighting == Lighting::kLambert || model.lighting == Lighting::kPhong;
+  }
+};
+
+// What can be fitted.
+enum class Parameter { kPositions, kColors, kTexture, kUv, kCamera, kLight, kSh, kMaterial };
+inline constexpr std::array kParameters = {
+    Parameter::kPositions, Parameter::kColors, Parameter::kTexture, Parameter::kUv,
+    Parameter::kCamera,    Parameter::kLight,  Parameter::kSh,      Parameter::kMaterial};
+const char* NameOf(Parameter parameter);  // "positions", ..., as on the command line
+
+struct ParameterSet {
+  std::array<bool, kParameters.size()> has = {};
+  bool operator[](Parameter p) const { return has[static_cast<std::size_t>(p)]; }
+  bool& operator[](Parameter p) { return has[static_cast<std::size_t>(p)]; }
+  bool empty() const;
+};
+
+// Which of them no image depends on, and why, in a sentence without the name; "" for the others.
+std::string WhyExcluded(const FitScene& scene, Parameter parameter);
+
+// dL/d(FitScene), of the shapes there. Cameras are those of the views that were rendered, in their
+// order. What is not wanted is left as it is.
+struct FitGradients {
+  AlignedVector<float> positions, colors, uvs, texture;
+  Surface surface;
+  std::vector<shade::DirectionalLight> lights;
+  std::array<float, 9> sh = {};
+  std::vector<Camera> cameras;
+};
+
+// Renders views of a scene, and takes gradients of images back. Allocates nothing once it has seen
+// the sizes. One call at a time.
+class FitRenderer {
+ public:
+  explicit FitRenderer(const Workers& workers) : renderer_(workers) {}
+
+  // `scale`: pixels of the images wanted for a pixel of the cameras. `views` index into
+  // scene.cameras.
+  struct Job {
+    std::span<const int> views;
+    float scale = 1;
+    RenderOptions options;
+    bool alpha = true;
+  };
+  Status Render(const FitScene& scene, const Job& job);
+  const ShadedFrame& frame() const { return frame_; }
+
+  // `scene` and `job` as in the last Render; d_frame in the shapes of its frame.
+  Status Backward(const FitScene& scene, const Job& job, const ShadedFrameGradients& d_frame,
+                  const ParameterSet& wanted, FitGradients* gradients);
+
+ private:
+  void SetScenes(const FitScene& scene, const Job& job);
+  void SetGradients(const FitScene& scene, const ParameterSet& wanted, FitGradients* gradients);
+  void GatherUvs(const FitScene& scene, FitGradients* gradients) const;
+
+  ShadedRenderer renderer_;
+  ShadedFrame frame_;
+  std::vector<ShadedScene> scenes_;
+  std::vector<ShadedGradients> d_scenes_;
+  AlignedVector<float> corner_uvs_, d_corner_uvs_;  // [F,3,2]
+  shade::TextureView texture_;
+  Surface surface_;
+  std::span<float> d_texture_;
+};
+
+// The camera of an image that has `scale` times as many pixels.
+Camera ScaledCamera(Camera camera, float scale);
+
+// A mesh with its first texture or its vertex colours, and back. Materials' factors are multiplied
+// into colours. An error says what a FitScene cannot hold: several textures, say.
+Result<FitScene> SceneOfMesh(const Mesh& mesh);
+Mesh MeshOfScene(const FitScene& scene);
+
+}  // namespace tilegrad::train

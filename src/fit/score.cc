@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSamples = 3;  // a side of a pixel
+constexpr double kBestPsnr = 99;
+
+// Means of samples, over white; alpha is the covered share.
+void Resolve(const ShadedFrame& frame, ImageSize size, Image* rgb, std::vector<float>* alpha) {
+  *rgb = Image(size.width, size.height, 3);
+  alpha->assign(rgb->pixels.size() / 3, 0.0f);
+  const auto wide = static_cast<std::size_t>(frame.width);
+  const std::size_t plane = wide * static_cast<std::size_t>(frame.height);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const auto pixel = static_cast<std::size_t>(y * size.width + x);
+      for (int s = 0; s < kSamples * kSamples; ++s) {
+        const std::size_t p = static_cast<std::size_t>(y * kSamples + s / kSamples) * wide +
+                              static_cast<std::size_t>(x * kSamples + s % kSamples);
+        const bool drawn = frame.face_ids[p] >= 0;
+        (*alpha)[pixel] += drawn ? 1.0f / (kSamples * kSamples) : 0.0f;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const float value = drawn ? std::clamp(frame.color[c * plane + p], 0.0f, 1.0f) : 1.0f;
+          rgb->pixels[3 * pixel + c] += value / (kSamples * kSamples);
+        }
+      }
+    }
+  }
+}
+
+Image TruthOverWhite(const TargetImages& images, std::size_t view) {
+  Image out(images.width, images.height, 3);
+  const std::size_t plane = images.pixels();
+  for (std::size_t p = 0; p < plane; ++p) {
+    const float alpha = images.alpha[view * plane + p];
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.pixels[3 * p + c] = alpha * images.color[(3 * view + c) * plane + p] + 1 - alpha;
+    }
+  }
+  return out;
+}
+
+double Psnr(const Image& a, const Image& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    const double gap = static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]);
+    sum += gap * gap;
+  }
+  const double mean = sum / static_cast<double>(a.pixels.size());
+  return mean > 0 ? std::min(kBestPsnr, -10 * std::log10(mean)) : kBestPsnr;
+}
+
+double Iou(std::span<const float> a, std::span<const float> b) {
+  double both = 0, either = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    both += static_cast<double>(a[i] * b[i]);
+    either += static_cast<double>(a[i] + b[i] - a[i] * b[i]);
+  }
+  return either > 0 ? both / either : 1;
+}
+
+ImageU8 ToBytes(const Image& image) {
+  ImageU8 out(image.width, image.height, image.channels);
+  std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float v) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0f, 1.0f)));
+  });
+  return out;
+}
+
+// glm is column-major, cameras are row-major.
+glm::dmat3 RotationOf(const Camera& camera) {
+  glm::dmat3 m;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) m[c][r] = static_cast<double>(camera.rotation[3 * r + c]);
+  }
+  return m;
+}
+
+glm::dvec3 TranslationOf(const Camera& c) {
+  return {c.translation[0], c.translation[1], c.translation[2]};
+}
+
+glm::dvec3 CentreOf(const Camera& camera) {
+  return -(glm::transpose(RotationOf(camera)) * TranslationOf(camera));
+}
+
+// The rotation nearest to m, by Newton's iteration for the polar decomposition.
+glm::dmat3 NearestRotation(glm::dmat3 m) {
+  for (int i = 0; i < 60; ++i) m = 0.5 * (m + glm::inverse(glm::transpose(m)));
+  return m;
+}
+
+glm::dmat3 MatrixOf(const Alignment& a) {
+  glm::dmat3 m;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) m[c][r] = a.rotation[3 * r + c];
+  }
+  return m;
+}
+
+}  // namespace
+
+Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
+                                          std::span<const int> views,
+                                          std::span<const Camera> cameras, const Workers& workers) {
+  FitScene seen = scene;
+  seen.cameras.assign(cameras.begin(), cameras.end());
+  FitRenderer renderer(workers);
+  const ImageSize size{input.images.width, input.images.height};
+  std::vector<ViewScore> scores;
+  for (int i = 0; i < static_cast<int>(views.size()); ++i) {
+    FitRenderer::Job job;
+    job.views = {&i, 1};
+    job.scale = kSamples, job.alpha = false;
+    job.options.width = kSamples * size.width, job.options.height = kSamples * size.height;
+    TILEGRAD_TRY(renderer.Render(seen, job));
+    ViewScore score;
+    score.view = views[static_cast<std::size_t>(i)];
+    const auto view = static_cast<std::size_t>(score.view);
+    Image rendered;
+    std::vector<float> alpha;
+    Resolve(renderer.frame(), size, &rendered, &alpha);
+    const Image truth = TruthOverWhite(input.images, view);
+    score.psnr = Psnr(truth, rendered);
+    const std::size_t plane = input.images.pixels();
+    score.iou = Iou(alpha, std::span(input.images.alpha).subspan(view * plane, plane));
+    score.truth = ToBytes(truth), score.rendered = ToBytes(rendered);
+    scores.push_back(std::move(score));
+  }
+  return scores;
+}
+
+Alignment AlignCameras(std::span<const Camera> from, std::span<const Camera> to) {
+  glm::dmat3 sum(0);
+  glm::dvec3 mean_from(0), mean_to(0);
+  const auto n = static_cast<double>(from.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    sum += glm::transpose(RotationOf(to[i])) * RotationOf(from[i]);
+    mean_from += CentreOf(from[i]) / n, mean_to += CentreOf(to[i]) / n;
+  }
+  const glm::dmat3 rotation = NearestRotation(sum);
+  double along = 0, square = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const glm::dvec3 a = rotation * (CentreOf(from[i]) - mean_from), b = CentreOf(to[i]) - mean_to;
+    along += glm::dot(a, b), square += glm::dot(a, a);
+  }
+  Alignment out;
+  if (square > 0 && along > 0) out.scale = along / square;
+  const glm::dvec3 offset = mean_to - out.scale * (rotation * mean_from);
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) out.rotation[3 * r + c] = rotation[c][r];
+    out.offset[r] = offset[r];
+  }
+  return out;
+}
+
+Camera Moved(const Camera& camera, const Alignment& a) {
+  // s (R p + t) = (R Q^T)(s Q p + b) + s t - R Q^T b
+  const glm::dmat3 r = RotationOf(camera) * glm::transpose(MatrixOf(a));
+  const glm::dvec3 t =
+      a.scale * TranslationOf(camera) - r * glm::dvec3(a.offset[0], a.offset[1], a.offset[2]);
+  Camera out = camera;
+  for (int i = 0; i < 3; ++i) {
+    for (int c = 0; c < 3; ++c) out.rotation[3 * i + c] = static_cast<float>(r[c][i]);
+    out.translation[i] = static_cast<float>(t[i]);
+  }
+  return out;
+}
+
+void Move(const Alignment& a, std::vector<float>* positions) {
+  const glm::dmat3 q = MatrixOf(a);
+  for (std::size_t i = 0; i < positions->size(); i += 3) {
+    float* p = positions->data() + i;
+    const glm::dvec3 moved = a.scale * (q * glm::dvec3(p[0], p[1], p[2])) +
+                             glm::dvec3(a.offset[0], a.offset[1], a.offset[2]);
+    for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(moved[c]);
+  }
+}
+
+double AngleBetween(const Camera& a, const Camera& b) {
+  const glm::dmat3 turn = glm::transpose(RotationOf(a)) * RotationOf(b);
+  const double cosine = 0.5 * (turn[0][0] + turn[1][1] + turn[2][2] - 1);
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// How good a fit is.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fit/input.h"
+#include "fit/scene.h"
+
+namespace tilegrad::train {
+
+struct ViewScore {
+  int view = 0;
+  double psnr = 0;  // dB over the whole image, both over white; 3 x 3 samples a pixel
+  double iou = 0;   // of the silhouettes
+  ImageU8 truth, rendered;
+};
+
+// Views of the input rendered from `cameras` (one for each of `views`).
+Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
+                                          std::span<const int> views,
+                                          std::span<const Camera> cameras, const Workers& workers);
+
+// The similarity p' = scale * rotation * p + offset that brings cameras `from` to stand and look
+// like `to` as well as possible: rotation from their axes, the rest from their centres. Refined
+// cameras fix a scene only up to it.
+struct Alignment {
+  double scale = 1;
+  double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major
+  double offset[3] = {0, 0, 0};
+};
+Alignment AlignCameras(std::span<const Camera> from, std::span<const Camera> to);
+// The camera that sees a world moved by `a` as `camera` sees the world.
+Camera Moved(const Camera& camera, const Alignment& a);
+void Move(const Alignment& a, std::vector<float>* positions);
+// Degrees between the two cameras' orientations.
+double AngleBetween(const Camera& a, const Camera& b);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a job to the scene that its fit starts with.
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/hash.h"
+#include "base/rng.h"
+#include "scene/shapes.h"
+#include "fit/run.h"
+#include "fit/sphere_uv.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr float kGrey = 0.5f;                 // what is to be coloured
+constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
+
+Status CheckRange(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return {};
+  return InvalidArgument("{} is {}, must be in [{}, {}]", name, value, low, high);
+}
+
+Status CheckConfig(const FitConfig& c) {
+  TILEGRAD_TRY(CheckRange("steps", static_cast<double>(c.steps), 1, 1e7));
+  TILEGRAD_TRY(CheckRange("views_per_step", c.views_per_step, 1, 1e6));
+  TILEGRAD_TRY(CheckRange("levels", c.levels, 1, 8));
+  TILEGRAD_TRY(CheckRange("template_level", c.template_level, 0, 7));
+  TILEGRAD_TRY(CheckRange("texture_size", c.texture_size, 2, 8192));
+  TILEGRAD_TRY(CheckRange("delta_start", c.delta_start, 1e-9, 1e3));
+  TILEGRAD_TRY(CheckRange("delta", c.delta, 0, 1e3));
+  TILEGRAD_TRY(CheckRange("smoothing", c.smoothing, 0, 1e4));
+  TILEGRAD_TRY(CheckRange("color_weight", c.loss.color_weight, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("silhouette_weight", c.loss.silhouette_weight, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("laplacian", c.regularizers.laplacian, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("flatness", c.regularizers.flatness, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("edge_length", c.regularizers.edge_length, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("perturb_cameras", c.perturb_cameras, 0, 180));
+  TILEGRAD_TRY(CheckRange("timelapse", c.timelapse, 0, 1e6));
+  TILEGRAD_TRY(CheckRange("checkpoint_every", static_cast<double>(c.checkpoint_every), 1, 1e9));
+  if (c.loss.color_weight + c.loss.silhouette_weight == 0) {
+    return InvalidArgument("both weights, of colour and silhouette, are 0: nothing is left to fit");
+  }
+  const auto& d = c.light_direction;
+  if (!(std::isfinite(d[0]) && std::isfinite(d[1]) && std::isfinite(d[2])) ||
+      (d[0] == 0 && d[1] == 0 && d[2] == 0)) {
+    return InvalidArgument("light_direction is {} {} {}, must be finite and not 0 0 0", d[0], d[1],
+                           d[2]);
+  }
+  return {};
+}
+
+// The masks are what positions and cameras are fitted by.
+Status CheckMasks(const FitJob& job) {
+  if (job.input.masked || job.config.loss.silhouette_weight == 0) return {};
+  return InvalidArgument(
+      "no image has an alpha channel or a mask, so it is not known where the object is: add masks "
+      "(\"mask_path\" in transforms.json), or fit colours only with a silhouette weight of 0");
+}
+
+void SetBlankTexture(int size, FitScene* scene) {
+  scene->texture = Image(size, std::max(1, size / 2), 3, kGrey);
+  scene->colors.clear();
+}
+
+Result<FitScene> SphereScene(const FitJob& job) {
+  TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(job.input));
+  const Mesh unit = Icosphere(job.config.template_level, 1);
+  Mesh mesh = unit;
+  for (glm::vec3& p : mesh.positions) p = sphere.centre + sphere.radius * p;
+  TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(mesh));
+  std::fill(scene.colors.begin(), scene.colors.end(), kGrey);
+  if (!job.config.vertex_colors) {
+    SetSphereUv(unit, &scene);
+    SetBlankTexture(job.config.texture_size, &scene);
+  }
+  return scene;
+}
+
+Result<FitScene> MeshScene(const FitJob& job) {
+  TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(*job.start));
+  const bool wants_texture =
+      job.config.parameters[Parameter::kTexture] || job.config.parameters[Parameter::kUv];
+  if (!wants_texture || !scene.texture.empty()) return scene;
+  if (scene.uvs.empty()) {
+    return InvalidArgument(
+        "the mesh has no texture coordinates, so it cannot get a texture: fit \"colors\" instead");
+  }
+  SetBlankTexture(job.config.texture_size, &scene);
+  return scene;
+}
+
+struct Bounds {
+  glm::vec3 low{HUGE_VALF}, high{-HUGE_VALF};
+};
+Bounds BoundsOf(const FitScene& scene) {
+  Bounds box;
+  for (std::size_t i = 0; i < scene.positions.size(); i += 3) {
+    const glm::vec3 p(scene.positions[i], scene.positions[i + 1], scene.positions[i + 2]);
+    box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
+  }
+  return box;
+}
+
+float RadiusOf(const FitScene& scene) {
+  const Bounds box = BoundsOf(scene);
+  const glm::vec3 extent = box.high - box.low;
+  return 0.5f * std::max({extent.x, extent.y, extent.z, 0.0f});
+}
+
+// Turns a camera about the object's middle by `degrees` around a random axis: it moves and looks
+// elsewhere, but still at the object.
+Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees, Rng* rng) {
+  const glm::dvec3 axis =
+      glm::normalize(glm::dvec3(rng->Normal(), rng->Normal(), rng->Normal()) + 1e-9);
+  const double angle = degrees * std::numbers::pi / 180, s = std::sin(angle), c = std::cos(angle);
+  Camera out = camera;
+  for (int r = 0; r < 3; ++r) {
+    const glm::dvec3 row(camera.rotation[3 * r], camera.rotation[3 * r + 1],
+                         camera.rotation[3 * r + 2]);
+    const glm::dvec3 turned =
+        c * row + s * glm::cross(axis, row) + (1 - c) * glm::dot(axis, row) * axis;
+    for (int k = 0; k < 3; ++k) out.rotation[3 * r + k] = static_cast<float>(turned[k]);
+    // R p + t at the middle stays what it was.
+    out.translation[r] += static_cast<float>(glm::dot(row - turned, middle));
+  }
+  return out;
+}
+
+void SetCameras(const FitJob& job, FitScene* scene) {
+  scene->cameras = job.input.cameras;
+  if (job.config.perturb_cameras == 0) return;
+  constexpr std::uint64_t kStream = 0x6361'6d65'7261;  // apart from those of the steps
+  Rng rng(job.config.seed, kStream);
+  const Bounds box = BoundsOf(*scene);
+  const glm::dvec3 middle = 0.5 * (glm::dvec3(box.low) + glm::dvec3(box.high));
+  for (const int i : job.input.training) {
+    Camera& camera = scene->cameras[static_cast<std::size_t>(i)];
+    camera = Perturbed(camera, middle, job.config.perturb_cameras, &rng);
+  }
+}
+
+void SetLight(const FitConfig& config, FitScene* scene) {
+  scene->model.lighting = config.lighting;
+  scene->filter = config.filter;
+  if (scene->uses_lights()) scene->lights = {{config.light_direction, 1}};
+  scene->sh[0] = kFirstHarmonic;
+}
+
+void AddMesh(const Mesh& mesh, Hash* hash) {
+  hash->AddAll(mesh.positions), hash->AddAll(mesh.faces);
+  hash->AddAll(mesh.colors), hash->AddAll(mesh.corner_uvs);
+  for (const Texture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
+}
+
+// Of the images, the cameras, which of them are held out, and the mesh to start from.
+std::string InputHash(const FitJob& job) {
+  Hash hash;
+  hash.AddAll(job.input.images.color), hash.AddAll(job.input.images.alpha);
+  for (const Camera& c : job.input.cameras) {
+    hash.AddBytes(c.rotation, sizeof(c.rotation));
+    hash.AddBytes(c.translation, sizeof(c.translation));
+    for (const float number : {c.fx, c.fy, c.cx, c.cy}) hash.AddBytes(&number, sizeof(number));
+  }
+  hash.AddAll(job.input.held_out);
+  if (job.start.has_value()) AddMesh(*job.start, &hash);
+  return hash.Text();
+}
+
+}  // namespace
+
+std::string DescribeJob(const FitJob& job) {
+  return DescribeConfig(job.config) +
+         fmt::format("images = {} of {} x {}, {} held out\nmesh = {}\ninput = {}\n",
+                     job.input.cameras.size(), job.input.images.width, job.input.images.height,
+                     job.input.held_out.size(),
+                     job.start.has_value()
+                         ? fmt::format("{} vertices, {} faces", job.start->positions.size(),
+                                       job.start->faces.size())
+                         : "sphere",
+                     InputHash(job));
+}
+
+Result<FitStart> PrepareFit(const FitJob& job) {
+  TILEGRAD_TRY(CheckConfig(job.config));
+  TILEGRAD_TRY(CheckMasks(job));
+  FitStart start;
+  TILEGRAD_ASSIGN(start.scene, job.start.has_value() ? MeshScene(job) : SphereScene(job));
+  SetCameras(job, &start.scene);
+  SetLight(job.config, &start.scene);
+  FitterOptions& options = start.options;
+  options.parameters = job.config.parameters;
+  if (options.parameters.empty()) {
+    options.parameters[Parameter::kPositions] = true;
+    options.parameters[start.scene.texture.empty() ? Parameter::kColors : Parameter::kTexture] =
+        true;
+  }
+  options.rates = job.config.rates;
+  options.rates[Parameter::kPositions] *= static_cast<double>(RadiusOf(start.scene));
+  options.loss = job.config.loss, options.regularizers = job.config.regularizers;
+  options.smoothing = job.config.smoothing;
+  return start;
+}
+
+}  // namespace tilegrad::train

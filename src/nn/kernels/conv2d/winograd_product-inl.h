@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// The products of conv2d_winograd.h, one for each slot, and the way back to a weight's gradient.
+
+#if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
+#undef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
+#else
+#define TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/parallel.h"
+#include "nn/kernels/conv2d/winograd_tiles-inl.h"
+#include "nn/kernels/conv2d/winograd_weights-inl.h"
+#include "nn/kernels/pack-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::nn::HWY_NAMESPACE {
+
+constexpr std::size_t kSlotDepth = 256;        // steps of k in one pass: half of L1
+constexpr std::size_t kSlotRowPanels = 21;     // in one work item: 126 rows
+constexpr std::size_t kSlotColumnPanels = 16;  // in one work item: 256 tiles
+
+// ---- Forward and input gradient: out[slot] = weights[slot] in[slot] ----
+
+struct SlotProduct {
+  const PackedWinogradWeights& weights;
+  const float* packed;
+  const SlotLayout& in_layout;  // PanelLayout of the depth's side
+  const float* in;
+  const SlotLayout& out_layout;  // RowLayout of the rows' side
+  float* out;
+  const TileRows& rows;
+};
+
+struct SlotItem {
+  std::size_t slot;
+  std::size_t row_begin, row_end;        // row panels
+  std::size_t column_begin, column_end;  // column panels
+};
+
+inline void MultiplyItem(const SlotProduct& p, const SlotItem& item) {
+  const std::size_t depth = p.weights.depth.size(item.slot);
+  for (std::size_t k = 0; k < depth; k += kSlotDepth) {
+    const std::size_t steps = std::min(kSlotDepth, depth - k);
+    for (std::size_t column = item.column_begin; column < item.column_end; ++column) {
+      const PackedColumns columns{p.in + p.in_layout.At(item.slot, k, column)};
+      for (std::size_t panel = item.row_begin; panel < item.row_end; ++panel) {
+        const std::size_t count = p.weights.RowCount(panel);
+        const TileTarget target{
+            .c = p.out + p.out_layout.At(item.slot, p.weights.RowBegin(panel), column),
+            .ldc = p.out_layout.index_stride,
+            .offset = {0, kLanes},
+            .count = {kLanes, kLanes},
+            .accumulate = k > 0};
+        PackedRowsTile(p.weights.Panel(p.packed, item.slot, panel) + k * count, count, columns,
+                       steps, target);
+      }
+    }
+  }
+}
+
+// loops: as in conv2d_winograd_portions-inl.h.
+template <class Loops>
+void MultiplySlots(const SlotProduct& p, const Loops& loops) {
+  const WinogradPlan& plan = p.weights.plan;
+  std::size_t most = 0;
+  for (std::size_t slot = 0; slot < plan.slots(); ++slot) {
+    most = std::max(most, DivideUp(p.weights.panel_count(slot), kSlotRowPanels));
+  }
+  const Panels columns(p.rows.padded / kTileColumns, kSlotColumnPanels);
+  loops.For(plan.slots() * most * columns.count(), [&](std::size_t index, std::size_t) {
+    const std::size_t slot = index / (most * columns.count());
+    const std::size_t block = index / columns.count() % most, column = index % columns.count();
+    const Panels blocks(p.weights.panel_count(slot), kSlotRowPanels);
+    if (block >= blocks.count()) return;
+    MultiplyItem(p, {slot, blocks.begin(block), blocks.begin(block) + blocks.size(block),
+                     columns.begin(column), columns.begin(column) + columns.size(column)});
+  });
+}
+
+// ---- Weight gradient: sums[slot] (+)= inputs[slot] outputs[slot]^T ----
+
+template <std::size_t R = kTileRows>
+HWY_INLINE void PlainRowsTile(const float* rows, std::size_t row_stride, std::size_t count,
+                              PackedColumns columns, std::size_t steps, const TileTarget& target) {
+  if (count == R) {
+    PlainRows<R> factor;
+    for (std::size_t r = 0; r < R; ++r) factor.data[r] = rows + r * row_stride;
+    RunTile(factor, columns, steps, target);
+  } else if constexpr (R > 1) {
+    PlainRowsTile<R - 1>(rows, row_stride, count, columns, steps, target);
+  }
+}
+
+struct WinogradCorrelation {
+  const WinogradSide& input;
+  const SlotLayout& in_layout;  // RowLayout
+  const float* inputs;
+  float* outputs;  // [slot][panel of output channels][tile][kTileColumns]
+  float* sums;     // [slot][panel of output channels][index of the input's side][kTileColumns]
+  const TileRows& rows;
+  std::size_t panels;  // of output channels
+  bool accumulate;
+
+  std::size_t OutputAt(std::size_t slot, std::size_t panel) const {
+    return (slot * panels + panel) * rows.pitch * kTileColumns;
+  }
+  std::size_t SumAt(std::size_t slot, std::size_t panel, std::size_t index) const {
+    return (input.before(slot) * panels + panel * input.size(slot) + index) * kTileColumns;
+  }
+
+  void Multiply(const Workers& workers) const {
+    std::size_t most = 0;
+    for (std::size_t slot = 0; slot < input.plan.slots(); ++slot) {
+      most = std::max(most, DivideUp(input.size(slot), kSlotRowPanels * kTileRows));
+    }
+    workers.For(input.plan.slots() * most, [&](std::size_t index, std::size_t) {
+      const std::size_t slot = index / most, block = index % most;
+      const Panels blocks(input.size(slot), kSlotRowPanels * kTileRows);
+      if (block < blocks.count()) MultiplyRows(slot, blocks.begin(block), blocks.size(block));
+    });
+  }
+
+ private:
+  void MultiplyRows(std::size_t slot, std::size_t begin, std::size_t count) const {
+    const Panels row_panels(count, kTileRows);
+    for (std::size_t t = 0; t < rows.tiles; t += kSlotDepth) {
+      const std::size_t steps = std::min(kSlotDepth, rows.tiles - t);
+      for (std::size_t panel = 0; panel < panels; ++panel) {
+        const PackedColumns columns{outputs + OutputAt(slot, panel) + t * kTileColumns};
+        for (std::size_t i = 0; i < row_panels.count(); ++i) {
+          const std::size_t row = begin + row_panels.begin(i);
+          PlainRowsTile(inputs + in_layout.At(slot, row, 0) + t, in_layout.index_stride,
+                        row_panels.size(i), columns, steps,
+                        {.c = sums + SumAt(slot, panel, row),
+                         .ldc = kTileColumns,
+                         .offset = {0, kLanes},
+                         .count = {kLanes, kLanes},
+                         .accumulate = accumulate || t > 0});
+        }
+      }
+    }
+  }
+};
+
+// The values of one panel of output channels. memory: of one row of tiles, all channels.
+inline void TransformOutputPanel(const WinogradCorrelation& product, const float* d_y,
+                                 std::size_t panel, float* memory) {
+  const WinogradPlan& plan = product.input.plan;
+  const std::size_t slot_stride = product.OutputAt(1, 0);
+  for (std::size_t r = 0; r < product.rows.count; ++r) {
+    GatherChannels(plan, TileRow(plan, product.rows.first + r), d_y, panel * kTileColumns, memory);
+    float* values =
+        product.outputs + product.OutputAt(0, panel) + r * plan.tiles_across * kTileColumns;
+    if (plan.axis_slots == 4) {
+      TransformChannels<4>(plan, memory, slot_stride, values);
+    } else {
+      TransformChannels<3>(plan, memory, slot_stride, values);
+    }
+  }
+}
+
+struct WeightSums {
+  const float* data[4][4];
+};
+
+template <std::size_t Ra, std::size_t Rb>
+struct TransformWeightsBack {
+  // taps: tap (i, j) of the phase, kTileColumns lanes each, lies at (i * kernel + j) * stride.
+  static HWY_INLINE void Run(const WeightSums& sums, std::size_t channel, const WinogradPlan& plan,
+                             float* taps) {
+    for (std::size_t v = 0; v < kTileColumns; v += kLanes) {
+      const std::size_t at = channel * kTileColumns + v;
+      Square in, out;
+      for (std::size_t i = 0; i <= Ra; ++i) {
+        for (std::size_t j = 0; j <= Rb; ++j) in[i][j] = hn::LoadU(Tag(), sums.data[i][j] + at);
+      }
+      Transform<WeightAdjoint<Ra>, WeightAdjoint<Rb>>(in, out);
+      for (std::size_t i = 0; i < Ra; ++i) {
+        for (std::size_t j = 0; j < Rb; ++j) {
+          const std::size_t tap = (i * plan.kernel + j) * plan.stride;
+          hn::StoreU(out[i][j], Tag(), taps + tap * kTileColumns + v);
+        }
+      }
+    }
+  }
+};
+
+// The sums of phase (a, b) between input channel 0 and one panel of output channels.
+inline WeightSums SumsOfPhase(const WinogradCorrelation& product, std::size_t panel, std::size_t a,
+                              std::size_t b) {
+  const WinogradPlan& plan = product.input.plan;
+  WeightSums from;
+  for (std::size_t i = 0; i <= plan.taps(a); ++i) {
+    for (std::size_t j = 0; j <= plan.taps(b); ++j) {
+      const std::size_t slot = i * plan.axis_slots + j;
+      const std::size_t index = plan.phase_index(slot, a, b) * product.input.channels();
+      from.data[i][j] = product.sums + product.SumAt(slot, panel, index);
+    }
+  }
+  return from;
+}
+
+inline void FinishWeightGrad(const WinogradCorrelation& product, std::size_t panel,
+                             float* d_weight) {
+  const WinogradPlan& plan = product.input.plan;
+  const std::size_t area = plan.kernel * plan.kernel, first = panel * kTileColumns;
+  const std::size_t in_channels = plan.s.in_channels;
+  const std::size_t channels = std::min(kTileColumns, plan.s.out_channels - first);
+  WeightSums sums[4];  // stride <= 2
+  for (std::size_t a = 0; a < plan.stride; ++a) {
+    for (std::size_t b = 0; b < plan.stride; ++b) {
+      sums[a * plan.stride + b] = SumsOfPhase(product, panel, a, b);
+    }
+  }
+  float taps[kMostTaps * kTileColumns];
+  for (std::size_t c = 0; c < in_channels; ++c) {
+    for (std::size_t a = 0; a < plan.stride; ++a) {
+      for (std::size_t b = 0; b < plan.stride; ++b) {
+        ForTaps<TransformWeightsBack>(plan.taps(a), plan.taps(b), sums[a * plan.stride + b], c,
+                                      plan, taps + (a * plan.kernel + b) * kTileColumns);
+      }
+    }
+    TransposeStrip(taps, kTileColumns, area, channels, d_weight + (first * in_channels + c) * area,
+                   in_channels * area);
+  }
+}
+
+}  // namespace tilegrad::nn::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

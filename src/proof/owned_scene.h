@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes that own their arrays, in any scalar type, with their gradients and cotangents, and all
+// their numbers by name: what proofs need that hold the ShadedRenderer to the reference, and the
+// reference to differences (tests/render, src/proof/selftest).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/rng.h"
+#include "render/scene.h"
+
+namespace tilegrad {
+
+template <class T>
+struct OwnedMesh {
+  std::vector<T> positions;
+  std::vector<std::int32_t> faces;
+  std::vector<T> attributes;
+  int channels = 3;
+  AttributeRate rate = AttributeRate::kVertex;
+  CameraT<T> camera;
+
+  SceneViewT<T> View() const { return {positions, faces, attributes, channels, rate, camera}; }
+  std::size_t vertex_count() const { return positions.size() / 3; }
+  std::size_t face_count() const { return faces.size() / 3; }
+};
+
+template <class T, class U>
+OwnedMesh<T> MeshCast(const OwnedMesh<U>& s) {
+  return {{s.positions.begin(), s.positions.end()},
+          s.faces,
+          {s.attributes.begin(), s.attributes.end()},
+          s.channels,
+          s.rate,
+          CameraCast<T>(s.camera)};
+}
+
+template <class T>
+struct OwnedTexture {
+  std::vector<T> texels;
+  int width = 1, height = 1;
+  shade::Wrap wrap = shade::Wrap::kRepeat;
+  shade::Filter filter = shade::Filter::kBilinear;
+};
+
+// Owns what a ShadedScene looks at.
+template <class T>
+struct OwnedScene {
+  ShadingModel model;
+  OwnedMesh<T> mesh;  // its attributes are the user's channels
+  std::vector<T> colors, uvs, normals, light_directions, sh;
+  AttributeRate colors_rate = AttributeRate::kVertex, uvs_rate = AttributeRate::kCorner;
+  AttributeRate normals_rate = AttributeRate::kVertex;
+  std::vector<OwnedTexture<T>> textures;
+  std::vector<SurfaceT<T>> surfaces;
+  std::vector<std::int32_t> face_surfaces;
+  std::vector<shade::DirectionalLightT<T>> lights;
+  std::vector<shade::TextureViewT<T>> texture_views;  // made by View
+
+  ShadedSceneT<T> View() {
+    texture_views.clear();
+    for (const auto& t : textures) {
+      texture_views.push_back({t.texels, t.width, t.height, 3, t.wrap, t.filter});
+    }
+    ShadedSceneT<T> view;
+    static_cast<SceneViewT<T>&>(view) = mesh.View();
+    view.model = model;
+    view.colors = {colors, colors_rate}, view.uvs = {uvs, uvs_rate};
+    view.normals = {normals, normals_rate}, view.textures = texture_views;
+    view.surfaces = surfaces, view.face_surfaces = face_surfaces, view.lights = lights;
+    view.light_directions = light_directions, view.sh = sh;
+    return view;
+  }
+};
+
+// Calls visit(name, number) for every number of a scene that has a gradient. `scene` may be an
+// OwnedScene of anything with the same members, so gradients are visited in the same order.
+template <class T, class Visit>
+void ForEachNumber(OwnedScene<T>& s, const Visit& visit) {
+  const auto all = [&](const char* name, auto& values) {
+    for (auto& v : values) visit(name, v);
+  };
+  all("positions", s.mesh.positions), all("attributes", s.mesh.attributes);
+  all("colors", s.colors), all("uvs", s.uvs), all("normals", s.normals);
+  all("light_directions", s.light_directions), all("sh", s.sh);
+  for (auto& t : s.textures) all("texture", t.texels);
+  for (auto& u : s.surfaces) {
+    all("base_color", u.base_color), all("ambient", u.ambient), all("diffuse", u.diffuse);
+    all("specular", u.specular), visit("shininess", u.shininess);
+  }
+  for (auto& l : s.lights) all("light", l.direction), visit("intensity", l.intensity);
+  all("rotation", s.mesh.camera.rotation), all("translation", s.mesh.camera.translation);
+  visit("lens", s.mesh.camera.fx), visit("lens", s.mesh.camera.fy);
+  visit("lens", s.mesh.camera.cx), visit("lens", s.mesh.camera.cy);
+}
+
+template <class T, class U>
+OwnedScene<T> OwnedCast(const OwnedScene<U>& s) {
+  const auto cast = [](const auto& v) { return std::vector<T>(v.begin(), v.end()); };
+  const auto cast3 = [](const std::array<U, 3>& v) {
+    return std::array<T, 3>{T(v[0]), T(v[1]), T(v[2])};
+  };
+  OwnedScene<T> out;
+  out.model = s.model, out.mesh = MeshCast<T>(s.mesh);
+  out.colors = cast(s.colors), out.uvs = cast(s.uvs), out.normals = cast(s.normals);
+  out.light_directions = cast(s.light_directions), out.sh = cast(s.sh);
+  out.colors_rate = s.colors_rate, out.uvs_rate = s.uvs_rate, out.normals_rate = s.normals_rate;
+  for (const auto& t : s.textures) {
+    out.textures.push_back({cast(t.texels), t.width, t.height, t.wrap, t.filter});
+  }
+  for (const auto& u : s.surfaces) {
+    out.surfaces.push_back({cast3(u.base_color), u.texture, cast3(u.ambient), cast3(u.diffuse),
+                            cast3(u.specular), T(u.shininess)});
+  }
+  for (const auto& l : s.lights) out.lights.push_back({cast3(l.direction), T(l.intensity)});
+  out.face_surfaces = s.face_surfaces;
+  return out;
+}
+
+// Gradients of a scene: the same members, all 0, and the views that a renderer fills.
+template <class T>
+struct OwnedGradients {
+  OwnedScene<T> d;
+  std::vector<std::span<T>> textures;
+
+  explicit OwnedGradients(const OwnedScene<T>& scene) : d(scene) {
+    ForEachNumber(d, [](const char*, T& v) { v = T(0); });
+    for (auto& t : d.textures) textures.push_back(t.texels);
+  }
+  ShadedGradientsT<T> View() {
+    ShadedGradientsT<T> view;
+    view.positions = d.mesh.positions, view.attributes = d.mesh.attributes, view.camera = true;
+    view.colors = d.colors, view.uvs = d.uvs, view.light_directions = d.light_directions;
+    if (d.model.normals == NormalKind::kGiven) view.normals = d.normals;
+    view.textures = textures, view.surfaces = d.surfaces, view.lights = d.lights, view.sh = d.sh;
+    return view;
+  }
+  // After the renderer.
+  void TakeCamera(const ShadedGradientsT<T>& view) { d.mesh.camera = view.d_camera; }
+};
+
+// Cotangents of all images, random in [-1, 1].
+template <class T>
+struct OwnedCotangents {
+  std::vector<T> color, alpha, normals, uv, depth, attributes;
+
+  OwnedCotangents() = default;
+  OwnedCotangents(std::size_t pixels, std::size_t channels, Rng* rng) {
+    for (const auto& [v, planes] : {std::pair{&color, std::size_t{3}},
+                                    {&alpha, 1},
+                                    {&normals, 3},
+                                    {&uv, 2},
+                                    {&depth, 1},
+                                    {&attributes, channels}}) {
+      v->resize(planes * pixels);
+      for (T& d : *v) d = static_cast<T>(static_cast<float>(rng->Uniform(-1, 1)));
+    }
+  }
+  template <class U>
+  OwnedCotangents<U> Cast() const {
+    const auto cast = [](const std::vector<T>& v) { return std::vector<U>(v.begin(), v.end()); };
+    OwnedCotangents<U> out;
+    out.color = cast(color), out.alpha = cast(alpha), out.normals = cast(normals);
+    out.uv = cast(uv), out.depth = cast(depth), out.attributes = cast(attributes);
+    return out;
+  }
+  ShadedFrameGradientsT<T> View() const {
+    ShadedFrameGradientsT<T> view;
+    view.color = color, view.alpha = alpha, view.normals = normals, view.uv = uv;
+    view.depth = depth, view.attributes = attributes;
+    return view;
+  }
+};
+
+}  // namespace tilegrad

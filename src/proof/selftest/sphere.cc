@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// All images and gradients of a sphere: the engine beside the reference in double, and the
+// reference's gradients beside complex steps.
+#include <algorithm>
+
+#include "proof/selftest/checks.h"
+#include "proof/selftest/sphere_scene.h"
+#include "proof/complex_step.h"
+
+namespace tilegrad::selftest {
+namespace {
+
+using Gradients = std::map<std::string, std::vector<double>>;
+
+// Whether numbers of the sphere have a gradient that is not 0 in some light.
+bool HasGradient(Lighting lighting, const std::string& kind) {
+  const bool phong = lighting == Lighting::kPhong;
+  if (kind == "specular" || kind == "shininess") return phong;
+  if (kind == "ambient" || kind == "diffuse") return phong || lighting == Lighting::kLambert;
+  return true;  // and only lights that are there have numbers
+}
+
+template <class Frame>
+void TakeImages(const CheckContext& context, Frame* frame) {
+  context.Take("face_ids", frame->face_ids), context.Take("color", frame->color);
+  context.Take("alpha", frame->alpha), context.Take("depth", frame->depth);
+  context.Take("normals", frame->normals), context.Take("uv", frame->uv);
+}
+
+template <class T>
+Gradients TakeGradients(const CheckContext& context, OwnedScene<T>& d) {
+  Gradients out;
+  for (auto& [name, numbers] : NumbersOf(d)) {
+    context.Take("d_" + name, numbers);
+    out[name].assign(numbers.begin(), numbers.end());
+  }
+  return out;
+}
+
+// Vertices are rounded to 1/1024 pixel before visibility is decided. No centre of a pixel of this
+// sphere is so near to an edge that rounding before that could decide: moving all numbers of the
+// scene by up to two units in the last place changes nothing.
+Status ExpectFaceIds(std::span<const std::int32_t> got, std::span<const std::int32_t> want) {
+  const auto covered = std::count_if(want.begin(), want.end(), [](int id) { return id >= 0; });
+  if (covered < 300) return InternalError("the sphere covers {} pixels only", covered);
+  return Gauge().Expect("face_ids", got, want, 0);
+}
+
+// A weight errs by 16 eps W + 1e-5, eps = 2^-23, W = 32 pixels, on faces down to a quarter of a
+// pixel in height: 7e-5. A gradient has one weight and one 1/height more and errs by eight times
+// that, relative to its largest entry. Light and texture have errors of their own, but most faces
+// are ten times as high.
+constexpr double kShare = 5.7e-4;
+
+struct BothRenderings {
+  OwnedRendering<float> got;
+  OwnedRendering<double> want;
+};
+
+Status ExpectReference(const CheckContext& context, Lighting lighting, BothRenderings* both,
+                       Gauge* gauge) {
+  TakeImages(context, &both->got.frame);
+  const auto& got = both->got.frame;
+  const auto& want = both->want.frame;
+  TILEGRAD_TRY(gauge->ExpectOfLargest("color", got.color, want.color, kShare));
+  TILEGRAD_TRY(gauge->ExpectOfLargest("alpha", got.alpha, want.alpha, kShare));
+  TILEGRAD_TRY(gauge->ExpectOfLargest("depth", got.depth, want.depth, kShare));
+  TILEGRAD_TRY(gauge->ExpectOfLargest("normals", got.normals, want.normals, kShare));
+  TILEGRAD_TRY(gauge->ExpectOfLargest("uv", got.uv, want.uv, kShare));
+  Gradients d_got = TakeGradients(context, both->got.d);
+  for (const auto& [kind, numbers] : NumbersOf(both->want.d)) {
+    const bool none = !HasGradient(lighting, kind);
+    TILEGRAD_TRY(none ? gauge->Expect("d_" + kind, d_got[kind], numbers, 0)
+                      : gauge->ExpectOfLargest("d_" + kind, d_got[kind], numbers, kShare));
+  }
+  return {};
+}
+
+Status CheckSphere(const CheckContext& context, const SphereShape& shape, Gauge* gauge) {
+  const RenderOptions options = SphereOptions(shape);
+  auto scene = MakeSphere(shape);
+  auto scene64 = OwnedCast<double>(scene);
+  Rng rng(1, 21);
+  const OwnedCotangents<double> d_frame(1024, 0, &rng);
+  BothRenderings both;
+  TILEGRAD_TRY(RenderOwned(scene, options, ImagesWithGradients(), d_frame.Cast<float>(),
+                           context.workers, &both.got));
+  // The reference is given the engine's own visibility, which is checked apart.
+  both.want = RenderOwnedRef<double>(scene64, options, ImagesWithGradients(), d_frame,
+                                     both.got.frame.face_ids);
+  TILEGRAD_TRY(ExpectReference(context, shape.lighting, &both, gauge));
+  return ExpectFaceIds(both.got.frame.face_ids,
+                       FaceIdsRef<double>(scene64.View(), options, {0, shape.height}));
+}
+
+Result<Finding> EngineIsTheReference(const CheckContext& context) {
+  Gauge gauge;
+  for (const auto& [name, shape] : kSpheres) {
+    TILEGRAD_TRY(CheckSphere(context, shape, &gauge).Within(name));
+  }
+  return gauge.Found();
+}
+
+Status CheckSlope(const SlopeProblem& problem, const std::string& kind,
+                  const std::vector<double>& gradient, Gauge* gauge) {
+  const Slope slope = SlopeAlong(problem, kind, gradient, Rng(2, 21));
+  if (slope.size == 0) return InternalError("d_{}: all {} numbers are 0", kind, slope.count);
+  const double got[] = {slope.by_gradient}, want[] = {slope.by_step};
+  return gauge->Expect("slope of the loss along " + kind, got, want, slope.rounding());
+}
+
+Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) {
+  shape.level = 1, shape.width = shape.height = 16;
+  const RenderOptions options = SphereOptions(shape);
+  const auto scene = MakeSphere(shape);
+  auto scene64 = OwnedCast<double>(scene);
+  const auto ids = FaceIdsRef<double>(scene64.View(), options, {0, shape.height});
+  Rng rng(3, 21);
+  const OwnedCotangents<double> d_frame(ids.size(), 0, &rng);
+  auto d = OwnedRefBackward<double>(scene64, options, d_frame, ids);
+  const ShadedRequest request = ImagesWithGradients();
+  const SlopeProblem problem{scene, options, request, ids, d_frame};
+  for (const auto& [kind, gradient] : TakeGradients(context, d)) {
+    TILEGRAD_TRY(
+        HasGradient(shape.lighting, kind)
+            ? CheckSlope(problem, kind, gradient, gauge)
+            : gauge->Expect("d_" + kind, gradient, std::vector<double>(gradient.size()), 0));
+  }
+  return {};
+}
+
+Result<Finding> ReferenceIsTheComplexStep(const CheckContext& context) {
+  Gauge gauge;
+  for (const auto& [name, shape] : kSpheres) {
+    TILEGRAD_TRY(CheckSteps(context, shape, &gauge).Within(name));
+  }
+  return gauge.Found();
+}
+
+}  // namespace
+
+std::vector<Check> SphereChecks() {
+  return {OnEveryTarget({"images and gradients of a sphere, beside float64", EngineIsTheReference}),
+          {"gradients of float64, beside complex steps", ReferenceIsTheComplexStep}};
+}
+
+}  // namespace tilegrad::selftest

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proof/tradeoff.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/rng.h"
+#include "render/pipeline/pipeline_ref.h"
+
+namespace tilegrad {
+namespace {
+
+double CpuMilliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double Median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+double Dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// The naive renderer's answer on some rows.
+struct Truth {
+  std::vector<int> rows;
+  std::vector<double> alpha;        // [H,W], of those rows
+  std::vector<double> d_positions;  // of L restricted to those rows
+  double forward_ms = 0, backward_ms = 0;
+};
+
+std::vector<int> SpreadRows(const TradeoffJob& job, std::size_t faces) {
+  const double row_pairs = static_cast<double>(job.options.width) * static_cast<double>(faces);
+  const int height = job.options.height;
+  const auto affordable = std::floor(job.truth_pairs / std::max(row_pairs, 1.0));
+  const int count = static_cast<int>(std::clamp(affordable, 1.0, static_cast<double>(height)));
+  std::vector<int> rows;
+  for (int k = 0; k < count; ++k) {
+    rows.push_back(static_cast<int>((k + 0.5) * height / count));
+  }
+  return rows;
+}
+
+class Measurement {
+ public:
+  Measurement(const TradeoffJob& job, const ProgressSink& progress, const StopFlag& stop)
+      : job_(job), progress_(progress), stop_(stop), renderer_(one_) {
+    for (const double error : job.errors) settings_.push_back(WithError(error));
+    if (job.paper_rule) {
+      settings_.push_back(job.options);
+      settings_.back().soft_rule = SoftRule::kPaper;
+    }
+    total_ = settings_.size() * static_cast<std::size_t>(job.repetitions + 1);
+  }
+
+  Result<Tradeoff> Run() {
+    TILEGRAD_TRY(FindIds());
+    TILEGRAD_TRY(FindTruth());
+    for (const RenderOptions& setting : settings_) TILEGRAD_TRY(AddAccuracy(setting));
+    TILEGRAD_TRY(Time());
+    out_.faces = job_.scene.faces.size() / 3;
+    out_.truth_rows = static_cast<int>(truth_.rows.size());
+    out_.image_rows = job_.options.height;
+    const double share = static_cast<double>(out_.truth_rows) / out_.image_rows;
+    out_.truth_forward_ms = truth_.forward_ms / share;
+    out_.truth_backward_ms = truth_.backward_ms / share;
+    return std::move(out_);
+  }
+
+ private:
+  RenderOptions WithError(double error) const {
+    RenderOptions options = job_.options;
+    options.soft_rule = SoftRule::kAllFaces, options.max_alpha_error = error;
+    return options;
+  }
+  Status Step(const char* stage, std::size_t done, std::size_t total) {
+    if (stop_) return Cancelled("stopped");
+    if (progress_) progress_({stage, done, total, {}});
+    return {};
+  }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(job_.options.width) *
+           static_cast<std::size_t>(job_.options.height);
+  }
+
+  Status FindIds();
+  Status FindTruth();
+  Status AddAccuracy(const RenderOptions& setting);
+  Status Time();
+  Status Forward(const RenderOptions& setting) {
+    return renderer_.Render({&job_.scene, 1}, setting, {false, true, false, false}, &frame_);
+  }
+  // d_positions_ <- the gradient of L with upstream gradients `d_alpha`.
+  Status Backward(const RenderOptions& setting, const std::vector<float>& d_alpha) {
+    SceneGradients d_scene{d_positions_, {}, false, {}};
+    return renderer_.Backward({&job_.scene, 1}, setting, frame_, {{}, d_alpha}, {&d_scene, 1});
+  }
+
+  const TradeoffJob& job_;
+  const ProgressSink& progress_;
+  const StopFlag& stop_;
+  const Workers one_{1};
+  Renderer renderer_;
+  std::vector<RenderOptions> settings_;
+  Frame frame_;
+  std::vector<std::int32_t> ids_;
+  std::vector<float> d_alpha_, d_alpha_truth_;  // [H,W]; the second only where there is a truth
+  std::vector<float> d_positions_;
+  Truth truth_;
+  Tradeoff out_;
+  std::size_t total_ = 0;
+};
+
+Status Measurement::FindIds() {
+  TILEGRAD_TRY(Step("ids", 0, 1));
+  TILEGRAD_TRY(Forward(WithError(0.1)));
+  ids_.assign(frame_.face_ids.begin(), frame_.face_ids.end());
+  Rng rng(1, 0);
+  d_alpha_.resize(pixels()), d_alpha_truth_.assign(pixels(), 0.0f);
+  for (float& d : d_alpha_) d = static_cast<float>(rng.Uniform(-1, 1));
+  truth_.rows = SpreadRows(job_, job_.scene.faces.size() / 3);
+  const auto width = static_cast<std::size_t>(job_.options.width);
+  for (const int row : truth_.rows) {
+    const std::size_t first = static_cast<std::size_t>(row) * width;
+    std::copy_n(d_alpha_.begin() + static_cast<std::ptrdiff_t>(first), width,
+                d_alpha_truth_.begin() + static_cast<std::ptrdiff_t>(first));
+  }
+  d_positions_.resize(job_.scene.positions.size());
+  return {};
+}
+
+Status Measurement::FindTruth() {
+  const std::vector<double> positions(job_.scene.positions.begin(), job_.scene.positions.end());
+  SceneViewT<double> scene;
+  scene.positions = positions, scene.faces = job_.scene.faces;
+  scene.camera = CameraCast<double>(job_.scene.camera);
+  PreparedScene<double> prepared;
+  PrepareRef(scene, job_.options, &prepared);
+  PreparedGradients<double> gradients(scene, prepared);
+  FrameT<double> frame;
+  SizeFrame(1, 0, job_.options, {false, true, false, false}, &frame);
+  const std::vector<double> d_alpha(d_alpha_truth_.begin(), d_alpha_truth_.end());
+  std::size_t done = 0;
+  const auto for_row = [&](int row, const auto& visit) {
+    const double started = CpuMilliseconds();
+    for (int j = 0; j < job_.options.width; ++j) {
+      const auto pixel = static_cast<std::size_t>(row * job_.options.width + j);
+      visit(j, raster::PieceAt(prepared.mesh, ids_[pixel], j, row));
+    }
+    return CpuMilliseconds() - started;
+  };
+  for (const int row : truth_.rows) {
+    TILEGRAD_TRY(Step("truth in float64", done++, truth_.rows.size()));
+    truth_.forward_ms += for_row(row, [&](int j, std::int32_t face) {
+      ShadePixelRef(scene, prepared, job_.options, j, row, face, &frame);
+    });
+    truth_.backward_ms += for_row(row, [&](int j, std::int32_t face) {
+      ShadePixelRefBackward<double>(prepared, job_.options, j, row, face, {{}, d_alpha},
+                                    &gradients);
+    });
+  }
+  truth_.alpha.assign(frame.alpha.begin(), frame.alpha.end());
+  truth_.d_positions.resize(positions.size());
+  SceneGradientsT<double> d_scene{truth_.d_positions, {}, false, {}};
+  PrepareRefBackward(scene, job_.options, prepared, gradients, &d_scene);
+  if (Dot(truth_.d_positions, truth_.d_positions) == 0) {
+    return InvalidArgument("alpha of this scene has no gradient: nothing is near its background");
+  }
+  return {};
+}
+
+Status Measurement::AddAccuracy(const RenderOptions& setting) {
+  TILEGRAD_TRY(Step("measuring", out_.rows.size(), total_));
+  TradeoffRow row;
+  row.rule = setting.soft_rule;
+  row.max_alpha_error = setting.soft_rule == SoftRule::kPaper
+                            ? std::numeric_limits<double>::infinity()
+                            : setting.max_alpha_error;
+  TILEGRAD_TRY(Forward(setting));
+  row.reported = frame_.alpha_error_bound;
+  std::size_t background = 0;
+  for (const int y : truth_.rows) {
+    for (int x = 0; x < job_.options.width; ++x) {
+      const auto pixel = static_cast<std::size_t>(y * job_.options.width + x);
+      if (ids_[pixel] >= 0) continue;
+      const double off = std::abs(static_cast<double>(frame_.alpha[pixel]) - truth_.alpha[pixel]);
+      row.largest = std::max(row.largest, off), row.mean += off, ++background;
+    }
+  }
+  row.mean /= static_cast<double>(std::max<std::size_t>(background, 1));
+  TILEGRAD_TRY(Backward(setting, d_alpha_truth_));
+  const std::vector<double> d(d_positions_.begin(), d_positions_.end());
+  std::vector<double> off = d;
+  for (std::size_t i = 0; i < d.size(); ++i) off[i] -= truth_.d_positions[i];
+  const double truth = std::sqrt(Dot(truth_.d_positions, truth_.d_positions));
+  const double ours = std::sqrt(Dot(d, d));
+  row.gradient_error = std::sqrt(Dot(off, off)) / truth;
+  // Of the chord between the directions: the arc cosine would lose small angles.
+  double chord = 0;
+  for (std::size_t i = 0; i < d.size() && ours > 0; ++i) {
+    const double part = d[i] / ours - truth_.d_positions[i] / truth;
+    chord += part * part;
+  }
+  const double half = ours > 0 ? std::min(std::sqrt(chord) / 2, 1.0) : std::sqrt(0.5);
+  row.gradient_angle = 2 * std::asin(half) * 180 / std::numbers::pi;
+  out_.rows.push_back(row);
+  return {};
+}
+
+Status Measurement::Time() {
+  std::vector<std::vector<double>> forward(out_.rows.size()), backward(out_.rows.size());
+  std::size_t done = out_.rows.size();
+  for (int k = 0; k < job_.repetitions; ++k) {
+    for (std::size_t i = 0; i < out_.rows.size(); ++i) {
+      TILEGRAD_TRY(Step("measuring", done++, total_));
+      const double started = CpuMilliseconds();
+      TILEGRAD_TRY(Forward(settings_[i]));
+      const double between = CpuMilliseconds();
+      TILEGRAD_TRY(Backward(settings_[i], d_alpha_));
+      forward[i].push_back(between - started), backward[i].push_back(CpuMilliseconds() - between);
+    }
+  }
+  for (std::size_t i = 0; i < out_.rows.size(); ++i) {
+    out_.rows[i].forward_ms = Median(forward[i]), out_.rows[i].backward_ms = Median(backward[i]);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Tradeoff> MeasureTradeoff(const TradeoffJob& job, const ProgressSink& progress,
+                                 const StopFlag& stop) {
+  if (job.errors.empty()) return InvalidArgument("no max_alpha_error to try");
+  for (const double error : job.errors) {
+    if (!(error >= 0 && error <= 1)) {
+      return InvalidArgument("max_alpha_error is {}; it must be in [0, 1]", error);
+    }
+  }
+  if (job.repetitions < 1) return InvalidArgument("repetitions is {}; at least 1", job.repetitions);
+  return Measurement(job, progress, stop).Run();
+}
+
+}  // namespace tilegrad

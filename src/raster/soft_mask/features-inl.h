@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which features of a face the pixels of a block see: one corner, the inside of one edge, one edge,
+// or anything ("Nearest features"). Lanes are faces.
+
+#if defined(TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_
+#undef TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_
+#else
+#define TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <bit>
+#include <cstddef>
+#include <initializer_list>
+
+#include "base/simd_math-inl.h"
+#include "raster/soft_mask/faces-inl.h"
+#include "raster/soft_mask/pixels-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::raster::HWY_NAMESPACE {
+
+// Those of faces i, i + 1, ... of which the box is within `reach` of the block's background.
+HWY_INLINE SoftMask BoxesNear(SoftTag d, const SoftFaceArrays& faces, std::size_t i,
+                              const SoftBlock& block, float reach) {
+  const auto side = [&](SoftFaceArrays::Array a) HWY_ATTR { return hn::Load(d, faces.v[a] + i); };
+  const SoftVec z =
+      BoxDistance(d, side(SoftFaceArrays::kLeft), side(SoftFaceArrays::kTop),
+                  side(SoftFaceArrays::kRight), side(SoftFaceArrays::kBottom), block.box);
+  return hn::Le(z, hn::Set(d, reach * reach));
+}
+
+// One of three by lanes.
+template <class V, class M>
+HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
+  return hn::IfThenElse(first, v[0], hn::IfThenElse(second, v[1], v[2]));
+}
+
+// Members are appended at `at`, which is the list's count: compilers would load that again after
+// each store of a vector.
+HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, std::size_t at,
+                           SoftList* to) {
+  compact.Store(slot, to->slot + at), compact.Store(part, to->part + at);
+  to->count = at + compact.count();
+}
+
+// 0, 1 or 2 by lanes.
+HWY_INLINE SoftInt PartOf(SoftMask first, SoftMask second) {
+  const SoftIntTag di;
+  const SoftInt parts[3] = {hn::Zero(di), hn::Set(di, 1), hn::Set(di, 2)};
+  return Pick(parts, hn::RebindMask(di, first), hn::RebindMask(di, second));
+}
+
+HWY_INLINE void AppendEdges(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMask keep,
+                            const SoftMask (&only)[3], SoftListOf<SoftLists::kEdgeArrays>* to) {
+  if (hn::AllFalse(d, keep)) return;
+  const Compactor compact(d, keep);
+  const std::size_t at = to->count;
+  const auto append = [&](SoftLists::Edge a, const SoftVec(&v)[3])
+                          HWY_ATTR { compact.Store(Pick(v, only[0], only[1]), to->v[a] + at); };
+  append(SoftLists::kTx, f.tx), append(SoftLists::kTy, f.ty), append(SoftLists::kSide, f.side);
+  append(SoftLists::kFirst, f.first), append(SoftLists::kLast, f.last);
+  append(SoftLists::kInverse, f.inverse);
+  AppendTags(slot, PartOf(only[0], only[1]), compact, at, to);
+}
+
+HWY_INLINE void AppendVertices(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMask keep,
+                               const SoftMask (&only)[3], SoftListOf<2>* to) {
+  if (hn::AllFalse(d, keep)) return;
+  const Compactor compact(d, keep);
+  const std::size_t at = to->count;
+  compact.Store(Pick(f.x, only[0], only[1]), to->v[0] + at);
+  compact.Store(Pick(f.y, only[0], only[1]), to->v[1] + at);
+  AppendTags(slot, PartOf(only[0], only[1]), compact, at, to);
+}
+
+HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, SoftInt slot, SoftMask keep,
+                                 SoftListOf<3 * SoftLists::kEdgeArrays>* to) {
+  if (hn::AllFalse(d, keep)) return;
+  const Compactor compact(d, keep);
+  const std::size_t at = to->count;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftVec edge[] = {f.tx[k], f.ty[k], f.side[k], f.first[k], f.last[k], f.inverse[k]};
+    for (std::size_t a = 0; a < SoftLists::kEdgeArrays; ++a) {
+      compact.Store(edge[a], to->v[k * SoftLists::kEdgeArrays + a] + at);
+    }
+  }
+  AppendTags(slot, hn::Zero(SoftIntTag()), compact, at, to);
+}
+
+// Who looks: `pixels` of a block. Faces nearer than `reach.near` go to the boundaries if `split`,
+// whatever is seen of them.
+struct FeatureSearch {
+  const SoftBlock& block;
+  std::uint64_t pixels;
+  const SoftReach& reach;
+  bool split;
+  // What follows from these, once for all faces ("Nearest features"). Whether edges behind are
+  // looked for: where a block is larger than faces reach, faces lie all around its pixels.
+  const bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
+  // More than the rounding of distances to lines of edges: 32 u of the largest they are made of.
+  const float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
+                                     kLongEdge * (block.box.unit_x + block.box.unit_y));
+};
+
+// Some faces: all, and those that are not near ones; where they are in the chunk.
+struct FeatureFaces {
+  SoftMask all, far;
+  SoftInt slot;
+};
+
+// Edges with the pixels of a block on their inner side, where none can lie within the face: nearest
+// points that are on them are on another edge, too.
+HWY_INLINE void EdgesBehind(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
+                            SoftMask (&behind)[3]) {
+  const SoftBlock& block = search.block;
+  SoftMask ahead[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftVec half = hn::MulAdd(hn::Abs(f.ty[k]), hn::Set(d, block.half_x),
+                                    hn::Mul(hn::Abs(f.tx[k]), hn::Set(d, block.half_y)));
+    const SoftVec least = hn::Add(half, hn::Set(d, search.rounding));
+    const SoftVec inner = hn::CopySign(f.side[k], hn::Xor(f.side[k], f.turn));
+    behind[k] = hn::Lt(least, inner), ahead[k] = hn::Lt(inner, hn::Neg(least));
+  }
+  const SoftMask sure = hn::Ne(f.turn, hn::Zero(d));
+  const SoftMask outside = hn::And(sure, hn::Or(hn::Or(ahead[0], ahead[1]), ahead[2]));
+  for (SoftMask& b : behind) b = hn::And(b, outside);
+}
+
+// Edges of which all pixels of a block have the first corner, or the last one, as nearest point.
+struct EdgeEnds {
+  SoftMask start[3], end[3];
+};
+
+// Faces of which the nearest point is on one edge, by edge, unless it is a corner ("Nearest
+// features").
+HWY_INLINE void FindOnlyEdges(SoftTag d, const FaceEdges& f, const FeatureSearch& search,
+                              const EdgeEnds& at, SoftMask (&only)[3]) {
+  if (!search.looks_behind) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      only[k] = hn::And(at.start[(k + 1) % 3], at.end[(k + 2) % 3]);
+    }
+    return;
+  }
+  SoftMask behind[3], gone[3];
+  EdgesBehind(d, f, search, behind);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftMask at_start = hn::AndNot(behind[(k + 2) % 3], at.start[k]);
+    const SoftMask at_end = hn::AndNot(behind[(k + 1) % 3], at.end[k]);
+    gone[k] = hn::Or(behind[k], hn::Or(at_start, at_end));
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    only[k] = hn::AndNot(gone[k], hn::And(gone[(k + 1) % 3], gone[(k + 2) % 3]));
+  }
+}
+
+HWY_INLINE void AppendFeatures(SoftTag d, const FaceEdges& f, const FeatureFaces& faces,
+                               const FeatureSearch& search, SoftLists* lists) {
+  const SoftBlock& block = search.block;
+  EdgeEnds at;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SoftVec half = hn::MulAdd(hn::Abs(f.tx[k]), hn::Set(d, block.half_x),
+                                    hn::Mul(hn::Abs(f.ty[k]), hn::Set(d, block.half_y)));
+    at.start[k] = hn::Le(half, f.first[k]);
+    at.end[k] = hn::Le(half, hn::Neg(f.last[k]));
+  }
+  const SoftMask corner[3] = {hn::And(at.start[0], at.end[2]), hn::And(at.start[1], at.end[0]),
+                              hn::And(at.start[2], at.end[1])};
+  SoftMask edge[3];
+  FindOnlyEdges(d, f, search, at, edge);
+  const SoftMask vertex = hn::And(faces.far, hn::Or(hn::Or(corner[0], corner[1]), corner[2]));
+  const SoftMask segment =
+      hn::AndNot(vertex, hn::And(faces.far, hn::Or(hn::Or(edge[0], edge[1]), edge[2])));
+  AppendVertices(d, f, faces.slot, vertex, corner, &lists->vertices);
+  AppendEdges(d, f, faces.slot, segment, edge, &lists->segments);
+  AppendBoundaries(d, f, faces.slot, hn::AndNot(hn::Or(vertex, segment), faces.all),
+                   &lists->boundaries);
+}
+
+// Fills a list up to whole vectors: `far` are its arrays of distances.
+template <std::size_t kArrays>
+HWY_INLINE void PadList(std::initializer_list<std::size_t> far, SoftListOf<kArrays>* list) {
+  const SoftTag d;
+  const SoftIntTag di;
+  if (list->count % hn::Lanes(d) == 0) return;
+  for (auto& array : list->v) hn::StoreU(hn::Zero(d), d, array + list->count);
+  hn::StoreU(hn::Set(di, SoftList::kNoSlot), di, list->slot + list->count);
+  for (const std::size_t a : far) hn::StoreU(hn::Set(d, 1e15f), d, list->v[a] + list->count);
+}
+
+// Vectors of faces of which one is near: their first faces, and which lanes are near.
+struct NearVectors {
+  std::size_t count = 0;
+  std::int32_t first[kChunkRoom];
+  std::uint8_t lanes[kChunkRoom];  // bits
+
+  // No branch, which would be hard to foretell.
+  HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {
+    for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
+      const SoftMask near = hn::And(BoxesNear(d, faces, i, search.block, search.reach.root),
+                                    hn::FirstN(d, faces.count - i));
+      first[count] = static_cast<std::int32_t>(i);
+      lanes[count] = static_cast<std::uint8_t>(BitsOf(d, near));
+      count += lanes[count] != 0;
+    }
+  }
+};
+
+// Fills `lists` with the members of the block among the faces of a chunk.
+inline void FindFeatures(const SoftChunk& chunk, const SoftMaskPlan& plan,
+                         const FeatureSearch& search, SoftLists* lists) {
+  const SoftTag d;
+  const SoftIntTag di;
+  const BlockAxes axes(search.block, search.reach);
+  lists->vertices.count = lists->segments.count = lists->boundaries.count = lists->whole = 0;
+  const auto append = [&](const SoftFaceArrays& faces, std::size_t first_slot,
+                          const auto& edges) HWY_ATTR {
+    const NearVectors near(d, faces, search);
+    for (std::size_t n = 0; n < near.count; ++n) {
+      const auto i = static_cast<std::size_t>(near.first[n]), slot = first_slot + i;
+      const FacePixels pixels = PixelsOfFaces(d, faces, i, axes);
+      const std::uint32_t seen_bits = near.lanes[n] & ~pixels.UnseenBy(search.pixels);
+      if (seen_bits == 0) continue;
+      pixels.Store(lists->pixels + slot);
+      lists->whole +=
+          static_cast<std::size_t>(std::popcount(seen_bits & pixels.SeenByAll(search.block.bits)));
+      const SoftMask seen = MaskOf(d, seen_bits);
+      SoftMask far = seen;
+      if (search.split) {
+        far = hn::AndNot(BoxesNear(d, faces, i, search.block, search.reach.near), seen);
+      }
+      const SoftInt slots = simd::CountFrom(di, static_cast<std::int32_t>(slot));
+      AppendFeatures(d, edges(i), {seen, far, slots}, search, lists);
+    }
+  };
+  append(chunk.shorts, 0, [&](std::size_t i) HWY_ATTR {
+    FaceEdges f;
+    LoadCorners(d, chunk.shorts, i, search.block, &f), ShortEdges(d, chunk.shorts, i, &f);
+    return f;
+  });
+  append(chunk.longs, kChunkRoom,
+         [&](std::size_t i) HWY_ATTR { return LongEdges(d, chunk.longs, i, plan, search.block); });
+  PadList({0}, &lists->vertices);
+  PadList({SoftLists::kSide}, &lists->segments);
+  PadList({SoftLists::kSide, SoftLists::kEdgeArrays + SoftLists::kSide,
+           2 * SoftLists::kEdgeArrays + SoftLists::kSide},
+          &lists->boundaries);
+}
+
+}  // namespace tilegrad::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/picture/mesh_scene.h"
+
+#include <algorithm>
+#include <array>
+
+#include "scene/srgb.h"
+
+namespace tilegrad {
+namespace {
+
+template <class Vec>
+std::span<const float> Flat(const std::vector<Vec>& values) {
+  static_assert(sizeof(Vec) == Vec::length() * sizeof(float));
+  return {reinterpret_cast<const float*>(values.data()), values.size() * Vec::length()};
+}
+
+float Decode(float value, ColorSpace space) {
+  return space == ColorSpace::kLinear ? SrgbToLinear(value) : value;
+}
+
+std::vector<float> DecodeTexels(const ImageU8& image, ColorSpace space) {
+  std::array<float, 256> table;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    table[i] = Decode(static_cast<float>(i) / 255.0f, space);
+  const auto channels = static_cast<std::size_t>(image.channels);
+  const std::size_t count = image.pixels.size() / channels;
+  std::vector<float> out(3 * count);
+  for (std::size_t p = 0; p < count; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) out[3 * p + c] = table[image.pixels[channels * p + c]];
+  }
+  return out;
+}
+
+shade::Wrap WrapOf(TextureWrap wrap) {
+  return wrap == TextureWrap::kClamp    ? shade::Wrap::kClamp
+         : wrap == TextureWrap::kMirror ? shade::Wrap::kMirror
+                                        : shade::Wrap::kRepeat;
+}
+
+}  // namespace
+
+MeshScene::MeshScene(const Mesh& mesh, const MeshSceneOptions& options)
+    : mesh_(mesh), options_(options), texels_(mesh.textures.size()) {
+  scene_.positions = Flat(mesh.positions);
+  scene_.faces = {mesh.faces.data()->data(), 3 * mesh.faces.size()};
+  scene_.model.two_sided = true;
+  AddNormals();
+  for (const glm::vec4& color : mesh.colors) {
+    for (int c = 0; c < 3; ++c) colors_.push_back(Decode(color[c], options.color_space));
+  }
+  scene_.colors = {colors_, AttributeRate::kVertex};
+  AddSurfaces();
+  if (!textures_.empty()) {
+    scene_.uvs = {Flat(mesh.corner_uvs), AttributeRate::kCorner};
+    scene_.textures = textures_;
+  }
+}
+
+void MeshScene::AddNormals() {
+  scene_.model.normals =
+      options_.normals == NormalSource::kSmooth ? NormalKind::kSmooth : NormalKind::kFlat;
+  if (options_.normals != NormalSource::kAuto) return;
+  if (!mesh_.corner_normals.empty()) {
+    scene_.normals = {Flat(mesh_.corner_normals), AttributeRate::kCorner};
+  } else if (!mesh_.normals.empty()) {
+    scene_.normals = {Flat(mesh_.normals), AttributeRate::kVertex};
+  } else {
+    return;
+  }
+  scene_.model.normals = NormalKind::kGiven;
+}
+
+// The view of a material's texture, one for each way of looking it up.
+int MeshScene::AddTexture(const Material& material) {
+  if (material.base_color_texture < 0 || mesh_.corner_uvs.empty()) return -1;
+  const auto index = static_cast<std::size_t>(material.base_color_texture);
+  const ImageU8& image = mesh_.textures[index].image;
+  if (texels_[index].empty()) texels_[index] = DecodeTexels(image, options_.color_space);
+  const shade::TextureView view = {
+      texels_[index],        image.width,
+      image.height,          3,
+      WrapOf(material.wrap), material.nearest ? shade::Filter::kNearest : options_.filter};
+  const auto same = [&](const shade::TextureView& v) {
+    return v.texels.data() == view.texels.data() && v.wrap == view.wrap && v.filter == view.filter;
+  };
+  const auto found = std::find_if(textures_.begin(), textures_.end(), same);
+  if (found != textures_.end()) return static_cast<int>(found - textures_.begin());
+  textures_.push_back(view);
+  return static_cast<int>(textures_.size()) - 1;
+}
+
+void MeshScene::AddSurfaces() {
+  for (const Material& material : mesh_.materials) {
+    Surface surface;
+    for (int c = 0; c < 3; ++c) {
+      surface.base_color[static_cast<std::size_t>(c)] =
+          Decode(material.base_color[c], options_.color_space);
+    }
+    surface.texture = AddTexture(material);
+    surface.ambient = options_.ambient, surface.diffuse = options_.diffuse;
+    surface.specular = options_.specular, surface.shininess = options_.shininess;
+    if (material.unlit) {
+      surface.ambient = {1, 1, 1};
+      surface.diffuse = surface.specular = {0, 0, 0};
+    }
+    surfaces_.push_back(surface);
+  }
+  if (surfaces_.empty()) {  // a mesh without materials: white times its vertex colours
+    surfaces_.push_back(
+        {{1, 1, 1}, -1, options_.ambient, options_.diffuse, options_.specular, options_.shininess});
+  }
+  single_sided_ =
+      !mesh_.materials.empty() && std::none_of(mesh_.materials.begin(), mesh_.materials.end(),
+                                               [](const Material& m) { return m.double_sided; });
+  scene_.surfaces = surfaces_;
+  scene_.face_surfaces = mesh_.face_materials;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/picture/picture.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "raster/conventions.h"
+
+namespace tilegrad {
+namespace {
+
+std::size_t PixelCount(const PictureRequest& r) {
+  return static_cast<std::size_t>(r.width) * static_cast<std::size_t>(r.height);
+}
+
+Status Check(const PictureRequest& r) {
+  if (r.width < 1 || r.height < 1 || r.supersampling < 1)
+    return InvalidArgument("a picture of {} x {} pixels, {} samples along each side", r.width,
+                           r.height, r.supersampling);
+  if (std::max(r.width, r.height) > raster::kMaxImageSize / r.supersampling) {
+    return InvalidArgument(
+        "{} x {} pixels with {} samples along each side is more than {}; take fewer of either",
+        r.width, r.height, r.supersampling, raster::kMaxImageSize);
+  }
+  return {};
+}
+
+RenderOptions OptionsOf(const PictureRequest& r, int scale) {
+  RenderOptions options;
+  options.width = scale * r.width, options.height = scale * r.height;
+  options.culling = r.culling;
+  if (r.soft_delta > 0) options.delta = r.soft_delta;
+  return options;
+}
+
+// Sums over the samples of one pixel.
+struct Square {
+  float rgb[3] = {}, covered = 0, alpha = 0;
+};
+
+Square SumSamples(const ShadedFrame& frame, int x, int y, int scale) {
+  Square sum;
+  const auto pixels =
+      static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  for (int j = y * scale; j < (y + 1) * scale; ++j) {
+    for (int i = x * scale; i < (x + 1) * scale; ++i) {
+      const auto at = static_cast<std::size_t>(j) * static_cast<std::size_t>(frame.width) +
+                      static_cast<std::size_t>(i);
+      if (!frame.alpha.empty()) sum.alpha += frame.alpha[at];
+      if (frame.face_ids[at] < 0) continue;
+      sum.covered += 1;
+      for (std::size_t c = 0; c < 3 && !frame.color.empty(); ++c)
+        sum.rgb[c] += std::clamp(frame.color[c * pixels + at], 0.0f, 1.0f);
+    }
+  }
+  return sum;
+}
+
+template <class To, class From>
+void Copy(const From& from, To* to) {
+  to->assign(from.begin(), from.end());
+}
+
+}  // namespace
+
+Status PictureRenderer::RenderColor(ShadedScene scene, const PictureRequest& request,
+                                    Picture* picture) {
+  const int scale = request.supersampling;
+  const auto s = static_cast<float>(scale);
+  Camera& camera = scene.camera;
+  camera.fx *= s, camera.fy *= s, camera.cx *= s, camera.cy *= s;
+  ShadedRequest images;
+  images.color = request.color, images.attributes = false, images.alpha = request.soft_delta > 0;
+  TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, scale), images, &frame_));
+  const std::size_t pixels = PixelCount(request);
+  if (request.color) picture->color.assign(3 * pixels, 0);
+  picture->alpha.assign(pixels, 0);
+  for (int y = 0; y < request.height; ++y) {
+    for (int x = 0; x < request.width; ++x) {
+      const Square sum = SumSamples(frame_, x, y, scale);
+      const auto at = static_cast<std::size_t>(y * request.width + x);
+      picture->alpha[at] = (images.alpha ? sum.alpha : sum.covered) / (s * s);
+      for (std::size_t c = 0; c < 3 && request.color && sum.covered > 0; ++c)
+        picture->color[c * pixels + at] = sum.rgb[c] / sum.covered;
+    }
+  }
+  return {};
+}
+
+Status PictureRenderer::RenderExact(const ShadedScene& scene, const PictureRequest& request,
+                                    Picture* picture) {
+  ShadedRequest images;
+  images.color = images.attributes = images.alpha = false;
+  images.depth = request.depth, images.normals = request.normals;
+  images.uv = request.uv && !scene.uvs.values.empty();
+  TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, 1), images, &frame_));
+  if (request.depth) Copy(frame_.depth, &picture->depth);
+  if (request.normals) Copy(frame_.normals, &picture->normals);
+  if (request.uv) Copy(frame_.uv, &picture->uv);
+  if (request.uv && !images.uv) picture->uv.assign(2 * PixelCount(request), 0);
+  if (request.face_ids) Copy(frame_.face_ids, &picture->face_ids);
+  return {};
+}
+
+Status PictureRenderer::Render(const ShadedScene& scene, const PictureRequest& request,
+                               Picture* picture) {
+  TILEGRAD_TRY(Check(request));
+  *picture = Picture{};
+  picture->width = request.width, picture->height = request.height;
+  if (request.color || request.alpha) {
+    TILEGRAD_TRY(RenderColor(scene, request, picture));
+    picture->plans.push_back(renderer_.Explain());
+  }
+  if (request.depth || request.normals || request.uv || request.face_ids) {
+    TILEGRAD_TRY(RenderExact(scene, request, picture));
+    picture->plans.push_back(renderer_.Explain());
+  }
+  return {};
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scratch of a Renderer: what is kept per image of the batch and per worker. Everything grows to
+// its largest use and stays.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/aligned.h"
+#include "raster/attributes.h"
+#include "raster/bin.h"
+#include "raster/drawn_faces.h"
+#include "raster/interpolate.h"
+#include "raster/interpolate_backward.h"
+#include "raster/project.h"
+#include "raster/screen_mesh.h"
+#include "raster/soft_mask/soft_mask.h"
+#include "raster/visibility.h"
+#include "render/pipeline/pipeline.h"
+#include "render/pipeline/topologies.h"
+
+namespace tilegrad {
+
+// What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
+// the forward pass of the same scenes.
+struct PreparedFrom {
+  bool valid = false, drawn_bins = false, soft_tree = false;
+  AlignedVector<float> positions;
+  TopologyId topology;
+  CameraT<float> camera;
+  int width = 0, height = 0;
+  double delta = 0, max_alpha_error = 0;
+  FaceCulling culling = FaceCulling::kNone;
+};
+
+// A scene on the screen, ready for its tiles.
+struct ImageScratch {
+  raster::ScreenMeshBuffers buffers;
+  raster::ScreenMesh mesh;
+  AlignedVector<float> clipped_attributes;
+  raster::AttributeViewT<const float> attributes;  // in the layout of `mesh`
+  AlignedVector<float> clipped_recomputed;
+  raster::AttributeViewT<const float> recomputed;  // of a PixelStage, in the layout of `mesh`
+  raster::DrawnFaces drawn_faces;
+  raster::TileListBuffers drawn_buffers;
+  raster::TileLists drawn;
+  raster::SoftTree soft;
+  raster::SoftMaskPlan soft_plan;
+  AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, as MergeScratch's
+  PreparedFrom prepared;
+};
+
+// Gradients of one image in the layout of its screen mesh.
+struct MergeScratch {
+  AlignedVector<float> d_vertices;              // [V][4] d_x, d_y, d_inverse_depth, 0
+  AlignedVector<float> d_rows;                  // [rows of attributes][groups of channels][4]
+  AlignedVector<float> d_attributes, d_clip_t;  // where faces were cut
+  raster::ProjectBackwardScratch project;
+};
+
+// Gradients of the faces seen in one band of an image.
+struct BandGradients {
+  std::size_t stride = 0;
+  AlignedVector<std::int32_t> faces;   // those of slots 1, 2, ...
+  AlignedVector<float> values;         // as FinishBand writes them; never shrinks
+  AlignedVector<std::int32_t> pieces;  // where faces were cut: which piece each pixel sees
+};
+
+// Gradients through the alpha of one bin of an image.
+using BinGradients = AlignedVector<raster::SoftFaceGradient>;
+
+struct WorkerScratch {
+  std::size_t index;  // of the worker
+  raster::VisibilityBin bin;
+  raster::InterpolateScratch interpolate;
+  raster::SoftMaskScratch soft;
+  raster::BandSums band;
+  MergeScratch merge;
+  RenderStats stats;
+  RenderTimes times;
+  // Of a PixelStage: attributes of a block, the faces of a block on the way back, cotangents of a
+  // band.
+  AlignedVector<float> varyings, d_varyings;
+  AlignedVector<std::int32_t> block_faces;
+  // Of an image that is small enough to be one task: it stays in the worker's cache.
+  raster::DrawnFaces drawn_faces;
+  raster::TileListBuffers drawn_buffers;
+  BandGradients band_gradients;
+  BinGradients bin_gradients;
+};
+
+// One tile of one image of the batch.
+struct TileTask {
+  std::size_t image, tile;
+  raster::TileRect rect;
+};
+
+}  // namespace tilegrad

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/pipeline/pipeline.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "base/stage_clock.h"
+#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/merge_gradients.h"
+#include "render/alpha/paper_alpha.h"
+#include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/prepare.h"
+#include "render/pipeline/tile_backward.h"
+#include "render/pipeline/tile_forward.h"
+#include "render/pipeline/validate.h"
+
+namespace tilegrad {
+namespace {
+
+// A call of Render or Backward.
+struct ForwardCall {
+  std::span<const SceneView> scenes;
+  const RenderOptions& options;
+  PrepareRequest request;
+  Frame* frame;
+  PixelStage* stage;
+};
+
+struct BackwardCall {
+  std::span<const SceneView> scenes;
+  BackwardInput input;
+  PrepareRequest request;
+  std::span<SceneGradients> d_scenes;
+  raster::TileGrid grid;    // of bins
+  std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
+
+  bool wants_geometry(std::size_t n) const {
+    return !d_scenes[n].positions.empty() || d_scenes[n].camera;
+  }
+  // Where faces were cut, geometry moves the attributes at the cut.
+  raster::BackwardRequest request_of(std::size_t n, const raster::ScreenMesh& mesh) const {
+    const bool geometry = wants_geometry(n);
+    return {geometry, !d_scenes[n].attributes.empty() || (geometry && mesh.was_clipped())};
+  }
+};
+
+// Only after something was found to be wrong.
+Status FindError(const BackwardCall& call) {
+  TILEGRAD_TRY(ValidateSceneNumbers(call.scenes));
+  TILEGRAD_TRY(ValidateBackwardNumbers(call.scenes, call.input.frame, call.input.d_frame));
+  return ValidateResult(call.d_scenes);
+}
+
+}  // namespace
+
+// How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
+// cache of its worker from beginning to end; so are larger ones as long as there are enough of them
+// for all workers, who share the parts of the last ones.
+struct Renderer::Impl {
+  explicit Impl(const Workers& w)
+      : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {
+    for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
+  }
+
+  Status Render(const ForwardCall& call);
+  Status Backward(const BackwardCall& call);
+
+  bool Prepare(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
+               std::size_t n, WorkerScratch* worker);
+  void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
+  void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
+  void RenderOneBin(const ForwardCall& call, const TileTask& bin, WorkerScratch* worker);
+
+  void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
+  void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
+                SceneGradients* d_scene);
+  void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
+                    BandGradients* out);
+  void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
+                   BinGradients* out);
+
+  // Returns whether the indices of all scenes are in range.
+  bool Begin(std::span<const SceneView> scenes) {
+    const std::size_t count = scenes.size();
+    if (images.size() < count) images.resize(count);
+    for (WorkerScratch& worker : worker_scratch) {
+      worker.stats = {}, worker.times = {}, worker.soft.work = {};
+    }
+    sound = topologies.Update(scenes, *workers);
+    return sound;
+  }
+  void Require(bool holds) {
+    if (!holds) sound = false;
+  }
+
+  const Workers* workers;
+  std::atomic<bool> sound = true;  // false: some task met a number that is an error
+  Topologies topologies;
+  std::vector<ImageScratch> images;
+  std::vector<WorkerScratch> worker_scratch;
+  std::vector<double> bin_errors;             // of alpha, [image][bin]
+  std::vector<BandGradients> band_gradients;  // [image][band]
+  std::vector<BinGradients> bin_gradients;    // [image][bin]
+};
+
+bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& options,
+                             const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
+  StageClock clock;
+  const bool done = PrepareImage({scene, topologies.of(n)}, options, request, *workers, &images[n],
+                                 &worker->stats);
+  Require(done);
+  clock.Lap(&worker->times.prepare);
+  return done;
+}
+
+void Renderer::Impl::RenderOneBin(const ForwardCall& call, const TileTask& bin,
+                                  WorkerScratch* worker) {
+  const std::size_t bins = bin_errors.size() / call.scenes.size();
+  bin_errors[bin.image * bins + bin.tile] =
+      RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.stage}, bin, worker,
+                call.frame);
+}
+
+// The list of drawn faces, the largest thing of all, is the worker's, not the image's.
+void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
+                                      WorkerScratch* worker) {
+  ImageScratch& image = images[n];
+  std::swap(image.drawn_faces, worker->drawn_faces);
+  std::swap(image.drawn_buffers, worker->drawn_buffers);
+  if (Prepare(call.scenes[n], call.options, call.request, n, worker)) {
+    RenderOneBin(call, {n, 0, {0, 0, call.options.width, call.options.height}}, worker);
+  }
+  image.prepared.drawn_bins = false;
+  std::swap(image.drawn_faces, worker->drawn_faces);
+  std::swap(image.drawn_buffers, worker->drawn_buffers);
+}
+
+void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
+                                 const Workers::Part& part) {
+  WorkerScratch* const own = &worker_scratch[part.worker()];
+  if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
+  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  part.For(bins.tiles(), [&](std::size_t bin, std::size_t worker) {
+    RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
+  });
+}
+
+Status Renderer::Impl::Render(const ForwardCall& call) {
+  const std::size_t count = call.scenes.size();
+  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  if (!Begin(call.scenes)) return ValidateSceneNumbers(call.scenes);
+  bin_errors.assign(count * bins.tiles(), 0.0);
+  if (bins.tiles() == 1) {
+    workers->For(count, [&](std::size_t n, std::size_t worker) {
+      RenderWholeImage(call, n, &worker_scratch[worker]);
+    });
+  } else {
+    workers->ForParts(
+        count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
+  }
+  if (!sound) return ValidateSceneNumbers(call.scenes);
+  for (const double error : bin_errors) {
+    call.frame->alpha_error_bound = std::max(call.frame->alpha_error_bound, error);
+  }
+  return {};
+}
+
+void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
+                                  WorkerScratch* worker, BandGradients* out) {
+  const ImageScratch& image = images[task.image];
+  Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
+                             worker, out));
+}
+
+void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
+                                 WorkerScratch* worker, BinGradients* out) {
+  if (!call.wants_geometry(n)) return;
+  StageClock clock;
+  RenderBinBackward(call.input, images[n], {n, bin, call.grid.rect(bin)}, worker, out);
+  clock.Lap(&worker->times.alpha);
+}
+
+void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
+                                        WorkerScratch* worker) {
+  ImageScratch& image = images[n];
+  const SceneView& scene = call.scenes[n];
+  if (!Prepare(scene, call.input.options, call.request, n, worker)) return;
+  PrepareRecomputed(call.input.stage, scene, n, &image);
+  BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
+  if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
+  const ImageGradients gradients{{&worker->band_gradients, 1},
+                                 {&worker->bin_gradients, call.bins},
+                                 call.request_of(n, image.mesh)};
+  SceneGradients* d_scene = &call.d_scenes[n];
+  AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
+  StageClock clock;
+  if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
+  Require(MergeGeometry(scene, call.input.options, image, gradients, *d_vertices, worker, d_scene));
+  Require(MergeAttributes(image, gradients, worker, d_scene));
+  clock.Lap(&worker->times.merge);
+}
+
+// Bands and bins together.
+void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
+                                   const Workers::Part& part) {
+  WorkerScratch* const own = &worker_scratch[part.worker()];
+  if (!Prepare(call.scenes[n], call.input.options, call.request, n, own)) return;
+  PrepareRecomputed(call.input.stage, call.scenes[n], n, &images[n]);
+  BandGradients* const bands = &band_gradients[n * call.bands];
+  BinGradients* const bins = bin_gradients.data() + n * call.bins;
+  part.For(call.bands + call.bins, [&](std::size_t i, std::size_t worker) {
+    if (i < call.bands) {
+      BackwardBand(call, {n, i}, &worker_scratch[worker], &bands[i]);
+    } else {
+      const std::size_t bin = i - call.bands;
+      BackwardBin(call, n, bin, &worker_scratch[worker], &bins[bin]);
+    }
+  });
+  if (sound) Merge(call, n, part);
+}
+
+// Three sums that can be made at once, for the sake of a batch of one: the longest first.
+void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
+                              const Workers::Part& part, SceneGradients* d_scene) {
+  ImageScratch& image = images[n];
+  const bool geometry = gradients.request.geometry;
+  part.For(3, [&](std::size_t i, std::size_t w) {
+    StageClock clock;
+    if (i == 0 && geometry && !gradients.bins.empty()) {
+      SumGeometry(image, {{}, gradients.bins, gradients.request}, &image.d_bin_vertices);
+    } else if (i == 1 && geometry) {
+      SumGeometry(image, {gradients.bands, {}, gradients.request}, &image.d_band_vertices);
+    } else if (i == 2) {
+      Require(MergeAttributes(image, gradients, &worker_scratch[w], d_scene));
+    }
+    clock.Lap(&worker_scratch[w].times.merge);
+  });
+}
+
+void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+  ImageScratch& image = images[n];
+  WorkerScratch* const worker = &worker_scratch[part.worker()];
+  SceneGradients* const d_scene = &call.d_scenes[n];
+  const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
+                                 std::span(bin_gradients).subspan(n * call.bins, call.bins),
+                                 call.request_of(n, image.mesh)};
+  SumParts(gradients, n, part, d_scene);
+  StageClock clock;
+  if (gradients.request.geometry && !gradients.bins.empty()) {
+    std::transform(image.d_band_vertices.begin(), image.d_band_vertices.end(),
+                   image.d_bin_vertices.begin(), image.d_band_vertices.begin(), std::plus());
+  }
+  Require(MergeGeometry(call.scenes[n], call.input.options, image, gradients, image.d_band_vertices,
+                        worker, d_scene));
+  clock.Lap(&worker->times.merge);
+}
+
+Status Renderer::Impl::Backward(const BackwardCall& call) {
+  if (!Begin(call.scenes)) return FindError(call);
+  const std::size_t count = call.scenes.size();
+  if (call.grid.tiles() == 1 && call.bands == 1) {
+    workers->For(count, [&](std::size_t n, std::size_t worker) {
+      BackwardWholeImage(call, n, &worker_scratch[worker]);
+    });
+  } else {
+    if (band_gradients.size() < count * call.bands) band_gradients.resize(count * call.bands);
+    if (bin_gradients.size() < count * call.bins) bin_gradients.resize(count * call.bins);
+    workers->ForParts(
+        count, [&](std::size_t n, const Workers::Part& part) { BackwardImage(call, n, part); });
+  }
+  return sound ? Status() : FindError(call);
+}
+
+Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
+                        const RenderRequest& request, Frame* frame, PixelStage* stage) {
+  TILEGRAD_TRY(ValidateOptions(options));
+  TILEGRAD_TRY(ValidateSceneSizes(scenes));
+  const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
+  SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
+  frame->transmittance.resize(options.soft_rule == SoftRule::kAllFaces ? frame->alpha.size() : 0);
+  if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
+    return impl_->Render({scenes, options, {true, request.alpha, false}, frame, stage});
+  }
+  AlignedVector<float> alpha;  // kept away from the tiles
+  alpha.swap(frame->alpha);
+  TILEGRAD_TRY(impl_->Render({scenes, options, {true, false, false}, frame, stage}));
+  alpha.swap(frame->alpha);
+  PaperAlpha(scenes, options, *impl_->workers, frame);
+  frame->alpha_error_bound = std::numeric_limits<double>::infinity();
+  return {};
+}
+
+Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
+                          const Frame& frame, const FrameGradients& d_frame,
+                          std::span<SceneGradients> d_scenes, PixelStage* stage) {
+  TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
+  const raster::TileGrid grid = raster::BinGrid(options.width, options.height);
+  const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
+  const bool alpha = !d_frame.alpha.empty() && !paper;
+  const FrameGradients d_tiles{d_frame.attributes,
+                               alpha ? d_frame.alpha : std::span<const float>()};
+  const Status status = impl_->Backward({scenes,
+                                         {options, frame, d_tiles, stage},
+                                         {false, alpha, true},
+                                         d_scenes,
+                                         grid,
+                                         BandGrid(options.width, options.height).count(),
+                                         alpha ? grid.tiles() : 0});
+  if (!status.ok() || !paper) return status;
+  TILEGRAD_TRY(ValidateBackwardNumbers(scenes, frame, d_frame));
+  PaperAlphaBackward(scenes, options, *impl_->workers, frame, d_frame.alpha, d_scenes);
+  return ValidateResult(d_scenes);
+}
+
+RenderStats Renderer::stats() const {
+  RenderStats sum;
+  for (const WorkerScratch& worker : impl_->worker_scratch) {
+    sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
+    sum.interpolated += worker.stats.interpolated, sum.softened += worker.stats.softened;
+    sum.merged += worker.stats.merged;
+    sum.pairs += worker.soft.work.pairs, sum.powers += worker.soft.work.powers;
+  }
+  return sum;
+}
+
+RenderTimes Renderer::times() const {
+  RenderTimes sum;
+  for (const WorkerScratch& worker : impl_->worker_scratch) {
+    const RenderTimes& t = worker.times;
+    sum.prepare += t.prepare, sum.visibility += t.visibility, sum.interpolate += t.interpolate;
+    sum.stage += t.stage, sum.gradients += t.gradients, sum.alpha += t.alpha;
+    sum.merge += t.merge;
+  }
+  return sum;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/pipeline/prepare.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "raster/project.h"
+#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/quick_checks.h"
+
+namespace tilegrad {
+namespace {
+
+// `attributes` of the scene, in the layout of the mesh; `storage` is for a mesh that was cut.
+raster::AttributeViewT<const float> InMeshLayout(const SceneView& scene,
+                                                 const raster::ScreenMesh& mesh,
+                                                 raster::AttributeViewT<const float> attributes,
+                                                 AlignedVector<float>* storage) {
+  if (!mesh.was_clipped()) return attributes;
+  storage->resize(raster::AttributeRows(mesh, attributes.rate) *
+                  static_cast<std::size_t>(attributes.channels));
+  raster::ClipAttributes<float>(mesh, scene.faces, attributes, *storage);
+  attributes.values = *storage;
+  return attributes;
+}
+
+template <class T>
+bool SameBits(std::span<const T> a, const AlignedVector<T>& b) {
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
+}
+
+bool SameCamera(const Camera& a, const Camera& b) {
+  static_assert(sizeof(Camera) == 17 * sizeof(float));  // no padding
+  return std::memcmp(&a, &b, sizeof(Camera)) == 0;
+}
+
+bool IsSoundScene(const SceneView& scene, bool same_positions) {
+  return (same_positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
+         IsSoundCamera(scene.camera);
+}
+
+bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
+                const PrepareRequest& request, const PreparedFrom& from) {
+  return from.valid && in.topology.id == from.topology &&
+         (from.drawn_bins || !request.drawn_bins) && (from.soft_tree || !request.soft_tree) &&
+         from.width == options.width && from.height == options.height &&
+         from.delta == options.delta && from.max_alpha_error == options.max_alpha_error &&
+         from.culling == options.culling && SameCamera(in.scene.camera, from.camera);
+}
+
+void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
+                      const PrepareRequest& request, PreparedFrom* from) {
+  const SceneView& scene = in.scene;
+  from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_tree = request.soft_tree;
+  from->positions.assign(scene.positions.begin(), scene.positions.end());
+  from->topology = in.topology.id;
+  from->camera = scene.camera;
+  from->width = options.width, from->height = options.height;
+  from->delta = options.delta, from->max_alpha_error = options.max_alpha_error;
+  from->culling = options.culling;
+}
+
+void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
+                 const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
+  raster::FaceSource<float> source = FaceSourceOf(in.scene, options);
+  source.corners = &in.topology.corners;
+  raster::Project(source, options.width, options.height, &image->buffers,
+                  {request.drawn_bins ? &image->drawn_faces : nullptr,
+                   request.soft_tree ? &image->soft.corners : nullptr},
+                  &workers);
+  image->mesh = image->buffers.View();
+  if (request.drawn_bins) {
+    image->drawn =
+        raster::BinDrawnFaces(image->drawn_faces, raster::BinGrid(options.width, options.height),
+                              &image->drawn_buffers, &workers);
+  }
+  if (request.soft_tree) {
+    raster::BuildSoftTree(&image->soft, &workers);
+    image->soft_plan = raster::PlanSoftMask(
+        {options.width, options.height, options.delta, options.max_alpha_error, image->soft.faces});
+  }
+}
+
+}  // namespace
+
+bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
+                  const PrepareRequest& request, const Workers& workers, ImageScratch* image,
+                  RenderStats* stats) {
+  const SceneView& scene = in.scene;
+  // Compared only if that may save something: positions change from frame to frame. By bits, not
+  // hashes: what was kept is what would be computed again.
+  const bool same_positions = request.reuse && SameBits(scene.positions, image->prepared.positions);
+  if (!IsSoundScene(scene, same_positions)) return false;
+  if (!same_positions || !IsPrepared(in, options, request, image->prepared)) {
+    ++stats->prepared;
+    image->prepared.valid = false;
+    PrepareMesh(in, options, request, workers, image);
+    RememberPrepared(in, options, request, &image->prepared);
+  }
+  image->attributes =
+      InMeshLayout(scene, image->mesh, AttributesOf(scene), &image->clipped_attributes);
+  return true;
+}
+
+void PrepareRecomputed(const PixelStage* stage, const SceneView& scene, std::size_t n,
+                       ImageScratch* image) {
+  if (stage == nullptr) return;
+  image->recomputed =
+      InMeshLayout(scene, image->mesh, stage->recomputed(n), &image->clipped_recomputed);
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/pipeline/tile_backward.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/stage_clock.h"
+#include "raster/fragments.h"
+#include "raster/visibility_ref.h"
+#include "render/pipeline/frame_layout.h"
+#include "render/pipeline/quick_checks.h"
+
+namespace tilegrad {
+namespace {
+
+// Faces of the screen mesh, from the ids of the caller's faces, in rows of a mesh that was cut.
+void FindPieces(const raster::ScreenMesh& mesh, int row_begin, std::span<const std::int32_t> ids,
+                AlignedVector<std::int32_t>* faces) {
+  faces->resize(ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto width = static_cast<std::size_t>(mesh.width);
+    (*faces)[i] = raster::PieceAt(mesh, ids[i], static_cast<int>(i % width),
+                                  row_begin + static_cast<int>(i / width));
+  }
+}
+
+// Where a band lies in the batch.
+struct BandPlace {
+  int row_begin, row_end;
+  std::size_t plane;         // pixels of an image
+  std::size_t first, count;  // its pixels in an image
+  std::size_t image;
+
+  BandPlace(const BandGrid& bands, const BandTask& task)
+      : row_begin(static_cast<int>(task.band) * bands.rows),
+        row_end(std::min(row_begin + bands.rows, bands.height)),
+        plane(static_cast<std::size_t>(bands.width) * static_cast<std::size_t>(bands.height)),
+        first(static_cast<std::size_t>(row_begin) * static_cast<std::size_t>(bands.width)),
+        count(static_cast<std::size_t>(row_end - row_begin) *
+              static_cast<std::size_t>(bands.width)),
+        image(task.image) {}
+
+  // The band's pixels of plane c of an image of `planes` planes.
+  template <class T>
+  std::span<const T> Of(std::span<const T> batch, std::size_t planes, std::size_t c) const {
+    return batch.subspan((image * planes + c) * plane + first, count);
+  }
+};
+
+bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std::size_t channels,
+                 const BandPlace& place) {
+  const std::span<const std::int32_t> ids(input.frame.face_ids);
+  if (!AllWithin(place.Of(ids, 1, 0), raster::kNoFace, mesh.source_faces)) return false;
+  const FrameGradients& d_frame = input.d_frame;
+  if (!d_frame.alpha.empty() && !AllFinite(place.Of(d_frame.alpha, 1, 0))) return false;
+  for (std::size_t c = 0; c < channels && !d_frame.attributes.empty(); ++c) {
+    if (!AllFinite(place.Of(d_frame.attributes, channels, c))) return false;
+  }
+  return true;
+}
+
+// Pixels [x0, x0 + columns) of the rows of a band, whose faces are `faces` [rows][width of image].
+struct BlockPlace {
+  const BandPlace& band;
+  std::span<const std::int32_t> faces;
+  int width, x0;
+
+  int columns() const { return std::min(raster::kBinSize, width - x0); }
+  int row_count() const { return band.row_end - band.row_begin; }
+};
+
+// The faces of a block, in rows of kBinSize. Returns whether there is one.
+bool GatherBlockFaces(const BlockPlace& block, AlignedVector<std::int32_t>* faces) {
+  faces->assign(static_cast<std::size_t>(raster::kBinSize * block.row_count()), raster::kNoFace);
+  std::int32_t all = raster::kNoFace;
+  for (int i = 0; i < block.row_count(); ++i) {
+    const std::int32_t* from =
+        block.faces.data() + static_cast<std::ptrdiff_t>(i) * block.width + block.x0;
+    std::int32_t* to = faces->data() + static_cast<std::ptrdiff_t>(i) * raster::kBinSize;
+    for (int j = 0; j < block.columns(); ++j) to[j] = from[j], all &= from[j];
+  }
+  return all != raster::kNoFace;
+}
+
+void RunStageBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                      const BlockPlace& place, WorkerScratch* worker) {
+  if (!GatherBlockFaces(place, &worker->block_faces)) return;
+  const PixelBlock block{.image = task.image,
+                         .band = task.band,
+                         .worker = worker->index,
+                         .mesh = &image.mesh,
+                         .attributes = image.recomputed,
+                         .rows = {worker->block_faces.data(), raster::kBinSize, place.x0,
+                                  place.band.row_begin, place.band.row_end},
+                         .columns = place.columns(),
+                         .first = place.band.first + static_cast<std::size_t>(place.x0),
+                         .varyings = worker->varyings.data(),
+                         .any_face = true};
+  StageClock clock;
+  if (image.recomputed.channels > 0) {
+    raster::Interpolate(
+        {&image.mesh, image.recomputed, input.options.interpolation, false}, block.rows,
+        {{worker->varyings.data(), static_cast<std::ptrdiff_t>(block.plane()), raster::kBinSize},
+         {},
+         block.columns},
+        &worker->interpolate);
+  }
+  clock.Lap(&worker->times.interpolate);
+  input.stage->Backward(block, {worker->d_varyings.data() + place.x0,
+                                static_cast<std::ptrdiff_t>(place.band.count), place.width});
+  clock.Lap(&worker->times.stage);
+}
+
+// The cotangents of the attributes of a band, from the stage. False: it met a number that is not
+// finite.
+bool BandCotangents(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                    const BandPlace& place, std::span<const std::int32_t> faces,
+                    WorkerScratch* worker) {
+  if (!input.stage->BeginBand(task.image, task.band, place.first, place.count)) return false;
+  const auto grow = [](std::size_t size, AlignedVector<float>* array) {
+    if (array->size() < size) array->resize(size);
+  };
+  const auto rows = static_cast<std::size_t>(place.row_end - place.row_begin);
+  grow(static_cast<std::size_t>(image.recomputed.channels) * rows * raster::kBinSize,
+       &worker->varyings);
+  grow(static_cast<std::size_t>(image.attributes.channels) * place.count, &worker->d_varyings);
+  for (int x0 = 0; x0 < input.options.width; x0 += raster::kBinSize) {
+    RunStageBackward(input, image, task, {place, faces, input.options.width, x0}, worker);
+  }
+  return true;
+}
+
+// Gradients of a band's faces from the cotangents of its pixels' attributes.
+void SumBandFaces(const BackwardInput& input, const ImageScratch& image,
+                  const raster::BackwardBand& band, const raster::BackwardRequest& request,
+                  raster::BandSums* sums, BandGradients* out) {
+  const raster::InterpolateInput interpolate{&image.mesh, image.attributes,
+                                             input.options.interpolation, false};
+  raster::SumBand(interpolate, band, sums);
+  if (sums->faces() == 0) return;
+  out->stride = sums->stride();
+  out->faces.assign(sums->face.data() + 1, sums->face.data() + sums->count);
+  const std::size_t arrays = raster::FaceGradientArrays(image.attributes.channels, request);
+  const std::size_t numbers = 4 * arrays * out->stride;
+  if (out->values.size() < numbers) out->values.resize(numbers);
+  raster::FinishBand(interpolate, *sums, request, out->values);
+}
+
+}  // namespace
+
+bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
+                        const raster::BackwardRequest& request, WorkerScratch* worker,
+                        BandGradients* out) {
+  const BandPlace place(BandGrid(input.options.width, input.options.height), task);
+  const auto channels = static_cast<std::size_t>(image.attributes.channels);
+  const bool staged = input.stage != nullptr, wanted = request.geometry || request.attributes;
+  out->faces.clear();
+  if (!IsSoundBand(input, image.mesh, channels, place)) return false;
+  if (!staged && (input.d_frame.attributes.empty() || !wanted)) return true;
+  ++worker->stats.interpolated;
+  auto ids = place.Of(std::span<const std::int32_t>(input.frame.face_ids), 1, 0);
+  if (image.mesh.was_clipped()) {
+    FindPieces(image.mesh, place.row_begin, ids, &out->pieces);
+    ids = out->pieces;
+  }
+  raster::PlanarView<const float> d_out{nullptr, static_cast<std::ptrdiff_t>(place.plane),
+                                        input.options.width};
+  if (staged) {
+    if (!BandCotangents(input, image, task, place, ids, worker)) return false;
+    if (channels == 0 || !wanted) return true;
+    d_out.data = worker->d_varyings.data();
+    d_out.plane = static_cast<std::ptrdiff_t>(place.count);
+  } else {
+    d_out.data = place.Of(input.d_frame.attributes, channels, 0).data();
+  }
+  StageClock clock;
+  SumBandFaces(input, image,
+               {{ids.data(), input.options.width, 0, place.row_begin, place.row_end}, d_out},
+               request, &worker->band, out);
+  clock.Lap(&worker->times.gradients);
+  return true;
+}
+
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
+                       WorkerScratch* worker, BinGradients* out) {
+  const raster::TileGrid tiles(input.options.width, input.options.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(tiles.width) * static_cast<std::size_t>(tiles.height);
+  const auto part = [&](auto batch) {
+    return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
+  };
+  const raster::SoftMaskAdjoint adjoint{part(std::span<const float>(input.frame.alpha)),
+                                        part(std::span<const float>(input.frame.transmittance)),
+                                        part(input.d_frame.alpha)};
+  out->clear();
+  ++worker->stats.softened;
+  raster::SoftMaskBackward(image.soft, image.soft_plan,
+                           {bin.rect, part(std::span<const std::int32_t>(input.frame.face_ids))},
+                           adjoint, out, &worker->soft);
+}
+
+}  // namespace tilegrad

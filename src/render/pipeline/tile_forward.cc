@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/pipeline/tile_forward.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+#include "base/prefetch.h"
+#include "base/stage_clock.h"
+#include "raster/fragments.h"
+#include "render/pipeline/frame_layout.h"
+
+namespace tilegrad {
+namespace {
+
+// Calls visit(index in the bin's arrays, index in an image) for each pixel of the bin.
+template <class Visit>
+void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
+  for (int i = rect.y0; i < rect.y1; ++i) {
+    for (int j = rect.x0; j < rect.x1; ++j) {
+      visit(static_cast<std::size_t>((i - rect.y0) * raster::kBinSize + j - rect.x0),
+            static_cast<std::size_t>(i) * static_cast<std::size_t>(width) +
+                static_cast<std::size_t>(j));
+    }
+  }
+}
+
+void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
+                  const std::int32_t* faces, std::int32_t* ids) {
+  if (!mesh.was_clipped()) {
+    constexpr int kRowsAhead = 4;  // copying a row is faster than memory
+    const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
+    for (int i = rect.y0; i < rect.y1; ++i, faces += raster::kBinSize) {
+      std::int32_t* to = ids + static_cast<std::ptrdiff_t>(i) * mesh.width + rect.x0;
+      if (i + kRowsAhead < rect.y1) PrefetchNumbers(to + kRowsAhead * mesh.width, width);
+      std::copy_n(faces, width, to);
+    }
+    return;
+  }
+  ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
+    const std::int32_t face = faces[from];
+    ids[to] = face >= 0 ? mesh.source_face[static_cast<std::size_t>(face)] : face;
+  });
+}
+
+// Where no face is drawn.
+void WriteBackground(const raster::TileRect& rect, int width, std::int32_t* ids, float* depth) {
+  for (int i = rect.y0; i < rect.y1; ++i) {
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i) * width;
+    std::fill(ids + row + rect.x0, ids + row + rect.x1, raster::kNoFace);
+    if (depth == nullptr) continue;
+    std::fill(depth + row + rect.x0, depth + row + rect.x1, std::numeric_limits<float>::infinity());
+  }
+}
+
+void WriteDepth(const raster::TileRect& rect, int width, const float* inverse, float* depth) {
+  ForEachPixel(rect, width, [&](std::size_t from, std::size_t to) {
+    depth[to] = inverse[from] > 0 ? 1.0f / inverse[from] : std::numeric_limits<float>::infinity();
+  });
+}
+
+// Turns the weights of a cut piece's corners into those of its source face.
+void MixCutWeights(const SceneView& scene, const raster::ScreenMesh& mesh,
+                   const raster::TileRect& rect, const std::int32_t* faces, float* w1, float* w2) {
+  ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
+    if (faces[from] == raster::kNoFace) return;
+    const float piece[3] = {1 - w1[to] - w2[to], w1[to], w2[to]};
+    float source[3];
+    raster::SourceWeights<float>(mesh, scene.faces, static_cast<std::size_t>(faces[from]), piece,
+                                 source);
+    w1[to] = source[1], w2[to] = source[2];
+  });
+}
+
+// The images of one scene within a batch.
+struct ImageOfFrame {
+  std::size_t pixels, channels, n;
+  template <class T>
+  T* plane(AlignedVector<T>& batch, std::size_t planes) const {
+    return batch.empty() ? nullptr : batch.data() + n * planes * pixels;
+  }
+};
+
+bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
+  std::int32_t all = raster::kNoFace;
+  for (std::size_t i = 0; i < pixels; ++i) all &= faces[i];
+  return all != raster::kNoFace;
+}
+
+// Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
+// then only the frame's are written.
+bool WriteVisibility(const BinInput& input, const TileTask& task, const ImageOfFrame& part,
+                     WorkerScratch* worker, Frame* frame) {
+  const raster::TileRect& rect = task.rect;
+  const ImageScratch& image = input.image;
+  const int width = input.options.width;
+  std::int32_t* const ids = part.plane(frame->face_ids, 1);
+  float* const depth = part.plane(frame->depth, 1);
+  ++worker->stats.drawn;
+  const std::span<const std::int32_t> listed = image.drawn[task.tile];
+  if (listed.empty()) {
+    WriteBackground(rect, width, ids, depth);
+    return false;
+  }
+  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, listed}, rect, &worker->bin);
+  WriteFaceIds(image.mesh, rect, worker->bin.face, ids);
+  if (depth != nullptr) WriteDepth(rect, width, worker->bin.inverse_depth, depth);
+  return true;
+}
+
+// Where a bin's attributes go: into the frame, or to the stage.
+raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask& task,
+                                          const ImageOfFrame& part, WorkerScratch* worker,
+                                          Frame* frame) {
+  if (input.stage != nullptr) {
+    const auto plane = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
+    const std::size_t size = static_cast<std::size_t>(input.image.attributes.channels) * plane;
+    if (worker->varyings.size() < size) worker->varyings.resize(size);
+    return {worker->varyings.data(), static_cast<std::ptrdiff_t>(plane), raster::kBinSize};
+  }
+  const auto row = static_cast<std::ptrdiff_t>(input.options.width);
+  float* attributes = part.plane(frame->attributes, part.channels);
+  if (attributes != nullptr) attributes += task.rect.y0 * row + task.rect.x0;
+  return {attributes, static_cast<std::ptrdiff_t>(part.pixels), row};
+}
+
+void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFrame& part, bool drawn,
+                    WorkerScratch* worker, Frame* frame) {
+  const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
+  const raster::TileRect& rect = task.rect;
+  const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker, frame);
+  float* barycentrics = part.plane(frame->barycentrics, 2);
+  raster::InterpolateInput input{&bin.image.mesh, bin.image.attributes, bin.options.interpolation,
+                                 barycentrics != nullptr};
+  if (target.data == nullptr) input.attributes.channels = 0;
+  ++worker->stats.interpolated;
+  const raster::FaceRows rows{worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1};
+  const raster::InterpolateOutput out{
+      target,
+      {barycentrics == nullptr ? nullptr : barycentrics + rect.y0 * row + rect.x0,
+       static_cast<std::ptrdiff_t>(part.pixels), row},
+      rect.x1 - rect.x0};
+  if (!drawn) {
+    raster::InterpolateBackground(input, rows, out);
+    return;
+  }
+  raster::Interpolate(input, rows, out, &worker->interpolate);
+  if (barycentrics != nullptr && bin.image.mesh.was_clipped()) {
+    MixCutWeights(bin.scene, bin.image.mesh, rect, worker->bin.face, barycentrics,
+                  barycentrics + part.pixels);
+  }
+}
+
+void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerScratch* worker) {
+  const raster::TileRect& rect = task.rect;
+  bin.stage->Forward(
+      {.image = task.image,
+       .band = 0,
+       .worker = worker->index,
+       .mesh = &bin.image.mesh,
+       .attributes = bin.image.attributes,
+       .rows = {worker->bin.face, raster::kBinSize, rect.x0, rect.y0, rect.y1},
+       .columns = rect.x1 - rect.x0,
+       .first = static_cast<std::size_t>(rect.y0) * static_cast<std::size_t>(bin.options.width) +
+                static_cast<std::size_t>(rect.x0),
+       .varyings = worker->varyings.data(),
+       .any_face = any_face});
+}
+
+// Alpha of a bin. Returns the error spent.
+double SoftAlpha(const ImageScratch& image, const TileTask& task, const ImageOfFrame& part,
+                 WorkerScratch* worker, Frame* frame) {
+  const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
+  const raster::SoftMaskImages images{{part.plane(frame->alpha, 1), part.pixels},
+                                      {part.plane(frame->transmittance, 1), part.pixels}};
+  ++worker->stats.softened;
+  return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, images,
+                                 &worker->soft);
+}
+
+}  // namespace
+
+double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame) {
+  const ImageScratch& image = input.image;
+  RenderTimes* const times = &worker->times;
+  StageClock clock;
+  const ImageOfFrame part{
+      static_cast<std::size_t>(frame->width) * static_cast<std::size_t>(frame->height),
+      static_cast<std::size_t>(frame->channels), task.image};
+  const bool drawn = WriteVisibility(input, task, part, worker, frame);
+  clock.Lap(&times->visibility);
+  const auto pixels = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
+  const bool to_stage = input.stage != nullptr && drawn && AnyFace(worker->bin.face, pixels);
+  const bool to_frame = input.stage == nullptr && !frame->attributes.empty();
+  if (to_stage || to_frame || !frame->barycentrics.empty()) {
+    InterpolateBin(input, task, part, drawn, worker, frame);
+  }
+  clock.Lap(&times->interpolate);
+  if (input.stage != nullptr) RunStage(input, task, to_stage, worker);
+  clock.Lap(&times->stage);
+  if (frame->alpha.empty()) return 0;
+  const double spent = SoftAlpha(image, task, part, worker, frame);
+  clock.Lap(&times->alpha);
+  return spent;
+}
+
+}  // namespace tilegrad

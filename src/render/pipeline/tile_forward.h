@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// All stages forward: a bin is drawn, then its tiles are interpolated and given their alpha.
+#pragma once
+
+#include "render/pipeline/image_scratch.h"
+#include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/pipeline.h"
+
+namespace tilegrad {
+
+// What the bins of an image have in common.
+struct BinInput {
+  const SceneView& scene;
+  const RenderOptions& options;
+  const ImageScratch& image;
+  PixelStage* stage;  // null: attributes are images themselves
+};
+
+// Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
+// task.tile and task.rect are those of raster::BinGrid.
+double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame);
+
+}  // namespace tilegrad

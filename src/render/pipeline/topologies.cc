@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/pipeline/topologies.h"
+
+#include <atomic>
+#include <cstring>
+
+#include "base/array_checks.h"
+#include "raster/project.h"
+
+namespace tilegrad {
+namespace {
+
+std::size_t VerticesOf(const SceneView& scene) { return scene.positions.size() / 3; }
+
+// The very same array: its numbers need not be looked at.
+bool ShareFaces(const SceneView& a, const SceneView& b) {
+  return a.faces.data() == b.faces.data() && a.faces.size() == b.faces.size() &&
+         VerticesOf(a) == VerticesOf(b);
+}
+
+bool HasFacesOf(const Topology& topology, const SceneView& scene) {
+  return topology.id.version != 0 && topology.vertices == VerticesOf(scene) &&
+         topology.faces.size() == scene.faces.size() &&
+         (scene.faces.empty() ||
+          std::memcmp(topology.faces.data(), scene.faces.data(), scene.faces.size_bytes()) == 0);
+}
+
+}  // namespace
+
+// Only neighbours are compared, so that a batch of all different meshes costs no more.
+void Topologies::Group(std::span<const SceneView> scenes) {
+  of_scene_.resize(scenes.size()), first_scene_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (n == 0 || !ShareFaces(scenes[n - 1], scenes[n])) first_scene_.push_back(n);
+    of_scene_[n] = first_scene_.size() - 1;
+  }
+  if (topologies_.size() < first_scene_.size()) topologies_.resize(first_scene_.size());
+}
+
+bool Topologies::Update(std::span<const SceneView> scenes, const Workers& workers) {
+  Group(scenes), ++updates_;
+  std::atomic<bool> sound = true;
+  workers.For(first_scene_.size(), [&](std::size_t i, std::size_t) {
+    const SceneView& scene = scenes[first_scene_[i]];
+    Topology& topology = topologies_[i];
+    if (HasFacesOf(topology, scene)) return;
+    topology.id = {};
+    if (!AllWithin(scene.faces, 0, static_cast<std::int32_t>(VerticesOf(scene)))) {
+      sound = false;
+      return;
+    }
+    topology.vertices = VerticesOf(scene);
+    topology.faces.assign(scene.faces.begin(), scene.faces.end());
+    raster::SplitFaces(topology.faces, &topology.corners, &workers);
+    topology.id = {i, updates_};
+  });
+  return sound;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradients of the arrays of meshes: what the renderer pulls on a scene's streams goes to scratch
+// of the scene's own, and is then summed into the arrays of the caller, which scenes may share.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "base/parallel.h"
+#include "render/pipeline/pipeline.h"
+#include "render/shading/inputs.h"
+#include "render/shading/plan.h"
+#include "render/scene.h"
+
+namespace tilegrad {
+
+class ShadeGradients {
+ public:
+  explicit ShadeGradients(const Workers& workers) : workers_(&workers) {}
+
+  // Where Renderer::Backward is to write, given the views that it gets. Cameras are asked for as
+  // d_scenes do.
+  std::span<SceneGradients> Begin(const BackwardPlan& plan, std::span<const SceneView> views,
+                                  std::span<const ShadedGradients> d_scenes);
+  // Sums what it has written into the arrays of d_scenes, which are overwritten: in the order of
+  // scenes, whatever the number of workers.
+  void Merge(const BackwardPlan& plan, const ShadeInputs& inputs,
+             std::span<const ShadedScene> scenes, std::span<ShadedGradients> d_scenes);
+
+ private:
+  // Of one scene before they are merged.
+  struct SceneScratch {
+    AlignedVector<float> d_varyings, d_positions;
+    AlignedVector<shade::Vec3<float>> d_units;
+  };
+  // One array of the caller; scenes may share it.
+  struct Sink {
+    std::span<float> out;
+    Varying what;  // kPosition: positions
+  };
+  // What a merge is about.
+  struct Batch {
+    const BackwardPlan& plan;
+    const ShadeInputs& inputs;
+    std::span<const ShadedScene> scenes;
+    std::span<const ShadedGradients> d_scenes;
+  };
+
+  void AddToPositions(const Batch& batch, std::size_t scene);
+  void FindSinks(std::span<const ShadedGradients> d_scenes);
+  void FillSink(const Batch& batch, const Sink& sink) const;
+
+  const Workers* workers_;
+  std::vector<SceneScratch> scratch_;
+  std::vector<SceneGradients> d_views_;
+  std::vector<Sink> sinks_;
+};
+
+}  // namespace tilegrad

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/shading/inputs.h"
+
+#include <cstdint>
+#include <utility>
+
+#include "base/stage_clock.h"
+#include "shade/normalize_ref.h"
+#include "shade/spherical_harmonics_ref.h"
+
+namespace tilegrad {
+namespace {
+
+// The arrays of a scene that are packed. Scenes with the same ones share what is packed.
+bool SameSources(const ShadedScene& a, const ShadedScene& b) {
+  const auto same = [](auto x, auto y) { return x.data() == y.data() && x.size() == y.size(); };
+  return same(a.positions, b.positions) && same(a.faces, b.faces) &&
+         same(a.attributes, b.attributes) && same(a.colors.values, b.colors.values) &&
+         same(a.uvs.values, b.uvs.values) && same(a.normals.values, b.normals.values) &&
+         same(a.light_directions, b.light_directions);
+}
+
+void SetLights(const ShadedScene& scene, StageScene* out) {
+  out->lights.assign(scene.lights.begin(), scene.lights.end());
+  out->inverse_lengths.clear();
+  for (auto& light : out->lights) {
+    const auto unit = shade::NormalizeScaledRef(light.direction);
+    light.direction = unit.unit;
+    out->inverse_lengths.push_back(unit.inverse_length);
+  }
+  if (scene.model.lighting != Lighting::kSphericalHarmonics) return;
+  out->sh = shade::ShPolynomialOf<float>(scene.model.sh_basis, scene.sh);
+}
+
+void SetSurfaces(const ShadedScene& scene, StageScene* out) {
+  out->surfaces.assign(scene.surfaces.begin(), scene.surfaces.end());
+  if (!out->surfaces.empty()) return;
+  Surface surface;
+  surface.texture = scene.textures.empty() ? -1 : 0;
+  out->surfaces.push_back(surface);
+}
+
+shade::Vec3<float> EyeOf(const Camera& camera) {  // -R^T t
+  shade::Vec3<float> eye = {};
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c)
+      eye[c] -= camera.rotation[3 * r + c] * camera.translation[r];
+  }
+  return eye;
+}
+
+bool SameTexture(const shade::TextureView& a, const shade::TextureView& b) {
+  return a.texels.data() == b.texels.data() && a.width == b.width && a.height == b.height &&
+         a.wrap == b.wrap && a.filter == b.filter;
+}
+
+}  // namespace
+
+void ShadeInputs::PrepareTextures(std::span<const ShadedScene> scenes) {
+  pyramid_views_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    for (const shade::TextureView& view : scenes[n].textures) {
+      std::size_t i = 0;
+      while (i < pyramid_views_.size() && !SameTexture(pyramid_views_[i], view)) ++i;
+      if (i == pyramid_views_.size()) pyramid_views_.push_back(view);
+      if (i == pyramids_.size()) pyramids_.push_back(std::make_unique<shade::TexturePyramid>());
+      stage_scenes_[n].textures.push_back(pyramids_[i].get());
+    }
+  }
+  StageClock clock;
+  workers_->For(pyramid_views_.size(),
+                [&](std::size_t i, std::size_t) { pyramids_[i]->Build(pyramid_views_[i]); });
+  clock.Lap(&work_.textures_ms);
+  for (std::size_t i = 0; i < pyramid_views_.size(); ++i) {
+    const shade::LevelSize& last = pyramids_[i]->sizes().back();
+    work_.texels += static_cast<std::int64_t>(last.first + last.texels());
+  }
+}
+
+void ShadeInputs::Begin(std::span<const ShadedScene> scenes, bool textures) {
+  work_ = {};
+  stage_scenes_.resize(scenes.size());
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    StageScene& out = stage_scenes_[n];
+    out.scene = &scenes[n];
+    SetSurfaces(scenes[n], &out), SetLights(scenes[n], &out);
+    out.eye = EyeOf(scenes[n].camera);
+    out.textures.clear();
+  }
+  if (textures) PrepareTextures(scenes);
+}
+
+void ShadeInputs::FindPacks(std::span<const ShadedScene> scenes) {
+  first_of_pack_.clear(), pack_of_scene_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack_.push_back(n);
+    pack_of_scene_.push_back(first_of_pack_.size() - 1);
+  }
+  if (packs_.size() < first_of_pack_.size()) packs_.resize(first_of_pack_.size());
+}
+
+void ShadeInputs::DerivePackNormals(std::span<const ShadedScene> scenes) {
+  StageClock clock;
+  workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
+    DeriveNormals(scenes[first_of_pack_[i]], &packs_[i].normals);
+  });
+  for (const std::size_t n : first_of_pack_) {
+    work_.normals += static_cast<std::int64_t>(scenes[n].faces.size() / 3);
+  }
+  clock.Lap(&work_.normals_ms);
+}
+
+void ShadeInputs::PackStreams(std::span<const ShadedScene> scenes, const StreamSets& sets) {
+  StageClock clock;
+  workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
+    ScenePack& pack = packs_[i];
+    const ShadedScene& scene = scenes[first_of_pack_[i]];
+    PackVaryings(scene, sets.varyings, pack.normals, &pack.varyings);
+    if (sets.recomputed == nullptr) return;
+    PackVaryings(scene, *sets.recomputed, pack.normals, &pack.recomputed);
+  });
+  for (std::size_t i = 0; i < first_of_pack_.size(); ++i) {
+    work_.packed += static_cast<std::int64_t>(packs_[i].varyings.size());
+    if (sets.recomputed == nullptr) continue;
+    work_.packed += static_cast<std::int64_t>(packs_[i].recomputed.size());
+  }
+  clock.Lap(&work_.pack_ms);
+}
+
+void ShadeInputs::Pack(std::span<const ShadedScene> scenes, const StreamSets& sets) {
+  FindPacks(scenes);
+  if (sets.normals && scenes[0].model.normals != NormalKind::kGiven) DerivePackNormals(scenes);
+  PackStreams(scenes, sets);
+  const VaryingSet& set = sets.varyings;
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    const ScenePack& pack = packs_[pack_of_scene_[n]];
+    StageScene& out = stage_scenes_[n];
+    out.varyings = {pack.varyings, set.channels(), set.rate};
+    out.recomputed = out.varyings;
+    if (sets.recomputed == nullptr) continue;
+    out.recomputed = {pack.recomputed, sets.recomputed->channels(), sets.recomputed->rate};
+  }
+  SetViews(scenes);
+}
+
+void ShadeInputs::UsePlain(std::span<const ShadedScene> scenes, bool colors, bool user) {
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    const ShadedScene& s = scenes[n];
+    stage_scenes_[n].varyings = {};
+    if (colors) stage_scenes_[n].varyings = {s.colors.values, 3, s.colors.rate};
+    if (user) stage_scenes_[n].varyings = {s.attributes, s.channels, s.rate};
+  }
+  SetViews(scenes);
+}
+
+void ShadeInputs::SetViews(std::span<const ShadedScene> scenes) {
+  views_.clear();
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    SceneView view = scenes[n];
+    view.attributes = stage_scenes_[n].varyings.values;
+    view.channels = stage_scenes_[n].varyings.channels, view.rate = stage_scenes_[n].varyings.rate;
+    views_.push_back(view);
+  }
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/shading/plan.h"
+
+namespace tilegrad {
+namespace {
+
+AttributeRate RateOf(const SceneParts& parts, Varying v) {
+  switch (v) {
+    case Varying::kColor:
+      return parts.colors_rate;
+    case Varying::kUv:
+      return parts.uvs_rate;
+    case Varying::kUser:
+      return parts.user_rate;
+    case Varying::kNormal:
+      if (parts.model.normals == NormalKind::kFlat) return AttributeRate::kCorner;
+      return parts.model.normals == NormalKind::kGiven ? parts.normals_rate
+                                                       : AttributeRate::kVertex;
+    default:
+      return AttributeRate::kVertex;
+  }
+}
+
+// Corner rate as soon as one of them has it.
+void Finish(const SceneParts& parts, VaryingSet* set) {
+  set->user_channels = parts.user_channels;
+  for (std::size_t i = 0; i < kVaryings; ++i) {
+    const auto v = static_cast<Varying>(i);
+    if (set->width(v) == 0) set->has[i] = false;
+    if (set->has[i] && RateOf(parts, v) == AttributeRate::kCorner) {
+      set->rate = AttributeRate::kCorner;
+    }
+  }
+}
+
+// Whether an image of colour is nothing but the interpolated colours.
+bool IsPlainColor(const SceneParts& parts) {
+  return parts.colors && !parts.textures && !parts.surfaces && !parts.lit() && !parts.model.clamp;
+}
+
+bool IsOnly(const VaryingSet& set, Varying v) {
+  VaryingSet only = set;
+  only.has = {};
+  only[v] = true;
+  return set == only;
+}
+
+ShadeSteps ColorSteps(const SceneParts& parts) {
+  return {.color = true,
+          .texture = parts.textures,
+          .level = parts.textures && parts.trilinear,
+          .normal = parts.lit(),
+          .light = parts.lit(),
+          .highlight = parts.model.lighting == Lighting::kPhong};
+}
+
+// Whether somebody wants a gradient that normals hand on.
+bool WantsNormals(const BackwardPlan& plan) {
+  const bool given = plan.parts.model.normals == NormalKind::kGiven;
+  return plan.geometry || (given ? plan.wishes.normals : plan.wishes.positions);
+}
+
+void SetColorTargets(BackwardPlan* plan) {
+  const SceneParts& parts = plan->parts;
+  const GradientWishes& wishes = plan->wishes;
+  const bool geometry = plan->geometry;
+  plan->to_colors = parts.colors && (geometry || wishes.colors);
+  plan->to_uv = parts.textures && parts.bilinear && (geometry || wishes.uvs);
+  plan->to_texture = parts.textures && wishes.textures;
+  plan->to_normal = parts.lit() && WantsNormals(*plan);
+  plan->to_eye = parts.model.lighting == Lighting::kPhong && geometry;
+  plan->to_light_vectors =
+      parts.uses_lights() &&
+      (wishes.lights || (parts.light_directions && (geometry || wishes.light_directions)));
+  plan->to_light = plan->to_normal || plan->to_eye || plan->to_light_vectors ||
+                   (parts.model.lighting == Lighting::kSphericalHarmonics && wishes.sh);
+  plan->to_surfaces = wishes.surfaces;
+}
+
+VaryingSet PulledVaryings(const BackwardPlan& plan) {
+  const GradientWishes& wishes = plan.wishes;
+  const bool geometry = plan.geometry;
+  VaryingSet set;
+  set[Varying::kColor] = plan.to_colors;
+  set[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes.uvs));
+  set[Varying::kNormal] = plan.to_normal || (wishes.d_normals && WantsNormals(plan));
+  set[Varying::kPosition] = plan.to_eye || (wishes.d_depth && geometry);
+  set[Varying::kLightDirection] =
+      plan.to_light_vectors && plan.parts.light_directions && (geometry || wishes.light_directions);
+  set[Varying::kUser] = wishes.d_user && (geometry || wishes.user);
+  Finish(plan.parts, &set);
+  return set;
+}
+
+// Whether the adjoint of colour needs what light or surfaces multiply.
+bool PullsOnFactors(const BackwardPlan& plan) { return plan.to_light || plan.to_surfaces; }
+bool PullsOnTexture(const BackwardPlan& plan) { return plan.to_uv || plan.to_texture; }
+
+ShadeSteps RecomputedSteps(const BackwardPlan& plan) {
+  const SceneParts& parts = plan.parts;
+  ShadeSteps steps;
+  if (plan.to_colors || PullsOnTexture(plan) || PullsOnFactors(plan)) {
+    steps = ColorSteps(parts);
+    // The highlight is a sum of its own: colours and textures do not need its value.
+    steps.highlight = steps.highlight && (parts.model.clamp || PullsOnFactors(plan));
+  }
+  if (plan.wishes.d_normals && WantsNormals(plan)) steps.normal = true;
+  return steps;
+}
+
+VaryingSet RecomputedVaryings(const BackwardPlan& plan) {
+  const SceneParts& parts = plan.parts;
+  const ShadeSteps& steps = plan.steps;
+  VaryingSet set;
+  set[Varying::kColor] = steps.color && parts.colors &&
+                         (parts.model.clamp || PullsOnTexture(plan) || PullsOnFactors(plan));
+  set[Varying::kUv] = steps.texture;
+  set[Varying::kNormal] = steps.normal;
+  set[Varying::kPosition] = steps.highlight || (plan.wishes.d_depth && plan.wishes.camera);
+  set[Varying::kLightDirection] = steps.light && parts.uses_lights() && parts.light_directions;
+  Finish(parts, &set);
+  return set;
+}
+
+}  // namespace
+
+int VaryingSet::width(Varying v) const {
+  if (!(*this)[v]) return 0;
+  return v == Varying::kUser ? user_channels : v == Varying::kUv ? 2 : 3;
+}
+
+int VaryingSet::first(Varying v) const {
+  int sum = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(v); ++i)
+    sum += width(static_cast<Varying>(i));
+  return sum;
+}
+
+int VaryingSet::channels() const { return first(Varying::kUser) + width(Varying::kUser); }
+
+ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request) {
+  ForwardPlan plan;
+  plan.parts = parts, plan.request = request;
+  if (request.color) plan.steps = ColorSteps(parts);
+  if (request.normals) plan.steps.normal = true;
+  VaryingSet& set = plan.varyings;
+  set[Varying::kColor] = plan.steps.color && parts.colors;
+  set[Varying::kUv] = plan.steps.texture || (request.uv && parts.uvs);
+  set[Varying::kNormal] = plan.steps.normal;
+  set[Varying::kPosition] = plan.steps.highlight;
+  set[Varying::kLightDirection] = plan.steps.light && parts.uses_lights() && parts.light_directions;
+  set[Varying::kUser] = request.attributes;
+  Finish(parts, &set);
+  plan.colors_only = IsPlainColor(parts) && IsOnly(set, Varying::kColor);
+  plan.user_only = IsOnly(set, Varying::kUser) && !request.color;
+  return plan;
+}
+
+bool BackwardPlan::staged() const {
+  if (colors_only || user_only) return false;
+  return pulled.channels() > 0 || to_texture || to_surfaces || to_light_vectors || wishes.sh ||
+         to_eye || (wishes.d_depth && geometry);
+}
+
+BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
+  BackwardPlan plan;
+  wishes.d_uv = wishes.d_uv && parts.uvs;
+  plan.parts = parts, plan.wishes = wishes;
+  plan.geometry = wishes.positions || wishes.camera;
+  if (wishes.d_color) SetColorTargets(&plan);
+  plan.pulled = PulledVaryings(plan);
+  plan.steps = RecomputedSteps(plan);
+  plan.recomputed = RecomputedVaryings(plan);
+  plan.colors_only = IsPlainColor(parts) && wishes.d_color &&
+                     IsOnly(plan.pulled, Varying::kColor) && !plan.to_surfaces;
+  plan.user_only =
+      IsOnly(plan.pulled, Varying::kUser) && plan.recomputed.channels() == 0 && !wishes.d_color;
+  return plan;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Only what is needed is computed. The plan is made once for a batch, from what its scenes hold,
+// which images are wanted and which gradients; every stage asks it, and it can be printed.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/scene.h"
+
+namespace tilegrad {
+
+// What is interpolated over faces.
+enum class Varying { kColor, kUv, kNormal, kPosition, kLightDirection, kUser };
+inline constexpr std::size_t kVaryings = 6;
+
+// Which of them, and where their channels stand: in the order above.
+struct VaryingSet {
+  std::array<bool, kVaryings> has = {};
+  AttributeRate rate = AttributeRate::kVertex;  // of the array that holds them
+  int user_channels = 0;
+
+  bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
+  bool& operator[](Varying v) { return has[static_cast<std::size_t>(v)]; }
+  int width(Varying v) const;  // channels
+  int first(Varying v) const;  // its first channel
+  int channels() const;        // of all
+  bool operator==(const VaryingSet&) const = default;
+};
+
+// What a batch of scenes is made of; they must agree.
+struct SceneParts {
+  ShadingModel model;
+  bool colors = false, uvs = false, normals = false, textures = false, surfaces = false;
+  bool light_directions = false;
+  bool bilinear = false;  // some texture is filtered: coordinates have a gradient
+  bool trilinear = false;
+  AttributeRate colors_rate = AttributeRate::kVertex, uvs_rate = AttributeRate::kVertex;
+  AttributeRate normals_rate = AttributeRate::kVertex, user_rate = AttributeRate::kVertex;
+  int user_channels = 0;
+
+  bool lit() const { return model.lighting != Lighting::kNone; }
+  bool uses_lights() const {
+    return model.lighting == Lighting::kLambert || model.lighting == Lighting::kPhong;
+  }
+};
+
+// Steps for the pixels of a run.
+struct ShadeSteps {
+  bool color = false, texture = false, level = false, normal = false, light = false;
+  bool highlight = false;
+
+  bool any() const { return color || texture || normal; }
+};
+
+// `color`: that is the image wanted, or pulled on.
+struct ForwardPlan {
+  SceneParts parts;
+  ShadedRequest request;
+  VaryingSet varyings;
+  ShadeSteps steps;
+  // Attributes are images themselves: the colours, or the user's channels. Nothing is packed.
+  bool colors_only = false, user_only = false;
+
+  bool staged() const {
+    return (varyings.channels() > 0 || steps.color) && !colors_only && !user_only;
+  }
+};
+
+// Which cotangents and gradients there are, in any scene of a batch.
+struct GradientWishes {
+  bool d_color = false, d_normals = false, d_uv = false, d_depth = false, d_user = false,
+       d_alpha = false;
+  bool positions = false, camera = false, colors = false, uvs = false, normals = false,
+       light_directions = false, user = false, textures = false, surfaces = false, lights = false,
+       sh = false;
+};
+
+struct BackwardPlan {
+  SceneParts parts;
+  GradientWishes wishes;
+  VaryingSet pulled;      // get a cotangent that somebody wants
+  VaryingSet recomputed;  // are needed for that; may be `pulled` itself
+  ShadeSteps steps;       // of the recomputation
+  // What the adjoint of colour goes on to.
+  bool to_colors = false, to_texture = false, to_uv = false, to_light = false, to_normal = false,
+       to_eye = false, to_light_vectors = false, to_surfaces = false;
+  bool geometry = false;
+  bool colors_only = false, user_only = false;  // as in ForwardPlan
+
+  // Whether pixels have to be visited for more than alpha.
+  bool staged() const;
+};
+
+ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request);
+BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes);
+
+// One stage of a call, as it was run.
+struct StageReport {
+  std::string_view name;
+  std::int64_t count = 0;  // of `unit`; 0: it did not run
+  std::string_view unit;
+  double milliseconds = 0;  // summed over workers
+  std::string what;         // on what, or what spares it
+};
+
+// A call of ShadedRenderer: its stages in their order, those too that did not run.
+struct PlanReport {
+  bool backward = false;
+  std::vector<StageReport> stages;
+
+  std::int64_t count(std::string_view name) const;  // of the stage of that name
+};
+
+// A heading, and one line for each stage: name, count, time, on what.
+std::vector<std::string> ExplainLines(const PlanReport& report);
+
+}  // namespace tilegrad

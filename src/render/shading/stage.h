@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shading as a stage of the renderer: the pixels of a block are gathered into runs (shade_run.h)
+// and written to the images; on the way back, to cotangents of what was interpolated, and sums for
+// each band.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/pipeline/pixel_stage.h"
+#include "render/shading/pixel_segments.h"
+#include "render/shading/plan.h"
+#include "render/shading/run.h"
+#include "render/scene.h"
+
+namespace tilegrad {
+
+// A scene of the batch, ready for its pixels.
+struct StageScene {
+  const ShadedScene* scene = nullptr;
+  std::vector<Surface> surfaces;
+  std::vector<shade::DirectionalLight> lights;  // unit directions
+  std::vector<float> inverse_lengths;           // of the lights' directions
+  shade::ShPolynomial sh = {};
+  shade::Vec3<float> eye = {};
+  std::vector<const shade::TexturePyramid*> textures;
+  raster::AttributeViewT<const float> varyings;    // forward, or what is pulled on
+  raster::AttributeViewT<const float> recomputed;  // on the way back
+};
+
+// What a band of an image has summed.
+struct StageBand {
+  SceneSums sums;
+  std::vector<std::vector<shade::TexelShare>> shares;  // of each texture
+};
+
+// Of one worker.
+struct StageWorker {
+  std::vector<PixelSegment> segments;
+  RunValues values;
+  RunCotangents d;
+  ShadeWork work;
+};
+
+class ShadeStage : public PixelStage {
+ public:
+  explicit ShadeStage(std::size_t workers);
+
+  // What the next call is about; all is kept by the caller.
+  void BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
+                    const RenderOptions& options, ShadedFrame* frame);
+  void BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
+                     const RenderOptions& options, const ShadedFrameGradients& d_frame);
+
+  void Forward(const PixelBlock& block) override;
+  raster::AttributeViewT<const float> recomputed(std::size_t image) const override;
+  bool BeginBand(std::size_t image, std::size_t band, std::size_t first,
+                 std::size_t pixels) override;
+  void Backward(const PixelBlock& block, const raster::PlanarView<float>& d_varyings) override;
+
+  std::span<const StageBand> bands(std::size_t image) const {
+    return std::span(bands_).subspan(image * bands_of_image_, bands_of_image_);
+  }
+  ShadeWork work() const;                // of this call
+  bool sound() const { return sound_; }  // false: a cotangent was not finite
+
+ private:
+  void Begin(std::span<const StageScene> scenes, const RenderOptions& options);
+  void ForwardRun(const PixelBlock& block, const PixelRun& run, StageWorker* worker);
+  void BackwardRun(const PixelBlock& block, const PixelRun& run,
+                   const raster::PlanarView<float>& d_varyings, StageWorker* worker);
+  RunScene RunSceneOf(const StageScene& scene, std::int32_t surface) const;
+  void GatherInputs(const PixelBlock& block, const PixelRun& run, const VaryingSet& set,
+                    const ShadeSteps& steps, StageWorker* worker) const;
+  void GatherCotangentsOf(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
+  void AddUvCotangents(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
+  shade::TexelShare* NewShares(const RunScene& scene, std::size_t count, StageBand* band) const;
+  void DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
+                    SceneSums* sums);
+  void ScatterCotangents(const PixelBlock& block, const PixelRun& run,
+                         const raster::PlanarView<float>& d_varyings, const RunCotangents& d) const;
+
+  const ForwardPlan* forward_ = nullptr;
+  const BackwardPlan* backward_ = nullptr;
+  std::span<const StageScene> scenes_;
+  const RenderOptions* options_ = nullptr;
+  std::size_t pixels_ = 0;  // of an image
+  ShadedFrame* frame_ = nullptr;
+  const ShadedFrameGradients* d_frame_ = nullptr;
+  std::vector<std::unique_ptr<StageWorker>> workers_;
+  std::vector<StageBand> bands_;  // [image][band]
+  std::size_t bands_of_image_ = 0;
+  std::atomic<bool> sound_ = true;
+};
+
+}  // namespace tilegrad

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/build/build.h"
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+
+#include "base/error.h"
+#include "base/folder_lock.h"
+#include "base/rng.h"
+#include "base/temporary_file.h"
+#include "train/data/build/contact_sheet.h"
+#include "train/data/build/make_model.h"
+
+namespace tilegrad::train {
+namespace {
+
+struct Outcome {
+  std::optional<ModelStamp> stamp;  // of a finished file
+  Status failure;                   // of a model that cannot be used
+  std::vector<std::string> warnings;
+};
+
+DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
+  DatasetInfo info;
+  info.image_size = options.image_size;
+  info.views = options.views;
+  info.camera = options.camera;
+  if (const auto fixed = source.FixedInfo()) info = *fixed;
+  info.source = source.name();
+  info.credits = source.credits();
+  info.camera.lens.width = info.camera.lens.height = info.image_size;
+  info.recipe = RecipeOf(info);
+  return info;
+}
+
+std::vector<std::string> ClassesOf(const ModelSource& source,
+                                   const std::vector<std::size_t>& chosen) {
+  std::set<std::string> classes;
+  for (std::size_t i : chosen) classes.insert(source.entries()[i].class_name);
+  return {classes.begin(), classes.end()};
+}
+
+// The first by hash, so that a part of a set is as varied as the whole; ascending.
+std::vector<std::size_t> Choose(const ModelSource& source, const BuildOptions& options) {
+  const auto& entries = source.entries();
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const std::string key = entries[i].class_name + "/" + entries[i].id;
+    order.emplace_back(HashText(key, Mix64(options.split.seed)), i);
+  }
+  std::sort(order.begin(), order.end());
+  std::map<std::string, int> taken;
+  std::vector<std::size_t> chosen;
+  for (const auto& [hash, i] : order) {
+    if (options.per_class > 0 && taken[entries[i].class_name]++ >= options.per_class) continue;
+    if (options.limit > 0 && chosen.size() >= static_cast<std::size_t>(options.limit)) break;
+    chosen.push_back(i);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+class Builder {
+ public:
+  Builder(const ModelSource& source, const BuildOptions& options, const Path& folder,
+          const Workers& workers, const ProgressSink& progress, const StopFlag& stop)
+      : source_(source),
+        options_(options),
+        folder_(folder),
+        workers_(workers),
+        progress_(progress),
+        stop_(stop),
+        info_(MakeInfo(source, options)),
+        chosen_(Choose(source, options)),
+        outcomes_(chosen_.size()) {}
+
+  Result<BuildSummary> Run() {
+    if (chosen_.empty()) return NotFound("the source \"{}\" holds no models", source_.name());
+    TILEGRAD_TRY(Prepare());
+    TILEGRAD_TRY(ForEachModel("checking", [&](std::size_t i, std::size_t) { Reuse(i); }));
+    const auto reused = std::count_if(outcomes_.begin(), outcomes_.end(),
+                                      [](const Outcome& o) { return o.stamp.has_value(); });
+    if (reused < static_cast<std::ptrdiff_t>(chosen_.size())) TILEGRAD_TRY(MakeMissing());
+    summary_.reused = static_cast<int>(reused);
+    return Finish();
+  }
+
+ private:
+  const SourceEntry& entry(std::size_t i) const { return source_.entries()[chosen_[i]]; }
+  Path FileOf(std::size_t i) const {
+    return ModelFilePath(folder_, entry(i).class_name, entry(i).id);
+  }
+
+  Status Prepare() {
+    TILEGRAD_ASSIGN(lock_, FolderLock::Take(folder_));
+    info_.classes = ClassesOf(source_, chosen_);
+    RemoveTemporaries(folder_);
+    for (const std::string& name : info_.classes)
+      RemoveTemporaries(ModelFilePath(folder_, name, "").parent_path());
+    std::error_code error;
+    if (std::filesystem::exists(DatasetInfoPath(folder_), error)) {
+      TILEGRAD_ASSIGN(const DatasetInfo there, ReadDatasetInfo(folder_));
+      if (there.recipe != info_.recipe) {
+        return InvalidArgument(
+            "{} holds a dataset made with other settings (source {}, {} pixels, {} views); choose "
+            "another folder or delete it",
+            folder_.string(), there.source, there.image_size, there.views);
+      }
+      // The index that may be there belongs to the classes of then, and stays until the new one.
+      return {};
+    }
+    return WriteDatasetInfo(folder_, info_);
+  }
+
+  void Reuse(std::size_t i) {
+    std::error_code error;
+    if (!std::filesystem::exists(FileOf(i), error)) return;
+    if (auto stamp = VerifyModelFile(FileOf(i), info_); stamp.ok()) outcomes_[i].stamp = *stamp;
+  }
+
+  Status MakeMissing() {
+    // The list stands for a complete set, which this no longer is.
+    std::error_code error;
+    std::filesystem::remove(ModelsPath(folder_), error);
+    std::vector<LitRenderer> renderers(static_cast<std::size_t>(workers_.count()));
+    TILEGRAD_TRY(ForEachModel("rendering", [&](std::size_t i, std::size_t worker) {
+      if (!outcomes_[i].stamp) Make(i, renderers[worker]);
+    }));
+    return write_failure_;
+  }
+
+  void Make(std::size_t i, LitRenderer& renderer) {
+    auto made = Load(i, renderer);
+    if (!made.ok()) {
+      outcomes_[i].failure = made.status();
+      return;
+    }
+    const Status written = SaveModelFile(FileOf(i), info_, made->data, made->stamp);
+    if (written.ok()) {
+      outcomes_[i].stamp = made->stamp;
+      return;
+    }
+    // A disk that is full for one is full for all.
+    const std::lock_guard lock(mutex_);
+    if (write_failure_.ok()) write_failure_ = written;
+    failed_ = true;
+  }
+
+  Result<MadeModel> Load(std::size_t i, LitRenderer& renderer) {
+    TILEGRAD_ASSIGN(SourceModel model, source_.Load(chosen_[i]));
+    outcomes_[i].warnings = std::move(model.warnings);
+    return MakeModel(entry(i), std::move(model), info_, renderer);
+  }
+
+  // Workers draw the next model from a counter: ascending, as sources want it, and balanced, since
+  // the largest mesh takes a thousand times as long as the smallest.
+  template <class Task>
+  Status ForEachModel(const char* stage, Task task) {
+    std::atomic<std::size_t> next = 0, done = 0;
+    workers_.For(static_cast<std::size_t>(workers_.count()), [&](std::size_t, std::size_t worker) {
+      for (std::size_t i = next++; i < chosen_.size() && !stop_ && !failed_; i = next++) {
+        task(i, worker);
+        const std::lock_guard lock(mutex_);
+        if (progress_) progress_({stage, ++done, chosen_.size(), entry(i).class_name});
+      }
+    });
+    if (!stop_ || done == chosen_.size()) return {};
+    return Cancelled("stopped; what is finished is in {}, the same command goes on from there",
+                     folder_.string());
+  }
+
+  void Collect() {
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      const SourceEntry& e = entry(i);
+      if (!outcomes_[i].stamp) {
+        summary_.rejected.push_back({e.id, e.class_name, e.file, outcomes_[i].failure.message()});
+        continue;
+      }
+      usable_.push_back(chosen_[i]);
+      for (std::string& text : outcomes_[i].warnings)
+        summary_.warnings.push_back({e.file, std::move(text)});
+    }
+    info_.classes = ClassesOf(source_, usable_);
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      if (outcomes_[i].stamp) summary_.models.push_back(Describe(entry(i), *outcomes_[i].stamp));
+    }
+  }
+
+  ModelInfo Describe(const SourceEntry& e, const ModelStamp& stamp) const {
+    const auto at = std::find(info_.classes.begin(), info_.classes.end(), e.class_name);
+    ModelInfo model;
+    model.id = e.id;
+    model.name = e.name;
+    model.class_index = static_cast<int>(at - info_.classes.begin());
+    model.license = e.license;
+    model.creator = e.creator;
+    model.source_faces = stamp.source_faces;
+    model.geometry = stamp.geometry;
+    return model;
+  }
+
+  // What the source fixes stands; the rest is ours.
+  void Split() {
+    SplitModels(info_.classes, options_.split, &summary_.models);
+    for (std::size_t i = 0; i < usable_.size(); ++i) {
+      if (const auto& fixed = source_.entries()[usable_[i]].split) {
+        summary_.models[i].split = *fixed;
+      }
+    }
+  }
+
+  Result<BuildSummary> Finish() {
+    Collect();
+    TILEGRAD_TRY(WriteRejected(folder_, summary_.rejected));
+    if (summary_.models.empty()) {
+      return DataLoss("none of {} models can be used; {} says why", chosen_.size(),
+                      RejectedPath(folder_).string());
+    }
+    Split();
+    // No list for a moment rather than one that does not fit the classes.
+    std::error_code error;
+    std::filesystem::remove(ModelsPath(folder_), error);
+    TILEGRAD_TRY(WriteDatasetInfo(folder_, info_));
+    TILEGRAD_TRY(WriteModels(folder_, info_, summary_.models));
+    TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder_));
+    TILEGRAD_TRY(WriteContactSheet(dataset));
+    summary_.info = info_;
+    for (std::size_t i = 0; i < summary_.models.size(); ++i) {
+      summary_.bytes += std::filesystem::file_size(dataset.ModelPath(static_cast<int>(i)), error);
+    }
+    return std::move(summary_);
+  }
+
+  const ModelSource& source_;
+  const BuildOptions& options_;
+  const Path& folder_;
+  const Workers& workers_;
+  const ProgressSink& progress_;
+  const StopFlag& stop_;
+  FolderLock lock_;
+  DatasetInfo info_;
+  std::vector<std::size_t> chosen_;  // entries of the source, ascending
+  std::vector<Outcome> outcomes_;    // of chosen_
+  std::vector<std::size_t> usable_;  // entries of summary_.models
+  std::mutex mutex_;
+  Status write_failure_;
+  std::atomic<bool> failed_ = false;
+  BuildSummary summary_;
+};
+
+Status CheckRange(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return {};
+  return InvalidArgument("{} must be in [{}, {}], got {}", name, low, high, value);
+}
+
+Status CheckOptions(const BuildOptions& options) {
+  TILEGRAD_TRY(CheckRange("the image size", options.image_size, 8, 1024));
+  TILEGRAD_TRY(CheckRange("the number of views", options.views, 1, 1024));
+  TILEGRAD_TRY(CheckRange("the number per class", options.per_class, 0, INT32_MAX));
+  TILEGRAD_TRY(CheckRange("the limit", options.limit, 0, INT32_MAX));
+  TILEGRAD_TRY(CheckRange("the test share", options.split.test_share, 0, 0.9));
+  TILEGRAD_TRY(CheckRange("the validation share", options.split.validation_share, 0, 0.9));
+  return CheckRange("the sum of the test and validation shares",
+                    options.split.test_share + options.split.validation_share, 0, 0.95);
+}
+
+}  // namespace
+
+Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
+                                  const Path& folder, const Workers& workers,
+                                  const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_TRY(CheckOptions(options));
+  return Builder(source, options, folder, workers, progress, stop).Run();
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes a dataset from a source of models: loads, normalises, renders, voxelises, samples, splits.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "train/data/dataset_files.h"
+#include "train/data/sources/model_source.h"
+#include "train/data/split.h"
+
+namespace tilegrad::train {
+
+struct BuildOptions {
+  int image_size = 64;  // pixels
+  int views = 24;
+  CameraRule camera;  // its lens's width and height follow image_size
+  SplitRule split;
+  int per_class = 0;  // at most that many models of a class, chosen by a hash of the seed; 0: all
+  int limit = 0;      // at most that many in all; 0: all
+};
+
+// What was left out of a model that is used all the same.
+struct ModelWarning {
+  std::string file, text;
+};
+
+struct BuildSummary {
+  std::vector<ModelInfo> models;
+  DatasetInfo info;
+  std::vector<RejectedModel> rejected;
+  std::vector<ModelWarning> warnings;  // of models that this run read; kept ones are not read again
+  int reused = 0;                      // model files that an earlier run had finished
+  std::uint64_t bytes = 0;             // of the dataset's files
+};
+
+// Fills `folder` (dataset.h says with what). Model files that are there, readable and of the same
+// recipe are kept, so an interrupted run goes on where it stopped and gives the same bytes as one
+// that was not interrupted; so does any number of workers. Models that fail are listed in
+// rejected.jsonl and left out. `stop` ends the run between models with kCancelled. Errors: a folder
+// that holds a dataset of another recipe, options out of range, no usable model, a full disk.
+Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
+                                  const Path& folder, const Workers& workers,
+                                  const ProgressSink& progress, const StopFlag& stop);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// From one loaded model to the data that a dataset keeps of it.
+#pragma once
+
+#include <string>
+
+#include "render/picture/lit_renderer.h"
+#include "train/data/dataset_files.h"
+#include "train/data/sources/model_source.h"
+
+namespace tilegrad::train {
+
+struct MadeModel {
+  ModelData data;
+  ModelStamp stamp;
+};
+
+// Glass goes (glass.h), the rest is centred and scaled to the rule's half-extent, rendered,
+// voxelised, sampled (seeded by class and id) and reduced for reports. A pure function of the
+// model, the entry and `info`.
+Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
+                            LitRenderer& renderer);
+
+// 16 hex digits that change whenever model files would: `info`'s sizes and camera, the source's
+// name, and a version of the rules.
+std::string RecipeOf(const DatasetInfo& info);
+
+}  // namespace tilegrad::train

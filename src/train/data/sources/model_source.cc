@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/sources/model_source.h"
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+
+std::string SynsetName(const std::string& synset) {
+  constexpr std::pair<const char*, const char*> kNames[] = {
+      {"02691156", "airplane"}, {"02828884", "bench"},   {"02933112", "cabinet"},
+      {"02958343", "car"},      {"03001627", "chair"},   {"03211117", "display"},
+      {"03636649", "lamp"},     {"03691459", "speaker"}, {"04090263", "rifle"},
+      {"04256520", "sofa"},     {"04379243", "table"},   {"04401088", "phone"},
+      {"04530566", "vessel"}};
+  for (const auto& [id, name] : kNames) {
+    if (synset == id) return name;
+  }
+  return synset;
+}
+
+Result<std::vector<Path>> ListFolder(const Path& folder) {
+  std::error_code error;
+  std::vector<Path> out;
+  std::filesystem::directory_iterator at(folder, error);
+  for (; !error && at != std::filesystem::directory_iterator(); at.increment(error)) {
+    out.push_back(at->path());
+  }
+  if (error) return NotFound("{}: cannot list the folder: {}", folder.string(), error.message());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+std::string SafeFileName(const std::string& text) {
+  std::string out = text;
+  for (char& c : out) {
+    const auto u = static_cast<unsigned char>(c);
+    if (u > 127 || (!std::isalnum(u) && c != '.' && c != '-' && c != '_')) c = '_';
+  }
+  const bool hidden = out.empty() || out[0] == '.';
+  return hidden ? "_" + out : out;
+}
+
+void SortEntries(std::vector<SourceEntry>* entries) {
+  const auto key = [](const SourceEntry& e) { return std::tie(e.class_name, e.id, e.file); };
+  std::sort(entries->begin(), entries->end(),
+            [&](const SourceEntry& a, const SourceEntry& b) { return key(a) < key(b); });
+  std::set<std::pair<std::string, std::string>> taken;
+  for (SourceEntry& entry : *entries) {
+    const std::string base = entry.id;
+    for (int n = 2; !taken.emplace(entry.class_name, entry.id).second; ++n) {
+      entry.id = base + "-" + std::to_string(n);
+    }
+  }
+  std::sort(entries->begin(), entries->end(),
+            [&](const SourceEntry& a, const SourceEntry& b) { return key(a) < key(b); });
+}
+
+}  // namespace tilegrad::train

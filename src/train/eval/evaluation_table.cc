@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "train/eval/evaluate.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Cell(const Score& score) {
+  return score.f_score ? fmt::format("{:.1f} / {:.1f}", 100 * score.iou, 100 * *score.f_score)
+                       : fmt::format("{:.1f} / -", 100 * score.iou);
+}
+
+// Heading, then a line a method: the cells of the table as text.
+std::vector<std::vector<std::string>> Cells(const Evaluation& evaluation) {
+  std::vector<std::vector<std::string>> cells = {{"method"}};
+  for (const auto& name : evaluation.classes) cells[0].push_back(name);
+  cells[0].push_back("mean");
+  for (const auto& row : evaluation.rows) {
+    auto& line = cells.emplace_back(1, row.method);
+    for (const auto& score : row.classes) line.push_back(Cell(score));
+    line.push_back(Cell(row.mean));
+  }
+  return cells;
+}
+
+std::vector<std::size_t> Widths(const std::vector<std::vector<std::string>>& cells) {
+  std::vector<std::size_t> widths(cells[0].size(), 0);
+  for (const auto& line : cells) {
+    for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], line[i].size());
+  }
+  return widths;
+}
+
+// Methods to the left, numbers to the right.
+std::string Join(const std::vector<std::string>& line, const std::vector<std::size_t>& widths,
+                 const std::string& between) {
+  std::string out = fmt::format("{:<{}}", line[0], widths[0]);
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    out += fmt::format("{}{:>{}}", between, line[i], widths[i]);
+  }
+  return out;
+}
+
+std::string Caption(const Evaluation& evaluation) {
+  int models = 0;
+  for (const int n : evaluation.class_models) models += n;
+  return fmt::format(
+      "3D IoU at 32^3 (%) / F-score at {} (%) on {} models of the {} split, {} view{} each",
+      kFScoreThreshold, models, evaluation.split, evaluation.views_per_model,
+      evaluation.views_per_model == 1 ? "" : "s");
+}
+
+std::string Notes(const Evaluation& evaluation) {
+  std::string notes = fmt::format(
+      "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
+      "that "
+      "scores best on the training models.",
+      100 * evaluation.shape_threshold);
+  if (evaluation.unusable_predictions > 0) {
+    notes += fmt::format(" {} predictions without extent or area score 0.",
+                         evaluation.unusable_predictions);
+  }
+  return notes;
+}
+
+Json ToJson(const Score& score) {
+  Json json = {{"iou", score.iou}, {"f_score", nullptr}};
+  if (score.f_score) json["f_score"] = *score.f_score;
+  return json;
+}
+
+Json ToJson(const Evaluation& evaluation, const Dataset& dataset) {
+  Json json = {{"predictor", evaluation.predictor},
+               {"dataset", dataset.info().source},
+               {"split", evaluation.split},
+               {"views_per_model", evaluation.views_per_model},
+               {"f_score_threshold", kFScoreThreshold},
+               {"shape_threshold", evaluation.shape_threshold},
+               {"unusable_predictions", evaluation.unusable_predictions},
+               {"classes", evaluation.classes},
+               {"class_models", evaluation.class_models},
+               {"rows", Json::array()},
+               {"models", Json::array()}};
+  for (const auto& row : evaluation.rows) {
+    Json classes = Json::array();
+    for (const auto& score : row.classes) classes.push_back(ToJson(score));
+    json["rows"].push_back(
+        {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}});
+  }
+  for (const auto& [model, score] : evaluation.models) {
+    const auto& info = dataset.models()[static_cast<std::size_t>(model)];
+    Json entry = ToJson(score);
+    entry["class"] = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
+    entry["id"] = info.id;
+    json["models"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string FormatTable(const Evaluation& evaluation) {
+  const auto cells = Cells(evaluation);
+  const auto widths = Widths(cells);
+  std::string out = Caption(evaluation) + "\n\n";
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string line = Join(cells[i], widths, "  ");
+    out += line + "\n";
+    if (i == 0) out += std::string(line.size(), '-') + "\n";
+  }
+  return out + "\n" + Notes(evaluation) + "\n";
+}
+
+std::string FormatMarkdown(const Evaluation& evaluation) {
+  const auto cells = Cells(evaluation);
+  const auto widths = Widths(cells);
+  std::string out =
+      fmt::format("# Evaluation\n\n{}\n\n{}.\n\n", evaluation.predictor, Caption(evaluation));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    out += "| " + Join(cells[i], widths, " | ") + " |\n";
+    if (i > 0) continue;
+    out += "|" + std::string(widths[0] + 2, '-');
+    for (std::size_t k = 1; k < widths.size(); ++k)
+      out += "|" + std::string(widths[k] + 1, '-') + ":";
+    out += "|\n";
+  }
+  return out + "\n" + Notes(evaluation) + "\n";
+}
+
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation, const Dataset& dataset) {
+  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", ToJson(evaluation, dataset).dump(1) + "\n"));
+  return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run/trained_models.h"
+
+#include <sstream>
+#include <unordered_set>
+
+#include "base/error.h"
+#include "train/run/first_difference.h"
+
+namespace tilegrad::train {
+namespace {
+
+Path ListOf(const Path& run) { return run / "training_models.txt"; }
+
+std::string LineOf(const Dataset& dataset, int index) {
+  const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
+  return fmt::format("{:016x} {}/{}", model.geometry,
+                     dataset.info().classes[static_cast<std::size_t>(model.class_index)], model.id);
+}
+
+std::string TextOf(const Dataset& dataset) {
+  std::string text = fmt::format("recipe {}\n", dataset.info().recipe);
+  for (const int model : dataset.Select(Split::kTrain)) text += LineOf(dataset, model) + "\n";
+  return text;
+}
+
+}  // namespace
+
+Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start) {
+  const Path file = ListOf(run);
+  const std::string now = TextOf(dataset);
+  std::error_code error;
+  if (start == RunStart::kNew || !std::filesystem::exists(file, error)) {
+    return WriteTextAtomic(file, now);
+  }
+  TILEGRAD_ASSIGN(const std::string then, ReadText(file));
+  if (then == now) return {};
+  return InvalidArgument(
+      "{}: this run was started with other training models than those of {}: {}; resume with that "
+      "dataset and its split, or give another --out",
+      run.string(), dataset.folder().string(), FirstDifference(then, now));
+}
+
+Status CheckHeldOut(const Path& run, const Dataset& dataset) {
+  const Path file = ListOf(run);
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return {};
+  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+  std::unordered_set<std::string> trained;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) trained.insert(line);
+  const std::vector<int> test = dataset.Select(Split::kTest);
+  std::vector<std::string> seen;
+  for (const int model : test) {
+    if (trained.count(LineOf(dataset, model)) > 0) seen.push_back(LineOf(dataset, model));
+  }
+  if (seen.empty()) return {};
+  return InvalidArgument(
+      "{}: {} of the {} test models of {} were trained on ({}, ...): the dataset has been split "
+      "anew since; make it with the seed, shares and limits it had then, or train again",
+      run.string(), seen.size(), test.size(), dataset.folder().string(),
+      seen[0].substr(seen[0].find(' ') + 1));
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/single_image/step.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/losses/color_l1.h"
+#include "train/losses/iou.h"
+#include "train/losses/laplacian.h"
+#include "train/losses/smoothness.h"
+#include "train/ops/render_op.h"
+
+namespace tilegrad::train {
+namespace {
+
+template <class T>
+void BytesToUnit(std::span<const std::uint8_t> from, T* to) {
+  for (std::size_t i = 0; i < from.size(); ++i) to[i] = static_cast<T>(from[i]) * T(1.0 / 255);
+}
+
+// Where image n of a batch lies in its tensors.
+struct Places {
+  std::size_t plane;  // pixels
+  template <class T>
+  void Truth(std::span<const std::uint8_t> image, std::size_t n, BatchTensors& out) const {
+    BytesToUnit(image.first(3 * plane), out.truth_colors.data<T>() + 3 * plane * n);
+    BytesToUnit(image.subspan(3 * plane), out.truth_alpha.data<T>() + plane * n);
+  }
+};
+
+}  // namespace
+
+BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
+                         const std::vector<Sample>& batch) {
+  const auto objects = static_cast<std::int64_t>(batch.size()),
+             size = static_cast<std::int64_t>(store.size);
+  const auto views = batch[0].views.size();
+  const std::int64_t images = objects * static_cast<std::int64_t>(views);
+  BatchTensors out{context.Empty({objects, 4, size, size}),
+                   context.Empty({images, 3, size, size}),
+                   context.Empty({images, size, size}),
+                   {}};
+  for (const Sample& sample : batch) {
+    for (const int view : sample.views)
+      out.cameras.push_back(store.cameras[static_cast<std::size_t>(view)]);
+  }
+  const Places places{static_cast<std::size_t>(size * size)};
+  nn::WithFloatType(context.dtype(), [&]<class T>(T) {
+    context.workers().For(batch.size(), [&](std::size_t b, std::size_t) {
+      const Sample& sample = batch[b];
+      BytesToUnit(store.Image(sample.model, sample.views[0]),
+                  out.input.data<T>() + b * store.ImageBytes());
+      for (std::size_t v = 0; v < views; ++v) {
+        places.Truth<T>(store.Image(sample.model, sample.views[v]), b * views + v, out);
+      }
+    });
+  });
+  return out;
+}
+
+double LearningRateAt(const TrainConfig& config, std::int64_t step) {
+  const OptimizerConfig& o = config.optimizer;
+  const nn::CosineSchedule cosine{config.schedule.steps, o.final_factor};
+  return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
+}
+
+double SharpnessAt(const TrainConfig& config, std::int64_t step) {
+  const double share =
+      std::min(1.0, 2.0 * static_cast<double>(step) / static_cast<double>(config.schedule.steps));
+  return config.render.sharpness_start *
+         std::pow(config.render.sharpness / config.render.sharpness_start, share);
+}
+
+TrainStep::TrainStep(nn::Context& context, const TrainConfig& config, int image_size)
+    : context_(context),
+      config_(config),
+      image_size_(image_size),
+      network_(context, config.network, image_size,
+               static_cast<std::uint64_t>(config.schedule.seed)),
+      adam_(context, nn::Parameters(network_.module()),
+            {.learning_rate = config.optimizer.learning_rate,
+             .beta1 = config.optimizer.beta1,
+             .beta2 = config.optimizer.beta2}),
+      topology_(
+          BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
+      renderer_(context.workers()) {}
+
+RenderOptions TrainStep::OptionsAt(std::int64_t step) const {
+  RenderOptions options;
+  options.width = options.height = image_size_;
+  options.delta = 1 / SharpnessAt(config_, step);
+  options.max_alpha_error = config_.render.max_alpha_error;
+  return options;
+}
+
+std::span<const std::int32_t> TrainStep::faces() const {
+  const auto& faces = network_.template_mesh().faces;
+  return {faces[0].data(), 3 * faces.size()};
+}
+
+nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues* values) {
+  const PredictedMeshes meshes =
+      network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
+  const int views =
+      static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
+  const RenderedImages images = RenderMeshes(renderer_, meshes.positions, meshes.colors,
+                                             {faces(), batch.cameras, views, OptionsAt(step)});
+  const nn::Var iou = IouLoss(images.alpha, batch.truth_alpha);
+  const nn::Var color = ColorL1Loss(images.colors, batch.truth_colors);
+  const nn::Var smoothness =
+      SmoothnessLoss(meshes.positions, network_.template_mesh().faces, topology_);
+  const nn::Var laplacian = LaplacianLoss(meshes.movement, topology_);
+  const LossConfig& w = config_.loss;
+  const nn::Var total = w.iou * iou + w.color * color + w.smoothness * smoothness +
+                        w.laplacian * laplacian;  // equation 14
+  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item()};
+  return total;
+}
+
+Result<LossValues> TrainStep::Run(const BatchTensors& batch, std::int64_t step) {
+  LossValues values;
+  const nn::Var loss = Loss(batch, step, &values);
+  const auto gradients = nn::Gradients(loss, adam_.parameters());
+  TILEGRAD_TRY(context_.TakeStatus());
+  if (!std::isfinite(values.total) || !nn::IsFinite(context_, gradients)) {
+    return InternalError(
+        "step {}: the loss is {} (iou {}, color {}, smoothness {}, laplacian {}), the gradient's "
+        "norm {}; a smaller "
+        "optimizer.learning_rate may help",
+        step, values.total, values.iou, values.color, values.smoothness, values.laplacian,
+        nn::GlobalNorm(context_, gradients));
+  }
+  adam_.options().learning_rate = LearningRateAt(config_, step);
+  TILEGRAD_TRY(adam_.Step(gradients));
+  return values;
+}
+
+}  // namespace tilegrad::train

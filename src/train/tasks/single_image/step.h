@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// One training step of section 5.1: images -> network -> renderer -> losses of equation 14 ->
+// gradients -> Adam.
+#pragma once
+
+#include <memory>
+
+#include "nn/optim.h"
+#include "scene/topology.h"
+#include "train/config.h"
+#include "train/data/batches.h"
+#include "train/models/mesh_network.h"
+#include "train/ops/render_op.h"
+
+namespace tilegrad::train {
+
+struct LossValues {
+  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
+};
+
+// The tensors of one batch: what the network sees, and what the renders are held to.
+struct BatchTensors {
+  nn::Tensor input;             // [B, 4, size, size]
+  nn::Tensor truth_colors;      // [B * views, 3, size, size]
+  nn::Tensor truth_alpha;       // [B * views, size, size]
+  std::vector<Camera> cameras;  // [B * views]
+};
+BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
+                         const std::vector<Sample>& batch);
+
+// The learning rate and 1/delta of a step: both follow schedules of the configuration.
+double LearningRateAt(const TrainConfig& config, std::int64_t step);
+double SharpnessAt(const TrainConfig& config, std::int64_t step);
+
+// Network, optimiser and renderer of a run.
+class TrainStep {
+ public:
+  TrainStep(nn::Context& context, const TrainConfig& config, int image_size);
+
+  // Equation 14 of a batch, on the tape; `values` gets the parts.
+  nn::Var Loss(const BatchTensors& batch, std::int64_t step, LossValues* values);
+  // Loss, gradients and one step of Adam. A loss or gradient that is not finite is an error, before
+  // any weight changes.
+  Result<LossValues> Run(const BatchTensors& batch, std::int64_t step);
+
+  MeshNetwork& network() { return network_; }
+  nn::Adam& adam() { return adam_; }
+  MeshRenderer& renderer() { return renderer_; }
+  RenderOptions OptionsAt(std::int64_t step) const;
+  std::span<const std::int32_t> faces() const;
+
+ private:
+  nn::Context& context_;
+  TrainConfig config_;
+  int image_size_;
+  MeshNetwork network_;
+  nn::Adam adam_;
+  Topology topology_;
+  MeshRenderer renderer_;
+};
+
+}  // namespace tilegrad::train

@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compat/nvdiffrast/rasterize.h"
+
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <limits>
+#include <optional>
+
+#include "base/simd_target.h"
+#include "compat/nvdiffrast/barycentrics_ref.h"
+#include "deferred_test_util.h"
+
+namespace tilegrad::deferred {
+namespace {
+
+// w = 1: the triangle (-1, -1), (1, -1), (-1, 1) of an image of 4 x 4, its lower left half.
+Scene<float> HalfImage() {
+  Scene<float> out;
+  out.positions = {-1, -1, 0.5f, 1, 1, -1, 0.5f, 1, -1, 1, -0.5f, 1};
+  out.faces = {0, 1, 2};
+  out.height = out.width = 4;
+  return out;
+}
+
+TEST(Rasterize, TriangleByHand) {
+  const auto out = Rasterize(HalfImage());
+  // Pixel (x, y) has its centre at fractions (x + 0.5) / 4 and (y + 0.5) / 4 of the two legs: these
+  // are the weights of corners 1 and 2. Row 0 is the bottom. The diagonal belongs to one side only.
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const float* pixel = &out.rast[static_cast<std::size_t>(4 * (4 * y + x))];
+      const float right = (static_cast<float>(x) + 0.5f) / 4,
+                  up = (static_cast<float>(y) + 0.5f) / 4;
+      if (x + y > 3) {
+        for (int c = 0; c < 4; ++c) EXPECT_EQ(pixel[c], 0) << x << "," << y;
+      } else if (x + y < 3) {
+        EXPECT_NEAR(pixel[0], 1 - right - up, 1e-6f);
+        EXPECT_NEAR(pixel[1], right, 1e-6f);
+        EXPECT_NEAR(pixel[2], 0.5f - up, 1e-6f);
+        EXPECT_EQ(pixel[3], 1);
+        const float* db = &out.rast_db[static_cast<std::size_t>(4 * (4 * y + x))];
+        EXPECT_NEAR(db[0], -0.25f, 1e-6f);
+        EXPECT_NEAR(db[1], -0.25f, 1e-6f);
+        EXPECT_NEAR(db[2], 0.25f, 1e-6f);
+        EXPECT_NEAR(db[3], 0, 1e-6f);
+      }
+    }
+  }
+}
+
+TEST(Rasterize, PerspectiveCorrectOverALongFloor) {
+  // A floor strip from w = 1 to w = 9: the middle of the strip in space is at w = 5, not in the
+  // middle of the screen.
+  Scene<double> scene;
+  scene.positions = {-1, -1, 0, 1, 1, -1, 0, 1, 0, 0, 0, 9};
+  scene.faces = {0, 1, 2};
+  scene.height = 64, scene.width = 3;
+  const auto out = Rasterize(scene);
+  for (int y = 0; y < 31; ++y) {
+    const double* pixel = &out.rast[static_cast<std::size_t>(4 * (3 * y + 1))];
+    ASSERT_EQ(pixel[3], 1);
+    // On the axis, y/w = -(1 - b) / (1 + 8 b), b the weight of corner 2.
+    const double at = (2 * y + 1) / 64.0 - 1, b = (1 + at) / (1 - 8 * at);
+    EXPECT_NEAR(1 - pixel[0] - pixel[1], b, 1e-12) << y;
+  }
+}
+
+// Every face for every pixel, in homogeneous coordinates without clipping. Nothing where rounding
+// decides: close to an edge, a clip plane or another face.
+struct Truth {
+  std::int32_t face;
+  Barycentrics<double> at;
+};
+std::optional<Truth> TruthAt(const Scene<double>& scene, int x, int y) {
+  constexpr double kClose = 2e-3;
+  Truth best{-1, {}};
+  best.at.depth = 2;
+  bool sure = true;
+  for (std::size_t f = 0; f < scene.faces.size() / 3; ++f) {
+    ClipCorners<double> c;
+    for (int k = 0; k < 3; ++k) {
+      const double* p = &scene.positions[4 * static_cast<std::size_t>(scene.faces[3 * f + k])];
+      c.x[k] = p[0], c.y[k] = p[1], c.z[k] = p[2], c.w[k] = p[3];
+    }
+    const auto b = BarycentricsAt(c, CentreOf(scene.grid(), x, y), SizeOf(scene.grid()));
+    const double last = 1 - b.u - b.v;
+    const double w = b.u * c.w[0] + b.v * c.w[1] + last * c.w[2];
+    const double inside = std::min({b.u, b.v, last, w, 1 - b.depth, 1 + b.depth});
+    // A weight changes by its slope over a pixel; coverage is decided at 1/1024 of one.
+    const double slope =
+        std::max({std::abs(b.du_dx), std::abs(b.du_dy), std::abs(b.dv_dx), std::abs(b.dv_dy), 1.0});
+    if (!b.solid || (inside > -kClose * slope && inside < kClose * slope)) sure = false;
+    if (inside <= 0) continue;
+    if (std::abs(b.depth - best.at.depth) < kClose) sure = false;
+    if (b.depth < best.at.depth) best = {static_cast<std::int32_t>(f), b};
+  }
+  return sure ? std::optional(best) : std::nullopt;
+}
+
+TEST(Rasterize, SoupAroundTheFrustumIsWhatRaysSee) {
+  std::size_t seen = 0, clipped = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const Scene<double> scene = Soup(1 + seed % 4, seed, 13, 17);
+    const auto out = Rasterize(scene);
+    for (int y = 0; y < scene.height; ++y) {
+      for (int x = 0; x < scene.width; ++x) {
+        const auto truth = TruthAt(scene, x, y);
+        if (!truth.has_value()) continue;
+        const double* pixel = &out.rast[static_cast<std::size_t>(4 * (scene.width * y + x))];
+        ASSERT_EQ(pixel[3], truth->face + 1) << "seed " << seed << " pixel " << x << "," << y;
+        if (truth->face < 0) continue;
+        ++seen;
+        for (int k = 0; k < 3; ++k) {
+          clipped += scene.positions[static_cast<std::size_t>(12 * truth->face + 4 * k + 3)] < 0;
+        }
+        EXPECT_NEAR(pixel[0], truth->at.u, 1e-12);
+        EXPECT_NEAR(pixel[1], truth->at.v, 1e-12);
+        EXPECT_NEAR(pixel[2], truth->at.depth, 1e-12);
+        const double* db = &out.rast_db[static_cast<std::size_t>(4 * (scene.width * y + x))];
+        EXPECT_NEAR(db[0], truth->at.du_dx, 1e-12);
+        EXPECT_NEAR(db[3], truth->at.dv_dy, 1e-12);
+      }
+    }
+  }
+  EXPECT_GT(seen, 1000u);
+  EXPECT_GT(clipped, 300u);
+}
+
+TEST(Rasterize, ClippedQuadHasNoSeam) {
+  // Two faces through the eye and far out of the image share their diagonal: a floor under it.
+  Scene<double> scene;
+  scene.positions = {-50, -1, 30, 30, 50, -1, 30, 30, 50, -1, -40, -40, -50, -1, -40, -40};
+  for (std::size_t v = 0; v < 4; ++v) scene.positions[4 * v + 2] -= 0.2;
+  scene.faces = {0, 1, 2, 0, 2, 3};
+  scene.height = 50, scene.width = 70;
+  const auto out = Rasterize(scene);
+  for (int y = 0; y < scene.height; ++y) {
+    const double at = CentreOf(scene.grid(), 0, y).y;
+    for (int x = 0; x < scene.width; ++x) {
+      const double* pixel = &out.rast[static_cast<std::size_t>(4 * (scene.width * y + x))];
+      // The floor is y = -1, so at y/w = `at` it has w = -1 / at, up to w = 30.
+      const bool floor = at < 0 && -1 / at < 29;
+      const bool empty = at > 0 || -1 / at > 31;
+      if (floor || empty) {
+        EXPECT_EQ(pixel[3] > 0, floor) << x << "," << y;
+      }
+    }
+  }
+}
+
+TEST(Rasterize, OfCoincidingFacesTheFirstIsSeen) {
+  Scene<float> scene = HalfImage();
+  scene.faces = {0, 1, 2, 1, 2, 0, 2, 1, 0};
+  const auto out = Rasterize(scene);
+  EXPECT_EQ(out.rast[3], 1);
+}
+
+// Also of faces that are cut, by any of the planes, wherever they start and however they are wound;
+// and then there is nothing to peel.
+TEST(Rasterize, OfCoincidingFacesThatAreCutTheFirstIsSeen) {
+  std::size_t seen = 0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    Scene<float> scene = AsScene<float>(Soup(1, seed, 40, 48));
+    scene.faces = {0, 1, 2, 1, 2, 0, 0, 2, 1, 2, 1, 0};
+    std::rotate(scene.faces.begin(), scene.faces.begin() + 3 * (seed % 4), scene.faces.end());
+    Numbers<float> peeled(scene.grid().pixels(), std::numeric_limits<float>::infinity());
+    const auto first = Rasterize(scene, Workers(1), &peeled);
+    const auto second = Rasterize(scene, Workers(1), &peeled);
+    for (std::size_t p = 3; p < first.rast.size(); p += 4) {
+      ASSERT_LE(first.rast[p], 1) << "seed " << seed << " pixel " << p / 4;
+      ASSERT_EQ(second.rast[p], 0) << "seed " << seed << " pixel " << p / 4;
+      seen += first.rast[p] == 1;
+    }
+  }
+  EXPECT_GT(seen, 50000u);
+}
+
+TEST(Rasterize, RangesChooseFacesAndKeepTheirNumbers) {
+  Scene<double> all = WavyGrid(4, 1, 20, 24);
+  Scene<double> ranged = all;
+  ranged.shared = true, ranged.images = 3;
+  ranged.ranges = {10, 7, 0, 0, 0, 32};
+  const auto out = Rasterize(ranged);
+  for (std::size_t n = 0; n < 3; ++n) {
+    Scene<double> one = all;
+    const std::int32_t first = ranged.ranges[2 * n], count = ranged.ranges[2 * n + 1];
+    one.faces.assign(all.faces.begin() + 3 * first, all.faces.begin() + 3 * (first + count));
+    const auto expected = Rasterize(one);
+    for (std::size_t p = 0; p < one.grid().pixels(); ++p) {
+      const double* a = &out.rast[4 * (n * one.grid().pixels() + p)];
+      const double* b = &expected.rast[4 * p];
+      EXPECT_EQ(a[0], b[0]);
+      EXPECT_EQ(a[3], b[3] == 0 ? 0 : b[3] + first) << "image " << n << " pixel " << p;
+    }
+  }
+}
+
+TEST(Rasterize, LayersPeelFromFrontToBack) {
+  Scene<float> scene;
+  scene.height = scene.width = 70;  // more than one bin, and a face that covers all of a bin
+  const float depths[3] = {0.5f, -0.5f, 0.0f};
+  for (const float z : depths) {
+    for (const float v : {-3.0f, -3.0f, z, 1.0f, 9.0f, -3.0f, z, 1.0f, -3.0f, 9.0f, z, 1.0f}) {
+      scene.positions.push_back(v);
+    }
+  }
+  for (std::int32_t i = 0; i < 9; ++i) scene.faces.push_back(i);
+  Numbers<float> peeled(scene.grid().pixels(), std::numeric_limits<float>::infinity());
+  for (const float expected : {2.0f, 3.0f, 1.0f, 0.0f, 0.0f}) {
+    const auto out = Rasterize(scene, Workers(1), &peeled);
+    for (std::size_t p = 0; p < scene.grid().pixels(); ++p) {
+      ASSERT_EQ(out.rast[4 * p + 3], expected) << p;
+    }
+  }
+}
+
+TEST(Rasterize, BadInputIsNamed) {
+  const auto message = [](const Scene<float>& scene) {
+    Numbers<float> rast(4 * scene.grid().pixels());
+    return Rasterizer().Run(scene.input(), Workers(1), {rast, {}, {}}).message();
+  };
+  Scene<float> scene = HalfImage();
+  scene.faces = {0, 1, 3};
+  EXPECT_NE(message(scene).find("face 0 has vertex 3, but there are 3"), std::string::npos);
+  scene = HalfImage();
+  scene.positions[5] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(message(scene).find("position 1 of vertex 1 is nan"), std::string::npos);
+  scene = HalfImage();
+  scene.ranges = {0, 2};
+  EXPECT_NE(message(scene).find("range 0"), std::string::npos);
+  scene = HalfImage();
+  scene.width = 0;
+  EXPECT_NE(message(scene).find("4 x 0"), std::string::npos);
+}
+
+TEST(Rasterize, FloatAgreesWithDouble) {
+  const Scene<double> scene = WavyGrid(6, 3, 40, 40);
+  const auto exact = Rasterize(scene);
+  const auto out = Rasterize(AsScene<float>(scene));
+  std::size_t differ = 0;
+  for (std::size_t p = 0; p < scene.grid().pixels(); ++p) {
+    if (static_cast<double>(out.rast[4 * p + 3]) != exact.rast[4 * p + 3]) {
+      ++differ;  // positions are rounded: a centre close to an edge may change sides
+      continue;
+    }
+    // Rounding moves corners by 2^-24 of coordinates up to 1.6; faces are 5 pixels, 0.25, wide.
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(static_cast<double>(out.rast[4 * p + c]), exact.rast[4 * p + c], 4e-6);
+    }
+  }
+  EXPECT_LT(differ, 3u);
+}
+
+TEST(Rasterize, SameBitsForEveryTargetAndNumberOfWorkers) {
+  Scene<double> scene = WavyGrid(9, 5, 150, 90);
+  for (const double v : Soup(30, 8, 1, 1).positions) scene.positions.push_back(v);
+  for (std::int32_t i = 0; i < 90; ++i) scene.faces.push_back(100 + i);
+  const Scene<float> narrow = AsScene<float>(scene);
+  const auto expected = Rasterize(narrow);
+  const auto d_rast = RandomNumbers<float>(expected.rast.size(), 1);
+  const auto d_db = RandomNumbers<float>(expected.rast.size(), 2);
+  std::optional<Numbers<float>> gradient;
+  for (const std::string& target : RunnableTargets()) {
+    ASSERT_TRUE(ForceTarget(target).ok());
+    for (const int count : {1, 2, 7}) {
+      const Workers workers(count);
+      const auto out = Rasterize(narrow, workers);
+      EXPECT_EQ(out.rast, expected.rast) << target << " " << count;
+      EXPECT_EQ(out.rast_db, expected.rast_db) << target << " " << count;
+      Numbers<float> d(narrow.positions.size());
+      ASSERT_TRUE(
+          RasterizeBackward<float>(narrow.input(), {out.rast, d_rast, d_db}, workers, d).ok());
+      if (!gradient.has_value()) gradient = d;
+      EXPECT_EQ(d, *gradient) << target << " " << count;
+    }
+  }
+  ASSERT_TRUE(ForceTarget("").ok());
+}
+
+// The derivative of what a pixel says, weighted, by complex step: exact to rounding.
+TEST(RasterizeBackward, BarycentricsByComplexStep) {
+  using Complex = std::complex<double>;
+  Rng rng(4, 4);
+  for (int round = 0; round < 200; ++round) {
+    ClipCorners<double> c;
+    for (int k = 0; k < 3; ++k) {
+      c.w[k] = rng.Uniform(0.5, 2);
+      c.x[k] = rng.Uniform(-1, 1), c.y[k] = rng.Uniform(-1, 1), c.z[k] = rng.Uniform(-1, 1);
+    }
+    const PixelCentre at{rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
+    const PixelSize size{2.0 / 50, 2.0 / 40};
+    if (!BarycentricsAt(c, at, size).solid) continue;
+    BarycentricsCotangent<double> d{rng.Uniform(-1, 1), rng.Uniform(-1, 1), {}};
+    for (double& slope : d.d_slopes) slope = rng.Uniform(-1, 1);
+    ClipCorners<double> gradient{};
+    BarycentricsAdjoint(c, at, size, d, &gradient);
+    for (int i = 0; i < 9; ++i) {
+      ClipCorners<Complex> moved;
+      for (int k = 0; k < 3; ++k) {
+        moved.x[k] = c.x[k], moved.y[k] = c.y[k], moved.z[k] = c.z[k], moved.w[k] = c.w[k];
+      }
+      Complex* const numbers[3] = {moved.x, moved.y, moved.w};
+      const double* const gradients[3] = {gradient.x, gradient.y, gradient.w};
+      numbers[i / 3][i % 3] += Complex(0, 1e-30);
+      const auto b = BarycentricsAt(moved, at, size);
+      const Complex loss = d.d_u * b.u + d.d_v * b.v + d.d_slopes[0] * b.du_dx +
+                           d.d_slopes[1] * b.du_dy + d.d_slopes[2] * b.dv_dx +
+                           d.d_slopes[3] * b.dv_dy;
+      const double expected = loss.imag() / 1e-30;
+      // Conditioning: weights of faces seen at a slant are quotients by a small s.
+      const double scale = std::max(1.0, std::abs(expected));
+      EXPECT_NEAR(gradients[i / 3][i % 3], expected, 1e-9 * scale) << round << " " << i;
+    }
+  }
+}
+
+TEST(RasterizeBackward, SumsOverPixelsAndImages) {
+  for (const bool shared : {false, true}) {
+    Scene<double> scene = WavyGrid(2, 9, 11, 13);
+    scene.images = 2, scene.shared = shared;
+    if (shared) scene.ranges = {0, 8, 3, 4};
+    if (!shared) {
+      const auto other = WavyGrid(2, 10, 11, 13).positions;
+      scene.positions.insert(scene.positions.end(), other.begin(), other.end());
+    }
+    const auto out = Rasterize(scene);
+    const auto d_rast = RandomNumbers<double>(out.rast.size(), 11);
+    auto d_db = RandomNumbers<double>(out.rast.size(), 12);
+    Numbers<double> gradient(scene.positions.size());
+    const Workers workers(2);
+    ASSERT_TRUE(
+        RasterizeBackward<double>(scene.input(), {out.rast, d_rast, d_db}, workers, gradient).ok());
+    auto weights = d_rast;
+    for (std::size_t i = 0; i < weights.size(); i += 4) weights[i + 2] = weights[i + 3] = 0;
+    ExpectGradient("position", &scene.positions, gradient, [&] {
+      const auto moved = Rasterize(scene, workers);
+      EXPECT_TRUE(
+          std::equal(moved.rast.begin(), moved.rast.end(), out.rast.begin(),
+                     [i = 0](double a, double b) mutable { return i++ % 4 != 3 || a == b; }));
+      return Dot<double>(moved.rast, weights) + Dot<double>(moved.rast_db, d_db);
+    });
+  }
+}
+
+TEST(RasterizeBackward, StaysFiniteWhereWIsTiny) {
+  Scene<float> scene = AsScene<float>(WavyGrid(2, 9, 40, 40));
+  for (float& v : scene.positions) v *= 1e-37f;  // the same image, gradients of 1e38 and more
+  const auto out = Rasterize(scene);
+  const Numbers<float> ones(out.rast.size(), 100.0f);
+  Numbers<float> gradient(scene.positions.size());
+  ASSERT_TRUE(
+      RasterizeBackward<float>(scene.input(), {out.rast, ones, ones}, Workers(1), gradient).ok());
+  float largest = 0;
+  for (const float d : gradient) {
+    ASSERT_TRUE(std::isfinite(d));
+    largest = std::max(largest, std::abs(d));
+  }
+  EXPECT_EQ(largest, std::numeric_limits<float>::max());
+}
+
+TEST(RasterizeBackward, EdgeOnFacesPullNothing) {
+  Scene<double> scene;
+  scene.positions = {-1, -1, 0, 1, 1, 1, 0, 1, 1 - 1e-9, 1, 0, 1};
+  scene.faces = {0, 1, 2};
+  const Numbers<double> rast(4 * scene.grid().pixels(), 1.0);  // says that the face is everywhere
+  Numbers<double> gradient(scene.positions.size(), 1.0);
+  ASSERT_TRUE(
+      RasterizeBackward<double>(scene.input(), {rast, rast, rast}, Workers(1), gradient).ok());
+  for (const double d : gradient) EXPECT_EQ(d, 0);
+}
+
+}  // namespace
+}  // namespace tilegrad::deferred

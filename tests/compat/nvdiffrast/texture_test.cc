@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compat/nvdiffrast/texture.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "compat/nvdiffrast/texture_cube.h"
+#include "compat/nvdiffrast/texture_point.h"
+#include "deferred_test_util.h"
+
+namespace tilegrad::deferred {
+namespace {
+
+// A texture with its pyramid, and where it is looked up.
+template <class T>
+struct Lookups {
+  std::vector<Numbers<T>> levels;
+  std::vector<MipSize> sizes;
+  std::size_t textures = 1, channels = 1;
+  TextureFilter filter = TextureFilter::kLinear;
+  TextureBoundary boundary = TextureBoundary::kWrap;
+  PixelGrid grid{1, 1, 1};
+  Numbers<T> uv, uv_da, bias;
+  std::vector<TextureLevel<T>> views;
+
+  std::size_t faces() const { return boundary == TextureBoundary::kCube ? 6 : 1; }
+  TextureInput<T> input() {
+    views.clear();
+    for (std::size_t l = 0; l < levels.size(); ++l) views.push_back({levels[l], sizes[l]});
+    return {views, textures, channels, filter, boundary, grid, uv, uv_da, bias};
+  }
+  void Random(const MipSize& size, std::uint64_t seed) {
+    sizes = MipSizes(size, -1).value();
+    for (const MipSize& s : sizes) {
+      levels.push_back(RandomNumbers<T>(
+          textures * faces() * static_cast<std::size_t>(s.height * s.width) * channels, ++seed));
+    }
+  }
+};
+
+template <class T>
+Numbers<T> Sampled(Lookups<T>& lookups, const Workers& workers = Workers(1)) {
+  Numbers<T> out(lookups.grid.pixels() * lookups.channels, T(-7));
+  SampleTexture<T>(lookups.input(), workers, out);
+  return out;
+}
+
+// 4 x 2 texels, 10 times the row plus the column.
+Lookups<double> Ramp(TextureFilter filter, TextureBoundary boundary) {
+  Lookups<double> out;
+  out.filter = filter, out.boundary = boundary;
+  out.sizes = {{2, 4}};
+  out.levels = {{0, 1, 2, 3, 10, 11, 12, 13}};
+  return out;
+}
+
+double At(Lookups<double> lookups, double s, double t) {
+  lookups.uv = {s, t};
+  return Sampled(lookups)[0];
+}
+
+TEST(Texture, LinearAndNearestByHand) {
+  const auto linear = Ramp(TextureFilter::kLinear, TextureBoundary::kClamp);
+  EXPECT_NEAR(At(linear, 0.125, 0.25), 0, 1e-12);  // the centre of the first texel; row 0 at t = 0
+  EXPECT_NEAR(At(linear, 0.875, 0.75), 13, 1e-12);
+  EXPECT_NEAR(At(linear, 0.25, 0.5), 5.5, 1e-12);  // between four
+  EXPECT_NEAR(At(linear, 0.30, 0.25), 0.7, 1e-12);
+  EXPECT_NEAR(At(linear, -3, 9), 10, 1e-12);  // clamped to the centres of the outer texels
+  const auto nearest = Ramp(TextureFilter::kNearest, TextureBoundary::kClamp);
+  EXPECT_EQ(At(nearest, 0.249, 0.499), 0);
+  EXPECT_EQ(At(nearest, 0.251, 0.501), 11);
+  EXPECT_EQ(At(nearest, 1.0, 1.0), 13);
+  EXPECT_EQ(At(nearest, -5, -5), 0);
+}
+
+TEST(Texture, BoundariesByHand) {
+  const auto wrap = Ramp(TextureFilter::kLinear, TextureBoundary::kWrap);
+  EXPECT_NEAR(At(wrap, 0, 0.25), 1.5, 1e-12);  // between the last and the first column
+  EXPECT_NEAR(At(wrap, 1, 0.25), 1.5, 1e-12);
+  EXPECT_NEAR(At(wrap, -0.7, 3.25), At(wrap, 0.3, 0.25), 1e-12);
+  EXPECT_EQ(At(Ramp(TextureFilter::kNearest, TextureBoundary::kWrap), -0.01, 1.1), 3);
+  const auto zero = Ramp(TextureFilter::kLinear, TextureBoundary::kZero);
+  EXPECT_NEAR(At(zero, 1, 0.75), 6.5, 1e-12);  // half of 13, half of nothing
+  EXPECT_NEAR(At(zero, 1, 1), 3.25, 1e-12);
+  EXPECT_NEAR(At(zero, 1.2, 0.5), 0, 1e-12);
+  EXPECT_NEAR(At(zero, 1e30, 0.5), 0, 1e-12);
+  EXPECT_EQ(At(Ramp(TextureFilter::kNearest, TextureBoundary::kZero), 1.01, 0.6), 0);
+  EXPECT_EQ(At(wrap, std::nan(""), 0.5), 0);
+}
+
+TEST(Texture, ALevelIsOneTexelForEachPixelOfTheLongerAxis) {
+  Lookups<double> lookups;
+  lookups.filter = TextureFilter::kLinearMipmapLinear;
+  lookups.sizes = MipSizes({16, 16}, -1).value();
+  ASSERT_EQ(lookups.sizes.size(), 5u);
+  for (std::size_t l = 0; l < 5; ++l) {
+    const auto side = static_cast<std::size_t>(lookups.sizes[l].width);
+    lookups.levels.emplace_back(side * side, static_cast<double>(l));  // shows its own number
+  }
+  lookups.uv = {0.3, 0.6};
+  const auto level = [&](double texels_x, double texels_y) {
+    lookups.uv_da = {texels_x / 16, 0, 0, texels_y / 16};
+    return Sampled(lookups)[0];
+  };
+  EXPECT_NEAR(level(1, 1), 0, 1e-12);
+  EXPECT_NEAR(level(2, 1), 1, 1e-12);
+  EXPECT_NEAR(level(1, 4), 2, 1e-12);
+  EXPECT_NEAR(level(3, 0), std::log2(3.0), 1e-12);
+  EXPECT_NEAR(level(0, 0), 0, 1e-12);
+  EXPECT_NEAR(level(1e9, 0), 4, 1e-12);
+  // Turned by 45 degrees, sheared: the singular value of (2 2; -2 2) is 2 sqrt(2).
+  lookups.uv_da = {2.0 / 16, 2.0 / 16, -2.0 / 16, 2.0 / 16};
+  EXPECT_NEAR(Sampled(lookups)[0], 1.5, 1e-12);
+  lookups.bias = {0.75};
+  EXPECT_NEAR(Sampled(lookups)[0], 2.25, 1e-12);
+  lookups.filter = TextureFilter::kLinearMipmapNearest;
+  EXPECT_NEAR(Sampled(lookups)[0], 2, 1e-12);
+  lookups.uv_da.clear();
+  lookups.bias = {3.6};
+  EXPECT_NEAR(Sampled(lookups)[0], 4, 1e-12);
+  lookups.filter = TextureFilter::kLinearMipmapLinear;
+  EXPECT_NEAR(Sampled(lookups)[0], 3.6, 1e-12);
+}
+
+TEST(Mip, LevelsAreMeansAndSizesAreChecked) {
+  const auto sizes = MipSizes({4, 16}, -1).value();
+  ASSERT_EQ(sizes.size(), 5u);
+  EXPECT_EQ(sizes[3].height, 1);
+  EXPECT_EQ(sizes[3].width, 2);
+  EXPECT_EQ(MipSizes({4, 16}, 1).value().size(), 2u);
+  EXPECT_EQ(MipSizes({4, 16}, 0).value().size(), 1u);
+  EXPECT_EQ(MipSizes({32, 160}, 5).value().size(), 6u);
+  const auto odd = MipSizes({32, 160}, -1);
+  ASSERT_FALSE(odd.ok());
+  EXPECT_NE(odd.status().message().find("32 x 160"), std::string::npos);
+  EXPECT_NE(odd.status().message().find("max_mip_level to 5"), std::string::npos);
+  const Numbers<double> fine = {0, 1, 2, 3, 10, 11, 12, 13};
+  Numbers<double> coarse(2), last(1);
+  HalveTexture<double>({fine, {2, 4}}, 1, Workers(1), coarse);
+  EXPECT_EQ(coarse, (Numbers<double>{5.5, 7.5}));
+  HalveTexture<double>({coarse, {1, 2}}, 1, Workers(1), last);
+  EXPECT_EQ(last, Numbers<double>{6.5});
+}
+
+TEST(Mip, BackwardIsTheTransposed) {
+  for (const MipSize size : {MipSize{4, 6}, MipSize{1, 8}, MipSize{6, 1}}) {
+    const auto n = static_cast<std::size_t>(2 * size.height * size.width * 3);
+    const std::size_t ratio = size.height > 1 && size.width > 1 ? 4 : 2;
+    const auto fine = RandomNumbers<double>(n, 1), d = RandomNumbers<double>(n / ratio, 2);
+    Numbers<double> coarse(n / ratio), d_fine(n);
+    HalveTexture<double>({fine, size}, 3, Workers(2), coarse);
+    const MipSize half{std::max(1, size.height / 2), std::max(1, size.width / 2)};
+    HalveTextureBackward<double>({d, half}, size, 3, Workers(2), d_fine);
+    EXPECT_NEAR(Dot<double>(coarse, d), Dot<double>(fine, d_fine), 1e-12);
+  }
+}
+
+TEST(CubeMap, FacesAreThoseOfOpenGl) {
+  Lookups<double> lookups;
+  lookups.boundary = TextureBoundary::kCube, lookups.filter = TextureFilter::kNearest;
+  lookups.sizes = {{2, 2}};
+  lookups.levels = {Numbers<double>(24)};
+  for (std::size_t i = 0; i < 24; ++i) lookups.levels[0][i] = static_cast<double>(i);
+  const auto at = [&](double x, double y, double z) {
+    lookups.uv = {x, y, z};
+    return Sampled(lookups)[0];
+  };
+  // The table of the OpenGL specification: on +x, s goes with -z and t with -y, and so on.
+  EXPECT_EQ(at(1, 0.5, 0.5), 0 + 0);
+  EXPECT_EQ(at(1, 0.5, -0.5), 0 + 1);
+  EXPECT_EQ(at(1, -0.5, 0.5), 0 + 2);
+  EXPECT_EQ(at(-1, 0.5, -0.5), 4 + 0);
+  EXPECT_EQ(at(-0.5, 1, -0.5), 8 + 0);
+  EXPECT_EQ(at(0.5, 1, -0.5), 8 + 1);
+  EXPECT_EQ(at(-0.5, -1, 0.5), 12 + 0);
+  EXPECT_EQ(at(-0.5, 0.5, 1), 16 + 0);
+  EXPECT_EQ(at(0.5, -0.5, 1), 16 + 3);
+  EXPECT_EQ(at(0.5, 0.5, -1), 20 + 0);
+  EXPECT_EQ(at(-3, 0.5, -7), 20 + 1);
+  EXPECT_EQ(at(0, 0, 0), 0);
+  EXPECT_EQ(at(0, std::nan(""), 1), 0);
+}
+
+// The direction of a texel's centre.
+Direction CentreOfTexel(int face, int x, int y, int size) {
+  const CubeFace& f = kCubeFaces[face];
+  Direction r{};
+  r[static_cast<std::size_t>(f.major.index)] = f.major.sign;
+  r[static_cast<std::size_t>(f.s.index)] = f.s.sign * ((2.0 * x + 1) / size - 1);
+  r[static_cast<std::size_t>(f.t.index)] = f.t.sign * ((2.0 * y + 1) / size - 1);
+  return r;
+}
+
+TEST(CubeMap, AcrossAnEdgeIsTheTexelBesideIt) {
+  for (const int size : {1, 2, 3, 8, 64, 1024}) {
+    for (int face = 0; face < 6; ++face) {
+      for (int i = 0; i < size; ++i) {
+        for (const CubeTexel out : {CubeTexel{face, -1, i}, CubeTexel{face, size, i},
+                                    CubeTexel{face, i, -1}, CubeTexel{face, i, size}}) {
+          const CubeTexel there = AcrossEdge(out, size);
+          ASSERT_NE(there.face, face);
+          // Both texels touch the same piece of the edge: of their centres, the component along it
+          // agrees, and the other two have changed places.
+          const CubeTexel here = {face, std::clamp(out.x, 0, size - 1),
+                                  std::clamp(out.y, 0, size - 1)};
+          const Direction a = CentreOfTexel(face, here.x, here.y, size);
+          const Direction b = CentreOfTexel(there.face, there.x, there.y, size);
+          double apart = 0;
+          for (std::size_t c = 0; c < 3; ++c) apart += (a[c] - b[c]) * (a[c] - b[c]);
+          EXPECT_NEAR(std::sqrt(apart), std::sqrt(2.0) / size, 1e-9) << size << " " << face;
+        }
+      }
+    }
+  }
+}
+
+TEST(CubeMap, LinearLookupsHaveNoSeam) {
+  Lookups<double> lookups;
+  lookups.boundary = TextureBoundary::kCube;
+  lookups.Random({4, 4}, 3);
+  Rng rng(1, 1);
+  // Beside an edge of the cube, and beside a corner: a small step changes little.
+  for (int round = 0; round < 2000; ++round) {
+    Direction r = {rng.Uniform(-1, 1), rng.Uniform(-1, 1), rng.Uniform(-1, 1)};
+    const std::size_t a = rng.Below(3), b = (a + 1 + rng.Below(2)) % 3;
+    const double side = rng.Uniform() < 0.5 ? -1 : 1;
+    r[a] = 1, r[b] = side;
+    if (round % 4 == 0) r[3 - a - b] = 1 - 1e-9 * rng.Uniform();
+    double values[2];
+    for (int i = 0; i < 2; ++i) {
+      r[a] = 1 + (i == 0 ? 1e-9 : -1e-9);
+      lookups.uv = {r[0], r[1], r[2]};
+      values[i] = Sampled(lookups)[0];
+    }
+    EXPECT_NEAR(values[0], values[1], 1e-7) << r[0] << " " << r[1] << " " << r[2];
+  }
+}
+
+TEST(TexturePoint, DerivativesOfLevelAndCubeByDifferences) {
+  Rng rng(2, 2);
+  for (int round = 0; round < 100; ++round) {
+    Numbers<double> slopes(4);
+    for (double& s : slopes) s = rng.Uniform(-1, 1);
+    const auto level = [&] {
+      const double values[4] = {slopes[0], slopes[1], slopes[2], slopes[3]};
+      return LevelOf(values, {32, 8});
+    };
+    const double at[4] = {slopes[0], slopes[1], slopes[2], slopes[3]};
+    double d_slopes[4];
+    LevelAdjoint(at, {32, 8}, 1.0, d_slopes);
+    ExpectGradient(
+        "slope", &slopes, Numbers<double>(d_slopes, d_slopes + 4), [&] { return level(); }, 1e-5);
+    Numbers<double> numbers(9);
+    for (double& v : numbers) v = rng.Uniform(-1, 1);
+    numbers[rng.Below(3)] = rng.Uniform() < 0.5 ? 1.3 : -1.3;
+    const auto coordinates = [&] {
+      TextureCoordinates out{};
+      std::copy(numbers.begin(), numbers.begin() + 3, out.uv);
+      std::copy(numbers.begin() + 3, numbers.end(), out.uv_da);
+      return out;
+    };
+    PointCotangent d;
+    for (double& v : d.d_st) v = rng.Uniform(-1, 1);
+    for (double& v : d.d_slopes) v = rng.Uniform(-1, 1);
+    TextureCoordinates gradient;
+    TexturePoint point;
+    FindPoint(coordinates(), true, &point);
+    PointAdjoint(coordinates(), point, true, d, &gradient);
+    Numbers<double> all(gradient.uv, gradient.uv + 3);
+    all.insert(all.end(), gradient.uv_da, gradient.uv_da + 6);
+    ExpectGradient("direction", &numbers, all, [&] {
+      TexturePoint p;
+      FindPoint(coordinates(), true, &p);
+      double sum = 0;
+      for (int i = 0; i < 2; ++i) sum += d.d_st[i] * p.st[i];
+      for (int i = 0; i < 4; ++i) sum += d.d_slopes[i] * p.slopes[i];
+      return sum;
+    });
+  }
+}
+
+struct Case {
+  const char* name;
+  TextureFilter filter;
+  TextureBoundary boundary;
+  bool uv_da, bias;
+  std::size_t textures;
+};
+
+class TextureGradientsOf : public testing::TestWithParam<Case> {};
+
+TEST_P(TextureGradientsOf, EverythingByDifferences) {
+  const Case& c = GetParam();
+  const bool cube = c.boundary == TextureBoundary::kCube;
+  Lookups<double> lookups;
+  lookups.filter = c.filter, lookups.boundary = c.boundary;
+  lookups.textures = c.textures, lookups.channels = 2;
+  lookups.grid = {2, 5, 6};
+  lookups.Random(cube ? MipSize{8, 8} : MipSize{8, 16}, 20);
+  const std::size_t n = cube ? 3 : 2, pixels = lookups.grid.pixels();
+  lookups.uv = RandomNumbers<double>(pixels * n, 30);
+  if (c.uv_da) lookups.uv_da = RandomNumbers<double>(pixels * 2 * n, 35);
+  for (double& v : lookups.uv_da) v *= 0.1;
+  if (c.bias) lookups.bias = RandomNumbers<double>(pixels, 32);
+  if (!c.uv_da) {
+    for (double& v : lookups.bias) v = 2 * v + 1;
+  }
+  const auto d_out = RandomNumbers<double>(pixels * 2, 33);
+  std::vector<Numbers<double>> d_levels;
+  std::vector<std::span<double>> spans;
+  for (const auto& level : lookups.levels) d_levels.emplace_back(level.size(), 9.0);
+  for (auto& level : d_levels) spans.push_back(level);
+  Numbers<double> d_uv(lookups.uv.size()), d_da(lookups.uv_da.size()), d_bias(lookups.bias.size());
+  const Workers workers(2);
+  SampleTextureBackward<double>(lookups.input(), d_out, workers, {spans, d_uv, d_da, d_bias});
+  // A lookup has kinks where it passes from texel to texel and from level to level: with these
+  // seeds none is within a step of one.
+  const auto loss = [&] { return Dot<double>(Sampled(lookups, workers), d_out); };
+  ExpectGradient("texel", &lookups.levels[0], d_levels[0], loss);
+  const bool mips = c.filter >= TextureFilter::kLinearMipmapNearest;
+  if (mips) ExpectGradient("texel of level 1", &lookups.levels[1], d_levels[1], loss);
+  if (c.filter == TextureFilter::kNearest) {
+    for (const double d : d_uv) EXPECT_EQ(d, 0);
+    return;
+  }
+  ExpectGradient("uv", &lookups.uv, d_uv, loss, 1e-5);
+  if (c.filter == TextureFilter::kLinearMipmapLinear) {
+    if (c.uv_da) ExpectGradient("uv_da", &lookups.uv_da, d_da, loss, 1e-5);
+    if (c.bias) ExpectGradient("bias", &lookups.bias, d_bias, loss, 1e-5);
+  }
+}
+
+constexpr auto kNearest = TextureFilter::kNearest, kLinear = TextureFilter::kLinear,
+               kMipNearest = TextureFilter::kLinearMipmapNearest,
+               kMipLinear = TextureFilter::kLinearMipmapLinear;
+INSTANTIATE_TEST_SUITE_P(
+    All, TextureGradientsOf,
+    testing::Values(Case{"nearest", kNearest, TextureBoundary::kWrap, false, false, 1},
+                    Case{"wrap", kLinear, TextureBoundary::kWrap, false, false, 2},
+                    Case{"clamp", kLinear, TextureBoundary::kClamp, false, false, 1},
+                    Case{"zero", kLinear, TextureBoundary::kZero, false, false, 1},
+                    Case{"cube", kLinear, TextureBoundary::kCube, false, false, 2},
+                    Case{"mip_nearest", kMipNearest, TextureBoundary::kWrap, true, false, 1},
+                    Case{"mip_linear", kMipLinear, TextureBoundary::kWrap, true, false, 2},
+                    Case{"mip_bias", kMipLinear, TextureBoundary::kClamp, true, true, 1},
+                    Case{"bias_alone", kMipLinear, TextureBoundary::kZero, false, true, 1},
+                    Case{"cube_mip", kMipLinear, TextureBoundary::kCube, true, true, 1}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST(Texture, SameBitsForAnyNumberOfWorkers) {
+  Lookups<float> lookups;
+  lookups.filter = TextureFilter::kLinearMipmapLinear;
+  lookups.channels = 3;
+  lookups.grid = {2, 150, 40};
+  lookups.Random({32, 64}, 40);
+  lookups.uv = RandomNumbers<float>(lookups.grid.pixels() * 2, 41);
+  lookups.uv_da = RandomNumbers<float>(lookups.grid.pixels() * 4, 42);
+  for (float& v : lookups.uv_da) v *= 0.1f;
+  const auto d_out = RandomNumbers<float>(lookups.grid.pixels() * 3, 43);
+  std::optional<Numbers<float>> out, d_texels;
+  for (const int count : {1, 2, 7}) {
+    const Workers workers(count);
+    const auto image = Sampled(lookups, workers);
+    std::vector<Numbers<float>> d_levels;
+    std::vector<std::span<float>> spans;
+    for (const auto& level : lookups.levels) d_levels.emplace_back(level.size());
+    for (auto& level : d_levels) spans.push_back(level);
+    SampleTextureBackward<float>(lookups.input(), d_out, workers, {spans, {}, {}, {}});
+    if (!out.has_value()) out = image, d_texels = d_levels[1];
+    EXPECT_EQ(image, *out) << count;
+    EXPECT_EQ(d_levels[1], *d_texels) << count;
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::deferred

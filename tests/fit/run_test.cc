@@ -1,0 +1,381 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole fits on a few small images of a box.
+#include "fit/run.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+#include "train/run/checkpoint.h"
+#include "fit/make_views.h"
+#include "fit/transforms.h"
+
+namespace tilegrad::train {
+namespace {
+
+class Fit : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
+    SetColor(box, {0.8f, 0.4f, 0.2f, 1});
+    const Status made =
+        MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", {}, stop_);
+    ASSERT_TRUE(made.ok()) << made.message();
+  }
+  FitJob Job(const std::string& out) {
+    FitJob job;
+    auto input = ReadFitFolder(folder_ / "views", 0);
+    EXPECT_TRUE(input.ok()) << input.status().message();
+    if (input.ok()) job.input = std::move(*input);
+    job.out = folder_ / out;
+    job.config.steps = 60, job.config.template_level = 2, job.config.texture_size = 32;
+    job.config.checkpoint_every = 20, job.config.timelapse = 3;
+    return job;
+  }
+  Result<FitOutcome> Run(const FitJob& job, int workers = 2) {
+    const Workers w(workers);
+    return RunFit(job, w, {}, stop_);
+  }
+  Bytes Read(const Path& path) {
+    auto bytes = ReadFile(path);
+    EXPECT_TRUE(bytes.ok()) << bytes.status().message();
+    return bytes.ok() ? *bytes : Bytes();
+  }
+
+  StopFlag stop_ = false;
+};
+
+TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  FitJob job = Job("run");
+  job.config.steps = 400, job.config.template_level = 3;
+  job.truth = truth->mesh;
+  const auto outcome = Run(job);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_EQ(outcome->held_out.size(), 2u);
+  // The sphere itself: 13.5 dB, 0.78 and 0.69.
+  EXPECT_GT(MeanPsnr(outcome->held_out), 16.5);
+  EXPECT_GT(MeanIou(outcome->held_out), 0.86);
+  EXPECT_GT(outcome->voxel_iou.value_or(0), 0.78);
+  const auto mesh = io::LoadMesh(job.out / "mesh.glb");
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(mesh->mesh.textures.size(), 1u);
+  for (const char* name : {"report.html", "timelapse.png", "transforms_fitted.json"}) {
+    EXPECT_TRUE(std::filesystem::exists(job.out / name)) << name;
+  }
+}
+
+TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
+  ASSERT_TRUE(Run(Job("whole"), 1).ok());
+  FitJob job = Job("parts");
+  const Workers workers(2);
+  const auto stop_late = [&](const Progress& p) { stop_ = p.done == 27; };
+  const auto stopped = RunFit(job, workers, stop_late, stop_);
+  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled) << stopped.status().message();
+  EXPECT_NE(stopped.status().message().find("--resume"), std::string::npos);
+  stop_ = false;
+  EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
+  job.resume = true;
+  const auto resumed = Run(job, 7);
+  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  EXPECT_EQ(resumed->first_step, 27);
+  EXPECT_EQ(Read(folder_ / "whole" / "mesh.glb"), Read(folder_ / "parts" / "mesh.glb"));
+}
+
+TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
+  FitJob job = Job("run");
+  job.config.checkpoint_every = 5;
+  const Workers workers(2);
+  const auto stop_at = [&](std::uint64_t step) {
+    return RunFit(
+        job, workers, [&, step](const Progress& p) { stop_ = p.done == step; }, stop_);
+  };
+  EXPECT_EQ(stop_at(12).status().code(), StatusCode::kCancelled);
+  const Path newest = ListCheckpoints(job.out).back();
+  std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);
+  std::vector<std::string> warnings;
+  job.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  job.resume = true, stop_ = false;
+  EXPECT_EQ(stop_at(13).status().code(), StatusCode::kCancelled);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
+}
+
+// Of one that was killed before its first checkpoint pictures are all that is there.
+TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
+  FitJob job = Job("whole");
+  job.config.steps = 6;
+  ASSERT_TRUE(Run(job).ok());
+  job.out = folder_ / "again";
+  for (const char* name : {"00000001.png", "00000100.png"}) {
+    ASSERT_TRUE(io::SavePng(job.out / "timelapse" / name, ImageU8(64, 64, 3)).ok());
+  }
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_EQ(Read(job.out / "timelapse.png"), Read(folder_ / "whole" / "timelapse.png"));
+}
+
+TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
+  FitJob job = Job("run");
+  ASSERT_TRUE(Run(job).ok());
+  job.resume = true, job.config.smoothing = 3;
+  ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
+}
+
+TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
+  FitJob job = Job("run");
+  job.config.steps = 20;
+  ASSERT_TRUE(Run(job).ok());
+  job.resume = true;
+  job.input.images.color[5] += 0.1f;
+  ExpectMessage(Run(job).status(), "input = ");
+  job.input.images.color[5] -= 0.1f;
+  job.input.cameras[1].translation[2] += 1;
+  ExpectMessage(Run(job).status(), "input = ");
+  // Nor is a wish passed over that contradicts the files.
+  ExpectMessage(ReadFitFolder(folder_ / "views", 3).status(), "transforms_test.json", "--hold-out");
+}
+
+// Held-out views of another mesh would judge the fit.
+TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
+  const auto make = [&](int held_out, const Path& folder) {
+    return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder, {},
+                     stop_);
+  };
+  ASSERT_TRUE(make(0, folder_ / "views").ok());
+  const auto input = ReadFitFolder(folder_ / "views", 3);
+  ASSERT_TRUE(input.ok()) << input.status().message();
+  EXPECT_EQ(input->images.width, 16);
+  EXPECT_EQ(input->held_out.size(), 1u);
+  stop_ = true;  // a call that is stopped leaves no cameras for images of two meshes
+  EXPECT_EQ(make(1, folder_ / "views").code(), StatusCode::kCancelled);
+  EXPECT_EQ(ReadFitFolder(folder_ / "views", 0).status().code(), StatusCode::kNotFound);
+  stop_ = false;
+  EXPECT_TRUE(make(1, folder_ / "views").ok());
+  for (const std::string name : {"transforms.json", "transforms_train.json"}) {
+    const Path file = Write("photos_" + name + "/" + name, std::string("{}"));
+    ExpectMessage(make(1, file.parent_path()), name, "another folder");
+    EXPECT_EQ(ReadText(file).value(), "{}");
+  }
+}
+
+// Those of a longer call would be taken for views of the new mesh, by whoever looks. What no call
+// wrote, or none says that it did, stays.
+TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
+  const auto make = [&](int views) {
+    return MakeViews(Icosphere(1, 1), {.views = views, .held_out = 1, .size = 16}, folder_ / "few",
+                     {}, stop_);
+  };
+  ASSERT_TRUE(make(6).ok());
+  const Path images = folder_ / "few" / "images";
+  Write("few/images/photo.png", std::string("mine"));
+  Write("few/images/007.png", std::string("mine"));
+  // No process has that number.
+  for (const std::string name : {"001.png", "photo.png", "copy"}) {
+    Write("few/images/" + name + ".99999999.tmp", std::string("half"));
+  }
+  ASSERT_TRUE(make(2).ok());
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(images)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  const std::vector<std::string> expected = {"000.png",
+                                             "001.png",
+                                             "002.png",
+                                             "007.png",
+                                             "copy.99999999.tmp",
+                                             "photo.png",
+                                             "photo.png.99999999.tmp"};
+  EXPECT_EQ(names, expected);
+}
+
+TEST_F(Fit, RefinesCameras) {
+  FitJob job = Job("run");
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  job.start = truth->mesh;
+  job.config.parameters[Parameter::kCamera] = true;
+  job.config.perturb_cameras = 5, job.config.steps = 200;
+  const auto outcome = Run(job);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_NEAR(outcome->camera_error_before.value_or(0), 5, 1e-2);
+  EXPECT_LT(outcome->camera_error_after.value_or(90), 2.5);
+}
+
+// Every parameter moves, under the light that it needs.
+TEST_F(Fit, EveryParameterCanBeFitted) {
+  const auto truth = io::LoadMesh(folder_ / "views" / "truth.glb");
+  ASSERT_TRUE(truth.ok());
+  const std::pair<Parameter, Lighting> cases[] = {{Parameter::kColors, Lighting::kNone},
+                                                  {Parameter::kTexture, Lighting::kLambert},
+                                                  {Parameter::kUv, Lighting::kNone},
+                                                  {Parameter::kLight, Lighting::kLambert},
+                                                  {Parameter::kSh, Lighting::kSphericalHarmonics},
+                                                  {Parameter::kMaterial, Lighting::kPhong}};
+  for (const auto& [parameter, lighting] : cases) {
+    FitJob job = Job(NameOf(parameter));
+    job.config.parameters[parameter] = true;
+    job.config.parameters[Parameter::kPositions] = parameter == Parameter::kUv;
+    if (parameter == Parameter::kUv) job.config.parameters[Parameter::kTexture] = true;
+    job.config.lighting = lighting, job.config.steps = 30;
+    job.config.views_per_step = 8, job.config.levels = 1;  // every step sees the same
+    job.config.vertex_colors = parameter == Parameter::kColors;
+    const bool sphere = parameter == Parameter::kTexture || parameter == Parameter::kUv;
+    if (!sphere) job.start = truth->mesh;
+    const auto outcome = Run(job);
+    ASSERT_TRUE(outcome.ok()) << NameOf(parameter) << ": " << outcome.status().message();
+    const auto log = ReadText(job.out / "metrics.jsonl");
+    ASSERT_TRUE(log.ok());
+    const auto color_of = [&](std::size_t line) {
+      std::size_t at = 0;
+      for (std::size_t i = 0; i < line; ++i) at = log->find('\n', at) + 1;
+      return std::stod(log->substr(log->find("\"color\":", at) + 8));
+    };
+    EXPECT_LT(color_of(2), 1.001 * color_of(0)) << NameOf(parameter);
+  }
+}
+
+TEST_F(Fit, ThePageSaysWhichViewsItShows) {
+  FitJob job = Job("run");
+  job.config.steps = 1;
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_NE(ReadText(job.out / "report.html")->find(">Held-out views: "), std::string::npos);
+  job = Job("fitted");
+  job.config.steps = 1, job.input.held_out.clear();
+  ASSERT_TRUE(Run(job).ok());
+  EXPECT_NE(ReadText(job.out / "report.html")->find(">Fitted views (the first 6 of 8): "),
+            std::string::npos);
+}
+
+TEST_F(Fit, ErrorsNameTheCure) {
+  FitJob job = Job("run");
+  job.config.parameters[Parameter::kSh] = true;
+  ExpectMessage(Run(job).status(), "sh cannot be fitted", "spherical harmonics");
+  job = Job("run");
+  job.input.masked = false;
+  ExpectMessage(Run(job).status(), "mask");
+  job = Job("run");
+  job.config.steps = 0;
+  ExpectMessage(Run(job).status(), "steps is 0");
+  job = Job("run");
+  job.config.perturb_cameras = NAN;
+  ExpectMessage(Run(job).status(), "perturb_cameras is nan");
+  job = Job("run");
+  job.config.timelapse = -1;
+  ExpectMessage(Run(job).status(), "timelapse is -1");
+  job = Job("run");
+  job.config.lighting = Lighting::kLambert, job.config.light_direction = {0, 0, 0};
+  ExpectMessage(Run(job).status(), "light_direction is 0 0 0");
+  EXPECT_EQ(ReadFitFolder(folder_ / "none", 0).status().code(), StatusCode::kNotFound);
+  Write("broken/transforms.json", std::string("{\"frames\": [{\"file_path\": \"a.png\"}]}"));
+  ExpectMessage(ReadFitFolder(folder_ / "broken", 0).status(), "frame 0", "camera_angle_x");
+}
+
+TEST_F(Fit, WildTransforms) {
+  const auto error = [this](const std::string& fields) {
+    Write("wild/transforms.json",
+          R"({"camera_angle_x": 0.7, "frames": [{"file_path": "a.png", )" + fields + "}]}");
+    const auto frames = ReadTransforms(folder_ / "wild/transforms.json");
+    return frames.ok() ? CameraOfFrame(frames->at(0), {8, 8}).status() : frames.status();
+  };
+  const auto matrix = [](const std::string& number) {
+    return R"("transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,)" + number + "],[0,0,0,1]]";
+  };
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  EXPECT_TRUE(error(matrix("4")).ok());
+  EXPECT_TRUE(error(R"("w": "x", "w": 8, )" + matrix("4")).ok());  // the last counts
+  ExpectMessage(error(matrix("1e999")), "transforms.json", "1e999");
+  ExpectMessage(error(matrix("null")), "transforms.json", "frame 0", "transform_matrix");
+  ExpectMessage(error(R"("transform_matrix": )" + deep), "transforms.json", "nested");
+  for (const std::string field : {"\"w\": 1e300", "\"h\": -1", "\"fl_x\": []", "\"k1\": 1e-320",
+                                  "\"mask_path\": 1", "\"file_path\": null"}) {
+    ExpectMessage(error(field + ", " + matrix("4")), "transforms.json", "frame 0");
+  }
+}
+
+// Black and white saved as RGBA has an alpha that says nothing; a cut-out has one that says all.
+TEST_F(Fit, MasksAreWhiteOrCutOut) {
+  ImageU8 opaque(8, 8, 4, 255), cut(8, 8, 4, 0), grey(8, 8, 1, 0);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      for (int c = 0; c < 3; ++c) opaque.at(x, y)[c] = x < 4 ? 255 : 0;
+      cut.at(x, y)[3] = grey.at(x, y)[0] = x < 4 ? 255 : 0;
+    }
+  }
+  const std::string pose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
+  Write("masks/transforms.json", R"({"camera_angle_x":0.7,"frames":[{"file_path":"a.png",)"
+                                 R"("mask_path":"mask.png",)" +
+                                     pose + "]}");
+  ASSERT_TRUE(io::SavePng(folder_ / "masks/a.png", ImageU8(8, 8, 3, 99)).ok());
+  for (const ImageU8& mask : {opaque, cut, grey}) {
+    ASSERT_TRUE(io::SavePng(folder_ / "masks/mask.png", mask).ok());
+    const auto input = ReadFitFolder(folder_ / "masks", 0);
+    ASSERT_TRUE(input.ok()) << input.status().message();
+    for (std::size_t p = 0; p < 64; ++p) {
+      EXPECT_EQ(input->images.alpha[p], p % 8 < 4 ? 1.0f : 0.0f) << mask.channels << ", " << p;
+    }
+  }
+}
+
+// Cameras that are turned about the world's origin would lose an object that stands elsewhere.
+TEST_F(Fit, PerturbedCamerasStillSeeTheObject) {
+  FitJob job = Job("run");
+  job.start = Icosphere(1, 0.1f);
+  for (glm::vec3& p : job.start->positions) p += glm::vec3(50, 0, 0);
+  for (Camera& camera : job.input.cameras) {
+    for (int r = 0; r < 3; ++r) camera.translation[r] -= 50 * camera.rotation[3 * r];
+  }
+  job.config.perturb_cameras = 10;
+  const auto start = PrepareFit(job);
+  ASSERT_TRUE(start.ok()) << start.status().message();
+  for (std::size_t i = 0; i < job.input.cameras.size(); ++i) {
+    const Camera &before = job.input.cameras[i], &after = start->scene.cameras[i];
+    for (int r = 0; r < 3; ++r) {
+      EXPECT_NEAR(after.rotation[3 * r] * 50 + after.translation[r],
+                  before.rotation[3 * r] * 50 + before.translation[r], 1e-4);
+    }
+  }
+}
+
+TEST_F(Fit, TransformsRoundTrip) {
+  const Camera camera = OrbitCamera({50, 40, 30}, 20, 30, 2);
+  const Path file = folder_ / "cameras.json";
+  ASSERT_TRUE(WriteTextAtomic(file, WriteTransforms({{"a.png", camera}}, {40, 30})).ok());
+  const auto frames = ReadTransforms(file);
+  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  // Half the size: everything in pixels halves.
+  const auto half = CameraOfFrame(frames->at(0), {20, 15});
+  ASSERT_TRUE(half.ok());
+  EXPECT_NEAR(half->fx, camera.fx / 2, 1e-4);
+  EXPECT_NEAR(half->cy, camera.cy / 2, 1e-4);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(half->rotation[i], camera.rotation[i], 1e-5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(half->translation[i], camera.translation[i], 1e-5);
+}
+
+TEST(FitScore, AlignmentFindsASimilarity) {
+  Alignment truth;
+  const double angle = 0.4;
+  truth.scale = 1.3;
+  truth.rotation[0] = truth.rotation[4] = std::cos(angle);
+  truth.rotation[1] = -std::sin(angle), truth.rotation[3] = std::sin(angle);
+  truth.offset[0] = 0.2, truth.offset[2] = -0.5;
+  std::vector<Camera> from, to;
+  for (int i = 0; i < 5; ++i) {
+    from.push_back(OrbitCamera({50, 40, 30}, 70 * i, 10 * i, 2));
+    to.push_back(Moved(from.back(), truth));
+  }
+  const Alignment found = AlignCameras(from, to);
+  EXPECT_NEAR(found.scale, truth.scale, 1e-5);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(found.rotation[i], truth.rotation[i], 1e-5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.offset[i], truth.offset[i], 1e-5);
+  EXPECT_NEAR(AngleBetween(from[0], to[0]), angle * 180 / M_PI, 1e-2);
+}
+
+}  // namespace
+}  // namespace tilegrad::train

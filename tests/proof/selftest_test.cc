@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad selftest: that it holds here, what its command line does, that each check fails where a
+// result that it looks at is wrong, and that nothing stays behind.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <regex>
+
+#include "base/simd_target.h"
+#include "proof/selftest/checks.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+using selftest::Check;
+using selftest::CheckContext;
+using selftest::Numbers;
+
+std::size_t Count(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; ++at) ++count;
+  return count;
+}
+
+bool Contains(const std::string& text, const std::string& part) { return Count(text, part) > 0; }
+
+// ---- The program ----
+
+class SelftestCommand : public TempFolderTest {
+ protected:
+  SelftestCommand() {
+    ::unsetenv("TILEGRAD_TARGET");
+    ::setenv("TMPDIR", folder_.c_str(), 1);
+  }
+  ~SelftestCommand() override {
+    ::unsetenv("TILEGRAD_TARGET");
+    ::unsetenv("TMPDIR");
+  }
+};
+
+TEST_F(SelftestCommand, AllChecksHoldOnEveryTargetAndNothingStaysBehind) {
+  const Outcome outcome = RunProgram("selftest");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::size_t count = selftest::AllChecks().size();
+  EXPECT_EQ(Count(outcome.output, "ok    "), count) << outcome.output;
+  EXPECT_TRUE(std::regex_search(outcome.output, std::regex("\nall " + std::to_string(count) +
+                                                           R"( checks hold \(\d+\.\d s\)\n$)")));
+  for (const Check& check : selftest::AllChecks()) {
+    EXPECT_TRUE(Contains(outcome.output, "ok    " + check.title)) << check.title;
+  }
+  for (const auto& target : RunnableTargets()) {
+    const std::regex fingerprint(target + " [0-9a-f]{8}[,) ]");
+    EXPECT_EQ(std::distance(
+                  std::sregex_iterator(outcome.output.begin(), outcome.output.end(), fingerprint),
+                  std::sregex_iterator()),
+              2)
+        << target;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(SelftestCommand, AForcedTargetIsCheckedAlone) {
+  ::setenv("TILEGRAD_TARGET", "EMU128", 1);
+  const Outcome outcome = RunProgram("selftest --only BITS");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(Contains(outcome.output, "SIMD targets: EMU128 (forced by TILEGRAD_TARGET)\n"));
+  EXPECT_TRUE(Contains(outcome.output, "all 2 checks hold"));
+  EXPECT_FALSE(Contains(outcome.output, "SSE4"));
+}
+
+// The bits that it prints are those of any number of threads.
+TEST_F(SelftestCommand, FingerprintsAreThoseOfAnyRun) {
+  const std::regex seconds(R"(\(\d+\.\d+ s\)|\d+ threads?\n)");
+  const auto run = [&](const std::string& more) {
+    return std::regex_replace(RunProgram("selftest --only bits " + more).output, seconds, "");
+  };
+  EXPECT_EQ(run("--workers 1"), run("--workers 3"));
+}
+
+TEST_F(SelftestCommand, ListsItsChecksAndRunsSome) {
+  const Outcome list = RunProgram("selftest --list");
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_EQ(Count(list.output, "\n"), selftest::AllChecks().size());
+  EXPECT_EQ(RunProgram("selftest --list --only png").output, "  files: PNG\n");
+  EXPECT_EQ(RunProgram("selftest --list --workers 2").exit_code, 2);
+  const Outcome some = RunProgram("selftest --only png");
+  EXPECT_EQ(some.exit_code, 0) << some.output;
+  EXPECT_TRUE(Contains(some.output, "ok    files: PNG"));
+  EXPECT_TRUE(Contains(some.output, "all 1 checks hold"));
+}
+
+TEST_F(SelftestCommand, AnUnknownCheckIsAnErrorWithTheList) {
+  const Outcome outcome = RunProgram("selftest --only nonsense");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_TRUE(Contains(outcome.output, "nonsense"));
+  for (const Check& check : selftest::AllChecks()) {
+    EXPECT_TRUE(Contains(outcome.output, check.title));
+  }
+}
+
+TEST_F(SelftestCommand, AFailureIsPrintedAndEndsWithOne) {
+  ::setenv("TMPDIR", (folder_ / "nowhere").c_str(), 1);
+  const Outcome outcome = RunProgram("selftest --only files");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(Count(outcome.output, "FAIL  files: "), 4u) << outcome.output;
+  EXPECT_EQ(Count(outcome.output, "set TMPDIR"), 4u);
+  EXPECT_TRUE(Contains(outcome.output, "4 of 4 checks FAILED ("));
+}
+
+// ---- The checks ----
+
+// How a result is altered.
+enum class Wrong {
+  kOff,  // the largest number by a quarter of a percent, integers by one
+  kNaN,  // the first number
+  kZero  // all numbers
+};
+
+template <class T>
+void Spoil(Wrong wrong, std::span<T> numbers) {
+  if (wrong == Wrong::kZero) std::fill(numbers.begin(), numbers.end(), T(0));
+  if (wrong == Wrong::kNaN) numbers[0] = std::numeric_limits<T>::quiet_NaN();
+  if (wrong != Wrong::kOff) return;
+  const auto size = [](T x) { return std::isfinite(x) ? std::abs(x) : T(-1); };
+  T& largest = *std::max_element(numbers.begin(), numbers.end(),
+                                 [&](T a, T b) { return size(a) < size(b); });
+  largest += T(0.0025) * (largest == 0 ? T(1) : largest);
+}
+
+template <class T>
+void SpoilIntegers(Wrong wrong, std::span<T> numbers) {
+  for (T& x : numbers) x = wrong == Wrong::kZero ? T(0) : static_cast<T>(x + 1);
+}
+
+struct Spoiler {
+  Wrong wrong;
+  void operator()(std::span<float> numbers) const { Spoil(wrong, numbers); }
+  void operator()(std::span<double> numbers) const { Spoil(wrong, numbers); }
+  void operator()(std::span<std::int32_t> numbers) const { SpoilIntegers(wrong, numbers); }
+  void operator()(std::span<std::uint8_t> numbers) const { SpoilIntegers(wrong, numbers); }
+};
+
+class SelftestChecks : public testing::Test {
+ protected:
+  Workers workers_{2};
+  // The best target: the others differ in the kernels that run, not in what is compared.
+  CheckContext context_{workers_, {ActiveTarget()}};
+
+  // How often a check looks at results, by name.
+  std::map<std::string, int> LookedAt(const Check& check) {
+    std::map<std::string, int> looks;
+    context_.tamper = [&](std::string_view what, const Numbers&) { ++looks[std::string(what)]; };
+    const auto finding = check.run(context_);
+    EXPECT_TRUE(finding.ok()) << check.title << ": " << finding.status().message();
+    return looks;
+  }
+
+  // What the check says if that is wrong at the last look, or OK.
+  Status AfterSpoiling(const Check& check, const std::string& name, int looks, Wrong wrong) {
+    context_.tamper = [&](std::string_view what, const Numbers& numbers) {
+      if (what == name && --looks == 0) std::visit(Spoiler{wrong}, numbers);
+    };
+    return check.run(context_).status();
+  }
+};
+
+TEST_F(SelftestChecks, AResultThatIsOffFailsTheCheck) {
+  for (const Check& check : selftest::AllChecks()) {
+    if (check.title.starts_with("degenerate")) continue;  // of numbers that have no right value
+    const auto looks = LookedAt(check);
+    EXPECT_FALSE(looks.empty()) << check.title;
+    for (const auto& [name, count] : looks) {
+      if (name == "alpha_error_bound") continue;  // below
+      const Status status = AfterSpoiling(check, name, count, Wrong::kOff);
+      EXPECT_FALSE(status.ok()) << check.title << " does not see that " << name << " is off";
+    }
+  }
+}
+
+TEST_F(SelftestChecks, NaNFailsTheCheck) {
+  for (const Check& check : selftest::AllChecks()) {
+    for (const auto& [name, count] : LookedAt(check)) {
+      const Status status = AfterSpoiling(check, name, count, Wrong::kNaN);
+      EXPECT_FALSE(status.ok()) << check.title << " does not see that " << name << " is NaN";
+    }
+  }
+}
+
+// Enough is dropped that a renderer which keeps silent about it is found out.
+TEST_F(SelftestChecks, ABoundThatIsTooLowFailsTheCheck) {
+  context_.tamper = [](std::string_view what, const Numbers& numbers) {
+    if (what == "alpha_error_bound") std::visit(Spoiler{Wrong::kZero}, numbers);
+  };
+  for (const Check& check : selftest::AlphaBoundChecks()) {
+    ExpectMessage(check.run(context_).status(), "alpha[", "off by", "allowed");
+  }
+}
+
+TEST_F(SelftestChecks, ErrorsNameTargetNumberAndTolerance) {
+  context_.tamper = [](std::string_view what, const Numbers& numbers) {
+    if (what == "alpha") std::visit(Spoiler{Wrong::kOff}, numbers);
+  };
+  const Check alpha = selftest::TriangleChecks()[1];
+  ExpectMessage(alpha.run(context_).status(), ActiveTarget() + ": alpha[", "is 1.0025",
+                "expected 1: off by 2.5e-03, allowed 2.7e-05");
+}
+
+// The target that was in use is in use again, whatever the outcome.
+TEST_F(SelftestChecks, TargetsAreRestored) {
+  for (const bool spoilt : {false, true}) {
+    ASSERT_TRUE(ForceTarget("EMU128").ok());
+    context_.targets = RunnableTargets();
+    context_.tamper = [&](std::string_view, const Numbers& numbers) {
+      if (spoilt) std::visit(Spoiler{Wrong::kNaN}, numbers);
+    };
+    EXPECT_EQ(selftest::TriangleChecks()[1].run(context_).ok(), !spoilt);
+    EXPECT_EQ(ForcedTarget(), "EMU128");
+    ASSERT_TRUE(ForceTarget("").ok());
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad

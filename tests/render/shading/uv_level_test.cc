@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mip levels, and sides, of faces that float has trouble with: those that reach past the camera.
+#include "render/shading/uv_level.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "base/rng.h"
+#include "raster/interpolate_ref.h"
+#include "render/pipeline/pipeline_ref.h"
+#include "render/renderer.h"
+#include "render/renderer_ref.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr int kWidth = 48, kHeight = 40;
+
+RenderOptions Options() {
+  RenderOptions options;
+  options.width = kWidth, options.height = kHeight;
+  return options;
+}
+
+// A triangle of random corners, most of them on both sides of the near plane.
+template <class T>
+struct Wall {
+  std::vector<T> positions, uvs;
+  std::vector<std::int32_t> faces = {0, 1, 2};
+  CameraT<T> camera;
+
+  Wall(double reach, double near_plane, Rng* rng) {
+    for (int i = 0; i < 9; ++i) positions.push_back(Number(rng->Uniform(-reach, reach)));
+    for (int i = 0; i < 6; ++i) uvs.push_back(Number(rng->Uniform(0, 8)));
+    camera.fx = camera.fy = 20, camera.cx = kWidth / 2, camera.cy = kHeight / 2;
+    camera.near_plane = Number(near_plane);
+  }
+  // What float holds.
+  static T Number(double x) { return static_cast<T>(static_cast<float>(x)); }
+
+  SceneViewT<T> View() const { return {positions, faces, uvs, 2, AttributeRate::kVertex, camera}; }
+};
+
+// A screen mesh in double, number for number.
+void Widen(const raster::ScreenMeshBuffersT<float>& from, raster::ScreenMeshBuffersT<double>* to) {
+  to->x.assign(from.x.begin(), from.x.end()), to->y.assign(from.y.begin(), from.y.end());
+  to->depth.assign(from.depth.begin(), from.depth.end());
+  to->inverse_depth.assign(from.inverse_depth.begin(), from.inverse_depth.end());
+  to->v0 = from.v0, to->v1 = from.v1, to->v2 = from.v2;
+  to->source_face = from.source_face, to->reject = from.reject;
+  to->source_vertices = from.source_vertices, to->source_faces = from.source_faces;
+  to->width = from.width, to->height = from.height;
+}
+
+// Of one mesh the levels are the same in either type, up to a rounding of a logarithm below 32 and
+// of a quotient in it.
+TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
+  Rng rng(1, 1);
+  int levels = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Wall<float> wall(4, 0.01, &rng);
+    PreparedScene<float> scene;
+    PrepareRef(wall.View(), Options(), &scene);
+    raster::ScreenMeshBuffersT<double> buffers;
+    Widen(scene.buffers, &buffers);
+    const raster::ScreenMeshT<double> mesh = buffers.View();
+    const std::vector<double> values(scene.attributes.values.begin(),
+                                     scene.attributes.values.end());
+    const raster::AttributeViewT<const double> attributes{values, 2, AttributeRate::kVertex};
+    for (std::size_t f = 0; f < mesh.faces(); ++f) {
+      if (mesh.reject[f] != raster::kFaceDrawn) continue;
+      const auto mode = Interpolation::kPerspective;
+      const UvPlanes narrow = UvPlanesOf(scene.mesh, scene.attributes, 0, f, mode);
+      const UvPlanes wide = UvPlanesOf(mesh, attributes, 0, f, mode);
+      const auto plane = raster::MakeFacePlane(mesh, f);
+      for (int at = 0; at < kWidth * kHeight; at += 7) {
+        const int x = at % kWidth, y = at / kWidth, size[2] = {256, 256};
+        if (!raster::Covers(raster::SnapFaceClockwise(mesh, f), x, y)) continue;
+        const auto weights = raster::PixelWeightsRef(mesh, plane, f, mode, x + 0.5, y + 0.5);
+        double uv[2];
+        raster::InterpolateRef<double>(mesh, attributes, f, weights, uv);
+        const float got = UvLevel<float>(narrow, x + 0.5, y + 0.5, uv, size);
+        EXPECT_NEAR(got, UvLevel<double>(wide, x + 0.5, y + 0.5, uv, size), 4e-6) << trial;
+        ++levels;
+      }
+    }
+  }
+  EXPECT_GT(levels, 9000);
+}
+
+template <class T>
+ShadedSceneT<T> TwoSided(const Wall<T>& wall) {
+  ShadedSceneT<T> scene;
+  static_cast<SceneViewT<T>&>(scene) = wall.View();
+  scene.attributes = {}, scene.channels = 0;
+  scene.model.normals = NormalKind::kFlat, scene.model.two_sided = true;
+  return scene;
+}
+
+// Cut at a hundred millionth of their size faces reach so far out of the image that the sign of
+// their area there is beyond float. A normal turned the wrong way would be off by 2.
+TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
+  const Workers workers(1);
+  ShadedRenderer renderer(workers);
+  ShadedRequest request;
+  request.color = request.alpha = false, request.normals = true;
+  int pixels = 0;
+  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+    Rng rng(seed, 2), same(seed, 2);
+    const Wall<float> wall(100, 1e-6, &rng);
+    const Wall<double> wide(100, 1e-6, &same);
+    const ShadedScene scene = TwoSided(wall);
+    ShadedFrame frame;
+    ASSERT_TRUE(renderer.Render({&scene, 1}, Options(), request, &frame).ok());
+    ShadedFrameT<double> truth;
+    ShadedRenderRef<double>(TwoSided(wide), Options(), request, frame.face_ids, &truth);
+    int off = 0;
+    for (std::size_t i = 0; i < frame.normals.size(); ++i) {
+      off += std::abs(static_cast<double>(frame.normals[i]) - truth.normals[i]) > 1e-3;
+    }
+    EXPECT_EQ(off, 0) << "scene " << seed;
+    for (const std::int32_t id : frame.face_ids) pixels += id >= 0;
+  }
+  EXPECT_GT(pixels, 50000);
+}
+
+}  // namespace
+}  // namespace tilegrad

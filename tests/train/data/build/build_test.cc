@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/build/build.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "base/error.h"
+#include "base/folder_lock.h"
+#include "io/image_file.h"
+#include "scene/shapes.h"
+#include "train/data/temp_folder.h"
+
+namespace tilegrad::train {
+namespace {
+
+BuildOptions SmallOptions() {
+  BuildOptions options;
+  options.image_size = 16;
+  options.views = 3;
+  return options;
+}
+
+class BuildTest : public FolderTest {
+ protected:
+  Result<BuildSummary> Build(const ModelSource& source, const Path& folder, int workers = 1,
+                             const ProgressSink& progress = {}) {
+    return BuildDataset(source, options_, folder, Workers(workers), progress, stop_);
+  }
+
+  BuildOptions options_ = SmallOptions();
+  StopFlag stop_ = false;
+};
+
+TEST_F(BuildTest, ProceduralSetEndToEnd) {
+  const auto source = ProceduralSource(4, 1);
+  const auto summary = Build(*source, root_ / "set", 2);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  EXPECT_EQ(summary->models.size(), 20u);
+  EXPECT_TRUE(summary->rejected.empty());
+
+  const auto dataset = Dataset::Open(root_ / "set");
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  EXPECT_EQ(dataset->info().classes,
+            (std::vector<std::string>{"car", "chair", "lamp", "plane", "table"}));
+  EXPECT_EQ(dataset->Select(Split::kTest).size(), 5u);
+  EXPECT_EQ(dataset->Select(Split::kTrain).size(), 15u);
+  for (std::size_t i = 0; i < dataset->models().size(); ++i) {
+    const auto data = dataset->Load(static_cast<int>(i));
+    ASSERT_TRUE(data.ok()) << data.status().message();
+    EXPECT_EQ(data->images.size(), 3u * 4 * 16 * 16);
+    EXPECT_EQ(data->images, dataset->LoadImages(static_cast<int>(i)).value());
+    EXPECT_GT(std::count(data->occupancy.begin(), data->occupancy.end(), 1), 32);
+    ASSERT_EQ(data->points.size(), static_cast<std::size_t>(kTruthPoints));
+    float reach = 0;
+    for (const auto& p : data->mesh.positions) {
+      for (int k = 0; k < 3; ++k) reach = std::max(reach, std::abs(p[k]));
+    }
+    EXPECT_NEAR(reach, 0.45f, 1e-6f);  // one rounding of the scale and one of the shift
+    EXPECT_LE(data->mesh.faces.size(), static_cast<std::size_t>(kTruthFaces));
+  }
+  const auto sheet = io::LoadImage(root_ / "set" / "contact_sheet.png");
+  ASSERT_TRUE(sheet.ok());
+  EXPECT_GT(sheet->width, 6 * 3 * 16);
+}
+
+TEST_F(BuildTest, RgbIsPremultiplied) {
+  const auto source = ProceduralSource(2, 5);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  const auto images = Dataset::Open(root_ / "set")->LoadImages(0).value();
+  constexpr std::size_t kPlane = 16 * 16;
+  int partial = 0;
+  for (std::size_t view = 0; view < 3; ++view) {
+    for (std::size_t p = 0; p < kPlane; ++p) {
+      const std::uint8_t* pixel = images.data() + view * 4 * kPlane + p;
+      const int alpha = pixel[3 * kPlane];
+      partial += alpha > 0 && alpha < 255;
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_LE(pixel[c * kPlane], alpha);
+    }
+  }
+  EXPECT_GT(partial, 10);  // edges are anti-aliased
+}
+
+TEST_F(BuildTest, WorkersDoNotChangeAByte) {
+  const auto source = ProceduralSource(2, 3);
+  ASSERT_TRUE(Build(*source, root_ / "one", 1).ok());
+  ASSERT_TRUE(Build(*source, root_ / "two", 2).ok());
+  ASSERT_TRUE(Build(*source, root_ / "seven", 7).ok());
+  const auto one = Contents(root_ / "one");
+  EXPECT_EQ(one.size(), 10u + 5u);  // models; dataset.json, two lists, the sheet, the lock
+  EXPECT_EQ(one, Contents(root_ / "two"));
+  EXPECT_EQ(one, Contents(root_ / "seven"));
+}
+
+TEST_F(BuildTest, StoppedAndGoneOnIsTheSame) {
+  const auto source = ProceduralSource(2, 3);
+  ASSERT_TRUE(Build(*source, root_ / "whole").ok());
+  const auto stop_after_four = [&](const Progress& p) {
+    if (p.stage == "rendering" && p.done == 4) stop_ = true;
+  };
+  const auto stopped = Build(*source, root_ / "parts", 1, stop_after_four);
+  ASSERT_FALSE(stopped.ok());
+  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
+  const auto incomplete = Dataset::Open(root_ / "parts");
+  ASSERT_FALSE(incomplete.ok());
+  EXPECT_NE(incomplete.status().message().find("not complete"), std::string::npos);
+
+  stop_ = false;
+  const auto resumed = Build(*source, root_ / "parts");
+  ASSERT_TRUE(resumed.ok()) << resumed.status().message();
+  EXPECT_EQ(resumed->reused, 4);
+  EXPECT_EQ(Contents(root_ / "whole"), Contents(root_ / "parts"));
+  EXPECT_EQ(Build(*source, root_ / "parts")->reused, 10);
+}
+
+TEST_F(BuildTest, HalfWrittenFilesOfAKilledCommandGo) {
+  const auto source = ProceduralSource(1, 3);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  const auto whole = Contents(root_ / "set");
+  for (const char* name : {"models/lamp/lamp-00000.npz", "models.jsonl"}) {
+    ASSERT_TRUE(WriteTextAtomic(root_ / "set" / (std::string(name) + ".4194305.tmp"), "x").ok());
+  }
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  EXPECT_EQ(Contents(root_ / "set"), whole);
+}
+
+TEST_F(BuildTest, OneProcessAtATime) {
+  const auto source = ProceduralSource(1, 3);
+  {
+    const auto lock = FolderLock::Take(root_ / "set");
+    ASSERT_TRUE(lock.ok());
+    const auto refused = Build(*source, root_ / "set");
+    ASSERT_FALSE(refused.ok());
+    EXPECT_NE(refused.status().message().find("another process"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(root_ / "set" / "dataset.json"));
+  }
+  EXPECT_TRUE(Build(*source, root_ / "set").ok());
+}
+
+TEST_F(BuildTest, StoppedWithOtherClassesTheIndexStillFits) {
+  const auto source = ProceduralSource(2, 1);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  options_.limit = 2;
+  stop_ = true;
+  ASSERT_EQ(Build(*source, root_ / "set").status().code(), StatusCode::kCancelled);
+  const auto dataset = Dataset::Open(root_ / "set");
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  EXPECT_EQ(dataset->models().size(), 10u);
+}
+
+TEST_F(BuildTest, BrokenModelFilesAreMadeAgain) {
+  const auto source = ProceduralSource(1, 3);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  const auto whole = Contents(root_ / "set");
+  const Path file = root_ / "set" / "models" / "lamp" / "lamp-00000.npz";
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  const auto again = Build(*source, root_ / "set");
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again->reused, 4);
+  EXPECT_EQ(Contents(root_ / "set"), whole);
+}
+
+TEST_F(BuildTest, OtherSettingsDoNotOverwrite) {
+  const auto source = ProceduralSource(1, 3);
+  ASSERT_TRUE(Build(*source, root_ / "set").ok());
+  const auto whole = Contents(root_ / "set");
+  options_.image_size = 32;
+  const auto other = Build(*source, root_ / "set");
+  ASSERT_FALSE(other.ok());
+  EXPECT_EQ(other.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(Build(*ProceduralSource(1, 4), root_ / "set").status().code(),
+            StatusCode::kInvalidArgument);
+  EXPECT_EQ(Contents(root_ / "set"), whole);
+}
+
+TEST_F(BuildTest, PerClassAndLimitChoose) {
+  const auto source = ProceduralSource(6, 3);
+  options_.per_class = 2;
+  EXPECT_EQ(Build(*source, root_ / "a")->models.size(), 10u);
+  options_.limit = 7;
+  EXPECT_EQ(Build(*source, root_ / "b")->models.size(), 7u);
+}
+
+TEST_F(BuildTest, OptionsOutOfRangeAreErrors) {
+  const auto source = ProceduralSource(1, 3);
+  options_.views = 0;
+  EXPECT_EQ(Build(*source, root_ / "a").status().code(), StatusCode::kInvalidArgument);
+  options_ = SmallOptions();
+  options_.split.test_share = std::nan("");
+  EXPECT_EQ(Build(*source, root_ / "a").status().code(), StatusCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(root_ / "a"));
+}
+
+// A sphere, the same in red, and three that cannot be used.
+class MixedSource : public ModelSource {
+ public:
+  MixedSource() {
+    for (const char* id : {"broken", "empty", "flat-point", "red", "white"}) {
+      entries_.push_back({"ball", id, id, "", "", std::string(id) + ".obj", {}});
+    }
+  }
+  std::string name() const override { return "mixed"; }
+  std::vector<std::string> credits() const override { return {}; }
+  const std::vector<SourceEntry>& entries() const override { return entries_; }
+  Result<SourceModel> Load(std::size_t entry) const override {
+    const std::string& id = entries_[entry].id;
+    if (id == "broken") return DataLoss("broken.obj: line 3: no number");
+    if (id == "empty") return SourceModel{Mesh{}};
+    Mesh mesh = Icosphere(1, 1.0f);
+    if (id == "flat-point") {
+      for (auto& p : mesh.positions) p = glm::vec3(1, 2, 3);
+    }
+    if (id == "red") SetColor(mesh, {1, 0, 0, 1});
+    SourceModel model{mesh};
+    if (id == "red") model.warnings = {"texture \"red.png\" not found"};
+    return model;
+  }
+
+ private:
+  std::vector<SourceEntry> entries_;
+};
+
+TEST_F(BuildTest, UnusableModelsAreListedWithReasons) {
+  const auto summary = Build(MixedSource(), root_ / "set", 2);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  EXPECT_EQ(summary->models.size(), 2u);
+  ASSERT_EQ(summary->rejected.size(), 3u);
+  EXPECT_EQ(summary->rejected[0].reason, "broken.obj: line 3: no number");
+  const std::string list = ReadText(root_ / "set" / "rejected.jsonl").value();
+  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 3);
+  for (const char* word : {"\"broken\"", "\"empty.obj\"", "\"flat-point\""}) {
+    EXPECT_NE(list.find(word), std::string::npos) << word;
+  }
+}
+
+TEST_F(BuildTest, WarningsOfReadingAreReported) {
+  const auto summary = Build(MixedSource(), root_ / "set", 2);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  ASSERT_EQ(summary->warnings.size(), 1u);
+  EXPECT_EQ(summary->warnings[0].file, "red.obj");
+  EXPECT_EQ(summary->warnings[0].text, "texture \"red.png\" not found");
+}
+
+TEST_F(BuildTest, RecolouredCopiesAreOnOneSideOfTheSplit) {
+  const auto summary = Build(MixedSource(), root_ / "set");
+  ASSERT_TRUE(summary.ok());
+  EXPECT_EQ(summary->models[0].geometry, summary->models[1].geometry);
+  EXPECT_NE(summary->models[0].geometry, 0u);
+  EXPECT_EQ(summary->models[0].split, summary->models[1].split);
+}
+
+}  // namespace
+}  // namespace tilegrad::train

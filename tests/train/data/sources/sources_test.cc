@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <set>
+
+#include "io/npz.h"
+#include "train/data/build/build.h"
+#include "train/data/sources/procedural.h"
+#include "train/data/sources/sweethome3d_list.h"
+#include "train/data/temp_folder.h"
+#include "support/source_dir.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr const char* kTetrahedron =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+class SourcesTest : public FolderTest {
+ protected:
+  void Write(const std::string& name, std::string_view text) {
+    ASSERT_TRUE(WriteTextAtomic(root_ / name, text).ok());
+  }
+};
+
+TEST(Procedural, ModelsAreValidDifferentAndRepeatable) {
+  for (int c = 0; c < static_cast<int>(ProceduralClasses().size()); ++c) {
+    std::set<std::vector<float>> shapes;
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      const Mesh mesh = ProceduralModel(c, i, 9), again = ProceduralModel(c, i, 9);
+      ASSERT_TRUE(Validate(mesh).ok());
+      EXPECT_EQ(mesh.colors.size(), mesh.positions.size());
+      EXPECT_EQ(mesh.positions, again.positions);
+      EXPECT_EQ(mesh.colors, again.colors);
+      const Bounds bounds = MeshBounds(mesh);
+      const glm::vec3 size = bounds.high - bounds.low;
+      shapes.insert({size.x, size.y, size.z});
+    }
+    EXPECT_EQ(shapes.size(), 20u) << ProceduralClasses()[static_cast<std::size_t>(c)];
+  }
+}
+
+// Six times the volume that the faces enclose: positive if they are counter-clockwise from outside.
+double SignedVolume(const Mesh& mesh) {
+  double volume = 0;
+  for (const Face& f : mesh.faces) {
+    const glm::dvec3 a(mesh.positions[static_cast<std::size_t>(f[0])]),
+        b(mesh.positions[static_cast<std::size_t>(f[1])]),
+        c(mesh.positions[static_cast<std::size_t>(f[2])]);
+    volume += glm::dot(a, glm::cross(b, c));
+  }
+  return volume;
+}
+
+TEST(Procedural, FacesLookOutwards) {
+  for (int c = 0; c < static_cast<int>(ProceduralClasses().size()); ++c) {
+    for (std::uint64_t i = 0; i < 20; ++i) EXPECT_GT(SignedVolume(ProceduralModel(c, i, 2)), 0);
+  }
+}
+
+TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
+  Write("set/solid/a b.obj", kTetrahedron);
+  Write("set/solid/c.obj", "v 0 0 0\nf 1 2 9\n");
+  Write("set/solid/notes.txt", "no model");
+  Write("set/readme.md", "no class");
+  const auto source = FolderSource(root_ / "set");
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  ASSERT_EQ((*source)->entries().size(), 2u);
+  EXPECT_EQ((*source)->entries()[0].id, "a_b");
+  EXPECT_EQ((*source)->entries()[0].class_name, "solid");
+  BuildOptions options;
+  options.image_size = 8, options.views = 2;
+  const StopFlag stop = false;
+  const auto summary = BuildDataset(**source, options, root_ / "out", Workers(1), {}, stop);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  EXPECT_EQ(summary->models.size(), 1u);
+  ASSERT_EQ(summary->rejected.size(), 1u);
+  EXPECT_NE(summary->rejected[0].reason.find("c.obj"), std::string::npos);
+}
+
+TEST_F(SourcesTest, FoldersWithoutModelsAreErrors) {
+  EXPECT_EQ(FolderSource(root_).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(FolderSource(root_ / "no").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(ShapeNetSource(root_, {}).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(NmrSource(root_).status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(SourcesTest, ShapeNetTreeAndSplitList) {
+  for (const char* model : {"a1", "b2", "c3"}) {
+    Write(std::string("net/03001627/") + model + "/models/model_normalized.obj", kTetrahedron);
+  }
+  Write("net/99999999/z/models/model_normalized.obj", kTetrahedron);
+  const auto all = ShapeNetSource(root_ / "net", {});
+  ASSERT_TRUE(all.ok()) << all.status().message();
+  ASSERT_EQ((*all)->entries().size(), 3u);
+  EXPECT_EQ((*all)->entries()[0].class_name, "chair");
+  EXPECT_FALSE((*all)->entries()[0].split.has_value());
+  EXPECT_TRUE((*all)->Load(0).ok());
+
+  Write("split.txt", "03001627/a1 test\n\n03001627/c3 val\n");
+  const auto listed = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  ASSERT_TRUE(listed.ok()) << listed.status().message();
+  ASSERT_EQ((*listed)->entries().size(), 2u);
+  EXPECT_EQ((*listed)->entries()[0].split, Split::kTest);
+  EXPECT_EQ((*listed)->entries()[1].split, Split::kValidation);
+
+  Write("split.txt", "03001627/a1 test\n03001627/b2 exam\n");
+  const auto wrong = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.status().message().find("line 2"), std::string::npos);
+
+  Write("split.txt", "03001627/d4 test\n");
+  const auto none = ShapeNetSource(root_ / "net", root_ / "split.txt");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.status().message().find("split.txt names"), std::string::npos);
+}
+
+TEST_F(SourcesTest, MissingFurnitureSaysWhatToInstall) {
+  const auto source = SweetHome3dSource(root_);
+  ASSERT_FALSE(source.ok());
+  EXPECT_EQ(source.status().code(), StatusCode::kNotFound);
+  EXPECT_NE(source.status().message().find("apt-get install"), std::string::npos);
+}
+
+TEST(SweetHome3d, ListIsCompiledIn) {
+  const Path file = Path(TILEGRAD_SOURCE_DIR) / "data" / "sweethome3d_classes.tsv";
+  EXPECT_EQ(ReadText(file).value(), SweetHome3dList());
+}
+
+TEST(SweetHome3d, ElevenClassesLoad) {
+  if (!std::filesystem::exists(kSweetHome3dFolder)) {
+    GTEST_SKIP() << "the package sweethome3d-furniture is not installed";
+  }
+  const auto source = SweetHome3dSource(kSweetHome3dFolder);
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  std::set<std::string> classes;
+  for (std::size_t i = 0; i < (*source)->entries().size(); ++i) {
+    if (!classes.insert((*source)->entries()[i].class_name).second) continue;
+    const auto model = (*source)->Load(i);
+    EXPECT_TRUE(model.ok()) << model.status().message();
+  }
+  EXPECT_EQ(classes.size(), 11u);
+}
+
+// --- N3MR / SoftRas ---
+
+constexpr std::size_t kImage = 24 * 4 * 64 * 64, kGrid = 32 * 32 * 32;
+
+// `models` opaque white squares on black, with `grid` for all.
+void WriteNmr(const Path& stem, std::size_t models, const std::vector<std::uint8_t>& grid) {
+  std::vector<std::uint8_t> images(models * kImage), voxels;
+  for (std::size_t i = 0; i < images.size(); i += 64 * 64) {
+    std::fill_n(images.begin() + static_cast<std::ptrdiff_t>(i + 64 * 32), 64, 255);
+  }
+  for (std::size_t i = 0; i < models; ++i) voxels.insert(voxels.end(), grid.begin(), grid.end());
+  auto npy = io::MakeNpy<std::uint8_t>({models, 32, 32, 32}, voxels);
+  npy.type = io::NpyType::kBool;
+  ASSERT_TRUE(io::SaveNpz(stem.string() + "_images.npz",
+                          {{"arr_0", io::MakeNpy<std::uint8_t>({models, 24, 4, 64, 64}, images)}})
+                  .ok());
+  ASSERT_TRUE(io::SaveNpz(stem.string() + "_voxels.npz", {{"arr_0", npy}}).ok());
+}
+
+TEST_F(SourcesTest, NmrBecomesADataset) {
+  std::vector<std::uint8_t> grid(kGrid);
+  grid[5] = 1;
+  WriteNmr(root_ / "03001627_train", 2, grid);
+  WriteNmr(root_ / "03001627_test", 1, grid);
+  const auto source = NmrSource(root_);
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  const StopFlag stop = false;
+  const auto summary = BuildDataset(**source, {}, root_ / "out", Workers(2), {}, stop);
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  const auto dataset = Dataset::Open(root_ / "out");
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  EXPECT_EQ(dataset->info().classes, std::vector<std::string>{"chair"});
+  EXPECT_EQ(dataset->Select(Split::kTrain).size(), 2u);
+  EXPECT_EQ(dataset->Select(Split::kTest).size(), 1u);
+  EXPECT_DOUBLE_EQ(dataset->info().camera.lens.fov_y, 30);
+  const auto data = dataset->Load(0);
+  ASSERT_TRUE(data.ok()) << data.status().message();
+  EXPECT_TRUE(data->points.empty());
+  EXPECT_TRUE(data->mesh.faces.empty());
+  EXPECT_EQ(data->images.size(), kImage);
+}
+
+TEST_F(SourcesTest, NmrFilesThatDoNotFitAreErrors) {
+  WriteNmr(root_ / "car_val", 1, std::vector<std::uint8_t>(kGrid));
+  const std::vector<std::uint8_t> small(16);
+  ASSERT_TRUE(io::SaveNpz(root_ / "car_val_voxels.npz",
+                          {{"arr_0", io::MakeNpy<std::uint8_t>({1, 16}, small)}})
+                  .ok());
+  const auto source = NmrSource(root_);
+  ASSERT_FALSE(source.ok());
+  EXPECT_NE(source.status().message().find("car_val_voxels.npz"), std::string::npos);
+}
+
+using Vec = glm::dvec3;
+
+// Where N3MR's own camera sees a point of its frame in view v: right and up, 1 at the border.
+glm::dvec2 ProjectAsNmr(Vec p, int v) {
+  const double rad = std::acos(-1.0) / 180, azimuth = -15 * v * rad, elevation = 30 * rad;
+  const Vec eye = 2.732 * Vec(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+                              -std::cos(elevation) * std::cos(azimuth));
+  const Vec z = glm::normalize(-eye), x = glm::normalize(glm::cross(Vec(0, 1, 0), z)),
+            y = glm::cross(z, x), q = p - eye;
+  const double width = std::tan(15 * rad) * glm::dot(z, q);
+  return {glm::dot(x, q) / width, glm::dot(y, q) / width};
+}
+
+glm::dvec2 ProjectAsOurs(Vec p, const Camera& camera) {
+  Vec q;
+  for (int r = 0; r < 3; ++r) {
+    q[r] = camera.translation[r];
+    for (int c = 0; c < 3; ++c) q[r] += camera.rotation[3 * r + c] * p[c];
+  }
+  return {camera.fx * q.x / -q.z / 32, camera.fy * q.y / -q.z / 32};
+}
+
+// A voxel of their frame, through the file and back, stands where their images show it.
+TEST_F(SourcesTest, NmrVoxelsMeetTheirImages) {
+  const std::array<int, 3> theirs = {3, 20, 11};  // x', y', z'
+  std::vector<std::uint8_t> grid(kGrid);
+  grid[static_cast<std::size_t>((theirs[1] * 32 + theirs[0]) * 32 + 31 - theirs[2])] = 1;
+  WriteNmr(root_ / "car_train", 1, grid);
+  const auto source = NmrSource(root_);
+  ASSERT_TRUE(source.ok());
+  const auto data = std::get<ModelData>((*source)->Load(0).value().data);
+  const auto at = std::find(data.occupancy.begin(), data.occupancy.end(), 1);
+  ASSERT_NE(at, data.occupancy.end());
+  const int index = static_cast<int>(at - data.occupancy.begin());
+  const auto place = [](int x, int y, int z) { return (Vec(x, y, z) + 0.5) / 32.0 - 0.5; };
+  const Vec ours = place(index / 1024, index / 32 % 32, index % 32);
+  const DatasetInfo info = *(*source)->FixedInfo();
+  for (int v = 0; v < info.views; ++v) {
+    const auto a = ProjectAsNmr(place(theirs[0], theirs[1], theirs[2]), v);
+    const auto b = ProjectAsOurs(ours, info.camera.View(v));
+    EXPECT_NEAR(a.x, b.x, 1e-5) << v;  // the camera is float: 2^-24 times a few terms of size 3
+    EXPECT_NEAR(a.y, b.y, 1e-5) << v;
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::train
