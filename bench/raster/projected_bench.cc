@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <vector>
 
-#include "raster/bench_scenes.h"
 #include "compat/kaolin/face_visibility_ref.h"
-#include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
-#include "compat/pytorch3d/layered_raster.h"
 #include "compat/kaolin/projected_raster.h"
 #include "compat/kaolin/projected_soft_mask.h"
+#include "compat/pytorch3d/layered_raster.h"
+#include "raster/bench_scenes.h"
+#include "raster/project.h"
+#include "render/pipeline/frame_layout.h"
 
 namespace tilegrad::bench {
 namespace {

@@ -65,7 +65,7 @@ struct SoftBench {
   Frame frame;
   bool failed = false;
   raster::SoftMaskPlan plan;
-  raster::TileGrid grid;
+  raster::SquareGrid grid;
   raster::SoftTree tree;
   std::vector<float> alpha, transmittance;
   AlignedVector<raster::SoftFaceGradient> gradients;
@@ -78,7 +78,7 @@ void SoftForward(benchmark::State& state, const SceneSpec& spec, double delta, d
   double spent = 0;
   for (auto _ : state) {
     b.Build();
-    for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
+    for (std::size_t t = 0; t < b.grid.cells(); ++t) {
       spent = std::max(spent, SoftMaskForward(b.tree, b.plan, b.Bin(t), b.Images(), &b.scratch));
     }
   }
@@ -90,12 +90,12 @@ void SoftBackward(benchmark::State& state, const SceneSpec& spec, double delta, 
   SoftBench b(spec, delta, error);
   if (b.failed) return state.SkipWithError("the scene did not render");
   const auto d_alpha = std::span<const float>(b.batch.d_alpha).first(b.alpha.size());
-  for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
+  for (std::size_t t = 0; t < b.grid.cells(); ++t) {
     SoftMaskForward(b.tree, b.plan, b.Bin(t), b.Images(), &b.scratch);
   }
   for (auto _ : state) {
     b.gradients.clear();
-    for (std::size_t t = 0; t < b.grid.tiles(); ++t) {
+    for (std::size_t t = 0; t < b.grid.cells(); ++t) {
       SoftMaskBackward(b.tree, b.plan, b.Bin(t), {b.alpha, b.transmittance, d_alpha}, &b.gradients,
                        &b.scratch);
     }

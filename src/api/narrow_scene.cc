@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <limits>
 
-#include "render/shading/validate.h"
 #include "render/pipeline/validate.h"
+#include "render/shading/validate.h"
 
 namespace tilegrad {
 namespace {

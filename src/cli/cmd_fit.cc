@@ -11,8 +11,8 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "io/mesh_file.h"
 #include "fit/run.h"
+#include "io/mesh_file.h"
 
 namespace tilegrad::cli {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "cli/command.h"
 #include "cli/console.h"
-#include "io/mesh_file.h"
 #include "fit/make_views.h"
+#include "io/mesh_file.h"
 
 namespace tilegrad::cli {
 namespace {

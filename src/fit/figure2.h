@@ -8,8 +8,8 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "scene/image.h"
 #include "fit/fitter.h"
+#include "scene/image.h"
 
 namespace tilegrad::train {
 

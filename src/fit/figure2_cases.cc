@@ -4,9 +4,9 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "scene/shapes.h"
 #include "fit/figure2.h"
 #include "fit/sphere_uv.h"
+#include "scene/shapes.h"
 
 namespace tilegrad::train {
 namespace {

@@ -8,11 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "nn/layers.h"
 #include "fit/diffusion.h"
 #include "fit/image_loss.h"
 #include "fit/parameter_block.h"
 #include "fit/regularizer.h"
+#include "nn/layers.h"
 
 namespace tilegrad::train {
 

@@ -9,11 +9,11 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "fit/transforms.h"
 #include "io/image_file.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/data/dataset_files.h"
-#include "fit/transforms.h"
 
 namespace tilegrad::train {
 namespace {

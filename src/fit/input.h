@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/file.h"
+#include "fit/image_loss.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
-#include "fit/image_loss.h"
 
 namespace tilegrad::train {
 

@@ -9,11 +9,11 @@
 
 #include "base/error.h"
 #include "base/temporary_file.h"
+#include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "render/picture/lit_renderer.h"
 #include "train/data/build/glass.h"
-#include "fit/transforms.h"
 
 namespace tilegrad::train {
 namespace {

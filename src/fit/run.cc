@@ -9,16 +9,16 @@
 
 #include "base/error.h"
 #include "base/folder_lock.h"
+#include "fit/pictures.h"
+#include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "nn/context.h"
-#include "train/run/checkpoint.h"
 #include "train/data/dataset.h"
-#include "train/run/first_difference.h"
-#include "fit/pictures.h"
-#include "fit/transforms.h"
 #include "train/metrics/metrics.h"
 #include "train/pictures.h"
+#include "train/run/checkpoint.h"
+#include "train/run/first_difference.h"
 #include "train/run/log.h"
 
 namespace tilegrad::train {

@@ -15,8 +15,8 @@
 #include "base/file.h"
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "fit/doctor.h"
 #include "fit/config.h"
+#include "fit/doctor.h"
 #include "fit/input.h"
 #include "fit/score.h"
 

@@ -9,9 +9,9 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/rng.h"
-#include "scene/shapes.h"
 #include "fit/run.h"
 #include "fit/sphere_uv.h"
+#include "scene/shapes.h"
 
 namespace tilegrad::train {
 namespace {

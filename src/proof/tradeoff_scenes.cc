@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "proof/tradeoff_study.h"
 #include "io/mesh_file.h"
+#include "proof/tradeoff_study.h"
 #include "scene/camera.h"
 #include "scene/shapes.h"
 

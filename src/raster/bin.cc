@@ -36,37 +36,37 @@ void ForEachFaceAndBin(const DrawnFaces& faces, int bin_columns, std::size_t beg
   }
 }
 
-// From the number of each chunk's faces per tile to where they go: sets `begin` and `cursor`.
-void PlaceChunks(std::size_t tiles, TileListBuffers* buffers) {
+// From the number of each chunk's faces per bin to where they go: sets `begin` and `cursor`.
+void PlaceChunks(std::size_t bins, BinListBuffers* buffers) {
   std::int32_t total = 0;
-  for (std::size_t t = 0; t < tiles; ++t) {
+  for (std::size_t t = 0; t < bins; ++t) {
     buffers->begin[t] = total;
-    for (std::size_t at = t; at < buffers->cursor.size(); at += tiles) {
+    for (std::size_t at = t; at < buffers->cursor.size(); at += bins) {
       const std::int32_t count = buffers->cursor[at];
       buffers->cursor[at] = total, total += count;
     }
   }
-  buffers->begin[tiles] = total;
+  buffers->begin[bins] = total;
 }
 
-// A counting sort, which is stable, in chunks of `share` lists: no fewer faces than tiles, or their
+// A counting sort, which is stable, in chunks of `share` lists: no fewer faces than bins, or their
 // counters would cost more than they.
-TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListBuffers* buffers,
-                        const Workers* workers) {
+BinLists SortIntoBins(const DrawnFaces& faces, const SquareGrid& grid, BinListBuffers* buffers,
+                      const Workers* workers) {
   constexpr std::size_t kList = DrawnFaces::kChunk;
-  const std::size_t tiles = grid.tiles(), lists = faces.counts.size();
-  const std::size_t share = (tiles + kList - 1) / kList;
-  buffers->begin.resize(tiles + 1);
-  buffers->cursor.assign((lists + share - 1) / share * tiles, 0);
+  const std::size_t bins = grid.cells(), lists = faces.counts.size();
+  const std::size_t share = (bins + kList - 1) / kList;
+  buffers->begin.resize(bins + 1);
+  buffers->cursor.assign((lists + share - 1) / share * bins, 0);
   const auto for_each_bin = [&](const auto& emit) {
     ForChunks(workers, lists, share, [&](std::size_t begin, std::size_t end) {
-      std::int32_t* const cursor = buffers->cursor.data() + begin / share * tiles;
+      std::int32_t* const cursor = buffers->cursor.data() + begin / share * bins;
       ForEachFaceAndBin(faces, grid.columns, begin, end,
                         [&](std::size_t face, std::size_t bin) { emit(face, &cursor[bin]); });
     });
   };
   for_each_bin([](std::size_t, std::int32_t* count) { ++*count; });
-  PlaceChunks(tiles, buffers);
+  PlaceChunks(bins, buffers);
   buffers->faces.resize(static_cast<std::size_t>(buffers->begin.back()));
   for_each_bin([&](std::size_t face, std::int32_t* next) {
     buffers->faces[static_cast<std::size_t>((*next)++)] = static_cast<std::int32_t>(face);
@@ -74,9 +74,9 @@ TileLists SortIntoTiles(const DrawnFaces& faces, const TileGrid& grid, TileListB
   return buffers->View();
 }
 
-// All faces into the only tile. Room for as many as there can be: which image comes to which worker
+// All faces into the only bin. Room for as many as there can be: which image comes to which worker
 // is not determined, and nothing shall be allocated once every size has been seen.
-TileLists ListAll(const DrawnFaces& faces, TileListBuffers* buffers) {
+BinLists ListAll(const DrawnFaces& faces, BinListBuffers* buffers) {
   buffers->faces.clear();
   buffers->faces.reserve(faces.storage.size());
   for (std::size_t chunk = 0; chunk < faces.counts.size(); ++chunk) {
@@ -91,10 +91,10 @@ TileLists ListAll(const DrawnFaces& faces, TileListBuffers* buffers) {
 
 }  // namespace
 
-TileLists BinDrawnFaces(const DrawnFaces& faces, const TileGrid& bins, TileListBuffers* buffers,
-                        const Workers* workers) {
-  if (bins.tiles() == 1) return ListAll(faces, buffers);
-  return SortIntoTiles(faces, bins, buffers, workers);
+BinLists BinDrawnFaces(const DrawnFaces& faces, const SquareGrid& bins, BinListBuffers* buffers,
+                       const Workers* workers) {
+  if (bins.cells() == 1) return ListAll(faces, buffers);
+  return SortIntoBins(faces, bins, buffers, workers);
 }
 
 }  // namespace tilegrad::raster

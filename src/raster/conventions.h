@@ -64,6 +64,23 @@
 // 8. Slivers. Interpolation divides by a face's height on the screen. A face thinner than 1/64
 //    pixel is interpolated flat: the mean of its corners, and no gradient of positions through
 //    attributes, since that gradient grows with 1/height without bound.
+//
+// 9. Parts of an image, from large to small. The same words everywhere in src/:
+//
+//      band    whole rows, BandGrid: the unit of work of gradients of attributes
+//      bin     64 x 64 pixels: faces are listed and drawn by bins; the unit of work forward
+//      tile    16 x 16 pixels of a bin: the unit of coverage in 32 bits and of the soft mask
+//      block   8 x 8 pixels of a tile: what the soft mask sorts faces for
+//      strip   up to a bin's width of pixels, interpolated together and handed to shading
+//      run     up to 256 pixels of a strip that show one surface: what a shading kernel sees
+//
+//      bin +----+----+----+----+      Faces have words of their own: a chunk is a range of faces
+//          |tile|    |    |    |      that one task prepares, a packet 16 faces that lie side by
+//          +----+----+----+----+      side in memory for vectors, a node a packet in the hierarchy
+//          |    |    | blk|blk |      of the soft mask.
+//          +----+----+----+----+
+//          |    |    | blk|blk |
+//          +----+----+----+----+
 #pragma once
 
 #include <cstdint>
@@ -73,7 +90,7 @@ namespace tilegrad::raster {
 inline constexpr int kSubpixelBits = 10;  // coverage: 1/1024 pixel
 inline constexpr std::int64_t kSubpixels = std::int64_t{1} << kSubpixelBits;
 inline constexpr int kTileBits = 4;
-inline constexpr int kTileSize = 1 << kTileBits;  // pixels; the unit of work
+inline constexpr int kTileSize = 1 << kTileBits;  // pixels
 inline constexpr int kBinBits = 6;
 inline constexpr int kBinSize = 1 << kBinBits;  // pixels; faces are drawn by bins, of 4 x 4 tiles
 inline constexpr int kMaxImageSize = 16384;     // pixels, each axis

@@ -349,11 +349,11 @@ HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& cor
   return static_cast<std::size_t>(std::popcount(keep));
 }
 
-static_assert(kMostFaceLanes <= kBlockFaces);
+static_assert(kMostFaceLanes <= kPacketFaces);
 
 // Faces f to f + count - 1; nowhere those that do not take part in the soft mask, and lanes beyond.
 HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t count,
-                             const std::uint8_t* reject, CornerBlocks* to) {
+                             const std::uint8_t* reject, CornerPackets* to) {
   const FaceTag d;
   const FaceIntTag di;
   const hn::Rebind<std::uint8_t, FaceTag> bytes;
@@ -368,16 +368,16 @@ HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t c
   for (std::size_t k = 0; k < 3; ++k) {
     const auto store = [&](FaceVec v, std::size_t number) HWY_ATTR {
       hn::Store(hn::IfThenElse(nowhere, hn::Set(d, kNowhere), v), d,
-                to->at(f / kBlockFaces, number) + f % kBlockFaces);
+                to->at(f / kPacketFaces, number) + f % kPacketFaces);
     };
     store(c.x[k], k), store(c.y[k], 3 + k);
   }
 }
 
-// `corner_blocks` may be null. `out` has null, or room for all of the faces. Returns how many were
+// `corner_packets` may be null. `out` has null, or room for all of the faces. Returns how many were
 // written.
 std::size_t SetUpSomeFaces(const ScreenMesh& mesh, const SomeFaces& range, std::uint8_t* reject,
-                           CornerBlocks* corner_blocks, const FaceList& out) {
+                           CornerPackets* corner_packets, const FaceList& out) {
   const std::size_t lanes = hn::Lanes(FaceIntTag());
   std::size_t listed = 0;
   for (std::size_t f = range.begin; f < range.end; f += lanes) {
@@ -385,7 +385,7 @@ std::size_t SetUpSomeFaces(const ScreenMesh& mesh, const SomeFaces& range, std::
     const ShapeCorners corners = LoadShapeCorners(mesh, f, count);
     ShapeLanes shapes = ShapesOf(corners);
     const std::uint32_t drawn = RejectShapes(mesh, shapes, range.cull_back, f, count, reject + f);
-    if (corner_blocks != nullptr) StoreCorners(corners, f, count, reject + f, corner_blocks);
+    if (corner_packets != nullptr) StoreCorners(corners, f, count, reject + f, corner_packets);
     if (out.face == nullptr || drawn == 0) continue;
     listed += ListFaces(mesh, corners, &shapes, f, drawn, {out.face + listed, out.bins + listed});
   }

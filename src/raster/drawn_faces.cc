@@ -19,11 +19,11 @@ namespace {
 HWY_EXPORT(SetUpSomeFaces);
 
 // Where there is no face.
-void FillUp(std::size_t faces, CornerBlocks* corners) {
-  for (std::size_t block = faces / kBlockFaces; block < corners->blocks(); ++block) {
-    const std::size_t from = block == faces / kBlockFaces ? faces % kBlockFaces : 0;
+void FillUp(std::size_t faces, CornerPackets* corners) {
+  for (std::size_t packet = faces / kPacketFaces; packet < corners->packets(); ++packet) {
+    const std::size_t from = packet == faces / kPacketFaces ? faces % kPacketFaces : 0;
     for (std::size_t number = 0; number < kCornerNumbers; ++number) {
-      std::fill(corners->at(block, number) + from, corners->at(block, number) + kBlockFaces,
+      std::fill(corners->at(packet, number) + from, corners->at(packet, number) + kPacketFaces,
                 kNowhere);
     }
   }

@@ -8,7 +8,7 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "raster/corner_blocks.h"
+#include "raster/corner_packets.h"
 #include "raster/coverage.h"
 #include "raster/face_plane.h"
 #include "raster/screen_mesh.h"
@@ -70,8 +70,8 @@ struct SomeFaces {
 
 // What is to be set up of the faces of an image; null is not wanted.
 struct FaceSetUp {
-  DrawnFaces* drawn = nullptr;      // those that are drawn and may cover a pixel of the image
-  CornerBlocks* corners = nullptr;  // of those that take part in the soft mask
+  DrawnFaces* drawn = nullptr;       // those that are drawn and may cover a pixel of the image
+  CornerPackets* corners = nullptr;  // of those that take part in the soft mask
 };
 
 // Where records go.

@@ -31,6 +31,6 @@ struct TileFaceSetup {
 };
 
 // `shape` wound clockwise. Returns false if the face's box holds no pixel centre of the tile.
-bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out);
+bool SetUpTileFace(const SnappedFace& shape, const PixelRect& rect, TileFaceSetup* out);
 
 }  // namespace tilegrad::raster

@@ -177,7 +177,7 @@ HWY_INLINE void DrawRows(const EdgesAt<Face>& edges, const DrawnFace& face, cons
 }
 
 // A face's box within a bin: columns [x0, x1), rows [y0, y1).
-HWY_INLINE TileRect BoxIn(const TileRect& rect, const DrawnFace& face) {
+HWY_INLINE PixelRect BoxIn(const PixelRect& rect, const DrawnFace& face) {
   return {HWY_MAX(face.column_begin - rect.x0, 0), HWY_MAX(face.row_begin - rect.y0, 0),
           HWY_MIN(face.column_end, rect.x1) - rect.x0, HWY_MIN(face.row_end, rect.y1) - rect.y0};
 }
@@ -195,7 +195,7 @@ HWY_INLINE std::int32_t MovedStamp(std::int32_t pixels, int columns, int rows) {
 // A face of which the covered pixels are known. Without a branch on where they are: the stamp lies
 // in the bin as a whole.
 template <Layer kLayer>
-HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
+HWY_INLINE void DrawStamp(const DrawnFace& face, const PixelRect& rect, const BinTarget& out) {
   using Layout = StampLayout;
   const Layout::IntTag di;
   const int x = face.column_begin - rect.x0, y = face.row_begin - rect.y0;
@@ -218,7 +218,7 @@ HWY_INLINE void DrawStamp(const DrawnFace& face, const TileRect& rect, const Bin
 // By rows of the pixels of D. Where a face fits between two multiples of the lanes, vectors begin
 // there: their loads then take over what was stored last as it is, and no vector straddles a line.
 template <Layer kLayer, class D>
-HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const TileRect& rect, const TileRect& box,
+HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const PixelRect& rect, const PixelRect& box,
                            const BinTarget& out) {
   const int lanes = static_cast<int>(hn::Lanes(d));
   const int aligned = box.x0 & -lanes;
@@ -236,9 +236,9 @@ HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const TileRect& rect, con
 // 2^15, and vectors begin less than kTileSize columns before it. A narrow face takes few lanes: on
 // Zen 4 a store of 64 bytes takes twice as long as one of 32.
 template <Layer kLayer>
-HWY_INLINE void DrawSmall(const DrawnFace& face, const TileRect& rect, const BinTarget& out) {
+HWY_INLINE void DrawSmall(const DrawnFace& face, const PixelRect& rect, const BinTarget& out) {
   constexpr int kNarrow = 8;
-  const TileRect box = BoxIn(rect, face);
+  const PixelRect box = BoxIn(rect, face);
   if (hn::MaxLanes(VisibilityTag()) > kNarrow && box.x1 - box.x0 <= kNarrow) {
     DrawInRows<kLayer>(HWY_CAPPED(float, kNarrow)(), face, rect, box, out);
   } else {
@@ -266,7 +266,7 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
 // A large face in one tile of a bin, whose arrays `rows` begins. Returns whether it covers all of
 // it.
 template <Layer kLayer>
-HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const TileRect& tile,
+HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const PixelRect& tile,
                          DrawnRows rows) {
   TileFaceSetup setup;
   if (!SetUpTileFace(shape, tile, &setup)) return false;
@@ -301,17 +301,17 @@ struct DepthFloors {
 
 // Large faces go tile by tile: their exact edge functions step through a tile in 32 bits.
 template <Layer kLayer>
-HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const TileRect& rect,
+HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const PixelRect& rect,
                           DepthFloors* floors, const BinTarget& out) {
   const SnappedFace shape = SnapFaceClockwise(mesh, static_cast<std::size_t>(face.face));
-  const TileRect box = BoxIn(rect, face);
+  const PixelRect box = BoxIn(rect, face);
   for (int y = box.y0 >> kTileBits; y << kTileBits < box.y1; ++y) {
     for (int x = box.x0 >> kTileBits; x << kTileBits < box.x1; ++x) {
       float& floor = floors->tile[y][x];
       if (face.depth.high <= floor) continue;
       const int x0 = rect.x0 + (x << kTileBits), y0 = rect.y0 + (y << kTileBits);
-      const TileRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
-                          HWY_MIN(y0 + kTileSize, rect.y1)};
+      const PixelRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
+                           HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
       // Of a layer that is peeled, a face that covers a tile may lie before what is asked for.
       const bool covered = DrawTile<kLayer>(
@@ -324,7 +324,7 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const T
 }
 
 template <Layer kLayer>
-HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                           const BinTarget& out) {
   constexpr std::size_t kAhead = 4;  // records lie in the order of the mesh, not of the bin
   DepthFloors floors;
@@ -347,7 +347,7 @@ HWY_INLINE void DrawLayer(const ScreenMesh& mesh, const BinDrawList& list, const
 }
 
 // `behind` null: Layer::kFirst.
-void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void DrawFaces(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                const float* behind, VisibilityBin* out) {
   const BinTarget target{out->face, out->inverse_depth, behind};
   if (behind == nullptr) {

@@ -27,7 +27,7 @@ void CentreRange(std::int64_t low, std::int64_t high, int origin, int end, int* 
   *last = static_cast<int>(std::clamp<std::int64_t>(to, origin, end) - origin);
 }
 
-void SetUpEdges(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out) {
+void SetUpEdges(const SnappedFace& shape, const PixelRect& rect, TileFaceSetup* out) {
   constexpr std::int64_t kFar = std::int64_t{1} << 30;  // 15 steps in x and y stay below 2^30
   for (int k = 0; k < 3; ++k) {
     const int n = k == 2 ? 0 : k + 1;
@@ -41,7 +41,7 @@ void SetUpEdges(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* o
 
 }  // namespace
 
-bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup* out) {
+bool SetUpTileFace(const SnappedFace& shape, const PixelRect& rect, TileFaceSetup* out) {
   const auto [left, right] = std::minmax({shape.x[0], shape.x[1], shape.x[2]});
   const auto [top, bottom] = std::minmax({shape.y[0], shape.y[1], shape.y[2]});
   CentreRange(left, right, rect.x0, rect.x1, &out->column_begin, &out->column_end);
@@ -54,7 +54,7 @@ bool SetUpTileFace(const SnappedFace& shape, const TileRect& rect, TileFaceSetup
 
 namespace {
 
-void DrawBin(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void DrawBin(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
              const float* behind, VisibilityBin* out) {
   const int pixels = (rect.y1 - rect.y0) * kBinSize;
   std::fill(out->face, out->face + pixels, kNoFace);
@@ -70,12 +70,12 @@ void DrawBin(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& re
 
 }  // namespace
 
-void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                        VisibilityBin* out) {
   DrawBin(mesh, list, rect, nullptr, out);
 }
 
-void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                     const float* behind, VisibilityBin* out) {
   DrawBin(mesh, list, rect, behind, out);
 }

@@ -27,13 +27,13 @@ struct BinDrawList {
 
 // Draws a bin: `rect` of BinGrid. The result does not depend on the instruction set: the same bits
 // as VisibilityRef<float> everywhere.
-void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                        VisibilityBin* out);
 
 // The same of the faces that lie behind `behind` [kBinSize][kBinSize]: a pixel sees the nearest
 // whose 1/depth is less than what stands there. Infinity lets all be seen, 0 none; the 1/depth of
 // one layer asks for the next. At one depth only one face is ever seen.
-void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const TileRect& rect,
+void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                     const float* behind, VisibilityBin* out);
 
 }  // namespace tilegrad::raster

@@ -5,13 +5,13 @@
 #include <utility>
 
 #include "base/stage_clock.h"
+#include "render/pipeline/validate.h"
 #include "render/shading/gradients.h"
 #include "render/shading/inputs.h"
 #include "render/shading/merge.h"
 #include "render/shading/report.h"
 #include "render/shading/stage.h"
 #include "render/shading/validate.h"
-#include "render/pipeline/validate.h"
 
 namespace tilegrad {
 namespace {

@@ -15,8 +15,8 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "render/shading/plan.h"
 #include "render/scene.h"
+#include "render/shading/plan.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

@@ -11,11 +11,11 @@
 #include "nn/nn.h"
 #include "train/run/checkpoint.h"
 #include "train/run/first_difference.h"
-#include "train/run/machine.h"
 #include "train/run/log.h"
+#include "train/run/machine.h"
+#include "train/run/trained_models.h"
 #include "train/tasks/single_image/sample_images.h"
 #include "train/tasks/single_image/step.h"
-#include "train/run/trained_models.h"
 
 namespace tilegrad::train {
 namespace {

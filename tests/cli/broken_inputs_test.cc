@@ -9,8 +9,8 @@
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace tilegrad {
 namespace {

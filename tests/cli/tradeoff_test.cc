@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "support/run_program.h"
-#include "support/temp_folder.h"
 #include "support/source_dir.h"
+#include "support/temp_folder.h"
 
 namespace tilegrad {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "scene/shapes.h"
 #include "fit/diffusion.h"
+#include "scene/shapes.h"
 
 namespace tilegrad::train {
 namespace {

@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/make_views.h"
+#include "fit/transforms.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
-#include "fit/make_views.h"
-#include "fit/transforms.h"
 
 namespace tilegrad::train {
 namespace {

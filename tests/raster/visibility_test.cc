@@ -63,14 +63,14 @@ DrawnFaces DrawnFacesOf(const ScreenMesh& mesh) {
 
 // Faces of a whole image, by bins.
 std::vector<std::int32_t> Visible(const ScreenMesh& mesh) {
-  const TileGrid bins = BinGrid(mesh.width, mesh.height);
+  const SquareGrid bins = BinGrid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
-  TileListBuffers buffers;
-  const TileLists lists = BinDrawnFaces(drawn, bins, &buffers);
+  BinListBuffers buffers;
+  const BinLists lists = BinDrawnFaces(drawn, bins, &buffers);
   std::vector<std::int32_t> out(static_cast<std::size_t>(mesh.width) * mesh.height, -7);
   VisibilityBin bin;
-  for (std::size_t b = 0; b < bins.tiles(); ++b) {
-    const TileRect rect = bins.rect(b);
+  for (std::size_t b = 0; b < bins.cells(); ++b) {
+    const PixelRect rect = bins.rect(b);
     ComputeVisibility(mesh, {drawn.storage, lists[b]}, rect, &bin);
     for (int i = rect.y0; i < rect.y1; ++i) {
       for (int j = rect.x0; j < rect.x1; ++j) {
@@ -236,9 +236,9 @@ TEST_P(VisibilityOnEveryTarget, PeelingShowsAllLayersInTheirOrder) {
     const ScreenMesh mesh = flat.Finish();
     const auto faces = SetUpDrawnFaces(mesh);
     const DrawnFaces drawn = DrawnFacesOf(mesh);
-    TileListBuffers buffers;
-    const TileLists lists = BinDrawnFaces(drawn, BinGrid(mesh.width, mesh.height), &buffers);
-    const TileRect rect{0, 0, mesh.width, mesh.height};  // one bin
+    BinListBuffers buffers;
+    const BinLists lists = BinDrawnFaces(drawn, BinGrid(mesh.width, mesh.height), &buffers);
+    const PixelRect rect{0, 0, mesh.width, mesh.height};  // one bin
     std::vector<float> behind(kBinSize * kBinSize, std::numeric_limits<float>::infinity());
     std::vector<std::vector<std::int32_t>> seen(kBinSize * kBinSize);
     VisibilityBin bin;
@@ -318,15 +318,15 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   Rng rng(8, 4);
   Flat flat = RandomTriangles(400, 150, &rng, 300, 200);
   const ScreenMesh mesh = flat.Finish();
-  const TileGrid grid = BinGrid(mesh.width, mesh.height);
+  const SquareGrid grid = BinGrid(mesh.width, mesh.height);
   const DrawnFaces drawn = DrawnFacesOf(mesh);
-  TileListBuffers buffers;
-  const TileLists bins = BinDrawnFaces(drawn, grid, &buffers);
+  BinListBuffers buffers;
+  const BinLists bins = BinDrawnFaces(drawn, grid, &buffers);
   std::size_t listed = 0;
-  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+  for (std::size_t t = 0; t < grid.cells(); ++t) {
     EXPECT_TRUE(std::is_sorted(bins[t].begin(), bins[t].end()));
     listed += bins[t].size();
-    const TileRect rect = grid.rect(t);
+    const PixelRect rect = grid.rect(t);
     for (std::size_t f = 0; f < mesh.faces(); ++f) {
       if (mesh.reject[f] != kFaceDrawn) continue;
       bool covers = false;
@@ -340,7 +340,7 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
       }));
     }
   }
-  EXPECT_LT(listed, mesh.faces() * grid.tiles() / 2);  // it does reject
+  EXPECT_LT(listed, mesh.faces() * grid.cells() / 2);  // it does reject
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "base/file.h"
-#include "tilegrad/version.h"
 #include "support/source_dir.h"
+#include "tilegrad/version.h"
 
 namespace tilegrad {
 namespace {
@@ -83,7 +83,8 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
   // Library (first part of the include path) -> the only prefixes of files that may include it.
   const std::vector<std::pair<std::regex, std::vector<std::string>>> homes = {
       {std::regex("^(tbb|oneapi)/.*"), {"src/base/parallel.cc"}},
-      {std::regex("^hwy/.*"), {"src/base/", "src/raster/", "src/shade/", "src/nn/", "src/render/", "src/compat/"}},
+      {std::regex("^hwy/.*"),
+       {"src/base/", "src/raster/", "src/shade/", "src/nn/", "src/render/", "src/compat/"}},
       {std::regex("^glm/.*"),
        {"src/scene/", "src/raster/project", "src/io/", "src/train/", "src/fit/", "src/shade/"}},
       {std::regex("^(tiny_gltf|stb_.*)\\.h$"), {"src/io/"}},

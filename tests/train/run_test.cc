@@ -5,13 +5,13 @@
 #include <set>
 
 #include "nn/nn.h"
+#include "support/source_dir.h"
 #include "support/temp_folder.h"
-#include "train/run/checkpoint.h"
 #include "train/config.h"
 #include "train/data/batches.h"
+#include "train/run/checkpoint.h"
 #include "train/run/log.h"
 #include "train/run/tensorboard.h"
-#include "support/source_dir.h"
 
 namespace tilegrad::train {
 namespace {

@@ -19,11 +19,11 @@ namespace {
 struct Bins {
   const ImageSize& size;
   std::size_t images;
-  raster::TileGrid grid = raster::BinGrid(size.width, size.height);
+  raster::SquareGrid grid = raster::BinGrid(size.width, size.height);
 
-  std::size_t tasks() const { return images * grid.tiles(); }
-  std::size_t image(std::size_t task) const { return task / grid.tiles(); }
-  raster::TileRect rect(std::size_t task) const { return grid.rect(task % grid.tiles()); }
+  std::size_t tasks() const { return images * grid.cells(); }
+  std::size_t image(std::size_t task) const { return task / grid.cells(); }
+  raster::PixelRect rect(std::size_t task) const { return grid.rect(task % grid.cells()); }
 };
 
 // ---- Vector code: float, all faces.
@@ -119,8 +119,8 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
         &gradients[task], &scratch[worker]);
   });
   workers.For(batch.images, [&](std::size_t n, std::size_t) {
-    for (std::size_t bin = 0; bin < bins.grid.tiles(); ++bin) {
-      AddFaceGradients(gradients[n * bins.grid.tiles() + bin], options.size,
+    for (std::size_t bin = 0; bin < bins.grid.cells(); ++bin) {
+      AddFaceGradients(gradients[n * bins.grid.cells() + bin], options.size,
                        adjoint.d_xy.data() + 6 * n * batch.faces);
     }
   });
@@ -166,8 +166,8 @@ void ForScalarTiles(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions&
   workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
     const std::size_t n = bins.image(task);
     const NearFacesT<T> near =
-        FacesNear<T>(faces[n], bins.grid.rect(task % bins.grid.tiles()), width, height, box);
-    raster::ForTiles(bins.rect(task), [&](const raster::TileRect& rect) {
+        FacesNear<T>(faces[n], bins.grid.rect(task % bins.grid.cells()), width, height, box);
+    raster::ForTiles(bins.rect(task), [&](const raster::PixelRect& rect) {
       visit(task, n, PaperTile{rect, width, height, face_ids.data() + n * PixelCount(options.size)},
             FacesNear(near, rect, width, height, box));
     });
@@ -202,8 +202,8 @@ void ScalarMaskBackward(const ProjectedBatchT<T>& batch, const ProjectedMaskOpti
       });
   workers.For(batch.images, [&](std::size_t n, std::size_t) {
     T* d_xy = adjoint.d_xy.data() + 6 * n * batch.faces;
-    for (std::size_t bin = 0; bin < bins.grid.tiles(); ++bin) {
-      for (const NearFacesT<T>& tile : gradients[n * bins.grid.tiles() + bin]) {
+    for (std::size_t bin = 0; bin < bins.grid.cells(); ++bin) {
+      for (const NearFacesT<T>& tile : gradients[n * bins.grid.cells() + bin]) {
         for (std::size_t i = 0; i < tile.faces.size(); ++i) {
           T* to = d_xy + 6 * tile.source[i];
           for (int k = 0; k < 3; ++k) {

@@ -29,7 +29,7 @@ void WritePixel(const Barycentrics<double>& b, std::int32_t face, T* rast, T* ra
 struct PreparedImage {
   ClipScreen screen;
   raster::DrawnFaces drawn;
-  raster::TileListBuffers lists;
+  raster::BinListBuffers lists;
 };
 
 template <class T>
@@ -51,7 +51,7 @@ void Prepare(const RasterizeInput<T>& input, std::size_t image, const Workers* w
 // A bin of an image: what is seen in it, and where it stands.
 struct DrawnBin {
   std::size_t image;
-  raster::TileRect rect;
+  raster::PixelRect rect;
   const raster::ScreenMesh& mesh;
   const raster::VisibilityBin& seen;
 };
@@ -87,7 +87,8 @@ struct BinScratch {
 };
 
 // From the rows of an image to those of a bin; the rest of the bin is never looked at.
-void LoadPeeled(const float* peeled, std::size_t row, const raster::TileRect& rect, float* behind) {
+void LoadPeeled(const float* peeled, std::size_t row, const raster::PixelRect& rect,
+                float* behind) {
   std::fill(behind, behind + raster::kBinSize * raster::kBinSize, 0.0f);
   for (int y = rect.y0; y < rect.y1; ++y, behind += raster::kBinSize) {
     const float* from = peeled + static_cast<std::size_t>(y) * row;
@@ -98,7 +99,7 @@ void LoadPeeled(const float* peeled, std::size_t row, const raster::TileRect& re
 template <class T>
 void DrawBin(const RasterizeInput<T>& input, const PreparedImage& image, std::size_t n,
              std::size_t bin, BinScratch* scratch, const RasterizeOutput<T>& out) {
-  const raster::TileRect rect = raster::BinGrid(input.grid.width, input.grid.height).rect(bin);
+  const raster::PixelRect rect = raster::BinGrid(input.grid.width, input.grid.height).rect(bin);
   const raster::ScreenMesh mesh = image.screen.mesh.View();
   const raster::BinDrawList list{image.drawn.storage, image.lists.View()[bin]};
   if (out.peeled.empty()) {
@@ -136,7 +137,7 @@ Status Rasterizer::Run(const RasterizeInput<T>& input, const Workers& workers,
   } else {
     workers.For(n, [&](std::size_t i, std::size_t) { Prepare(input, i, nullptr, &images[i]); });
   }
-  const std::size_t count = raster::BinGrid(input.grid.width, input.grid.height).tiles();
+  const std::size_t count = raster::BinGrid(input.grid.width, input.grid.height).cells();
   workers.For(n * count, [&](std::size_t task, std::size_t worker) {
     const std::size_t image = task / count;
     DrawBin(input, images[image], image, task % count, bins[worker].get(), out);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch of images whose faces come already projected (compat/projected/projected_faces.h), and what their
-// checks have in common. For callers who project for themselves, as DIB-R's other implementations
-// have it; whoever has vertices and cameras uses Renderer, which clips, covers exactly and
-// interpolates with perspective.
+// A batch of images whose faces come already projected (compat/projected/projected_faces.h), and
+// what their checks have in common. For callers who project for themselves, as DIB-R's other
+// implementations have it; whoever has vertices and cameras uses Renderer, which clips, covers
+// exactly and interpolates with perspective.
 #pragma once
 
 #include <cstddef>

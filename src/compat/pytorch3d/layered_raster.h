@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The K nearest faces of every pixel, within a blur radius, as PyTorch3D's rasterizer has them
-// (compat/pytorch3d/layered_fragment.h), and the way back. For conversions: Renderer needs no such lists. The
-// same bits for any number of workers.
+// (compat/pytorch3d/layered_fragment.h), and the way back. For conversions: Renderer needs no such
+// lists. The same bits for any number of workers.
 //
 // A face is listed for a pixel if it has an area (> 1e-8), all its depths are >= 1e-8, and the
 // pixel is inside, or nearer to its boundary than the root of blur_radius. Lists are by depth, near

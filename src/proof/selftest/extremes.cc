@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "proof/owned_rendering.h"
 #include "proof/selftest/checks.h"
 #include "proof/selftest/sphere_scene.h"
-#include "proof/owned_rendering.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -4,11 +4,11 @@
 #include <cstring>
 
 #include "base/rng.h"
-#include "proof/selftest/checks.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "nn/nn.h"
+#include "proof/selftest/checks.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::selftest {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Products of matrices and convolutions against scalar loops in double.
-#include "proof/selftest/checks.h"
 #include "nn/kernels/conv2d/trial.h"
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/gemm.h"
 #include "nn/kernels/gemm_ref.h"
+#include "proof/selftest/checks.h"
 
 namespace tilegrad::selftest {
 namespace {

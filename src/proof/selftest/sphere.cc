@@ -3,9 +3,9 @@
 // reference's gradients beside complex steps.
 #include <algorithm>
 
+#include "proof/complex_step.h"
 #include "proof/selftest/checks.h"
 #include "proof/selftest/sphere_scene.h"
-#include "proof/complex_step.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "base/hash.h"
-#include "proof/selftest/checks.h"
 #include "nn/nn.h"
+#include "proof/selftest/checks.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <type_traits>
 
-#include "proof/selftest/checks.h"
 #include "proof/owned_rendering.h"
+#include "proof/selftest/checks.h"
 
 namespace tilegrad::selftest {
 namespace {

@@ -46,7 +46,7 @@ HWY_INLINE TilePixels SoftPixelsOf(const SoftMaskPlan& plan, const SoftMaskRegio
 // Backward through one tile, after FindNearGroups.
 class TileBackward {
  public:
-  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& tile,
+  TileBackward(const SoftTree& tree, const SoftMaskPlan& plan, const PixelRect& tile,
                const TilePixels& soft, const SoftMaskAdjoint& adjoint, SoftMaskScratch* scratch,
                AlignedVector<SoftFaceGradient>* out)
       : tree_(tree), plan_(plan), adjoint_(adjoint), scratch_(scratch), out_(out) {
@@ -276,8 +276,8 @@ inline void SoftMaskBackwardTarget(const SoftTree& tree, const SoftMaskPlan& pla
                                    const SoftMaskRegion& region, const SoftMaskAdjoint& adjoint,
                                    SoftMaskScratch* scratch, AlignedVector<SoftFaceGradient>* out) {
   FindNearGroups(tree, plan, region.rect, &scratch->groups);
-  ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
-    const TileRect next = NextTile(region.rect, tile);
+  ForTiles(region.rect, [&](const PixelRect& tile) HWY_ATTR {
+    const PixelRect next = NextTile(region.rect, tile);
     PrefetchTile(plan, next, region.face_ids.data());
     PrefetchTile(plan, next, adjoint.alpha.data());
     const TilePixels soft = SoftPixelsOf(plan, {tile, region.face_ids}, adjoint.alpha);

@@ -32,7 +32,7 @@ HWY_INLINE std::size_t TransmittanceIndex(const SoftMaskPlan& plan, const SoftBl
 }
 
 // The tile after `tile` in `region`, as ForTiles goes; empty behind the last one.
-HWY_INLINE TileRect NextTile(const TileRect& region, const TileRect& tile) {
+HWY_INLINE PixelRect NextTile(const PixelRect& region, const PixelRect& tile) {
   const bool right = tile.x1 < region.x1;
   const int x = right ? tile.x1 : region.x0, y = right ? tile.y0 : tile.y1;
   return {x, y, HWY_MIN(x + kTileSize, region.x1), HWY_MIN(y + kTileSize, region.y1)};
@@ -40,7 +40,7 @@ HWY_INLINE TileRect NextTile(const TileRect& region, const TileRect& tile) {
 
 // Asks for a tile of an image, which is in as many places as it has rows.
 template <class T>
-HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const TileRect& tile, const T* image) {
+HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const PixelRect& tile, const T* image) {
   for (int y = tile.y0; y < tile.y1; ++y) {
     PrefetchLine(image + PixelIndex(plan, tile.x0, y));
     PrefetchLine(image + PixelIndex(plan, tile.x1 - 1, y));
@@ -65,7 +65,7 @@ class TilePixels {
   // Those in whose lanes chosen(index in the image) is true, which is asked for whole vectors, and
   // at the right side of the image for one(index in the image).
   template <class Chosen, class One>
-  HWY_INLINE TilePixels(const SoftMaskPlan& plan, const TileRect& rect, const Chosen& chosen,
+  HWY_INLINE TilePixels(const SoftMaskPlan& plan, const PixelRect& rect, const Chosen& chosen,
                         const One& one) {
     const TileTag d;
     const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
@@ -132,7 +132,7 @@ HWY_INLINE std::uint32_t RowsOf(std::uint64_t bits) {
 }
 
 // The bounding box of the block's pixels to compute.
-HWY_INLINE TileRect BoxOf(const SoftBlock& block) {
+HWY_INLINE PixelRect BoxOf(const SoftBlock& block) {
   const std::uint32_t columns = ColumnsOf(block.bits), rows = RowsOf(block.bits);
   return {block.x0 + std::countr_zero(columns), block.y0 + std::countr_zero(rows),
           block.x0 + static_cast<int>(std::bit_width(columns)),
@@ -140,7 +140,7 @@ HWY_INLINE TileRect BoxOf(const SoftBlock& block) {
 }
 
 // Everything that follows from block.bits, of which `rect` is the bounding box.
-HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const TileRect& rect, SoftBlock* block) {
+HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const PixelRect& rect, SoftBlock* block) {
   const SoftBox& unit = block->box = CentresOf(rect, plan);
   block->live = block->bits, block->whole = 0;
   block->centre_x = 0.5f * static_cast<float>(rect.x0 + rect.x1);
@@ -157,9 +157,9 @@ HWY_INLINE void PlaceBlock(const SoftMaskPlan& plan, const TileRect& rect, SoftB
 // The blocks of a tile, and the box around all pixels to compute. bits_of(block, its number) says
 // which.
 template <class Bits>
-HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, const Bits& bits_of,
+HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const PixelRect& rect, const Bits& bits_of,
                                SoftBlock* blocks) {
-  TileRect all{rect.x1, rect.y1, rect.x0, rect.y0};
+  PixelRect all{rect.x1, rect.y1, rect.x0, rect.y0};
   for (std::size_t b = 0; b < kTileBlocks; ++b) {
     SoftBlock& block = blocks[b];
     block.x0 = rect.x0 + static_cast<int>(b % 2 * kBlockSize);
@@ -169,7 +169,7 @@ HWY_INLINE SoftBox SetUpBlocks(const SoftMaskPlan& plan, const TileRect& rect, c
     block.bits = block.width == 0 ? 0 : bits_of(block, b);
     block.live = 0, block.clear = true;
     if (block.bits == 0) continue;
-    const TileRect own = BoxOf(block);
+    const PixelRect own = BoxOf(block);
     PlaceBlock(plan, own, &block);
     all = {std::min(all.x0, own.x0), std::min(all.y0, own.y0), std::max(all.x1, own.x1),
            std::max(all.y1, own.y1)};

@@ -165,7 +165,7 @@ HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float
 }
 
 // Alpha of a tile before any face: 0 for the background, else 1.
-HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const TileRect& rect,
+HWY_INLINE void WriteClear(const SoftMaskPlan& plan, const PixelRect& rect,
                            const TilePixels& background, float* image) {
   const TileTag d;
   const auto width = static_cast<std::size_t>(rect.x1 - rect.x0);
@@ -287,7 +287,7 @@ inline double SoftMaskForwardTarget(const SoftTree& tree, const SoftMaskPlan& pl
                                     SoftMaskScratch* scratch) {
   FindNearGroups(tree, plan, region.rect, &scratch->groups);
   double spent = 0;
-  ForTiles(region.rect, [&](const TileRect& tile) HWY_ATTR {
+  ForTiles(region.rect, [&](const PixelRect& tile) HWY_ATTR {
     PrefetchTile(plan, NextTile(region.rect, tile), images.alpha.data());
     spent = std::max(spent, TileForward(tree, plan, {tile, region.face_ids}, images, scratch));
   });

@@ -37,7 +37,7 @@ HWY_INLINE std::uint32_t NearBits(SoftTag d, const SoftBoxes& boxes, std::size_t
 }
 
 // The box around the pixel centres of a rectangle.
-inline SoftBox CentresOf(const TileRect& rect, const SoftMaskPlan& plan) {
+inline SoftBox CentresOf(const PixelRect& rect, const SoftMaskPlan& plan) {
   return {static_cast<float>(rect.x0) + 0.5f, static_cast<float>(rect.y0) + 0.5f,
           static_cast<float>(rect.x1) - 0.5f, static_cast<float>(rect.y1) - 0.5f,
           static_cast<float>(plan.unit_x),    static_cast<float>(plan.unit_y)};
@@ -50,7 +50,7 @@ inline float GroupLimit(const SoftMaskPlan& plan) {
 
 // The groups that are not far from all pixels of a region. Distances grow with every box inside it,
 // in floating point too, so none that a tile would keep is lost.
-inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const TileRect& rect,
+inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const PixelRect& rect,
                            SoftNearGroups* near) {
   const SoftTag d;
   const SoftBox box = CentresOf(rect, plan);

@@ -46,7 +46,7 @@ SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options);
 // Whole tiles of one image, best those of a bin: what is far from all of them is found once. Images
 // are [H,W]; spans hold whole images.
 struct SoftMaskRegion {
-  TileRect rect;
+  PixelRect rect;
   std::span<const std::int32_t> face_ids;  // < 0 is background; only those are computed
 };
 

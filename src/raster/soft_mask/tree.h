@@ -9,12 +9,12 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "raster/corner_blocks.h"
+#include "raster/corner_packets.h"
 
 namespace tilegrad::raster {
 
-inline constexpr std::size_t kNodeFaces = kBlockFaces;
-inline constexpr std::size_t kGroupNodes = kTogether;
+inline constexpr std::size_t kNodeFaces = kPacketFaces;
+inline constexpr std::size_t kGroupNodes = kPacketGroup;
 inline constexpr std::size_t kGroupFaces = kNodeFaces * kGroupNodes;
 
 // Boxes and how many faces are in them, as structure of arrays.
@@ -33,7 +33,7 @@ struct SoftBoxes {
 
 struct SoftTree {
   std::size_t faces = 0;  // that take part
-  CornerBlocks corners;   // a node is a block
+  CornerPackets corners;  // a node is a packet
   SoftBoxes nodes, groups;
 };
 

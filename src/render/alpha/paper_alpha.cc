@@ -30,13 +30,14 @@ struct PaperImage {
 };
 
 // Image n of the batch.
-PaperTile TileOf(const raster::TileRect& rect, const Frame& frame, std::size_t n) {
+PaperTile TileOf(const raster::PixelRect& rect, const Frame& frame, std::size_t n) {
   return {rect, frame.width, frame.height,
           frame.face_ids.data() +
               n * static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height)};
 }
 
-NearFacesT<float> FacesNearTile(const PaperImage& image, const raster::TileRect& rect, double box) {
+NearFacesT<float> FacesNearTile(const PaperImage& image, const raster::PixelRect& rect,
+                                double box) {
   return FacesNear<float>(image.faces, rect, image.mesh.width, image.mesh.height, box);
 }
 
@@ -84,13 +85,13 @@ std::vector<PaperImage> ProjectAll(std::span<const SceneView> scenes,
 void PaperAlpha(std::span<const SceneView> scenes, const RenderOptions& options,
                 const Workers& workers, Frame* frame) {
   const auto images = ProjectAll(scenes, options);
-  const raster::TileGrid grid(options.width, options.height);
+  const raster::SquareGrid grid = raster::TileGrid(options.width, options.height);
   std::fill(frame->alpha.begin(), frame->alpha.end(), 1.0f);
   const std::size_t pixels =
       static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  workers.For(scenes.size() * grid.tiles(), [&](std::size_t task, std::size_t) {
-    const std::size_t n = task / grid.tiles();
-    const raster::TileRect rect = grid.rect(task % grid.tiles());
+  workers.For(scenes.size() * grid.cells(), [&](std::size_t task, std::size_t) {
+    const std::size_t n = task / grid.cells();
+    const raster::PixelRect rect = grid.rect(task % grid.cells());
     PaperTileAlpha(FacesNearTile(images[n], rect, options.paper.box), PaperRuleOf(options),
                    TileOf(rect, *frame, n), frame->alpha.data() + n * pixels);
   });
@@ -100,20 +101,20 @@ void PaperAlphaBackward(std::span<const SceneView> scenes, const RenderOptions& 
                         const Workers& workers, const Frame& frame, std::span<const float> d_alpha,
                         std::span<SceneGradients> d_scenes) {
   const auto images = ProjectAll(scenes, options);
-  const raster::TileGrid grid(options.width, options.height);
-  std::vector<NearFacesT<float>> tiles(scenes.size() * grid.tiles());
+  const raster::SquareGrid grid = raster::TileGrid(options.width, options.height);
+  std::vector<NearFacesT<float>> tiles(scenes.size() * grid.cells());
   const std::size_t pixels =
       static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   workers.For(tiles.size(), [&](std::size_t task, std::size_t) {
-    const std::size_t n = task / grid.tiles();
-    const raster::TileRect rect = grid.rect(task % grid.tiles());
+    const std::size_t n = task / grid.cells();
+    const raster::PixelRect rect = grid.rect(task % grid.cells());
     tiles[task] =
         PaperTileBackward(FacesNearTile(images[n], rect, options.paper.box), PaperRuleOf(options),
                           TileOf(rect, frame, n), d_alpha.data() + n * pixels);
   });
   workers.For(scenes.size(), [&](std::size_t n, std::size_t) {
     AddToScene(scenes[n], options, images[n],
-               std::span(tiles).subspan(n * grid.tiles(), grid.tiles()), &d_scenes[n]);
+               std::span(tiles).subspan(n * grid.cells(), grid.cells()), &d_scenes[n]);
   });
 }
 

@@ -35,7 +35,7 @@ struct NearFacesT {
 // Those whose box, grown by `box` (NDC), may hold a pixel centre of `rect`, in an image of width x
 // height.
 template <class T>
-NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster::TileRect& rect,
+NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster::PixelRect& rect,
                         int width, int height, double box) {
   const double grown = box + 1e-5;  // of rounding to float in InPaperBox
   const double x0 = NdcX(double(rect.x0), width) - grown;
@@ -55,7 +55,7 @@ NearFacesT<T> FacesNear(std::span<const raster::NdcFace<T>> faces, const raster:
 
 // The same of faces that were near a larger rectangle.
 template <class T>
-NearFacesT<T> FacesNear(const NearFacesT<T>& of, const raster::TileRect& rect, int width,
+NearFacesT<T> FacesNear(const NearFacesT<T>& of, const raster::PixelRect& rect, int width,
                         int height, double box) {
   NearFacesT<T> out = FacesNear<T>(of.faces, rect, width, height, box);
   for (std::size_t& source : out.source) source = of.source[source];
@@ -64,7 +64,7 @@ NearFacesT<T> FacesNear(const NearFacesT<T>& of, const raster::TileRect& rect, i
 
 // One tile of one image. `face_ids` [H,W] are the image's; < 0 is background.
 struct PaperTile {
-  raster::TileRect rect;
+  raster::PixelRect rect;
   int width, height;
   const std::int32_t* face_ids;
 };

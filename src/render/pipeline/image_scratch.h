@@ -34,7 +34,7 @@ struct PreparedFrom {
   FaceCulling culling = FaceCulling::kNone;
 };
 
-// A scene on the screen, ready for its tiles.
+// A scene on the screen, ready for its bins.
 struct ImageScratch {
   raster::ScreenMeshBuffers buffers;
   raster::ScreenMesh mesh;
@@ -43,8 +43,8 @@ struct ImageScratch {
   AlignedVector<float> clipped_recomputed;
   raster::AttributeViewT<const float> recomputed;  // of a PixelStage, in the layout of `mesh`
   raster::DrawnFaces drawn_faces;
-  raster::TileListBuffers drawn_buffers;
-  raster::TileLists drawn;
+  raster::BinListBuffers drawn_buffers;
+  raster::BinLists drawn;
   raster::SoftTree soft;
   raster::SoftMaskPlan soft_plan;
   AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, as MergeScratch's
@@ -79,21 +79,21 @@ struct WorkerScratch {
   MergeScratch merge;
   RenderStats stats;
   RenderTimes times;
-  // Of a PixelStage: attributes of a block, the faces of a block on the way back, cotangents of a
+  // Of a PixelStage: attributes of a strip, the faces of a strip on the way back, cotangents of a
   // band.
   AlignedVector<float> varyings, d_varyings;
-  AlignedVector<std::int32_t> block_faces;
+  AlignedVector<std::int32_t> strip_faces;
   // Of an image that is small enough to be one task: it stays in the worker's cache.
   raster::DrawnFaces drawn_faces;
-  raster::TileListBuffers drawn_buffers;
+  raster::BinListBuffers drawn_buffers;
   BandGradients band_gradients;
   BinGradients bin_gradients;
 };
 
-// One tile of one image of the batch.
-struct TileTask {
-  std::size_t image, tile;
-  raster::TileRect rect;
+// One bin of one image of the batch.
+struct BinTask {
+  std::size_t image, bin;
+  raster::PixelRect rect;
 };
 
 }  // namespace tilegrad

@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "base/stage_clock.h"
+#include "render/alpha/paper_alpha.h"
+#include "render/pipeline/bin_forward.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/merge_gradients.h"
-#include "render/alpha/paper_alpha.h"
+#include "render/pipeline/part_backward.h"
 #include "render/pipeline/pixel_stage.h"
 #include "render/pipeline/prepare.h"
-#include "render/pipeline/tile_backward.h"
-#include "render/pipeline/tile_forward.h"
 #include "render/pipeline/validate.h"
 
 namespace tilegrad {
@@ -36,7 +36,7 @@ struct BackwardCall {
   BackwardInput input;
   PrepareRequest request;
   std::span<SceneGradients> d_scenes;
-  raster::TileGrid grid;    // of bins
+  raster::SquareGrid grid;  // of bins
   std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
 
   bool wants_geometry(std::size_t n) const {
@@ -74,7 +74,7 @@ struct Renderer::Impl {
                std::size_t n, WorkerScratch* worker);
   void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
   void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
-  void RenderOneBin(const ForwardCall& call, const TileTask& bin, WorkerScratch* worker);
+  void RenderOneBin(const ForwardCall& call, const BinTask& bin, WorkerScratch* worker);
 
   void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
   void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
@@ -120,10 +120,10 @@ bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& option
   return done;
 }
 
-void Renderer::Impl::RenderOneBin(const ForwardCall& call, const TileTask& bin,
+void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
-  bin_errors[bin.image * bins + bin.tile] =
+  bin_errors[bin.image * bins + bin.bin] =
       RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.stage}, bin, worker,
                 call.frame);
 }
@@ -146,18 +146,18 @@ void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
                                  const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
   if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
-  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  part.For(bins.tiles(), [&](std::size_t bin, std::size_t worker) {
+  const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  part.For(bins.cells(), [&](std::size_t bin, std::size_t worker) {
     RenderOneBin(call, {n, bin, bins.rect(bin)}, &worker_scratch[worker]);
   });
 }
 
 Status Renderer::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
-  const raster::TileGrid bins = raster::BinGrid(call.options.width, call.options.height);
+  const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
   if (!Begin(call.scenes)) return ValidateSceneNumbers(call.scenes);
-  bin_errors.assign(count * bins.tiles(), 0.0);
-  if (bins.tiles() == 1) {
+  bin_errors.assign(count * bins.cells(), 0.0);
+  if (bins.cells() == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
       RenderWholeImage(call, n, &worker_scratch[worker]);
     });
@@ -265,7 +265,7 @@ void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
 Status Renderer::Impl::Backward(const BackwardCall& call) {
   if (!Begin(call.scenes)) return FindError(call);
   const std::size_t count = call.scenes.size();
-  if (call.grid.tiles() == 1 && call.bands == 1) {
+  if (call.grid.cells() == 1 && call.bands == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
       BackwardWholeImage(call, n, &worker_scratch[worker]);
     });
@@ -306,18 +306,18 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           const Frame& frame, const FrameGradients& d_frame,
                           std::span<SceneGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
-  const raster::TileGrid grid = raster::BinGrid(options.width, options.height);
+  const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
   const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
   const bool alpha = !d_frame.alpha.empty() && !paper;
-  const FrameGradients d_tiles{d_frame.attributes,
+  const FrameGradients d_parts{d_frame.attributes,
                                alpha ? d_frame.alpha : std::span<const float>()};
   const Status status = impl_->Backward({scenes,
-                                         {options, frame, d_tiles, stage},
+                                         {options, frame, d_parts, stage},
                                          {false, alpha, true},
                                          d_scenes,
                                          grid,
                                          BandGrid(options.width, options.height).count(),
-                                         alpha ? grid.tiles() : 0});
+                                         alpha ? grid.cells() : 0});
   if (!status.ok() || !paper) return status;
   TILEGRAD_TRY(ValidateBackwardNumbers(scenes, frame, d_frame));
   PaperAlphaBackward(scenes, options, *impl_->workers, frame, d_frame.alpha, d_scenes);
@@ -328,7 +328,7 @@ RenderStats Renderer::stats() const {
   RenderStats sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
-    sum.interpolated += worker.stats.interpolated, sum.softened += worker.stats.softened;
+    sum.interpolated += worker.stats.interpolated, sum.alpha_parts += worker.stats.alpha_parts;
     sum.merged += worker.stats.merged;
     sum.pairs += worker.soft.work.pairs, sum.powers += worker.soft.work.powers;
   }

@@ -117,7 +117,7 @@ struct RenderStats {
   std::int64_t prepared = 0;  // images projected and listed; others were as they had been before
   std::int64_t drawn = 0;     // parts
   std::int64_t interpolated = 0;  // parts, forward or backward
-  std::int64_t softened = 0;      // parts, forward or backward
+  std::int64_t alpha_parts = 0;   // parts, forward or backward
   std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
   // Of the soft mask, forward or backward, lanes of vectors that had no face included. They depend
   // on the instruction set.

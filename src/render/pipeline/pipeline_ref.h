@@ -16,8 +16,8 @@
 #include "raster/project_ref.h"
 #include "raster/soft_mask/soft_mask_ref.h"
 #include "raster/visibility_ref.h"
-#include "render/pipeline/frame_layout.h"
 #include "render/alpha/paper_alpha.h"
+#include "render/pipeline/frame_layout.h"
 #include "render/pipeline/pipeline.h"
 
 namespace tilegrad {

@@ -14,14 +14,14 @@
 namespace tilegrad {
 
 // Pixels of one image of the batch, up to kBinSize wide.
-struct PixelBlock {
+struct PixelStrip {
   std::size_t image, band;  // band: on the way back
   std::size_t worker;       // selects scratch
   const raster::ScreenMesh* mesh;
   raster::AttributeViewT<const float> attributes;  // what was interpolated, in the mesh's layout
   raster::FaceRows rows;                           // kBinSize wide
   int columns;                                     // of each row that are in the image
-  std::size_t first;                               // pixel of an image that is the block's first
+  std::size_t first;                               // pixel of an image that is the strip's first
   const float* varyings;                           // [channels][rows * kBinSize]
   bool any_face;                                   // false: all background; nothing to read
 
@@ -32,18 +32,18 @@ class PixelStage {
  public:
   virtual ~PixelStage() = default;
 
-  // Writes its images for the pixels of a block.
-  virtual void Forward(const PixelBlock& block) = 0;
+  // Writes its images for the pixels of a strip.
+  virtual void Forward(const PixelStrip& strip) = 0;
 
   // The attributes that Backward needs, in the layout of the scene; channels may be 0. Those of the
   // scene itself are the ones that get a gradient.
   virtual raster::AttributeViewT<const float> recomputed(std::size_t image) const = 0;
-  // Before the blocks of a band. False: a cotangent is not finite.
+  // Before the strips of a band. False: a cotangent is not finite.
   virtual bool BeginBand(std::size_t image, std::size_t band, std::size_t first,
                          std::size_t pixels) = 0;
-  // Writes the cotangents of the attributes, from the block's first pixel on; those of background
+  // Writes the cotangents of the attributes, from the strip's first pixel on; those of background
   // pixels are not read.
-  virtual void Backward(const PixelBlock& block, const raster::PlanarView<float>& d_varyings) = 0;
+  virtual void Backward(const PixelStrip& strip, const raster::PlanarView<float>& d_varyings) = 0;
 };
 
 }  // namespace tilegrad

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// First stage of a frame, per image: scene -> screen -> tiles.
+// First stage of a frame, per image: scene -> screen -> bins.
 #pragma once
 
 #include <cstddef>
 
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pixel_stage.h"
 #include "render/pipeline/pipeline.h"
+#include "render/pipeline/pixel_stage.h"
 
 namespace tilegrad {
 

@@ -8,8 +8,8 @@
 #include <span>
 
 #include "base/scalar.h"
-#include "render/shading/plan.h"
 #include "render/scene.h"
+#include "render/shading/plan.h"
 
 namespace tilegrad {
 

@@ -10,9 +10,9 @@
 #include "base/aligned.h"
 #include "base/parallel.h"
 #include "render/pipeline/pipeline.h"
+#include "render/scene.h"
 #include "render/shading/inputs.h"
 #include "render/shading/plan.h"
-#include "render/scene.h"
 
 namespace tilegrad {
 

@@ -12,11 +12,11 @@
 #include "base/aligned.h"
 #include "base/parallel.h"
 #include "render/pipeline/pipeline.h"
+#include "render/scene.h"
 #include "render/shading/pack.h"
 #include "render/shading/plan.h"
 #include "render/shading/report.h"
 #include "render/shading/stage.h"
-#include "render/scene.h"
 
 namespace tilegrad {
 

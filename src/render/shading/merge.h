@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "render/shading/stage.h"
 #include "render/scene.h"
+#include "render/shading/stage.h"
 #include "shade/texture_levels.h"
 
 namespace tilegrad {

@@ -8,8 +8,8 @@
 
 #include "base/aligned.h"
 #include "raster/attributes.h"
-#include "render/shading/plan.h"
 #include "render/scene.h"
+#include "render/shading/plan.h"
 #include "shade/mesh_normals.h"
 
 namespace tilegrad {

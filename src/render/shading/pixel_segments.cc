@@ -13,7 +13,7 @@ std::size_t PaddedEnd(std::size_t count) {
   return (count + shade::kRunPad - 1) / shade::kRunPad * shade::kRunPad;
 }
 
-void GatherPixels(const PixelRun& run, const float* plane, const BlockRows& rows, float* to) {
+void GatherPixels(const PixelRun& run, const float* plane, const StripRows& rows, float* to) {
   for (const PixelSegment& s : run.segments) {
     const float* const from = plane + rows(s.at);
     to = std::copy(from, from + s.count, to);
@@ -50,23 +50,23 @@ void FindSegments(const raster::FaceRows& rows, int columns,
   });
 }
 
-std::ptrdiff_t BlockRows::operator()(std::int32_t at) const {
+std::ptrdiff_t StripRows::operator()(std::int32_t at) const {
   return static_cast<std::ptrdiff_t>(at >> raster::kBinBits) * row + (at & (raster::kBinSize - 1));
 }
 
-void GatherRun(const PixelRun& run, const float* plane, const BlockRows& rows,
+void GatherRun(const PixelRun& run, const float* plane, const StripRows& rows,
                shade::RunPlane* to) {
   GatherPixels(run, plane, rows, to->at);
   PadRun(run.count, to);
 }
 
-void GatherCotangents(const PixelRun& run, const float* plane, const BlockRows& rows,
+void GatherCotangents(const PixelRun& run, const float* plane, const StripRows& rows,
                       shade::RunPlane* to) {
   GatherPixels(run, plane, rows, to->at);
   PadRunWithZeros(run.count, to);
 }
 
-void ScatterRun(const PixelRun& run, const shade::RunPlane& from, const BlockRows& rows,
+void ScatterRun(const PixelRun& run, const shade::RunPlane& from, const StripRows& rows,
                 float* plane) {
   const float* next = from.at;
   for (const PixelSegment& s : run.segments) {

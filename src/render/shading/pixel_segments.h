@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The foreground pixels of a block, gathered into runs of one surface and scattered back.
+// The foreground pixels of a strip, gathered into runs of one surface and scattered back.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@
 
 namespace tilegrad {
 
-// Neighbours in a row of a block whose faces have one surface.
+// Neighbours in a row of a strip whose faces have one surface.
 struct PixelSegment {
   std::int32_t surface;
-  std::int32_t at;     // of the first pixel in the block
+  std::int32_t at;     // of the first pixel in the strip
   std::int32_t count;  // up to kRunPixels
 };
 
@@ -46,7 +46,7 @@ void ForEachRun(std::span<const PixelSegment> segments, const Visit& visit) {
   }
 }
 
-// Calls visit(place in the run, pixel of the block) for each pixel of a run.
+// Calls visit(place in the run, pixel of the strip) for each pixel of a run.
 template <class Visit>
 void ForEachRunPixel(const PixelRun& run, const Visit& visit) {
   std::size_t to = 0;
@@ -55,19 +55,19 @@ void ForEachRunPixel(const PixelRun& run, const Visit& visit) {
   }
 }
 
-// Where pixels of a block stand in a plane of an image: rows of `row` floats.
-struct BlockRows {
+// Where pixels of a strip stand in a plane of an image: rows of `row` floats.
+struct StripRows {
   std::ptrdiff_t row;
-  std::ptrdiff_t operator()(std::int32_t at) const;  // of a pixel of the block
+  std::ptrdiff_t operator()(std::int32_t at) const;  // of a pixel of the strip
 };
 
-// to <- the run's pixels of `plane`, whose first is the block's first pixel; copies of the last one
+// to <- the run's pixels of `plane`, whose first is the strip's first pixel; copies of the last one
 // fill the last vector.
-void GatherRun(const PixelRun& run, const float* plane, const BlockRows& rows, shade::RunPlane* to);
+void GatherRun(const PixelRun& run, const float* plane, const StripRows& rows, shade::RunPlane* to);
 // The same; 0 fills the last vector, as cotangents want it.
-void GatherCotangents(const PixelRun& run, const float* plane, const BlockRows& rows,
+void GatherCotangents(const PixelRun& run, const float* plane, const StripRows& rows,
                       shade::RunPlane* to);
-void ScatterRun(const PixelRun& run, const shade::RunPlane& from, const BlockRows& rows,
+void ScatterRun(const PixelRun& run, const shade::RunPlane& from, const StripRows& rows,
                 float* plane);
 
 // Repeats the last of `count` values, or writes zeros, to the end of its vector.

@@ -101,7 +101,7 @@ PlanReport ReportForward(const ForwardPlan& plan, const CallWork& work) {
                      "equation 7", "no colour is computed"));
   out.push_back(Only("scatter", shade.pixels, "pixels", shade.scatter, "into images",
                      "attributes are the image"));
-  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha,
+  out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
                      Evaluated("equation 6", work.stats), "alpha is not wanted"));
   return report;
 }
@@ -126,7 +126,7 @@ PlanReport ReportBackward(const BackwardPlan& plan, const CallWork& work) {
                      work.times.gradients,
                      plan.geometry ? "of attributes and geometry" : "of attributes",
                      "no attribute has a gradient"));
-  out.push_back(Only("alpha", work.stats.softened, "bins", work.times.alpha,
+  out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
                      Evaluated("to geometry", work.stats), "alpha pulls on nothing"));
   out.push_back(Only("merge", work.stats.merged, "arrays", work.times.merge + work.scene.merge_ms,
                      "from faces to the scene", "nothing to merge"));

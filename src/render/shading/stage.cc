@@ -6,9 +6,9 @@
 #include "base/stage_clock.h"
 #include "raster/conventions.h"
 #include "raster/fragments.h"
+#include "render/pipeline/part_backward.h"
 #include "render/pipeline/quick_checks.h"
 #include "render/shading/uv_level.h"
-#include "render/pipeline/tile_backward.h"
 
 namespace tilegrad {
 namespace {
@@ -16,19 +16,19 @@ namespace {
 using shade::RunPlane;
 
 // Channels [0, n) of `from` to the planes of `to`.
-void GatherChannels(const PixelRun& run, const PixelBlock& block, int first,
+void GatherChannels(const PixelRun& run, const PixelStrip& strip, int first,
                     std::span<RunPlane> to) {
   for (std::size_t c = 0; c < to.size(); ++c) {
     const std::size_t channel = static_cast<std::size_t>(first) + c;
-    GatherRun(run, block.varyings + channel * block.plane(), {raster::kBinSize}, &to[c]);
+    GatherRun(run, strip.varyings + channel * strip.plane(), {raster::kBinSize}, &to[c]);
   }
 }
 
-// The planes of an image of `planes` planes, from a block's first pixel on.
+// The planes of an image of `planes` planes, from a strip's first pixel on.
 template <class T>
 T* PlaneOf(T* batch, std::size_t planes, std::size_t c, std::size_t pixels,
-           const PixelBlock& block) {
-  return batch + (block.image * planes + c) * pixels + block.first;
+           const PixelStrip& strip) {
+  return batch + (strip.image * planes + c) * pixels + strip.first;
 }
 
 // Counter-clockwise in space is clockwise here, where y goes down. In double: of faces that reach
@@ -38,43 +38,43 @@ bool SeenFromFront(const raster::ScreenMesh& mesh, std::size_t f) {
   return (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]) <= 0;
 }
 
-// Calls visit(place in the run, pixel of the block, its face); new_face: not that of the last call.
+// Calls visit(place in the run, pixel of the strip, its face); new_face: not that of the last call.
 template <class Visit>
-void ForEachFacePixel(const PixelBlock& block, const PixelRun& run, const Visit& visit) {
+void ForEachFacePixel(const PixelStrip& strip, const PixelRun& run, const Visit& visit) {
   std::int32_t last = raster::kNoFace;
   ForEachRunPixel(run, [&](std::size_t to, std::int32_t at) {
-    const std::int32_t face = block.rows.faces[at];
+    const std::int32_t face = strip.rows.faces[at];
     visit(to, at, static_cast<std::size_t>(face), face != last);
     last = face;
   });
 }
 
-void SetSides(const PixelBlock& block, const PixelRun& run, RunPlane* side) {
+void SetSides(const PixelStrip& strip, const PixelRun& run, RunPlane* side) {
   float value = 1;
-  ForEachFacePixel(block, run, [&](std::size_t to, std::int32_t, std::size_t face, bool fresh) {
-    if (fresh) value = SeenFromFront(*block.mesh, face) ? 1.0f : -1.0f;
+  ForEachFacePixel(strip, run, [&](std::size_t to, std::int32_t, std::size_t face, bool fresh) {
+    if (fresh) value = SeenFromFront(*strip.mesh, face) ? 1.0f : -1.0f;
     side->at[to] = value;
   });
   PadRun(run.count, side);
 }
 
-void SetLevels(const PixelBlock& block, const PixelRun& run, int first_uv, Interpolation mode,
+void SetLevels(const PixelStrip& strip, const PixelRun& run, int first_uv, Interpolation mode,
                const shade::TextureView& texture, RunValues* v) {
   UvPlanes planes;
   const int size[2] = {texture.width, texture.height};
-  ForEachFacePixel(block, run, [&](std::size_t to, std::int32_t at, std::size_t face, bool fresh) {
-    if (fresh) planes = UvPlanesOf(*block.mesh, block.attributes, first_uv, face, mode);
-    const int x = block.rows.x0 + (at & (raster::kBinSize - 1));
-    const int y = block.rows.row_begin + (at >> raster::kBinBits);
+  ForEachFacePixel(strip, run, [&](std::size_t to, std::int32_t at, std::size_t face, bool fresh) {
+    if (fresh) planes = UvPlanesOf(*strip.mesh, strip.attributes, first_uv, face, mode);
+    const int x = strip.rows.x0 + (at & (raster::kBinSize - 1));
+    const int y = strip.rows.row_begin + (at >> raster::kBinBits);
     const double uv[2] = {v->uv[0].at[to], v->uv[1].at[to]};
     v->level.at[to] = UvLevel<float>(planes, x + 0.5, y + 0.5, uv, size);
   });
   PadRun(run.count, &v->level);
 }
 
-void ClearRows(const PixelBlock& block, std::size_t width, float* plane) {
-  for (int i = block.rows.row_begin; i < block.rows.row_end; ++i, plane += width) {
-    std::fill_n(plane, block.columns, 0.0f);
+void ClearRows(const PixelStrip& strip, std::size_t width, float* plane) {
+  for (int i = strip.rows.row_begin; i < strip.rows.row_end; ++i, plane += width) {
+    std::fill_n(plane, strip.columns, 0.0f);
   }
 }
 
@@ -124,38 +124,38 @@ RunScene ShadeStage::RunSceneOf(const StageScene& scene, std::int32_t surface) c
           .eye = scene.eye};
 }
 
-void ShadeStage::GatherInputs(const PixelBlock& block, const PixelRun& run, const VaryingSet& set,
+void ShadeStage::GatherInputs(const PixelStrip& strip, const PixelRun& run, const VaryingSet& set,
                               const ShadeSteps& steps, StageWorker* worker) const {
   RunValues* const v = &worker->values;
   const auto gather = [&](Varying what, std::span<RunPlane> to) {
-    if (set[what]) GatherChannels(run, block, set.first(what), to);
+    if (set[what]) GatherChannels(run, strip, set.first(what), to);
   };
   gather(Varying::kColor, v->vertex_color), gather(Varying::kUv, v->uv);
   gather(Varying::kNormal, v->normal), gather(Varying::kPosition, v->position);
   gather(Varying::kLightDirection, v->light_direction);
-  const StageScene& scene = scenes_[block.image];
-  if (steps.normal && scene.scene->model.two_sided) SetSides(block, run, &v->side);
+  const StageScene& scene = scenes_[strip.image];
+  if (steps.normal && scene.scene->model.two_sided) SetSides(strip, run, &v->side);
   if (!steps.level) return;
   const RunScene run_scene = RunSceneOf(scene, run.surface());
   if (run_scene.texture == nullptr) return;
-  SetLevels(block, run, set.first(Varying::kUv), options_->interpolation, run_scene.texture->view(),
+  SetLevels(strip, run, set.first(Varying::kUv), options_->interpolation, run_scene.texture->view(),
             v);
 }
 
-void ShadeStage::ForwardRun(const PixelBlock& block, const PixelRun& run, StageWorker* worker) {
+void ShadeStage::ForwardRun(const PixelStrip& strip, const PixelRun& run, StageWorker* worker) {
   const ForwardPlan& plan = *forward_;
-  const RunScene scene = RunSceneOf(scenes_[block.image], run.surface());
+  const RunScene scene = RunSceneOf(scenes_[strip.image], run.surface());
   RunValues* const v = &worker->values;
   ShadeWork* const work = &worker->work;
   StageClock clock;
-  GatherInputs(block, run, plan.varyings, plan.steps, worker);
+  GatherInputs(strip, run, plan.varyings, plan.steps, worker);
   clock.Lap(&work->gather);
   ShadeRun(run.count, plan.steps, scene, v, work);
   clock = {};
-  const BlockRows rows{frame_->width};
+  const StripRows rows{frame_->width};
   const auto scatter = [&](AlignedVector<float>& images, std::span<const RunPlane> from) {
     for (std::size_t c = 0; c < from.size(); ++c) {
-      ScatterRun(run, from[c], rows, PlaneOf(images.data(), from.size(), c, pixels_, block));
+      ScatterRun(run, from[c], rows, PlaneOf(images.data(), from.size(), c, pixels_, strip));
     }
   };
   if (plan.steps.color) {
@@ -169,28 +169,28 @@ void ShadeStage::ForwardRun(const PixelBlock& block, const PixelRun& run, StageW
   const auto first = static_cast<std::size_t>(plan.varyings.first(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {
     RunPlane plane;
-    GatherRun(run, block.varyings + (first + c) * block.plane(), {raster::kBinSize}, &plane);
-    ScatterRun(run, plane, rows, PlaneOf(frame_->attributes.data(), user, c, pixels_, block));
+    GatherRun(run, strip.varyings + (first + c) * strip.plane(), {raster::kBinSize}, &plane);
+    ScatterRun(run, plane, rows, PlaneOf(frame_->attributes.data(), user, c, pixels_, strip));
   }
   clock.Lap(&work->scatter);
 }
 
-void ShadeStage::Forward(const PixelBlock& block) {
+void ShadeStage::Forward(const PixelStrip& strip) {
   const auto width = static_cast<std::size_t>(frame_->width);
   const auto clear = [&](AlignedVector<float>& images) {
     const std::size_t planes = images.size() / frame_->face_ids.size();
     for (std::size_t c = 0; c < planes; ++c) {
-      ClearRows(block, width, PlaneOf(images.data(), planes, c, pixels_, block));
+      ClearRows(strip, width, PlaneOf(images.data(), planes, c, pixels_, strip));
     }
   };
   clear(frame_->color), clear(frame_->normals), clear(frame_->uv), clear(frame_->attributes);
-  if (!block.any_face) return;
-  StageWorker* const worker = workers_[block.worker].get();
-  FindSegments(block.rows, block.columns, block.mesh->source_face,
-               scenes_[block.image].scene->face_surfaces, &worker->segments);
+  if (!strip.any_face) return;
+  StageWorker* const worker = workers_[strip.worker].get();
+  FindSegments(strip.rows, strip.columns, strip.mesh->source_face,
+               scenes_[strip.image].scene->face_surfaces, &worker->segments);
   ForEachRun(worker->segments, [&](const PixelRun& run) {
     worker->work.pixels += static_cast<std::int64_t>(run.count);
-    ForwardRun(block, run, worker);
+    ForwardRun(strip, run, worker);
   });
 }
 
@@ -220,11 +220,11 @@ bool ShadeStage::BeginBand(std::size_t image, std::size_t band, std::size_t firs
   return false;
 }
 
-void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run,
+void ShadeStage::GatherCotangentsOf(const PixelStrip& strip, const PixelRun& run,
                                     RunCotangents* d) const {
   const auto gather = [&](std::span<const float> images, std::span<RunPlane> to) {
     for (std::size_t c = 0; c < to.size(); ++c) {
-      GatherCotangents(run, PlaneOf(images.data(), to.size(), c, pixels_, block), {options_->width},
+      GatherCotangents(run, PlaneOf(images.data(), to.size(), c, pixels_, strip), {options_->width},
                        &to[c]);
     }
   };
@@ -234,11 +234,11 @@ void ShadeStage::GatherCotangentsOf(const PixelBlock& block, const PixelRun& run
 
 // depth = -(z . p + t_z), z the third row of the rotation. Background pixels, whose depth is
 // infinite, are not looked at: what a loss pulls on them is often NaN.
-void ShadeStage::DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
+void ShadeStage::DepthAdjoint(const PixelStrip& strip, const PixelRun& run, StageWorker* worker,
                               SceneSums* sums) {
-  const Camera& camera = scenes_[block.image].scene->camera;
+  const Camera& camera = scenes_[strip.image].scene->camera;
   RunPlane d_depth;
-  GatherCotangents(run, PlaneOf(d_frame_->depth.data(), 1, 0, pixels_, block), {options_->width},
+  GatherCotangents(run, PlaneOf(d_frame_->depth.data(), 1, 0, pixels_, strip), {options_->width},
                    &d_depth);
   if (!AllFinite(std::span<const float>(d_depth.at, run.count))) sound_ = false;
   if (!backward_->geometry) return;
@@ -254,10 +254,10 @@ void ShadeStage::DepthAdjoint(const PixelBlock& block, const PixelRun& run, Stag
   }
 }
 
-void ShadeStage::ScatterCotangents(const PixelBlock& block, const PixelRun& run,
+void ShadeStage::ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
                                    const raster::PlanarView<float>& d_varyings,
                                    const RunCotangents& d) const {
-  const BlockRows rows{d_varyings.row};
+  const StripRows rows{d_varyings.row};
   const VaryingSet& set = backward_->pulled;
   const auto scatter = [&](Varying what, std::span<const RunPlane> from) {
     if (!set[what]) return;
@@ -272,7 +272,7 @@ void ShadeStage::ScatterCotangents(const PixelBlock& block, const PixelRun& run,
   const auto user = static_cast<std::size_t>(set.width(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {
     RunPlane plane;
-    GatherCotangents(run, PlaneOf(d_frame_->attributes.data(), user, c, pixels_, block),
+    GatherCotangents(run, PlaneOf(d_frame_->attributes.data(), user, c, pixels_, strip),
                      {options_->width}, &plane);
     const std::ptrdiff_t to = set.first(Varying::kUser) + static_cast<std::ptrdiff_t>(c);
     ScatterRun(run, plane, rows, d_varyings.data + to * d_varyings.plane);
@@ -280,11 +280,11 @@ void ShadeStage::ScatterCotangents(const PixelBlock& block, const PixelRun& run,
 }
 
 // Adds what the image of coordinates pulls on them.
-void ShadeStage::AddUvCotangents(const PixelBlock& block, const PixelRun& run,
+void ShadeStage::AddUvCotangents(const PixelStrip& strip, const PixelRun& run,
                                  RunCotangents* d) const {
   for (std::size_t c = 0; c < 2; ++c) {
     RunPlane plane;
-    GatherCotangents(run, PlaneOf(d_frame_->uv.data(), 2, c, pixels_, block), {options_->width},
+    GatherCotangents(run, PlaneOf(d_frame_->uv.data(), 2, c, pixels_, strip), {options_->width},
                      &plane);
     for (std::size_t i = 0; i < run.count; ++i) {
       d->uv[c].at[i] = plane.at[i] + (backward_->to_uv ? d->uv[c].at[i] : 0.0f);
@@ -302,36 +302,36 @@ shade::TexelShare* ShadeStage::NewShares(const RunScene& scene, std::size_t coun
   return shares.data() + had;
 }
 
-void ShadeStage::BackwardRun(const PixelBlock& block, const PixelRun& run,
+void ShadeStage::BackwardRun(const PixelStrip& strip, const PixelRun& run,
                              const raster::PlanarView<float>& d_varyings, StageWorker* worker) {
   const BackwardPlan& plan = *backward_;
-  StageBand& band = bands_[block.image * bands_of_image_ + block.band];
-  const RunScene scene = RunSceneOf(scenes_[block.image], run.surface());
+  StageBand& band = bands_[strip.image * bands_of_image_ + strip.band];
+  const RunScene scene = RunSceneOf(scenes_[strip.image], run.surface());
   RunCotangents* const d = &worker->d;
   ShadeWork* const work = &worker->work;
   StageClock clock;
-  GatherInputs(block, run, plan.recomputed, plan.steps, worker);
-  GatherCotangentsOf(block, run, d);
+  GatherInputs(strip, run, plan.recomputed, plan.steps, worker);
+  GatherCotangentsOf(strip, run, d);
   clock.Lap(&work->gather);
   ShadeRun(run.count, plan.steps, scene, &worker->values, work);
   clock = {};
   ShadeRunAdjoint(run.count, plan, scene, worker->values,
                   {d, &band.sums.surfaces[static_cast<std::size_t>(run.surface())], &band.sums,
                    NewShares(scene, run.count, &band)});
-  if (plan.wishes.d_uv && plan.pulled[Varying::kUv]) AddUvCotangents(block, run, d);
-  if (plan.wishes.d_depth) DepthAdjoint(block, run, worker, &band.sums);
+  if (plan.wishes.d_uv && plan.pulled[Varying::kUv]) AddUvCotangents(strip, run, d);
+  if (plan.wishes.d_depth) DepthAdjoint(strip, run, worker, &band.sums);
   clock.Lap(&work->adjoint);
-  ScatterCotangents(block, run, d_varyings, *d);
+  ScatterCotangents(strip, run, d_varyings, *d);
   clock.Lap(&work->scatter);
 }
 
-void ShadeStage::Backward(const PixelBlock& block, const raster::PlanarView<float>& d_varyings) {
-  StageWorker* const worker = workers_[block.worker].get();
-  FindSegments(block.rows, block.columns, block.mesh->source_face,
-               scenes_[block.image].scene->face_surfaces, &worker->segments);
+void ShadeStage::Backward(const PixelStrip& strip, const raster::PlanarView<float>& d_varyings) {
+  StageWorker* const worker = workers_[strip.worker].get();
+  FindSegments(strip.rows, strip.columns, strip.mesh->source_face,
+               scenes_[strip.image].scene->face_surfaces, &worker->segments);
   ForEachRun(worker->segments, [&](const PixelRun& run) {
     worker->work.pixels += static_cast<std::int64_t>(run.count);
-    BackwardRun(block, run, d_varyings, worker);
+    BackwardRun(strip, run, d_varyings, worker);
   });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading as a stage of the renderer: the pixels of a block are gathered into runs (shade_run.h)
+// Shading as a stage of the renderer: the pixels of a strip are gathered into runs (shade_run.h)
 // and written to the images; on the way back, to cotangents of what was interpolated, and sums for
 // each band.
 #pragma once
@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "render/pipeline/pixel_stage.h"
+#include "render/scene.h"
 #include "render/shading/pixel_segments.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
-#include "render/scene.h"
 
 namespace tilegrad {
 
@@ -56,11 +56,11 @@ class ShadeStage : public PixelStage {
   void BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
                      const RenderOptions& options, const ShadedFrameGradients& d_frame);
 
-  void Forward(const PixelBlock& block) override;
+  void Forward(const PixelStrip& strip) override;
   raster::AttributeViewT<const float> recomputed(std::size_t image) const override;
   bool BeginBand(std::size_t image, std::size_t band, std::size_t first,
                  std::size_t pixels) override;
-  void Backward(const PixelBlock& block, const raster::PlanarView<float>& d_varyings) override;
+  void Backward(const PixelStrip& strip, const raster::PlanarView<float>& d_varyings) override;
 
   std::span<const StageBand> bands(std::size_t image) const {
     return std::span(bands_).subspan(image * bands_of_image_, bands_of_image_);
@@ -70,18 +70,18 @@ class ShadeStage : public PixelStage {
 
  private:
   void Begin(std::span<const StageScene> scenes, const RenderOptions& options);
-  void ForwardRun(const PixelBlock& block, const PixelRun& run, StageWorker* worker);
-  void BackwardRun(const PixelBlock& block, const PixelRun& run,
+  void ForwardRun(const PixelStrip& strip, const PixelRun& run, StageWorker* worker);
+  void BackwardRun(const PixelStrip& strip, const PixelRun& run,
                    const raster::PlanarView<float>& d_varyings, StageWorker* worker);
   RunScene RunSceneOf(const StageScene& scene, std::int32_t surface) const;
-  void GatherInputs(const PixelBlock& block, const PixelRun& run, const VaryingSet& set,
+  void GatherInputs(const PixelStrip& strip, const PixelRun& run, const VaryingSet& set,
                     const ShadeSteps& steps, StageWorker* worker) const;
-  void GatherCotangentsOf(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
-  void AddUvCotangents(const PixelBlock& block, const PixelRun& run, RunCotangents* d) const;
+  void GatherCotangentsOf(const PixelStrip& strip, const PixelRun& run, RunCotangents* d) const;
+  void AddUvCotangents(const PixelStrip& strip, const PixelRun& run, RunCotangents* d) const;
   shade::TexelShare* NewShares(const RunScene& scene, std::size_t count, StageBand* band) const;
-  void DepthAdjoint(const PixelBlock& block, const PixelRun& run, StageWorker* worker,
+  void DepthAdjoint(const PixelStrip& strip, const PixelRun& run, StageWorker* worker,
                     SceneSums* sums);
-  void ScatterCotangents(const PixelBlock& block, const PixelRun& run,
+  void ScatterCotangents(const PixelStrip& strip, const PixelRun& run,
                          const raster::PlanarView<float>& d_varyings, const RunCotangents& d) const;
 
   const ForwardPlan* forward_ = nullptr;

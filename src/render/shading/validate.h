@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "render/shading/plan.h"
 #include "render/scene.h"
+#include "render/shading/plan.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {

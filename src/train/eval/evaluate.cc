@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
-#include "train/metrics/metrics.h"
 #include "train/eval/single_shape.h"
+#include "train/metrics/metrics.h"
 
 namespace tilegrad::train {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "train/run/checkpoint.h"
 #include "train/config.h"
 #include "train/models/mesh_network.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
 namespace {

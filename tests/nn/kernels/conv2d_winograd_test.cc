@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nn/kernels/conv2d/winograd.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdint>
 
+#include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/conv2d_test_util.h"
 
 namespace tilegrad::nn {

@@ -12,8 +12,8 @@
 #include <string>
 
 #include "base/simd_target.h"
-#include "raster/soft_mask/plan.h"
 #include "raster/soft_mask/checks.h"
+#include "raster/soft_mask/plan.h"
 #include "raster/soft_mask/test_util.h"
 
 namespace tilegrad::raster {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "raster/soft_mask/soft_mask.h"
 #include "raster/soft_mask/plan.h"
+#include "raster/soft_mask/soft_mask.h"
 #include "raster/soft_mask/soft_mask_ref.h"
 
 namespace tilegrad::raster::test {
@@ -319,14 +319,14 @@ inline SoftResult RunSoftMask(const SoftScene& scene, const std::vector<float>& 
   SetUpFaces(mesh, /*cull_back=*/false, reject, {.corners = &tree.corners});
   BuildSoftTree(&tree);
   const SoftMaskPlan plan = PlanSoftMask(scene.options);
-  const TileGrid grid(scene.options.width, scene.options.height, run.region_bits);
+  const SquareGrid grid(scene.options.width, scene.options.height, run.region_bits);
   SoftResult out;
   out.alpha.assign(scene.pixels(), -1.0f), out.transmittance.assign(scene.pixels(), -2.0f);
   out.d_corners.assign(6 * mesh.faces(), 0.0f);
   AlignedVector<SoftFaceGradient> gradients;
   std::span<const float> known(out.transmittance);
   if (!run.with_transmittance) known = {};
-  for (std::size_t t = 0; t < grid.tiles(); ++t) {
+  for (std::size_t t = 0; t < grid.cells(); ++t) {
     const SoftMaskRegion region{grid.rect(t), scene.face_ids};
     out.spent = std::max(
         out.spent, SoftMaskForward(tree, plan, region, {out.alpha, out.transmittance}, scratch));

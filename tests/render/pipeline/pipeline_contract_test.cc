@@ -123,7 +123,7 @@ TEST(RendererMemory, BackwardWithoutTransmittanceIsTheSame) {
 
 bool operator==(const RenderStats& a, const RenderStats& b) {
   return a.prepared == b.prepared && a.drawn == b.drawn && a.interpolated == b.interpolated &&
-         a.softened == b.softened && a.merged == b.merged;
+         a.alpha_parts == b.alpha_parts && a.merged == b.merged;
 }
 
 // Only what is asked for runs. Images of 150 x 139: 3 x 3 bins, 3 bands.
@@ -156,7 +156,7 @@ TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
     EXPECT_TRUE(backward(colour, true, true) == (RenderStats{0, 0, 9, 0, 6}));
     EXPECT_TRUE(backward(colour, false, true) == (RenderStats{0, 0, 9, 0, 3}));
     EXPECT_TRUE(backward(alpha, true, false).interpolated == 0);
-    EXPECT_TRUE(backward(alpha, true, false).softened == 27);
+    EXPECT_TRUE(backward(alpha, true, false).alpha_parts == 27);
     EXPECT_TRUE(backward(both, true, true) == (RenderStats{0, 0, 9, 27, 6}));
     EXPECT_TRUE(backward(both, false, false) == (RenderStats{0, 0, 0, 0, 0}));
   }

@@ -16,9 +16,9 @@
 #include <array>
 #include <cstddef>
 
+#include "nn/kernels/conv2d/winograd_plan.h"
 #include "nn/kernels/conv2d/winograd_rows-inl.h"
 #include "nn/kernels/conv2d/winograd_transform-inl.h"
-#include "nn/kernels/conv2d/winograd_plan.h"
 #include "nn/kernels/pack-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -5,8 +5,8 @@
 
 #include "base/error.h"
 #include "train/data/build/glass.h"
-#include "train/data/split.h"
 #include "train/data/build/truth_mesh.h"
+#include "train/data/split.h"
 #include "train/metrics/metrics.h"
 
 namespace tilegrad::train {

@@ -7,11 +7,11 @@
 #include <set>
 
 #include "io/npz.h"
+#include "support/source_dir.h"
 #include "train/data/build/build.h"
 #include "train/data/sources/procedural.h"
 #include "train/data/sources/sweethome3d_list.h"
 #include "train/data/temp_folder.h"
-#include "support/source_dir.h"
 
 namespace tilegrad::train {
 namespace {

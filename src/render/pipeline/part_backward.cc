@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/tile_backward.h"
+#include "render/pipeline/part_backward.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -60,7 +60,7 @@ bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std
 }
 
 // Pixels [x0, x0 + columns) of the rows of a band, whose faces are `faces` [rows][width of image].
-struct BlockPlace {
+struct StripPlace {
   const BandPlace& band;
   std::span<const std::int32_t> faces;
   int width, x0;
@@ -69,28 +69,28 @@ struct BlockPlace {
   int row_count() const { return band.row_end - band.row_begin; }
 };
 
-// The faces of a block, in rows of kBinSize. Returns whether there is one.
-bool GatherBlockFaces(const BlockPlace& block, AlignedVector<std::int32_t>* faces) {
-  faces->assign(static_cast<std::size_t>(raster::kBinSize * block.row_count()), raster::kNoFace);
+// The faces of a strip, in rows of kBinSize. Returns whether there is one.
+bool GatherStripFaces(const StripPlace& strip, AlignedVector<std::int32_t>* faces) {
+  faces->assign(static_cast<std::size_t>(raster::kBinSize * strip.row_count()), raster::kNoFace);
   std::int32_t all = raster::kNoFace;
-  for (int i = 0; i < block.row_count(); ++i) {
+  for (int i = 0; i < strip.row_count(); ++i) {
     const std::int32_t* from =
-        block.faces.data() + static_cast<std::ptrdiff_t>(i) * block.width + block.x0;
+        strip.faces.data() + static_cast<std::ptrdiff_t>(i) * strip.width + strip.x0;
     std::int32_t* to = faces->data() + static_cast<std::ptrdiff_t>(i) * raster::kBinSize;
-    for (int j = 0; j < block.columns(); ++j) to[j] = from[j], all &= from[j];
+    for (int j = 0; j < strip.columns(); ++j) to[j] = from[j], all &= from[j];
   }
   return all != raster::kNoFace;
 }
 
 void RunStageBackward(const BackwardInput& input, const ImageScratch& image, const BandTask& task,
-                      const BlockPlace& place, WorkerScratch* worker) {
-  if (!GatherBlockFaces(place, &worker->block_faces)) return;
-  const PixelBlock block{.image = task.image,
+                      const StripPlace& place, WorkerScratch* worker) {
+  if (!GatherStripFaces(place, &worker->strip_faces)) return;
+  const PixelStrip strip{.image = task.image,
                          .band = task.band,
                          .worker = worker->index,
                          .mesh = &image.mesh,
                          .attributes = image.recomputed,
-                         .rows = {worker->block_faces.data(), raster::kBinSize, place.x0,
+                         .rows = {worker->strip_faces.data(), raster::kBinSize, place.x0,
                                   place.band.row_begin, place.band.row_end},
                          .columns = place.columns(),
                          .first = place.band.first + static_cast<std::size_t>(place.x0),
@@ -99,14 +99,14 @@ void RunStageBackward(const BackwardInput& input, const ImageScratch& image, con
   StageClock clock;
   if (image.recomputed.channels > 0) {
     raster::Interpolate(
-        {&image.mesh, image.recomputed, input.options.interpolation, false}, block.rows,
-        {{worker->varyings.data(), static_cast<std::ptrdiff_t>(block.plane()), raster::kBinSize},
+        {&image.mesh, image.recomputed, input.options.interpolation, false}, strip.rows,
+        {{worker->varyings.data(), static_cast<std::ptrdiff_t>(strip.plane()), raster::kBinSize},
          {},
-         block.columns},
+         strip.columns},
         &worker->interpolate);
   }
   clock.Lap(&worker->times.interpolate);
-  input.stage->Backward(block, {worker->d_varyings.data() + place.x0,
+  input.stage->Backward(strip, {worker->d_varyings.data() + place.x0,
                                 static_cast<std::ptrdiff_t>(place.band.count), place.width});
   clock.Lap(&worker->times.stage);
 }
@@ -181,11 +181,11 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
   return true;
 }
 
-void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
                        WorkerScratch* worker, BinGradients* out) {
-  const raster::TileGrid tiles(input.options.width, input.options.height);
+  const raster::SquareGrid bins = raster::BinGrid(input.options.width, input.options.height);
   const std::size_t pixels =
-      static_cast<std::size_t>(tiles.width) * static_cast<std::size_t>(tiles.height);
+      static_cast<std::size_t>(bins.width) * static_cast<std::size_t>(bins.height);
   const auto part = [&](auto batch) {
     return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
   };
@@ -193,7 +193,7 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
                                         part(std::span<const float>(input.frame.transmittance)),
                                         part(input.d_frame.alpha)};
   out->clear();
-  ++worker->stats.softened;
+  ++worker->stats.alpha_parts;
   raster::SoftMaskBackward(image.soft, image.soft_plan,
                            {bin.rect, part(std::span<const std::int32_t>(input.frame.face_ids))},
                            adjoint, out, &worker->soft);

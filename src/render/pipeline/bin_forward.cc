@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/pipeline/tile_forward.h"
+#include "render/pipeline/bin_forward.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace {
 
 // Calls visit(index in the bin's arrays, index in an image) for each pixel of the bin.
 template <class Visit>
-void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
+void ForEachPixel(const raster::PixelRect& rect, int width, const Visit& visit) {
   for (int i = rect.y0; i < rect.y1; ++i) {
     for (int j = rect.x0; j < rect.x1; ++j) {
       visit(static_cast<std::size_t>((i - rect.y0) * raster::kBinSize + j - rect.x0),
@@ -25,7 +25,7 @@ void ForEachPixel(const raster::TileRect& rect, int width, const Visit& visit) {
   }
 }
 
-void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
+void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::PixelRect& rect,
                   const std::int32_t* faces, std::int32_t* ids) {
   if (!mesh.was_clipped()) {
     constexpr int kRowsAhead = 4;  // copying a row is faster than memory
@@ -44,7 +44,7 @@ void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::TileRect& rect,
 }
 
 // Where no face is drawn.
-void WriteBackground(const raster::TileRect& rect, int width, std::int32_t* ids, float* depth) {
+void WriteBackground(const raster::PixelRect& rect, int width, std::int32_t* ids, float* depth) {
   for (int i = rect.y0; i < rect.y1; ++i) {
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i) * width;
     std::fill(ids + row + rect.x0, ids + row + rect.x1, raster::kNoFace);
@@ -53,7 +53,7 @@ void WriteBackground(const raster::TileRect& rect, int width, std::int32_t* ids,
   }
 }
 
-void WriteDepth(const raster::TileRect& rect, int width, const float* inverse, float* depth) {
+void WriteDepth(const raster::PixelRect& rect, int width, const float* inverse, float* depth) {
   ForEachPixel(rect, width, [&](std::size_t from, std::size_t to) {
     depth[to] = inverse[from] > 0 ? 1.0f / inverse[from] : std::numeric_limits<float>::infinity();
   });
@@ -61,7 +61,7 @@ void WriteDepth(const raster::TileRect& rect, int width, const float* inverse, f
 
 // Turns the weights of a cut piece's corners into those of its source face.
 void MixCutWeights(const SceneView& scene, const raster::ScreenMesh& mesh,
-                   const raster::TileRect& rect, const std::int32_t* faces, float* w1, float* w2) {
+                   const raster::PixelRect& rect, const std::int32_t* faces, float* w1, float* w2) {
   ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
     if (faces[from] == raster::kNoFace) return;
     const float piece[3] = {1 - w1[to] - w2[to], w1[to], w2[to]};
@@ -89,15 +89,15 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
 
 // Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
 // then only the frame's are written.
-bool WriteVisibility(const BinInput& input, const TileTask& task, const ImageOfFrame& part,
+bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
                      WorkerScratch* worker, Frame* frame) {
-  const raster::TileRect& rect = task.rect;
+  const raster::PixelRect& rect = task.rect;
   const ImageScratch& image = input.image;
   const int width = input.options.width;
   std::int32_t* const ids = part.plane(frame->face_ids, 1);
   float* const depth = part.plane(frame->depth, 1);
   ++worker->stats.drawn;
-  const std::span<const std::int32_t> listed = image.drawn[task.tile];
+  const std::span<const std::int32_t> listed = image.drawn[task.bin];
   if (listed.empty()) {
     WriteBackground(rect, width, ids, depth);
     return false;
@@ -109,7 +109,7 @@ bool WriteVisibility(const BinInput& input, const TileTask& task, const ImageOfF
 }
 
 // Where a bin's attributes go: into the frame, or to the stage.
-raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask& task,
+raster::PlanarView<float> AttributeTarget(const BinInput& input, const BinTask& task,
                                           const ImageOfFrame& part, WorkerScratch* worker,
                                           Frame* frame) {
   if (input.stage != nullptr) {
@@ -124,10 +124,10 @@ raster::PlanarView<float> AttributeTarget(const BinInput& input, const TileTask&
   return {attributes, static_cast<std::ptrdiff_t>(part.pixels), row};
 }
 
-void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFrame& part, bool drawn,
+void InterpolateBin(const BinInput& bin, const BinTask& task, const ImageOfFrame& part, bool drawn,
                     WorkerScratch* worker, Frame* frame) {
   const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
-  const raster::TileRect& rect = task.rect;
+  const raster::PixelRect& rect = task.rect;
   const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker, frame);
   float* barycentrics = part.plane(frame->barycentrics, 2);
   raster::InterpolateInput input{&bin.image.mesh, bin.image.attributes, bin.options.interpolation,
@@ -151,8 +151,8 @@ void InterpolateBin(const BinInput& bin, const TileTask& task, const ImageOfFram
   }
 }
 
-void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerScratch* worker) {
-  const raster::TileRect& rect = task.rect;
+void RunStage(const BinInput& bin, const BinTask& task, bool any_face, WorkerScratch* worker) {
+  const raster::PixelRect& rect = task.rect;
   bin.stage->Forward(
       {.image = task.image,
        .band = 0,
@@ -168,19 +168,19 @@ void RunStage(const BinInput& bin, const TileTask& task, bool any_face, WorkerSc
 }
 
 // Alpha of a bin. Returns the error spent.
-double SoftAlpha(const ImageScratch& image, const TileTask& task, const ImageOfFrame& part,
+double SoftAlpha(const ImageScratch& image, const BinTask& task, const ImageOfFrame& part,
                  WorkerScratch* worker, Frame* frame) {
   const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
   const raster::SoftMaskImages images{{part.plane(frame->alpha, 1), part.pixels},
                                       {part.plane(frame->transmittance, 1), part.pixels}};
-  ++worker->stats.softened;
+  ++worker->stats.alpha_parts;
   return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, images,
                                  &worker->soft);
 }
 
 }  // namespace
 
-double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame) {
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, Frame* frame) {
   const ImageScratch& image = input.image;
   RenderTimes* const times = &worker->times;
   StageClock clock;

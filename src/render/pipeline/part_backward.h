@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pixel_stage.h"
 #include "render/pipeline/pipeline.h"
+#include "render/pipeline/pixel_stage.h"
 
 namespace tilegrad {
 
@@ -44,7 +44,7 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
                         BandGradients* out);
 
 // Gradients of the faces that reach the tiles of a bin, through alpha.
-void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const TileTask& bin,
+void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
                        WorkerScratch* worker, BinGradients* out);
 
 }  // namespace tilegrad

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pixel_stage.h"
 #include "render/pipeline/pipeline.h"
+#include "render/pipeline/pixel_stage.h"
 
 namespace tilegrad {
 
@@ -17,7 +17,7 @@ struct BinInput {
 };
 
 // Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
-// task.tile and task.rect are those of raster::BinGrid.
-double RenderBin(const BinInput& input, const TileTask& task, WorkerScratch* worker, Frame* frame);
+// task.bin and task.rect are those of raster::BinGrid.
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, Frame* frame);
 
 }  // namespace tilegrad

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the corners of an image's faces are on the screen, gathered while faces are set up: who
+// looks at faces by the vector reads them from here.
+#pragma once
+
+#include <cstddef>
+
+#include "base/aligned.h"
+
+namespace tilegrad::raster {
+
+inline constexpr std::size_t kPacketFaces = 16;   // no vector has more lanes of floats
+inline constexpr std::size_t kCornerNumbers = 6;  // of a face: x of corners 0, 1, 2, then y
+inline constexpr std::size_t kPacketGroup = 16;   // there is room for a multiple of so many packets
+
+// Coordinate of faces that do not take part in the soft mask, and of those that fill up the last
+// packets: beyond the reach of every kernel.
+inline constexpr float kNowhere = 3e38f;
+
+// [packet][kCornerNumbers][kPacketFaces], pixels. A packet is read as a whole.
+struct CornerPackets {
+  AlignedVector<float> values;
+
+  static constexpr std::size_t PacketsOf(std::size_t faces) {
+    constexpr std::size_t kFaces = kPacketGroup * kPacketFaces;
+    return (faces + kFaces - 1) / kFaces * kPacketGroup;
+  }
+  std::size_t packets() const { return values.size() / (kCornerNumbers * kPacketFaces); }
+  // Reuses the memory.
+  void Resize(std::size_t faces) {
+    values.resize(PacketsOf(faces) * kCornerNumbers * kPacketFaces);
+  }
+  // One number of a packet's faces.
+  float* at(std::size_t packet, std::size_t number) { return values.data() + At(packet, number); }
+  const float* at(std::size_t packet, std::size_t number) const {
+    return values.data() + At(packet, number);
+  }
+
+ private:
+  static std::size_t At(std::size_t packet, std::size_t number) {
+    return (kCornerNumbers * packet + number) * kPacketFaces;
+  }
+};
+
+}  // namespace tilegrad::raster
