@@ -103,9 +103,16 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size);
 Result<GltfCamera> ToGltf(const Camera64& camera, ImageSize size);
 
 // The same view on an image of another size: everything scales, the field of view stays.
-Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to);
+inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {
+  Camera64 out = camera;
+  const double x = static_cast<double>(to.width) / from.width;
+  const double y = static_cast<double>(to.height) / from.height;
+  out.fx *= x, out.cx *= x, out.fy *= y, out.cy *= y;
+  return out;
+}
 
-// What every From... ends with: finite, a rotation, positive focal lengths and near plane.
+// Fails unless the camera is finite, its rotation is one, and its focal lengths and near plane are
+// positive. Every From... ends with it.
 Status Validate(const Camera64& camera);
 
 }  // namespace tilegrad
