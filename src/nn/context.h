@@ -32,7 +32,7 @@ class Context {
 
   const Workers& workers() const { return workers_; }
   KernelContext kernels() { return {workers_, scratch_, winograd_}; }
-  // Whether convolutions may use kernels/conv2d/conv2d_winograd.h (they do unless told otherwise).
+  // Whether convolutions may use kernels/conv2d/winograd.h (they do unless told otherwise).
   void set_winograd(bool on) { winograd_ = on; }
   DType dtype() const { return dtype_; }
 

@@ -37,7 +37,7 @@ class KernelScratch {
 struct KernelContext {
   const Workers& workers;
   KernelScratch& scratch;
-  // Convolutions may multiply less and round a little more: conv2d_winograd.h.
+  // Convolutions may multiply less and round a little more: winograd.h.
   bool winograd = true;
 };
 

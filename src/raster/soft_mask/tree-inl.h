@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of soft_mask_tree.h. Lanes are faces, nodes, groups.
+// Vector body of tree.h. Lanes are faces, nodes, groups.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_

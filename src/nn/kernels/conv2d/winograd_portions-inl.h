@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a pass of conv2d_winograd.h goes through the tiles: in portions, so that memory stays small.
+// How a pass of winograd.h goes through the tiles: in portions, so that memory stays small.
 // Where there are enough of them, each worker takes portions of its own, which stay in its caches
 // and for which it waits for nobody.
 

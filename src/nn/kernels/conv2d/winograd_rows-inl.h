@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Between one image row and the places of its tiles, a vector of tiles at a time, for
-// conv2d_winograd_tiles-inl.h.
+// winograd_tiles-inl.h.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_ROWS_INL_H_
