@@ -14,8 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// first, first + 1, ... by lanes. hn::Iota of a number that is not constant goes through memory,
-// number by number, and then waits for it.
+// first, first + 1, ... by lanes. hn::Iota of a variable goes through memory, element by element,
+// and stalls on the load.
 template <class D>
 HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
   return hn::Add(hn::Iota(d, 0), hn::Set(d, first));

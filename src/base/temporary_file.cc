@@ -29,7 +29,7 @@ std::optional<pid_t> WriterOf(const Path& file) {
   return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
 }
 
-// A file with our own number is of one that had it before: in a container each run may have it.
+// A file with our own number is from an earlier process: in a container every run may get it.
 bool IsOfAnother(pid_t writer) {
   return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
 }

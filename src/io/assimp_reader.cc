@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes by Assimp, which works in a process of its own; what it hands over becomes a mesh here.
+// Meshes by Assimp, which runs in a process of its own; its result becomes a mesh here.
 #include <algorithm>
 #include <cstring>
 #include <glm/mat3x3.hpp>

@@ -30,7 +30,7 @@ void SeparateFromParent(int parent_pid) {
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Nothing is read or printed, and no descriptor of the parent stays open but the two.
+// Closes or redirects every descriptor of the parent but two: nothing is read or printed.
 void CloseDescriptors(int a, int b) {
   const int null = ::open("/dev/null", O_RDWR);
   for (int stream = 0; stream <= STDERR_FILENO; ++stream) ::dup2(null, stream);
@@ -49,7 +49,7 @@ void Limit(decltype(RLIMIT_CPU) resource, rlim_t soft, rlim_t hard) {
   ::setrlimit(resource, &limit);
 }
 
-// If memory runs out all the same, the system takes the child rather than the parent.
+// If memory runs out all the same, the system kills the child rather than the parent.
 void BeFirstToGo() {
   const int file = ::open("/proc/self/oom_score_adj", O_WRONLY);
   if (file < 0) return;

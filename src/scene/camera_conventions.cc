@@ -40,7 +40,7 @@ Pose PoseOf(const Camera64& camera) {
   return pose;
 }
 
-// The same pose with some of the camera's axes turned round.
+// The same pose with some of the camera's axes flipped.
 Pose WithAxes(Pose pose, const Vec3Array& signs) {
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) pose.rotation[3 * r + c] *= signs[r];
@@ -50,7 +50,7 @@ Pose WithAxes(Pose pose, const Vec3Array& signs) {
 }
 constexpr Vec3Array kOpenCvAxes = {1, -1, -1}, kPyTorch3dAxes = {-1, 1, -1};
 
-// World to camera from where the camera stands.
+// World-to-camera pose from the camera's position.
 Pose PoseAt(const Mat3Array& rotation, const Vec3Array& position) {
   Vec3Array translation = Apply(rotation.data(), position);
   for (double& t : translation) t = -t;
@@ -272,7 +272,7 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size) {
   if (!(from.aspect_ratio >= 0) || !std::isfinite(from.aspect_ratio))
     return InvalidArgument("the aspect ratio is {}; it must be 0 or above", from.aspect_ratio);
   Mat4Array node = from.node_to_world;
-  for (int c = 0; c < 3; ++c) {  // scale does not count
+  for (int c = 0; c < 3; ++c) {  // scale is ignored
     const double length = std::hypot(node[c], node[4 + c], node[8 + c]);
     if (length > 0) node[c] /= length, node[4 + c] /= length, node[8 + c] /= length;
   }

@@ -23,7 +23,7 @@ struct Axis {
   float slope;
 };
 
-// A coordinate brought to where the texture is, and the derivative of that: [0, 1], or [-1, 2] if
+// A coordinate wrapped to the texture, and the derivative of that: [0, 1], or [-1, 2] if
 // clamped.
 template <class T>
 struct Wrapped {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every NN kernel is handed besides its operands: the workers it may use and memory it may
-// scribble on.
+// The environment of every NN kernel, besides its operands: the workers it may use, scratch memory
+// and options.
 #pragma once
 
 #include <cstddef>

@@ -184,7 +184,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
 
 namespace {
 
-// Two parts at a time would copy the front ones again and again; this places each part once.
+// Joining two at a time would copy the first parts repeatedly; this copies each part once.
 Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
   Context& context = parts[0].context();
   Tensor y = context.Empty(WithExtent(parts[0].shape(), axis, extent), parts[0].dtype());

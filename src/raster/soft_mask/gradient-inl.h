@@ -39,17 +39,17 @@ HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, co
     hn::StoreU(hn::Mul(first, to_pixels), d, to->d_corner[0]);
     hn::StoreU(hn::LowerHalf(d_last, hn::Mul(last, to_pixels)), d_last, to->d_corner[2]);
     to->face = faces[i];
-    // No branch: it would be hard to foretell.
+    // No branch: it would be hard to predict.
     to += !hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)));
   }
   out->resize(static_cast<std::size_t>(to - out->data()));
 }
 
-// A / (1 - A) as A (1 + A) (1 + A^2) (1 + A^4) ..., so many factors, until what is lacking is
-// about u.
+// The odds A / (1 - A) of equation 6's derivative, as A (1 + A) (1 + A^2) (1 + A^4) ...: kFactors
+// factors, which leaves a relative error of about u.
 template <int kFactors>
 HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
-  // The least power is far below u, and far from denormal numbers, which are slow.
+  // 2^-30 squared is far below u, yet far from denormal numbers, which are slow.
   const SoftVec base = hn::Max(a, hn::Set(d, 0x1p-30f));
   SoftVec power = hn::Mul(base, base), odds = hn::MulAdd(a, a, a);
   for (int i = 1; i < kFactors; ++i) {
@@ -57,21 +57,21 @@ HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
   }
   return odds;
 }
-// For z >= kSmallZ, which is A <= kSmallInfluence: lacks A^8, relatively, at most 2^-24.
+// For z >= kSmallZ, that is A <= kSmallInfluence: relative error A^8, at most 2^-24.
 inline constexpr float kSmallZ = 3, kSmallInfluence = 0.125f;
 HWY_INLINE SoftVec SmallOdds(SoftTag d, SoftVec a) { return OddsSeries<3>(d, a); }
-// For z >= kMediumZ: lacks A^32, at most 2^-24.
+// For z >= kMediumZ: relative error A^32, at most 2^-24.
 inline constexpr float kMediumZ = 0.75f;
 HWY_INLINE SoftVec MediumOdds(SoftTag d, SoftVec a) { return OddsSeries<5>(d, a); }
-// For A <= 63/64: lacks A^1024.
+// For A <= 63/64: relative error A^1024.
 HWY_INLINE SoftVec LargeOdds(SoftTag d, SoftVec a) { return OddsSeries<10>(d, a); }
 HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
   const bool small = hn::AllTrue(d, hn::Le(a, hn::Set(d, kSmallInfluence)));
   return small ? SmallOdds(d, a) : LargeOdds(d, a);
 }
 
-// The nearest of the faces' three edges: the way to the pixel, and the share of the edge's second
-// corner.
+// On the nearest of the faces' three edges: the offset of the pixel from it, and the share of the
+// edge's second corner.
 struct Nearest {
   SoftVec way_x, way_y, second;
   SoftMask on1, on2;  // edge 1, edge 2; else edge 0
@@ -321,7 +321,7 @@ struct WeakFaces {
   }
 
  private:
-  // Loops apart by how many factors the odds need: which pixel needs how many is hard to foretell.
+  // One loop per number of factors that the odds need: which pixel needs which is hard to predict.
   HWY_INLINE void PushAll(std::uint64_t bits, const FarPixels& far, Pushes& pushes) const {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
