@@ -65,7 +65,7 @@ class PinningObserver : public tbb::task_scheduler_observer {
 // but not its threads, and possibly locks that those held: it must not touch oneTBB.
 std::atomic<pid_t> tbb_process{0};
 
-bool TbbIsOfThisProcess() {
+bool ThisProcessOwnsTbb() {
 #ifdef __SANITIZE_THREAD__
   // oneTBB is not built with ThreadSanitizer, which therefore cannot see its synchronisation.
   return false;
@@ -151,14 +151,14 @@ int AvailableCores() {
 }
 
 Workers::Workers(int count, Pinning pinning) : count_(count > 0 ? count : AvailableCores()) {
-  if (count_ > 1 && TbbIsOfThisProcess()) impl_ = std::make_unique<Impl>(count_, pinning);
+  if (count_ > 1 && ThisProcessOwnsTbb()) impl_ = std::make_unique<Impl>(count_, pinning);
 }
 
 Workers::~Workers() {
-  if (impl_ != nullptr && !TbbIsOfThisProcess()) static_cast<void>(impl_.release());
+  if (impl_ != nullptr && !ThisProcessOwnsTbb()) static_cast<void>(impl_.release());
 }
 
-bool Workers::HasArena() const { return impl_ != nullptr && TbbIsOfThisProcess(); }
+bool Workers::HasArena() const { return impl_ != nullptr && ThisProcessOwnsTbb(); }
 
 namespace {
 

@@ -58,7 +58,7 @@ AddressArena::FreeRanges::iterator AddressArena::BestFit(std::size_t size) {
   return best;
 }
 
-std::byte* AddressArena::Take(std::size_t bytes) {
+std::byte* AddressArena::Allocate(std::size_t bytes) {
   const std::size_t size = Rounded(bytes);
   std::byte* data = nullptr;
   if (const auto fit = BestFit(size); fit != free_.end()) {
@@ -116,7 +116,7 @@ void AddressArena::AddRegion(std::size_t bytes) {
   regions_.push_back({static_cast<std::byte*>(memory), size, 0, 0});
 }
 
-void AddressArena::Give(std::byte* data, std::size_t bytes) {
+void AddressArena::Free(std::byte* data, std::size_t bytes) {
   bytes = Rounded(bytes);
   ASAN_POISON_MEMORY_REGION(data, bytes);
   auto next = free_.lower_bound(data);

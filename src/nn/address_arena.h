@@ -21,11 +21,11 @@ class AddressArena {
   AddressArena(const AddressArena&) = delete;
   AddressArena& operator=(const AddressArena&) = delete;
 
-  static std::size_t Rounded(std::size_t bytes);  // what Take really takes
+  static std::size_t Rounded(std::size_t bytes);  // what Allocate really takes
   // Uninitialised, aligned to kAlignment. Throws std::bad_alloc where the system has no memory, as
   // operator new does, and is as before then.
-  std::byte* Take(std::size_t bytes);
-  void Give(std::byte* data, std::size_t bytes);  // of Take(bytes)
+  std::byte* Allocate(std::size_t bytes);
+  void Free(std::byte* data, std::size_t bytes);  // of Allocate(bytes)
   void Trim();                                    // returns free memory to the system
 
   std::size_t held() const { return held_; }        // memory that is or ever was in use

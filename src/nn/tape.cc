@@ -82,7 +82,7 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
   return true;
 }
 
-bool Makeable(const char* op, const Var& operand, const Shape& result) {
+bool IsPossibleResult(const char* op, const Var& operand, const Shape& result) {
   if (result.IsPossible()) return true;
   operand.context().Fail(InvalidArgument("{}: {} would give {}, which no tensor can be", op,
                                          operand.shape().ToString(), result.ToString()));

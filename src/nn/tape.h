@@ -162,7 +162,7 @@ Var Fail(const Var& operand, Status status);
 // `operands`.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);
 // True if a tensor can have the shape of a result; else records why in the context of `operand`.
-bool Makeable(const char* op, const Var& operand, const Shape& result);
+bool IsPossibleResult(const char* op, const Var& operand, const Shape& result);
 // The invalid result that follows from an invalid operand.
 Var Invalid(std::initializer_list<const Var*> operands);
 

@@ -13,7 +13,7 @@ namespace tilegrad::HWY_NAMESPACE {
 void HalvingArray(const float* z, std::size_t n, float* power, float* one_minus) {
   const hn::CappedTag<float, 4> d;
   for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
-    const auto halving = HalvingOf(d, hn::LoadU(d, z + i));
+    const auto halving = Exp2Neg(d, hn::LoadU(d, z + i));
     hn::StoreU(halving.power, d, power + i);
     hn::StoreU(halving.one_minus, d, one_minus + i);
   }

@@ -38,7 +38,7 @@ LONG_FILES = {
     "src/fit/run.cc": (312, REWRITTEN),
     "src/nn/kernels/conv2d/winograd_tiles-inl.h": (394, VECTOR_BODY),
     "src/raster/drawn_faces-inl.h": (399, VECTOR_BODY),
-    "src/raster/soft_mask/gradient-inl.h": (403, VECTOR_BODY),
+    "src/raster/soft_mask/gradient-inl.h": (404, VECTOR_BODY),
     "src/raster/visibility-inl.h": (364, VECTOR_BODY),
     "src/render/pipeline/pipeline.cc": (349, REWRITTEN),
     "src/render/renderer_ref.h": (302, REWRITTEN),

@@ -147,8 +147,8 @@ inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, 
 
 // The same, with a task interleaved.
 template <class Task>
-HWY_INLINE void MultiplyBusily(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                               const float* packed_a, const ColumnPacker& columns, Task& task) {
+HWY_INLINE void MultiplyWithTask(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                 const float* packed_a, const ColumnPacker& columns, Task& task) {
   ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
     MultiplyTile(plan, packed_a, panel, columns.block(), j,
                  BusyColumns<Task>(columns.panel(j), task));
@@ -165,7 +165,7 @@ inline HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first
                                          const float* packed_a, const ColumnPacker& columns,
                                          const ColumnPacker& next) {
   PanelCopier copier = next.Copier(TaskRuns(rows, columns.block()));
-  MultiplyBusily(plan, first, rows, packed_a, columns, copier);
+  MultiplyWithTask(plan, first, rows, packed_a, columns, copier);
   copier.Finish();
   next.PackRest();
 }
@@ -175,7 +175,7 @@ inline HWY_NOINLINE void MultiplyAndFetch(const GemmPlan& plan, std::size_t firs
                                           const float* packed_a, const ColumnPacker& columns,
                                           const ColumnPacker& next) {
   BlockFetcher fetcher = next.Fetcher(TaskRuns(rows, columns.block()));
-  MultiplyBusily(plan, first, rows, packed_a, columns, fetcher);
+  MultiplyWithTask(plan, first, rows, packed_a, columns, fetcher);
 }
 
 // The blocks of B that a work item processes, in order: all columns of a depth, as the rows

@@ -80,7 +80,7 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
     return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
                                    a.shape().ToString(), b.shape().ToString()));
   }
-  if (!Makeable(info.name, a, shape)) return Invalid({&a});
+  if (!IsPossibleResult(info.name, a, shape)) return Invalid({&a});
   Tensor y = a.context().Empty(shape, a.dtype());
   return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
 }

@@ -101,7 +101,7 @@ class PartialAlpha {
     alignas(64) float of_pixel[kBlockPixels][kSoftLanes];
     ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(z(i), d, of_pixel[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
-      Put(d, i, simd::HalvingOf(d, hn::Load(d, of_pixel[i])).power);  // (5): A = 2^-z
+      Put(d, i, simd::Exp2Neg(d, hn::Load(d, of_pixel[i])).power);  // (5): A = 2^-z
     });
   }
   // The product of the lanes' 1 - a, for when 1 - alpha has lost its digits. Notes the least lane.

@@ -73,7 +73,7 @@ HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
 // On the nearest of the faces' three edges: the offset of the pixel from it, and the share of the
 // edge's second corner.
 struct Nearest {
-  SoftVec way_x, way_y, second;
+  SoftVec offset_x, offset_y, second;
   SoftMask on1, on2;  // edge 1, edge 2; else edge 0
 };
 
@@ -103,7 +103,7 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
 class NearestOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
-    hn::Store(n.way_x, d, v_[0][i]), hn::Store(n.way_y, d, v_[1][i]);
+    hn::Store(n.offset_x, d, v_[0][i]), hn::Store(n.offset_y, d, v_[1][i]);
     hn::Store(n.second, d, v_[2][i]);
     hn::Store(hn::VecFromMask(d, n.on1), d, v_[3][i]);
     hn::Store(hn::VecFromMask(d, n.on2), d, v_[4][i]);
@@ -152,7 +152,8 @@ struct CornerSums {
     for (std::size_t k = 0; k < 3; ++k) x[k] = y[k] = hn::Zero(d);
   }
   HWY_INLINE void Add(SoftTag d, const Nearest& n, SoftVec push) {
-    const SoftVec zero = hn::Zero(d), gx = hn::Mul(push, n.way_x), gy = hn::Mul(push, n.way_y);
+    const SoftVec zero = hn::Zero(d), gx = hn::Mul(push, n.offset_x),
+                  gy = hn::Mul(push, n.offset_y);
     const SoftVec b = n.second, a = hn::Sub(hn::Set(d, 1.0f), b);
     const SoftVec share[3] = {hn::IfThenElse(n.on2, b, hn::IfThenElse(n.on1, zero, a)),
                               hn::IfThenElse(n.on2, zero, hn::IfThenElse(n.on1, a, b)),
@@ -255,9 +256,9 @@ struct WeakFaces {
           ForPixels(columns, [&](std::size_t x) HWY_ATTR {
             const SoftVec influence = hn::Mul(members.columns.power[x], of_row);
             const SoftVec w = hn::Mul(odds(influence), hn::Set(d, row_push[x]));
-            d_x = hn::MulAdd(w, members.columns.way[x], d_x), pushed = hn::Add(pushed, w);
+            d_x = hn::MulAdd(w, members.columns.offsets[x], d_x), pushed = hn::Add(pushed, w);
           });
-          d_y = hn::MulAdd(pushed, members.rows.way[row], d_y);
+          d_y = hn::MulAdd(pushed, members.rows.offsets[row], d_y);
         });
         sums.Add(d, list, m, 0, d_x, d_y);
       };
@@ -326,7 +327,7 @@ struct WeakFaces {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
       ForPixels(some, [&](std::size_t i) HWY_ATTR {
-        const SoftVec a = simd::HalvingOf(d, hn::Load(d, pushes[i])).power;
+        const SoftVec a = simd::Exp2Neg(d, hn::Load(d, pushes[i])).power;
         hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushes[i]);
       });
     };
@@ -363,7 +364,7 @@ inline void AppendNear(const SoftBlock& block, float* product, AlignedVector<Sof
     ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(members.Z(d, block, i), d, z[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
       faces.before[i] = product[i];
-      const SoftVec outside = simd::HalvingOf(d, hn::Load(d, z[i])).one_minus;
+      const SoftVec outside = simd::Exp2Neg(d, hn::Load(d, z[i])).one_minus;
       product[i] *= hn::GetLane(LaneProducts(d, outside).all);
     });
   }
@@ -382,7 +383,7 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
     const auto push_all = [&](const FarPixels&, Pushes& pushes) HWY_ATTR {
       ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
-        const auto a = simd::HalvingOf(d, hn::Load(d, pushes[i]));
+        const auto a = simd::Exp2Neg(d, hn::Load(d, pushes[i]));
         const LaneProducts outside(d, a.one_minus);
         const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
         behind[i] *= hn::GetLane(outside.all);

@@ -57,11 +57,11 @@ HWY_INLINE void NoteVertexPairs(SoftTag d, std::uint64_t pixels, SoftWork* work)
   work->powers += lanes * (std::popcount(ColumnsOf(pixels)) + std::popcount(RowsOf(pixels)));
 }
 
-// 2^-(squared offset) along one axis, [column or row]; where kWays, also the offsets and the
+// 2^-(squared offset) along one axis, [column or row]; where kWithOffsets, also the offsets and the
 // largest power.
-template <bool kWays>
+template <bool kWithOffsets>
 struct AxisInfluence {
-  SoftVec power[kBlockSize], way[kWays ? kBlockSize : 1], most;
+  SoftVec power[kBlockSize], offsets[kWithOffsets ? kBlockSize : 1], most;
 
   // For the bits of `pixels`, columns or rows at `at`.
   HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels) {
@@ -69,8 +69,8 @@ struct AxisInfluence {
     for (; pixels != 0; pixels &= pixels - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
       const SoftVec offset = hn::Sub(hn::Set(d, at[i]), vertex);
-      power[i] = simd::HalvingOf(d, hn::Mul(offset, offset)).power;
-      if constexpr (kWays) way[i] = offset, largest = hn::Max(largest, power[i]);
+      power[i] = simd::Exp2Neg(d, hn::Mul(offset, offset)).power;
+      if constexpr (kWithOffsets) offsets[i] = offset, largest = hn::Max(largest, power[i]);
     }
     most = largest;
   }
@@ -78,9 +78,9 @@ struct AxisInfluence {
 
 // A vector of corners. Equation 5 factors: A = 2^-(x - vx)^2 2^-(y - vy)^2, one power per column
 // and one per row.
-template <bool kWays>
+template <bool kWithOffsets>
 struct VertexMembers {
-  AxisInfluence<kWays> columns, rows;
+  AxisInfluence<kWithOffsets> columns, rows;
 
   HWY_INLINE VertexMembers(SoftTag d, const SoftListOf<2>& list, std::size_t m,
                            const SoftBlock& block, std::uint64_t bits)
@@ -90,7 +90,7 @@ struct VertexMembers {
     return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);  // (5)
   }
   // All within `limit`.
-  HWY_INLINE bool AllWithin(SoftTag d, float limit) const requires kWays {
+  HWY_INLINE bool AllWithin(SoftTag d, float limit) const requires kWithOffsets {
     return hn::AllTrue(d, hn::Le(hn::Mul(columns.most, rows.most), hn::Set(d, limit)));
   }
 };
