@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Files that documents and comments name exist. Exit code 0 if so.
+"""Files that documents and comments name exist, and so do functions in them. Exit code 0 if so.
 
 A name with a folder must be the end of a file's path; a bare name, some file's name. Names of C++ and Python
-files only, those that move with the code; files of other projects are listed below.
+files only, those that move with the code; files of other projects are listed below. Documents name a function
+as `path/file.h`: `Function`, `Another`.
 """
 import pathlib
 import re
@@ -13,6 +14,7 @@ from typing import Iterator, List, Tuple
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 NAME = re.compile(r"(?<![\w./<*{-])((?:[\w.-]+/)*[\w-]+\.(?:h|cc|py|sh))(?![\w*])")
+NAMES_IN_FILE = re.compile(r"`([\w./-]+\.(?:h|cc|py))`: ((?:`\w+`(?:, )?)+)")
 COMMENT = re.compile(r"(?://|#).*")
 # Of other projects, or written by the program.
 FOREIGN = {"app.cc"}
@@ -37,6 +39,16 @@ def named(path: str) -> Iterator[Tuple[int, str]]:
             yield number, name
 
 
+def missing_functions(path: str) -> List[str]:
+    """Names in documents that the file beside them does not hold; files are given from the root."""
+    wrong = []
+    for file, names in NAMES_IN_FILE.findall((ROOT / path).read_text(encoding="utf-8")):
+        text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
+        wrong += [f"{path}: {file} has no {name}" for name in re.findall(r"\w+", names)
+                  if not re.search(rf"\b{name}\b", text)]
+    return wrong
+
+
 def main() -> int:
     paths = files()
     ends = {"/".join(p.split("/")[i:]) for p in paths for i in range(p.count("/") + 1)}
@@ -46,6 +58,8 @@ def main() -> int:
             continue
         if path.startswith(REWRITTEN):
             continue
+        if path.endswith(".md"):
+            wrong += missing_functions(path)
         for line, name in named(path):
             count += 1
             name = re.sub(r"^(\.\./)+", "", name)
