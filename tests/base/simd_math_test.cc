@@ -51,7 +51,7 @@ std::vector<float> Samples() {
   return z;
 }
 
-TEST(SimdMath, HalvingIsWithinItsBoundOnEveryTarget) {
+TEST(SimdMath, Exp2NegIsWithinItsBoundOnEveryTarget) {
   const std::vector<float> z = Samples();
   std::vector<float> power(z.size()), one_minus(z.size());
   for (const std::string& target : RunnableTargets()) {
@@ -65,7 +65,7 @@ TEST(SimdMath, HalvingIsWithinItsBoundOnEveryTarget) {
         ASSERT_EQ(one_minus[i], 1.0f);
         continue;
       }
-      // Beyond 126 the power is denormal, and kept to a unit of those.
+      // Beyond 126 the power is denormal, and within one denormal unit.
       if (x > 126) {
         ASSERT_LE(std::abs(static_cast<double>(power[i]) - std::exp2(-x)), 0x1p-148);
         continue;
