@@ -194,7 +194,7 @@ void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t
   if (parts_ == 1) {  // not in the arena
     workers_.For(n, task);
   } else if (n > 1 && waiting_.load(std::memory_order_relaxed) == 0 && workers_.HasArena()) {
-    // Not isolated: what may be taken meanwhile are tasks of loops like this one, which never wait.
+    // Not isolated: only tasks of loops like this one can be taken here, and those never wait.
     ForInArena(n, task);
   } else {
     for (std::size_t i = 0; i < n; ++i) task(i, worker_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads arrive as an argument: whoever computes is handed a Workers. This is the one home of
+// Threads are an argument: every computation receives a Workers. The one home of
 // oneTBB.
 #pragma once
 
@@ -57,7 +57,7 @@ class Workers {
     friend class Workers;
     const Workers& workers_;
     std::size_t worker_, parts_;
-    const std::atomic<std::size_t>& waiting_;  // parts that nobody has taken
+    const std::atomic<std::size_t>& waiting_;  // parts that no worker has taken
 
     Part(const Workers& workers, std::size_t worker, std::size_t parts,
          const std::atomic<std::size_t>& waiting)

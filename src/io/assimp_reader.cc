@@ -117,8 +117,8 @@ class Assembly {
   const FileSource& source_;
   const std::string& name_;
   LoadedMesh out_;
-  std::vector<std::optional<int>> images_;          // texture of each image that was asked for
-  std::vector<std::optional<Material>> materials_;  // those that were asked for
+  std::vector<std::optional<int>> images_;          // texture of each image that is used
+  std::vector<std::optional<Material>> materials_;  // those that are used
 };
 
 std::optional<Bytes> Answer(const FileSource& source, std::string_view question) {

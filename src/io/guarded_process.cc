@@ -152,7 +152,7 @@ Status TooMuchMemory(const GuardLimits& limits) {
   return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
 }
 
-// The mailbox is a file to the system: whoever started this process may have limited its size.
+// The mailbox counts as a file: the size limit of this process's files applies to it.
 Status TooLargeAResult(const GuardLimits& limits) {
   rlimit own = {};
   if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes) {

@@ -54,7 +54,7 @@ class Var {
 
 Var Constant(Context& context, Tensor value);   // no gradient flows into it
 Var Constant(Context& context, double value);   // a scalar
-Var Parameter(Context& context, Tensor value);  // Grad may be asked for it
+Var Parameter(Context& context, Tensor value);  // Grad can differentiate by it
 Var Detach(const Var& x);                       // the value of x, cut off from its graph
 
 struct GradOptions {
@@ -152,7 +152,7 @@ struct OpInfo {
   bool save_output = false;  // the rule reads Adjoint::y()
 };
 
-// Makes the Var of an operation's result. The rule is kept only where a gradient can be asked for.
+// Makes the Var of an operation's result. The rule is kept only if a gradient can be requested.
 Var Record(const OpInfo& info, Tensor value, std::span<const Var> inputs, Rule rule);
 Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, Rule rule);
 

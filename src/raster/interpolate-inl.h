@@ -144,7 +144,7 @@ struct QuadRow {
       step[k] = view.row;
     }
   }
-  // Asks for the row that is so many rows below.
+  // Prefetches the row `rows` below.
   HWY_INLINE void Prefetch(int rows) const {
     for (int k = 0; k < outputs; ++k) {
       PrefetchNumbers(to[k] + rows * step[k], static_cast<std::size_t>(count));

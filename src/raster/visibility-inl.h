@@ -313,7 +313,7 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
       const PixelRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
                            HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
-      // Of a layer that is peeled, a face that covers a tile may lie before what is asked for.
+      // When peeling, a face that covers a tile may lie in front of the layer that is drawn.
       const bool covered = DrawTile<kLayer>(
           shape, face, tile,
           {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, out.behind + first});

@@ -50,7 +50,7 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
   return i < 0 ? n - 1 : i < n ? i : 0;  // wrapped coordinates are at most one texel outside
 }
 
-// Along u; v is handed in as 1 - v.
+// Along u; for v, call it with 1 - v.
 template <class T>
 Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap wrap, bool nearest) {
   const bool corners = wrap == Wrap::kRepeatCorners;

@@ -98,7 +98,7 @@ class GroupUpdater {
   const float* gradient_ = nullptr;
 };
 
-// Row panels [first, end) of the packed columns, into `group`; meanwhile `before` is updated.
+// Row panels [first, end) of the packed columns, into `group`, interleaved with Adam over `before`.
 inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Range panels,
                                        const float* packed_a, const ColumnPacker& columns,
                                        float* group, GroupUpdater& before) {

@@ -30,8 +30,8 @@ static_assert(static_cast<double>(FacesOfLane(4) + 1) * 0x1p-24 < LaneRounding(4
 // The part of the budget that may be dropped: the rest covers rounding of the lanes' products.
 inline constexpr double kUnseenShare = 0.9;
 
-// The way back may also drop a face of so little A that 1 - A is 1 in float, as long as those that
-// a pixel drops have no more than kVanishingSum together (docs/numerics.md, "Gradients").
+// The backward pass may also drop a face of so little A that 1 - A is 1 in float, as long as those
+// that a pixel drops have no more than kVanishingSum together (docs/numerics.md, "Gradients").
 inline constexpr double kVanishingInfluence = 0x1p-25, kVanishingSum = 0x1p-17;
 
 // z from which on `n` faces have A <= share / n each, and together no more than `share`.

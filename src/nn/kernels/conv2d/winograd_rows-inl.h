@@ -53,7 +53,7 @@ struct RowOfTiles {
   std::size_t overlap;  // pixels that a tile and the next one both see
 };
 
-// The way back: places summed where tiles overlap, as a padded image row.
+// The inverse: places summed where tiles overlap, as a padded image row.
 template <std::size_t kStep>
 HWY_INLINE void SumRow(const float* places, const RowOfTiles& row, float* padded) {
   const std::size_t pitch = row.pitch;
