@@ -20,7 +20,6 @@ from typing import Any, Iterator, NamedTuple
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 
 import tilegrad
 import tilegrad.torch

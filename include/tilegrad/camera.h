@@ -53,7 +53,7 @@ TILEGRAD_API Result<CameraT<T>> MakeCamera(const Lens& lens, const Orbit& orbit)
 
 // Six numbers of rotation, the first two rows of a matrix before they are made orthonormal
 // (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019), and
-// the rest of a camera: what an optimiser may move freely.
+// the rest of a camera: free parameters for an optimiser.
 template <class T>
 struct CameraParametersT {
   T rotation[6] = {1, 0, 0, 0, 1, 0};

@@ -87,8 +87,8 @@ struct FrameGradientsT {
 template <class T>
 class TILEGRAD_API RendererT;
 
-// The record of a Render: its images, the views of its scenes, and what Backward needs. Reused by
-// the next Render into it: rendering the same sizes again allocates nothing.
+// The result of a Render: its images, the views of its scenes, and what Backward needs. The next
+// Render into it reuses its memory: rendering the same sizes again allocates nothing.
 template <class T>
 class TILEGRAD_API FrameT {
  public:

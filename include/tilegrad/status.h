@@ -20,7 +20,7 @@ enum class StatusCode {
   kIo,                 // the operating system refused: permission, full disk
   kResourceExhausted,  // larger than the memory or the limit allows
   kCancelled,          // a signal or the caller asked to stop
-  kInternal,           // a bug of ours
+  kInternal,           // a bug in tilegrad
 };
 
 class [[nodiscard]] Status {

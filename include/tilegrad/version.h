@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The version of the library, the single place where it is written in code (CMakeLists.txt holds
-// the same, a test compares).
+// The version of the library, the only place in code that states it (CMakeLists.txt repeats it, a
+// test compares).
 #pragma once
 #define TILEGRAD_VERSION_MAJOR 0
 #define TILEGRAD_VERSION_MINOR 1

@@ -19,7 +19,7 @@ std::align_val_t AlignmentOf(std::size_t bytes) {
 
 void* AllocateAligned(std::size_t bytes) {
   void* data = ::operator new(bytes, AlignmentOf(bytes));
-  // Advice only: where the system does not follow it, nothing changes but speed.
+  // Advice only: if the system ignores it, only speed suffers.
   if (bytes >= kHugePage) madvise(data, bytes, MADV_HUGEPAGE);
   return data;
 }

@@ -13,7 +13,7 @@ namespace tilegrad {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Merges term(v) of all values v; several at a time, so that they run side by side.
+// Merges term(v) of all values v, with several independent accumulators.
 template <class D, class Term, class Merge>
 HWY_INLINE hn::Vec<D> MergeTerms(D d, std::span<const hn::TFromD<D>> values, const Term& term,
                                  const Merge& merge) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Yes or no about whole arrays, fast.
+// Fast predicates over whole arrays.
 #pragma once
 
 #include <cstdint>

@@ -35,7 +35,7 @@ Status SystemError(const Path& path, const char* doing) {
   return {StatusCode::kIo, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(errno))};
 }
 
-// What is to be read and is not there, or below a file, is not found.
+// A missing file, or one below something that is no folder, is kNotFound.
 Status CannotOpenToRead(const Path& path) {
   const bool missing = errno == ENOENT || errno == ENOTDIR;
   const Status status = SystemError(path, "cannot open");
@@ -63,7 +63,7 @@ Status SyncFolder(const Path& folder) {
   return {};
 }
 
-// Errors name `path`, which the caller knows.
+// Errors name `path`, the name that the caller knows.
 Status WriteTemporary(const Path& temporary, const Path& path,
                       std::span<const std::uint8_t> bytes) {
   FileHandle file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
@@ -76,7 +76,7 @@ Status WriteTemporary(const Path& temporary, const Path& path,
 
 template <class Container>
 Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
-  FileHandle file(path, O_RDONLY | O_NONBLOCK);  // or a pipe waits for who writes into it
+  FileHandle file(path, O_RDONLY | O_NONBLOCK);  // opening a pipe must not wait for a writer
   if (file.fd() < 0) return CannotOpenToRead(path);
   struct stat info = {};
   if (::fstat(file.fd(), &info) != 0) return SystemError(path, "cannot stat");
@@ -110,7 +110,7 @@ Result<std::string> ReadText(const Path& path, std::size_t max_bytes) {
 
 namespace {
 
-// Terminals, pipes, /dev/null: a rename would put a file in their place.
+// Terminals, pipes, /dev/null: a rename would replace them by a file.
 bool IsDevice(const Path& path) {
   struct stat info = {};
   return ::stat(path.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode);
@@ -124,7 +124,7 @@ Status WriteToDevice(const Path& path, std::span<const std::uint8_t> bytes) {
   return {};
 }
 
-// What a symbolic link stands for; `path` itself where there is none, or nothing behind it.
+// The target of a symbolic link; `path` itself where it is none or dangles.
 Path BehindLinks(const Path& path) {
   std::error_code error;
   if (!std::filesystem::is_symlink(path, error)) return path;

@@ -8,7 +8,7 @@
 
 namespace tilegrad {
 
-// Held while it lives, and not longer than the process: killed, it is free again.
+// Held during its lifetime and released by the system if the process is killed.
 class FolderLock {
  public:
   FolderLock() = default;  // of nothing
@@ -19,8 +19,8 @@ class FolderLock {
     return *this;
   }
 
-  // Makes the folder and a file `.lock` in it. kInvalidArgument if another holds it. A file system
-  // without locks gives one of nothing.
+  // Makes the folder and a file `.lock` in it. kInvalidArgument if another process holds it. On a
+  // file system without locks the result locks nothing.
   static Result<FolderLock> Take(const Path& folder);
 
  private:

@@ -18,7 +18,7 @@ namespace tilegrad {
 
 class Hash {
  public:
-  // What is added apart gives another sum than what is added together.
+  // Adding in two parts gives another sum than adding at once.
   void Add(std::string_view bytes) {
     state_ = Mix64(state_ ^ bytes.size());
     while (!bytes.empty()) {

@@ -34,7 +34,7 @@ class InlineVector {
 
   void resize(std::size_t size) {
     if (size > N) {
-      // Moved: a copy that stayed behind would hold on to what its element holds.
+      // Moved: a copy left behind would keep its resources alive.
       if (size_ <= N) {
         many_.reserve(size);
         for (std::size_t i = 0; i < size_; ++i) many_.push_back(std::exchange(few_[i], T()));
@@ -55,7 +55,7 @@ class InlineVector {
 
  private:
   std::array<T, N> few_{};
-  std::vector<T> many_;  // all of them, where there are more than N
+  std::vector<T> many_;  // all elements, if there are more than N
   std::size_t size_ = 0;
 };
 

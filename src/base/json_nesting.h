@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON of strangers: the library that parses it, and whatever copies or writes the values, goes as
-// deep into the stack as they are nested.
+// Guards against deeply nested JSON: the parser, and any code that copies or writes the values,
+// recurses as deep as they are nested.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace tilegrad {
 
-// The byte whose bracket is the first one to lie within `most` others; npos if there is none. The
-// text need not be valid.
+// The position of the first bracket nested within `most` others; npos if there is none. The text
+// need not be valid.
 inline std::size_t FirstNestedDeeper(std::string_view json, int most) {
   int depth = 0;
   bool quoted = false;

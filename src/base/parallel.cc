@@ -38,8 +38,8 @@ cpu_set_t OnlyCore(const cpu_set_t& cores, int index) {
   return only;
 }
 
-// Binds every thread that enters the arena, the caller's too, to a core of its own, and gives it
-// all cores of the process back when it leaves.
+// Pins every thread that enters the arena, the caller's included, to a core of its own, and
+// restores the process's cores when it leaves.
 class PinningObserver : public tbb::task_scheduler_observer {
  public:
   explicit PinningObserver(tbb::task_arena& arena) : task_scheduler_observer(arena) {
@@ -61,13 +61,13 @@ class PinningObserver : public tbb::task_scheduler_observer {
   const cpu_set_t cores_ = CoresOfThread();
 };
 
-// The process that uses oneTBB, 0 before anybody does. A child that forks from it inherits oneTBB's
-// books but not its threads, and maybe locks that those held: there oneTBB must not be touched.
+// The process that uses oneTBB, 0 before any does. A forked child inherits oneTBB's bookkeeping,
+// but not its threads, and possibly locks that those held: it must not touch oneTBB.
 std::atomic<pid_t> tbb_process{0};
 
-bool TbbIsOfThisProcess() {
+bool ThisProcessOwnsTbb() {
 #ifdef __SANITIZE_THREAD__
-  // oneTBB is not built with ThreadSanitizer, which therefore cannot see how it hands over work.
+  // oneTBB is not built with ThreadSanitizer, which therefore cannot see its synchronisation.
   return false;
 #else
   const pid_t mine = getpid();
@@ -82,7 +82,7 @@ bool TbbIsOfThisProcess() {
 void AllowThreads(int count) {
   static std::mutex mutex;
   static int most = AvailableCores();
-  static tbb::global_control* limit = nullptr;  // is never ended: oneTBB may be gone by then
+  static tbb::global_control* limit = nullptr;  // never destroyed: oneTBB may be gone by then
   const std::lock_guard lock(mutex);
   if (count <= most) return;
   const auto* const before = limit;
@@ -92,15 +92,15 @@ void AllowThreads(int count) {
   most = count;
 }
 
-// The loop on threads of its own that the calling thread takes part in.
+// The fallback loop that the calling thread takes part in.
 struct OwnLoop {
   const Workers* workers = nullptr;
   std::size_t worker = 0;
 };
 thread_local OwnLoop own_loop;
 
-// In place of oneTBB: threads that live for one loop. `one_loop`: of the workers, for loops that
-// several threads of the caller begin.
+// Replaces oneTBB by threads that live for one loop. `one_loop`: mutex of the workers, for loops
+// that several threads of the caller begin.
 void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n,
                      FunctionRef<void(std::size_t, std::size_t)> task) {
   if (own_loop.workers == workers) {  // nested: on the thread that meets it
@@ -110,7 +110,7 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
   const std::lock_guard lock(*one_loop);
   std::atomic<std::size_t> next = 0;
   std::once_flag failed;
-  std::exception_ptr error;  // the first: no memory, which is the caller's to hear, as with oneTBB
+  std::exception_ptr error;  // the first (out of memory): rethrown to the caller, as oneTBB does
   const auto work = [&](std::size_t worker) {
     const OwnLoop outer = std::exchange(own_loop, {workers, worker});
     try {
@@ -127,7 +127,7 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
     threads.reserve(count);
     for (std::size_t w = 1; w < count; ++w) threads.emplace_back(work, w);
   } catch (...) {
-    // The system gives no more threads: those that are there do it.
+    // The system refuses more threads: those that exist do the work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
@@ -151,18 +151,18 @@ int AvailableCores() {
 }
 
 Workers::Workers(int count, Pinning pinning) : count_(count > 0 ? count : AvailableCores()) {
-  if (count_ > 1 && TbbIsOfThisProcess()) impl_ = std::make_unique<Impl>(count_, pinning);
+  if (count_ > 1 && ThisProcessOwnsTbb()) impl_ = std::make_unique<Impl>(count_, pinning);
 }
 
 Workers::~Workers() {
-  if (impl_ != nullptr && !TbbIsOfThisProcess()) static_cast<void>(impl_.release());
+  if (impl_ != nullptr && !ThisProcessOwnsTbb()) static_cast<void>(impl_.release());
 }
 
-bool Workers::HasArena() const { return impl_ != nullptr && TbbIsOfThisProcess(); }
+bool Workers::HasArena() const { return impl_ != nullptr && ThisProcessOwnsTbb(); }
 
 namespace {
 
-// The loop, by the threads of the arena that the calling one is in.
+// The loop, on the threads of the caller's arena.
 void ForInArena(std::size_t n, FunctionRef<void(std::size_t, std::size_t)> task) {
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, n, 1),
@@ -194,7 +194,7 @@ void Workers::Part::For(std::size_t n, FunctionRef<void(std::size_t, std::size_t
   if (parts_ == 1) {  // not in the arena
     workers_.For(n, task);
   } else if (n > 1 && waiting_.load(std::memory_order_relaxed) == 0 && workers_.HasArena()) {
-    // Not isolated: what may be taken meanwhile are tasks of loops like this one, which never wait.
+    // Not isolated: only tasks of loops like this one can be taken here, and those never wait.
     ForInArena(n, task);
   } else {
     for (std::size_t i = 0; i < n; ++i) task(i, worker_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads arrive as an argument: whoever computes is handed a Workers. This is the one home of
+// Threads are an argument: every computation receives a Workers. The one home of
 // oneTBB.
 #pragma once
 
@@ -12,15 +12,15 @@
 
 namespace tilegrad {
 
-// Whether each worker stays on one core while it works. Off by default: where other programs run, a
-// worker that may not move waits for its core, and so does everybody who waits for the worker.
+// Whether each worker is pinned to one core while it works. Off by default: where other programs
+// run, a pinned worker waits for its core, and everything that waits for the worker waits too.
 enum class Pinning { kOff, kOn };
 
 // A fixed number of workers. Copies nothing; two Workers are independent.
 //
-// They survive a fork: in a child of a process that used oneTBB, whose threads are not there, loops
-// start threads of their own, which costs some 20 microseconds for each thread and loop. Workers
-// that are in the middle of a loop when another thread forks are of no use to the child.
+// They survive a fork: a child of a process that used oneTBB lacks its threads, so loops there
+// start their own, at some 20 microseconds per thread and loop. Workers that are in the middle of a
+// loop when another thread forks are unusable in the child.
 class Workers {
  public:
   // count 0: one per core that this process may use.
@@ -50,25 +50,25 @@ class Workers {
    public:
     std::size_t worker() const { return worker_; }
 
-    // Workers::For within the task, but for what it says of nesting: `task` has no loops.
+    // As Workers::For, within the task; but `task` must not contain loops.
     void For(std::size_t n, FunctionRef<void(std::size_t index, std::size_t worker)> task) const;
 
    private:
     friend class Workers;
     const Workers& workers_;
     std::size_t worker_, parts_;
-    const std::atomic<std::size_t>& waiting_;  // parts that nobody has taken
+    const std::atomic<std::size_t>& waiting_;  // parts that no worker has taken
 
     Part(const Workers& workers, std::size_t worker, std::size_t parts,
          const std::atomic<std::size_t>& waiting)
         : workers_(workers), worker_(worker), parts_(parts), waiting_(waiting) {}
   };
 
-  // For where tasks are few and long, so that the last ones would leave workers idle: as long as
-  // some wait to be taken, a worker goes through the loops (Part::For) of its task alone; then
-  // workers without a task take part in them. A worker that waits for the end of such a loop may
-  // run what the loops of other tasks call. So what one loop leaves for the next must be in memory
-  // of the task, not in scratch by worker index that such calls write.
+  // For few, long tasks, whose last ones would leave workers idle. While tasks are waiting, a
+  // worker runs the loops (Part::For) of its task alone; after that, idle workers join in. A worker
+  // that waits for the end of such a loop may run iterations of other tasks' loops. So data that
+  // one loop leaves for the next must lie in memory of the task, not in scratch by worker index
+  // that such iterations write.
   void ForParts(std::size_t n, FunctionRef<void(std::size_t index, const Part& part)> task) const;
 
  private:

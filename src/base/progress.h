@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long work reports on itself and is asked to stop, without the library printing or catching
+// Progress and cancellation of long-running work, without the library printing or catching
 // signals.
 #pragma once
 
@@ -21,7 +21,7 @@ struct Progress {
 // draws.
 using ProgressSink = std::function<void(const Progress&)>;
 
-// Told at once of what went wrong and was got over: the work may be stopped before it ends.
+// Told at once of problems that were worked around: the work may be stopped before it ends.
 using WarningSink = std::function<void(const std::string&)>;
 
 // Set from a signal handler or another thread; long work looks at it between units, saves, and

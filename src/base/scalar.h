@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lets one scalar template serve float, double and std::complex<double>: every decision is
-// taken on the real part, so a complex step follows the branch of its base point.
+// Lets one scalar template serve float, double and std::complex<double>: every decision is taken on
+// the real part, so a complex step follows the branch of its base point.
 #pragma once
 
 #include <complex>

@@ -14,8 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace tilegrad::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// first, first + 1, ... by lanes. hn::Iota of a number that is not constant goes through memory,
-// number by number, and then waits for it.
+// first, first + 1, ... by lanes. hn::Iota of a variable goes through memory, element by element,
+// and stalls on the load.
 template <class D>
 HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
   return hn::Add(hn::Iota(d, 0), hn::Set(d, first));
@@ -23,7 +23,7 @@ HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
 
 // 2^-z and 1 - 2^-z.
 template <class V>
-struct Halving {
+struct Exp2NegPair {
   V power;
   V one_minus;
 };
@@ -36,7 +36,7 @@ struct Halving {
 //
 // with an interpolant q of degree 5 (relative error of 1 + p: 1e-8).
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE Halving<V> HalvingOf(D d, V z) {
+HWY_INLINE Exp2NegPair<V> Exp2Neg(D d, V z) {
   const hn::RebindToSigned<D> di;
   const V most = hn::Min(z, hn::Set(d, 127.0f));
   // Adding 1.5 2^23 rounds to an integer, whose bits are then the lowest ones.

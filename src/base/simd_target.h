@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which instruction set runs. Kernels are compiled for several Highway targets and the best one the
+// The instruction set in use. Kernels are compiled for several Highway targets and the best one the
 // CPU has is taken at the first call; TILEGRAD_TARGET=AVX2 (say) in the environment forces one,
 // which makes results reproducible across machines.
 #pragma once

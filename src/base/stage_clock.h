@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time of the stages of a task, one after the other.
+// Times the successive stages of a task.
 #pragma once
 
 #include <chrono>

@@ -29,8 +29,8 @@ std::optional<pid_t> WriterOf(const Path& file) {
   return error == std::errc() && at == end && writer > 0 ? std::optional(writer) : std::nullopt;
 }
 
-// A file with our own number is of one that had it before: in a container each run may have it.
-bool IsOfAnother(pid_t writer) {
+// A file with our own number is from an earlier process: in a container every run may get it.
+bool IsRunningElsewhere(pid_t writer) {
   return writer != ::getpid() && (::kill(writer, 0) == 0 || errno == EPERM);
 }
 
@@ -54,7 +54,7 @@ void RemoveAll(const Path& folder, const IsWanted& is_wanted) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::optional<pid_t> writer = WriterOf(entry.path());
-    if (!writer || IsOfAnother(*writer) || !entry.is_regular_file(error)) continue;
+    if (!writer || IsRunningElsewhere(*writer) || !entry.is_regular_file(error)) continue;
     if (is_wanted(entry.path().stem().stem().string())) {
       std::filesystem::remove(entry.path(), error);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files under a name of their own until they are whole, and what a killed process left of them.
+// Temporary names of files that are being written, and removal of those a killed process left.
 #pragma once
 
 #include <span>
@@ -13,10 +13,10 @@ namespace tilegrad {
 // of a name that would become too long.
 Path TemporaryOf(const Path& path);
 
-// Removes temporaries from `folder`, not from folders in it. Those of processes that still run
-// stay. For who works alone in the folder; what cannot be removed stays.
+// Removes temporaries from `folder`, not from its subfolders, unless their process still runs. The
+// caller must be alone in the folder. Files that cannot be removed stay.
 void RemoveTemporaries(const Path& folder);
-// Only those of files of these names: for folders that hold what is not ours, too.
+// Only those of files with these names: for folders that also hold other programs' files.
 void RemoveTemporaries(const Path& folder, std::span<const std::string> names);
 
 }  // namespace tilegrad

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// AC3D text (.ac), as FlightGear's models use it. Read here and not by Assimp, whose reader runs
-// out of memory, stack or array bounds where counts lie. Surfaces keep the order of their corners;
-// crease angles and subdivision are left to whoever draws.
+// AC3D text (.ac), as FlightGear's models use it. Not read by Assimp, whose reader exhausts memory,
+// overflows the stack or leaves array bounds on wrong counts. Surfaces keep the order of their
+// corners; crease angles and subdivision are ignored.
 #include <glm/mat4x4.hpp>
 #include <map>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMaxDepth = 256;  // objects are read recursively
 
-// The next token, or what stands between quotes, which may hold spaces.
+// The next token, or a quoted string, which may contain spaces.
 std::string_view NextString(std::string_view& rest) {
   const auto begin = rest.find_first_not_of(" \t");
   if (begin == std::string_view::npos || rest[begin] != '"') return NextToken(rest);

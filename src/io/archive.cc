@@ -73,7 +73,7 @@ struct ZipCloser {
 };
 using ZipHandle = std::unique_ptr<zip_t, ZipCloser>;
 
-// What libzip would wait for, a pipe without a writer, or call a damaged archive.
+// Refuses what libzip would wait for (a pipe without a writer) or call a damaged archive.
 Status CheckRegularFile(const Path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0 && errno == ENOENT) return {};
@@ -144,7 +144,7 @@ class Zip : public FileSource {
     const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
         zip_fopen_index(zip_.get(), index, 0), &zip_fclose);
     if (!file) return DataLoss("{}: {}", Describe(name), zip_strerror(zip_.get()));
-    // Grown as data arrives: a header that lies about the size costs no memory.
+    // Grows as data arrives: a header with a false size costs no memory.
     Bytes out;
     constexpr std::size_t kChunk = std::size_t{1} << 20;
     while (out.size() < size) {

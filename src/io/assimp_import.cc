@@ -146,8 +146,8 @@ ImportedScene ConvertScene(const aiScene& from) {
   return scene;
 }
 
-// Says what a part really holds. Some importers claim polygons where there are lines only, upon
-// which triangulation aborts the program.
+// Sets the primitive types that a part really holds. Some importers claim polygons where there are
+// only lines, on which triangulation aborts the program.
 void CorrectPrimitiveTypes(const aiScene& scene) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     aiMesh& part = *scene.mMeshes[m];
@@ -170,7 +170,7 @@ Result<ImportedScene> ImportByAssimp(const std::string& name, const Bytes& file,
       return DataLoss("{}", importer->GetErrorString());
     return ConvertScene(*scene);
   } catch (const std::bad_alloc&) {
-    throw;                                 // the guard's to report
+    throw;                                 // RunGuarded reports it
   } catch (const std::exception& error) {  // Assimp's importers throw on some broken files
     return DataLoss("{}", error.what());
   }

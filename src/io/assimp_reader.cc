@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes by Assimp, which works in a process of its own; what it hands over becomes a mesh here.
+// Meshes by Assimp, which runs in a process of its own; its result becomes a mesh here.
 #include <algorithm>
 #include <cstring>
 #include <glm/mat3x3.hpp>
@@ -117,8 +117,8 @@ class Assembly {
   const FileSource& source_;
   const std::string& name_;
   LoadedMesh out_;
-  std::vector<std::optional<int>> images_;          // texture of each image that was asked for
-  std::vector<std::optional<Material>> materials_;  // those that were asked for
+  std::vector<std::optional<int>> images_;          // texture of each image that is used
+  std::vector<std::optional<Material>> materials_;  // those that are used
 };
 
 std::optional<Bytes> Answer(const FileSource& source, std::string_view question) {

@@ -9,8 +9,8 @@
 //               {"name": "0002", "R": [[...]], "t": [...]},
 //               {"name": "0003", "rvec": [...], "tvec": [...], "K": ..., "width": ...}]}
 //
-// What a frame does not say is taken from the top; a file without "frames" is one camera. Lens
-// distortion is refused with a word on how to get rid of it: rays here are straight.
+// What a frame omits is taken from the top level; a file without "frames" is one camera. Lens
+// distortion is an error that explains how to remove it: the renderer's rays are straight.
 #pragma once
 
 #include <span>

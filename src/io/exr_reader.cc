@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// EXR in. Between the process that reads and this one go bytes: 'E' and a message, or 'I', width,
-// height, the number of channels, their names, each ended by 0, and the values.
+// Reads EXR. The reading process sends bytes to this one: 'E' and a message, or 'I', width, height,
+// the number of channels, their names, each terminated by 0, and the values.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -68,7 +68,7 @@ Status CheckHeader(const Imf::Header& header, const GuardLimits& limits) {
   if (channels < 1 || channels > kMaxChannels)
     return DataLoss("{} channels; 1 to {} are read", channels, kMaxChannels);
   const auto bytes = static_cast<std::size_t>(4 * width * height * channels);
-  if (bytes > limits.memory_bytes / 4)  // the library and the hand-over need room too
+  if (bytes > limits.memory_bytes / 4)  // the library and the transfer need room too
     return ResourceExhausted("{} x {} x {} numbers are too many", width, height, channels);
   return {};
 }
@@ -108,7 +108,7 @@ Bytes ReadPixels(Imf::InputFile& in) {
   return out;
 }
 
-// In the process of its own.
+// Runs in the child process.
 Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits) {
   try {  // the library throws
     MemoryInput stream(bytes);
@@ -122,7 +122,7 @@ Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits
   }
 }
 
-// From bytes that nobody vouches for.
+// From untrusted bytes.
 Result<LoadedExr> FromChild(std::span<const std::uint8_t> bytes) {
   const Status damaged = DataLoss("the reader returned no whole image");
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());

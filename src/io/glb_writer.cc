@@ -190,7 +190,7 @@ Json SamplerJson(const TextureUse& use) {
 void AddTextures(GlbBuilder& glb, const std::vector<TextureUse>& uses) {
   for (const TextureUse& use : uses) {
     Json texture = {{"source", use.image}};
-    if (use != TextureUse{.image = use.image}) {  // a viewer's own choice does otherwise
+    if (use != TextureUse{.image = use.image}) {  // viewers' defaults suffice otherwise
       glb.json["samplers"].push_back(SamplerJson(use));
       texture["sampler"] = glb.json["samplers"].size() - 1;
     }

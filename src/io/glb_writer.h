@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes out, as binary glTF 2.0, which every viewer opens.
+// Writes meshes as binary glTF 2.0, which every viewer opens.
 #pragma once
 
 #include "base/file.h"

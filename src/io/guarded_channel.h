@@ -64,6 +64,6 @@ struct ChildSetup {
 enum ChildExit { kChildDone = 0, kChildThrew = 80, kChildOutOfMemory, kChildCannotDeliver };
 
 // The whole life of the child after the fork. Expects all signals blocked.
-[[noreturn]] void LiveAsChild(const ChildSetup& setup, ChildFunction run) noexcept;
+[[noreturn]] void RunChildProcess(const ChildSetup& setup, ChildFunction run) noexcept;
 
 }  // namespace tilegrad::io

@@ -30,7 +30,7 @@ void SeparateFromParent(int parent_pid) {
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Nothing is read or printed, and no descriptor of the parent stays open but the two.
+// Closes or redirects every descriptor of the parent but two: nothing is read or printed.
 void CloseDescriptors(int a, int b) {
   const int null = ::open("/dev/null", O_RDWR);
   for (int stream = 0; stream <= STDERR_FILENO; ++stream) ::dup2(null, stream);
@@ -49,8 +49,8 @@ void Limit(decltype(RLIMIT_CPU) resource, rlim_t soft, rlim_t hard) {
   ::setrlimit(resource, &limit);
 }
 
-// If memory runs out all the same, the system takes the child rather than the parent.
-void BeFirstToGo() {
+// If memory runs out all the same, the system kills the child rather than the parent.
+void VolunteerForOutOfMemoryKill() {
   const int file = ::open("/proc/self/oom_score_adj", O_WRONLY);
   if (file < 0) return;
   if (::write(file, "1000", 4) < 0) errno = 0;  // where /proc is read-only, it stays as it was
@@ -58,7 +58,7 @@ void BeFirstToGo() {
 }
 
 void SetLimits(const ChildSetup& setup) {
-  BeFirstToGo();
+  VolunteerForOutOfMemoryKill();
   ::prctl(PR_SET_DUMPABLE, 0);  // a crash is expected and leaves no core
   Limit(RLIMIT_CORE, 0, 0);
   const auto cpu = static_cast<rlim_t>(setup.limits.cpu_seconds);
@@ -106,7 +106,7 @@ ChildExit Run(const ChildSetup& setup, ChildFunction run) {
 
 }  // namespace
 
-void LiveAsChild(const ChildSetup& setup, ChildFunction run) noexcept {
+void RunChildProcess(const ChildSetup& setup, ChildFunction run) noexcept {
   SeparateFromParent(setup.parent_pid);
   CloseDescriptors(setup.socket, setup.mailbox.fd());
   SetLimits(setup);

@@ -152,7 +152,7 @@ Status TooMuchMemory(const GuardLimits& limits) {
   return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
 }
 
-// The mailbox is a file to the system: whoever started this process may have limited its size.
+// The mailbox counts as a file: the size limit of this process's files applies to it.
 Status TooLargeAResult(const GuardLimits& limits) {
   rlimit own = {};
   if (::getrlimit(RLIMIT_FSIZE, &own) != 0 || own.rlim_max >= limits.memory_bytes) {
@@ -162,7 +162,7 @@ Status TooLargeAResult(const GuardLimits& limits) {
                  own.rlim_max);
 }
 
-Status OfSignal(int signal, const GuardLimits& limits) {
+Status StatusOfSignal(int signal, const GuardLimits& limits) {
   if (signal == SIGXCPU)
     return DataLoss("took more than {} s of processor time", limits.cpu_seconds);
   if (signal == SIGXFSZ) return TooLargeAResult(limits);
@@ -170,8 +170,8 @@ Status OfSignal(int signal, const GuardLimits& limits) {
   return DataLoss("crashed ({})", name == nullptr ? "unknown signal" : name);
 }
 
-Status OfEnd(int status, const GuardLimits& limits) {
-  if (WIFSIGNALED(status)) return OfSignal(WTERMSIG(status), limits);
+Status StatusOfExit(int status, const GuardLimits& limits) {
+  if (WIFSIGNALED(status)) return StatusOfSignal(WTERMSIG(status), limits);
   const int code = WEXITSTATUS(status);
   if (code == kChildDone) return {};
   if (code == kChildOutOfMemory) return TooMuchMemory(limits);
@@ -190,13 +190,13 @@ Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLi
   {
     const BlockedSignals blocked;  // no handler of ours may run in the child
     pid = ::fork();
-    if (pid == 0) LiveAsChild(setup, run);
+    if (pid == 0) RunChildProcess(setup, run);
   }
   if (pid < 0) return ResourceExhausted("could not be started: {}", std::strerror(errno));
   sockets.child.Close();
   Child child(pid);
   TILEGRAD_TRY(Guard(child, std::move(sockets.parent), mailbox, answer, limits).Watch());
-  TILEGRAD_TRY(OfEnd(child.status(), limits));
+  TILEGRAD_TRY(StatusOfExit(child.status(), limits));
   auto result = mailbox.Get(limits.memory_bytes);
   if (!result) return DataLoss("returned an incomplete result");
   return std::move(*result);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a function that may crash, hang or eat memory in a child process, and gets bytes back.
+// Runs a function that may crash, hang or exhaust memory in a child process, and gets bytes back.
 //
 // The child is a fork without exec of a process that may have other threads, none of which exist
 // in it: the function must not use Workers, nor any lock that another thread may have held at that

@@ -63,7 +63,7 @@ bool HuffmanTablesFit(ByteSpan segment) {
 }
 
 // Markers without a segment: TEM, RST0 to RST7, SOI.
-bool StandsAlone(int marker) { return marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8); }
+bool HasNoSegment(int marker) { return marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8); }
 
 // The position of the next marker's code: after 0xff that is neither stuffed (0x00) nor filler.
 std::size_t NextMarker(ByteSpan bytes, std::size_t at) {
@@ -79,7 +79,7 @@ Status CheckJpeg(ByteSpan bytes, const std::string& name) {
   for (; at < bytes.size(); at = NextMarker(bytes, at)) {
     const int marker = bytes[at++];
     if (marker == kEndOfImage) return {};
-    if (StandsAlone(marker)) continue;
+    if (HasNoSegment(marker)) continue;
     const std::size_t length = bytes.size() - at < 2 ? 0 : bytes[at] << 8 | bytes[at + 1];
     if (length < 2 || length > bytes.size() - at) {
       return DataLoss(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: what stb_image lets pass. It compares no PNG checksum, so that a changed header
-// gives a garbled picture, fills the missing part of a cut JPEG with grey, and that of other
-// formats with whatever was in memory.
+// Internal to io: checks that stb_image omits. It ignores PNG checksums, so that a corrupt header
+// gives a garbled picture; it fills the missing part of a truncated JPEG with grey, and that of
+// other formats with whatever was in memory.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to io: what an Assimp importer found in a file, as the process that ran it hands it
-// over. Plain data, no Assimp type.
+// Internal to io: what an Assimp importer found in a file, as sent by the process that ran it.
+// Plain data, no Assimp type.
 #pragma once
 
 #include <array>
@@ -55,7 +55,7 @@ struct ImportedScene {
 // A scene, or why there is none, as bytes of one version of this program.
 Bytes EncodeScene(const Result<ImportedScene>& scene);
 
-// The other way, from bytes that nobody vouches for: every count is checked against what is left
+// Decodes untrusted bytes: every count is checked against what is left
 // before anything is allocated, every index against what it points into. Whether numbers are finite
 // is left to Validate (scene/mesh.h). Errors: that of the encoded Result, or kDataLoss.
 Result<ImportedScene> DecodeScene(std::span<const std::uint8_t> bytes);

@@ -22,7 +22,7 @@ Result<json> ReadJson(const Path& file) {
   return parsed;
 }
 
-// A frame of a file: what it does not say is said at the top.
+// A frame of a file: what it omits is taken from the top level.
 struct Frame {
   const json& frame;
   const json& top;
@@ -147,7 +147,7 @@ Result<CameraView> Named(std::string name, const Result<Camera64>& camera, Image
   return CameraView{std::move(name), *camera, size};
 }
 
-// The focal length across `pixels`: said in pixels, or by the whole field of view in radians.
+// The focal length across `pixels`: given in pixels, or as the whole field of view in radians.
 Result<double> NerfFocal(const Frame& frame, const char* focal, const char* angle, int pixels) {
   if (frame.Find(focal) != nullptr) return frame.Number(focal);
   TILEGRAD_ASSIGN(const double radians, frame.Number(angle));
@@ -261,7 +261,7 @@ Status SaveNerfCameras(const Path& file, std::span<const CameraView> views) {
                       {"transform_matrix", Rows(c.camera_to_world, 4)}});
   }
   json top{{"camera_model", "PINHOLE"}, {"frames", frames}};
-  if (!views.empty()) {  // readers of the first datasets know nothing else
+  if (!views.empty()) {  // the only keys that readers of the first datasets know
     top["camera_angle_x"] = 2 * std::atan(0.5 * views[0].size.width / views[0].camera.fx);
   }
   return WriteTextAtomic(file, top.dump(1) + "\n");

@@ -21,7 +21,7 @@ struct MeshFileCamera {
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
               // transforms applied, polygons split, normals unit, colours in [0, 1]
-  std::vector<std::string> warnings;    // what was missing or left out and what stands in for it
+  std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stanford PLY, text and binary of both byte orders. Read here and not by Assimp, whose reader runs
-// out of the file where its header or a list lies.
+// Stanford PLY, text and binary of both byte orders. Not read by Assimp, whose reader reads past
+// the end of a file with a wrong header or list.
 #include <algorithm>
 #include <array>
 #include <bit>

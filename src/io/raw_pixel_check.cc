@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BMP and TGA: are the pixels there? Positions are where stb_image 2.27 reads them.
+// BMP and TGA: checks that the pixels are there. Positions are where stb_image 2.27 reads them.
 #include <algorithm>
 
 #include "base/error.h"

@@ -21,8 +21,8 @@ namespace tilegrad::nn {
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-// Addresses are plenty and cost nothing until they are used; where a process may have less, less
-// is asked for, down to this.
+// Address space is plentiful and free until used. If a limit forbids this much, smaller ranges are
+// tried, down to this.
 constexpr std::size_t kMostAddresses = std::size_t{64} << 30;
 constexpr std::size_t kFewestAddresses = std::size_t{64} << 20;
 
@@ -38,7 +38,7 @@ void* Reserve(std::size_t bytes) {
 }  // namespace
 
 std::size_t AddressArena::Rounded(std::size_t bytes) {
-  // Of large ranges whole pages, so that fewer remainders are left.
+  // Large ranges are rounded to whole pages, so that fewer remainders are left.
   constexpr std::size_t kLarge = std::size_t{1} << 18, kPage = 4096;
   return RoundUpTo(std::max<std::size_t>(bytes, 1), bytes >= kLarge ? kPage : kAlignment);
 }
@@ -58,7 +58,7 @@ AddressArena::FreeRanges::iterator AddressArena::BestFit(std::size_t size) {
   return best;
 }
 
-std::byte* AddressArena::Take(std::size_t bytes) {
+std::byte* AddressArena::Allocate(std::size_t bytes) {
   const std::size_t size = Rounded(bytes);
   std::byte* data = nullptr;
   if (const auto fit = BestFit(size); fit != free_.end()) {
@@ -73,7 +73,7 @@ std::byte* AddressArena::Take(std::size_t bytes) {
   return data;
 }
 
-// What is free at the end of the last region, and as much more as is missing.
+// Takes what is free at the end of the last region, plus as much as is missing.
 std::byte* AddressArena::Grow(std::size_t size) {
   ++growths_;
   if (regions_.empty() || regions_.back().reserved - regions_.back().used < size) AddRegion(size);
@@ -111,12 +111,12 @@ void AddressArena::AddRegion(std::size_t bytes) {
   }
   if (memory == MAP_FAILED) throw std::bad_alloc();
   // Fewer page faults at the start, fewer TLB misses in every pass over weights and activations.
-  // Advice only: where the system does not follow it, nothing changes but speed.
+  // Advice only: if the system ignores it, only speed suffers.
   madvise(memory, size, MADV_HUGEPAGE);
   regions_.push_back({static_cast<std::byte*>(memory), size, 0, 0});
 }
 
-void AddressArena::Give(std::byte* data, std::size_t bytes) {
+void AddressArena::Free(std::byte* data, std::size_t bytes) {
   bytes = Rounded(bytes);
   ASAN_POISON_MEMORY_REGION(data, bytes);
   auto next = free_.lower_bound(data);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ranges of memory out of one long range of addresses: the smallest free range that fits is taken,
-// and neighbours that are free join again. So the memory of activations serves gradients of other
-// sizes next, which blocks of fixed sizes cannot.
+// A best-fit allocator in one long range of addresses: it takes the smallest free range that fits
+// and merges free neighbours. So the memory of activations can serve gradients of other sizes,
+// which size classes could not do.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace tilegrad::nn {
 
-// Not thread-safe. Equal sequences of calls from equal states do the same: a training step that
-// begins where the one before began needs no more memory.
+// Not thread-safe. Equal sequences of calls from equal states behave equally: a training step that
+// starts in the state of the one before needs no more memory.
 class AddressArena {
  public:
   AddressArena() = default;
@@ -21,14 +21,14 @@ class AddressArena {
   AddressArena(const AddressArena&) = delete;
   AddressArena& operator=(const AddressArena&) = delete;
 
-  static std::size_t Rounded(std::size_t bytes);  // what Take really takes
+  static std::size_t Rounded(std::size_t bytes);  // what Allocate really takes
   // Uninitialised, aligned to kAlignment. Throws std::bad_alloc where the system has no memory, as
   // operator new does, and is as before then.
-  std::byte* Take(std::size_t bytes);
-  void Give(std::byte* data, std::size_t bytes);  // of Take(bytes)
-  void Trim();                                    // lets the system have what is free
+  std::byte* Allocate(std::size_t bytes);
+  void Free(std::byte* data, std::size_t bytes);  // of Allocate(bytes)
+  void Trim();                                    // returns free memory to the system
 
-  std::size_t held() const { return held_; }        // memory that was taken once, or is
+  std::size_t held() const { return held_; }        // memory that is or ever was in use
   std::size_t growths() const { return growths_; }  // how often held() had to grow
 
  private:

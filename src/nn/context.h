@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every computation of this library is handed: workers, memory, the number type, and the place
-// where errors are noted. There are no globals; two contexts are independent, and an operation
-// whose operands are of two is an error.
+// The environment of every computation of this library: workers, memory, the number type, and the
+// place where errors are recorded. There are no globals; contexts are independent, and mixing
+// operands of two is an error.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ namespace tilegrad::nn {
 
 // Belongs to one thread at a time (operations themselves run on all workers).
 //
-// Errors: an operation whose operands do not fit notes the reason here and returns an invalid Var;
-// operations on invalid Vars return invalid Vars. So formulas stay formulas, and one look at
-// status() after a step, or before its result is used, sees the first thing that went wrong.
+// Errors: an operation whose operands do not fit records the reason here and returns an invalid
+// Var; operations on invalid Vars return invalid Vars. So formulas need no error handling:
+// status(), checked once per step or before its result is used, holds the first error.
 class Context {
  public:
   // `workers` must outlive the context. `dtype` (kF32 or kF64) is that of the parameters which
@@ -32,7 +32,7 @@ class Context {
 
   const Workers& workers() const { return workers_; }
   KernelContext kernels() { return {workers_, scratch_, winograd_}; }
-  // Whether convolutions may use kernels/conv2d/conv2d_winograd.h (they do unless told otherwise).
+  // Whether convolutions may use kernels/conv2d/winograd.h (they do unless told otherwise).
   void set_winograd(bool on) { winograd_ = on; }
   DType dtype() const { return dtype_; }
 
@@ -47,7 +47,7 @@ class Context {
   Tensor Copy(const Tensor& tensor) const;                     // storage of its own
 
   MemoryPool& memory() const { return *pool_; }
-  // For the small things of a step (step_memory.h).
+  // For the small objects of a step (step_memory.h).
   template <class T>
   StepAllocator<T> allocator() const {
     return StepAllocator<T>(step_memory_);
@@ -88,7 +88,7 @@ class RecordingScope {
   bool before_;
 };
 
-// Evaluation without memory for a way back: { NoGrad off(context); ... }
+// Evaluation that keeps nothing for a backward pass: { NoGrad off(context); ... }
 class NoGrad : public RecordingScope {
  public:
   explicit NoGrad(Context& context) : RecordingScope(context, false) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values that parameters start with. The stream of random numbers is the caller's, so equal seeds
+// Initial values of parameters. The stream of random numbers is the caller's, so equal seeds
 // give equal networks for any number of workers.
 #pragma once
 

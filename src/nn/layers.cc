@@ -96,7 +96,7 @@ Var Spectral::Normalised(const Var& weight, Mode mode) {
   if (u_.empty()) return weight;
   const Var by_output = transposed_ ? Swapped(weight) : weight;
   if (mode == Mode::kTrain) SpectralStep(by_output, u_);
-  // A copy: what this pass records must not see the steps of later ones.
+  // A copy: the graph recorded by this pass must not see later iterations.
   const Var normalised = SpectralNorm(by_output, weight.context().Copy(u_));
   return transposed_ ? Swapped(normalised) : normalised;
 }
@@ -183,8 +183,7 @@ void GroupNormLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
 }
 
 Var Upsample::Forward(const Var& x, Mode) {
-  if (!x.valid() || x.shape().rank() != 4)
-    return Resize(x, {0, 0}, mode_);  // which says what is wrong
+  if (!x.valid() || x.shape().rank() != 4) return Resize(x, {0, 0}, mode_);  // reports the error
   return Resize(x, {2 * x.shape()[2], 2 * x.shape()[3]}, mode_);
 }
 

@@ -29,7 +29,7 @@ struct NamedVar {
   Var value;
 };
 
-// Is shown every parameter (trained) and every buffer (saved, not trained) of a module.
+// Visits every parameter (trained) and every buffer (saved, not trained) of a module.
 class ModuleVisitor {
  public:
   virtual ~ModuleVisitor() = default;
@@ -58,8 +58,8 @@ struct LinearShape {
   bool bias = true;
 };
 
-// A weight that is used divided by its largest singular value (SpectralNorm of ops/norm.h), which
-// one power iteration at each training step follows. The buffer is "spectral_u".
+// A weight divided by its largest singular value (SpectralNorm of ops/norm.h), which one power
+// iteration per training step tracks. The buffer is "spectral_u".
 class Spectral {
  public:
   Spectral() = default;  // none: leaves weights as they are
@@ -91,7 +91,7 @@ struct ConvShape {
   bool spectral = false;  // spectral norm of the weight
 };
 
-// What the two convolutions share.
+// Common base of the two convolutions.
 class ConvLayer : public Module {
  public:
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;

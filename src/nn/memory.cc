@@ -19,7 +19,7 @@ struct Block {
 };
 
 struct MemoryPool::State {
-  // Small tensors live apart, so that they do not lie between large ones.
+  // Small tensors have an arena of their own, so that they do not fragment that of large ones.
   AddressArena& ArenaOf(std::size_t bytes) {
     constexpr std::size_t kLarge = std::size_t{256} << 10;
     return bytes < kLarge ? small : large;
@@ -65,7 +65,7 @@ BlockRef MemoryPool::Allocate(std::size_t bytes) {
     state_->unused.reserve(state_->blocks.size());
   }
   Block* block = state_->unused.back();
-  block->data = state_->ArenaOf(bytes).Take(bytes);  // or throws
+  block->data = state_->ArenaOf(bytes).Allocate(bytes);  // or throws
   state_->unused.pop_back();
   block->bytes = bytes;
   stats.live_bytes += AddressArena::Rounded(bytes);
@@ -78,7 +78,7 @@ BlockRef MemoryPool::Allocate(std::size_t bytes) {
 void MemoryPool::Release(Block* block) {
   const std::lock_guard lock(state_->mutex);
   state_->stats.live_bytes -= AddressArena::Rounded(block->bytes);
-  state_->ArenaOf(block->bytes).Give(block->data, block->bytes);
+  state_->ArenaOf(block->bytes).Free(block->data, block->bytes);
   state_->unused.push_back(block);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory of tensors: reference-counted blocks that go back to a pool, so that a training step which
-// repeats the sizes of the one before takes nothing from the heap.
+// Memory of tensors: reference-counted blocks that return to a pool, so that a training step with
+// the same sizes as the one before allocates nothing from the heap.
 #pragma once
 
 #include <cstddef>
@@ -41,8 +41,8 @@ class BlockRef {
   Block* block_ = nullptr;
 };
 
-// Blocks are ranges of one arena (address_arena.h): the second or third round of an equal sequence
-// of requests is free of misses. Thread-safe. Blocks may outlive every other owner of the pool.
+// Blocks are ranges of one arena (address_arena.h): when a sequence of requests repeats, its second
+// or third round has no misses. Thread-safe. Blocks may outlive every other owner of the pool.
 class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
  public:
   static std::shared_ptr<MemoryPool> Make();
@@ -52,7 +52,7 @@ class MemoryPool : public std::enable_shared_from_this<MemoryPool> {
 
   // Uninitialised, aligned to kAlignment, at least `bytes` long.
   BlockRef Allocate(std::size_t bytes);
-  void Trim();  // lets the system have the memory of what is free
+  void Trim();  // returns free memory to the system
   void ResetPeak();
   MemoryStats stats() const;
 

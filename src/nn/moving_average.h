@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exponential moving average of weights: what a network is evaluated with is smoother than what it
-// is trained with.
+// Exponential moving average of weights, for evaluation: smoother than the weights in
+// training.
 //
 //   MovingAverage average(context, State(net), 0.999);
 //   ... each step:      average.Update();

@@ -65,7 +65,7 @@ struct AdamOptions {
   double beta2 = 0.999;
   double epsilon = 1e-8;  // added to sqrt(v / (1 - beta2^t)), as PyTorch does
   // AdamW (Loshchilov, Hutter 2019): each step also takes learning_rate * weight_decay of a
-  // parameter away. Biases and norms, which are of rank 1, do not decay.
+  // parameter away. Biases and norm parameters, which have rank 1, do not decay.
   double weight_decay = 0;
 };
 
@@ -109,12 +109,12 @@ class Sgd : public Optimizer {
   double gradient_scale_ = 1;
 };
 
-// Square root of the sum of all squares, summed in double and in a fixed order. Not finite where a
-// gradient is not: look before you step.
+// Square root of the sum of all squares, summed in double and in a fixed order. Not finite if a
+// gradient is not: check it before a step.
 double GlobalNorm(Context& context, std::span<const Var> gradients);
 double GlobalNorm(Context& context, std::span<const Gradient> gradients);  // computes products
-// Whether GlobalNorm is finite. A product is only computed to find out where its factors are not
-// small enough for the inequality of Cauchy and Schwarz to tell.
+// Whether GlobalNorm is finite. Computes a product only if its factors are too large for the
+// Cauchy-Schwarz inequality to decide.
 bool IsFinite(Context& context, std::span<const Gradient> gradients);
 // The factor that brings a norm above `max_norm` down to it: min(1, max_norm / norm).
 double ClipFactor(double norm, double max_norm);

@@ -17,7 +17,7 @@ namespace tilegrad::nn {
 namespace {
 
 using Json = nlohmann::json;
-using OrderedJson = nlohmann::ordered_json;  // slow to search: for writing only
+using OrderedJson = nlohmann::ordered_json;  // slow to search: only for writing
 
 constexpr std::size_t kLengthBytes = 8;
 constexpr std::size_t kMaxHeader = 100u << 20;  // the format's own limit

@@ -19,8 +19,8 @@ struct TensorFile {
   std::map<std::string, std::string> metadata;  // the header's "__metadata__"
 };
 
-// Of dtypes F32, F64, U8, I32 and I64. Every claim of the header (lengths, offsets, shapes) is held
-// against the file before memory is taken; a file that lies or is cut short gives kDataLoss, whose
+// Reads dtypes F32, F64, U8, I32 and I64. Checks every length, offset and shape in the header
+// against the file before it allocates; an inconsistent or truncated file gives kDataLoss, whose
 // message names the tensor.
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes);
 Result<TensorFile> ReadSafetensors(Context& context, const Path& path);

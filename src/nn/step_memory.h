@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory of the small things that every training step makes and forgets: nodes of the graph, lists
-// of Vars. It goes back to a pool, so that a step which repeats the one before takes nothing from
-// the heap. Tensors have a pool of their own: memory.h.
+// Memory of the small objects that every training step creates and drops: graph nodes, lists of
+// Vars. It returns to a pool, so that a step like the one before allocates nothing from the heap.
+// Tensors have a pool of their own: memory.h.
 #pragma once
 
 #include <cstddef>

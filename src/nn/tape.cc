@@ -65,7 +65,7 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
   const Var& first = **operands.begin();
   for (const Var* v : operands) {
     if (v->has_context() && first.has_context() && &v->context() != &first.context()) {
-      // Memory, errors and whether anything is recorded are of a context: two would each know half.
+      // Memory, errors and recording belong to a context: with two, each would know half.
       for (Context* of : {&first.context(), &v->context()}) {
         of->Fail(InvalidArgument("{}: operands are of two contexts; copy one's tensor", op));
       }
@@ -82,7 +82,7 @@ bool Usable(const char* op, std::initializer_list<const Var*> operands) {
   return true;
 }
 
-bool Makeable(const char* op, const Var& operand, const Shape& result) {
+bool IsPossibleResult(const char* op, const Var& operand, const Shape& result) {
   if (result.IsPossible()) return true;
   operand.context().Fail(InvalidArgument("{}: {} would give {}, which no tensor can be", op,
                                          operand.shape().ToString(), result.ToString()));

@@ -54,7 +54,7 @@ class Var {
 
 Var Constant(Context& context, Tensor value);   // no gradient flows into it
 Var Constant(Context& context, double value);   // a scalar
-Var Parameter(Context& context, Tensor value);  // Grad may be asked for it
+Var Parameter(Context& context, Tensor value);  // Grad can differentiate by it
 Var Detach(const Var& x);                       // the value of x, cut off from its graph
 
 struct GradOptions {
@@ -73,9 +73,9 @@ StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,
                      const GradOptions& options = {});
 
 // A gradient as optimisers take it: a value, or a product a^T b of matrices [k, m] and [k, n] that
-// nobody has computed yet. That of a linear layer's weight is one (a: the adjoint of the layer's
-// output, b: its input): Adam computes it a block at a time and uses each block at once, so that
-// the whole, as large as the weight, never lies in memory.
+// is not computed yet. A linear layer's weight has such a gradient (a: the adjoint of the layer's
+// output, b: its input): Adam computes it block by block and uses each block at once, so that the
+// whole, as large as the weight, never lies in memory.
 class Gradient {
  public:
   Gradient() = default;  // invalid
@@ -111,14 +111,14 @@ struct ExternalOp {
 };
 std::vector<Var> External(Context& context, ExternalOp op);
 
-// ---- For those who write operations ----
+// ---- For authors of operations ----
 
 struct UncomputedAdjoint {
   std::size_t input = 0;
   Gradient product;
 };
 
-// What a rule is given: the adjoints that arrived, and what is asked for.
+// The input of a rule: the adjoints that arrived, and which gradients are wanted.
 class Adjoint {
  public:
   // `left`: where a rule may leave a product, or null.
@@ -126,13 +126,13 @@ class Adjoint {
           UncomputedAdjoint* left)
       : y_(y), d_outputs_(d_outputs), needs_(needs), left_(left) {}
   const Var& dy() const { return d_outputs_[0]; }
-  // dy() for an operation that may work in its memory: once, and dy() no more.
+  // dy() for an operation that may overwrite it: call once, and not dy() afterwards.
   Var TakeDy() const { return std::move(d_outputs_[0]); }
   std::span<const Var> d_outputs() const { return d_outputs_; }
   const Var& y() const { return y_; }  // the output, if the operation saved it
   bool needs(std::size_t input) const { return needs_[input] != 0; }
-  // The adjoint of `input` is a^T b: returns that or, where nobody needs it now, leaves it to who
-  // will use it and returns an invalid Var. For one input of an operation.
+  // The adjoint of `input` is a^T b: returns that or, where it is not needed at once, defers it to
+  // its consumer and returns an invalid Var. For one input of an operation.
   Var Product(std::size_t input, const Var& a, const Var& b) const;
 
  private:
@@ -152,17 +152,17 @@ struct OpInfo {
   bool save_output = false;  // the rule reads Adjoint::y()
 };
 
-// Makes the Var of an operation's result. The rule is kept only where a gradient can be asked for.
+// Makes the Var of an operation's result. The rule is kept only if a gradient can be requested.
 Var Record(const OpInfo& info, Tensor value, std::span<const Var> inputs, Rule rule);
 Var Record(const OpInfo& info, Tensor value, std::initializer_list<Var> inputs, Rule rule);
 
 // The invalid Var of the operands' context, after noting `status` there.
 Var Fail(const Var& operand, Status status);
-// True where all are valid, of one context and float dtype; else the contexts of `operands` know
-// why.
+// True if all are valid, of one context and of float dtype; else records why in the contexts of
+// `operands`.
 bool Usable(const char* op, std::initializer_list<const Var*> operands);
-// True where a tensor can have the shape of a result; else the context of `operand` knows why.
-bool Makeable(const char* op, const Var& operand, const Shape& result);
+// True if a tensor can have the shape of a result; else records why in the context of `operand`.
+bool IsPossibleResult(const char* op, const Var& operand, const Shape& result);
 // The invalid result that follows from an invalid operand.
 Var Invalid(std::initializer_list<const Var*> operands);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives: walks over the graph from an output back to the inputs that were asked for.
+// Derivatives: walks over the graph from an output back to the requested inputs.
 #include <algorithm>
 #include <type_traits>
 #include <unordered_map>
@@ -60,8 +60,8 @@ class Backward {
 
  private:
   struct Visit {
-    bool useful = false;     // leads to something that was asked for
-    bool wanted = false;     // was asked for: its adjoint must survive
+    bool useful = false;     // leads to a requested input
+    bool wanted = false;     // is a requested input: its adjoint must survive
     InlineVector<Var, 1> d;  // adjoint of each output, summed over the uses met so far
     Gradient product;        // or that of a leaf which met one use
   };
@@ -98,7 +98,7 @@ class Backward {
     const auto needs = Needs(node);
     // The output as a Var of this very node, so that a rule that uses it can be differentiated.
     const Var y = node.saved.empty() ? Var() : Var(context_, node.saved, node.shared_from_this());
-    // What was asked for must survive the rule, which may take its adjoint.
+    // A requested adjoint must survive the rule, which may overwrite it.
     InlineVector<Var, 1> d = visit.wanted ? visit.d : std::move(visit.d);
     if (!visit.wanted) visit.d.clear();
     UncomputedAdjoint left;

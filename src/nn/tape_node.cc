@@ -8,7 +8,7 @@ namespace tilegrad::nn {
 
 namespace {
 
-// Lets go of what `node` depends on; what nobody else holds goes before `doomed`.
+// Releases what `node` depends on; prepends nodes without another owner to the list `doomed`.
 void Dismantle(Node& node, std::shared_ptr<Node>& doomed) {
   node.rule = nullptr;  // its Vars are of the nodes that the edges still hold
   for (Node::Edge& edge : node.edges) {
@@ -21,8 +21,8 @@ void Dismantle(Node& node, std::shared_ptr<Node>& doomed) {
 
 }  // namespace
 
-// In a loop: left to themselves the nodes of a long chain would end inside each other, on a stack
-// that has room for some hundred thousand.
+// A loop, since recursive destruction of a long chain would overflow the stack after some hundred
+// thousand nodes.
 Node::~Node() {
   std::shared_ptr<Node> doomed;
   Dismantle(*this, doomed);

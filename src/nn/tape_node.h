@@ -29,7 +29,7 @@ struct Node : std::enable_shared_from_this<Node> {
   Rule rule;
   Tensor saved;  // the output, where the rule wants it
   bool released = false;
-  std::shared_ptr<Node> next_doomed;  // while a graph is taken apart
+  std::shared_ptr<Node> next_doomed;  // list of nodes to destroy, without recursion
 };
 
 // Of an operation on `inputs`, without a rule yet.

@@ -76,7 +76,7 @@ class Tensor {
   DType dtype() const { return dtype_; }
   std::size_t elements() const { return static_cast<std::size_t>(shape_.elements()); }
   std::size_t bytes() const { return elements() * BytesOf(dtype_); }
-  bool unique() const { return block_.unique(); }  // nobody else sees the storage
+  bool unique() const { return block_.unique(); }  // the storage has no other owner
 
   template <class T>
   T* data() {

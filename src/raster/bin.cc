@@ -36,7 +36,7 @@ void ForEachFaceAndBin(const DrawnFaces& faces, int bin_columns, std::size_t beg
   }
 }
 
-// From the number of each chunk's faces per bin to where they go: sets `begin` and `cursor`.
+// Prefix sum over each chunk's faces per bin: sets `begin` and `cursor`.
 void PlaceChunks(std::size_t bins, BinListBuffers* buffers) {
   std::int32_t total = 0;
   for (std::size_t t = 0; t < bins; ++t) {
@@ -49,8 +49,8 @@ void PlaceChunks(std::size_t bins, BinListBuffers* buffers) {
   buffers->begin[bins] = total;
 }
 
-// A counting sort, which is stable, in chunks of `share` lists: no fewer faces than bins, or their
-// counters would cost more than they.
+// A counting sort, which is stable, in chunks of `share` lists. A chunk has at least as many faces
+// as there are bins; otherwise its counters would cost more than its faces.
 BinLists SortIntoBins(const DrawnFaces& faces, const SquareGrid& grid, BinListBuffers* buffers,
                       const Workers* workers) {
   constexpr std::size_t kList = DrawnFaces::kChunk;
@@ -74,8 +74,8 @@ BinLists SortIntoBins(const DrawnFaces& faces, const SquareGrid& grid, BinListBu
   return buffers->View();
 }
 
-// All faces into the only bin. Room for as many as there can be: which image comes to which worker
-// is not determined, and nothing shall be allocated once every size has been seen.
+// All faces into the only bin. Reserves the maximum, not the need: which worker gets which image
+// varies between calls, and once every size has been seen nothing may be allocated.
 BinLists ListAll(const DrawnFaces& faces, BinListBuffers* buffers) {
   buffers->faces.clear();
   buffers->faces.reserve(faces.storage.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faces into bins: which faces a bin has to look at. Order is stable: within a bin, faces ascend;
-// the tie rule and deterministic sums rest on that.
+// Binning: which faces each bin has to process. Stable: within a bin faces ascend, which the tie
+// rule and deterministic sums rely on.
 #pragma once
 
 #include <cstdint>
@@ -69,7 +69,7 @@ struct SquareGrid {
 inline SquareGrid BinGrid(int width, int height) { return {width, height, kBinBits}; }
 inline SquareGrid TileGrid(int width, int height) { return {width, height, kTileBits}; }
 
-// Owns the memory of a BinLists; reused from frame to frame.
+// The memory behind a BinLists; reused from frame to frame.
 struct BinListBuffers {
   AlignedVector<std::int32_t> begin, faces;
   AlignedVector<std::int32_t> cursor;  // [chunks of faces][bins] where a chunk's next face goes

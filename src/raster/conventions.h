@@ -71,7 +71,7 @@
 //      bin     64 x 64 pixels: faces are listed and drawn by bins; the unit of work forward
 //      tile    16 x 16 pixels of a bin: the unit of coverage in 32 bits and of the soft mask
 //      block   8 x 8 pixels of a tile: what the soft mask sorts faces for
-//      strip   up to a bin's width of pixels, interpolated together and handed to shading
+//      strip   up to a bin's width of pixels, interpolated together, then shaded
 //      run     up to 256 pixels of a strip that show one surface: what a shading kernel sees
 //
 //      bin +----+----+----+----+      Faces have words of their own: a chunk is a range of faces

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the corners of an image's faces are on the screen, gathered while faces are set up: who
-// looks at faces by the vector reads them from here.
+// Screen positions of face corners, packed for vector loads while faces are set up. Code with faces
+// in its lanes reads them from here instead of gathering.
 #pragma once
 
 #include <cstddef>

@@ -46,8 +46,8 @@ HWY_INLINE Plane ZeroPlane() {
   return {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
 }
 
-// Indices by lane and corner. As numbers, not as vectors: vectors would have to wait until all of
-// them are stored.
+// Indices by lane and corner. Scalars, not vectors: a vector load would stall on the stores before
+// it.
 struct CornerIndices {
   std::int32_t at[3][kMostFaceLanes];
 };
@@ -61,7 +61,7 @@ HWY_INLINE CornerIndices VerticesOf(const ScreenMesh& mesh, const std::int32_t* 
   return out;
 }
 
-// Asks for the vertices of a vector of faces.
+// Prefetches the vertices of a vector of faces.
 HWY_INLINE void PrefetchCorners(const ScreenMesh& mesh, const std::int32_t* faces) {
   const CornerIndices vertices = VerticesOf(mesh, faces);
   for (const auto& corner : vertices.at) {
@@ -85,7 +85,7 @@ HWY_INLINE CornerLanes LoadCorners(const ScreenMesh& mesh, const CornerIndices& 
   return out;
 }
 
-// Barycentric weights as planes: MakeFacePlane of face_plane.h.
+// Barycentric weights as planes (equation 2): MakeFacePlane of face_plane.h.
 HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y, Plane out[3]) {
   const LaneTag d;
   const auto x1 = hn::Sub(c.x[1], c.x[0]), y1 = hn::Sub(c.y[1], c.y[0]);
@@ -110,11 +110,11 @@ HWY_INLINE void WeightPlanes(const CornerLanes& c, Lane origin_x, Lane origin_y,
   out[0].dy = hn::Neg(hn::Add(out[1].dy, out[2].dy));
 }
 
-// Faces on which 1/depth varies by more than this are set up in double. Of such a face, cut at the
-// near plane for instance, the image holds a far end, where attributes in perspective are the
-// quotient of two small remainders: what float loses beside the near end is lost beside them.
-// Whatever the mode, the near corners weigh little there, but move far on the screen with the
-// vertices: the gradient of these needs the digits of small weights.
+// Faces whose 1/depth varies by more than this factor are set up in double. Of such a face (one cut
+// at the near plane, say) the image shows the far end, where perspective attributes are the
+// quotient of two small differences of large terms: float rounding at the near end would swamp
+// them. In either mode the near corners have small weights there but move far on the screen with
+// their vertices, so the gradient needs the digits of small weights.
 inline constexpr float kSteepDepth = 8;
 
 HWY_INLINE hn::Mask<LaneTag> IsSteep(const Lane (&inverse_depth)[3]) {
@@ -145,7 +145,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
   hn::StoreMaskBits(d, steep, bits);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if ((bits[i / 8] >> i % 8 & 1) == 0) continue;
-    // Thin, or too large for float to tell: flat it stays.
+    // Thin, or too large for float to tell: stays flat.
     if (lanes[1].dx[i] == 0 && lanes[1].dy[i] == 0) continue;
     const FacePlane<double> plane = MakeFacePlane(
         ScreenCorners<double>{{x[0][i], x[1][i], x[2][i]}, {y[0][i], y[1][i], y[2][i]}, {0, 0, 0}});
@@ -175,7 +175,7 @@ HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::
   return out;
 }
 
-// What the planes of a vector of faces are made of.
+// What the planes of a vector of faces are built from.
 struct CornerPlanes {
   Plane weight[3], q;
   Lane m[3];   // 1/depth times `scale`, or 1
@@ -212,7 +212,7 @@ HWY_INLINE CornerPlanes MakeCornerPlanes(const InterpolateInput& input, LaneInt 
   return out;
 }
 
-// Four attributes of each lane from a channel on; at the end of the array as many as there are.
+// Four attributes per lane, starting at a channel; fewer at the end of the array.
 class AttributeQuads {
  public:
   HWY_INLINE AttributeQuads(std::span<const float> values, const std::int32_t* row, int first)

@@ -95,7 +95,7 @@ HWY_INLINE FaceInt AreaLanes(const SnappedLanes& s) {
                  hn::Mul(hn::Sub(s.x[2], s.x[0]), hn::Sub(s.y[1], s.y[0])));
 }
 
-// The records of a vector of faces as words: word w of all of them.
+// The records of a vector of faces, word by word: word w of every face.
 inline constexpr int kWords = sizeof(DrawnFace) / 4, kDepthWord = 4, kEdgeWord = 11;
 static_assert(offsetof(DrawnFace, edge) == 4 * kEdgeWord && offsetof(DrawnFace, pixels) == 4 &&
               offsetof(DrawnFace, column_begin) == 8 &&
@@ -104,7 +104,7 @@ struct FaceWords {
   FaceInt word[kWords];
 };
 
-// Corners 1 and 2 change places where the doubled area is negative.
+// Swaps corners 1 and 2 where the doubled area is negative.
 HWY_INLINE void WindClockwise(FaceInt area, SnappedLanes* s) {
   const auto swap = hn::Lt(area, hn::Zero(FaceIntTag()));
   for (auto* a : {s->x, s->y}) {
@@ -228,7 +228,7 @@ HWY_INLINE DrawnFace* StoreRecords(const FaceWords& words, std::uint32_t keep, D
   return out;
 }
 
-// What the shapes of a vector of faces say.
+// Shape tests of a vector of faces.
 struct ShapeLanes {
   SnappedLanes corners;
   RangeLanes x, y;
@@ -257,7 +257,7 @@ HWY_INLINE std::uint32_t RejectShapes(const ScreenMesh& mesh, const ShapeLanes& 
   const std::uint32_t flat = BitsOf(FaceIntTag(), hn::Eq(shapes.area, hn::Zero(di)));
   const std::uint32_t back =
       cull_back ? BitsOf(FaceIntTag(), hn::Gt(shapes.area, hn::Zero(di))) : 0;
-  // Mostly there is nothing to say about any of them.
+  // Usually none of them is rejected.
   const std::uint32_t all = static_cast<std::uint32_t>((std::uint64_t{1} << count) - 1);
   std::uint8_t before = 0;
   for (std::size_t i = 0; i < count; ++i) before |= reject[i];
@@ -281,8 +281,8 @@ void SetWideDepths(const ScreenMesh& mesh, DrawnFace* first, DrawnFace* end) {
   }
 }
 
-// Bit kStamp * row + column: the face covers that pixel of its box. From the last pixel to the
-// first: what is known then moves up by a bit each time, which takes no constants.
+// Bit kStamp * row + column: the face covers that pixel of its box. Goes from the last pixel to the
+// first and shifts the result up by one bit per pixel, which needs no constants.
 HWY_INLINE FaceInt CoveredOf(const FaceWords& words) {
   const FaceIntTag di;
   static_assert(kStamp == 4);
@@ -351,7 +351,7 @@ HWY_INLINE std::size_t ListFaces(const ScreenMesh& mesh, const ShapeCorners& cor
 
 static_assert(kMostFaceLanes <= kPacketFaces);
 
-// Faces f to f + count - 1; nowhere those that do not take part in the soft mask, and lanes beyond.
+// Faces f to f + count - 1. Lanes beyond, and faces outside the soft mask, are moved out of reach.
 HWY_INLINE void StoreCorners(const ShapeCorners& c, std::size_t f, std::size_t count,
                              const std::uint8_t* reject, CornerPackets* to) {
   const FaceTag d;

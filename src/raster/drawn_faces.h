@@ -15,8 +15,8 @@
 
 namespace tilegrad::raster {
 
-// Faces with a box up to so many pixels wide and high know from the start which of a square of that
-// size they cover.
+// Faces whose box is at most this many pixels wide and high get their coverage computed at set-up,
+// as the bits of a square of this size (a stamp).
 inline constexpr int kStamp = 4;
 
 // A face that has a pixel centre of the image in its box; one that fits a stamp covers one, too.
@@ -30,8 +30,8 @@ struct DrawnFace {
   static constexpr std::int32_t kByEdges = -1;  // small, the box exceeds a stamp: edges are set
 
   std::int32_t face;  // index into the ScreenMesh
-  // Those two, or else bit kStamp * row + column, from (column_begin, row_begin) on: it covers that
-  // pixel. Edges may not be set then.
+  // kByTiles, kByEdges, or the stamp: bit kStamp * row + column says that the face covers that
+  // pixel, counted from (column_begin, row_begin). Edges may be unset then.
   std::int32_t pixels;
   std::int16_t column_begin, column_end, row_begin, row_end;  // pixels, within the image
   DepthPlane<float> depth;
@@ -68,13 +68,13 @@ struct SomeFaces {
   bool cull_back;
 };
 
-// What is to be set up of the faces of an image; null is not wanted.
+// What to set up for the faces of an image; null: not wanted.
 struct FaceSetUp {
   DrawnFaces* drawn = nullptr;       // those that are drawn and may cover a pixel of the image
   CornerPackets* corners = nullptr;  // of those that take part in the soft mask
 };
 
-// Where records go.
+// Where records are written.
 struct FaceList {
   DrawnFace* face;
   BinRange* bins;

@@ -63,8 +63,8 @@ HWY_INLINE FaceInt LoadSome(const std::int32_t* from, std::size_t count) {
 using QuadTag = hn::FixedTag<float, 4>;
 using Quad = hn::Vec<QuadTag>;
 
-// In each block of four lanes: from four numbers of four to four of number 0, of number 1, and so
-// on, in place.
+// Transposes each block of four lanes in place: from four vectors of (0, 1, 2, 3) to one vector of
+// number 0, one of number 1, and so on.
 template <class D>
 HWY_INLINE void Transpose(D d, hn::Vec<D> (&q)[4]) {
   const auto a = hn::InterleaveLower(d, q[0], q[2]), b = hn::InterleaveLower(d, q[1], q[3]);
@@ -113,7 +113,7 @@ HWY_INLINE void LoadVertices(const ScreenMesh& mesh, const std::int32_t* vertex,
 // Four pixels.
 using QuadIntTag = hn::RebindToSigned<QuadTag>;
 
-// Which of them see a face.
+// Which of them show a face.
 HWY_INLINE hn::Mask<QuadTag> SeesFace(const std::int32_t* faces) {
   const QuadIntTag di;
   return hn::RebindMask(QuadTag(), hn::Gt(hn::LoadU(di, faces), hn::Set(di, kNoFace)));

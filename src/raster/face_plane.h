@@ -59,7 +59,7 @@ ScreenCorners<T> CornersOf(const ScreenMeshT<T>& mesh, std::size_t face) {
   return out;
 }
 
-// The same in double, for what takes small differences of large products of them.
+// The same in double, for small differences of large products.
 template <class T>
 ScreenCorners<double> Wide(const ScreenCorners<T>& c) {
   ScreenCorners<double> out;

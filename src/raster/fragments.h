@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What visibility hands on is one number per pixel: the face that is seen.
+// The result of visibility is one number per pixel: the face that is seen.
 #pragma once
 
 #include <cstdint>

@@ -23,7 +23,7 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// N of `count` channels from `first` on, at most four.
+// Equation 1 as planes: N of `count` channels (at most four) from `first` on.
 HWY_INLINE void ChannelPlanes(const InterpolateInput& input, const CornerPlanes& corners, int first,
                               int count, Plane* out) {
   for (int c = 0; c < count; ++c) out[c] = ZeroPlane();
@@ -31,12 +31,12 @@ HWY_INLINE void ChannelPlanes(const InterpolateInput& input, const CornerPlanes&
     Lane a[4];
     CornerAttributes(input, corners, k, first, a);
     for (int c = 0; c < count; ++c) {
-      AddScaled(hn::Mul(corners.m[k], a[c]), corners.weight[k], &out[c]);
+      AddScaled(hn::Mul(corners.m[k], a[c]), corners.weight[k], &out[c]);  // (1): m_k a_kc b_k
     }
   }
 }
 
-// N of the barycentric of corner 1 or 2.
+// N of corner k's barycentric (equation 2), k = 1 or 2.
 HWY_INLINE Plane BarycentricPlane(const CornerPlanes& corners, int k) {
   Plane n = ZeroPlane();
   AddScaled(corners.m[k], corners.weight[k], &n);
@@ -82,8 +82,8 @@ HWY_INLINE void SetUpQuads(const InterpolateInput& input, const SeenFaces& seen,
   }
 }
 
-// What pixels read of the faces seen, by slot. As a copy: compilers would take stores of vectors
-// for changes of the original.
+// What pixels read about the visible faces, by slot. Held by value: if it were referenced,
+// compilers would assume that vector stores change it and reload it.
 struct SlotArrays {
   const std::int32_t* slot_of_face;
   const float *origin_x, *origin_y;
@@ -99,8 +99,8 @@ struct SlotArrays {
         least(scratch->quads.least()) {}
 };
 
-// The planes of a group at four pixels of a row, as planes. `faces`: of the four; (px, py): the
-// centre of the first.
+// Evaluates the planes of a group at four pixels of a row; out[k] is output k of the four. `faces`:
+// theirs; (px, py): the centre of the first.
 template <bool kWithQ>
 HWY_INLINE void EvaluateQuads(const SlotArrays& slots, const std::int32_t* faces, float px,
                               float py, Quad (&out)[4]) {
@@ -116,7 +116,7 @@ HWY_INLINE void EvaluateQuads(const SlotArrays& slots, const std::int32_t* faces
   Transpose(d, out);
 }
 
-// What pixels are made of and where they go.
+// Input, scratch and output of one call.
 struct InterpolateJob {
   const InterpolateInput& input;
   const FaceRows& rows;
@@ -144,7 +144,7 @@ struct QuadRow {
       step[k] = view.row;
     }
   }
-  // Asks for the row that is so many rows below.
+  // Prefetches the row `rows` below.
   HWY_INLINE void Prefetch(int rows) const {
     for (int k = 0; k < outputs; ++k) {
       PrefetchNumbers(to[k] + rows * step[k], static_cast<std::size_t>(count));
@@ -162,8 +162,8 @@ struct QuadRow {
   }
 };
 
-// One row of a group, of kOutputs outputs if that is not 0. inverse_q [kBinSize] of the row is set
-// by group 0, for the others.
+// One row of a group, with kOutputs outputs unless that is 0. Group 0 sets the row's inverse_q
+// [kBinSize] for the groups after it.
 template <bool kPerspective, int kOutputs>
 HWY_INLINE void InterpolateRow(const InterpolateJob& job, const QuadRow& row, int group, int i,
                                float* inverse_q) {
@@ -189,7 +189,7 @@ HWY_INLINE void InterpolateRow(const InterpolateJob& job, const QuadRow& row, in
     }
     if (kPerspective) scale = hn::Load(d, inverse_q + j);
     for (int k = 0; k < outputs; ++k) {
-      const auto value = kPerspective ? hn::Mul(values[k], scale) : values[k];
+      const auto value = kPerspective ? hn::Mul(values[k], scale) : values[k];  // (1): N / Q
       row.Store(k, j, hn::IfThenElseZero(seen, value));
     }
   }
@@ -225,7 +225,7 @@ void InterpolateFaces(const InterpolateInput& input, const FaceRows& rows,
   }
 }
 
-// Where nothing is seen.
+// Rows of background.
 void ClearPixels(const InterpolateInput& input, const FaceRows& rows,
                  const InterpolateOutput& out) {
   const InterpolateJob job{input, rows, out, InterpolateOutputs(input), nullptr};

@@ -34,7 +34,7 @@ struct InterpolateInput {
   bool barycentrics;  // two more planes: the weights of corners 1 and 2
 };
 
-// Channels, and two more where barycentrics are wanted.
+// Channels, plus two where barycentrics are wanted.
 inline int InterpolateOutputs(const InterpolateInput& input) {
   return input.attributes.channels + (input.barycentrics ? 2 : 0);
 }
@@ -61,7 +61,7 @@ class PlaneQuads {
   AlignedVector<float> data_;
 };
 
-// What Interpolate needs of a worker.
+// Scratch that Interpolate needs from a worker.
 struct InterpolateScratch {
   SeenFaces seen;
   PlaneQuads quads;

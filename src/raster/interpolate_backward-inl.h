@@ -75,7 +75,7 @@ void SetUpBand(const InterpolateInput& input, BandSums* sums) {
   }
 }
 
-// (h_0, h_1, h_2, s) of a pixel, from (g_0, g_1, g_2, 0). `planes`: of the pixel's slot.
+// Equation 3: (h_0, h_1, h_2, s) of a pixel from (g_0, g_1, g_2, 0). `planes`: of its slot.
 HWY_INLINE Quad PerspectiveAdjoint(Quad d_out, const float* planes, std::size_t stride,
                                    float least_q, Quad x, Quad y) {
   const QuadTag d;
@@ -84,8 +84,8 @@ HWY_INLINE Quad PerspectiveAdjoint(Quad d_out, const float* planes, std::size_t 
                  hn::MulAdd(hn::Load(d, planes + 8 * stride), y, hn::Load(d, planes)));
   const auto q = hn::Max(hn::Broadcast<3>(numerator), hn::Set(d, least_q));
   const auto inverse = hn::Div(hn::Set(d, 1.0f), q);
-  const auto h = hn::Mul(d_out, inverse);
-  const auto s = hn::SumOfLanes(d, hn::Mul(h, hn::Mul(numerator, inverse)));
+  const auto h = hn::Mul(d_out, inverse);                                     // g / Q
+  const auto s = hn::SumOfLanes(d, hn::Mul(h, hn::Mul(numerator, inverse)));  // sum of h_c I_c
   return hn::IfThenElse(hn::FirstN(d, 3), h, s);
 }
 
@@ -206,7 +206,7 @@ void SumMoments(const InterpolateInput& input, const BackwardBand& band, BandSum
   }
 }
 
-// S_k of a group, [corner][channel or s], for a vector of faces.
+// S_k of a group (equation 4: sums over pixels), [corner][channel or s], for a vector of faces.
 struct GroupSums {
   Lane sum[3][4];
 };
@@ -235,13 +235,13 @@ struct CornerAdjoints {
   Lane d_x[3], d_y[3], d_m[3];
 };
 
-// Adds what one group says.
+// Adds the share of one group: d_v_k and d_m_k of interpolate.h (equation 4).
 HWY_INLINE void AddGroup(const GroupPlanes& planes, const Plane& q, const GroupSums& sums,
                          bool perspective, CornerAdjoints* out) {
   for (int k = 0; k < 3; ++k) {
     for (int c = 0; c < 3; ++c) {
-      out->d_x[k] = hn::NegMulAdd(planes.numerator[c].dx, sums.sum[k][c], out->d_x[k]);
-      out->d_y[k] = hn::NegMulAdd(planes.numerator[c].dy, sums.sum[k][c], out->d_y[k]);
+      out->d_x[k] = hn::NegMulAdd(planes.numerator[c].dx, sums.sum[k][c], out->d_x[k]);  // (4)
+      out->d_y[k] = hn::NegMulAdd(planes.numerator[c].dy, sums.sum[k][c], out->d_y[k]);  // (4)
     }
     if (!perspective) continue;  // Q is constant, and so is m
     out->d_x[k] = hn::MulAdd(q.dx, sums.sum[k][3], out->d_x[k]);

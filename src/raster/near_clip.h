@@ -41,7 +41,7 @@ struct FaceSource {
   std::span<const std::int32_t> faces;  // [F,3]
   const CameraT<T>* camera;
   bool cull_back = false;
-  const FaceCorners* corners = nullptr;  // of `faces`, if somebody has split them
+  const FaceCorners* corners = nullptr;  // of `faces`, where they are already split by corner
 };
 
 template <class T>
@@ -111,10 +111,10 @@ void StartAtFirstCorner(const FaceSource<T>& source, std::int32_t (&polygon)[4])
   std::rotate(polygon, first, polygon + 4);
 }
 
-// Appends a piece of a cut face. It begins with the face's first corner, or else with one that
-// cutting made. Kernels give a piece's first corner the weight that the others leave, so a small
-// one has no digits: that of the face's first corner is no output, and on the near plane weights
-// are large.
+// Appends a piece of a cut face. It begins with the face's first corner or, failing that, with one
+// made by clipping. Kernels compute the weight of a piece's first corner as 1 minus the others,
+// which loses the digits of a small one: the weight of the face's first corner is not an output,
+// and on the near plane weights are large.
 template <class T>
 void AppendPiece(const FaceSource<T>& source, std::int32_t face,
                  std::array<std::int32_t, 3> corners, ScreenMeshBuffersT<T>* out) {

@@ -22,7 +22,7 @@ void SplitFaces(std::span<const std::int32_t> faces, FaceCorners* out,
 void Project(const FaceSource<float>& source, int width, int height, ScreenMeshBuffers* out,
              const FaceSetUp& faces = {}, const Workers* workers = nullptr);
 
-// What the adjoint of Project is asked for.
+// The gradients that are wanted from the adjoint of Project.
 struct ProjectGradients {
   std::span<float> d_positions;        // [V,3] overwritten; empty: not wanted
   CameraT<float>* d_camera = nullptr;  // overwritten; null: not wanted
@@ -34,7 +34,7 @@ struct VertexGradients {
   std::span<const float> d_clip_t;  // as in ScreenGradients
 };
 
-// Memory for meshes with faces that were cut.
+// Scratch for meshes with clipped faces.
 struct ProjectBackwardScratch {
   AlignedVector<CameraPoint<float>> points;
   AlignedVector<float> d_x, d_y, d_inverse_depth, d_clip_t;

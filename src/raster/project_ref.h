@@ -52,19 +52,33 @@ void PerspectiveBackward(const CameraPoint<T>& p, T d_x, T d_y, T d_inverse_dept
   d_camera->fy += -(v * d_y), d_camera->cy += d_y;
 }
 
-// Adjoint of one vertex made by clipping: its depth is the near plane, whatever a and b do.
+// Adjoint of a vertex made by clipping.
 template <class T>
-void ClipVertexBackward(const CameraPoint<T>& a, const CameraPoint<T>& b, T t, T d_x, T d_y,
-                        T d_clip_t, const CameraT<T>& camera, CameraPoint<T>* d_a,
-                        CameraPoint<T>* d_b, CameraT<T>* d_camera) {
+struct ClipAdjoint {
+  T d_x, d_y;  // of the new screen vertex
+  T d_clip_t;  // of its place on the edge, from attributes
+};
+
+// Clips the edge from clip.a to clip.b: the new vertex has the near plane's depth whatever its ends
+// do. Adds to d_points[clip.a], d_points[clip.b] and d_camera's intrinsics.
+template <class T>
+void ClipVertexBackward(const FaceSource<T>& source, const ClipVertexT<T>& clip,
+                        const ClipAdjoint<T>& d_vertex, std::span<CameraPoint<T>> d_points,
+                        CameraT<T>* d_camera) {
+  const CameraT<T>& camera = *source.camera;
+  const auto i = static_cast<std::size_t>(clip.a), j = static_cast<std::size_t>(clip.b);
+  const CameraPoint<T> a = ToCamera(camera, &source.positions[3 * i]);
+  const CameraPoint<T> b = ToCamera(camera, &source.positions[3 * j]);
+  const T t = clip.t;
   const CameraPoint<T> p{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), camera.near_plane};
   CameraPoint<T> d_p{T(0), T(0), T(0)};
-  PerspectiveBackward(p, d_x, d_y, T(0), camera, &d_p, d_camera);
-  const T d_t = d_clip_t + d_p.x * (b.x - a.x) + d_p.y * (b.y - a.y);
+  PerspectiveBackward(p, d_vertex.d_x, d_vertex.d_y, T(0), camera, &d_p, d_camera);
+  const T d_t = d_vertex.d_clip_t + d_p.x * (b.x - a.x) + d_p.y * (b.y - a.y);
   const T scale = d_t / (b.depth - a.depth);  // t = (near - depth_a) / (depth_b - depth_a)
-  d_a->x += (T(1) - t) * d_p.x, d_b->x += t * d_p.x;
-  d_a->y += (T(1) - t) * d_p.y, d_b->y += t * d_p.y;
-  d_a->depth += -((T(1) - t) * scale), d_b->depth += -(t * scale);
+  CameraPoint<T>&d_a = d_points[i], &d_b = d_points[j];
+  d_a.x += (T(1) - t) * d_p.x, d_b.x += t * d_p.x;
+  d_a.y += (T(1) - t) * d_p.y, d_b.y += t * d_p.y;
+  d_a.depth += -((T(1) - t) * scale), d_b.depth += -(t * scale);
 }
 
 // Adjoint of ToCamera: adds to d_position[3] and d_camera's rotation and translation.
@@ -105,10 +119,8 @@ void ProjectRefBackward(const FaceSource<T>& source, const ScreenMeshT<T>& mesh,
                         &d_points[v], d_camera);
   }
   for (std::size_t i = 0; i < mesh.clipped.size(); ++i) {
-    const ClipVertexT<T>& clip = mesh.clipped[i];
-    const auto a = static_cast<std::size_t>(clip.a), b = static_cast<std::size_t>(clip.b);
-    ClipVertexBackward(point(a), point(b), clip.t, d_mesh.d_x[n + i], d_mesh.d_y[n + i],
-                       d_mesh.d_clip_t[i], camera, &d_points[a], &d_points[b], d_camera);
+    const ClipAdjoint<T> d_vertex{d_mesh.d_x[n + i], d_mesh.d_y[n + i], d_mesh.d_clip_t[i]};
+    ClipVertexBackward(source, mesh.clipped[i], d_vertex, d_points, d_camera);
   }
   for (std::size_t v = 0; v < n; ++v) {
     T unwanted[3] = {T(0), T(0), T(0)};

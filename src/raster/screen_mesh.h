@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `project` hands on: a mesh on the screen of one camera, as structure of arrays; and the
-// gradient that comes back.
+// The result of projection: a mesh on the screen of one camera, as structure of arrays; and its
+// gradient.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct ClipVertexT {
   T t;
 };
 
-// A vertex for kernels that look at one after the other: one load instead of four.
+// A vertex for kernels that process one vertex at a time: one load instead of four.
 template <class T>
 struct PackedVertexT {
   T x, y, inverse_depth, depth;
@@ -70,13 +70,13 @@ struct FaceCorners {
   AlignedVector<std::int32_t> v0, v1, v2, source_face;
 };
 
-// Owns what a ScreenMesh looks at, but for the faces where none was cut and somebody else has them.
-// Reused from frame to frame.
+// The memory behind a ScreenMesh, except for its faces where none was clipped and they are shared
+// (`whole`). Reused from frame to frame.
 template <class T>
 struct ScreenMeshBuffersT : FaceCorners {
   AlignedVector<T> x, y, depth, inverse_depth;
   AlignedVector<PackedVertexT<T>> packed;
-  const FaceCorners* whole = nullptr;  // instead of the own
+  const FaceCorners* whole = nullptr;  // shared faces, instead of our own
   AlignedVector<ClipVertexT<T>> clipped;
   AlignedVector<std::uint8_t> reject;
   std::int32_t source_vertices = 0, source_faces = 0;
@@ -95,7 +95,7 @@ struct ScreenMeshBuffersT : FaceCorners {
 };
 using ScreenMeshBuffers = ScreenMeshBuffersT<float>;
 
-// dL/d(ScreenMesh); whoever produces a gradient adds to it.
+// dL/d(ScreenMesh); every producer of a gradient adds to it.
 template <class T>
 struct ScreenGradientsT {
   std::span<T> d_x, d_y;         // [V] per pixel

@@ -21,7 +21,7 @@ namespace tilegrad::raster {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Gives the face of pixel (x, y) the next slot if it has none. No branch: that is hard to foretell.
+// Gives the face of pixel (x, y) the next slot if it has none. No branch: it is hard to predict.
 HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen) {
   std::int32_t* slot = seen->slot_of_face.data() + 1 + face;
   const std::int32_t found = *slot, fresh = found >> 31;
@@ -32,8 +32,8 @@ HWY_INLINE void NumberPixel(std::int32_t face, float x, float y, SeenFaces* seen
   seen->count += static_cast<std::size_t>(-fresh);
 }
 
-// Bit p: pixel p sees a face that neither its left neighbour sees nor the one above it. `above`
-// null: the band's first row.
+// Bit p: pixel p shows a face that neither its left neighbour nor the pixel above it shows. `above`
+// null: first row of the band.
 HWY_INLINE std::uint32_t NewFaceBits(const std::int32_t* faces, const std::int32_t* above) {
   const FaceIntTag di;
   const auto here = hn::LoadU(di, faces);
@@ -58,12 +58,12 @@ HWY_INLINE void NumberRow(const FaceRows& rows, int i, SeenFaces* seen) {
   }
   number(0);
   for (int j = 1; j < rows.width;) {
-    // As many pixels as bits at a time: where the loop over bits ends is hard to foretell.
+    // As many pixels as bits at a time: the end of the loop over bits is hard to predict.
     const int first = j;
     std::uint64_t bits = 0;
     while (j < rows.width && j - first <= 64 - lanes) {
-      // The last vector begins within the one before it: pixels one by one would wait for each
-      // other.
+      // The last vector overlaps the one before it: a scalar tail would be a chain of dependent
+      // steps.
       const int at = HWY_MIN(j, rows.width - lanes);
       const std::uint64_t here = NewFaceBits(row + at, above == nullptr ? nullptr : above + at);
       bits |= here >> (j - at) << (j - first);

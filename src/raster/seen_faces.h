@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The faces seen in a part of an image, numbered: what is per face is then set up once, and
-// gradients are summed per face before they leave the part.
+// Numbers the faces visible in a part of an image, so that per-face work is done once and gradients
+// are summed per face before they leave the part.
 #pragma once
 
 #include <algorithm>
@@ -45,11 +45,11 @@ struct SeenFaces {
   }
 };
 
-// Grows the arrays to what the part can need, not what it does: which part comes to which worker is
-// not determined, and nothing shall be allocated once every size has been seen.
+// Grows the arrays to what the part can need at most: which worker gets which part varies between
+// calls, and once every size has been seen nothing may be allocated.
 void ReserveSeenFaces(std::size_t mesh_faces, std::size_t pixels, SeenFaces* out);
 
-// Reserves and numbers. `out` knows no face, as at first or after ForgetFaces.
+// Reserves, then numbers. `out` must be empty: new, or after ForgetFaces.
 void NumberFaces(const FaceRows& rows, std::size_t mesh_faces, SeenFaces* out);
 void ForgetFaces(SeenFaces* faces);
 

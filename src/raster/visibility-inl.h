@@ -84,7 +84,7 @@ struct DrawnRows {
   const float* behind;  // of kPeel
 };
 
-// Which of the faces that cover a pixel count: all, or those behind a depth that each pixel has.
+// Which of the faces that cover a pixel count: all, or only those behind a depth per pixel.
 enum class Layer { kFirst, kPeel };
 
 // Where a bin is drawn: the arrays of a VisibilityBin, and of kPeel what the pixels lie behind.
@@ -192,8 +192,8 @@ HWY_INLINE std::int32_t MovedStamp(std::int32_t pixels, int columns, int rows) {
   return rows >= 0 ? pixels << kStamp * rows & kAll : pixels >> -kStamp * rows;
 }
 
-// A face of which the covered pixels are known. Without a branch on where they are: the stamp lies
-// in the bin as a whole.
+// A face whose covered pixels are known. No branch on their position: the stamp lies wholly within
+// the bin.
 template <Layer kLayer>
 HWY_INLINE void DrawStamp(const DrawnFace& face, const PixelRect& rect, const BinTarget& out) {
   using Layout = StampLayout;
@@ -215,8 +215,8 @@ HWY_INLINE void DrawStamp(const DrawnFace& face, const PixelRect& rect, const Bi
   }
 }
 
-// By rows of the pixels of D. Where a face fits between two multiples of the lanes, vectors begin
-// there: their loads then take over what was stored last as it is, and no vector straddles a line.
+// By rows of D's lanes. Where a face fits between two multiples of the lane count, vectors are
+// aligned to it: store forwarding then works, and no vector straddles a cache line.
 template <Layer kLayer, class D>
 HWY_INLINE void DrawInRows(D d, const DrawnFace& face, const PixelRect& rect, const PixelRect& box,
                            const BinTarget& out) {
@@ -246,7 +246,7 @@ HWY_INLINE void DrawSmall(const DrawnFace& face, const PixelRect& rect, const Bi
   }
 }
 
-// The slow way, in 128 bits, for faces that leave the guard band.
+// The slow path, in 128 bits, for faces that leave the guard band.
 template <Layer kLayer>
 HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
                               const TileFaceSetup& tile, const DrawnRows& at) {
@@ -285,11 +285,11 @@ HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const 
   return setup.CoversTile();
 }
 
-// How near every pixel of a tile is at least. A large face that covers the tile raises it; what
-// lies behind is rejected unseen.
+// A depth bound per tile: every pixel is at least this near. A large face that covers the tile
+// raises it; faces behind it are rejected without a look at their pixels.
 struct DepthFloors {
   float tile[kBinSize / kTileSize][kBinSize / kTileSize] = {};
-  float bin = 0;  // the least
+  float bin = 0;  // the least of its tiles
 
   HWY_INLINE void Update() {
     bin = tile[0][0];
@@ -313,7 +313,7 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
       const PixelRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
                            HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
-      // Of a layer that is peeled, a face that covers a tile may lie before what is asked for.
+      // When peeling, a face that covers a tile may lie in front of the layer that is drawn.
       const bool covered = DrawTile<kLayer>(
           shape, face, tile,
           {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, out.behind + first});

@@ -30,9 +30,9 @@ struct BinDrawList {
 void ComputeVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                        VisibilityBin* out);
 
-// The same of the faces that lie behind `behind` [kBinSize][kBinSize]: a pixel sees the nearest
-// whose 1/depth is less than what stands there. Infinity lets all be seen, 0 none; the 1/depth of
-// one layer asks for the next. At one depth only one face is ever seen.
+// The same for the faces behind `behind` [kBinSize][kBinSize]: a pixel shows the nearest face whose
+// 1/depth is less than its entry. Infinity admits every face, 0 none; the 1/depth of one layer
+// yields the next (depth peeling). Of several faces at one depth only one is ever shown.
 void PeelVisibility(const ScreenMesh& mesh, const BinDrawList& list, const PixelRect& rect,
                     const float* behind, VisibilityBin* out);
 

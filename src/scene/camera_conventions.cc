@@ -40,7 +40,7 @@ Pose PoseOf(const Camera64& camera) {
   return pose;
 }
 
-// The same pose with some of the camera's axes turned round.
+// The same pose with some of the camera's axes flipped.
 Pose WithAxes(Pose pose, const Vec3Array& signs) {
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) pose.rotation[3 * r + c] *= signs[r];
@@ -50,7 +50,7 @@ Pose WithAxes(Pose pose, const Vec3Array& signs) {
 }
 constexpr Vec3Array kOpenCvAxes = {1, -1, -1}, kPyTorch3dAxes = {-1, 1, -1};
 
-// World to camera from where the camera stands.
+// World-to-camera pose from the camera's position.
 Pose PoseAt(const Mat3Array& rotation, const Vec3Array& position) {
   Vec3Array translation = Apply(rotation.data(), position);
   for (double& t : translation) t = -t;
@@ -103,59 +103,7 @@ Status CheckCentred(const Camera64& camera, ImageSize size, const char* conventi
       convention, 0.5 * size.width, 0.5 * size.height, camera.cx, camera.cy);
 }
 
-double Determinant(const double* m) {
-  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
-         m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
-Status CheckRotation(const double* m) {
-  double off = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      double dot = i == j ? -1 : 0;
-      for (int c = 0; c < 3; ++c) dot += m[3 * i + c] * m[3 * j + c];
-      off = std::max(off, std::abs(dot));
-    }
-  }
-  if (off > kRotationTolerance) {
-    return InvalidArgument(
-        "the camera's rotation is not a rotation: its rows are off unit length and right angles by "
-        "{:.3g}, {} is allowed (is there scale in the matrix?)",
-        off, kRotationTolerance);
-  }
-  if (Determinant(m) > 0) return {};
-  return InvalidArgument(
-      "the camera's rotation is a mirror (determinant -1): one axis points the other way than its "
-      "convention says");
-}
-
 }  // namespace
-
-Status Validate(const Camera64& camera) {
-  const auto finite = [](double x) { return std::isfinite(x); };
-  if (!std::all_of(std::begin(camera.rotation), std::end(camera.rotation), finite) ||
-      !std::all_of(std::begin(camera.translation), std::end(camera.translation), finite)) {
-    return InvalidArgument("the camera's pose holds a number that is not finite");
-  }
-  TILEGRAD_TRY(CheckRotation(camera.rotation));
-  if (!(finite(camera.fx) && finite(camera.fy) && camera.fx > 0 && camera.fy > 0)) {
-    return InvalidArgument("the camera's focal lengths are {} and {} pixels; both must be above 0",
-                           camera.fx, camera.fy);
-  }
-  if (!finite(camera.cx) || !finite(camera.cy))
-    return InvalidArgument("the camera's principal point is not finite");
-  if (!(finite(camera.near_plane) && camera.near_plane > 0))
-    return InvalidArgument("the camera's near plane is {}; it must be above 0", camera.near_plane);
-  return {};
-}
-
-Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {
-  Camera64 out = camera;
-  const double x = static_cast<double>(to.width) / from.width;
-  const double y = static_cast<double>(to.height) / from.height;
-  out.fx *= x, out.cx *= x, out.fy *= y, out.cy *= y;
-  return out;
-}
 
 // OpenCV, COLMAP ------------------------------------------------------------------------------
 
@@ -324,7 +272,7 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size) {
   if (!(from.aspect_ratio >= 0) || !std::isfinite(from.aspect_ratio))
     return InvalidArgument("the aspect ratio is {}; it must be 0 or above", from.aspect_ratio);
   Mat4Array node = from.node_to_world;
-  for (int c = 0; c < 3; ++c) {  // scale does not count
+  for (int c = 0; c < 3; ++c) {  // scale is ignored
     const double length = std::hypot(node[c], node[4 + c], node[8 + c]);
     if (length > 0) node[c] /= length, node[4 + c] /= length, node[8 + c] /= length;
   }

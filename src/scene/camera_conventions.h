@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras as other programs write them, from and to the one camera of the project (camera.h).
+// Converts other programs' cameras to and from the one camera of the project (camera.h).
 // docs/cameras.md has a picture and a number for each.
 //
 // All matrices are row-major and act on column vectors unless said otherwise; all lengths are world
 // units. From... fails on what is not a pinhole camera: a number that is not finite, a matrix that
 // is not a rotation (rows off by more than kRotationTolerance, or a mirror), a focal length that is
-// not positive, skew. To... fails where the other convention cannot say what the camera is. A
-// camera that goes there and back keeps its numbers to a few roundings; its near plane is kept
-// only by those conventions that have one, and is the default of camera.h otherwise.
+// not positive, skew. To... fails where the other convention cannot express the camera. A round
+// trip keeps the numbers up to a few roundings; the near plane survives only in conventions that
+// have one, and is the default of camera.h otherwise.
 #pragma once
 
 #include <array>
@@ -54,7 +54,7 @@ Result<Camera64> FromColmap(const ColmapCamera& from);
 ColmapCamera ToColmap(const Camera64& camera);
 
 // OpenGL: x right, y up, looking along -z; clip = projection * model_view * world. A matrix that
-// glGetFloatv fills is the transpose of what stands here.
+// glGetFloatv fills is the transpose of this one.
 struct OpenGlCamera {
   Mat4Array projection = {};
   Mat4Array model_view = {};
@@ -92,7 +92,7 @@ struct NerfCamera {
 Result<Camera64> FromNerf(const NerfCamera& from);
 NerfCamera ToNerf(const Camera64& camera);
 
-// glTF's perspective camera at a node: OpenGL's axes. The scale of the node does not count.
+// glTF's perspective camera at a node: OpenGL's axes. The scale of the node is ignored.
 struct GltfCamera {
   Mat4Array node_to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   double yfov = 0.8;        // radians, the whole vertical field of view, (0, pi)
@@ -103,9 +103,16 @@ Result<Camera64> FromGltf(const GltfCamera& from, ImageSize size);
 Result<GltfCamera> ToGltf(const Camera64& camera, ImageSize size);
 
 // The same view on an image of another size: everything scales, the field of view stays.
-Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to);
+inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize to) {
+  Camera64 out = camera;
+  const double x = static_cast<double>(to.width) / from.width;
+  const double y = static_cast<double>(to.height) / from.height;
+  out.fx *= x, out.cx *= x, out.fy *= y, out.cy *= y;
+  return out;
+}
 
-// What every From... ends with: finite, a rotation, positive focal lengths and near plane.
+// Fails unless the camera is finite, its rotation is one, and its focal lengths and near plane are
+// positive. Every From... ends with it.
 Status Validate(const Camera64& camera);
 
 }  // namespace tilegrad

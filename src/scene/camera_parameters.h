@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera as what an optimiser may move: six numbers of rotation (camera_ref.h), translation,
-// focal lengths and principal point.
+// A camera as free parameters for an optimiser: six numbers of rotation (camera_ref.h),
+// translation, focal lengths and principal point.
 //
 //   CameraParameters p = ParametersOf(start);
 //   Camera camera = CameraFromParameters(p, near).value();      // render with it

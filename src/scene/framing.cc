@@ -11,7 +11,7 @@
 namespace tilegrad {
 namespace {
 
-// How far the eye must be, and how deep the mesh reaches towards it, along one view.
+// The distance that the eye needs along one view, and how far the mesh reaches towards it.
 struct Reach {
   double distance = 0, towards_eye = -1e300;
 };
@@ -78,7 +78,7 @@ Result<std::vector<Camera>> FrameMesh(const Mesh& mesh, const Framing& framing,
     all.distance = std::max(all.distance, reach.distance);
     all.towards_eye = std::max(all.towards_eye, reach.towards_eye);
   }
-  // A line towards the eye would be touched by it.
+  // Otherwise the eye would touch a line that points towards it.
   const double distance = framing.distance > 0
                               ? framing.distance
                               : std::max(all.distance, all.towards_eye + 0.1 * extent);

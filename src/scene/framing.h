@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras that see a whole mesh, for people who have said nothing about cameras.
+// Default cameras that see a whole mesh.
 #pragma once
 
 #include <span>
@@ -17,7 +17,7 @@ struct ViewAngle {
 
 struct Framing {
   Lens lens;
-  double margin = 0.05;  // of the half image that stays free on each side, [0, 1)
+  double margin = 0.05;  // share of the half image left free on each side, [0, 1)
   double distance = 0;   // of the eye from the middle, world units; 0: as near as all views allow
 };
 

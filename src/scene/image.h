@@ -23,7 +23,7 @@ struct ImageT {
   bool empty() const { return pixels.empty(); }
 };
 using Image = ImageT<float>;  // values in [0, 1], sRGB-encoded as in the file: training compares
-                              // what people see
+                              // perceived colours
 using ImageU8 = ImageT<std::uint8_t>;  // 0..255
 
 }  // namespace tilegrad

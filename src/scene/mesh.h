@@ -29,9 +29,9 @@ struct Material {
   int base_color_texture = -1;                      // index into Mesh::textures, -1 for none
   TextureWrap wrap = TextureWrap::kRepeat;
   bool nearest = false;                       // texels as squares, not filtered
-  AlphaMode alpha_mode = AlphaMode::kOpaque;  // what the file asks of viewers
+  AlphaMode alpha_mode = AlphaMode::kOpaque;  // as requested by the file
   bool double_sided = true;                   // false: viewers do not draw its back faces
-  bool unlit = false;                         // the colour is shown as it is, whatever the light
+  bool unlit = false;                         // shown without lighting
 
   bool operator==(const Material&) const = default;
 };

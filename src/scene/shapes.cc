@@ -63,7 +63,7 @@ void BridgeRings(Mesh& mesh, std::int32_t lower, std::int32_t upper, int segment
   }
 }
 
-// A fan from `apex` over a ring; `up` says on which side the outside is.
+// A fan from `apex` over a ring; `up`: the outside is above.
 void FanRing(Mesh& mesh, std::int32_t apex, std::int32_t ring, int segments, bool up) {
   for (int i = 0; i < segments; ++i) {
     const int j = (i + 1) % segments;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who is next to whom: edges with their faces, vertices with their neighbours. What the
-// regularisers need.
+// Mesh adjacency for the regularisers: edges with their faces, vertices with their
+// neighbours.
 #pragma once
 
 #include <cstdint>

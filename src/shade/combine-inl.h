@@ -35,13 +35,13 @@ HWY_INLINE CombineLanes CombineChannel(const CombineInput& input, std::size_t c,
   out.texture = input.texture != nullptr ? LoadRun(input.texture[c], i) : one;
   out.vertex_color = input.vertex_color != nullptr ? LoadRun(input.vertex_color[c], i) : one;
   out.plain = hn::Mul(out.texture, out.vertex_color);
-  out.surface = hn::Mul(hn::Set(d, input.factors.base[c]), out.plain);
+  out.surface = hn::Mul(hn::Set(d, input.factors.base[c]), out.plain);  // (7): I_c
   out.light = one;
   if (input.light != nullptr) {
     out.light = hn::MulAdd(hn::Set(d, input.factors.diffuse[c]), LoadRun(*input.light, i),
-                           hn::Set(d, input.factors.ambient[c]));
+                           hn::Set(d, input.factors.ambient[c]));  // (7): I_l
   }
-  out.color = hn::Mul(out.light, out.surface);
+  out.color = hn::Mul(out.light, out.surface);  // (7): I_l I_c
   if (input.highlight != nullptr) {
     out.color =
         hn::MulAdd(hn::Set(d, input.factors.specular[c]), LoadRun(*input.highlight, i), out.color);
@@ -60,7 +60,7 @@ void CombineRun(std::size_t count, const CombineInput& input, RunPlane* color) {
   }
 }
 
-// Sums over a run of what one channel pulls on its factors.
+// Gradients of the factors of one channel, summed over a run.
 struct FactorSums {
   RunVec base, ambient, diffuse, specular;
 
@@ -71,7 +71,7 @@ struct FactorSums {
   }
 };
 
-// Channel 0 sets what all channels pull on, the others add.
+// Channel 0 sets the gradient that all channels share, the others add to it.
 HWY_INLINE void PullAll(RunVec v, std::size_t c, RunPlane* to, std::size_t i) {
   StoreRun(c == 0 ? v : hn::Add(LoadRun(*to, i), v), to, i);
 }

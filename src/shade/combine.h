@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The colour of a pixel from its parts (equation 7: I = I_l I_c + I_s):
 //
-//   I_c = base * texture * vertex colour                 (what is not there counts as 1)
-//   I_l = ambient + diffuse * light                      (1 where nothing is lit)
+//   I_c = base * texture * vertex colour                 (an absent factor is 1)
+//   I_l = ambient + diffuse * light                      (1 without light)
 //   I_s = specular * highlight                           (0 where there is none)
 #pragma once
 
@@ -39,7 +39,7 @@ struct CombineAdjoint {
 
 void Combine(std::size_t count, const CombineInput& input, RunPlane* color);
 
-// A colour outside of its clamp pulls nothing.
+// A colour outside its clamp has no gradient.
 void CombineAdjointOf(std::size_t count, const CombineInput& input, const RunPlane* d_color,
                       const CombineAdjoint& out);
 

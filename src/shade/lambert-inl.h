@@ -27,7 +27,7 @@ void LambertRun(std::size_t count, const RunPlane* normal, const RunLights& ligh
     auto sum = hn::Zero(d);
     for (std::size_t k = 0; k < LightCount(lights); ++k) {
       const LightLanes l = LightAt(lights, k, i);
-      sum = hn::MulAdd(l.intensity, hn::Max(Dot(n, l.direction), hn::Zero(d)), sum);
+      sum = hn::MulAdd(l.intensity, hn::Max(Dot(n, l.direction), hn::Zero(d)), sum);  // (10)
     }
     StoreRun(sum, light, i);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lambertian light (equation 10; the first term of equation 8): sum over lights of
-// intensity * max(0, N . L). What surfaces make of it: combine.h.
+// intensity * max(0, N . L). combine.h applies it to surfaces.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct RunLights {
   const RunPlane* per_pixel = nullptr;        // [3] unit; then `uniform` is empty
 };
 
-// What light pulls back. Null or empty: not wanted.
+// Where gradients of lights and normals go. Null or empty: not wanted.
 struct RunLightAdjoint {
   RunPlane* d_normal = nullptr;                  // [3] adds
   std::span<DirectionalLightT<double>> uniform;  // adds; as RunLights::uniform, or empty
@@ -40,8 +40,8 @@ struct RunLightAdjoint {
 // *light <- the sum above, for the unit normals [3] of a run. A normal of 0 gets no light.
 void Lambert(std::size_t count, const RunPlane* normal, const RunLights& lights, RunPlane* light);
 
-// d_light: cotangent of the sum. A light behind the surface pulls nothing; one exactly at the
-// horizon pulls as one in front does.
+// d_light: cotangent of the sum. A light behind the surface gets no gradient; one exactly at the
+// horizon counts as in front.
 void LambertAdjoint(std::size_t count, const RunPlane* normal, const RunLights& lights,
                     const RunPlane& d_light, const RunLightAdjoint& out);
 

@@ -22,7 +22,7 @@ T LambertRef(const LambertLightT<T>& light, const Vec3<T>& n) {
   return sum;
 }
 
-// Adds what d_light = dL/d(light) pulls back to d_n, and to d_lights (as light.lights; may be
+// Adds the gradients due to d_light = dL/d(light) to d_n and d_lights (as light.lights; may be
 // empty). dL/d(ambient) is d_light itself.
 template <class T>
 void LambertAdjointRef(const LambertLightT<T>& light, const Vec3<T>& n, T d_light, Vec3<T>& d_n,

@@ -37,8 +37,8 @@ glm::vec3 UnitOr(glm::vec3 v, glm::vec3 otherwise) {
   return length > 0 ? v / length : otherwise;
 }
 
-// The normal of corner k of face f, on the side of the face's winding: authors' normals point to
-// either side.
+// The normal of corner k of face f, flipped to the side of the face's winding: normals in files
+// point to either side.
 glm::vec3 CornerNormal(const Mesh& mesh, std::size_t f, std::size_t k, glm::vec3 face_normal) {
   glm::vec3 n = face_normal;
   if (!mesh.corner_normals.empty()) {

@@ -5,9 +5,9 @@
 //   flat:    n_f / |n_f|, for each face
 //   smooth:  sum of n_f over the faces of a vertex, over its length: weighted by area
 //
-// A face without area and a vertex without faces have no normal: it is 0 and pulls nothing. Nor has
-// a vertex whose faces' normals cancel to what rounding leaves, such as those of a sheet of which
-// each face is there twice, once for each side.
+// A face without area and a vertex without faces have no normal: it is 0 and has no gradient. The
+// same holds where the faces' normals cancel up to rounding, as on a sheet that has each face
+// twice, once per side.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Directions of pixels: x / |x|, and its adjoint.
 //
-// A vector whose squared length is at or below `least` has no direction: it becomes 0 and pulls
-// nothing, so that no NaN comes of a normal that interpolation has cancelled.
+// A vector whose squared length is at or below `least` has no direction: it becomes 0 without a
+// gradient, so that a normal cancelled by interpolation yields no NaN.
 #pragma once
 
 #include <cstddef>

@@ -15,7 +15,7 @@ namespace tilegrad::shade {
 template <class T>
 struct UnitVector {
   Vec3<T> unit = {T(0), T(0), T(0)};
-  T inverse_length = T(0);  // 0: there was no direction
+  T inverse_length = T(0);  // 0: no direction
 };
 
 template <class T>
@@ -32,8 +32,8 @@ auto LargestRef(const Vec3<T>& x) {
   return std::max({std::abs(RealPart(x[0])), std::abs(RealPart(x[1])), std::abs(RealPart(x[2]))});
 }
 
-// The same for vectors of any scale: only what has no component beyond kLeastComponent has no
-// direction.
+// The same for vectors of any scale: only a vector whose components are all at or below
+// kLeastComponent has no direction.
 template <class T>
 UnitVector<T> NormalizeScaledRef(const Vec3<T>& x) {
   const auto scale = LargestRef(x);

@@ -20,7 +20,7 @@ namespace tilegrad::shade {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Of a vector of pixels and one light.
+// The reflection of one light at a vector of pixels.
 struct PhongLanes {
   Run3 normal, eye, light, reflected;
   RunVec cosine, toward_eye, logarithm;
@@ -37,12 +37,12 @@ HWY_INLINE PhongLanes ReflectLanes(const PhongInput& input, const Run3& light, s
   out.cosine_inside = hn::And(hn::Ge(cosine, zero), hn::Le(cosine, one));
   out.cosine = hn::Min(hn::Max(cosine, zero), one);
   const auto twice = hn::Add(out.cosine, out.cosine);
-  out.reflected = AddScaled(Scale(hn::Set(d, -1.0f), light), twice, out.normal);
-  const auto toward = Dot(out.reflected, out.eye);
+  out.reflected = AddScaled(Scale(hn::Set(d, -1.0f), light), twice, out.normal);  // R
+  const auto toward = Dot(out.reflected, out.eye);                                // (8): R . V
   out.eye_inside = hn::And(hn::Ge(toward, least), hn::Le(toward, one));
   out.toward_eye = hn::Min(hn::Max(toward, least), one);
   out.logarithm = hn::Log(d, out.toward_eye);
-  out.power = hn::Exp(d, hn::Mul(hn::Set(d, input.shininess), out.logarithm));
+  out.power = hn::Exp(d, hn::Mul(hn::Set(d, input.shininess), out.logarithm));  // (8)
   return out;
 }
 
@@ -52,13 +52,13 @@ void PhongRun(std::size_t count, const PhongInput& input, RunPlane* highlight) {
     auto sum = hn::Zero(d);
     for (std::size_t k = 0; k < LightCount(input.lights); ++k) {
       const LightLanes l = LightAt(input.lights, k, i);
-      sum = hn::MulAdd(l.intensity, ReflectLanes(input, l.direction, i).power, sum);
+      sum = hn::MulAdd(l.intensity, ReflectLanes(input, l.direction, i).power, sum);  // (8)
     }
     StoreRun(sum, highlight, i);
   }
 }
 
-// What one vector of pixels pulls; d_power: on the power. Returns what it pulls on the light.
+// The adjoint of ReflectLanes; d_power is dL/d(power). Returns dL/d(light direction).
 HWY_INLINE Run3 PullReflection(const PhongLanes& p, RunVec d_power, const PhongInput& input,
                                const PhongAdjoint& out, std::size_t i) {
   const RunTag d;

@@ -33,7 +33,7 @@ struct PhongAdjoint {
 
 void Phong(std::size_t count, const PhongInput& input, RunPlane* highlight);
 
-// Outside of its clamps a value pulls nothing; at their ends it does.
+// Outside its clamps a value has no gradient; at their ends it does.
 void PhongAdjointOf(std::size_t count, const PhongInput& input, const RunPlane& d_highlight,
                     const PhongAdjoint& out);
 

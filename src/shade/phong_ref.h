@@ -16,7 +16,7 @@ struct PhongVectors {
   Vec3<T> normal, light, eye;
 };
 
-// A value kept in [least, 1]; `inside`: whether it was there.
+// A value clamped to [least, 1]; `inside`: whether it was within.
 template <class T>
 struct Clamped {
   T value;

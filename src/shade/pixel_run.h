@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What shading kernels work on: a run of foreground pixels, gathered so that background pixels cost
-// nothing. One plane for each number of a pixel.
+// The unit of work of shading kernels: a run of foreground pixels, gathered so that background
+// pixels cost nothing. One plane per component.
 #pragma once
 
 #include <cstddef>

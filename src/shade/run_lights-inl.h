@@ -36,7 +36,7 @@ HWY_INLINE LightLanes LightAt(const RunLights& lights, std::size_t k, std::size_
   return {SetRun3(l.direction.data()), hn::Set(d, l.intensity)};
 }
 
-// What a run pulls on one light.
+// The gradient of one light, summed over a run.
 struct LightSums {
   Run3 direction;
   RunVec intensity;
@@ -48,7 +48,7 @@ struct LightSums {
   }
 };
 
-// Adds what pixels pull on the direction of their light.
+// Adds the gradient of the pixels' light directions.
 HWY_INLINE void PullLight(const RunLightAdjoint& out, const Run3& d_direction, RunVec d_intensity,
                           std::size_t i, LightSums* sums) {
   if (out.per_pixel != nullptr) AddRun3(d_direction, out.per_pixel, i);

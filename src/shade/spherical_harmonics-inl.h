@@ -40,7 +40,7 @@ void ShLightRun(std::size_t count, const RunPlane* normal, const ShPolynomial& p
     const Run3 n = LoadRun3(normal, i);
     const MonomialLanes m = MonomialsOf(n);
     auto sum = hn::Set(d, p[0]);
-    for (int k = 1; k < 9; ++k) sum = hn::MulAdd(hn::Set(d, p[k]), m.at[k], sum);
+    for (int k = 1; k < 9; ++k) sum = hn::MulAdd(hn::Set(d, p[k]), m.at[k], sum);  // (11)
     StoreRun(hn::IfThenElseZero(HasDirectionLanes(n), sum), light, i);
   }
 }

@@ -39,8 +39,8 @@ struct WrappedLanes {
 HWY_INLINE WrappedLanes WrapLanes(RunVec u, Wrap wrap) {
   const RunTag d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  // Beyond 2^23 a float has no fraction; so kept, it and its neighbours are whole numbers, as it
-  // is.
+  // Beyond 2^23 a float has no fraction; clamped to that, the coordinate and its neighbours stay
+  // integers.
   const auto finite = hn::Lt(hn::Abs(u), hn::Set(d, 0x1p126f));
   if (wrap == Wrap::kClamp) {
     const auto kept = hn::Min(hn::Max(u, hn::Set(d, -1.0f)), hn::Set(d, 2.0f));
@@ -94,7 +94,7 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, const TextureInput& inp
   hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
 }
 
-// Where a run meets one level, of its own for each pixel.
+// The footprint of a run at one level, which differs from pixel to pixel.
 struct FootprintRun {
   AxisRun column, row;
 };
@@ -145,8 +145,8 @@ struct TexelQuad {
   }
 };
 
-// The levels that the pixels of a run mix, and the share of the coarser one: MixLevels of
-// texture_levels_ref.h.
+// The levels between which the pixels of a run interpolate, and the weight of the coarser one:
+// MixLevels of texture_levels_ref.h.
 struct alignas(128) MixRun {
   std::int32_t fine[kRunPixels], coarse[kRunPixels];
   float share[kRunPixels];
@@ -213,12 +213,12 @@ void SampleRun(std::size_t count, const TextureInput& input, RunPlane* color) {
   StorePlanes(quads, count, color);
 }
 
-// What the pixels of a run pull on the weights of their footprint, [pixel][4] each.
+// Gradients of the footprints' weights of a run, [pixel][4] each.
 struct alignas(128) WeightPull {
   float a[4 * kRunPixels], b[4 * kRunPixels];
 };
 
-// Adds the pull of pixel p at one level, times its slopes, to `pull`.
+// Adds the gradient of pixel p at one level, times its slopes, to `pull`.
 HWY_INLINE void PullPixel(const FootprintRun& at, const TextureLevel& level, Texel d_color,
                           std::size_t p, WeightPull* pull) {
   const TexelTag d;
@@ -248,7 +248,7 @@ HWY_INLINE TexelShare MakeShare(const FootprintRun& at, std::size_t level, const
   return out;
 }
 
-// What a run pulls, before sums over channels. Either may be null.
+// The gradients of a run, before sums over channels. Either may be null.
 struct PullTo {
   WeightPull* weights;
   TexelShare* shares;

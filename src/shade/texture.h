@@ -5,9 +5,9 @@
 // / H: row 0 is the top, v goes up (docs/conventions.md). The bilinear filter interpolates the four
 // nearest centres; its derivative is the one of the cell that holds the point, and at the border of
 // two cells that of the right (lower) one. The nearest texel is the one whose square holds the
-// point; it pulls nothing to the coordinates. The trilinear filter interpolates between two levels
-// of a pyramid (texture_levels.h); the level is held constant in derivatives, as the choice of
-// texels is.
+// point; it has no gradient to the coordinates. The trilinear filter interpolates between two
+// levels of a pyramid (texture_levels.h); the level is held constant in derivatives, as the choice
+// of texels is.
 #pragma once
 
 #include <cstddef>
@@ -56,7 +56,7 @@ struct TextureInput {
   const RunPlane* level;  // if trilinear: log2 of texels for a pixel, 0 is the finest; any number
 };
 
-// What a pixel pulls on up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color
+// A pixel's gradient to up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color
 // on (x0, y0), (x1, y0), (x0, y1), (x1, y1).
 struct TexelShare {
   std::uint16_t x0, x1, y0, y1;
@@ -65,7 +65,7 @@ struct TexelShare {
   std::uint32_t level;
 };
 
-// Shares that a lookup makes.
+// Shares per lookup.
 inline std::size_t SharesPerLookup(Filter filter) { return filter == Filter::kTrilinear ? 2 : 1; }
 
 // color[3] <- the texture at the coordinates of a run.

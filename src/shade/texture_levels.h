@@ -15,7 +15,7 @@
 
 namespace tilegrad::shade {
 
-// Where the texels of a pyramid stand in one array, finest first.
+// Where the levels of a pyramid lie in one array, finest first.
 struct LevelSize {
   int width, height;
   std::size_t first;  // texel
@@ -56,8 +56,8 @@ Coverage<Real> CoverageOf(int j, int coarse, int fine) {
   return {2 * j, 3, {(1 - x / m) / all, 1 / all, (x + 1) / m / all}};
 }
 
-// Texels of all levels in one array, [texel][kChannels]; level 0 is given. One loop for the way
-// there and back: calls visit(coarse texel, fine texel, weight).
+// Texels of all levels in one array, [texel][kChannels]; level 0 is given. One loop for forward and
+// adjoint: calls visit(coarse texel, fine texel, weight).
 template <class Real, class Visit>
 void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit& visit) {
   for (int y = 0; y < coarse.height; ++y) {

@@ -70,7 +70,7 @@ struct PyramidRef {
   }
 };
 
-// The levels that a lookup mixes, and the share of the coarser one.
+// The levels between which a lookup interpolates, and the weight of the coarser one.
 template <class Real>
 struct LevelMix {
   std::size_t fine, coarse;

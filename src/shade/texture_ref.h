@@ -23,7 +23,7 @@ struct Axis {
   float slope;
 };
 
-// A coordinate brought to where the texture is, and the derivative of that: [0, 1], or [-1, 2] if
+// A coordinate wrapped to the texture, and the derivative of that: [0, 1], or [-1, 2] if
 // clamped.
 template <class T>
 struct Wrapped {
@@ -50,7 +50,7 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
   return i < 0 ? n - 1 : i < n ? i : 0;  // wrapped coordinates are at most one texel outside
 }
 
-// Along u; v is handed in as 1 - v.
+// Along u; for v, call it with 1 - v.
 template <class T>
 Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap wrap, bool nearest) {
   const bool corners = wrap == Wrap::kRepeatCorners;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// On every target and for every length around whole vectors: a wrong value is found wherever it is,
-// and no right one is taken for wrong.
+// On every target, for every length around whole vectors: a bad value is found at any position, and
+// good ones are accepted.
 #include "base/array_checks.h"
 
 #include <gtest/gtest.h>

@@ -73,8 +73,8 @@ TEST(Workers, NestedLoopsKeepWorkersApart) {
   EXPECT_EQ(total, 400);
 }
 
-// Threads that wait for the rest of an inner loop meet tasks of the outer one that nobody has
-// taken. Inner tasks sleep, so that others take some of them.
+// Threads that wait for the rest of an inner loop could take waiting tasks of the outer one. Inner
+// tasks sleep, so that other workers take some of them.
 TEST(Workers, AWorkerThatWaitsForANestedLoopTakesNoOtherTask) {
   const Workers workers(4);
   std::vector<std::atomic<int>> busy(4);
@@ -117,8 +117,8 @@ TEST(Workers, PartsShareTheirLoops) {
   }
 }
 
-// One part has much to do, and the others nothing. Tasks sleep, so that others take some of them.
-// Threads may come late where the machine is busy: the part goes on until one has.
+// One part has much to do, the others nothing. Tasks sleep, so that other workers take some. On a
+// busy machine threads may arrive late: the part continues until one has.
 TEST(Workers, WithoutAPartTheyTakeThoseOfOthers) {
   const Workers workers(3);
   const bool sharing = !test::kThreadSanitizer;  // loops on threads of their own do not share
@@ -159,7 +159,7 @@ std::vector<std::size_t> NestedSums(const Workers& workers) {
   return sums;
 }
 
-// Workers whose threads are those of the parent, and new ones, in a child and in a child of that.
+// Workers created in the parent, and new ones, in a child and in a grandchild.
 TEST(Workers, SurviveAFork) {
   if (const char* why = test::WhyNoFork()) GTEST_SKIP() << why;
   const auto before = std::make_unique<Workers>(4);
@@ -177,7 +177,7 @@ TEST(Workers, SurviveAFork) {
   EXPECT_EQ(NestedSums(*before), expected);
 }
 
-// A child has several workers at once, too, and ends Workers of its parent.
+// A child, too, has several Workers at once, and destroys those of its parent.
 TEST(Workers, AChildHasThreadsOfItsOwn) {
   if (const char* why = test::WhyNoFork()) GTEST_SKIP() << why;
   auto before = std::make_unique<Workers>(4);
@@ -193,7 +193,7 @@ TEST(Workers, AChildHasThreadsOfItsOwn) {
   }));
 }
 
-// oneTBB prints a warning where it gives fewer threads than workers.
+// oneTBB prints a warning if it provides fewer threads than workers.
 TEST(Workers, OfSeveralCountsBeyondTheCoresPrintNothing) {
   testing::internal::CaptureStderr();
   {
@@ -206,7 +206,7 @@ TEST(Workers, OfSeveralCountsBeyondTheCoresPrintNothing) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
-// A task that runs out of memory is an error of the caller's, in a child of a fork as elsewhere.
+// Running out of memory in a task reaches the caller, in a forked child as elsewhere.
 bool ThrowsWhatATaskThrows(const Workers& workers) {
   std::atomic<int> calls = 0;
   try {
@@ -284,7 +284,7 @@ TEST(Arena, ReusesMemoryAfterReset) {
   EXPECT_EQ(arena.capacity(), held);
 }
 
-// What lies on the heap is not held a second time by the places in the object.
+// Elements moved to the heap are not also kept alive by the object's own slots.
 TEST(InlineVector, HoldsEachElementOnce) {
   const auto shared = std::make_shared<int>(1);
   InlineVector<std::shared_ptr<int>, 2> list;
@@ -320,7 +320,7 @@ TEST_F(FileTest, ErrorsNameThePath) {
   ASSERT_TRUE(WriteTextAtomic(folder_ / "big", "12345").ok());
   EXPECT_EQ(ReadFile(folder_ / "big", 4).status().code(), StatusCode::kResourceExhausted);
   EXPECT_EQ(ReadFile(folder_).status().code(), StatusCode::kInvalidArgument);
-  // A pipe into which nobody writes is not waited for.
+  // Opening a pipe without a writer does not block.
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   EXPECT_EQ(ReadFile(folder_ / "pipe").status().code(), StatusCode::kInvalidArgument);
 }
@@ -348,11 +348,11 @@ TEST_F(FileTest, NamesAsLongAsTheyMayBe) {
     ASSERT_TRUE(WriteTextAtomic(folder_ / std::string(length, 'n'), "x").ok()) << length;
     EXPECT_EQ(ReadText(folder_ / std::string(length, 'n')).value(), "x");
   }
-  // Not at once under one name, however long what they have in common.
+  // Temporaries differ even if the names share a long prefix.
   EXPECT_NE(TemporaryOf(std::string(254, 'n') + "a"), TemporaryOf(std::string(254, 'n') + "b"));
 }
 
-// Of processes that are gone, and of our own number: in a container the next run may have it, too.
+// Of dead processes, and of our own process number: in a container the next run may get it again.
 TEST_F(FileTest, WhatKilledWritesLeftIsRemoved) {
   ASSERT_TRUE(MakeFolder(folder_).ok());
   const std::string gone = "4194305";  // beyond the kernel's largest number of a process

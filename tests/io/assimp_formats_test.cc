@@ -56,7 +56,7 @@ TEST_F(AssimpFormatsTest, UnknownEndingsNameTheKnownOnes) {
                 ".fbx", ".ms3d");
 }
 
-// What transfers, editors and people do to files: bytes change, go, come twice, become extreme.
+// Damage as transfers, editors and people cause it: bytes change, vanish, repeat, become extreme.
 Bytes Damage(Bytes bytes, Rng& rng) {
   const auto place = [&] { return static_cast<std::ptrdiff_t>(rng.Below(bytes.size())); };
   for (std::uint64_t rounds = 1 + rng.Below(4); rounds > 0 && bytes.size() > 8; --rounds) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// glTF and GLB that are broken or hostile: an error that names the file and the place. tinygltf
-// hands on most numbers as they stand in the file, so each kind of number is wrong once here.
+// Broken or hostile glTF and GLB give an error that names the file and the place. tinygltf passes
+// on most numbers unchecked, so each kind of number is wrong once here.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a glTF says beside geometry: cameras, samplers, texture transforms, how materials are drawn.
+// glTF beyond geometry: cameras, samplers, texture transforms, how materials are drawn.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A function in a child process: what it returns arrives, and nothing that it does harms the
+// A function in a child process: its result arrives, and nothing that it does harms the
 // parent.
 #include "io/guarded_process.h"
 

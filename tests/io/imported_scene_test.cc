@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the importing process hands over: round trip, and bytes that are anything.
+// The scene sent by the importing process: round trip, and arbitrary bytes.
 #include "io/imported_scene.h"
 
 #include <gtest/gtest.h>

@@ -249,15 +249,15 @@ FbxNode Connection(std::int64_t child, std::int64_t parent) {
   return FbxNode{"C"}.Text("OO").Value("L", child).Value("L", parent);
 }
 
-Bytes BinaryFbx() {
-  const std::string tag("\0\1", 2);
+std::string FbxName(const std::string& name, const std::string& kind) {
+  return name + std::string("\0\1", 2) + kind;
+}
+
+FbxNode FbxGeometry() {
   std::vector<double> vertices;
   std::vector<std::int32_t> corners;
   for (const auto& corner : kCorners) vertices.insert(vertices.end(), corner.begin(), corner.end());
   for (const auto& [a, b, c] : kFaces) corners.insert(corners.end(), {a, b, ~c});
-  FbxNode color{"P"};
-  color.Text("DiffuseColor").Text("Color").Text("").Text("A");
-  for (const float x : kColor) color.Value("D", double{x});
   const std::int32_t zero = 0;
   const FbxNode materials =
       FbxNode{"LayerElementMaterial"}
@@ -269,31 +269,40 @@ Bytes BinaryFbx() {
       FbxNode{"LayerElement"}
           .Child(FbxNode{"Type"}.Text("LayerElementMaterial"))
           .Child(FbxNode{"TypedIndex"}.Value("I", zero)));
-  const FbxNode geometry = FbxNode{"Geometry"}
-                               .Value("L", std::int64_t{1})
-                               .Text("t" + tag + "Geometry")
-                               .Text("Mesh")
-                               .Child(FbxNode{"Vertices"}.Array("d", vertices))
-                               .Child(FbxNode{"PolygonVertexIndex"}.Array("i", corners))
-                               .Child(materials)
-                               .Child(layer);
+  return FbxNode{"Geometry"}
+      .Value("L", std::int64_t{1})
+      .Text(FbxName("t", "Geometry"))
+      .Text("Mesh")
+      .Child(FbxNode{"Vertices"}.Array("d", vertices))
+      .Child(FbxNode{"PolygonVertexIndex"}.Array("i", corners))
+      .Child(materials)
+      .Child(layer);
+}
+
+FbxNode FbxMaterial() {
+  FbxNode color{"P"};
+  color.Text("DiffuseColor").Text("Color").Text("").Text("A");
+  for (const float x : kColor) color.Value("D", double{x});
+  return FbxNode{"Material"}
+      .Value("L", std::int64_t{3})
+      .Text(FbxName("paint", "Material"))
+      .Text("")
+      .Child(FbxNode{"ShadingModel"}.Text("lambert"))
+      .Child(FbxNode{"Properties70"}.Child(color));
+}
+
+Bytes BinaryFbx() {
   const FbxNode model = FbxNode{"Model"}
                             .Value("L", std::int64_t{2})
-                            .Text("t" + tag + "Model")
+                            .Text(FbxName("t", "Model"))
                             .Text("Mesh")
                             .Child(FbxNode{"Version"}.Value("I", std::int32_t{232}));
-  const FbxNode material = FbxNode{"Material"}
-                               .Value("L", std::int64_t{3})
-                               .Text("paint" + tag + "Material")
-                               .Text("")
-                               .Child(FbxNode{"ShadingModel"}.Text("lambert"))
-                               .Child(FbxNode{"Properties70"}.Child(color));
   Packer file(std::endian::little);
   file.Text("Kaydara FBX Binary  ", 21).Text("\x1a", 2)(std::uint32_t{7400});
   FbxNode{"FBXHeaderExtension"}
       .Child(FbxNode{"FBXVersion"}.Value("I", std::int32_t{7400}))
       .AppendTo(file);
-  FbxNode{"Objects"}.Child(geometry).Child(model).Child(material).AppendTo(file);
+  FbxNode{"Objects"}.Child(FbxGeometry()).Child(model).Child(FbxMaterial()).AppendTo(file);
   FbxNode{"Connections"}
       .Child(Connection(2, 0))
       .Child(Connection(1, 2))

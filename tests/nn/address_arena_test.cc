@@ -17,18 +17,18 @@ constexpr std::size_t kMega = std::size_t{1} << 20;
 
 TEST(AddressArena, TakesTheSmallestRangeThatFits) {
   AddressArena arena;
-  std::byte* a = arena.Take(4 * kMega);
-  std::byte* b = arena.Take(kMega);
-  std::byte* c = arena.Take(2 * kMega);
-  std::byte* d = arena.Take(kMega);
-  arena.Give(a, 4 * kMega);
-  arena.Give(c, 2 * kMega);
-  EXPECT_EQ(arena.Take(kMega), c);
-  EXPECT_EQ(arena.Take(3 * kMega), a);
+  std::byte* a = arena.Allocate(4 * kMega);
+  std::byte* b = arena.Allocate(kMega);
+  std::byte* c = arena.Allocate(2 * kMega);
+  std::byte* d = arena.Allocate(kMega);
+  arena.Free(a, 4 * kMega);
+  arena.Free(c, 2 * kMega);
+  EXPECT_EQ(arena.Allocate(kMega), c);
+  EXPECT_EQ(arena.Allocate(3 * kMega), a);
   EXPECT_EQ(arena.growths(), 4u);
   EXPECT_EQ(arena.held(), 8 * kMega);
-  arena.Give(b, kMega);
-  arena.Give(d, kMega);
+  arena.Free(b, kMega);
+  arena.Free(d, kMega);
 }
 
 TEST(AddressArena, FreeNeighboursJoinWhateverTheOrder) {
@@ -36,40 +36,40 @@ TEST(AddressArena, FreeNeighboursJoinWhateverTheOrder) {
   for (const auto& order : orders) {
     AddressArena arena;
     std::byte* blocks[3];
-    for (std::byte*& block : blocks) block = arena.Take(kMega);
-    for (const int i : order) arena.Give(blocks[i], kMega);
-    EXPECT_EQ(arena.Take(3 * kMega), blocks[0]);
+    for (std::byte*& block : blocks) block = arena.Allocate(kMega);
+    for (const int i : order) arena.Free(blocks[i], kMega);
+    EXPECT_EQ(arena.Allocate(3 * kMega), blocks[0]);
     EXPECT_EQ(arena.held(), 3 * kMega);
   }
 }
 
 TEST(AddressArena, GrowsByWhatIsMissingBehindAFreeEnd) {
   AddressArena arena;
-  std::byte* a = arena.Take(kMega);
-  std::byte* b = arena.Take(kMega);
-  arena.Give(b, kMega);
-  EXPECT_EQ(arena.Take(5 * kMega), b);
+  std::byte* a = arena.Allocate(kMega);
+  std::byte* b = arena.Allocate(kMega);
+  arena.Free(b, kMega);
+  EXPECT_EQ(arena.Allocate(5 * kMega), b);
   EXPECT_EQ(arena.held(), 6 * kMega);
-  arena.Give(a, kMega);
+  arena.Free(a, kMega);
 }
 
 TEST(AddressArena, WithoutMemoryItIsAsBefore) {
   AddressArena arena;
-  std::byte* const first = arena.Take(1 << 20);
+  std::byte* const first = arena.Allocate(1 << 20);
   const std::size_t held = arena.held();
-  EXPECT_THROW(arena.Take(std::size_t{1} << 60), std::bad_alloc);
+  EXPECT_THROW(arena.Allocate(std::size_t{1} << 60), std::bad_alloc);
   EXPECT_EQ(arena.held(), held);
-  arena.Give(first, 1 << 20);
-  EXPECT_EQ(arena.Take(1 << 20), first);
+  arena.Free(first, 1 << 20);
+  EXPECT_EQ(arena.Allocate(1 << 20), first);
 }
 
 TEST(AddressArena, TrimmedMemoryIsThereAgain) {
   AddressArena arena;
-  std::byte* a = arena.Take(8 * kMega);
+  std::byte* a = arena.Allocate(8 * kMega);
   std::memset(a, 7, 8 * kMega);
-  arena.Give(a, 8 * kMega);
+  arena.Free(a, 8 * kMega);
   arena.Trim();
-  EXPECT_EQ(arena.Take(8 * kMega), a);
+  EXPECT_EQ(arena.Allocate(8 * kMega), a);
   std::memset(a, 9, 8 * kMega);
   EXPECT_EQ(a[8 * kMega - 1], std::byte{9});
 }
@@ -90,14 +90,14 @@ TEST(AddressArena, RepeatedRoundsHoldNoMore) {
       const Block b = live[i];
       EXPECT_EQ(b.data[0], std::byte{b.mark});
       EXPECT_EQ(b.data[b.bytes - 1], std::byte{b.mark});
-      arena.Give(b.data, b.bytes);
+      arena.Free(b.data, b.bytes);
       live.erase(live.begin() + static_cast<std::ptrdiff_t>(i));
     };
     for (int i = 0; i < 400; ++i) {
       if (!live.empty() && rng.Below(5) < 2) give(rng.Below(live.size()));
       const std::size_t bytes = 1 + rng.Below(rng.Below(4) == 0 ? 3 * kMega : 3000);
       const auto mark = static_cast<unsigned char>(i);
-      live.push_back({arena.Take(bytes), bytes, mark});
+      live.push_back({arena.Allocate(bytes), bytes, mark});
       EXPECT_EQ(reinterpret_cast<std::uintptr_t>(live.back().data) % kAlignment, 0u);
       std::memset(live.back().data, mark, bytes);
     }

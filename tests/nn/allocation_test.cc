@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training step that repeats the one before allocates nothing: tensors come from the context's
-// pool, nodes of the graph and lists from its step memory, scratch is kept.
+// A training step like the one before allocates nothing: tensors come from the context's pool,
+// graph nodes and lists from its step memory, and scratch is kept.
 #include <gtest/gtest.h>
 
 #include "nn/game.h"

@@ -12,7 +12,7 @@
 namespace tilegrad::nn {
 
 // Every operation that a network of this library uses is in its step, and every kernel: the wide
-// networks have channels enough for kernels/conv2d/conv2d_winograd.h.
+// networks have channels enough for kernels/conv2d/winograd.h.
 class Game {
  public:
   explicit Game(const Workers& workers)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The networks: shapes, names, derivatives through the whole of each, and what they are for.
+// The networks: shapes, names, derivatives through the whole of each, and their purpose.
 #include <gtest/gtest.h>
 
 #include <cmath>

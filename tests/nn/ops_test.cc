@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the operations do at kinks, ties and edges, and what compositions of them amount to.
-// derivatives_test.cc holds the derivatives of each to differences.
+// Operations at kinks, ties and edges, and compositions of them.
+// derivatives_test.cc compares the derivatives of each with differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -147,7 +147,7 @@ TEST_F(Ops, WhatDoesNotFitIsNamed) {
   refused(SumTo(whole, {1}), "I32");
 }
 
-// What goes wrong in one of two contexts would not be seen in the other.
+// An error in one of two contexts would go unnoticed in the other.
 TEST_F(Ops, OperandsOfTwoContextsAreRefused) {
   Context other(workers_, DType::kF64);
   const Var x = Random({3}), y = Parameter(other, other.Full({3}, 1)), broken = Gather(y, 9, {});

@@ -196,9 +196,9 @@ TEST_F(Safetensors, TensorsWithoutElements) {
   EXPECT_EQ(back->tensors[0].value.shape(), (Shape{0, 300}));
 }
 
-// In time that grows with their number: its square, which took minutes here, is for a hostile
-// file to choose. Processor time, as other programs may have most of the machine; a sanitizer takes
-// ten times as much.
+// Time must grow linearly with the number of tensors: quadratic time took minutes here, and a
+// hostile file chooses the number. Processor time, since other programs may have most of the
+// machine; a sanitizer takes ten times as much.
 // Processor time, in seconds, that `run` takes.
 template <class F>
 double SecondsOf(const F& run) {

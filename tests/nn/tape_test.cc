@@ -59,7 +59,7 @@ std::vector<double> Numbers(const Var& v) {
   return {numbers.begin(), numbers.end()};
 }
 
-// Rules may work in the memory of an adjoint, but not in one that somebody else still looks at.
+// Rules may overwrite an adjoint, but not one that is still shared.
 TEST_F(Tape, AdjointsThatOthersSeeAreLeftAlone) {
   const Var x = Vector({-1, 2}), u = Vector({-4, 8});
   const Var y = LeakyRelu(x, 0.5);
@@ -127,7 +127,7 @@ TEST_F(Tape, ReleasedGraphIsAnError) {
   EXPECT_NE(Message().find("was released"), std::string::npos);
 }
 
-// Nodes that end inside each other would need more stack than there is.
+// Recursive destruction of nodes would overflow the stack.
 TEST_F(Tape, LongChainsAreTakenApart) {
   const Var x = Vector({1});
   Var y = x;
@@ -148,7 +148,7 @@ TEST_F(Tape, NoGradRecordsNothing) {
   EXPECT_FALSE(Square(Detach(x)).requires_grad());
 }
 
-// A chain of n operations holds n values while it is recorded; on the way back each is let go as
+// A chain of n operations holds n values while it is recorded; the backward pass releases each as
 // soon as its rule has run, so the peak is the chain and a few adjoints, not twice the chain.
 TEST_F(Tape, ValuesAreReleasedOnTheWayBack) {
   const std::int64_t n = 1 << 16;

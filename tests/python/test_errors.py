@@ -25,6 +25,11 @@ class Errors(unittest.TestCase):
             call()
         self.assertEqual(str(caught.exception), text)
 
+    def expect_refused(self, cases):
+        """cases: (error, text, what Scene.replace is given)."""
+        for error, text, change in cases:
+            self.expect(error, text, lambda: patch().replace(**change))
+
     def test_scenes(self):
         scene = patch()
         cases = [
@@ -64,6 +69,13 @@ class Errors(unittest.TestCase):
              {"per_corner": ("uvs", "normals")}),
             (ValueError, "Scene: per_corner has 'uvs', but the scene has no uvs",
              {"uvs": None, "textures": None, "per_corner": "uvs"}),
+        ]
+        self.expect_refused(cases)
+        self.expect(ValueError, "Texture: wrap is 'tile', expected one of 'repeat', 'clamp', "
+                    "'mirror'", lambda: Texture(np.zeros((2, 2, 3)), "tile"))
+
+    def test_scenes_of_wrong_types(self):
+        self.expect_refused([
             (TypeError, "Scene: colors has dtype uint8, expected float32 from 0 to 1: divide by "
              "255", {"colors": np.full((16, 3), 255, np.uint8)}),
             (TypeError, "Scene: textures[1] has dtype uint8, expected float32 from 0 to 1: divide "
@@ -78,11 +90,7 @@ class Errors(unittest.TestCase):
             (ValueError, "Scene: normals is None, expected one of 'smooth', 'flat'",
              {"normals": None}),
             (ValueError, "Scene: faces has shape (0,), expected (F, 3)", {"faces": []}),
-        ]
-        for error, text, change in cases:
-            self.expect(error, text, lambda: scene.replace(**change))
-        self.expect(ValueError, "Texture: wrap is 'tile', expected one of 'repeat', 'clamp', "
-                    "'mirror'", lambda: Texture(np.zeros((2, 2, 3)), "tile"))
+        ])
 
     def test_render(self):
         scene, render = patch(), Renderer().render

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each converter against the projection that its convention's own manual writes, and there and
-// back.
+// Each converter against the projection given in its convention's manual, and as a round
+// trip.
 //
 // Tolerance: all is double. A pixel is made of some 30 roundings of numbers up to kLargest pixels
 // (the images are below 2,000 pixels and points within them or up to 10 times beside), divided by

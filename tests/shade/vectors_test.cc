@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading against numbers that other programs have made (the independent test data; skipped where
-// it is absent): texture lookups, spherical harmonics, Phong and Lambert.
+// Shading against results of other programs (independent test data; skipped where absent): texture
+// lookups, spherical harmonics, Phong and Lambert.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Holds the tree to docs/architecture.md: who may include whom, and which foreign library lives
-// where.
+// Holds the tree to docs/architecture.md: which folders there are, who may include whom, which
+// foreign library lives where, and which files make up a kernel. Lengths: sizes.py.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -22,8 +22,11 @@ struct Include {
   std::string target;  // as written between the quotes or brackets
 };
 
-std::vector<Include> IncludesUnder(const Path& folder) {
-  static const std::regex pattern(R"(^\s*#\s*include\s*["<]([^">]+)[">])");
+enum class Marks { kQuotesOrBrackets, kQuotes };
+
+std::vector<Include> IncludesUnder(const Path& folder, Marks marks = Marks::kQuotesOrBrackets) {
+  static const std::regex any(R"(^\s*#\s*include\s*["<]([^">]+)[">])"),
+      quoted(R"(^\s*#\s*include\s*["]([^"]+)["])");
   std::vector<Include> out;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(kRoot / folder)) {
     const std::string extension = entry.path().extension();
@@ -31,7 +34,7 @@ std::vector<Include> IncludesUnder(const Path& folder) {
     std::istringstream lines(ReadText(entry.path()).value());
     std::smatch match;
     for (std::string line; std::getline(lines, line);) {
-      if (std::regex_search(line, match, pattern)) {
+      if (std::regex_search(line, match, marks == Marks::kQuotes ? quoted : any)) {
         out.push_back({std::filesystem::relative(entry.path(), kRoot).string(), match[1]});
       }
     }
@@ -41,8 +44,24 @@ std::vector<Include> IncludesUnder(const Path& folder) {
 
 std::string FirstPart(const std::string& path) { return path.substr(0, path.find('/')); }
 
+std::set<std::string> FoldersIn(const Path& folder) {
+  std::set<std::string> out;
+  for (const auto& entry : std::filesystem::directory_iterator(kRoot / folder)) {
+    if (entry.is_directory()) out.insert(entry.path().filename().string());
+  }
+  return out;
+}
+
+template <class Value>
+std::set<std::string> Keys(const std::map<std::string, Value>& map) {
+  std::set<std::string> out;
+  for (const auto& [key, value] : map) out.insert(key);
+  return out;
+}
+
 // Folder -> folders of src/ it may include besides itself. Every folder may include tilegrad/ and
-// the standard library.
+// the standard library. `compat` stands above the renderer: the rules of other frameworks are not
+// ours, so neither kernels nor renderer know them.
 const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"base", {}},
     {"scene", {"base"}},
@@ -59,6 +78,32 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"cli", {"proof", "fit", "train", "render", "nn", "io", "scene", "base"}},
 };
 
+// Room of src/train -> rooms it may include besides itself. Losses, operations and metrics know
+// nothing of each other; a run knows no task; the report asks the task and names no loss.
+const std::map<std::string, std::set<std::string>> kMayIncludeInTrain = {
+    {"losses", {}},
+    {"ops", {}},
+    {"metrics", {}},
+    {"data", {"metrics"}},
+    {"run", {"data"}},
+    {"models", {"run", "data"}},
+    {"tasks", {"models", "losses", "ops", "metrics", "data", "run"}},
+    {"eval", {"tasks", "models", "metrics", "data", "run"}},
+    {"report", {"eval", "tasks", "models", "metrics", "data", "run"}},
+};
+
+TEST(Structure, FoldersAreTheOnesListedHere) {
+  EXPECT_EQ(FoldersIn("src"), Keys(kMayInclude));
+  EXPECT_EQ(FoldersIn("src/train"), Keys(kMayIncludeInTrain));
+  std::set<std::string> python = FoldersIn("src/compat");
+  python.erase("projected");  // what Kaolin's and PyTorch3D's rules share
+  for (const std::string& framework : python) {
+    const Path mirror = kRoot / "python/tilegrad/compat" / framework;
+    EXPECT_TRUE(std::filesystem::exists(mirror) || std::filesystem::exists(mirror.string() + ".py"))
+        << "src/compat/" << framework << " has no python/tilegrad/compat/" << framework;
+  }
+}
+
 TEST(Structure, IncludesPointOneWay) {
   const auto includes = IncludesUnder("src");
   ASSERT_GT(includes.size(), 40u);  // the search itself works
@@ -67,6 +112,29 @@ TEST(Structure, IncludesPointOneWay) {
     if (kMayInclude.count(to) == 0 || to == from) continue;
     EXPECT_TRUE(kMayInclude.at(from).count(to))
         << file << " includes " << target << ", but " << from << " may not include " << to;
+  }
+}
+
+TEST(Structure, RoomsOfTrainIncludeOneWay) {
+  int between_rooms = 0;
+  for (const auto& [file, target] : IncludesUnder("src/train")) {
+    const std::string from = FirstPart(file.substr(10));
+    const std::string to = FirstPart(target) == "train" ? FirstPart(target.substr(6)) : "";
+    const auto rule = kMayIncludeInTrain.find(from);
+    if (rule == kMayIncludeInTrain.end() || kMayIncludeInTrain.count(to) == 0 || to == from)
+      continue;
+    ++between_rooms;
+    EXPECT_TRUE(rule->second.count(to)) << file << " includes " << target;
+  }
+  EXPECT_GT(between_rooms, 0);
+}
+
+// From src/ or include/, so that an include tells the folder: the tests above see it.
+TEST(Structure, IncludesBeginWithAFolder) {
+  for (const auto& [file, target] : IncludesUnder("src", Marks::kQuotes)) {
+    const std::string folder = FirstPart(target);
+    EXPECT_TRUE(folder == "tilegrad" || kMayInclude.count(folder))
+        << file << " includes " << target;
   }
 }
 
@@ -94,19 +162,61 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^toml\\+\\+.*"), {"src/train/", "src/fit/"}},
       {std::regex("^CLI/.*"), {"src/cli/"}},
       {std::regex("^(pybind11/.*|Python\\.h)$"), {"python/bindings/"}},
+      {std::regex("^(fmt|nlohmann)/.*"), {"src/", "python/bindings/"}},
+      {std::regex("^(sys/.*|(fcntl|poll|pthread|sched|unistd|malloc)\\.h)$"),
+       {"src/base/", "src/io/archive", "src/io/guarded_", "src/nn/address_arena", "src/cli/console",
+        "python/bindings/"}},
+      {std::regex("^sanitizer/.*"), {"src/base/", "src/nn/address_arena"}},
   };
   auto includes = IncludesUnder("src");
   const auto bindings = IncludesUnder("python/bindings");
   ASSERT_FALSE(bindings.empty());
   includes.insert(includes.end(), bindings.begin(), bindings.end());
   for (const auto& [file, target] : includes) {
+    bool known = FirstPart(target) == "tilegrad" || kMayInclude.count(FirstPart(target)) ||
+                 FirstPart(target) == "bindings" ||
+                 target.find_first_of("/.") == std::string::npos;  // the standard library
     for (const auto& [library, allowed] : homes) {
       if (!std::regex_match(target, library)) continue;
+      known = true;
       bool home = false;
       for (const auto& prefix : allowed) home |= file.rfind(prefix, 0) == 0;
       EXPECT_TRUE(home) << file << " includes " << target << ", whose home is elsewhere";
     }
+    EXPECT_TRUE(known) << file << " includes " << target << ", which has no home in this list";
   }
+}
+
+// Kernel x is x.h (contract), x_ref.h (truth), x-inl.h (vector body) and x.cc (dispatch). Missing
+// file -> why.
+const std::map<std::string, std::string> kKernelsWithoutFile = {
+    {"src/base/array_checks-inl.h", "a loop of a few lines, in the .cc"},
+    {"src/base/array_checks_ref.h", "std::isfinite and comparisons, in the test"},
+    {"src/nn/kernels/conv2d/winograd_ref.h", "conv2d_ref.h: another way to the same convolution"},
+    {"src/nn/kernels/product_adam_ref.h", "gemm_ref.h, then adam_ref.h"},
+    {"src/raster/drawn_faces_ref.h", "visibility_ref.h, which tries every face"},
+    {"src/raster/interpolate_backward_ref.h", "interpolate_ref.h has both directions"},
+    {"src/raster/seen_faces_ref.h",
+     "a numbering: gradients summed by it are held to interpolate_ref.h"},
+    {"src/raster/soft_mask/soft_mask-inl.h", "forward-inl.h, backward-inl.h, tree-inl.h"},
+};
+
+TEST(Structure, AKernelIsASetOfFiles) {
+  std::set<std::string> unused = Keys(kKernelsWithoutFile);
+  int kernels = 0;
+  for (const auto& [file, target] : IncludesUnder("src")) {
+    if (target != "hwy/foreach_target.h") continue;
+    ++kernels;
+    ASSERT_TRUE(file.ends_with(".cc")) << file << " dispatches, but is no .cc";
+    const std::string stem = file.substr(0, file.size() - 3);
+    for (const char* part : {".h", "_ref.h", "-inl.h"}) {
+      if (std::filesystem::exists(kRoot / (stem + part))) continue;
+      EXPECT_TRUE(kKernelsWithoutFile.count(stem + part)) << stem << part << " is missing";
+      unused.erase(stem + part);
+    }
+  }
+  EXPECT_GT(kernels, 20);
+  for (const auto& file : unused) ADD_FAILURE() << file << ": remove its exception";
 }
 
 TEST(Structure, PublicHeadersNeedOnlyTheStandardLibrary) {

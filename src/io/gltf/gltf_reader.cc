@@ -183,7 +183,7 @@ Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
   return {};
 }
 
-// The nodes of the default scene, or of the first one, or all that are nobody's child.
+// The nodes of the default scene, or of the first one, or all root nodes.
 std::vector<int> RootNodes(const tinygltf::Model& model) {
   if (!model.scenes.empty()) {
     const bool valid =

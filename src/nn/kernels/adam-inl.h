@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of adam.h. Seven streams of memory bound it; the square root and the division hide
-// behind them.
+// Vector body of adam.h. Bound by seven streams of memory, which hide the square root and the
+// division.
 #if defined(TILEGRAD_NN_ADAM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_ADAM_INL_H_
 #undef TILEGRAD_NN_ADAM_INL_H_

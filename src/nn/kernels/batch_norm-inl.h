@@ -31,7 +31,7 @@ struct Normalise {
   }
   HWY_INLINE VF Apply(VF x) const { return hn::MulAdd(x, scale, shift); }
   HWY_INLINE VF Standard(VF x) const { return hn::Mul(hn::Sub(x, mean), inverse); }
-  // d_y where relu let y through: the same expression as in Apply, so the same sign.
+  // d_y where relu passed y: the same expression as in Apply, so the same sign.
   HWY_INLINE VF Mask(DF d, bool relu, VF x, VF dy) const {
     return relu ? hn::IfThenElseZero(hn::Gt(Apply(x), hn::Zero(d)), dy) : dy;
   }

@@ -24,8 +24,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::nn::HWY_NAMESPACE {
 
-// Steps of k in one block, for which C is read and written once. With vectors of 16 floats the tile
-// is so large that panels of B need not stay in L1, and more steps gain.
+// Steps of k in one block, for which C is read and written once. With vectors of 16 floats a tile
+// is so large that panels of B need not stay in L1, and deeper blocks are faster.
 constexpr std::size_t kDepth = kLanes > 8 ? 512 : 256;  // the best of 128 to 512 there
 constexpr std::size_t kBlockFloats = 65536;  // of B in one block; the next one shares L2 with it
 constexpr std::size_t kBlockPanels = kBlockFloats / (kDepth * kTileColumns);
@@ -42,8 +42,8 @@ struct GemmItems {
 
 constexpr std::size_t kLeastRows = 128;  // of an item, or packing B would weigh too much
 
-// The fewest columns of an item. All rows of A pass by for each item: where they are few and B is
-// read row by row, as many columns as one block has, if there are some for each worker.
+// The fewest columns of an item. Each item streams all rows of A: where these are few and B is read
+// row by row, as many columns as one block has, provided every worker gets some.
 inline std::size_t LeastColumns(const GemmProblem<float>& p, std::size_t workers) {
   constexpr std::size_t kLeast = 4 * kTileColumns;
   if (p.transpose_b || p.m > kLeastRows) return kLeast;
@@ -136,8 +136,8 @@ HWY_INLINE void ForTiles(std::size_t first, std::size_t rows, const ColumnBlock&
   }
 }
 
-// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one a
-// function of its own: within a large caller GCC 12 does not keep a tile's sums in registers.
+// The tiles of `rows` row panels from `first` on and of the packed columns. Like the next one, a
+// separate function: within a large caller GCC 12 does not keep a tile's sums in registers.
 inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                        const float* packed_a, const ColumnPacker& columns) {
   ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
@@ -145,10 +145,10 @@ inline HWY_NOINLINE void MultiplyBlock(const GemmPlan& plan, std::size_t first, 
   });
 }
 
-// The same; meanwhile a task runs.
+// The same, with a task interleaved.
 template <class Task>
-HWY_INLINE void MultiplyBusily(const GemmPlan& plan, std::size_t first, std::size_t rows,
-                               const float* packed_a, const ColumnPacker& columns, Task& task) {
+HWY_INLINE void MultiplyWithTask(const GemmPlan& plan, std::size_t first, std::size_t rows,
+                                 const float* packed_a, const ColumnPacker& columns, Task& task) {
   ForTiles(first, rows, columns.block(), [&](std::size_t panel, std::size_t j) HWY_ATTR {
     MultiplyTile(plan, packed_a, panel, columns.block(), j,
                  BusyColumns<Task>(columns.panel(j), task));
@@ -160,25 +160,25 @@ inline std::size_t TaskRuns(std::size_t rows, const ColumnBlock& block) {
   return std::max<std::size_t>(1, rows * block.panels() * (block.steps / kRunSteps));
 }
 
-// The same; meanwhile the tiles pack `next`.
+// The same; the tiles also pack `next`.
 inline HWY_NOINLINE void MultiplyAndPack(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                          const float* packed_a, const ColumnPacker& columns,
                                          const ColumnPacker& next) {
   PanelCopier copier = next.Copier(TaskRuns(rows, columns.block()));
-  MultiplyBusily(plan, first, rows, packed_a, columns, copier);
+  MultiplyWithTask(plan, first, rows, packed_a, columns, copier);
   copier.Finish();
   next.PackRest();
 }
 
-// The same; meanwhile the tiles ask memory for `next`, of a transposed B.
+// The same; the tiles also prefetch `next`, of a transposed B.
 inline HWY_NOINLINE void MultiplyAndFetch(const GemmPlan& plan, std::size_t first, std::size_t rows,
                                           const float* packed_a, const ColumnPacker& columns,
                                           const ColumnPacker& next) {
   BlockFetcher fetcher = next.Fetcher(TaskRuns(rows, columns.block()));
-  MultiplyBusily(plan, first, rows, packed_a, columns, fetcher);
+  MultiplyWithTask(plan, first, rows, packed_a, columns, fetcher);
 }
 
-// The blocks of B that a work item meets, one after the other: all columns of a depth, as the rows
+// The blocks of B that a work item processes, in order: all columns of a depth, as the rows
 // of B lie in memory, or all depths of some columns, as they lie in a transposed B.
 class BlockOrder {
  public:

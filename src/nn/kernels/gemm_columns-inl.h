@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The large operand of a matrix product, packed a block of columns and steps at a time. With few
-// rows on the other side (a training batch) copying it and waiting for it would cost as much as
-// multiplying: a B that is not transposed is packed by the tiles of the block before, a row of a
-// panel every few steps of theirs. A transposed B is packed a block at a time, which reads it in
-// runs as long as the block is deep; the tiles of the block before ask for them.
+// Packs the large operand of a matrix product, a block of columns and steps at a time. With few
+// rows on the other side (a training batch), copying it and its cache misses would cost as much as
+// multiplying. So the tiles of the block before pack a B that is not transposed, a row of a panel
+// every few steps. A transposed B is packed a whole block at a time, in runs as long as the block
+// is deep, which the tiles of the block before prefetch.
 
 #if defined(TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_GEMM_COLUMNS_INL_H_
@@ -39,8 +39,8 @@ struct ColumnBlock {
   std::size_t panels() const { return DivideUp(end - begin, kTileColumns); }
 };
 
-// Copies the whole panels of a block, a row of a panel at a time: row after row of B, so that what
-// is read lies in runs, and asked for in time.
+// Copies the whole panels of a block, one row of a panel at a time, going through B row by row:
+// reads are contiguous and prefetched.
 class PanelCopier {
  public:
   // b: the block in B, rows `ld` apart. Copies `share` rows of a panel in one run.
@@ -67,7 +67,7 @@ class PanelCopier {
   }
 
  private:
-  // Rows of panels between asking and copying: the best of 16 to 256 for lines past L1.
+  // Prefetch distance in rows of panels: the best of 16 to 256 for lines past L1.
   static constexpr std::size_t kAhead = 64;
 
   HWY_INLINE void Copy() {
@@ -92,10 +92,10 @@ class PanelCopier {
   std::ptrdiff_t next_panel_ = 0, next_row_to_ = 0;
 };
 
-// Asks for the lines of a block of a transposed B, some in one run.
+// Prefetches the lines of a block of a transposed B, some per run.
 class BlockFetcher {
  public:
-  // b: the block in B^T, `rows` runs of `steps` floats, `ld` apart. Asks for `share` lines in a
+  // b: the block in B^T, `rows` runs of `steps` floats, `ld` apart. Prefetches `share` lines per
   // run.
   BlockFetcher(const float* b, std::size_t ld, std::size_t rows, std::size_t steps,
                std::size_t share)
@@ -138,7 +138,7 @@ class ColumnPacker {
     return PanelCopier(RowOf(0), p_.ldb, block_, packed_,
                        DivideUp(block_.steps * whole_panels(), runs));
   }
-  // Of a transposed B: asks for the block in `runs` runs.
+  // Of a transposed B: prefetches the block in `runs` runs.
   BlockFetcher Fetcher(std::size_t runs) const {
     const std::size_t columns = block_.end - block_.begin;
     return BlockFetcher(p_.b + block_.begin * p_.ldb + block_.k, p_.ldb, columns, block_.steps,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every NN kernel is handed besides its operands: the workers it may use and memory it may
-// scribble on.
+// The environment of every NN kernel, besides its operands: the workers it may use, scratch memory
+// and options.
 #pragma once
 
 #include <cstddef>
@@ -37,7 +37,7 @@ class KernelScratch {
 struct KernelContext {
   const Workers& workers;
   KernelScratch& scratch;
-  // Convolutions may multiply less and round a little more: conv2d_winograd.h.
+  // Convolutions may multiply less and round a little more: winograd.h.
   bool winograd = true;
 };
 

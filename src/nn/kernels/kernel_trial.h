@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random operands for the NN kernels, and what rounding may do to results: for proofs that hold
-// kernels to their references (tests/nn/kernels, src/proof/selftest).
+// Random operands for the NN kernels, and rounding bounds of results: for tests that compare
+// kernels with their references (tests/nn/kernels, src/proof/selftest).
 #pragma once
 
 #include <cmath>

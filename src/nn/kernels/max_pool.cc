@@ -10,7 +10,7 @@ struct Range {
   std::size_t begin, end;
 };
 
-// What window i covers of an axis of `extent` elements.
+// The part of an axis of `extent` elements that window i covers.
 Range Window(const PoolShape& s, std::size_t i, std::size_t extent) {
   const std::size_t from = i * s.stride;  // in the padded axis
   return {from > s.padding ? from - s.padding : 0, std::min(extent, from + s.kernel - s.padding)};

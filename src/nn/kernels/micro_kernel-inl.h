@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one inner loop of every matrix product and convolution: a tile of at most kTileRows x
-// kTileColumns of C stays in registers while rank-one updates stream past. Where the two factors
-// come from is a policy: packed panels, rows of a matrix as they lie, or vectors addressed through
-// a table of offsets (implicit convolution).
+// The micro-kernel, the one inner loop of every matrix product and convolution: a tile of at most
+// kTileRows x kTileColumns of C stays in registers while rank-one updates stream past. Policies
+// supply the two factors: packed panels, rows of a matrix in place, or vectors addressed through a
+// table of offsets (implicit convolution).
 
 #if defined(TILEGRAD_NN_KERNELS_MICRO_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_MICRO_KERNEL_INL_H_
@@ -32,8 +32,8 @@ constexpr std::size_t kTileVectors = 2;
 constexpr std::size_t kMostTileVectors = 3;  // of a tile of few rows
 constexpr std::size_t kTileColumns = kTileVectors * kLanes;
 // Two FMA units of latency 4 need 8 independent sums at least; 6 x 2 sums, two vectors of B and one
-// of A are 15 of 16 registers. Where there are 32 registers, 12 x 2 halve the loads per FMA: AVX3
-// and what is better, which has lower bits and, in newer Highways, further names.
+// of A are 15 of 16 registers. With 32 registers, 12 x 2 halves the loads per FMA: AVX3 and better
+// targets, which have lower bits and, in newer versions of Highway, other names.
 #if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3) || HWY_TARGET == HWY_NEON
 constexpr std::size_t kTileRows = 12;
 constexpr std::size_t kRegisters = 32;  // of vectors
@@ -51,8 +51,8 @@ struct PackedRows {
   HWY_INLINE void Advance() { next += R; }
 };
 
-// The row factor from R rows as they lie in memory, row r at data[r], one step of k being one
-// float.
+// The row factor from R rows of a matrix in place (not packed): row r is at data[r], and one step
+// of k is one float.
 template <std::size_t R>
 struct PlainRows {
   static constexpr std::size_t kRows = R;
@@ -74,8 +74,8 @@ struct PackedColumns {
 // to 8.
 constexpr std::size_t kRunSteps = kLanes > 8 ? 4 : 8;
 
-// A packed panel; meanwhile `task` runs every kRunSteps steps, in the time that loads, stores and
-// integer arithmetic have beside the FMAs.
+// A packed panel; `task` runs every kRunSteps steps, in issue slots for loads, stores and integer
+// arithmetic that the FMAs leave free.
 template <class Task>
 struct BusyColumns : PackedColumns {
   BusyColumns(const float* panel, Task& t) : PackedColumns{panel}, task(t) {}
@@ -110,7 +110,7 @@ HWY_INLINE Vec WithBiasAndOld(Vec sum, const TileTarget& t, std::size_t row, con
   return t.accumulate ? hn::Add(hn::LoadU(Tag(), c), sum) : sum;
 }
 
-// Through a copy, without touching memory behind the lanes that exist.
+// Through a copy, without touching memory beyond the existing lanes.
 inline HWY_NOINLINE void StorePartialVector(Vec sum, const TileTarget& t, std::size_t row,
                                             std::size_t v) {
   HWY_ALIGN float bias[kLanes] = {}, c[kLanes] = {};
@@ -172,9 +172,9 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 
  private:
-  // Is a register left beside the sums, V vectors of columns and one of a row? Then two steps
-  // follow each other at once, and the second one's loads may go first. Else they would push sums
-  // out, and the exits of a run keep steps apart. docs/nn-speed.md has what either is worth.
+  // If a register is left beside the sums, V vectors of columns and one of a row, two steps are
+  // joined, so that the second one's loads may go first. Otherwise they would spill sums, and the
+  // exits of a run keep steps apart. docs/nn-speed.md has the effect of either.
   static constexpr bool kSparesRegister = R * V + V + 1 < kRegisters;
 
   template <std::size_t r>
@@ -185,7 +185,7 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   HWY_INLINE void AddProduct(Vec a, const Vec (&b)[V]) {
     ((sum[r][vector] = hn::MulAdd(a, b[vector], sum[r][vector])), ...);
   }
-  // The common case without a question for every vector.
+  // The common case, without a test per vector.
   HWY_INLINE void StoreWhole(const TileTarget& t) const {
     float* const c[V] = {t.c + t.offset[vector]...};
     t.accumulate ? (AddRow<row>(c, row * t.ldc), ...) : (StoreRow<row>(c, row * t.ldc), ...);
@@ -206,8 +206,8 @@ struct Tile<R, V, std::index_sequence<row...>, std::index_sequence<vector...>> {
   }
 };
 
-// Asks for the lines that Store will write. Past L1: rows of C may be a power of two apart, so that
-// L1 has room for a few of them only.
+// Prefetches the lines that Store will write. Into L2: rows of C may be a power of two apart, so
+// that L1 can hold only a few of them.
 template <std::size_t R, std::size_t V>
 HWY_INLINE void FetchTarget(const TileTarget& t) {
   constexpr std::size_t kVectorsOfLine = std::max<std::size_t>(1, kLineFloats / kLanes);

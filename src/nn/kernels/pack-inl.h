@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Copies of a strip of a matrix into the order in which the micro-kernel reads it.
+// Packs a strip of a matrix in the order in which the micro-kernel reads it.
 
 #if defined(TILEGRAD_NN_KERNELS_PACK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_KERNELS_PACK_INL_H_

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of pointwise.h. Assumes nothing of length or alignment: a tail goes through a buffer
-// of one vector, so an element's bits do not depend on its position.
+// Vector body of pointwise.h. Any length and alignment: a tail goes through a buffer of one vector,
+// so an element's bits do not depend on its position.
 #if defined(TILEGRAD_NN_POINTWISE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_POINTWISE_INL_H_
 #undef TILEGRAD_NN_POINTWISE_INL_H_

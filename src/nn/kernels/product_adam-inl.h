@@ -48,8 +48,8 @@ struct ProductAdamPlan {
   AdamRule rule;
 };
 
-// Adam over some rows and columns of the gradient, a little at a time: whoever multiplies runs it
-// between two tiles, so that what it asks memory for arrives while the tile is computed.
+// Adam over some rows and columns of the gradient, in small portions: the multiplication calls it
+// between tiles, so that its prefetches arrive while a tile is computed.
 class GroupUpdater {
  public:
   GroupUpdater() = default;  // of no rows
@@ -98,7 +98,7 @@ class GroupUpdater {
   const float* gradient_ = nullptr;
 };
 
-// Row panels [first, end) of the packed columns, into `group`; meanwhile `before` is updated.
+// Row panels [first, end) of the packed columns, into `group`, interleaved with Adam over `before`.
 inline HWY_NOINLINE void MultiplyGroup(const ProductAdamPlan& plan, Panels::Range panels,
                                        const float* packed_a, const ColumnPacker& columns,
                                        float* group, GroupUpdater& before) {

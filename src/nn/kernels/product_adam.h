@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of Adam over a matrix whose gradient is a product, as of a linear layer's weight: the
-// gradient is computed block by block, and each block used while it lies in cache. Nothing of it
+// One step of Adam over a matrix whose gradient is a product, as that of a linear layer's weight
+// is. The gradient is computed block by block and each block is used while in cache. None of it
 // goes to memory, which would take as long as the step itself.
 #pragma once
 
@@ -12,8 +12,8 @@
 
 namespace tilegrad::nn {
 
-// The most steps k of a product that ProductAdamStep takes; beyond them multiplying weighs more
-// than memory.
+// The largest k of a product that ProductAdamStep accepts; beyond it multiplication outweighs
+// memory traffic.
 constexpr std::size_t kMostProductAdamSteps = 256;
 
 // The same bits as Gemm(product) into a gradient and AdamStep(adam) over it. `product.c` and

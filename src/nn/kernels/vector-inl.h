@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the vector bodies of this folder share: the float vector, tails, and sums in a fixed order.
+// Shared by the vector bodies of this folder: the float vector, tails, sums in a fixed order.
 #if defined(TILEGRAD_NN_VECTOR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_VECTOR_INL_H_
 #undef TILEGRAD_NN_VECTOR_INL_H_

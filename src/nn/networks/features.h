@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The convolutional part of three classifiers, with weights that the user brings, to compare images
-// by what it sees in them (Johnson et al. 2016; Zhang et al. 2018 say which layers).
+// The convolutional part of three classifiers, with weights supplied by the user, to compare images
+// by their features (Johnson et al. 2016; Zhang et al. 2018 say which layers).
 #pragma once
 
 #include <span>

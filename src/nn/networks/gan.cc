@@ -93,7 +93,7 @@ void Critic::Visit(const std::string& prefix, ModuleVisitor& visitor) {
 
 Var GradientPenalty(Module& critic, const Var& x) {
   if (!x.valid() || x.shape().rank() < 1) return Invalid({&x});
-  // sqrt has no gradient at 0, where a critic without slope would be.
+  // sqrt has no finite gradient at 0, the value for a constant critic.
   constexpr double kTiny = 1e-12;
   const std::int64_t samples = x.shape()[0];
   const Var at = Parameter(x.context(), x.value());

@@ -14,7 +14,7 @@ namespace {
 
 constexpr ConvOptions kHalve = {.stride = 2, .padding = 1};  // of a 4x4 kernel
 
-// What an image must be so that halving it `halvings` times leaves no rest.
+// Checks that an image can be halved `halvings` times without a remainder.
 Status CheckImage(const Var& x, std::size_t halvings) {
   const std::int64_t step = std::int64_t{1} << halvings;
   const Shape& shape = x.shape();
@@ -41,7 +41,7 @@ UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) {
                            .options = kHalve},
                   .norm = norm},
                  rng);
-    // Above the innermost level the way up carries the skipped channels beside its own.
+    // Above the innermost level the decoder has the skip connection's channels beside its own.
     const std::int64_t from = i + 1 == levels ? channels(i) : 2 * channels(i);
     ConvBlock block{.conv = {.in = from,
                              .out = i == 0 ? shape.out : channels(i - 1),

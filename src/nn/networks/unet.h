@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// U-Nets: down to a code and back up, where each level also sees what the way down had at its size.
+// U-Nets: an encoder down to a code and a decoder with skip connections from each level.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sparse linear map along one axis: what padding, resizing and average pooling are made of. The
-// adjoint of a map is that of the transposed matrix, so one operation is closed.
+// A sparse linear map along one axis, the basis of padding, resizing and average pooling. Its
+// adjoint is the map of the transposed matrix, so the operation is closed under differentiation.
 #pragma once
 
 #include <limits>

@@ -40,7 +40,7 @@ BatchNormParameters<T> ParametersOf(const Operands& o) {
   return {o.gamma.value().data<T>(), o.beta.value().data<T>(), o.options.epsilon, o.options.relu};
 }
 
-// The gradient in one pass, in dy's memory where nobody else sees it; it cannot be differentiated.
+// The gradient in one fused pass, in dy's memory if unshared; it cannot be differentiated.
 Vars FusedGrad(const Operands& o, const BatchStatistics& statistics, const Var& dy) {
   Context& context = o.x.context();
   Tensor dx = dy.value().unique() ? dy.value() : context.Empty(o.x.shape(), o.x.dtype());

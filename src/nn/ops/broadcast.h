@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How NumPy-style broadcasting is laid out for a kernel.
+// The layout of NumPy-style broadcasting for a kernel.
 #pragma once
 
 #include <array>

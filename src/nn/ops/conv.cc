@@ -33,7 +33,7 @@ Result<Conv2dShape> MakeShape(const Extents& e, const ConvOptions& options) {
     return InvalidArgument("conv2d: input {} with weight {}, stride {}, padding {}", e.x.ToString(),
                            e.weight.ToString(), options.stride, options.padding);
   }
-  // An image that is asked for by its size may have any.
+  // The caller may request an image of any size.
   if (!e.x.IsPossible() || !e.weight.IsPossible() ||
       !PaddedShape(e.x, options.padding).IsPossible()) {
     return InvalidArgument("conv2d: input {} with weight {}, padding {}: no tensor has such a size",

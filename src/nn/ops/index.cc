@@ -50,7 +50,7 @@ Var Gather(const Var& x, int axis, const Tensor& indices) {
     return Fail(x, s);
   }
   const Shape picked = WithExtent(x.shape(), axis, indices.shape()[0]);
-  if (!Makeable("gather", x, picked)) return Invalid({&x});
+  if (!IsPossibleResult("gather", x, picked)) return Invalid({&x});
   Tensor y = x.context().Empty(picked, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     GatherRows(RowsOf(x.shape(), axis, indices), x.value().data<T>(), y.data<T>(),
@@ -71,7 +71,7 @@ Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t exten
                                    axis, x.shape().ToString()));
   }
   const Shape whole = WithExtent(x.shape(), axis, extent);
-  if (!Makeable("scatter", x, whole)) return Invalid({&x});
+  if (!IsPossibleResult("scatter", x, whole)) return Invalid({&x});
   Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     ScatterRows(RowsOf(y.shape(), axis, indices), x.value().data<T>(), y.data<T>(),
@@ -129,7 +129,7 @@ Var PlaceAlong(const Var& x, const Tensor& indices, std::int64_t extent) {
   }
   if (!status.ok()) return Fail(x, status);
   const Shape whole = WithExtent(x.shape(), x.shape().rank() - 1, extent);
-  if (!Makeable("place along", x, whole)) return Invalid({&x});
+  if (!IsPossibleResult("place along", x, whole)) return Invalid({&x});
   Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
     PlaceElements(PickedOf(indices, extent), x.value().data<T>(), y.data<T>(),

@@ -56,7 +56,8 @@ Var Matmul(const Var& a, const Var& b, const MatmulOptions& options) {
                                    options.transpose_b ? "^T" : ""));
   }
   const bool ta = options.transpose_a, tb = options.transpose_b;
-  if (!Makeable("matmul", a, {a.shape()[ta ? 1 : 0], b.shape()[tb ? 0 : 1]})) return Invalid({&a});
+  if (!IsPossibleResult("matmul", a, {a.shape()[ta ? 1 : 0], b.shape()[tb ? 0 : 1]}))
+    return Invalid({&a});
   return Record({"matmul"}, Product(a, b, Var(), options), {a, b},
                 [a, b, ta, tb](const Adjoint& adj) {
                   const Var& dc = adj.dy();
@@ -77,7 +78,7 @@ Var Linear(const Var& x, const Var& w, const Var& b) {
     return Fail(x, InvalidArgument("linear: input {}, weight {}, bias {}", x.shape().ToString(),
                                    w.shape().ToString(), b.shape().ToString()));
   }
-  if (!Makeable("linear", x, {x.shape()[0], w.shape()[0]})) return Invalid({&x});
+  if (!IsPossibleResult("linear", x, {x.shape()[0], w.shape()[0]})) return Invalid({&x});
   const auto rule = [x, w](const Adjoint& adj) {
     const Var& dy = adj.dy();
     return Vars{adj.needs(0) ? Matmul(dy, w) : Var(), adj.needs(1) ? adj.Product(1, dy, x) : Var(),

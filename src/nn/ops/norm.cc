@@ -15,7 +15,7 @@
 namespace tilegrad::nn {
 namespace {
 
-// Each of `rows` runs of x brought to mean 0 and variance 1; in x's shape.
+// Normalises each of `rows` runs of x to mean 0 and variance 1; in x's shape.
 Var Standardised(const Var& x, std::int64_t rows, const NormOptions& options) {
   Context& context = x.context();
   const auto filled = [&](double value) {

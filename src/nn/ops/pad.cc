@@ -33,7 +33,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after, PadMode
   if (most == 0) return x;
   Shape padded = x.shape();
   padded[axis] += before + after;
-  if (!Makeable("pad", x, padded)) return Invalid({&x});
+  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
   const AxisMap map = MakeAxisMap(x, {extent, padded[axis]}, [&](std::int64_t i, AxisTerms& terms) {
     terms.push_back({SourceOf(i - before, extent, mode), 1.0});
   });

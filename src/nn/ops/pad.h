@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Padding by what the edge of an axis is next to.
+// Padding modes and operations.
 #pragma once
 
 #include "nn/tape.h"

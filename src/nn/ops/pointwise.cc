@@ -57,7 +57,7 @@ void FillProblem(const Broadcast& broadcast, BinaryProblem<T>& problem) {
   problem.strides_b = broadcast.strides[1];
 }
 
-// Into y, which may be the memory of an operand of its shape.
+// Writes to y, which may share memory with an operand of its shape.
 Tensor ComputeBinary(const BinaryCall& call, const Var& a, const Var& b, Tensor y) {
   const Broadcast broadcast = PlanBroadcast(y.shape(), a.shape(), b.shape());
   WithFloatType(a.dtype(), [&]<class T>(T) {
@@ -80,12 +80,12 @@ Var BinaryVar(const OpInfo& info, const BinaryCall& call, const Var& a, const Va
     return Fail(a, InvalidArgument("{}: shapes {} and {} do not broadcast", info.name,
                                    a.shape().ToString(), b.shape().ToString()));
   }
-  if (!Makeable(info.name, a, shape)) return Invalid({&a});
+  if (!IsPossibleResult(info.name, a, shape)) return Invalid({&a});
   Tensor y = a.context().Empty(shape, a.dtype());
   return Record(info, ComputeBinary(call, a, b, std::move(y)), {a, b}, std::move(rule));
 }
 
-// Whether an operation that is given `v` for good may write its result there.
+// Whether an operation that owns `v` may write its result there.
 bool IsExpendable(const Var& v) { return v.value().unique() && !v.context().recording(); }
 
 // No gradient flows out of a mask.

@@ -48,11 +48,11 @@ inline Var operator-(const Var& x, double s) { return AddScalar(x, -s); }
 inline Var operator+(double s, const Var& x) { return AddScalar(x, s); }
 inline Var operator-(double s, const Var& x) { return AddScalar(Neg(x), s); }
 
-// The adjoint of Relu from its output y: y > 0 ? dy : 0. In dy's memory where nobody else sees it
-// and nothing is recorded.
+// The adjoint of Relu from its output y: y > 0 ? dy : 0. In dy's memory if that is unshared and
+// nothing is recorded.
 Var ReluGrad(const Var& y, Var dy);
 
-// sum + term, equal shapes, in sum's memory where nobody else sees it and nothing is recorded.
+// sum + term, equal shapes, in sum's memory if that is unshared and nothing is recorded.
 Var Accumulated(Var sum, const Var& term);
 
 // Masks, without gradient: 1 where the relation holds, else 0. Broadcast like the others.

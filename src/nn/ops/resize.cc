@@ -53,7 +53,7 @@ Var Resize(const Var& x, ImageSize size, ResizeMode mode) {
     return Fail(
         x, InvalidArgument("resize: {} to {} x {}", x.shape().ToString(), size.height, size.width));
   }
-  if (!Makeable("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
+  if (!IsPossibleResult("resize", x, {x.shape()[0], x.shape()[1], size.height, size.width})) {
     return Invalid({&x});
   }
   return ResizeAxis(ResizeAxis(x, 2, size.height, mode), 3, size.width, mode);

@@ -103,7 +103,7 @@ Var Reshape(const Var& x, Shape shape) {
 Var BroadcastTo(const Var& x, const Shape& shape) {
   if (!Usable("broadcast", {&x})) return Invalid({&x});
   if (x.shape() == shape) return x;
-  if (!Makeable("broadcast", x, shape)) return Invalid({&x});
+  if (!IsPossibleResult("broadcast", x, shape)) return Invalid({&x});
   Shape joined;
   if (!BroadcastShape(x.shape(), shape, joined) || !(joined == shape)) {
     return Fail(x, InvalidArgument("broadcast: {} to {}", x.shape().ToString(), shape.ToString()));
@@ -174,7 +174,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
   }
   const std::int64_t extent = x.shape()[axis];
   const Shape padded = WithExtent(x.shape(), axis, before + extent + after);
-  if (!Makeable("pad", x, padded)) return Invalid({&x});
+  if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
   Tensor y = Zeros(x, padded);
   MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
   return Record({"pad"}, std::move(y), {x}, [axis, before, extent](const Adjoint& adj) {
@@ -184,7 +184,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
 
 namespace {
 
-// Two parts at a time would copy the front ones again and again; this places each part once.
+// Joining two at a time would copy the first parts repeatedly; this copies each part once.
 Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
   Context& context = parts[0].context();
   Tensor y = context.Empty(WithExtent(parts[0].shape(), axis, extent), parts[0].dtype());

@@ -38,8 +38,8 @@ Var LogSumExp(const Var& x, int axis) {
   const double most = x.dtype() == DType::kF64 ? std::numeric_limits<double>::max()
                                                : std::numeric_limits<float>::max();
   const Var largest = Detach(ReduceMax(x, {axis}, Keep::kYes));
-  // Infinity less infinity has no value, so a finite number is taken out. The sum has a term of 1,
-  // or none at all, and log 0 would pull NaN.
+  // Infinity minus infinity is NaN, so a finite number is subtracted. The sum has a term of 1 or
+  // none at all, where the gradient of log 0 would be NaN.
   const Var lowered = Sub(x, Clamp(largest, -most, most));
   const Var sum = Clamp(Sum(Exp(lowered), {axis}, Keep::kYes), 0.5, kInfinity);
   return Sum(Add(Log(sum), largest), {axis});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Softmax over one axis and the losses of classification. The largest element is taken out before
-// anything is exponentiated, so that no finite input overflows.
+// Softmax over one axis and the losses of classification. The largest element is subtracted before
+// exponentiation, so that no finite input overflows.
 #pragma once
 
 #include "nn/tape.h"

@@ -108,7 +108,7 @@ constexpr nn::Conv2dShape kWinograd[] = {{2, 20, 9, 10, 16, 3, 3, 1, 1},
                                          {1, 16, 12, 9, 18, 5, 5, 2, 2}};
 
 // The transforms cost some accuracy: root mean square errors are 0.6 to 2.4 times those of the
-// direct kernels (conv2d_winograd.h), which the check before holds to their bound. 4 times are
+// direct kernels (winograd.h), which the check before holds to their bound. 4 times are
 // allowed; a term that is wrong makes tens of thousands.
 Status CheckWinograd(const CheckContext& context, const nn::Conv2dShape& s, Gauge* gauge) {
   if (!nn::WinogradFits(s)) return InternalError("is not taken by Winograd's algorithm");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way back through alpha. Where A is not close to 1, the product over all other faces is the
-// whole product times 1 + A + A^2 + ... So it is in light pixels, of which forward hands on the
-// product, and with the far faces of dark ones. For the near faces of dark pixels the products
-// before and behind each are kept. Nothing is divided by 1 - A. Lanes are faces, pixels are in the
-// loop.
+// The adjoint of alpha. Where A is not close to 1, the product over all other faces is the whole
+// product times 1 + A + A^2 + ... This covers light pixels, whose product the forward pass stores,
+// and the far faces of dark pixels. For the near faces of dark pixels, prefix and suffix products
+// are kept. Nothing is ever divided by 1 - A.
+// Lanes are faces, the loop runs over pixels.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_BACKWARD_INL_H_
@@ -26,8 +26,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// The background of a tile where alpha is not so small that all faces may be dropped: together they
-// have A <= about alpha.
+// The background pixels of a tile, except those whose alpha is so small that all faces may be
+// dropped: the sum of A over all faces is at most about alpha.
 HWY_INLINE TilePixels SoftPixelsOf(const SoftMaskPlan& plan, const SoftMaskRegion& tile,
                                    std::span<const float> alpha) {
   const std::int32_t* ids = tile.face_ids.data();
@@ -93,9 +93,9 @@ class TileBackward {
                       block.y0 + static_cast<int>(i / kBlockSize));
   }
 
-  // Those of the pixels `soft` of block b that have a gradient to hand on. Sets their push, 2
-  // d_alpha times the product over all faces: moving the nearest point along the way to the pixel
-  // lowers z. Dark ones, whose product is not known, have none yet.
+  // The pixels of block b among `soft` that have a gradient. Sets their push, 2 d_alpha times the
+  // product over all faces: moving the nearest point towards the pixel lowers z. Dark pixels, whose
+  // product is unknown, get theirs later.
   HWY_INLINE std::uint64_t TakePixels(const SoftBlock& block, std::uint64_t soft, std::size_t b) {
     std::uint64_t bits = 0;
     for (std::uint32_t rows = RowsOf(soft); rows != 0; rows &= rows - 1) {
@@ -176,7 +176,7 @@ class TileBackward {
                  &scratch_->lists);
   }
 
-  // The products over all faces in dark pixels: near ones by and by, far ones in block.alpha.
+  // The products over all faces in dark pixels: near faces one by one, far ones in block.alpha.
   void FindProducts() {
     SoftBlock* blocks = scratch_->blocks;
     for (std::size_t b = 0; b < kTileBlocks; ++b) {
@@ -267,7 +267,7 @@ class TileBackward {
   std::size_t chunk_begin_ = std::numeric_limits<std::size_t>::max(), chunk_end_ = 0;
   PixelScale scale_;
   std::uint64_t dark_[kTileBlocks] = {};  // pixels whose product is to be found
-  std::uint64_t weak_[kTileBlocks] = {};  // pixels in which weak faces matter
+  std::uint64_t weak_[kTileBlocks] = {};  // pixels where weak faces matter
   alignas(64) float push_[kTileBlocks][kBlockPixels];
   alignas(64) float near_product_[kTileBlocks][kBlockPixels];
 };

@@ -38,7 +38,7 @@ HWY_INLINE PixelRect NextTile(const PixelRect& region, const PixelRect& tile) {
   return {x, y, HWY_MIN(x + kTileSize, region.x1), HWY_MIN(y + kTileSize, region.y1)};
 }
 
-// Asks for a tile of an image, which is in as many places as it has rows.
+// Prefetches a tile of an image, row by row.
 template <class T>
 HWY_INLINE void PrefetchTile(const SoftMaskPlan& plan, const PixelRect& tile, const T* image) {
   for (int y = tile.y0; y < tile.y1; ++y) {
@@ -181,8 +181,8 @@ HWY_INLINE bool AnyLive(const SoftBlock* blocks) {
   return std::any_of(blocks, blocks + kTileBlocks, [](const SoftBlock& b) { return b.live != 0; });
 }
 
-// Fills what a block has for each pixel. With vectors: compilers would take an instruction that
-// takes long to begin.
+// Fills the arrays per pixel of a block. With vectors: compilers would choose rep stos, which is
+// slow to start.
 template <class T>
 HWY_INLINE void FillPixels(T value, T* to) {
   const hn::CappedTag<T, kBlockSize> d;

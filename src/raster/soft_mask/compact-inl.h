@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Appending chosen lanes to arrays. hn::CompressStore of this Highway copies its table to the stack
-// with each call, where masks are not registers.
+// Appends selected lanes to arrays. Where masks are not registers, this Highway's hn::CompressStore
+// copies its table to the stack on every call.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_COMPACT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_COMPACT_INL_H_

@@ -91,7 +91,7 @@ HWY_INLINE void SetUpDirections(SoftTag d, float unit_x, float unit_y, SoftFaceA
   }
 }
 
-// What their octagons have beyond boxes.
+// The diagonal bounds that make octagons of boxes.
 HWY_INLINE void SetUpDiagonals(SoftTag d, SoftFaceArrays* faces) {
   for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
     SoftVec sum[3], difference[3];
@@ -110,7 +110,7 @@ HWY_INLINE void SetUpDiagonals(SoftTag d, SoftFaceArrays* faces) {
   }
 }
 
-// Faces with long edges have none: a sum of large numbers may lie anywhere.
+// Faces with long edges have none: sums of large coordinates are not precise enough.
 HWY_INLINE void ForgetDiagonals(SoftTag d, SoftFaceArrays* faces) {
   for (std::size_t i = 0; i < faces->count; i += hn::Lanes(d)) {
     for (const auto least : {SoftFaceArrays::kLeastSum, SoftFaceArrays::kLeastDifference}) {
@@ -197,7 +197,7 @@ HWY_INLINE void StoreNarrow(SoftDouble v, float* to) {
              SoftNarrowTag(), to);
 }
 
-// What FaceEdges has of a face, array by array.
+// The fields of FaceEdges, array by array.
 struct LongFaces {
   enum Array { kX = 0, kY = 3, kEdges = 6, kArrays = 24 };
   alignas(64) float v[kArrays][kSoftLanes];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which features of a face the pixels of a block see: one corner, the inside of one edge, one edge,
-// or anything ("Nearest features"). Lanes are faces.
+// Which feature of a face is nearest to the pixels of a block: one corner, the inside of one edge,
+// one edge, or it varies ("Nearest features"). Lanes are faces.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_FEATURES_INL_H_
@@ -32,14 +32,14 @@ HWY_INLINE SoftMask BoxesNear(SoftTag d, const SoftFaceArrays& faces, std::size_
   return hn::Le(z, hn::Set(d, reach * reach));
 }
 
-// One of three by lanes.
+// Selects one of three, lane by lane.
 template <class V, class M>
 HWY_INLINE V Pick(const V (&v)[3], M first, M second) {
   return hn::IfThenElse(first, v[0], hn::IfThenElse(second, v[1], v[2]));
 }
 
-// Members are appended at `at`, which is the list's count: compilers would load that again after
-// each store of a vector.
+// Members are appended at `at`, a copy of the list's count: compilers would reload that after each
+// vector store.
 HWY_INLINE void AppendTags(SoftInt slot, SoftInt part, const Compactor& compact, std::size_t at,
                            SoftList* to) {
   compact.Store(slot, to->slot + at), compact.Store(part, to->part + at);
@@ -90,8 +90,8 @@ HWY_INLINE void AppendBoundaries(SoftTag d, const FaceEdges& f, SoftInt slot, So
   AppendTags(slot, hn::Zero(SoftIntTag()), compact, at, to);
 }
 
-// Who looks: `pixels` of a block. Faces nearer than `reach.near` go to the boundaries if `split`,
-// whatever is seen of them.
+// The `pixels` of a block for which features are found. If `split`, faces nearer than `reach.near`
+// go to the boundaries, whichever feature is nearest.
 struct FeatureSearch {
   const SoftBlock& block;
   std::uint64_t pixels;
@@ -100,7 +100,7 @@ struct FeatureSearch {
   // What follows from these, once for all faces ("Nearest features"). Whether edges behind are
   // looked for: where a block is larger than faces reach, faces lie all around its pixels.
   const bool looks_behind = block.half_x + block.half_y < 2 * reach.root;
-  // More than the rounding of distances to lines of edges: 32 u of the largest they are made of.
+  // Exceeds the rounding of distances to edge lines: 32 u of the largest term in them.
   const float rounding = 0x1p-19f * (block.half_x + block.half_y + 2 * reach.root +
                                      kLongEdge * (block.box.unit_x + block.box.unit_y));
 };
@@ -196,7 +196,7 @@ struct NearVectors {
   std::int32_t first[kChunkRoom];
   std::uint8_t lanes[kChunkRoom];  // bits
 
-  // No branch, which would be hard to foretell.
+  // No branch: it would be hard to predict.
   HWY_INLINE NearVectors(SoftTag d, const SoftFaceArrays& faces, const FeatureSearch& search) {
     for (std::size_t i = 0; i < faces.count; i += hn::Lanes(d)) {
       const SoftMask near = hn::And(BoxesNear(d, faces, i, search.block, search.reach.root),

@@ -18,9 +18,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace tilegrad::raster::HWY_NAMESPACE {
 
-// a + (1 - a) A: keeps small alphas precise, which 1 - product would not.
+// Equation 6, one face more: a + (1 - a) A. Keeps small alphas precise, unlike 1 - product.
 HWY_INLINE SoftVec Over(SoftTag d, SoftVec a, SoftVec influence) {
-  return hn::MulAdd(hn::Sub(hn::Set(d, 1.0f), a), influence, a);
+  return hn::MulAdd(hn::Sub(hn::Set(d, 1.0f), a), influence, a);  // (6)
 }
 
 // Alpha over the members of a chunk, pixel by pixel and lane by lane, for a block.
@@ -75,15 +75,15 @@ class PartialAlpha {
       a = Over(d, a, NextPair(d, a));
       a = Over(d, a, Neighbour(d, a));
       const auto alpha = static_cast<double>(hn::GetLane(a));
-      block_->alpha[i] += (1 - block_->alpha[i]) * alpha;
+      block_->alpha[i] += (1 - block_->alpha[i]) * alpha;  // (6)
       block_->product[i] *= 1 - alpha >= kLightProduct ? 1 - alpha : SmallProduct(d, lanes, i);
     });
     touched_ = 0;
   }
 
  private:
-  // Member m is next: after kChunkFaces of them, which only the way back may have in one list, the
-  // lanes have enough.
+  // Called before member m. Merges after every kChunkFaces members, so that rounding in the lanes
+  // stays bounded; only the backward pass has longer lists.
   HWY_INLINE void MergeBefore(std::size_t m) {
     if (m != 0 && m % kChunkFaces == 0) Merge();
   }
@@ -93,7 +93,7 @@ class PartialAlpha {
     touched_ |= bits;
     return bits;
   }
-  // Two loops, so that what is under way at a time is not one chain from the distance to alpha.
+  // Two loops, so that iterations overlap instead of forming one chain from distance to alpha.
   template <class Distance>
   HWY_INLINE void AddDistances(std::uint64_t bits, const Distance& z) {
     const SoftTag d;
@@ -101,16 +101,16 @@ class PartialAlpha {
     alignas(64) float of_pixel[kBlockPixels][kSoftLanes];
     ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(z(i), d, of_pixel[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
-      Put(d, i, simd::HalvingOf(d, hn::Load(d, of_pixel[i])).power);
+      Put(d, i, simd::Exp2Neg(d, hn::Load(d, of_pixel[i])).power);  // (5): A = 2^-z
     });
   }
-  // What lanes with alpha `a` leave together: 1 - alpha has no digits left. Notes the least of one.
+  // The product of the lanes' 1 - a, for when 1 - alpha has lost its digits. Notes the least lane.
   HWY_INLINE double SmallProduct(SoftTag d, SoftVec a, std::size_t pixel) {
     SoftVec left = hn::Sub(hn::Set(d, 1.0f), a);
     const SoftMask dark = hn::Lt(left, hn::Set(d, static_cast<float>(kLightProduct)));
     const SoftVec rounding = hn::Set(d, static_cast<float>(LaneRounding(hn::MaxLanes(d))));
     left = hn::Add(left, hn::IfThenElseZero(dark, rounding));
-    // A dark lane stays one: with that rounding its product has too few digits to be handed on.
+    // A dark lane stays dark: that rounding leaves its product too few digits for a gradient.
     const SoftVec noted = hn::IfThenElse(dark, hn::Min(left, hn::Set(d, kMostDark)), left);
     block_->least[pixel] = std::min(block_->least[pixel], hn::GetLane(hn::MinOfLanes(d, noted)));
     return static_cast<double>(hn::GetLane(LaneProducts(d, left).all));
@@ -127,8 +127,8 @@ class PartialAlpha {
   std::uint64_t touched_ = 0;
 };
 
-// Pixels whose product is within `stop` need no more faces. Where others might have mattered on the
-// way back, it has to look at them.
+// Pixels whose product is within `stop` need no more faces. Where further ones may matter for the
+// gradient, the backward pass processes them.
 HWY_INLINE void StopPixels(const SoftMaskPlan& plan, double stop, SoftBlock* block) {
   ForPixels(block->live, [&](std::size_t i) {
     if (1 - block->alpha[i] > stop) return;
@@ -138,7 +138,7 @@ HWY_INLINE void StopPixels(const SoftMaskPlan& plan, double stop, SoftBlock* blo
   });
 }
 
-// What the block's pixels spent: those that stopped, their product; the others, what was dropped.
+// The error spent by the block: of pixels that stopped, their product; of others, what was dropped.
 HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double share) {
   double spent = 0;
   if (block.live != 0) {
@@ -151,8 +151,8 @@ HWY_INLINE double SpentBy(const SoftBlock& block, const SoftNodes& nodes, double
   return std::min(spent, 1.0);
 }
 
-// A row of a block to an image. By quads, which is how rows are made: a wider load would have to
-// wait for their stores.
+// Copies a row of a block to an image. By quads, as rows are written: a wider load could not be
+// forwarded from those stores.
 HWY_INLINE void CopyRow(const float (&row)[kBlockSize], std::size_t width, float* to) {
   const QuadTag d;
   if (width < kBlockSize) {

@@ -39,17 +39,17 @@ HWY_INLINE void AppendGradients(const std::int32_t* faces, std::size_t count, co
     hn::StoreU(hn::Mul(first, to_pixels), d, to->d_corner[0]);
     hn::StoreU(hn::LowerHalf(d_last, hn::Mul(last, to_pixels)), d_last, to->d_corner[2]);
     to->face = faces[i];
-    // No branch: it would be hard to foretell.
+    // No branch: it would be hard to predict.
     to += !hn::AllTrue(d, hn::Eq(hn::Or(first, last), hn::Zero(d)));
   }
   out->resize(static_cast<std::size_t>(to - out->data()));
 }
 
-// A / (1 - A) as A (1 + A) (1 + A^2) (1 + A^4) ..., so many factors, until what is lacking is
-// about u.
+// The odds A / (1 - A) of equation 6's derivative, as A (1 + A) (1 + A^2) (1 + A^4) ...: kFactors
+// factors, which leaves a relative error of about u.
 template <int kFactors>
 HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
-  // The least power is far below u, and far from denormal numbers, which are slow.
+  // 2^-30 squared is far below u, yet far from denormal numbers, which are slow.
   const SoftVec base = hn::Max(a, hn::Set(d, 0x1p-30f));
   SoftVec power = hn::Mul(base, base), odds = hn::MulAdd(a, a, a);
   for (int i = 1; i < kFactors; ++i) {
@@ -57,23 +57,23 @@ HWY_INLINE SoftVec OddsSeries(SoftTag d, SoftVec a) {
   }
   return odds;
 }
-// For z >= kSmallZ, which is A <= kSmallInfluence: lacks A^8, relatively, at most 2^-24.
+// For z >= kSmallZ, that is A <= kSmallInfluence: relative error A^8, at most 2^-24.
 inline constexpr float kSmallZ = 3, kSmallInfluence = 0.125f;
 HWY_INLINE SoftVec SmallOdds(SoftTag d, SoftVec a) { return OddsSeries<3>(d, a); }
-// For z >= kMediumZ: lacks A^32, at most 2^-24.
+// For z >= kMediumZ: relative error A^32, at most 2^-24.
 inline constexpr float kMediumZ = 0.75f;
 HWY_INLINE SoftVec MediumOdds(SoftTag d, SoftVec a) { return OddsSeries<5>(d, a); }
-// For A <= 63/64: lacks A^1024.
+// For A <= 63/64: relative error A^1024.
 HWY_INLINE SoftVec LargeOdds(SoftTag d, SoftVec a) { return OddsSeries<10>(d, a); }
 HWY_INLINE SoftVec Odds(SoftTag d, SoftVec a) {
   const bool small = hn::AllTrue(d, hn::Le(a, hn::Set(d, kSmallInfluence)));
   return small ? SmallOdds(d, a) : LargeOdds(d, a);
 }
 
-// The nearest of the faces' three edges: the way to the pixel, and the share of the edge's second
-// corner.
+// On the nearest of the faces' three edges: the offset of the pixel from it, and the share of the
+// edge's second corner.
 struct Nearest {
-  SoftVec way_x, way_y, second;
+  SoftVec offset_x, offset_y, second;
   SoftMask on1, on2;  // edge 1, edge 2; else edge 0
 };
 
@@ -103,7 +103,7 @@ HWY_INLINE Nearest NearestOf(SoftTag d, const BoundaryMembers& faces, const Soft
 class NearestOfPixels {
  public:
   HWY_INLINE void Store(SoftTag d, std::size_t i, const Nearest& n) {
-    hn::Store(n.way_x, d, v_[0][i]), hn::Store(n.way_y, d, v_[1][i]);
+    hn::Store(n.offset_x, d, v_[0][i]), hn::Store(n.offset_y, d, v_[1][i]);
     hn::Store(n.second, d, v_[2][i]);
     hn::Store(hn::VecFromMask(d, n.on1), d, v_[3][i]);
     hn::Store(hn::VecFromMask(d, n.on2), d, v_[4][i]);
@@ -152,7 +152,8 @@ struct CornerSums {
     for (std::size_t k = 0; k < 3; ++k) x[k] = y[k] = hn::Zero(d);
   }
   HWY_INLINE void Add(SoftTag d, const Nearest& n, SoftVec push) {
-    const SoftVec zero = hn::Zero(d), gx = hn::Mul(push, n.way_x), gy = hn::Mul(push, n.way_y);
+    const SoftVec zero = hn::Zero(d), gx = hn::Mul(push, n.offset_x),
+                  gy = hn::Mul(push, n.offset_y);
     const SoftVec b = n.second, a = hn::Sub(hn::Set(d, 1.0f), b);
     const SoftVec share[3] = {hn::IfThenElse(n.on2, b, hn::IfThenElse(n.on1, zero, a)),
                               hn::IfThenElse(n.on2, zero, hn::IfThenElse(n.on1, a, b)),
@@ -255,9 +256,9 @@ struct WeakFaces {
           ForPixels(columns, [&](std::size_t x) HWY_ATTR {
             const SoftVec influence = hn::Mul(members.columns.power[x], of_row);
             const SoftVec w = hn::Mul(odds(influence), hn::Set(d, row_push[x]));
-            d_x = hn::MulAdd(w, members.columns.way[x], d_x), pushed = hn::Add(pushed, w);
+            d_x = hn::MulAdd(w, members.columns.offsets[x], d_x), pushed = hn::Add(pushed, w);
           });
-          d_y = hn::MulAdd(pushed, members.rows.way[row], d_y);
+          d_y = hn::MulAdd(pushed, members.rows.offsets[row], d_y);
         });
         sums.Add(d, list, m, 0, d_x, d_y);
       };
@@ -321,12 +322,12 @@ struct WeakFaces {
   }
 
  private:
-  // Loops apart by how many factors the odds need: which pixel needs how many is hard to foretell.
+  // One loop per number of factors that the odds need: which pixel needs which is hard to predict.
   HWY_INLINE void PushAll(std::uint64_t bits, const FarPixels& far, Pushes& pushes) const {
     const SoftTag d;
     const auto push_some = [&](std::uint64_t some, const auto& odds) HWY_ATTR {
       ForPixels(some, [&](std::size_t i) HWY_ATTR {
-        const SoftVec a = simd::HalvingOf(d, hn::Load(d, pushes[i])).power;
+        const SoftVec a = simd::Exp2Neg(d, hn::Load(d, pushes[i])).power;
         hn::Store(hn::Mul(odds(a), hn::Set(d, push[i])), d, pushes[i]);
       });
     };
@@ -363,7 +364,7 @@ inline void AppendNear(const SoftBlock& block, float* product, AlignedVector<Sof
     ForPixels(bits, [&](std::size_t i) HWY_ATTR { hn::Store(members.Z(d, block, i), d, z[i]); });
     ForPixels(bits, [&](std::size_t i) HWY_ATTR {
       faces.before[i] = product[i];
-      const SoftVec outside = simd::HalvingOf(d, hn::Load(d, z[i])).one_minus;
+      const SoftVec outside = simd::Exp2Neg(d, hn::Load(d, z[i])).one_minus;
       product[i] *= hn::GetLane(LaneProducts(d, outside).all);
     });
   }
@@ -382,7 +383,7 @@ inline void AppendNearGradients(const SoftBlock& block, std::span<const SoftNear
     const BoundaryMembers members(d, faces.edge[0], kSoftLanes);
     const auto push_all = [&](const FarPixels&, Pushes& pushes) HWY_ATTR {
       ForPixels(faces.bits, [&](std::size_t i) HWY_ATTR {
-        const auto a = simd::HalvingOf(d, hn::Load(d, pushes[i]));
+        const auto a = simd::Exp2Neg(d, hn::Load(d, pushes[i]));
         const LaneProducts outside(d, a.one_minus);
         const SoftVec rest = hn::Set(d, push[i] * (faces.before[i] * behind[i]));
         behind[i] *= hn::GetLane(outside.all);

@@ -45,58 +45,58 @@ HWY_INLINE std::uint64_t PixelsOf(SoftTag d, const SoftLists& lists, const SoftL
   return bits & among;
 }
 
-// Notes that the members from m on are evaluated at `pixels`: by a power for each.
+// Counts the pairs of members from m on and `pixels`, and the powers: one per pair.
 HWY_INLINE void NotePairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
   const auto pairs = static_cast<std::int64_t>(hn::Lanes(d)) * std::popcount(pixels);
   work->pairs += pairs, work->powers += pairs;
 }
-// By powers of columns and rows.
+// The same for corners: one power per column and row.
 HWY_INLINE void NoteVertexPairs(SoftTag d, std::uint64_t pixels, SoftWork* work) {
   const auto lanes = static_cast<std::int64_t>(hn::Lanes(d));
   work->pairs += lanes * std::popcount(pixels);
   work->powers += lanes * (std::popcount(ColumnsOf(pixels)) + std::popcount(RowsOf(pixels)));
 }
 
-// Squared lengths along one axis, halved that often; where kWays, the ways themselves and the
-// largest power, too: [column or row].
-template <bool kWays>
+// 2^-(squared offset) along one axis, [column or row]; where kWithOffsets, also the offsets and the
+// largest power.
+template <bool kWithOffsets>
 struct AxisInfluence {
-  SoftVec power[kBlockSize], way[kWays ? kBlockSize : 1], most;
+  SoftVec power[kBlockSize], offsets[kWithOffsets ? kBlockSize : 1], most;
 
   // For the bits of `pixels`, columns or rows at `at`.
   HWY_INLINE AxisInfluence(SoftTag d, const float* at, SoftVec vertex, std::uint32_t pixels) {
-    SoftVec largest = hn::Zero(d);  // a member would be in memory, as the arrays are
+    SoftVec largest = hn::Zero(d);  // a local, to stay in a register
     for (; pixels != 0; pixels &= pixels - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(pixels));
       const SoftVec offset = hn::Sub(hn::Set(d, at[i]), vertex);
-      power[i] = simd::HalvingOf(d, hn::Mul(offset, offset)).power;
-      if constexpr (kWays) way[i] = offset, largest = hn::Max(largest, power[i]);
+      power[i] = simd::Exp2Neg(d, hn::Mul(offset, offset)).power;
+      if constexpr (kWithOffsets) offsets[i] = offset, largest = hn::Max(largest, power[i]);
     }
     most = largest;
   }
 };
 
-// A vector of corners: A = 2^-(x - vx)^2 2^-(y - vy)^2, so the powers are those of columns and
-// rows.
-template <bool kWays>
+// A vector of corners. Equation 5 factors: A = 2^-(x - vx)^2 2^-(y - vy)^2, one power per column
+// and one per row.
+template <bool kWithOffsets>
 struct VertexMembers {
-  AxisInfluence<kWays> columns, rows;
+  AxisInfluence<kWithOffsets> columns, rows;
 
   HWY_INLINE VertexMembers(SoftTag d, const SoftListOf<2>& list, std::size_t m,
                            const SoftBlock& block, std::uint64_t bits)
       : columns(d, block.x, hn::Load(d, list.v[0] + m), ColumnsOf(bits)),
         rows(d, block.y, hn::Load(d, list.v[1] + m), RowsOf(bits)) {}
   HWY_INLINE SoftVec Influence(std::size_t pixel) const {
-    return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);
+    return hn::Mul(columns.power[pixel % kBlockSize], rows.power[pixel / kBlockSize]);  // (5)
   }
   // All within `limit`.
-  HWY_INLINE bool AllWithin(SoftTag d, float limit) const requires kWays {
+  HWY_INLINE bool AllWithin(SoftTag d, float limit) const requires kWithOffsets {
     return hn::AllTrue(d, hn::Le(hn::Mul(columns.most, rows.most), hn::Set(d, limit)));
   }
 };
 
-// Where a pixel lies relative to edges; (side, beyond) is the way from the nearest point, in the
-// frame (n, t) of the edge, and `along` the way to that point from the first corner.
+// Where a pixel lies relative to edges: (side, beyond) leads from the nearest point to the pixel in
+// the edge's frame (n, t); `along` is that point's distance from the first corner.
 struct EdgeOffset {
   SoftVec side, beyond, along;
 };

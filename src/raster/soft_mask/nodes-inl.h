@@ -48,8 +48,8 @@ inline float GroupLimit(const SoftMaskPlan& plan) {
   return static_cast<float>(plan.group_z * (1 + 0x1p-20));
 }
 
-// The groups that are not far from all pixels of a region. Distances grow with every box inside it,
-// in floating point too, so none that a tile would keep is lost.
+// The groups that are near some pixel of a region. A box inside the region is no nearer to a group
+// than the region is, in floating point too, so no group that a tile would keep is lost.
 inline void FindNearGroups(const SoftTree& tree, const SoftMaskPlan& plan, const PixelRect& rect,
                            SoftNearGroups* near) {
   const SoftTag d;
@@ -113,7 +113,7 @@ HWY_INLINE std::size_t FindNodesOfGroups(const SoftTree& tree, const SoftMaskPla
   return count;
 }
 
-// Nodes by the whole part of their z, which is less than `end`.
+// A histogram of nodes by the integer part of their z, which is less than `end`.
 struct SoftHistogram {
   int end;
   double beyond;  // faces of others, from `end` on
@@ -155,7 +155,7 @@ inline SoftNodes FindSoftNodes(const SoftTree& tree, const SoftMaskPlan& plan, c
   double near_faces = 0;
   const std::size_t count =
       FindNodesOfGroups(tree, plan, box, far, scratch, &out.dropped, &near_faces);
-  if (count == 0) {  // as most tiles that lie in the background have it
+  if (count == 0) {  // the usual case for tiles of pure background
     out.dropped += std::ldexp(near_faces, -far);
     return out;
   }

@@ -41,8 +41,8 @@ struct PixelAxis {
   static constexpr float kRounding = 1.0f / 64;
 };
 
-// Those of a block. Found once: compilers would do it again for each vector of faces, after which
-// lists are written.
+// The directions of a block, computed once: compilers would recompute them for every vector of
+// faces, since lists are written in between.
 struct BlockAxes {
   PixelAxis columns, rows, sums, differences;
 
@@ -68,7 +68,7 @@ struct PixelRange {
   SoftBytes begin, end;
 
   HWY_INLINE PixelRange(SoftTag d, const float* low, const float* high, const PixelAxis& axis) {
-    constexpr float kLarge = 0x1p23f;  // a number as the last digits of a much larger one
+    constexpr float kLarge = 0x1p23f;  // adding it moves the integer into the lowest bits
     const auto nearest = [&](const float* at, float shift) HWY_ATTR {
       const SoftVec index = hn::Add(hn::Load(d, at), hn::Set(d, shift));
       const SoftVec clamped = hn::Min(hn::Max(index, hn::Zero(d)), hn::Set(d, axis.count));

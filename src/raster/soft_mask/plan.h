@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What of the error budget is spent where (docs/numerics.md, "Budget").
+// How the error budget is divided (docs/numerics.md, "Budget").
 #pragma once
 
 #include "raster/soft_mask/soft_mask.h"
@@ -15,23 +15,23 @@ inline constexpr double kFarZ = 3;
 // The least product in light pixels, or of each of their lanes: A <= 63/64 there for all faces, and
 // ten factors of Odds suffice. Smaller ones would cost digits, larger ones make more pixels dark.
 inline constexpr double kLightProduct = 1.0 / 64;
-// The float below it.
+// The largest float below it.
 inline constexpr float kMostDark = static_cast<float>(kLightProduct) * (1 - 0x1p-24f);
 // How many faces of a chunk a lane of vectors of so many lanes may get: those of three lists, each
 // filled up to whole vectors.
 constexpr std::size_t FacesOfLane(std::size_t lanes) {
   return (kChunkFaces + 3 * (lanes - 1)) / lanes;
 }
-// More than rounding may take from the product of a lane: u for each face, and once for those of
-// 1 - a (docs/numerics.md, "Rounding" 4).
+// Bounds the rounding of a lane's product: u per face, and once that of 1 - a (docs/numerics.md,
+// "Rounding" 4).
 constexpr double LaneRounding(std::size_t lanes) { return lanes < kSoftLanes ? 0x1p-17 : 0x1p-18; }
 static_assert(static_cast<double>(FacesOfLane(8) + 1) * 0x1p-24 < LaneRounding(8));
 static_assert(static_cast<double>(FacesOfLane(4) + 1) * 0x1p-24 < LaneRounding(4));
-// Of what may be dropped: the rest covers the rounding of products of lanes.
+// The part of the budget that may be dropped: the rest covers rounding of the lanes' products.
 inline constexpr double kUnseenShare = 0.9;
 
-// The way back may also drop a face of so little A that 1 - A is 1 in float, as long as those that
-// a pixel drops have no more than kVanishingSum together (docs/numerics.md, "Gradients").
+// The backward pass may also drop a face of so little A that 1 - A is 1 in float, as long as those
+// that a pixel drops have no more than kVanishingSum together (docs/numerics.md, "Gradients").
 inline constexpr double kVanishingInfluence = 0x1p-25, kVanishingSum = 0x1p-17;
 
 // z from which on `n` faces have A <= share / n each, and together no more than `share`.
@@ -40,8 +40,8 @@ double DropZ(std::size_t n, double share);
 // The product at which a pixel may stop.
 double StopProduct(const SoftMaskPlan& plan);
 
-// No product of a pixel over all faces but one is more than product / least, that of all lanes and
-// the least of one, both not too small: whether that is too little to hand on.
+// A pixel's product over all faces but one is at most product / least (of all lanes, and the least
+// lane), if neither is too small. True if that is too little to matter for a gradient.
 bool IsUnseen(const SoftMaskPlan& plan, double product, double least);
 
 // SoftMaskImages::transmittance of a background pixel of which only alpha is known.

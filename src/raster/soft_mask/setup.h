@@ -17,11 +17,11 @@ inline constexpr std::size_t kBlockSize = 8;  // pixels
 inline constexpr std::size_t kBlockPixels = kBlockSize * kBlockSize;
 inline constexpr std::size_t kTileBlocks = (kTileSize / kBlockSize) * (kTileSize / kBlockSize);
 inline constexpr std::size_t kSoftLanes = 8;  // the most that vectors of this kernel have
-// Faces that a tile looks at before its blocks merge what they have in double, and look whether
-// they may stop. Bounds rounding independently of the number of faces.
+// Faces that a tile processes before its blocks merge their lanes in double and test whether they
+// may stop. Bounds rounding independently of the number of faces.
 inline constexpr std::size_t kChunkFaces = 256;
-// Of the way back, which where there are several chunks has to find the members of blocks twice,
-// for the products and for the gradients (docs/benchmarks.md has what that costs).
+// For the backward pass, which with several chunks has to find the members of blocks twice: for the
+// products and for the gradients (docs/benchmarks.md has the cost).
 inline constexpr std::size_t kBackwardChunkFaces = 1024;
 // Room for a vector more, and 67 cache lines: of arrays a power of two apart, few fit into a cache.
 inline constexpr std::size_t kChunkRoom = kBackwardChunkFaces + 6 * kSoftLanes;
@@ -42,7 +42,7 @@ struct ChosenLanes {
 };
 inline constexpr ChosenLanes kChosenLanes;
 
-// Pixel centres of a rectangle.
+// The bounding box of a rectangle's pixel centres.
 struct SoftBox {
   float left, top, right, bottom;  // pixels
   float unit_x, unit_y;            // kernel units per pixel
@@ -87,8 +87,8 @@ struct SoftBlock {
   float centre_x, centre_y;                        // pixels, its middle
   float half_x, half_y;                            // half of it
   alignas(64) float x[kBlockSize], y[kBlockSize];  // of columns and rows, from the centre
-  std::size_t whole;                               // faces that all pixels have seen
-  bool clear;  // no pixel has seen a face yet, and what follows is not set
+  std::size_t whole;                               // faces evaluated at all pixels
+  bool clear;  // no face has been evaluated yet, and what follows is not set
   alignas(64) double alpha[kBlockPixels];  // 1 where there is nothing to compute
   // 1 - alpha to relative precision as long as no lane of a chunk leaves less than kLightProduct;
   // else not less. The least that a lane leaves.
@@ -96,18 +96,18 @@ struct SoftBlock {
   alignas(64) float least[kBlockPixels];
 };
 
-// From where on faces are far. Kernel units.
+// Distances at which faces count as far or are dropped. Kernel units.
 struct SoftReach {
   float z;              // squared distance at which a face is dropped
-  float root;           // its root, and something for rounding
+  float root;           // its root, plus a margin for rounding
   float near;           // the root of kFarZ likewise: within, A may exceed 1/8
   double share;         // A at z
   float columns, rows;  // the root, pixels
   float diagonals;      // how much x + y or x - y change within it, pixels
 };
 
-// Members of a block, by what of a face its pixels see. Structures of arrays, filled up to whole
-// vectors with members that no pixel sees.
+// Members of a block, by the feature nearest to its pixels. Structures of arrays, padded to whole
+// vectors with members that no pixel reaches.
 struct SoftList {
   static constexpr std::size_t kRoom = 2 * kChunkRoom + kSoftLanes;
   static constexpr std::int32_t kNoSlot = 2 * kChunkRoom;  // of what fills it up
@@ -163,13 +163,13 @@ struct SoftNearGroups {
   std::size_t count = 0;
 };
 
-// What was evaluated, lanes without a face included.
+// Work done, counting lanes without a face.
 struct SoftWork {
   std::int64_t pairs = 0;   // of a face and a background pixel
   std::int64_t powers = 0;  // 2^-z: one for each pair, or one for each column and row of corners
 };
 
-// Memory of one worker. Grows to its largest use, then nothing is allocated.
+// Scratch of one worker. Grows to its largest use; after that nothing is allocated.
 struct SoftMaskScratch {
   SoftWork work;  // since the caller cleared it
   SoftChunk chunk;

@@ -29,13 +29,13 @@ struct SoftMaskOptions {
   std::size_t faces = 0;          // that take part: SoftTree::faces
 };
 
-// What is decided once per image. Lengths in kernel units, NDC sqrt(log2(e) / delta), so that
-// A = 2^-z with z = d^2.
+// Decided once per image. Lengths in kernel units, NDC times sqrt(log2(e) / delta), so that A =
+// 2^-z with z = d^2.
 struct SoftMaskPlan {
   int width = 0, height = 0;
   double unit_x = 0, unit_y = 0;  // kernel units per pixel
-  // Of E: what nodes and faces that are dropped may have, and the product at which a pixel stops,
-  // whatever was dropped before.
+  // Shares of E: for the nodes and the faces that are dropped, and the product at which a pixel
+  // stops, whatever was dropped before.
   double node_error = 0, face_error = 0, stop_error = 0;
   double group_z = 0;          // squared distance at which a tile drops a group of the tree
   double group_influence = 0;  // A there
@@ -43,8 +43,8 @@ struct SoftMaskPlan {
 
 SoftMaskPlan PlanSoftMask(const SoftMaskOptions& options);
 
-// Whole tiles of one image, best those of a bin: what is far from all of them is found once. Images
-// are [H,W]; spans hold whole images.
+// Whole tiles of one image, preferably those of a bin: groups far from all of them are found once.
+// Images are [H,W]; spans hold whole images.
 struct SoftMaskRegion {
   PixelRect rect;
   std::span<const std::int32_t> face_ids;  // < 0 is background; only those are computed
@@ -52,16 +52,16 @@ struct SoftMaskRegion {
 
 struct SoftMaskImages {
   std::span<float> alpha;  // [H,W] 1 where face_ids >= 0
-  // May be empty. For the way back, as many numbers, but block after block of up to 8 x 8 pixels, a
-  // row of blocks after the other. Written only where a block has background pixels whose alpha is
-  // more than E / 4: the product over all faces, 1 - alpha, to relative precision, where no more is
-  // needed; 0 where there is nothing to hand on, kUnknownTransmittance where it must multiply again
+  // May be empty. Input of the backward pass, as many numbers as alpha but stored block by block of
+  // up to 8 x 8 pixels, in rows of blocks. Written only where a block has background pixels with
+  // alpha above E / 4: the product over all faces, 1 - alpha, to relative precision where that is
+  // enough; 0 where no gradient passes; kUnknownTransmittance where backward must multiply again
   // (docs/numerics.md, "Gradients").
   std::span<float> transmittance = {};
 };
 inline constexpr float kUnknownTransmittance = -1;
 
-// Writes the region's pixels. Returns what was spent: no pixel's alpha is farther than this from
+// Writes the region's pixels. Returns the error spent: no pixel's alpha is farther than this from
 // equation 6 over all faces, rounding aside (docs/numerics.md, "Rounding"). At most E. 0 where no
 // pixel is background.
 double SoftMaskForward(const SoftTree& tree, const SoftMaskPlan& plan, const SoftMaskRegion& region,

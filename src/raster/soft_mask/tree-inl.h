@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vector body of soft_mask_tree.h. Lanes are faces, nodes, groups.
+// Vector body of tree.h. Lanes are faces, nodes, groups.
 
 #if defined(TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_RASTER_SOFT_MASK_TREE_INL_H_
@@ -74,7 +74,7 @@ HWY_INLINE void StoreNode(SoftTag d, std::size_t node, SoftTree* tree) {
         const std::size_t axis = a == SoftBoxes::kLeft || a == SoftBoxes::kRight ? 0 : 3;
         const auto corner = [&](std::size_t k) HWY_ATTR {
           const SoftVec at = hn::Load(d, tree->corners.at(node, axis + k) + i);
-          // On the far side, too, a face that is nowhere widens no box.
+          // On the far side, too, a face out of reach must not widen a box.
           return a < SoftBoxes::kRight
                      ? at
                      : hn::IfThenElse(hn::Eq(at, hn::Set(d, kNowhere)), hn::Set(d, -kNowhere), at);

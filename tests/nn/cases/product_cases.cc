@@ -37,7 +37,7 @@ void AddRandomConvolutions(CaseList& list) {
   AddConvolutions(list, {n, in, w[2] + list.Extent(), w[3] + list.Extent(9)}, w, options);
 }
 
-// Channels enough for kernels/conv2d/conv2d_winograd.h.
+// Channels enough for kernels/conv2d/winograd.h.
 void AddWinogradConvolutions(CaseList& list) {
   AddConvolutions(list, {1, 16, 5, 6}, {16, 16, 3, 3}, {.stride = 1, .padding = 1});
   AddConvolutions(list, {1, 17, 7, 8}, {16, 17, 4, 4}, {.stride = 2, .padding = 1});

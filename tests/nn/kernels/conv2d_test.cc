@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The direct convolutions, and those that are matrix products; conv2d_winograd_test.cc has the
+// Direct convolutions and those by matrix products; conv2d_winograd_test.cc has the
 // others.
 #include "nn/kernels/conv2d/conv2d.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of the convolutions share.
+// Shared by the tests of the convolutions.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A number that carries a bound on how far the same computation in float may be off: running error
+// A number that carries a bound on the error of the same computation in float: running error
 // analysis (Higham, Accuracy and Stability of Numerical Algorithms, 3.3). The references of raster
 // and render are templates over their number type, so that run on these they state their own
 // tolerance.

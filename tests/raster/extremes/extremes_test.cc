@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The renderer at the edge of what floats can hold: images and gradients are finite and within the
+// The renderer at the limits of float: images and gradients are finite and within the
 // derived tolerance of the references, or there is a clear error. A scene that fails is named by
 // its number; TILEGRAD_SCENE=<number> runs that one alone.
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes at the edge of what floats can hold and rasterizers get wrong. A scene is a pure function
-// of its number.
+// Scenes at the limits of float, and ones that rasterizers get wrong. A scene is a pure function of
+// its number.
 #pragma once
 
 #include <cstddef>

@@ -140,9 +140,8 @@ SoftScene SpotsScene(std::uint64_t seed) {
   return scene;
 }
 
-// Tiles come in another order, and find in their memory what others left there. Gradients of a face
-// are summed in that order: of some sixty tiles at most, each with an error of 2^-24 of the
-// largest.
+// Tiles come in another order and reuse scratch with other leftovers. Gradients of a face are
+// summed in that order: over some sixty tiles at most, each with an error of 2^-24 of the largest.
 void CheckRegions(const SoftScene& scene, SoftMaskScratch* scratch) {
   const SoftResult bins = RunSoftMask(scene, scene.d_alpha, scratch);
   const SoftResult tiles = RunSoftMask(scene, scene.d_alpha, scratch, {.region_bits = kTileBits});

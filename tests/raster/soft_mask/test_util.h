@@ -43,7 +43,7 @@ struct SoftScene {
   }
 };
 
-// The kinds of faces that kernels get wrong.
+// Kinds of faces that kernels tend to get wrong.
 enum class FaceKind { kSmall, kLarge, kSliver, kPoint, kSegment, kOnCentres, kFarAway, kCount };
 
 inline void RandomFace(FaceKind kind, Rng* rng, SoftScene* scene) {

@@ -132,9 +132,9 @@ inline void RunConvProduct(const ConvProduct& p, const KernelContext& context,
   });
 }
 
-// Pixels of a work item out of `pixels`: `most`, which one worker's caches like best. Several get
-// four items each, so that whoever is ahead finds more to do, unless these would be so small that
-// an item costs more than its pixels.
+// Pixels of a work item out of `pixels`: `most`, the best size for one worker's caches. With
+// several workers about four items each, for load balance, unless those would be so small that
+// overhead dominates.
 inline std::size_t PiecePixels(std::size_t pixels, std::size_t most, const KernelContext& context) {
   const auto workers = static_cast<std::size_t>(context.workers.count());
   if (workers == 1) return most;

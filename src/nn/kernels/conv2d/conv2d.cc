@@ -55,7 +55,7 @@ void Multiply(const Factor& a, const Factor& b, const float* bias, float* c,
        context);
 }
 
-// A kernel of one pixel does not ask where pixels lie: those of a small image go into one row,
+// A kernel of one pixel is independent of where pixels lie: those of a small image go into one row,
 // which fills vectors better than its own rows. The direct kernels cut images by rows, so a row is
 // kept as short as a work item of theirs, kConvPixels.
 Conv2dShape Flattened(Conv2dShape shape) {

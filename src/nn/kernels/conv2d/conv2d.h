@@ -13,7 +13,7 @@
 // y [N,O,H',W'].
 //
 // Each shape goes the way that is fastest for it: a matrix product where the kernel is as large as
-// the image, Winograd's algorithm where it fits (conv2d_winograd.h), else directly.
+// the image, Winograd's algorithm where it fits (winograd.h), else directly.
 //
 // The bits of the results depend on shape and SIMD target, never on the number of workers.
 #pragma once

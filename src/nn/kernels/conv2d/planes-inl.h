@@ -111,8 +111,8 @@ inline void CopyPlaneRow(const PlaneGrid& g, const PlaneRowSpan& span, const flo
   }
 }
 
-// Asks for the same row some channels on: the rows of a band lie in too short runs for the machine
-// to see them coming.
+// Prefetches the same row some channels on: the rows of a band are too short for the hardware
+// prefetcher.
 inline void FetchRow(const PlaneGrid& g, const float* row) {
   constexpr std::size_t kChannels = 4;  // a few hundred cycles
   PrefetchNumbers(row + kChannels * g.height * g.width, g.width);

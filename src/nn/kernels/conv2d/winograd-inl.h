@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three passes of conv2d_winograd.h. Each takes some rows of tiles at a time: transform, one
+// The three passes of winograd.h. Each takes some rows of tiles at a time: transform, one
 // product for each slot, transform back.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -24,7 +24,7 @@ namespace tilegrad::nn {
 // Of inputs and of outputs: with fewer the transforms cost more than they save.
 inline constexpr std::size_t kLeastWinogradChannels = 16;
 
-// Whether the three functions below take this shape: square kernels of 2 or 3 taps in each phase,
+// Whether the three functions below accept this shape: square kernels of 2 or 3 taps in each phase,
 // and enough channels and pixels that the transforms cost less than they save.
 bool WinogradFits(const Conv2dShape& shape);
 

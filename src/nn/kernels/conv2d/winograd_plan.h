@@ -82,7 +82,7 @@ struct TileRows {
         pitch(padded + panel) {}
   std::size_t first, count;
   std::size_t tiles, padded;
-  std::size_t pitch;  // from one row of values to the next: no power of 2, which caches dislike
+  std::size_t pitch;  // between rows of values: not a power of 2, which would thrash caches
 };
 
 // What one row of tiles is: row `down` of the tiles of an image.

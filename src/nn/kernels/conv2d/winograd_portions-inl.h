@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a pass of conv2d_winograd.h goes through the tiles: in portions, so that memory stays small.
-// Where there are enough of them, each worker takes portions of its own, which stay in its caches
-// and for which it waits for nobody.
+// How a pass of winograd.h goes through the tiles: in portions, so that memory stays small.
+// If there are enough of them, each worker takes portions of its own, which stay in its caches and
+// need no synchronisation.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PORTIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PORTIONS_INL_H_

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The products of conv2d_winograd.h, one for each slot, and the way back to a weight's gradient.
+// The products of winograd.h, one for each slot, and the inverse transform of a weight's gradient.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_PRODUCT_INL_H_
@@ -64,7 +64,7 @@ inline void MultiplyItem(const SlotProduct& p, const SlotItem& item) {
   }
 }
 
-// loops: as in conv2d_winograd_portions-inl.h.
+// loops: as in winograd_portions-inl.h.
 template <class Loops>
 void MultiplySlots(const SlotProduct& p, const Loops& loops) {
   const WinogradPlan& plan = p.weights.plan;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Between one image row and the places of its tiles, a vector of tiles at a time, for
-// conv2d_winograd_tiles-inl.h.
+// winograd_tiles-inl.h.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TILEGRAD_NN_CONV2D_WINOGRAD_ROWS_INL_H_
@@ -53,7 +53,7 @@ struct RowOfTiles {
   std::size_t overlap;  // pixels that a tile and the next one both see
 };
 
-// The way back: places summed where tiles overlap, as a padded image row.
+// The inverse: places summed where tiles overlap, as a padded image row.
 template <std::size_t kStep>
 HWY_INLINE void SumRow(const float* places, const RowOfTiles& row, float* padded) {
   const std::size_t pitch = row.pitch;

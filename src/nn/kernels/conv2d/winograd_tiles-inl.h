@@ -102,7 +102,7 @@ inline void DealRow(const WinogradPlan& plan, const float* padded, std::size_t p
   DealRow<7, 4>(padded, tiles, pitch, places);
 }
 
-// Asks for what row `index` of tiles sees first of channel c.
+// Prefetches the first image rows that row `index` of tiles reads from channel c.
 inline void PrefetchRows(const WinogradPlan& plan, std::size_t index, const float* x,
                          std::size_t c) {
   const Conv2dShape& s = plan.s;
@@ -127,7 +127,7 @@ inline void GatherInput(const WinogradPlan& plan, const TileRows& rows, const fl
     const SeenRows in_image(plan, row);
     const float* channel = x + (row.image * s.in_channels + c) * s.in_pixels();
     PrefetchRows(plan, rows.first + r + 2, x, c);
-    // All rows before any is dealt: loads do not wait for what was just stored.
+    // All rows are padded before any is dealt, so that loads do not stall on recent stores.
     CopyStrip(channel + in_image[in_image.begin] * s.in_width, s.in_width, seen,
               in_image.end - in_image.begin, padded + in_image.begin * pitch + s.padding, pitch);
     for (std::size_t i = 0; i < plan.span; ++i) {
@@ -247,7 +247,7 @@ inline void ScatterTileRow(const WinogradPlan& plan, const TileRow& row, const f
   const std::size_t padded_pitch = PaddedPitch(plan);
   // Of the padded row.
   const std::size_t width = std::min(s.in_width, plan.step * (plan.tiles_across + 1) - s.padding);
-  // All rows before any goes to the image: loads do not wait for what was just stored.
+  // All rows before any goes to the image, so that loads do not stall on recent stores.
   for (std::size_t i = in_image.begin; i < in_image.end; ++i) {
     SumRow(plan, places + i * plan.span * pitch, pitch, padded + i * padded_pitch);
   }

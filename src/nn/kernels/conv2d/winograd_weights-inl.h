@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The weights of conv2d_winograd.h, transformed and packed as the row factor of each slot's
+// The weights of winograd.h, transformed and packed as the row factor of each slot's
 // product.
 
 #if defined(TILEGRAD_NN_CONV2D_WINOGRAD_WEIGHTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
