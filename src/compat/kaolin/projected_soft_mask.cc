@@ -12,7 +12,7 @@
 #include "render/alpha/paper_bin.h"
 #include "render/pipeline/validate.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 // A task is a bin of an image; the tiles of the bins have their scalar or vector code.
@@ -38,7 +38,7 @@ struct SoftImage {
   raster::SoftTree tree;
   raster::SoftMaskPlan plan;
 
-  void Build(const raster::ProjectedFacesT<float>& faces, const ProjectedMaskOptions& options) {
+  void Build(const ProjectedFacesT<float>& faces, const ProjectedMaskOptions& options) {
     Place(faces, options.size);
     raster::SetUpFaces(buffers.View(), /*cull_back=*/false, buffers.reject,
                        {.corners = &tree.corners});
@@ -48,7 +48,7 @@ struct SoftImage {
   }
 
  private:
-  void Place(const raster::ProjectedFacesT<float>& faces, const ImageSize& size) {
+  void Place(const ProjectedFacesT<float>& faces, const ImageSize& size) {
     const std::size_t count = faces.count();
     buffers.width = size.width, buffers.height = size.height;
     buffers.packed.resize(3 * count), buffers.reject.assign(count, raster::kFaceDrawn);
@@ -147,7 +147,7 @@ raster::PaperSoftMask ScalarRule(const ProjectedMaskOptions& options, std::size_
 }
 
 template <class T>
-std::vector<raster::NdcFace<T>> NdcFacesOf(const raster::ProjectedFacesT<T>& faces) {
+std::vector<raster::NdcFace<T>> NdcFacesOf(const ProjectedFacesT<T>& faces) {
   std::vector<raster::NdcFace<T>> out(faces.count());
   for (std::size_t f = 0; f < out.size(); ++f) {
     const T* v = faces.corners(f);
@@ -282,4 +282,4 @@ TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin
