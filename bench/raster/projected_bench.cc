@@ -18,6 +18,9 @@
 namespace tilegrad::bench {
 namespace {
 
+namespace kaolin = compat::kaolin;
+namespace pytorch3d = compat::pytorch3d;
+
 constexpr std::size_t kChannels = 3;
 
 // The scenes of a batch, projected; everything that the calls read and write.
@@ -27,31 +30,31 @@ struct ProjectedBench {
     raster.size = mask.size = {spec.size, spec.size};
     mask.delta = batch.options.delta;
     for (const SceneView& scene : batch.scenes) Append(scene, spec.size);
-    const std::size_t pixels = PixelCount(raster.size) * batch.scenes.size();
+    const std::size_t pixels = compat::PixelCount(raster.size) * batch.scenes.size();
     features.assign(z.size() * kChannels, T(0.5)), d_features.resize(features.size());
     ids.resize(pixels), alpha.resize(pixels), d_alpha.assign(pixels, T(1));
     image.resize(pixels * kChannels), d_image.assign(image.size(), T(1)), d_xy.resize(xy.size());
     failed = !Rasterize().ok() || !Soften().ok();
   }
-  ProjectedBatchT<T> View() const {
+  compat::ProjectedBatchT<T> View() const {
     return {batch.scenes.size(), z.size() / 3 / batch.scenes.size(), xy, z, {}};
   }
   Status Rasterize() {
-    return RasterizeProjected<T>(View(), raster, features, kChannels, one, ids, image);
+    return kaolin::RasterizeProjected<T>(View(), raster, features, kChannels, one, ids, image);
   }
   Status RasterizeBack() {
-    return RasterizeProjectedBackward<T>(View(), raster, features, kChannels, one,
-                                         {ids, d_image, d_xy, d_features});
+    return kaolin::RasterizeProjectedBackward<T>(View(), raster, features, kChannels, one,
+                                                 {ids, d_image, d_xy, d_features});
   }
-  Status Soften() { return ProjectedSoftMask<T>(View(), mask, ids, one, alpha).status(); }
+  Status Soften() { return kaolin::ProjectedSoftMask<T>(View(), mask, ids, one, alpha).status(); }
   Status SoftenBack() {
-    return ProjectedSoftMaskBackward<T>(View(), mask, one, {ids, alpha, d_alpha, d_xy});
+    return kaolin::ProjectedSoftMaskBackward<T>(View(), mask, one, {ids, alpha, d_alpha, d_xy});
   }
 
   BenchBatch batch;
   Workers one{1};
-  ProjectedRasterOptions raster;
-  ProjectedMaskOptions mask;
+  kaolin::ProjectedRasterOptions raster;
+  kaolin::ProjectedMaskOptions mask;
   std::vector<T> xy, z, features, d_features, image, d_image, alpha, d_alpha, d_xy;
   std::vector<std::int32_t> ids;
   bool failed = false;
@@ -91,10 +94,10 @@ void Projected(benchmark::State& state, const SceneSpec& spec,
 template <class T>
 void NaiveVisibility(benchmark::State& state, const SceneSpec& spec) {
   const ProjectedBench<T> b(spec);
-  const raster::PixelCentresT<T> pixels(spec.size, spec.size);
+  const kaolin::PixelCentresT<T> pixels(spec.size, spec.size);
   Measure(state, pixels.width, [&] {
     for (std::size_t j = 0; j < pixels.width; ++j) {
-      benchmark::DoNotOptimize(raster::FaceSeenRef(b.View().image(0), pixels.x[j],
+      benchmark::DoNotOptimize(kaolin::FaceSeenRef(b.View().image(0), pixels.x[j],
                                                    pixels.y[pixels.height / 2], T(1e-14)));
     }
     return Status();
@@ -108,15 +111,15 @@ void Layers(benchmark::State& state, const SceneSpec& spec, int layers) {
   for (std::size_t i = 0; i < b.View().faces * 3; ++i) {
     vertices.insert(vertices.end(), {-b.xy[2 * i], b.xy[2 * i + 1], -b.z[i]});
   }
-  LayeredOptions options;
+  pytorch3d::LayeredOptions options;
   options.size = b.raster.size, options.faces_per_pixel = layers, options.blur_radius = 9.2e-4;
   options.rule.clip_barycentrics = true;
-  const std::size_t n = PixelCount(options.size) * static_cast<std::size_t>(layers);
+  const std::size_t n = compat::PixelCount(options.size) * static_cast<std::size_t>(layers);
   std::vector<std::int64_t> ids(n);
   std::vector<float> z(n), bary(3 * n), dists(n);
-  const FaceRange all[] = {{0, static_cast<std::int64_t>(b.View().faces)}};
-  Measure(state, PixelCount(options.size), [&] {
-    return RasterizeLayers<float>(vertices, all, options, b.one, {ids, z, bary, dists});
+  const pytorch3d::FaceRange all[] = {{0, static_cast<std::int64_t>(b.View().faces)}};
+  Measure(state, compat::PixelCount(options.size), [&] {
+    return pytorch3d::RasterizeLayers<float>(vertices, all, options, b.one, {ids, z, bary, dists});
   });
 }
 

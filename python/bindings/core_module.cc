@@ -12,8 +12,8 @@ void BindRenderer(py::module_& m);
 void BindCamera(py::module_& m);
 void BindShapes(py::module_& m);
 void BindKaolin(py::module_& m);
-void BindDeferred(py::module_& m);
-void BindFragments(py::module_& m);
+void BindNvdiffrast(py::module_& m);
+void BindPytorch3d(py::module_& m);
 
 }  // namespace tilegrad::python
 
@@ -30,6 +30,6 @@ PYBIND11_MODULE(_core, m) {
   BindCamera(m);
   BindShapes(m);
   BindKaolin(m);
-  BindDeferred(m);
-  BindFragments(m);
+  BindNvdiffrast(m);
+  BindPytorch3d(m);
 }

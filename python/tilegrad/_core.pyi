@@ -163,7 +163,7 @@ def projected_soft_mask_backward(
 TEXTURE_FILTERS: tuple[str, ...]
 TEXTURE_BOUNDARIES: tuple[str, ...]
 
-class DeferredRasterizer:
+class NvdiffrastRasterizer:
     def __init__(self) -> None: ...
     def rasterize(
         self, pos: np.ndarray, tri: np.ndarray, ranges: Optional[np.ndarray], height: int,
@@ -182,29 +182,29 @@ class TextureCall:
                  mip_level_bias: Optional[np.ndarray], filter: int, boundary: int,
                  threads: int) -> None: ...
 
-def deferred_rasterize_backward(
+def nvdiffrast_rasterize_backward(
     pos: np.ndarray, tri: np.ndarray, rast: np.ndarray, d_rast: Optional[np.ndarray],
     d_rast_db: Optional[np.ndarray], threads: int) -> np.ndarray: ...
-def deferred_interpolate(
+def nvdiffrast_interpolate(
     attr: np.ndarray, call: InterpolateCall) -> tuple[np.ndarray, np.ndarray]: ...
-def deferred_interpolate_backward(
+def nvdiffrast_interpolate_backward(
     attr: np.ndarray, call: InterpolateCall, d_out: np.ndarray, d_out_da: Optional[np.ndarray],
     wanted: Sequence[bool]
 ) -> tuple[Optional[np.ndarray], Optional[np.ndarray], Optional[np.ndarray]]: ...
-def deferred_antialias(
+def nvdiffrast_antialias(
     color: np.ndarray, rast: np.ndarray, pos: np.ndarray, tri: np.ndarray, rings: EdgeRings,
     threads: int) -> np.ndarray: ...
-def deferred_antialias_backward(
+def nvdiffrast_antialias_backward(
     color: np.ndarray, rast: np.ndarray, pos: np.ndarray, tri: np.ndarray, rings: EdgeRings,
     gradient: np.ndarray, wanted: Sequence[bool], threads: int
 ) -> tuple[Optional[np.ndarray], Optional[np.ndarray]]: ...
-def deferred_texture(levels: Sequence[np.ndarray], call: TextureCall) -> np.ndarray: ...
-def deferred_texture_backward(
+def nvdiffrast_texture(levels: Sequence[np.ndarray], call: TextureCall) -> np.ndarray: ...
+def nvdiffrast_texture_backward(
     levels: Sequence[np.ndarray], call: TextureCall, gradient: np.ndarray, wanted: Sequence[bool]
 ) -> tuple[list[np.ndarray], Optional[np.ndarray], Optional[np.ndarray],
            Optional[np.ndarray]]: ...
-def deferred_mip(tex: np.ndarray, most: int, threads: int) -> list[np.ndarray]: ...
-def deferred_mip_backward(d_levels: Sequence[np.ndarray], threads: int) -> np.ndarray: ...
+def nvdiffrast_mip(tex: np.ndarray, most: int, threads: int) -> list[np.ndarray]: ...
+def nvdiffrast_mip_backward(d_levels: Sequence[np.ndarray], threads: int) -> np.ndarray: ...
 
 # Of tilegrad.fragments.
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "compat/projected/projected_batch.h"
+#include "compat/projected_batch.h"
 
-namespace tilegrad::test {
+namespace tilegrad::compat::test {
 
 template <class T>
 struct ProjectedFacesOwner {
@@ -50,4 +50,4 @@ inline ProjectedFacesOwner<float> RandomFaces(std::size_t images, std::size_t fa
   return out;
 }
 
-}  // namespace tilegrad::test
+}  // namespace tilegrad::compat::test

@@ -138,6 +138,37 @@ TEST(Structure, IncludesBeginWithAFolder) {
   }
 }
 
+// The rules of other renderers stay out of ours: only bindings, benchmarks and tests include them.
+TEST(Structure, NothingOfTheEngineIncludesCompat) {
+  std::size_t seen = 0;
+  for (const auto& [file, target] : IncludesUnder("src")) {
+    if (FirstPart(target) != "compat") continue;
+    ++seen;
+    EXPECT_EQ(file.rfind("src/compat/", 0), 0u) << file << " includes " << target;
+  }
+  EXPECT_GT(seen, 20u);  // the search itself works
+}
+
+// A file of compat/x declares tilegrad::compat::x, and knows of no other framework's folder.
+TEST(Structure, FoldersOfCompatAreNamespaces) {
+  for (const char* framework : {"kaolin", "nvdiffrast", "pytorch3d"}) {
+    const std::string folder = std::string("src/compat/") + framework;
+    const std::string open = std::string("namespace tilegrad::compat::") + framework + " {";
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(kRoot / folder)) {
+      ++files;
+      EXPECT_NE(ReadText(entry.path()).value().find(open), std::string::npos) << entry.path();
+    }
+    EXPECT_GT(files, 2u);
+    for (const auto& [file, target] : IncludesUnder(folder)) {
+      if (FirstPart(target) != "compat" || target.rfind('/') == std::string("compat").size())
+        continue;
+      EXPECT_EQ(target.rfind(std::string("compat/") + framework + "/", 0), 0u)
+          << file << " includes " << target;
+    }
+  }
+}
+
 TEST(Structure, ShadeSeesOnlyTheRecordsOfRaster) {
   const std::set<std::string> records = {"raster/fragments.h", "raster/screen_mesh.h",
                                          "raster/conventions.h"};

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of face_visibility.h; lanes are columns. No fused operations: the same bits on every
 // instruction set.
-#if defined(TILEGRAD_RASTER_FACE_VISIBILITY_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_RASTER_FACE_VISIBILITY_INL_H_
-#undef TILEGRAD_RASTER_FACE_VISIBILITY_INL_H_
+#if defined(TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
+#undef TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
 #else
-#define TILEGRAD_RASTER_FACE_VISIBILITY_INL_H_
+#define TILEGRAD_COMPAT_KAOLIN_FACE_VISIBILITY_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -19,7 +19,7 @@
 #include "raster/fragments.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::raster {
+namespace tilegrad::compat::kaolin {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -121,7 +121,7 @@ HWY_INLINE FaceInLanes<D> SpreadFace(D d, const ProjectedFacesT<T>& faces, std::
   return out;
 }
 
-// `scratch` holds rows [row_begin, row_end), with -infinity and kNoFace to begin with.
+// `scratch` holds rows [row_begin, row_end), with -infinity and raster::kNoFace to begin with.
 template <class T>
 HWY_INLINE void DrawProjectedFaces(const ProjectedFacesT<T>& faces, const PixelCentresT<T>& pixels,
                                    T eps, std::size_t row_begin, std::size_t row_end,
@@ -159,7 +159,7 @@ void DrawProjectedDouble(const ProjectedFacesT<double>& faces, const PixelCentre
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::kaolin
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -10,7 +10,7 @@
 
 #if HWY_ONCE
 
-namespace tilegrad::raster {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 HWY_EXPORT(DrawProjectedFloat);
@@ -22,7 +22,7 @@ void DrawRows(const PixelCentresT<T>& pixels, std::size_t rows, FaceVisibilitySc
               const Draw& draw, std::int32_t* face_ids) {
   const std::size_t stride = pixels.width + PixelCentresT<T>::kPadding;
   scratch->nearest.assign(rows * stride, -std::numeric_limits<T>::infinity());
-  scratch->face.assign(rows * stride, kNoFace);
+  scratch->face.assign(rows * stride, raster::kNoFace);
   draw();
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t j = 0; j < pixels.width; ++j) {
@@ -60,5 +60,5 @@ void FaceVisibility(const ProjectedFacesT<double>& faces, const PixelCentresT<do
   DrawRows(pixels, row_end - row_begin, scratch, draw, face_ids);
 }
 
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::kaolin
 #endif

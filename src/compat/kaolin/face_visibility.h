@@ -13,9 +13,9 @@
 #include <type_traits>
 
 #include "base/aligned.h"
-#include "compat/projected/projected_faces.h"
+#include "compat/projected_faces.h"
 
-namespace tilegrad::raster {
+namespace tilegrad::compat::kaolin {
 
 // Centres of the pixels of an image in NDC: x_j = (2j + 1 - W) / W, y_i = (H - 2i - 1) / H.
 template <class T>
@@ -37,7 +37,7 @@ struct FaceVisibilityScratchT {
 };
 
 // Rows [row_begin, row_end) of the image: face_ids [rows][W] <- index of the face that is seen, or
-// kNoFace. `eps` >= 0, NDC^2. The same bits as FaceVisibilityRef on every instruction set.
+// raster::kNoFace. `eps` >= 0, NDC^2. The same bits as FaceVisibilityRef on every instruction set.
 void FaceVisibility(const ProjectedFacesT<float>& faces, const PixelCentresT<float>& pixels,
                     float eps, std::size_t row_begin, std::size_t row_end,
                     FaceVisibilityScratchT<float>* scratch, std::int32_t* face_ids);
@@ -45,4 +45,4 @@ void FaceVisibility(const ProjectedFacesT<double>& faces, const PixelCentresT<do
                     double eps, std::size_t row_begin, std::size_t row_end,
                     FaceVisibilityScratchT<double>* scratch, std::int32_t* face_ids);
 
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::kaolin

@@ -12,7 +12,7 @@
 #include "compat/kaolin/face_visibility.h"
 #include "raster/fragments.h"
 
-namespace tilegrad::raster {
+namespace tilegrad::compat::kaolin {
 
 // Whether corners [3,2] cover the centre (px, py).
 template <class T>
@@ -29,7 +29,7 @@ bool CoversCentre(const T* v, const T& px, const T& py) {
 template <class T>
 std::int32_t FaceSeenRef(const ProjectedFacesT<T>& faces, const T& px, const T& py, const T& eps) {
   T nearest = -std::numeric_limits<T>::infinity();
-  std::int32_t best = kNoFace;
+  std::int32_t best = raster::kNoFace;
   for (std::size_t f = 0; f < faces.count(); ++f) {
     if (!faces.is_valid(f) || !CoversCentre(faces.corners(f), px, py)) continue;
     const auto w = ScreenWeights(faces.corners(f), px, py, eps);
@@ -53,4 +53,4 @@ std::vector<std::int32_t> FaceVisibilityRef(const ProjectedFacesT<T>& faces,
   return ids;
 }
 
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::kaolin

@@ -9,7 +9,7 @@
 #include "raster/fragments.h"
 #include "render/pipeline/validate.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 constexpr std::size_t kBandRows = 64;
@@ -23,9 +23,8 @@ struct RowsOfImage {
 
 // Features [F,3,C] of an image at the pixels of some rows.
 template <class T>
-void InterpolateRows(const raster::ProjectedFacesT<T>& faces,
-                     const raster::PixelCentresT<T>& pixels, T eps, const T* features,
-                     std::size_t channels, const RowsOfImage& rows, T* out) {
+void InterpolateRows(const ProjectedFacesT<T>& faces, const PixelCentresT<T>& pixels, T eps,
+                     const T* features, std::size_t channels, const RowsOfImage& rows, T* out) {
   const std::int32_t* id = rows.face_ids;
   for (std::size_t i = rows.row; i < rows.row_end; ++i) {
     for (std::size_t j = 0; j < pixels.width; ++j, ++id, out += channels) {
@@ -34,7 +33,7 @@ void InterpolateRows(const raster::ProjectedFacesT<T>& faces,
         continue;
       }
       const auto face = static_cast<std::size_t>(*id);
-      const auto w = raster::ScreenWeights(faces.corners(face), pixels.x[j], pixels.y[i], eps);
+      const auto w = ScreenWeights(faces.corners(face), pixels.x[j], pixels.y[i], eps);
       const T* f = features + 3 * face * channels;
       for (std::size_t c = 0; c < channels; ++c) {
         out[c] = w[0] * f[c] + w[1] * f[channels + c] + w[2] * f[2 * channels + c];
@@ -77,12 +76,12 @@ struct FaceAdjoint {
 
 // sums [3,C] <- D_kc.
 template <class T>
-void SumFeatures(const FaceAdjoint<T>& face, const raster::PixelCentresT<T>& pixels, T eps,
+void SumFeatures(const FaceAdjoint<T>& face, const PixelCentresT<T>& pixels, T eps,
                  std::span<double> sums) {
   std::fill(sums.begin(), sums.end(), 0.0);
   for (const std::uint32_t pixel : face.pixels) {
-    const auto w = raster::ScreenWeights(face.corners, pixels.x[pixel % pixels.width],
-                                         pixels.y[pixel / pixels.width], eps);
+    const auto w = ScreenWeights(face.corners, pixels.x[pixel % pixels.width],
+                                 pixels.y[pixel / pixels.width], eps);
     const T* d = face.d_image + pixel * face.channels;
     for (std::size_t k = 0; k < 3; ++k) {
       for (std::size_t c = 0; c < face.channels; ++c) {
@@ -104,7 +103,7 @@ void CornersFromFeatures(const FaceAdjoint<T>& face, double eps, std::span<const
   }
   const double area = gy[2] * gx[1] - gx[2] * gy[1];
   if (area == 0) return;
-  const double denominator = raster::WeightDenominator(area, eps);
+  const double denominator = WeightDenominator(area, eps);
   double moved = 0;  // sum_kc f_kc D_kc
   double along_x[3] = {}, along_y[3] = {};
   for (std::size_t c = 0; c < face.channels; ++c) {
@@ -163,17 +162,17 @@ Status RasterizeProjected(const ProjectedBatchT<T>& batch, const ProjectedRaster
   const std::size_t pixels = PixelCount(options.size);
   TILEGRAD_TRY(CheckSize("face_idx", face_ids.size(), batch.images * pixels));
   TILEGRAD_TRY(CheckSize("the image", image.size(), batch.images * pixels * channels));
-  const raster::PixelCentresT<T> centres(options.size.width, options.size.height);
+  const PixelCentresT<T> centres(options.size.width, options.size.height);
   const T eps = static_cast<T>(options.eps);
   const std::size_t bands = (centres.height + kBandRows - 1) / kBandRows;
-  std::vector<raster::FaceVisibilityScratchT<T>> scratch(static_cast<std::size_t>(workers.count()));
+  std::vector<FaceVisibilityScratchT<T>> scratch(static_cast<std::size_t>(workers.count()));
   workers.For(batch.images * bands, [&](std::size_t task, std::size_t worker) {
     const std::size_t n = task / bands, row = task % bands * kBandRows;
     const std::size_t row_end = std::min(row + kBandRows, centres.height);
     const std::size_t first = n * pixels + row * centres.width;
     const auto faces = batch.image(n);
     std::int32_t* ids = face_ids.data() + first;
-    raster::FaceVisibility(faces, centres, eps, row, row_end, &scratch[worker], ids);
+    FaceVisibility(faces, centres, eps, row, row_end, &scratch[worker], ids);
     if (channels == 0) return;
     InterpolateRows(faces, centres, eps, features.data() + 3 * n * batch.faces * channels, channels,
                     {row, row_end, ids}, image.data() + first * channels);
@@ -191,7 +190,7 @@ Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
   TILEGRAD_TRY(CheckNotNegative("eps", options.eps));
   TILEGRAD_TRY(ValidateFeatures(batch, features, channels));
   TILEGRAD_TRY(ValidateAdjoint(batch, options.size, channels, adjoint));
-  const raster::PixelCentresT<T> centres(options.size.width, options.size.height);
+  const PixelCentresT<T> centres(options.size.width, options.size.height);
   const std::size_t pixels = PixelCount(options.size);
   std::vector<PixelsOfFaces> lists(batch.images, PixelsOfFaces({}, 0));
   workers.For(batch.images, [&](std::size_t n, std::size_t) {
@@ -232,4 +231,4 @@ TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin

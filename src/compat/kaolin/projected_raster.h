@@ -16,9 +16,9 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "compat/projected/projected_batch.h"
+#include "compat/projected_batch.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 
 struct ProjectedRasterOptions {
   ImageSize size;      // pixels, 1..16384
@@ -48,4 +48,4 @@ Status RasterizeProjectedBackward(const ProjectedBatchT<T>& batch,
                                   std::span<const T> features, std::size_t channels,
                                   const Workers& workers, const ProjectedRasterAdjoint<T>& adjoint);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin

@@ -9,10 +9,10 @@
 
 #include "base/error.h"
 #include "raster/soft_mask/soft_mask.h"
-#include "render/alpha/paper_tile.h"
+#include "render/alpha/paper_bin.h"
 #include "render/pipeline/validate.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 // A task is a bin of an image; the tiles of the bins have their scalar or vector code.
@@ -24,6 +24,10 @@ struct Bins {
   std::size_t tasks() const { return images * grid.cells(); }
   std::size_t image(std::size_t task) const { return task / grid.cells(); }
   raster::PixelRect rect(std::size_t task) const { return grid.rect(task % grid.cells()); }
+  std::size_t first(std::size_t task) const { return image(task) * PixelCount(size); }  // pixel
+  PaperRegion region(std::size_t task, std::span<const std::int32_t> face_ids) const {
+    return {rect(task), size.width, size.height, face_ids.data() + first(task)};
+  }
 };
 
 // ---- Vector code: float, all faces.
@@ -34,7 +38,7 @@ struct SoftImage {
   raster::SoftTree tree;
   raster::SoftMaskPlan plan;
 
-  void Build(const raster::ProjectedFacesT<float>& faces, const ProjectedMaskOptions& options) {
+  void Build(const ProjectedFacesT<float>& faces, const ProjectedMaskOptions& options) {
     Place(faces, options.size);
     raster::SetUpFaces(buffers.View(), /*cull_back=*/false, buffers.reject,
                        {.corners = &tree.corners});
@@ -44,7 +48,7 @@ struct SoftImage {
   }
 
  private:
-  void Place(const raster::ProjectedFacesT<float>& faces, const ImageSize& size) {
+  void Place(const ProjectedFacesT<float>& faces, const ImageSize& size) {
     const std::size_t count = faces.count();
     buffers.width = size.width, buffers.height = size.height;
     buffers.packed.resize(3 * count), buffers.reject.assign(count, raster::kFaceDrawn);
@@ -143,7 +147,7 @@ raster::PaperSoftMask ScalarRule(const ProjectedMaskOptions& options, std::size_
 }
 
 template <class T>
-std::vector<raster::NdcFace<T>> NdcFacesOf(const raster::ProjectedFacesT<T>& faces) {
+std::vector<raster::NdcFace<T>> NdcFacesOf(const ProjectedFacesT<T>& faces) {
   std::vector<raster::NdcFace<T>> out(faces.count());
   for (std::size_t f = 0; f < out.size(); ++f) {
     const T* v = faces.corners(f);
@@ -152,26 +156,15 @@ std::vector<raster::NdcFace<T>> NdcFacesOf(const raster::ProjectedFacesT<T>& fac
   return out;
 }
 
-// Calls visit(task, image, tile, faces near the tile) for all tiles.
-template <class T, class Visit>
-void ForScalarTiles(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions& options,
-                    std::span<const std::int32_t> face_ids, const Workers& workers,
-                    const Visit& visit) {
-  const Bins bins{options.size, batch.images};
-  const int width = options.size.width, height = options.size.height;
-  const double box = ScalarRule(options, batch.faces).box;
-  std::vector<std::vector<raster::NdcFace<T>>> faces(batch.images);
+template <class T>
+using FacesOfImages = std::vector<std::vector<raster::NdcFace<T>>>;
+
+template <class T>
+FacesOfImages<T> NdcFacesOf(const ProjectedBatchT<T>& batch, const Workers& workers) {
+  FacesOfImages<T> out(batch.images);
   workers.For(batch.images,
-              [&](std::size_t n, std::size_t) { faces[n] = NdcFacesOf(batch.image(n)); });
-  workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
-    const std::size_t n = bins.image(task);
-    const NearFacesT<T> near =
-        FacesNear<T>(faces[n], bins.grid.rect(task % bins.grid.cells()), width, height, box);
-    raster::ForTiles(bins.rect(task), [&](const raster::PixelRect& rect) {
-      visit(task, n, PaperTile{rect, width, height, face_ids.data() + n * PixelCount(options.size)},
-            FacesNear(near, rect, width, height, box));
-    });
-  });
+              [&](std::size_t n, std::size_t) { out[n] = NdcFacesOf(batch.image(n)); });
+  return out;
 }
 
 template <class T>
@@ -179,13 +172,25 @@ double ScalarMask(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions& o
                   std::span<const std::int32_t> face_ids, const Workers& workers,
                   std::span<T> alpha) {
   const raster::PaperSoftMask rule = ScalarRule(options, batch.faces);
-  std::fill(alpha.begin(), alpha.end(), T(1));
-  ForScalarTiles(batch, options, face_ids, workers,
-                 [&](std::size_t, std::size_t n, const PaperTile& tile, const NearFacesT<T>& near) {
-                   PaperTileAlpha(near, rule, tile, alpha.data() + n * PixelCount(options.size));
-                 });
+  const Bins bins{options.size, batch.images};
+  const FacesOfImages<T> faces = NdcFacesOf(batch, workers);
+  workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
+    PaperForward<T>(faces[bins.image(task)], rule, bins.region(task, face_ids),
+                    alpha.data() + bins.first(task));
+  });
   if (options.rule == SoftRule::kPaper) return std::numeric_limits<double>::infinity();
   return options.max_alpha_error;
+}
+
+// Adds dL/d(corners) of the faces near a tile to d_xy [F,3,2].
+template <class T>
+void AddTile(const NearFacesT<T>& tile, T* d_xy) {
+  for (std::size_t i = 0; i < tile.faces.size(); ++i) {
+    T* to = d_xy + 6 * tile.source[i];
+    for (int k = 0; k < 3; ++k) {
+      to[2 * k] += tile.faces[i].x[k], to[2 * k + 1] += tile.faces[i].y[k];
+    }
+  }
 }
 
 template <class T>
@@ -193,23 +198,17 @@ void ScalarMaskBackward(const ProjectedBatchT<T>& batch, const ProjectedMaskOpti
                         const Workers& workers, const ProjectedMaskAdjoint<T>& adjoint) {
   const raster::PaperSoftMask rule = ScalarRule(options, batch.faces);
   const Bins bins{options.size, batch.images};
+  const FacesOfImages<T> faces = NdcFacesOf(batch, workers);
   std::vector<std::vector<NearFacesT<T>>> gradients(bins.tasks());  // of tiles
-  ForScalarTiles(
-      batch, options, adjoint.face_ids, workers,
-      [&](std::size_t task, std::size_t n, const PaperTile& tile, NearFacesT<T> near) {
-        gradients[task].push_back(PaperTileBackward(
-            std::move(near), rule, tile, adjoint.d_alpha.data() + n * PixelCount(options.size)));
-      });
+  workers.For(bins.tasks(), [&](std::size_t task, std::size_t) {
+    gradients[task] =
+        PaperBackward<T>(faces[bins.image(task)], rule, bins.region(task, adjoint.face_ids),
+                         adjoint.d_alpha.data() + bins.first(task));
+  });
   workers.For(batch.images, [&](std::size_t n, std::size_t) {
-    T* d_xy = adjoint.d_xy.data() + 6 * n * batch.faces;
     for (std::size_t bin = 0; bin < bins.grid.cells(); ++bin) {
       for (const NearFacesT<T>& tile : gradients[n * bins.grid.cells() + bin]) {
-        for (std::size_t i = 0; i < tile.faces.size(); ++i) {
-          T* to = d_xy + 6 * tile.source[i];
-          for (int k = 0; k < 3; ++k) {
-            to[2 * k] += tile.faces[i].x[k], to[2 * k + 1] += tile.faces[i].y[k];
-          }
-        }
+        AddTile(tile, adjoint.d_xy.data() + 6 * n * batch.faces);
       }
     }
   });
@@ -283,4 +282,4 @@ TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin

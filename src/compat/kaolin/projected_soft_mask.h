@@ -7,10 +7,10 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "compat/projected/projected_batch.h"
+#include "compat/projected_batch.h"
 #include "render/pipeline/pipeline.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 
 struct ProjectedMaskOptions {
   ImageSize size;             // pixels, 1..16384
@@ -43,4 +43,4 @@ Status ProjectedSoftMaskBackward(const ProjectedBatchT<T>& batch,
                                  const ProjectedMaskOptions& options, const Workers& workers,
                                  const ProjectedMaskAdjoint<T>& adjoint);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin

@@ -9,7 +9,7 @@
 #include "compat/nvdiffrast/band_sums.h"
 #include "compat/nvdiffrast/edge_crossing.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // Pixel `to` takes `weight` of what `from` shows beyond itself. The pixels are those of the batch.
@@ -233,4 +233,4 @@ TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

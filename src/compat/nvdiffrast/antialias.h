@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fourth of the deferred operations (rasterize.h): smooth silhouettes, and with them gradients
+// The fourth of nvdiffrast's operations (rasterize.h): smooth silhouettes, and with them gradients
 // of what is seen (Laine et al. 2020, section 3.5).
 //
 // Every two pixels next to each other, beside or above, that show different faces are looked at.
@@ -24,7 +24,7 @@
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class T>
 struct AntialiasInput {
@@ -52,4 +52,4 @@ template <class T>
 Status AntialiasBackward(const AntialiasInput<T>& input, std::span<const T> d_out,
                          const Workers& workers, const AntialiasGradients<T>& out);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 BandSums::BandSums(std::size_t rows, std::size_t channels, std::size_t bands,
                    const Workers& workers)
@@ -73,4 +73,4 @@ void BandSums::AddTo(std::span<T> out, const Workers& workers, std::size_t first
 template void BandSums::AddTo(std::span<float>, const Workers&, std::size_t) const;
 template void BandSums::AddTo(std::span<double>, const Workers&, std::size_t) const;
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -12,7 +12,7 @@
 #include "base/aligned.h"
 #include "base/parallel.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 class BandSums {
  public:
@@ -55,4 +55,4 @@ class BandSums {
   std::vector<AlignedVector<std::int32_t>> slots_;
 };
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -17,7 +17,7 @@
 #include "base/scalar.h"
 #include "compat/nvdiffrast/pixel_grid.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class S>
 struct ClipCorners {
@@ -162,4 +162,4 @@ void BarycentricsAdjoint(const ClipCorners<S>& c, const PixelCentre& at, const P
   }
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

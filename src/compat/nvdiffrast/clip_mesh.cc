@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 Status CheckFaces(FaceList faces, std::size_t vertices) {
   for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -31,4 +31,4 @@ Status CheckFaceIds(std::span<const T> rast, std::size_t faces) {
 template Status CheckFaceIds(std::span<const float>, std::size_t);
 template Status CheckFaceIds(std::span<const double>, std::size_t);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the deferred operations are given: faces over vertices, and an image that names a face for
+// What nvdiffrast's operations are given: faces over vertices, and an image that names a face for
 // every pixel.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // Rows of numbers at vertices: positions in clip space (4), or attributes.
 template <class T>
@@ -42,4 +42,4 @@ Status CheckFaces(FaceList faces, std::size_t vertices);
 template <class T>
 Status CheckFaceIds(std::span<const T> rast, std::size_t faces);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -8,7 +8,7 @@
 #include "base/inline_vector.h"
 #include "raster/conventions.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 constexpr int kPlanes = 6;  // near, far, left, right, below, above
@@ -211,4 +211,4 @@ template void MakeClipScreen(const VertexRows<float>&, FaceList, const FaceRange
 template void MakeClipScreen(const VertexRows<double>&, FaceList, const FaceRange&, std::size_t,
                              const PixelGrid&, ClipScreen*);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -17,7 +17,7 @@
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "raster/screen_mesh.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // Faces [first, first + count).
 struct FaceRange {
@@ -36,4 +36,4 @@ template <class T>
 void MakeClipScreen(const VertexRows<T>& positions, FaceList faces, const FaceRange& range,
                     std::size_t image, const PixelGrid& grid, ClipScreen* out);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -13,7 +13,7 @@
 #include "base/scalar.h"
 #include "compat/nvdiffrast/pixel_grid.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // The way: from the centre of a pixel, one pixel along axis 0 (x) or 1 (y), forwards or back.
 struct PixelStep {
@@ -70,4 +70,4 @@ void CrossingAdjoint(const PixelStep& step, const WayPoint<S>& i, const WayPoint
   PointOnWayAdjoint(step, {-(d_n * i.r), d_n * i.q + d_m * i.w, -(d_m * i.r)}, d_j);
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // Vertices of an edge, the lower one first, and one of its sides. Sorting brings those of one edge
@@ -44,4 +44,4 @@ EdgeRings BuildEdgeRings(FaceList faces) {
   return out;
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -8,7 +8,7 @@
 
 #include "compat/nvdiffrast/clip_mesh.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // Side 3 f + k of face f goes from its corner k to the next one, and is opposite to the third. The
 // sides of one edge form a ring: next[side] is another side of the same edge, or the side itself at
@@ -19,4 +19,4 @@ struct EdgeRings {
 
 EdgeRings BuildEdgeRings(FaceList faces);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

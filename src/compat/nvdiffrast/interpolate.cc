@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "compat/nvdiffrast/band_sums.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -186,4 +186,4 @@ TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

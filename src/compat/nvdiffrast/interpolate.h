@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The second of the deferred operations (rasterize.h): attributes of vertices over the pixels.
+// The second of nvdiffrast's operations (rasterize.h): attributes of vertices over the pixels.
 //
 //     out_c = u a_0c + v a_1c + (1 - u - v) a_2c                 a_k: the attributes of corner k
 //     out_da = (dA/dX, dA/dY) of the selected channels A, by the chain rule from rast_db
@@ -16,7 +16,7 @@
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class T>
 struct InterpolateInput {
@@ -55,4 +55,4 @@ Status InterpolateBackward(const InterpolateInput<T>& input,
                            const InterpolateCotangents<T>& cotangents, const Workers& workers,
                            const InterpolateGradients<T>& out);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

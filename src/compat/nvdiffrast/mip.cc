@@ -3,7 +3,7 @@
 
 #include "base/error.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // How a level follows from the finer one: steps of 2, or 1 where a side is one texel.
@@ -102,4 +102,4 @@ TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

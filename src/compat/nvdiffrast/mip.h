@@ -10,7 +10,7 @@
 #include "base/parallel.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 struct MipSize {
   int height, width;
@@ -36,4 +36,4 @@ template <class T>
 void HalveTextureBackward(const TextureLevel<T>& d_coarse, const MipSize& fine,
                           std::size_t channels, const Workers& workers, std::span<T> d_fine);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

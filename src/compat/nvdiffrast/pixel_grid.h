@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The images that the deferred operations read and write, and how they are split into tasks.
+// The images that nvdiffrast's operations read and write, and how they are split into tasks.
 //
 // All are [N,H,W,C], rows from the bottom: pixel (X, Y) has its centre at x/w = 2 (X + 0.5) / W -
 // 1, y/w = 2 (Y + 0.5) / H - 1, the coordinates of OpenGL.
@@ -10,7 +10,7 @@
 
 #include "base/parallel.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 inline constexpr int kBandRows = 64;
 
@@ -58,4 +58,4 @@ void ForEachPixel(const PixelGrid& grid, const Band& band, const Visit& visit) {
   for (std::size_t p = grid.first(band.image, band.row_begin); p < end; ++p) visit(p);
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -12,7 +12,7 @@
 #include "raster/fragments.h"
 #include "raster/visibility.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -150,4 +150,4 @@ template Status Rasterizer::Run(const RasterizeInput<float>&, const Workers&,
 template Status Rasterizer::Run(const RasterizeInput<double>&, const Workers&,
                                 const RasterizeOutput<double>&);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first of the deferred operations: which face is seen in each pixel, and where on it.
+// The first of nvdiffrast's operations: which face is seen in each pixel, and where on it.
 //
 // The operations (rasterize, interpolate, texture, antialias) are those of Laine et al., Modular
 // Primitives for High-Performance Differentiable Rendering, 2020: each reads and writes whole
@@ -25,7 +25,7 @@
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class T>
 struct RasterizeInput {
@@ -74,4 +74,4 @@ template <class T>
 Status RasterizeBackward(const RasterizeInput<T>& input, const RasterizeCotangents<T>& cotangents,
                          const Workers& workers, std::span<T> d_positions);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

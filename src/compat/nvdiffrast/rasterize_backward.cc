@@ -5,7 +5,7 @@
 #include "compat/nvdiffrast/band_sums.h"
 #include "compat/nvdiffrast/rasterize_input.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -91,4 +91,4 @@ template Status RasterizeBackward(const RasterizeInput<float>&, const RasterizeC
 template Status RasterizeBackward(const RasterizeInput<double>&, const RasterizeCotangents<double>&,
                                   const Workers&, std::span<double>);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

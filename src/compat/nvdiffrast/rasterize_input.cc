@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "raster/conventions.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -51,4 +51,4 @@ Status CheckInput(const RasterizeInput<T>& input) {
 template Status CheckInput(const RasterizeInput<float>&);
 template Status CheckInput(const RasterizeInput<double>&);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

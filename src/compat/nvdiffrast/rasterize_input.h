@@ -9,7 +9,7 @@
 #include "compat/nvdiffrast/rasterize.h"
 #include "raster/fragments.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class T>
 Status CheckInput(const RasterizeInput<T>& input);
@@ -44,4 +44,4 @@ class LastFace {
   ClipCorners<double> corners_;
 };
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

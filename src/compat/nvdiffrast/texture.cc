@@ -9,7 +9,7 @@
 #include "compat/nvdiffrast/texture_point.h"
 #include "compat/nvdiffrast/texture_taps.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // Levels `low` and low + 1, the weight of the second; `moves`: the weight follows the level.
@@ -297,4 +297,4 @@ TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The third of the deferred operations (rasterize.h): filtered lookups into textures and cube maps.
+// The third of nvdiffrast's operations (rasterize.h): filtered lookups into textures and cube maps.
 //
 // Textures are [N|1,H,W,C], row 0 at t = 0: the texel in column j and row i has its centre at
 // s = (j + 0.5) / W, t = (i + 0.5) / H. Cube maps are [N|1,6,S,S,C], faces +x, -x, +y, -y, +z, -z
@@ -22,7 +22,7 @@
 #include "compat/nvdiffrast/pixel_grid.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 enum class TextureFilter {
   kNearest,
@@ -70,4 +70,4 @@ template <class T>
 void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_out,
                            const Workers& workers, const TextureGradients<T>& out);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // Signed axes of a face: component `index` times `sign`.
 struct CubeAxis {
@@ -65,4 +65,4 @@ inline CubeTexel AcrossEdge(const CubeTexel& texel, int size) {
   return {face, cell(to.s), cell(to.t)};
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

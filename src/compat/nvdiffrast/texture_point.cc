@@ -8,7 +8,7 @@
 
 #include "compat/nvdiffrast/texture_cube.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 void FindPlainPoint(const TextureCoordinates& at, TexturePoint* out) {
@@ -114,4 +114,4 @@ void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level
   }
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

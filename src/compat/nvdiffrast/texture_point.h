@@ -7,7 +7,7 @@
 
 #include "compat/nvdiffrast/mip.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // (s, t) on a face (0 of a plain texture) and d(s, t)/d(X, Y): ds/dX, ds/dY, dt/dX, dt/dY.
 struct TexturePoint {
@@ -41,4 +41,4 @@ double LevelOf(const double (&slopes)[4], const MipSize& size);
 void LevelAdjoint(const double (&slopes)[4], const MipSize& size, double d_level,
                   double (&d_slopes)[4]);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

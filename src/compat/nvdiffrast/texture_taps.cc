@@ -7,7 +7,7 @@
 
 #include "compat/nvdiffrast/texture_cube.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // One axis: texels `low` and `high`, the weight of `high`, and its derivative by the coordinate.
@@ -101,4 +101,4 @@ void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
   }
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

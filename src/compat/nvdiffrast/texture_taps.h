@@ -7,7 +7,7 @@
 #include "compat/nvdiffrast/texture.h"
 #include "compat/nvdiffrast/texture_point.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 // Four texels (one, if nearest): (1-a)(1-b), a(1-b), (1-a)b and ab of what stands at texel[0..3].
 struct Taps {
@@ -29,4 +29,4 @@ struct Taps {
 void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
               TextureBoundary boundary, Taps* out);
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "render/pipeline/validate.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::pytorch3d {
 namespace {
 
 constexpr std::size_t kBandRows = 16;
@@ -80,10 +80,10 @@ struct Band {
 
 template <class T>
 bool IsListed(const T* v, bool cull_backfaces) {
-  if (std::min({v[2], v[5], v[8]}) < T(raster::kFragmentEps)) return false;
+  if (std::min({v[2], v[5], v[8]}) < T(kFragmentEps)) return false;
   const T area = (v[6] - v[0]) * (v[4] - v[1]) - (v[7] - v[1]) * (v[3] - v[0]);
   if (cull_backfaces && area < 0) return false;
-  return std::isfinite(area) && std::abs(area) > T(raster::kFragmentEps);
+  return std::isfinite(area) && std::abs(area) > T(kFragmentEps);
 }
 
 template <class T>
@@ -99,7 +99,7 @@ void DrawFace(const T* v, std::int64_t id, const Centres<T>& centres, const Laye
   const IndexRange columns = Within(centres.x, left - radius, right + radius);
   for (std::size_t i = begin; i < end; ++i) {
     for (std::size_t j = columns.begin; j < columns.end; ++j) {
-      const auto at = raster::FragmentOf(v, centres.x[j], centres.y[i], options.rule);
+      const auto at = FragmentOf(v, centres.x[j], centres.y[i], options.rule);
       // Weights of a pixel outside of its face may overflow where perspective turns them around.
       if (!(at.z >= 0 && std::isfinite(at.z))) continue;
       if (!at.inside && !(at.dist < T(options.blur_radius))) continue;
@@ -119,9 +119,9 @@ void WriteBand(std::span<const T> face_vertices, const Centres<T>& centres,
       const std::size_t to = (first_pixel + p) * lists.layers + k;
       const bool empty = k >= static_cast<std::size_t>(lists.count[p]);
       const std::int64_t id = empty ? -1 : lists.face[p * lists.layers + k];
-      raster::LayeredFragment<T> at{{T(-1), T(-1), T(-1)}, T(-1), T(-1), false};
+      LayeredFragment<T> at{{T(-1), T(-1), T(-1)}, T(-1), T(-1), false};
       if (!empty) {
-        at = raster::FragmentOf(face_vertices.data() + 9 * id, px, py, options.rule);
+        at = FragmentOf(face_vertices.data() + 9 * id, px, py, options.rule);
       }
       out.pix_to_face[to] = id, out.zbuf[to] = at.z, out.dists[to] = at.dist;
       std::copy(at.bary.begin(), at.bary.end(), out.barycentrics.data() + 3 * to);
@@ -217,9 +217,9 @@ void AddFragment(const T* v, const Centres<T>& centres, const LayeredOptions& op
                             (centres.width * centres.height);
   std::array<T, 3> d_bary;
   for (std::size_t k = 0; k < 3; ++k) d_bary[k] = at(adjoint.d_barycentrics, 3 * fragment + k);
-  raster::FragmentBackward(v, centres.x[pixel % centres.width], centres.y[pixel / centres.width],
-                           options.rule, d_bary, at(adjoint.d_zbuf, fragment),
-                           at(adjoint.d_dists, fragment), d_v);
+  FragmentBackward(v, centres.x[pixel % centres.width], centres.y[pixel / centres.width],
+                   options.rule, d_bary, at(adjoint.d_zbuf, fragment),
+                   at(adjoint.d_dists, fragment), d_v);
 }
 
 }  // namespace
@@ -284,4 +284,4 @@ TILEGRAD_INSTANTIATE(float);
 TILEGRAD_INSTANTIATE(double);
 #undef TILEGRAD_INSTANTIATE
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::pytorch3d

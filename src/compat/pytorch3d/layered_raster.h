@@ -16,14 +16,14 @@
 #include "scene/camera.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::pytorch3d {
 
 struct LayeredOptions {
   ImageSize size;           // pixels, 1..16384; the shorter side spans [-1, 1]
   int faces_per_pixel = 1;  // K, 1..1024
   double blur_radius = 0;   // NDC^2, >= 0
   bool cull_backfaces = false;
-  raster::FragmentRule rule;
+  FragmentRule rule;
 };
 
 // Faces [first, first + count) of those packed make up one image.
@@ -58,4 +58,4 @@ template <class T>
 Status RasterizeLayersBackward(std::span<const T> face_vertices, const LayeredOptions& options,
                                const Workers& workers, const LayeredAdjoint<T>& adjoint);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::pytorch3d

@@ -168,20 +168,20 @@ void RunStage(const BinInput& bin, const BinTask& task, bool any_face, WorkerScr
 }
 
 // Alpha of a bin. Returns the error spent.
-double SoftAlpha(const ImageScratch& image, const BinTask& task, const ImageOfFrame& part,
-                 WorkerScratch* worker, Frame* frame) {
-  const std::span<const std::int32_t> ids(part.plane(frame->face_ids, 1), part.pixels);
-  const raster::SoftMaskImages images{{part.plane(frame->alpha, 1), part.pixels},
-                                      {part.plane(frame->transmittance, 1), part.pixels}};
+double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
+                WorkerScratch* worker, Frame* frame) {
+  const auto plane = [&](auto& batch) {
+    return std::span(part.plane(batch, 1), batch.empty() ? 0 : part.pixels);
+  };
   ++worker->stats.alpha_parts;
-  return raster::SoftMaskForward(image.soft, image.soft_plan, {task.rect, ids}, images,
-                                 &worker->soft);
+  return input.alpha->Forward(
+      {input.image, task, worker->index},
+      {plane(frame->face_ids), plane(frame->alpha), plane(frame->transmittance)});
 }
 
 }  // namespace
 
 double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, Frame* frame) {
-  const ImageScratch& image = input.image;
   RenderTimes* const times = &worker->times;
   StageClock clock;
   const ImageOfFrame part{
@@ -198,8 +198,8 @@ double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* work
   clock.Lap(&times->interpolate);
   if (input.stage != nullptr) RunStage(input, task, to_stage, worker);
   clock.Lap(&times->stage);
-  if (frame->alpha.empty()) return 0;
-  const double spent = SoftAlpha(image, task, part, worker, frame);
+  if (input.alpha == nullptr) return 0;
+  const double spent = RunAlpha(input, task, part, worker, frame);
   clock.Lap(&times->alpha);
   return spent;
 }

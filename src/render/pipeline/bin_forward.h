@@ -2,6 +2,7 @@
 // All stages forward: a bin is drawn, then its tiles are interpolated and given their alpha.
 #pragma once
 
+#include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
@@ -14,6 +15,7 @@ struct BinInput {
   const RenderOptions& options;
   const ImageScratch& image;
   PixelStage* stage;  // null: attributes are images themselves
+  AlphaStage* alpha;  // null: not wanted
 };
 
 // Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.

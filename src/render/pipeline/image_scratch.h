@@ -15,7 +15,8 @@
 #include "raster/interpolate_backward.h"
 #include "raster/project.h"
 #include "raster/screen_mesh.h"
-#include "raster/soft_mask/soft_mask.h"
+#include "raster/soft_mask/setup.h"
+#include "raster/soft_mask/tree.h"
 #include "raster/visibility.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/topologies.h"
@@ -25,13 +26,11 @@ namespace tilegrad {
 // What an ImageScratch was made from, to see whether it still fits: a backward pass mostly follows
 // the forward pass of the same scenes.
 struct PreparedFrom {
-  bool valid = false, drawn_bins = false, soft_tree = false;
+  bool valid = false, drawn_bins = false, alpha = false;
   AlignedVector<float> positions;
   TopologyId topology;
   CameraT<float> camera;
-  int width = 0, height = 0;
-  double delta = 0, max_alpha_error = 0;
-  FaceCulling culling = FaceCulling::kNone;
+  RenderOptions options;
 };
 
 // A scene on the screen, ready for its bins.
@@ -45,8 +44,7 @@ struct ImageScratch {
   raster::DrawnFaces drawn_faces;
   raster::BinListBuffers drawn_buffers;
   raster::BinLists drawn;
-  raster::SoftTree soft;
-  raster::SoftMaskPlan soft_plan;
+  raster::SoftTree soft;                                 // where the rule of alpha asks for it
   AlignedVector<float> d_band_vertices, d_bin_vertices;  // of a large image, as MergeScratch's
   PreparedFrom prepared;
 };
@@ -74,7 +72,6 @@ struct WorkerScratch {
   std::size_t index;  // of the worker
   raster::VisibilityBin bin;
   raster::InterpolateScratch interpolate;
-  raster::SoftMaskScratch soft;
   raster::BandSums band;
   MergeScratch merge;
   RenderStats stats;

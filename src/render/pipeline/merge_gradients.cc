@@ -139,8 +139,11 @@ bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const I
   raster::ProjectBackward(FaceSourceOf(scene, options), image.mesh, {d_vertices, scratch->d_clip_t},
                           &scratch->project,
                           {d_scene->positions, d_scene->camera ? &d_scene->d_camera : nullptr});
-  return finite && AllFinite(d_scene->positions) &&
-         (!d_scene->camera || IsFiniteCamera(d_scene->d_camera));
+  return finite && IsFiniteGeometry(*d_scene);
+}
+
+bool IsFiniteGeometry(const SceneGradients& d_scene) {
+  return AllFinite(d_scene.positions) && (!d_scene.camera || IsFiniteCamera(d_scene.d_camera));
 }
 
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,

@@ -30,6 +30,9 @@ bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const I
                    const ImageGradients& gradients, std::span<const float> d_vertices,
                    WorkerScratch* worker, SceneGradients* d_scene);
 
+// Whether what was written of positions and the camera is finite.
+bool IsFiniteGeometry(const SceneGradients& d_scene);
+
 // Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
 // MergeGeometry, since attributes at the cut depend on geometry.
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,

@@ -189,14 +189,14 @@ void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, co
   const auto part = [&](auto batch) {
     return batch.empty() ? batch : batch.subspan(bin.image * pixels, pixels);
   };
-  const raster::SoftMaskAdjoint adjoint{part(std::span<const float>(input.frame.alpha)),
-                                        part(std::span<const float>(input.frame.transmittance)),
-                                        part(input.d_frame.alpha)};
   out->clear();
   ++worker->stats.alpha_parts;
-  raster::SoftMaskBackward(image.soft, image.soft_plan,
-                           {bin.rect, part(std::span<const std::int32_t>(input.frame.face_ids))},
-                           adjoint, out, &worker->soft);
+  input.alpha->Backward(
+      {image, bin, worker->index},
+      {part(std::span<const std::int32_t>(input.frame.face_ids)),
+       part(std::span<const float>(input.frame.alpha)),
+       part(std::span<const float>(input.frame.transmittance)), part(input.d_frame.alpha)},
+      out);
 }
 
 }  // namespace tilegrad

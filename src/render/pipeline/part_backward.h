@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
@@ -30,6 +31,7 @@ struct BackwardInput {
   const Frame& frame;
   const FrameGradients& d_frame;
   PixelStage* stage;  // null: cotangents of attributes are images themselves
+  AlphaStage* alpha;  // null: alpha has no gradient
 };
 
 // One band of one image of the batch.
@@ -43,7 +45,7 @@ bool RenderBandBackward(const BackwardInput& input, const ImageScratch& image, c
                         const raster::BackwardRequest& request, WorkerScratch* worker,
                         BandGradients* out);
 
-// Gradients of the faces that reach the tiles of a bin, through alpha.
+// Gradients of faces through the alpha of a bin, with a rule.
 void RenderBinBackward(const BackwardInput& input, const ImageScratch& image, const BinTask& bin,
                        WorkerScratch* worker, BinGradients* out);
 

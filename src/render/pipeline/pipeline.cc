@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/stage_clock.h"
-#include "render/alpha/paper_alpha.h"
+#include "render/alpha/rules.h"
 #include "render/pipeline/bin_forward.h"
 #include "render/pipeline/frame_layout.h"
 #include "render/pipeline/merge_gradients.h"
@@ -26,7 +26,7 @@ namespace {
 struct ForwardCall {
   std::span<const SceneView> scenes;
   const RenderOptions& options;
-  PrepareRequest request;
+  PrepareRequest request;  // and the rule of alpha
   Frame* frame;
   PixelStage* stage;
 };
@@ -39,6 +39,8 @@ struct BackwardCall {
   raster::SquareGrid grid;  // of bins
   std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
 
+  // Of bins: what joins the gradients of bands on the screen.
+  std::size_t summed_bins() const { return bins > 0 && input.alpha->needs().own_sums ? 0 : bins; }
   bool wants_geometry(std::size_t n) const {
     return !d_scenes[n].positions.empty() || d_scenes[n].camera;
   }
@@ -63,7 +65,9 @@ Status FindError(const BackwardCall& call) {
 // for all workers, who share the parts of the last ones.
 struct Renderer::Impl {
   explicit Impl(const Workers& w)
-      : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {
+      : workers(&w),
+        alpha_rules(static_cast<std::size_t>(w.count())),
+        worker_scratch(static_cast<std::size_t>(w.count())) {
     for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
   }
 
@@ -81,18 +85,19 @@ struct Renderer::Impl {
   void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
                 SceneGradients* d_scene);
   void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
+  void MergeOwnSums(const BackwardCall& call, std::size_t n);
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
                     BandGradients* out);
   void BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin, WorkerScratch* worker,
                    BinGradients* out);
 
   // Returns whether the indices of all scenes are in range.
-  bool Begin(std::span<const SceneView> scenes) {
+  bool Begin(std::span<const SceneView> scenes, const RenderOptions& options, AlphaStage* rule) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
-    for (WorkerScratch& worker : worker_scratch) {
-      worker.stats = {}, worker.times = {}, worker.soft.work = {};
-    }
+    for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};
+    alpha = rule;
+    if (alpha != nullptr) alpha->Begin(options, count);
     sound = topologies.Update(scenes, *workers);
     return sound;
   }
@@ -102,6 +107,8 @@ struct Renderer::Impl {
 
   const Workers* workers;
   std::atomic<bool> sound = true;  // false: some task met a number that is an error
+  AlphaRules alpha_rules;
+  AlphaStage* alpha = nullptr;  // of the last call; null: no alpha
   Topologies topologies;
   std::vector<ImageScratch> images;
   std::vector<WorkerScratch> worker_scratch;
@@ -113,8 +120,8 @@ struct Renderer::Impl {
 bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& options,
                              const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
   StageClock clock;
-  const bool done = PrepareImage({scene, topologies.of(n)}, options, request, *workers, &images[n],
-                                 &worker->stats);
+  const bool done = PrepareImage({n, scene, topologies.of(n)}, options, request, *workers,
+                                 &images[n], &worker->stats);
   Require(done);
   clock.Lap(&worker->times.prepare);
   return done;
@@ -123,9 +130,9 @@ bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& option
 void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
-  bin_errors[bin.image * bins + bin.bin] =
-      RenderBin({call.scenes[bin.image], call.options, images[bin.image], call.stage}, bin, worker,
-                call.frame);
+  bin_errors[bin.image * bins + bin.bin] = RenderBin(
+      {call.scenes[bin.image], call.options, images[bin.image], call.stage, call.request.alpha},
+      bin, worker, call.frame);
 }
 
 // The list of drawn faces, the largest thing of all, is the worker's, not the image's.
@@ -155,7 +162,8 @@ void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
 Status Renderer::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
-  if (!Begin(call.scenes)) return ValidateSceneNumbers(call.scenes);
+  if (!Begin(call.scenes, call.options, call.request.alpha))
+    return ValidateSceneNumbers(call.scenes);
   bin_errors.assign(count * bins.cells(), 0.0);
   if (bins.cells() == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
@@ -166,9 +174,9 @@ Status Renderer::Impl::Render(const ForwardCall& call) {
         count, [&](std::size_t n, const Workers::Part& part) { RenderImage(call, n, part); });
   }
   if (!sound) return ValidateSceneNumbers(call.scenes);
-  for (const double error : bin_errors) {
-    call.frame->alpha_error_bound = std::max(call.frame->alpha_error_bound, error);
-  }
+  double* const bound = &call.frame->alpha_error_bound;
+  for (const double error : bin_errors) *bound = std::max(*bound, error);
+  if (alpha != nullptr && !alpha->needs().bounded) *bound = std::numeric_limits<double>::infinity();
   return {};
 }
 
@@ -196,7 +204,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
   if (call.bins > 0) BackwardBin(call, n, 0, worker, &worker->bin_gradients);
   const ImageGradients gradients{{&worker->band_gradients, 1},
-                                 {&worker->bin_gradients, call.bins},
+                                 {&worker->bin_gradients, call.summed_bins()},
                                  call.request_of(n, image.mesh)};
   SceneGradients* d_scene = &call.d_scenes[n];
   AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
@@ -204,6 +212,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
   if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
   Require(MergeGeometry(scene, call.input.options, image, gradients, *d_vertices, worker, d_scene));
   Require(MergeAttributes(image, gradients, worker, d_scene));
+  MergeOwnSums(call, n);
   clock.Lap(&worker->times.merge);
 }
 
@@ -248,9 +257,10 @@ void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
   ImageScratch& image = images[n];
   WorkerScratch* const worker = &worker_scratch[part.worker()];
   SceneGradients* const d_scene = &call.d_scenes[n];
-  const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
-                                 std::span(bin_gradients).subspan(n * call.bins, call.bins),
-                                 call.request_of(n, image.mesh)};
+  const ImageGradients gradients{
+      std::span(band_gradients).subspan(n * call.bands, call.bands),
+      std::span(bin_gradients).subspan(n * call.bins, call.summed_bins()),
+      call.request_of(n, image.mesh)};
   SumParts(gradients, n, part, d_scene);
   StageClock clock;
   if (gradients.request.geometry && !gradients.bins.empty()) {
@@ -259,11 +269,19 @@ void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
   }
   Require(MergeGeometry(call.scenes[n], call.input.options, image, gradients, image.d_band_vertices,
                         worker, d_scene));
+  MergeOwnSums(call, n);
   clock.Lap(&worker->times.merge);
 }
 
+// Of a rule that does not hand its sums to MergeGeometry.
+void Renderer::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
+  if (call.bins == call.summed_bins() || !call.wants_geometry(n)) return;
+  alpha->AddToScene(call.scenes[n], n, images[n], &call.d_scenes[n]);
+  Require(IsFiniteGeometry(call.d_scenes[n]));
+}
+
 Status Renderer::Impl::Backward(const BackwardCall& call) {
-  if (!Begin(call.scenes)) return FindError(call);
+  if (!Begin(call.scenes, call.input.options, call.request.alpha)) return FindError(call);
   const std::size_t count = call.scenes.size();
   if (call.grid.cells() == 1 && call.bands == 1) {
     workers->For(count, [&](std::size_t n, std::size_t worker) {
@@ -289,17 +307,10 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  frame->transmittance.resize(options.soft_rule == SoftRule::kAllFaces ? frame->alpha.size() : 0);
-  if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
-    return impl_->Render({scenes, options, {true, request.alpha, false}, frame, stage});
-  }
-  AlignedVector<float> alpha;  // kept away from the tiles
-  alpha.swap(frame->alpha);
-  TILEGRAD_TRY(impl_->Render({scenes, options, {true, false, false}, frame, stage}));
-  alpha.swap(frame->alpha);
-  PaperAlpha(scenes, options, *impl_->workers, frame);
-  frame->alpha_error_bound = std::numeric_limits<double>::infinity();
-  return {};
+  AlphaStage* const alpha = request.alpha ? impl_->alpha_rules.Of(options.soft_rule) : nullptr;
+  const bool transmittance = alpha != nullptr && alpha->needs().transmittance;
+  frame->transmittance.resize(transmittance ? frame->alpha.size() : 0);
+  return impl_->Render({scenes, options, {true, alpha, false}, frame, stage});
 }
 
 Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
@@ -307,21 +318,15 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           std::span<SceneGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
-  const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
-  const bool alpha = !d_frame.alpha.empty() && !paper;
-  const FrameGradients d_parts{d_frame.attributes,
-                               alpha ? d_frame.alpha : std::span<const float>()};
-  const Status status = impl_->Backward({scenes,
-                                         {options, frame, d_parts, stage},
-                                         {false, alpha, true},
-                                         d_scenes,
-                                         grid,
-                                         BandGrid(options.width, options.height).count(),
-                                         alpha ? grid.cells() : 0});
-  if (!status.ok() || !paper) return status;
-  TILEGRAD_TRY(ValidateBackwardNumbers(scenes, frame, d_frame));
-  PaperAlphaBackward(scenes, options, *impl_->workers, frame, d_frame.alpha, d_scenes);
-  return ValidateResult(d_scenes);
+  AlphaStage* const alpha =
+      d_frame.alpha.empty() ? nullptr : impl_->alpha_rules.Of(options.soft_rule);
+  return impl_->Backward({scenes,
+                          {options, frame, d_frame, stage, alpha},
+                          {false, alpha, true},
+                          d_scenes,
+                          grid,
+                          BandGrid(options.width, options.height).count(),
+                          alpha != nullptr ? grid.cells() : 0});
 }
 
 RenderStats Renderer::stats() const {
@@ -330,7 +335,10 @@ RenderStats Renderer::stats() const {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
     sum.interpolated += worker.stats.interpolated, sum.alpha_parts += worker.stats.alpha_parts;
     sum.merged += worker.stats.merged;
-    sum.pairs += worker.soft.work.pairs, sum.powers += worker.soft.work.powers;
+  }
+  if (impl_->alpha != nullptr) {
+    const raster::SoftWork work = impl_->alpha->work();
+    sum.pairs = work.pairs, sum.powers = work.powers;
   }
   return sum;
 }

@@ -3,8 +3,9 @@
 // out (paper, section 3).
 //
 // A batch of N scenes, each with its own mesh and camera, is rendered to N images of one size.
-// Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha of
-// background pixels is equation 6 over all faces, within `max_alpha_error`. The backward pass is
+// Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha is made by a
+// rule (SoftRule; the default is equation 6 over all faces, within `max_alpha_error`, for
+// background pixels). The backward pass is
 // analytic and needs only the Frame: face ids and alpha, and goes faster with its transmittance.
 #pragma once
 
@@ -37,7 +38,7 @@ struct SceneViewT {
   CameraT<T> camera;
 };
 
-// How alpha of background pixels is made.
+// How alpha is made: render/alpha/ has a stage for each.
 enum class SoftRule {
   kAllFaces,  // equation 6 over all faces, within max_alpha_error
   kPaper      // as the paper's implementations: no bound, depends on the order of the faces, slow.
@@ -47,6 +48,8 @@ enum class SoftRule {
 struct PaperSoftRule {
   double box = 0.02;   // NDC, >= 0: a face counts where its box, grown by this, holds the pixel
   int max_faces = 30;  // >= 0: only the first so many count, in the order of the faces
+
+  bool operator==(const PaperSoftRule&) const = default;
 };
 struct RenderOptions {
   int width = 64, height = 64;  // pixels, 1..16384
@@ -59,6 +62,8 @@ struct RenderOptions {
   FaceCulling culling = FaceCulling::kNone;
   SoftRule soft_rule = SoftRule::kAllFaces;
   PaperSoftRule paper;  // with SoftRule::kPaper, which has no use for max_alpha_error
+
+  bool operator==(const RenderOptions&) const = default;
 };
 
 // Which images are wanted. What is not wanted is not computed and takes no memory.
@@ -132,7 +137,7 @@ struct RenderTimes {
   double interpolate = 0;  // attributes of pixels, forward or backward
   double stage = 0;        // a PixelStage
   double gradients = 0;    // from attributes of pixels to faces
-  double alpha = 0;        // the soft mask, forward or backward
+  double alpha = 0;        // the rule of alpha, forward or backward
   double merge = 0;        // from faces to the scene
 };
 

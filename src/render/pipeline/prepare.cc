@@ -43,31 +43,29 @@ bool IsSoundScene(const SceneView& scene, bool same_positions) {
 bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
                 const PrepareRequest& request, const PreparedFrom& from) {
   return from.valid && in.topology.id == from.topology &&
-         (from.drawn_bins || !request.drawn_bins) && (from.soft_tree || !request.soft_tree) &&
-         from.width == options.width && from.height == options.height &&
-         from.delta == options.delta && from.max_alpha_error == options.max_alpha_error &&
-         from.culling == options.culling && SameCamera(in.scene.camera, from.camera);
+         (from.drawn_bins || !request.drawn_bins) && (from.alpha || request.alpha == nullptr) &&
+         from.options == options && SameCamera(in.scene.camera, from.camera);
 }
 
 void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
                       const PrepareRequest& request, PreparedFrom* from) {
   const SceneView& scene = in.scene;
-  from->valid = true, from->drawn_bins = request.drawn_bins, from->soft_tree = request.soft_tree;
+  from->valid = true, from->drawn_bins = request.drawn_bins;
+  from->alpha = request.alpha != nullptr;
   from->positions.assign(scene.positions.begin(), scene.positions.end());
   from->topology = in.topology.id;
   from->camera = scene.camera;
-  from->width = options.width, from->height = options.height;
-  from->delta = options.delta, from->max_alpha_error = options.max_alpha_error;
-  from->culling = options.culling;
+  from->options = options;
 }
 
 void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
                  const PrepareRequest& request, const Workers& workers, ImageScratch* image) {
   raster::FaceSource<float> source = FaceSourceOf(in.scene, options);
   source.corners = &in.topology.corners;
+  const bool soft_tree = request.alpha != nullptr && request.alpha->needs().soft_tree;
   raster::Project(source, options.width, options.height, &image->buffers,
                   {request.drawn_bins ? &image->drawn_faces : nullptr,
-                   request.soft_tree ? &image->soft.corners : nullptr},
+                   soft_tree ? &image->soft.corners : nullptr},
                   &workers);
   image->mesh = image->buffers.View();
   if (request.drawn_bins) {
@@ -75,11 +73,8 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
         raster::BinDrawnFaces(image->drawn_faces, raster::BinGrid(options.width, options.height),
                               &image->drawn_buffers, &workers);
   }
-  if (request.soft_tree) {
-    raster::BuildSoftTree(&image->soft, &workers);
-    image->soft_plan = raster::PlanSoftMask(
-        {options.width, options.height, options.delta, options.max_alpha_error, image->soft.faces});
-  }
+  if (soft_tree) raster::BuildSoftTree(&image->soft, &workers);
+  if (request.alpha != nullptr) request.alpha->Prepare(in.n, *image);
 }
 
 }  // namespace

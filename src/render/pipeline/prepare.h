@@ -4,6 +4,7 @@
 
 #include <cstddef>
 
+#include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
@@ -11,12 +12,13 @@
 namespace tilegrad {
 
 struct PrepareRequest {
-  bool drawn_bins = true;  // visibility will run
-  bool soft_tree = true;   // alpha or its gradient will run
-  bool reuse = false;      // what was prepared last, if it was for the same scene and options
+  bool drawn_bins = true;       // visibility will run
+  AlphaStage* alpha = nullptr;  // alpha or its gradient will run, by this rule
+  bool reuse = false;           // what was prepared last, if it was for the same scene and options
 };
 
 struct SceneToPrepare {
+  std::size_t n;  // of the batch
   const SceneView& scene;
   const Topology& topology;  // of its faces
 };

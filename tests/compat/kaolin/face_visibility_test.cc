@@ -11,7 +11,7 @@
 #include "base/simd_target.h"
 #include "compat/kaolin/face_visibility_ref.h"
 
-namespace tilegrad::raster {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 template <class T>
@@ -138,4 +138,4 @@ TYPED_TEST(FaceVisibilityOf, NoCracksBetweenNeighbours) {
 }
 
 }  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::kaolin

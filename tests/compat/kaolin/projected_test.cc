@@ -14,7 +14,7 @@
 #include "compat/projected_scenes.h"
 #include "support/shared_data.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::kaolin {
 namespace {
 
 using Json = nlohmann::json;
@@ -113,7 +113,7 @@ double Interpolated(const ProjectedFacesOwner<double>& faces, const Case& c,
     const double x = (2.0 * double(pixel % width) + 1 - c.raster.size.width) / c.raster.size.width;
     const double y =
         (c.raster.size.height - 2.0 * double(pixel / width) - 1) / c.raster.size.height;
-    const auto w = raster::ScreenWeights(faces.xy.data() + 6 * face, x, y, c.raster.eps);
+    const auto w = ScreenWeights(faces.xy.data() + 6 * face, x, y, c.raster.eps);
     for (std::size_t i = 0; i < 3 * faces.channels; ++i) {
       sum += weights[p * faces.channels + i % faces.channels] * w[i / faces.channels] *
              faces.features[3 * face * faces.channels + i];
@@ -382,4 +382,4 @@ TEST(Projected, NothingToDraw) {
 }
 
 }  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::kaolin

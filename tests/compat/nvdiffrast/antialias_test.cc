@@ -5,9 +5,9 @@
 
 #include <optional>
 
-#include "deferred_test_util.h"
+#include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -263,4 +263,4 @@ TEST(Antialias, RingsOfOtherFacesAreRefused) {
 }
 
 }  // namespace
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

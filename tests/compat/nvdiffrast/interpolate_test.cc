@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "deferred_test_util.h"
+#include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 template <class T>
@@ -186,4 +186,4 @@ TEST(Interpolate, BadInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

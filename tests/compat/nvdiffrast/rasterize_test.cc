@@ -9,9 +9,9 @@
 
 #include "base/simd_target.h"
 #include "compat/nvdiffrast/barycentrics_ref.h"
-#include "deferred_test_util.h"
+#include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // w = 1: the triangle (-1, -1), (1, -1), (-1, 1) of an image of 4 x 4, its lower left half.
@@ -371,4 +371,4 @@ TEST(RasterizeBackward, EdgeOnFacesPullNothing) {
 }
 
 }  // namespace
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

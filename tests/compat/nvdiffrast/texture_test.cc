@@ -5,11 +5,11 @@
 
 #include <optional>
 
+#include "compat/nvdiffrast/test_util.h"
 #include "compat/nvdiffrast/texture_cube.h"
 #include "compat/nvdiffrast/texture_point.h"
-#include "deferred_test_util.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 namespace {
 
 // A texture with its pyramid, and where it is looked up.
@@ -374,4 +374,4 @@ TEST(Texture, SameBitsForAnyNumberOfWorkers) {
 }
 
 }  // namespace
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

@@ -9,7 +9,7 @@
 
 #include "base/rng.h"
 
-namespace tilegrad::raster {
+namespace tilegrad::compat::pytorch3d {
 namespace {
 
 using Complex = std::complex<double>;
@@ -65,4 +65,4 @@ TEST(LayeredFragment, AdjointIsThatOfAComplexStep) {
 }
 
 }  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::compat::pytorch3d

@@ -12,7 +12,7 @@
 
 #include "base/rng.h"
 
-namespace tilegrad {
+namespace tilegrad::compat::pytorch3d {
 namespace {
 
 template <class T>
@@ -70,7 +70,7 @@ Layers<double> Naive(const std::vector<double>& v, const std::vector<FaceRange>&
         const double area = (c[6] - c[0]) * (c[4] - c[1]) - (c[7] - c[1]) * (c[3] - c[0]);
         if (std::min({c[2], c[5], c[8]}) < 1e-8 || std::abs(area) <= 1e-8) continue;
         if (o.cull_backfaces && area < 0) continue;
-        const auto at = raster::FragmentOf(c, x, y, o.rule);
+        const auto at = FragmentOf(c, x, y, o.rule);
         if (at.z < 0 || (!at.inside && at.dist >= o.blur_radius)) continue;
         found.emplace_back(at.z, f);
       }
@@ -78,8 +78,8 @@ Layers<double> Naive(const std::vector<double>& v, const std::vector<FaceRange>&
       for (std::size_t k = 0; k < static_cast<std::size_t>(o.faces_per_pixel); ++k) {
         const std::int64_t f = k < found.size() ? std::get<1>(found[k]) : -1;
         out.faces.push_back(f);
-        raster::LayeredFragment<double> at{{-1, -1, -1}, -1, -1, false};
-        if (f >= 0) at = raster::FragmentOf(v.data() + 9 * f, x, y, o.rule);
+        LayeredFragment<double> at{{-1, -1, -1}, -1, -1, false};
+        if (f >= 0) at = FragmentOf(v.data() + 9 * f, x, y, o.rule);
         out.z.push_back(at.z), out.dists.push_back(at.dist);
         out.bary.insert(out.bary.end(), at.bary.begin(), at.bary.end());
       }
@@ -170,7 +170,7 @@ TEST(LayeredRaster, GradientIsThatOfDifferences) {
       if (out.faces[i] < 0) continue;
       const int p = static_cast<int>(i / 3 % 273);
       const double x = double(21 - 2 * (p % 21) - 1) / 13, y = double(13 - 2 * (p / 21) - 1) / 13;
-      const auto at = raster::FragmentOf(v.data() + 9 * out.faces[i], x, y, o.rule);
+      const auto at = FragmentOf(v.data() + 9 * out.faces[i], x, y, o.rule);
       sum += d_z[i] * at.z + d_dists[i] * at.dist;
       for (std::size_t k = 0; k < 3; ++k) sum += d_bary[3 * i + k] * at.bary[k];
     }
@@ -213,4 +213,4 @@ TEST(LayeredRaster, Errors) {
 }
 
 }  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::compat::pytorch3d

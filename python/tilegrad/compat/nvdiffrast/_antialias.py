@@ -33,7 +33,7 @@ class _Antialias(torch.autograd.Function):
     def forward(ctx, color, rast, pos, call):
         ctx.save_for_backward(color, rast, pos)
         ctx.call = call
-        return torch.from_numpy(_core.deferred_antialias(
+        return torch.from_numpy(_core.nvdiffrast_antialias(
             _tensors.to_numpy(color), _tensors.to_numpy(rast), _tensors.to_numpy(pos), call.tri,
             call.rings, _tensors.threads()))
 
@@ -42,7 +42,7 @@ class _Antialias(torch.autograd.Function):
     def backward(ctx, d_out):
         color, rast, pos = ctx.saved_tensors
         wanted = [ctx.needs_input_grad[0], ctx.needs_input_grad[2]]
-        d_color, d_pos = map(_inputs.optional_tensor, _core.deferred_antialias_backward(
+        d_color, d_pos = map(_inputs.optional_tensor, _core.nvdiffrast_antialias_backward(
             _tensors.to_numpy(color), _tensors.to_numpy(rast), _tensors.to_numpy(pos),
             ctx.call.tri, ctx.call.rings, _tensors.to_numpy(d_out), wanted, _tensors.threads()))
         if d_pos is not None and ctx.call.pos_gradient_boost != 1.0:

@@ -39,7 +39,7 @@ class RasterizeCpuContext:
         if device is not None and torch.device(device).type != "cpu":
             raise ValueError(f"{type(self).__name__}: device is {device!r}, but tilegrad renders "
                              f"on the CPU: device='cpu', or none")
-        self.rasterizer = _core.DeferredRasterizer()
+        self.rasterizer = _core.NvdiffrastRasterizer()
 
 
 class _RenamedContext(RasterizeCpuContext):

@@ -28,7 +28,7 @@ class _Call(NamedTuple):
 class _Interpolate(torch.autograd.Function):
     @staticmethod
     def forward(ctx, attr, rast, rast_db, call):
-        out, out_da = map(torch.from_numpy, _core.deferred_interpolate(
+        out, out_da = map(torch.from_numpy, _core.nvdiffrast_interpolate(
             _tensors.to_numpy(attr), call.record(rast, rast_db)))
         ctx.save_for_backward(attr, rast, rast_db)
         ctx.call = call
@@ -38,7 +38,7 @@ class _Interpolate(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, d_out, d_out_da):
         attr, rast, rast_db = ctx.saved_tensors
-        gradients = _core.deferred_interpolate_backward(
+        gradients = _core.nvdiffrast_interpolate_backward(
             _tensors.to_numpy(attr), ctx.call.record(rast, rast_db), _tensors.to_numpy(d_out),
             _tensors.to_numpy(d_out_da), list(ctx.needs_input_grad[:3]))
         return (*map(_inputs.optional_tensor, gradients), None)

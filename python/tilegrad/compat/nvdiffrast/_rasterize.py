@@ -47,7 +47,7 @@ class _Rasterize(torch.autograd.Function):
             d_rast_db = None
         if d_rast is None and d_rast_db is None:
             return None, None, None
-        d_pos = _core.deferred_rasterize_backward(
+        d_pos = _core.nvdiffrast_rasterize_backward(
             _tensors.to_numpy(pos), ctx.call.tri, _tensors.to_numpy(rast),
             _inputs.optional_numpy(d_rast), _inputs.optional_numpy(d_rast_db), _tensors.threads())
         return torch.from_numpy(d_pos), None, None

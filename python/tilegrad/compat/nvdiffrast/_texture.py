@@ -45,7 +45,7 @@ class _Texture(torch.autograd.Function):
     def forward(ctx, call, uv, uv_da, bias, *levels):
         ctx.save_for_backward(uv, uv_da, bias, *levels)
         ctx.call = call
-        return torch.from_numpy(_core.deferred_texture(
+        return torch.from_numpy(_core.nvdiffrast_texture(
             [_tensors.to_numpy(level) for level in levels], call.record(uv, uv_da, bias)))
 
     @staticmethod
@@ -53,13 +53,13 @@ class _Texture(torch.autograd.Function):
     def backward(ctx, d_out):
         uv, uv_da, bias, *levels = ctx.saved_tensors
         wants_levels = any(ctx.needs_input_grad[4:])
-        d_levels, *d_others = _core.deferred_texture_backward(
+        d_levels, *d_others = _core.nvdiffrast_texture_backward(
             [_tensors.to_numpy(level) for level in levels], ctx.call.record(uv, uv_da, bias),
             _tensors.to_numpy(d_out), [wants_levels, *ctx.needs_input_grad[1:4]])
         if not wants_levels:
             d_levels = [None] * len(levels)
         elif ctx.call.own_levels:
-            base = _core.deferred_mip_backward(d_levels, _tensors.threads())
+            base = _core.nvdiffrast_mip_backward(d_levels, _tensors.threads())
             d_levels = [base] + [None] * (len(levels) - 1)
         return (None, *map(_inputs.optional_tensor, d_others),
                 *map(_inputs.optional_tensor, d_levels))
@@ -110,7 +110,7 @@ def texture_construct_mip(tex: torch.Tensor, max_mip_level: Optional[int] = None
     """
     _check_texture("texture_construct_mip", tex, bool(cube_mode), None, None)
     most = _most("texture_construct_mip", max_mip_level)
-    levels = _core.deferred_mip(_tensors.to_numpy(tex), most, _tensors.threads())
+    levels = _core.nvdiffrast_mip(_tensors.to_numpy(tex), most, _tensors.threads())
     return TextureMip([torch.from_numpy(level) for level in levels], tex.shape)
 
 

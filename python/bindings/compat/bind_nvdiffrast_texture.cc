@@ -11,30 +11,32 @@
 
 namespace tilegrad::python {
 
-void BindTexture(py::module_& m);
+void BindNvdiffrastTexture(py::module_& m);
 
 namespace {
+
+namespace nvdiffrast = compat::nvdiffrast;
 
 using OptionalArray = std::optional<py::array>;
 using Levels = std::vector<py::array>;
 
 // [N,H,W,C], of a cube map [N,6,S,S,C]: lengths from the end.
-deferred::MipSize SizeOf(const py::array& level) {
+nvdiffrast::MipSize SizeOf(const py::array& level) {
   if (level.ndim() < 4) throw py::value_error("texture: a level must have 4 or 5 axes");
   return {static_cast<int>(level.shape(level.ndim() - 3)),
           static_cast<int>(level.shape(level.ndim() - 2))};
 }
 py::ssize_t ChannelsOf(const py::array& level) { return level.shape(level.ndim() - 1); }
 
-std::vector<py::ssize_t> LevelShape(const py::array& base, const deferred::MipSize& size) {
+std::vector<py::ssize_t> LevelShape(const py::array& base, const nvdiffrast::MipSize& size) {
   std::vector<py::ssize_t> shape(base.shape(), base.shape() + base.ndim());
   shape[shape.size() - 3] = size.height, shape[shape.size() - 2] = size.width;
   return shape;
 }
 
 template <class T>
-deferred::TextureLevel<T> LevelOf(const py::array& level, const char* function) {
-  const deferred::MipSize size = SizeOf(level);
+nvdiffrast::TextureLevel<T> LevelOf(const py::array& level, const char* function) {
+  const nvdiffrast::MipSize size = SizeOf(level);
   const py::ssize_t channels = ChannelsOf(level);
   return {level.ndim() == 4
               ? SpanOf<T>(level, function, "tex", {kAny, size.height, size.width, channels})
@@ -52,8 +54,8 @@ struct TextureCall {
 // A call as the engine takes it.
 template <class T>
 struct TextureArguments {
-  std::vector<deferred::TextureLevel<T>> levels;
-  deferred::TextureInput<T> input;
+  std::vector<nvdiffrast::TextureLevel<T>> levels;
+  nvdiffrast::TextureInput<T> input;
 
   TextureArguments(const Levels& from, const TextureCall& call, const char* function) {
     if (from.empty()) throw py::value_error("texture: no levels");
@@ -61,8 +63,8 @@ struct TextureArguments {
     input.levels = levels;
     input.textures = static_cast<std::size_t>(from[0].shape(0));
     input.channels = static_cast<std::size_t>(ChannelsOf(from[0]));
-    input.filter = static_cast<deferred::TextureFilter>(call.filter);
-    input.boundary = static_cast<deferred::TextureBoundary>(call.boundary);
+    input.filter = static_cast<nvdiffrast::TextureFilter>(call.filter);
+    input.boundary = static_cast<nvdiffrast::TextureBoundary>(call.boundary);
     SetCoordinates(call, function);
     CheckLevels(from);
   }
@@ -81,11 +83,11 @@ struct TextureArguments {
   }
   // Each level follows from the one before, and textures fit the images.
   void CheckLevels(const Levels& from) const {
-    const bool cube = input.boundary == deferred::TextureBoundary::kCube;
+    const bool cube = input.boundary == nvdiffrast::TextureBoundary::kCube;
     bool fits = from[0].ndim() == (cube ? 5 : 4) && from[0].size() > 0 &&
                 (input.textures == 1 || input.textures == input.grid.images);
     for (std::size_t l = 1; fits && l < from.size(); ++l) {
-      const deferred::MipSize fine = levels[l - 1].size, size = levels[l].size;
+      const nvdiffrast::MipSize fine = levels[l - 1].size, size = levels[l].size;
       fits = size.height == std::max(1, fine.height / 2) &&
              size.width == std::max(1, fine.width / 2) && from[l].ndim() == from[0].ndim() &&
              from[l].shape(0) == from[0].shape(0) && ChannelsOf(from[l]) == ChannelsOf(from[0]);
@@ -103,7 +105,7 @@ py::array Sample(const Levels& levels, const TextureCall& call) {
   const auto to = NumbersOf(out);
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
-    deferred::SampleTexture<T>(arguments.input, workers, to);
+    nvdiffrast::SampleTexture<T>(arguments.input, workers, to);
     return Status();
   });
   return out;
@@ -129,11 +131,11 @@ py::tuple SampleBackward(const Levels& levels, const TextureCall& call, const py
   };
   auto d_uv = new_if(wanted.at(1), call.uv), d_uv_da = new_if(wanted.at(2), call.uv_da);
   auto d_bias = new_if(wanted.at(3), call.mip_level_bias);
-  const deferred::TextureGradients<T> to{spans, NumbersOf(d_uv), NumbersOf(d_uv_da),
-                                         NumbersOf(d_bias)};
+  const nvdiffrast::TextureGradients<T> to{spans, NumbersOf(d_uv), NumbersOf(d_uv_da),
+                                           NumbersOf(d_bias)};
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
-    deferred::SampleTextureBackward<T>(arguments.input, d_out, workers, to);
+    nvdiffrast::SampleTextureBackward<T>(arguments.input, d_out, workers, to);
     return Status();
   });
   return py::make_tuple(d_levels, d_uv, d_uv_da, d_bias);
@@ -143,7 +145,7 @@ py::tuple SampleBackward(const Levels& levels, const TextureCall& call, const py
 template <class T>
 Levels ConstructMip(const py::array& tex, int most, int threads) {
   constexpr char kName[] = "texture_construct_mip";
-  const auto sizes = ValueOrThrow(deferred::MipSizes(SizeOf(tex), most));
+  const auto sizes = ValueOrThrow(nvdiffrast::MipSizes(SizeOf(tex), most));
   const auto channels = static_cast<std::size_t>(ChannelsOf(tex));
   const Workers& workers = SharedWorkers(threads);
   Levels out;
@@ -152,7 +154,7 @@ Levels ConstructMip(const py::array& tex, int most, int threads) {
     py::array_t<T> coarse(LevelShape(tex, sizes[l]));
     const auto to = NumbersOf(coarse);
     Run(kName, [&] {
-      deferred::HalveTexture<T>(fine, channels, workers, to);
+      nvdiffrast::HalveTexture<T>(fine, channels, workers, to);
       return Status();
     });
     out.push_back(std::move(coarse));
@@ -169,10 +171,10 @@ py::array MipBackward(Levels d_levels, int threads) {
   for (std::size_t l = d_levels.size() - 1; l > 0; --l) {
     const auto coarse = LevelOf<T>(d_levels[l], kName);
     py::array_t<T> fine = py::cast<py::array_t<T>>(d_levels[l - 1]);
-    const deferred::MipSize size = SizeOf(fine);
+    const nvdiffrast::MipSize size = SizeOf(fine);
     const auto to = NumbersOf(fine);
     Run(kName, [&] {
-      deferred::HalveTextureBackward<T>(coarse, size, channels, workers, to);
+      nvdiffrast::HalveTextureBackward<T>(coarse, size, channels, workers, to);
       return Status();
     });
   }
@@ -198,7 +200,7 @@ void BindCall(py::module_& m) {
 
 void BindLookup(py::module_& m) {
   m.def(
-      "deferred_texture",
+      "nvdiffrast_texture",
       [](const Levels& levels, const TextureCall& call) {
         return Dispatch(call.uv, "texture", "uv",
                         [&](auto t) { return Sample<decltype(t)>(levels, call); });
@@ -206,7 +208,7 @@ void BindLookup(py::module_& m) {
       py::arg("levels"), py::arg("call"),
       "[N, H, W, C] of the levels of a texture, each [N or 1, h, w, C] or [N or 1, 6, s, s, C].");
   m.def(
-      "deferred_texture_backward",
+      "nvdiffrast_texture_backward",
       [](const Levels& levels, const TextureCall& call, const py::array& gradient,
          const std::vector<bool>& wanted) {
         return Dispatch(call.uv, "texture's backward pass", "uv", [&](auto t) {
@@ -219,7 +221,7 @@ void BindLookup(py::module_& m) {
 
 void BindMip(py::module_& m) {
   m.def(
-      "deferred_mip",
+      "nvdiffrast_mip",
       [](const py::array& tex, int most, int threads) {
         return Dispatch(tex, "texture_construct_mip", "tex",
                         [&](auto t) { return ConstructMip<decltype(t)>(tex, most, threads); });
@@ -227,7 +229,7 @@ void BindMip(py::module_& m) {
       py::arg("tex"), py::arg("most"), py::arg("threads"),
       "The levels below tex, at most `most` of them, or all if that is negative.");
   m.def(
-      "deferred_mip_backward",
+      "nvdiffrast_mip_backward",
       [](Levels d_levels, int threads) {
         return Dispatch(d_levels.at(0), "texture's backward pass", "the gradient", [&](auto t) {
           return MipBackward<decltype(t)>(std::move(d_levels), threads);
@@ -239,7 +241,7 @@ void BindMip(py::module_& m) {
 
 }  // namespace
 
-void BindTexture(py::module_& m) {
+void BindNvdiffrastTexture(py::module_& m) {
   BindCall(m);
   BindLookup(m);
   BindMip(m);

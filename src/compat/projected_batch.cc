@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compat/projected/projected_batch.h"
+#include "compat/projected_batch.h"
 
 #include <limits>
 
@@ -7,7 +7,7 @@
 #include "render/pipeline/quick_checks.h"
 #include "render/pipeline/validate.h"
 
-namespace tilegrad {
+namespace tilegrad::compat {
 namespace {
 
 Status CheckFaceIds(std::span<const std::int32_t> ids, std::size_t faces) {
@@ -47,4 +47,4 @@ template Status ValidateProjected(const ProjectedBatchT<float>&, const ImageSize
 template Status ValidateProjected(const ProjectedBatchT<double>&, const ImageSize&,
                                   std::span<const std::int32_t>);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat

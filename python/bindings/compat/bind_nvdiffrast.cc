@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tilegrad.compat.nvdiffrast needs of the engine: the geometry's part; bind_texture.cc has the
-// rest.
+// What tilegrad.compat.nvdiffrast needs of the engine: the geometry's part;
+// bind_nvdiffrast_texture.cc has the rest.
 #include <pybind11/stl.h>
 
 #include <memory>
@@ -15,13 +15,15 @@
 
 namespace tilegrad::python {
 
-void BindDeferred(py::module_& m);
-void BindTexture(py::module_& m);
+void BindNvdiffrast(py::module_& m);
+void BindNvdiffrastTexture(py::module_& m);
 
 namespace {
 
-using deferred::PixelGrid;
-using deferred::VertexRows;
+namespace nvdiffrast = compat::nvdiffrast;
+
+using nvdiffrast::PixelGrid;
+using nvdiffrast::VertexRows;
 using OptionalArray = std::optional<py::array>;
 
 std::size_t Length(const py::array& array, int axis) {
@@ -55,7 +57,7 @@ std::span<const T> ImageOf(const OptionalArray& image, const char* function, con
 }
 
 // The engine's rasterizer for any thread: who finds it at work takes one of his own.
-class DeferredRasterizer {
+class NvdiffrastRasterizer {
  public:
   struct Call {
     py::array tri;
@@ -69,7 +71,7 @@ class DeferredRasterizer {
   py::tuple Rasterize(const py::array& pos, const Call& call) {
     constexpr char kName[] = "rasterize";
     const py::ssize_t n = call.ranges ? call.ranges->shape(0) : pos.shape(0);
-    deferred::RasterizeInput<T> input{
+    nvdiffrast::RasterizeInput<T> input{
         RowsOf<T>(pos, kName, "pos", n),
         FacesOf(call.tri, kName),
         OptionalSpanOf<std::int32_t>(call.ranges, kName, "ranges", {n, 2}),
@@ -79,7 +81,7 @@ class DeferredRasterizer {
     }
     auto rast = NewArray<T>({n, call.height, call.width, 4});
     auto rast_db = NewArray<T>({n, call.height, call.width, 4});
-    deferred::RasterizeOutput<T> out{NumbersOf(rast), NumbersOf(rast_db), {}};
+    nvdiffrast::RasterizeOutput<T> out{NumbersOf(rast), NumbersOf(rast_db), {}};
     if (call.peeled) {
       out.peeled =
           MutableSpanOf<float>(*call.peeled, kName, "peeled", {n, call.height, call.width});
@@ -87,7 +89,7 @@ class DeferredRasterizer {
     const Workers& workers = SharedWorkers(call.threads);
     Run(kName, [&] {
       const std::unique_lock lock(mutex_, std::try_to_lock);
-      deferred::Rasterizer own;
+      nvdiffrast::Rasterizer own;
       return (lock.owns_lock() ? rasterizer_ : own).Run(input, workers, out);
     });
     return py::make_tuple(rast, rast_db);
@@ -95,7 +97,7 @@ class DeferredRasterizer {
 
  private:
   std::mutex mutex_;
-  deferred::Rasterizer rasterizer_;
+  nvdiffrast::Rasterizer rasterizer_;
 };
 
 struct RasterizeBackwardCall {
@@ -107,18 +109,18 @@ struct RasterizeBackwardCall {
 template <class T>
 py::array RasterizeBackward(const py::array& pos, const RasterizeBackwardCall& call) {
   constexpr char kName[] = "rasterize's backward pass";
-  deferred::RasterizeInput<T> input{RowsOf<T>(pos, kName, "pos", call.rast.shape(0)),
-                                    FacesOf(call.tri, kName),
-                                    {},
-                                    GridOf(call.rast)};
-  const deferred::RasterizeCotangents<T> cotangents{
+  nvdiffrast::RasterizeInput<T> input{RowsOf<T>(pos, kName, "pos", call.rast.shape(0)),
+                                      FacesOf(call.tri, kName),
+                                      {},
+                                      GridOf(call.rast)};
+  const nvdiffrast::RasterizeCotangents<T> cotangents{
       SpanOf<T>(call.rast, kName, "rast", {kAny, kAny, kAny, 4}),
       ImageOf<T>(call.d_rast, kName, "the gradient of rast", call.rast, 4),
       ImageOf<T>(call.d_rast_db, kName, "the gradient of rast_db", call.rast, 4)};
   auto d_pos = NewArrayLike<T>(pos);
   const auto to = NumbersOf(d_pos);
   const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return deferred::RasterizeBackward<T>(input, cotangents, workers, to); });
+  Run(kName, [&] { return nvdiffrast::RasterizeBackward<T>(input, cotangents, workers, to); });
   return d_pos;
 }
 
@@ -130,8 +132,9 @@ struct InterpolateCall {
 };
 
 template <class T>
-deferred::InterpolateInput<T> InterpolateInputOf(const py::array& attr, const InterpolateCall& call,
-                                                 const char* function) {
+nvdiffrast::InterpolateInput<T> InterpolateInputOf(const py::array& attr,
+                                                   const InterpolateCall& call,
+                                                   const char* function) {
   const auto rast = SpanOf<T>(call.rast, function, "rast", {kAny, kAny, kAny, 4});
   return {RowsOf<T>(attr, function, "attr", call.rast.shape(0)),
           FacesOf(call.tri, function),
@@ -150,9 +153,9 @@ py::tuple Interpolate(const py::array& attr, const InterpolateCall& call) {
   auto out = NewArray<T>({like.shape(0), like.shape(1), like.shape(2), channels});
   auto out_da =
       NewArray<T>({like.shape(0), like.shape(1), like.shape(2), 2 * call.diff_attrs.shape(0)});
-  const deferred::InterpolateOutput<T> to{NumbersOf(out), NumbersOf(out_da)};
+  const nvdiffrast::InterpolateOutput<T> to{NumbersOf(out), NumbersOf(out_da)};
   const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return deferred::Interpolate<T>(input, workers, to); });
+  Run(kName, [&] { return nvdiffrast::Interpolate<T>(input, workers, to); });
   return py::make_tuple(out, out_da);
 }
 
@@ -171,28 +174,28 @@ py::tuple InterpolateBackward(const py::array& attr, const InterpolateCall& call
   constexpr char kName[] = "interpolate's backward pass";
   const auto input = InterpolateInputOf<T>(attr, call, kName);
   const auto channels = static_cast<py::ssize_t>(input.attributes.channels);
-  const deferred::InterpolateCotangents<T> cotangents{
+  const nvdiffrast::InterpolateCotangents<T> cotangents{
       ImageOf<T>(d_out, kName, "the gradient", call.rast, channels),
       ImageOf<T>(d_out_da, kName, "the gradient of out_da", call.rast,
                  2 * call.diff_attrs.shape(0))};
   auto d_attr = NewIf<T>(wanted.at(0), attr), d_rast = NewIf<T>(wanted.at(1), call.rast);
   auto d_rast_db = NewIf<T>(wanted.at(2), call.rast);
-  const deferred::InterpolateGradients<T> to{NumbersOf(d_attr), NumbersOf(d_rast),
-                                             NumbersOf(d_rast_db)};
+  const nvdiffrast::InterpolateGradients<T> to{NumbersOf(d_attr), NumbersOf(d_rast),
+                                               NumbersOf(d_rast_db)};
   const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return deferred::InterpolateBackward<T>(input, cotangents, workers, to); });
+  Run(kName, [&] { return nvdiffrast::InterpolateBackward<T>(input, cotangents, workers, to); });
   return py::make_tuple(d_attr, d_rast, d_rast_db);
 }
 
 struct AntialiasCall {
   py::array rast, pos, tri;
-  const deferred::EdgeRings& rings;
+  const nvdiffrast::EdgeRings& rings;
   int threads;
 };
 
 template <class T>
-deferred::AntialiasInput<T> AntialiasInputOf(const py::array& color, const AntialiasCall& call,
-                                             const char* function) {
+nvdiffrast::AntialiasInput<T> AntialiasInputOf(const py::array& color, const AntialiasCall& call,
+                                               const char* function) {
   const auto colors = SpanOf<T>(color, function, "color", {kAny, kAny, kAny, kAny});
   const auto positions = RowsOf<T>(call.pos, function, "pos", color.shape(0));
   if (positions.channels != 4) throw py::value_error("antialias: pos must be [N, V, 4] or [V, 4]");
@@ -212,7 +215,7 @@ py::array Antialias(const py::array& color, const AntialiasCall& call) {
   auto out = NewArrayLike<T>(color);
   const auto to = NumbersOf(out);
   const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return deferred::Antialias<T>(input, workers, to); });
+  Run(kName, [&] { return nvdiffrast::Antialias<T>(input, workers, to); });
   return out;
 }
 
@@ -223,24 +226,24 @@ py::tuple AntialiasBackward(const py::array& color, const AntialiasCall& call,
   const auto input = AntialiasInputOf<T>(color, call, kName);
   const auto d_out = ImageOf<T>(gradient, kName, "the gradient", color, color.shape(3));
   auto d_color = NewIf<T>(wanted.at(0), color), d_pos = NewIf<T>(wanted.at(1), call.pos);
-  const deferred::AntialiasGradients<T> to{NumbersOf(d_color), NumbersOf(d_pos)};
+  const nvdiffrast::AntialiasGradients<T> to{NumbersOf(d_color), NumbersOf(d_pos)};
   const Workers& workers = SharedWorkers(call.threads);
-  Run(kName, [&] { return deferred::AntialiasBackward<T>(input, d_out, workers, to); });
+  Run(kName, [&] { return nvdiffrast::AntialiasBackward<T>(input, d_out, workers, to); });
   return py::make_tuple(d_color, d_pos);
 }
 
 void BindRasterize(py::module_& m) {
-  py::class_<DeferredRasterizer>(
-      m, "DeferredRasterizer",
+  py::class_<NvdiffrastRasterizer>(
+      m, "NvdiffrastRasterizer",
       "Memory that rasterizing reuses. Several threads may share one: whoever finds it at work\n"
       "takes memory of his own.")
       .def(py::init<>())
       .def(
           "rasterize",
-          [](DeferredRasterizer& self, const py::array& pos, py::array tri, OptionalArray ranges,
+          [](NvdiffrastRasterizer& self, const py::array& pos, py::array tri, OptionalArray ranges,
              int height, int width, OptionalArray peeled, int threads) {
-            const DeferredRasterizer::Call call{std::move(tri), std::move(ranges), height,
-                                                width,          std::move(peeled), threads};
+            const NvdiffrastRasterizer::Call call{std::move(tri), std::move(ranges), height,
+                                                  width,          std::move(peeled), threads};
             return Dispatch(pos, "rasterize", "pos",
                             [&](auto t) { return self.Rasterize<decltype(t)>(pos, call); });
           },
@@ -250,7 +253,7 @@ void BindRasterize(py::module_& m) {
           "[N, 2]; tri [F, 3]; peeled [N, height, width] float32: only what lies behind is seen,\n"
           "and it moves there; infinity at first.");
   m.def(
-      "deferred_rasterize_backward",
+      "nvdiffrast_rasterize_backward",
       [](const py::array& pos, py::array tri, py::array rast, OptionalArray d_rast,
          OptionalArray d_rast_db, int threads) {
         const RasterizeBackwardCall call{std::move(tri), std::move(rast), std::move(d_rast),
@@ -275,7 +278,7 @@ void BindInterpolate(py::module_& m) {
            py::kw_only(), py::arg("tri"), py::arg("rast"), py::arg("rast_db"),
            py::arg("diff_attrs"), py::arg("threads"));
   m.def(
-      "deferred_interpolate",
+      "nvdiffrast_interpolate",
       [](const py::array& attr, const InterpolateCall& call) {
         return Dispatch(attr, "interpolate", "attr",
                         [&](auto t) { return Interpolate<decltype(t)>(attr, call); });
@@ -283,7 +286,7 @@ void BindInterpolate(py::module_& m) {
       py::arg("attr"), py::arg("call"),
       "([N, H, W, A], [N, H, W, 2 D]) of attr [N, V, A] or [V, A].");
   m.def(
-      "deferred_interpolate_backward",
+      "nvdiffrast_interpolate_backward",
       [](const py::array& attr, const InterpolateCall& call, const OptionalArray& d_out,
          const OptionalArray& d_out_da, const Wanted& wanted) {
         return Dispatch(attr, "interpolate's backward pass", "attr", [&](auto t) {
@@ -295,17 +298,17 @@ void BindInterpolate(py::module_& m) {
 }
 
 void BindAntialias(py::module_& m) {
-  py::class_<deferred::EdgeRings, std::shared_ptr<deferred::EdgeRings>>(
+  py::class_<nvdiffrast::EdgeRings, std::shared_ptr<nvdiffrast::EdgeRings>>(
       m, "EdgeRings", "Which triangles of tri [F, 3] share an edge.")
       .def(py::init([](const py::array& tri) {
-             return std::make_shared<deferred::EdgeRings>(
-                 deferred::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
+             return std::make_shared<nvdiffrast::EdgeRings>(
+                 nvdiffrast::BuildEdgeRings(FacesOf(tri, "antialias_construct_topology_hash")));
            }),
            py::arg("tri"));
   m.def(
-      "deferred_antialias",
+      "nvdiffrast_antialias",
       [](const py::array& color, py::array rast, py::array pos, py::array tri,
-         const deferred::EdgeRings& rings, int threads) {
+         const nvdiffrast::EdgeRings& rings, int threads) {
         const AntialiasCall call{std::move(rast), std::move(pos), std::move(tri), rings, threads};
         return Dispatch(color, "antialias", "color",
                         [&](auto t) { return Antialias<decltype(t)>(color, call); });
@@ -313,9 +316,9 @@ void BindAntialias(py::module_& m) {
       py::arg("color"), py::arg("rast"), py::arg("pos"), py::arg("tri"), py::arg("rings"),
       py::arg("threads"), "color [N, H, W, C] with smooth silhouettes.");
   m.def(
-      "deferred_antialias_backward",
+      "nvdiffrast_antialias_backward",
       [](const py::array& color, py::array rast, py::array pos, py::array tri,
-         const deferred::EdgeRings& rings, const py::array& gradient, const Wanted& wanted,
+         const nvdiffrast::EdgeRings& rings, const py::array& gradient, const Wanted& wanted,
          int threads) {
         const AntialiasCall call{std::move(rast), std::move(pos), std::move(tri), rings, threads};
         return Dispatch(color, "antialias's backward pass", "color", [&](auto t) {
@@ -329,11 +332,11 @@ void BindAntialias(py::module_& m) {
 
 }  // namespace
 
-void BindDeferred(py::module_& m) {
+void BindNvdiffrast(py::module_& m) {
   BindRasterize(m);
   BindInterpolate(m);
   BindAntialias(m);
-  BindTexture(m);
+  BindNvdiffrastTexture(m);
 }
 
 }  // namespace tilegrad::python

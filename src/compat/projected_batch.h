@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A batch of images whose faces come already projected (compat/projected/projected_faces.h), and
+// A batch of images whose faces come already projected (compat/projected_faces.h), and
 // what their checks have in common. For callers who project for themselves, as DIB-R's other
 // implementations have it; whoever has vertices and cameras uses Renderer, which clips, covers
 // exactly and interpolates with perspective.
@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <span>
 
-#include "compat/projected/projected_faces.h"
+#include "compat/projected_faces.h"
 #include "scene/camera.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad {
+namespace tilegrad::compat {
 
 // N images of F faces each, views over the caller's arrays.
 template <class T>
@@ -23,7 +23,7 @@ struct ProjectedBatchT {
   std::span<const T> z;                 // [N,F,3] camera z, the larger is nearer
   std::span<const std::uint8_t> valid;  // [N,F] 0 covers nothing; empty: all are valid
 
-  raster::ProjectedFacesT<T> image(std::size_t n) const {
+  ProjectedFacesT<T> image(std::size_t n) const {
     return {xy.subspan(6 * n * faces, 6 * faces),
             z.empty() ? z : z.subspan(3 * n * faces, 3 * faces),
             valid.empty() ? valid : valid.subspan(n * faces, faces)};
@@ -40,4 +40,4 @@ template <class T>
 Status ValidateProjected(const ProjectedBatchT<T>& batch, const ImageSize& size,
                          std::span<const std::int32_t> face_ids);
 
-}  // namespace tilegrad
+}  // namespace tilegrad::compat

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes, and gradients by differences, for the tests of the deferred operations.
+// Scenes, and gradients by differences, for the tests of nvdiffrast's operations.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 #include "base/rng.h"
 #include "compat/nvdiffrast/rasterize.h"
 
-namespace tilegrad::deferred {
+namespace tilegrad::compat::nvdiffrast {
 
 template <class T>
 using Numbers = std::vector<T>;
@@ -147,4 +147,4 @@ Scene<T> AsScene(const Scene<double>& from) {
   return out;
 }
 
-}  // namespace tilegrad::deferred
+}  // namespace tilegrad::compat::nvdiffrast

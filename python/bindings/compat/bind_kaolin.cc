@@ -17,6 +17,8 @@ void BindKaolin(py::module_& m);
 
 namespace {
 
+namespace kaolin = compat::kaolin;
+
 using py::ssize_t;
 
 constexpr char kFaces[] = "face_vertices_image";  // the argument that all functions begin with
@@ -43,7 +45,7 @@ template <class T>
 py::tuple Rasterize(const py::array& xy, const RasterCall& call) {
   constexpr char kName[] = "rasterize";
   const Lengths of(xy);
-  ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
+  compat::ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
   batch.xy = SpanOf<T>(xy, kName, "face_vertices_image", {of.images, of.faces, 3, 2});
   batch.z = SpanOf<T>(call.z, kName, "face_vertices_z", {of.images, of.faces, 3});
   if (call.valid) {
@@ -58,8 +60,9 @@ py::tuple Rasterize(const py::array& xy, const RasterCall& call) {
   const auto to_ids = NumbersOf(ids);
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
-    return RasterizeProjected<T>(batch, {{call.width, call.height}, call.eps}, features,
-                                 static_cast<std::size_t>(channels), workers, to_ids, to_image);
+    return kaolin::RasterizeProjected<T>(batch, {{call.width, call.height}, call.eps}, features,
+                                         static_cast<std::size_t>(channels), workers, to_ids,
+                                         to_image);
   });
   return py::make_tuple(image, ids);
 }
@@ -75,12 +78,12 @@ template <class T>
 py::tuple RasterizeBackward(const py::array& xy, const RasterBackwardCall& call) {
   constexpr char kName[] = "rasterize's backward pass";
   const Lengths of(xy);
-  ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
+  compat::ProjectedBatchT<T> batch{of.n(), of.f(), {}, {}, {}};
   batch.xy = SpanOf<T>(xy, kName, "face_vertices_image", {of.images, of.faces, 3, 2});
   const auto features =
       SpanOf<T>(call.features, kName, "face_features", {of.images, of.faces, 3, kAny});
   const ssize_t channels = call.features.shape(3);
-  ProjectedRasterAdjoint<T> adjoint;
+  kaolin::ProjectedRasterAdjoint<T> adjoint;
   adjoint.face_ids = SpanOf<std::int32_t>(call.ids, kName, "face_idx", {of.images, kAny, kAny});
   const ssize_t height = call.ids.shape(1), width = call.ids.shape(2);
   adjoint.d_image =
@@ -90,7 +93,7 @@ py::tuple RasterizeBackward(const py::array& xy, const RasterBackwardCall& call)
   adjoint.d_xy = NumbersOf(d_xy), adjoint.d_features = NumbersOf(d_features);
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
-    return RasterizeProjectedBackward<T>(
+    return kaolin::RasterizeProjectedBackward<T>(
         batch, {{static_cast<int>(width), static_cast<int>(height)}, call.eps}, features,
         static_cast<std::size_t>(channels), workers, adjoint);
   });
@@ -101,13 +104,13 @@ py::tuple RasterizeBackward(const py::array& xy, const RasterBackwardCall& call)
 template <class T>
 struct MaskInput {
   Lengths of;
-  ProjectedBatchT<T> batch;
+  compat::ProjectedBatchT<T> batch;
   std::span<const std::int32_t> ids;
   ssize_t height, width;
-  ProjectedMaskOptions options;
+  kaolin::ProjectedMaskOptions options;
 
   MaskInput(const char* name, const py::array& xy, const py::array& face_ids,
-            const ProjectedMaskOptions& rule)
+            const kaolin::ProjectedMaskOptions& rule)
       : of(xy), batch{of.n(), of.f(), {}, {}, {}}, options(rule) {
     batch.xy = SpanOf<T>(xy, name, "face_vertices_image", {of.images, of.faces, 3, 2});
     ids = SpanOf<std::int32_t>(face_ids, name, "selected_face_idx", {of.images, kAny, kAny});
@@ -117,8 +120,8 @@ struct MaskInput {
 };
 
 template <class T>
-py::tuple SoftMask(const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
-                   int threads) {
+py::tuple SoftMask(const py::array& xy, const py::array& ids,
+                   const kaolin::ProjectedMaskOptions& options, int threads) {
   constexpr char kName[] = "dibr_soft_mask";
   const MaskInput<T> in(kName, xy, ids, options);
   auto mask = NewArray<T>({in.of.images, in.height, in.width});
@@ -126,7 +129,7 @@ py::tuple SoftMask(const py::array& xy, const py::array& ids, const ProjectedMas
   double bound = 0;
   const Workers& workers = SharedWorkers(threads);
   Run(kName, [&]() -> Status {
-    TILEGRAD_ASSIGN(bound, ProjectedSoftMask<T>(in.batch, in.options, in.ids, workers, to));
+    TILEGRAD_ASSIGN(bound, kaolin::ProjectedSoftMask<T>(in.batch, in.options, in.ids, workers, to));
     return {};
   });
   return py::make_tuple(mask, bound);
@@ -134,7 +137,7 @@ py::tuple SoftMask(const py::array& xy, const py::array& ids, const ProjectedMas
 
 struct MaskBackwardCall {
   py::array ids, mask, d_mask;
-  const ProjectedMaskOptions& options;
+  const kaolin::ProjectedMaskOptions& options;
   int threads;
 };
 
@@ -149,15 +152,17 @@ py::array_t<T> SoftMaskBackward(const py::array& xy, const MaskBackwardCall& cal
   const auto to = NumbersOf(d_xy);
   const Workers& workers = SharedWorkers(call.threads);
   Run(kName, [&] {
-    return ProjectedSoftMaskBackward<T>(in.batch, in.options, workers, {in.ids, mask, d_mask, to});
+    return kaolin::ProjectedSoftMaskBackward<T>(in.batch, in.options, workers,
+                                                {in.ids, mask, d_mask, to});
   });
   return d_xy;
 }
 
 void BindMaskOptions(py::module_& m) {
-  py::class_<ProjectedMaskOptions>(m, "ProjectedMaskOptions", "How projected_soft_mask works.")
+  py::class_<kaolin::ProjectedMaskOptions>(m, "ProjectedMaskOptions",
+                                           "How projected_soft_mask works.")
       .def(py::init([](double delta, double max_alpha_error) {
-             ProjectedMaskOptions options;
+             kaolin::ProjectedMaskOptions options;
              options.delta = delta, options.max_alpha_error = max_alpha_error;
              return options;
            }),
@@ -165,7 +170,7 @@ void BindMaskOptions(py::module_& m) {
       .def_static(
           "paper",
           [](double delta, double boxlen, int knum, double edge_eps) {
-            ProjectedMaskOptions options;
+            kaolin::ProjectedMaskOptions options;
             options.delta = delta, options.rule = SoftRule::kPaper;
             options.paper = {boxlen, knum}, options.paper_eps = edge_eps;
             return options;
@@ -211,7 +216,7 @@ void BindRasterize(py::module_& m) {
 void BindSoftMask(py::module_& m) {
   m.def(
       "projected_soft_mask",
-      [](const py::array& xy, const py::array& ids, const ProjectedMaskOptions& options,
+      [](const py::array& xy, const py::array& ids, const kaolin::ProjectedMaskOptions& options,
          int threads) {
         return Dispatch(xy, "dibr_soft_mask", kFaces,
                         [&](auto t) { return SoftMask<decltype(t)>(xy, ids, options, threads); });
@@ -223,7 +228,7 @@ void BindSoftMask(py::module_& m) {
   m.def(
       "projected_soft_mask_backward",
       [](const py::array& xy, py::array ids, py::array mask, py::array d_mask,
-         const ProjectedMaskOptions& options, int threads) {
+         const kaolin::ProjectedMaskOptions& options, int threads) {
         const MaskBackwardCall call{std::move(ids), std::move(mask), std::move(d_mask), options,
                                     threads};
         return Dispatch(xy, "dibr_soft_mask's backward pass", kFaces, [&](auto t) -> py::array {
