@@ -8,7 +8,7 @@
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
 #include "train/data/cutout.h"
-#include "train/models/predictor.h"
+#include "train/predictor.h"
 
 namespace tilegrad::python {
 

@@ -5,9 +5,8 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
-#include "train/eval/evaluate.h"
-#include "train/models/predictor.h"
-#include "train/run/trained_models.h"
+#include "train/predictor.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -21,24 +20,16 @@ struct EvalOptions {
 Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
-  TILEGRAD_ASSIGN(const train::Dataset dataset, train::Dataset::Open(data));
-  if (!options.training_models) TILEGRAD_TRY(train::CheckHeldOut(run, dataset));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
-  TILEGRAD_TRY(predictor.CheckImageSize(dataset));
-  train::EvaluationJob job;
-  job.dataset = &dataset;
-  job.split = options.training_models ? train::Split::kTrain : train::Split::kTest;
-  job.predict = [&](std::span<const std::uint8_t> images) { return predictor.Predict(images); };
-  job.template_mesh = predictor.template_mesh();
-  job.views_per_model = options.views_per_model;
-  job.predictor = predictor.description();
+  const train::TaskEvaluation job{run, data, predictor, options.training_models,
+                                  options.views_per_model};
   ProgressLine line;
-  auto evaluation = train::Evaluate(job, workers, line.Sink(), StopOnSignals());
+  auto evaluation = predictor.task().Evaluate(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!evaluation.ok()) return evaluation.status();
   // Files first: printing may fail. A look at overfitting leaves them their held-out figures.
-  if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation, dataset));
+  if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
   fmt::print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
   if (options.training_models) return {};
   fmt::print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());

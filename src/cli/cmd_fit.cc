@@ -122,7 +122,8 @@ Result<train::FitJob> MakeJob(const Options& options) {
   if (!options.truth.empty()) {
     TILEGRAD_ASSIGN(job.truth, Load(options.truth));
   }
-  job.out = options.out, job.resume = options.resume;
+  job.out = options.out;
+  job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
   return job;
 }
 
@@ -203,28 +204,16 @@ void AddWhat(CLI::App* command, Options* o) {
       ->check(CLI::NonNegativeNumber);
 }
 
-void AddHow(CLI::App* command, FitConfig* c) {
-  const auto number = [&](const char* name, auto* value, const char* help) {
-    return command->add_option(name, *value, help)->capture_default_str();
-  };
-  number("--steps", &c->steps, "gradient steps");
-  number("--views-per-step", &c->views_per_step, "images a step looks at");
-  number("--levels", &c->levels, "resolutions, coarse to fine, each twice the one before");
-  number("--delta-start", &c->delta_start, "softness of outlines at the start, squared NDC");
-  number("--delta", &c->delta, "and at the end; 0: 0.7 pixels");
-  number("--texture-size", &c->texture_size, "texels around a blank texture");
-  number("--template-level", &c->template_level, "of the sphere: 3 has 642 vertices, 4 has 2562");
-  number("--smoothing", &c->smoothing, "of vertex steps (lambda of Large Steps); 0: none");
-  number("--laplacian", &c->regularizers.laplacian, "weight of the movement's Laplacian");
-  number("--flatness", &c->regularizers.flatness, "weight of the angles between faces");
-  number("--edge-length", &c->regularizers.edge_length, "weight of unequal edges");
-  number("--color-weight", &c->loss.color_weight, "of the L1 loss of colours");
-  number("--silhouette-weight", &c->loss.silhouette_weight, "of the IoU loss of masks");
-  number("--perturb-cameras", &c->perturb_cameras,
-         "turn each camera by this many degrees at random, to try out refining them");
-  number("--seed", &c->seed, "of the choice of images")->check(CLI::NonNegativeNumber);
-  number("--checkpoint-every", &c->checkpoint_every, "steps");
-  number("--timelapse", &c->timelapse, "pictures of the run; 0: none");
+// --views-per-step for "views_per_step", and so on.
+void AddNumbers(CLI::App* command, FitConfig* config) {
+  for (const train::ConfigField& field : train::FieldsOf(config)) {
+    std::string name = "--" + field.key;
+    std::replace(name.begin(), name.end(), '_', '-');
+    std::visit(
+        [&](auto* value) { command->add_option(name, *value, field.help)->capture_default_str(); },
+        field.target);
+  }
+  command->get_option("--seed")->check(CLI::NonNegativeNumber);
 }
 
 }  // namespace
@@ -235,7 +224,7 @@ void AddFit(CLI::App& app, Action* action) {
   auto* command = app.add_subcommand(
       "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
   AddWhat(command, options.get());
-  AddHow(command, &options->config);
+  AddNumbers(command, &options->config);
   command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)");
   command->add_flag("--resume", options->resume, "go on with the fit in --out");
   command->add_flag("--doctor", options->doctor,

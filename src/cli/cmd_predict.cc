@@ -11,8 +11,8 @@
 #include "io/image_file.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
-#include "train/models/predictor.h"
 #include "train/pictures.h"
+#include "train/predictor.h"
 
 namespace tilegrad::cli {
 namespace {

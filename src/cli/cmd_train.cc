@@ -19,7 +19,7 @@ struct TrainOptions {
   int workers = 0;
 };
 
-void PrintOutcome(const train::TrainOutcome& outcome, const TrainOptions& options) {
+void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options) {
   if (outcome.first_step == outcome.last_step) {
     fmt::print("{}: the run is complete at step {}; nothing to do\n", options.out,
                outcome.last_step);
@@ -28,7 +28,7 @@ void PrintOutcome(const train::TrainOutcome& outcome, const TrainOptions& option
   fmt::print("{}: {} at step {}, {} of training\n", options.out,
              outcome.finished ? "finished" : "stopped", outcome.last_step,
              FormatDuration(outcome.seconds));
-  if (!outcome.finished) fmt::print("go on with the same command and --resume\n");
+  if (!outcome.finished) fmt::print("continue with the same command and --resume\n");
 }
 
 Status RunTraining(const TrainOptions& options) {
@@ -53,8 +53,7 @@ Status RunTraining(const TrainOptions& options) {
 
 void AddTrain(CLI::App& app, Action* action) {
   auto options = std::make_shared<TrainOptions>();
-  auto* command = app.add_subcommand(
-      "train", "Train a single-image 3D predictor on a dataset, 2D supervision only");
+  auto* command = app.add_subcommand("train", "Train what a configuration names on a dataset");
   command
       ->add_option("--config", options->config,
                    "TOML file, e.g. configs/quick.toml or configs/paper.toml")
@@ -66,7 +65,7 @@ void AddTrain(CLI::App& app, Action* action) {
   command->add_option("--set", options->overrides,
                       "override a key: --set schedule.steps=100 (repeatable)");
   command->add_flag("--resume", options->resume,
-                    "go on with the run in --out (start it if there is none)");
+                    "continue the run in --out (start it if there is none)");
   command
       ->add_option("--max-minutes", options->max_minutes,
                    "save and stop after this many minutes; 0: no limit")

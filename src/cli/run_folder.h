@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/file.h"
-#include "train/models/predictor.h"
+#include "train/predictor.h"
 
 namespace tilegrad::cli {
 

@@ -33,12 +33,37 @@ int LevelsOf(const FitConfig& config, ImageSize size) {
 
 }  // namespace
 
-std::string DescribeConfig(const FitConfig& c) {
+ConfigFields FieldsOf(FitConfig* c) {
+  const auto reporting = Affects::kReporting;
+  return {
+      {"steps", &c->steps, 1, 1e7, "gradient steps"},
+      {"views_per_step", &c->views_per_step, 1, 1e6, "images a step looks at"},
+      {"levels", &c->levels, 1, 8, "resolutions, coarse to fine, each twice the one before"},
+      {"delta_start", &c->delta_start, 1e-9, 1e3, "softness of outlines at the start, squared NDC"},
+      {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.7 pixels"},
+      {"texture_size", &c->texture_size, 2, 8192, "texels around a blank texture"},
+      {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
+      {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
+      {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
+      {"flatness", &c->regularizers.flatness, 0, 1e6, "weight of the angles between faces"},
+      {"edge_length", &c->regularizers.edge_length, 0, 1e6, "weight of unequal edges"},
+      {"color_weight", &c->loss.color_weight, 0, 1e6, "of the L1 loss of colours"},
+      {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "of the IoU loss of masks"},
+      {"perturb_cameras", &c->perturb_cameras, 0, 180,
+       "turn each camera by this many degrees at random, to try out refining them"},
+      {"seed", &c->seed, 0, kNoLimit, "of the choice of images"},
+      {"checkpoint_every", &c->checkpoint_every, 1, 1e9, "steps", reporting},
+      {"timelapse", &c->timelapse, 0, 1e6, "pictures of the run; 0: none", reporting},
+  };
+}
+
+std::string DescribeConfig(const FitConfig& config) {
+  FitConfig c = config;
   std::string names;
   for (const Parameter p : kParameters) {
     if (c.parameters[p]) names += fmt::format("{}{}", names.empty() ? "" : ",", NameOf(p));
   }
-  std::string out;
+  std::string out = ResultSettings(FieldsOf(&c));
   const auto line = [&out](const char* key, const auto& value) {
     out += fmt::format("{} = {}\n", key, value);
   };
@@ -46,27 +71,12 @@ std::string DescribeConfig(const FitConfig& c) {
   line("lighting", static_cast<int>(c.lighting));
   line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
   line("filter", static_cast<int>(c.filter));
-  line("template_level", c.template_level);
   line("vertex_colors", c.vertex_colors);
-  line("texture_size", c.texture_size);
-  line("steps", c.steps);
-  line("views_per_step", c.views_per_step);
-  line("seed", c.seed);
-  line("levels", c.levels);
-  line("delta_start", c.delta_start);
-  line("delta", c.delta);
   line("max_alpha_error", c.max_alpha_error);
   line("rates", fmt::format("{}", fmt::join(c.rates.of, ",")));
   line("final_rate", c.final_rate);
-  line("smoothing", c.smoothing);
-  line("color_weight", c.loss.color_weight);
-  line("silhouette_weight", c.loss.silhouette_weight);
   line("color_region", static_cast<int>(c.loss.region));
   line("silhouette_loss", static_cast<int>(c.loss.silhouette));
-  line("laplacian", c.regularizers.laplacian);
-  line("flatness", c.regularizers.flatness);
-  line("edge_length", c.regularizers.edge_length);
-  line("perturb_cameras", c.perturb_cameras);
   return out;
 }
 
@@ -91,7 +101,7 @@ FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize siz
 std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from) {
   std::vector<int> views(from.begin(), from.end());
   const std::size_t count = std::min(static_cast<std::size_t>(config.views_per_step), views.size());
-  Rng rng(config.seed, static_cast<std::uint64_t>(step));
+  Rng rng(static_cast<std::uint64_t>(config.seed), static_cast<std::uint64_t>(step));
   for (std::size_t i = 0; i < count; ++i) {
     std::swap(views[i], views[i + rng.Below(views.size() - i)]);
   }

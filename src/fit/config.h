@@ -7,6 +7,7 @@
 #include <string>
 
 #include "fit/fitter.h"
+#include "train/run/config_fields.h"
 
 namespace tilegrad::train {
 
@@ -23,7 +24,7 @@ struct FitConfig {
 
   std::int64_t steps = 1000;
   int views_per_step = 4;
-  std::uint64_t seed = 1;
+  std::int64_t seed = 1;
   int levels = 3;             // of resolution, each half of the next; the last is the images' own
   double delta_start = 3e-3;  // of equation 5; falls geometrically to `delta` over 70 % of the run
   double delta = 0;           // 0: 0.7 pixels of the whole image
@@ -39,6 +40,10 @@ struct FitConfig {
   std::int64_t checkpoint_every = 100;
   int timelapse = 24;  // pictures; 0: none
 };
+
+// The numbers that `tilegrad fit` has an option for, each with its range and help: "steps" is
+// --steps. Positions and directions have rules of their own.
+ConfigFields FieldsOf(FitConfig* config);
 
 // One line "key = value" for each that shapes the result; two runs with the same lines and input
 // do the same.

@@ -2,13 +2,11 @@
 #include "fit/run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <utility>
 
 #include "base/error.h"
-#include "base/folder_lock.h"
 #include "fit/pictures.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
@@ -17,14 +15,9 @@
 #include "train/data/dataset.h"
 #include "train/metrics/metrics.h"
 #include "train/pictures.h"
-#include "train/run/checkpoint.h"
-#include "train/run/first_difference.h"
-#include "train/run/log.h"
 
 namespace tilegrad::train {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kLogEvery = 10;
 constexpr std::int64_t kKeptCheckpoints = 2;
@@ -45,172 +38,130 @@ FitStep StepOf(const FitConfig& config, const FitSchedule& schedule, const Targe
   return step;
 }
 
-// One session of a fit.
-class Session {
- public:
-  Session(const FitJob& job, const Workers& workers, Fitter fitter)
-      : job_(job), workers_(workers), context_(workers), fitter_(std::move(fitter)) {}
+RunPlan PlanOf(const FitJob& job) {
+  RunPlan plan{.stage = "fitting",
+               .folder = job.out,
+               .settings = DescribeJob(job),
+               .pictures = "timelapse/",
+               .image_size = job.input.images.width,
+               .existing = job.existing,
+               .warn = job.warn};
+  plan.schedule = {.steps = job.config.steps,
+                   .seed = job.config.seed,
+                   .log_every = kLogEvery,
+                   .checkpoint_every = job.config.checkpoint_every,
+                   .keep_checkpoints = kKeptCheckpoints};
+  return plan;
+}
 
-  Status Open(FitOutcome* outcome);
-  Status Run(const ProgressSink& progress, const StopFlag& stop, FitOutcome* outcome);
-  Status Finish(FitOutcome* outcome);
+// Pictures are spread evenly over the run, the start and the end included.
+bool ShowsAt(const FitConfig& config, std::int64_t step) {
+  const std::int64_t count = config.timelapse - 1, steps = config.steps;
+  if (config.timelapse <= 0) return false;
+  if (step == 0 || step == steps || count <= 0) return step == 0 || step == steps;
+  return step * count / steps != (step - 1) * count / steps;
+}
+
+class FitWork : public RunWork {
+ public:
+  FitWork(const FitJob& job, nn::Context& context, Fitter fitter)
+      : job_(job), context_(context), fitter_(std::move(fitter)) {}
+
+  Result<std::string> ResultSettings(const std::string& settings,
+                                     const std::string& /*place*/) const override {
+    return settings;
+  }
+  Status Begin(std::int64_t /*first_step*/) override { return {}; }
+  Status Step(std::int64_t step, StepValues* values) override;
+  std::vector<nn::NamedTensor> State() override { return fitter_.State(context_); }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t /*steps*/) override {
+    return fitter_.LoadState(state);
+  }
+  bool HasPicture(std::int64_t steps) const override { return ShowsAt(job_.config, steps); }
+  Result<ImageU8> Picture(std::int64_t steps) override;
+
+  const FitScene& scene() const { return fitter_.scene(); }
 
  private:
   const TargetImages& Targets(int factor);
-  Status Save();
-  Status Log(const FitValues& values, const FitSchedule& schedule);
-  bool ShowsAt(std::int64_t step) const;
-  Path PictureOf(std::int64_t step) const;
-  Status Show();
-  Result<ImageU8> Sheet() const;
-  Status Score(FitOutcome* outcome) const;
-  Status ScoreCameras(const FitScene& start, FitOutcome* outcome) const;
-  Status WriteCameras() const;
-  double Seconds() const {
-    return seconds_before_ + std::chrono::duration<double>(Clock::now() - began_).count();
-  }
 
   const FitJob& job_;
-  const Workers& workers_;
-  FolderLock lock_;
-  nn::Context context_;
+  nn::Context& context_;
   Fitter fitter_;
-  std::optional<RunLog> log_;
   std::map<int, TargetImages> targets_;  // by factor
-  std::int64_t step_ = 0;                // done
-  double seconds_before_ = 0;
-  Clock::time_point began_ = Clock::now();
 };
 
-Status Session::Open(FitOutcome* outcome) {
-  TILEGRAD_ASSIGN(lock_, FolderLock::Take(job_.out));
-  RemoveHalfWritten(job_.out);
-  if (!ListCheckpoints(job_.out).empty()) {
-    if (!job_.resume) {
-      return InvalidArgument(
-          "{}: already holds a fit; --resume goes on with it, or choose another --out",
-          job_.out.string());
-    }
-    TILEGRAD_ASSIGN(FoundCheckpoint found, LoadNewestCheckpoint(context_, job_.out));
-    const CheckpointInfo& info = found.checkpoint.info;
-    const std::string difference = FirstDifference(info.config, DescribeJob(job_));
-    if (!difference.empty()) {
-      return InvalidArgument("{}: its fit was started with other settings: {}", job_.out.string(),
-                             difference);
-    }
-    const Status loaded = fitter_.LoadState(found.checkpoint.tensors);
-    if (!loaded.ok()) return loaded.Within(found.file.string());
-    SetAside(found.broken);
-    step_ = info.step, seconds_before_ = info.seconds;
-    for (const auto& warning : found.warnings) {
-      if (job_.warn) job_.warn("passed over: " + warning);
-    }
-  }
-  TILEGRAD_ASSIGN(log_, RunLog::Open(job_.out, step_));
-  outcome->first_step = step_;
-  return {};
-}
-
-const TargetImages& Session::Targets(int factor) {
+const TargetImages& FitWork::Targets(int factor) {
   auto [at, added] = targets_.try_emplace(factor);
   if (added) at->second = Reduce(job_.input.images, factor);
   return at->second;
 }
 
-Status Session::Save() {
-  const CheckpointInfo info{step_, job_.input.images.width, DescribeJob(job_), Seconds()};
-  TILEGRAD_TRY(SaveCheckpoint(job_.out, info, fitter_.State(context_)));
-  PruneCheckpoints(job_.out, kKeptCheckpoints);
+Status FitWork::Step(std::int64_t step, StepValues* values) {
+  const FitConfig& config = job_.config;
+  const FitSchedule schedule = ScheduleAt(config, step, SizeOf(job_.input));
+  const std::vector<int> views = ViewsAt(config, step, job_.input.training);
+  TILEGRAD_ASSIGN(const FitValues v,
+                  fitter_.Step(StepOf(config, schedule, Targets(schedule.factor), views)));
+  const RegularizerTerms& weights = config.regularizers;
+  values->loss = v.total;
+  values->terms = {{"color", config.loss.color_weight, v.image.color},
+                   {"silhouette", config.loss.silhouette_weight, v.image.silhouette},
+                   {"laplacian", weights.laplacian, v.regularizers.laplacian},
+                   {"flatness", weights.flatness, v.regularizers.flatness},
+                   {"edge_length", weights.edge_length, v.regularizers.edge_length}};
+  values->also = {{"delta", schedule.delta}, {"factor", static_cast<double>(schedule.factor)}};
+  values->images = static_cast<std::int64_t>(views.size());
   return {};
 }
 
-Status Session::Log(const FitValues& values, const FitSchedule& schedule) {
-  LogEntry entry{step_, {}};
-  entry.values = {{"loss", values.total},
-                  {"color", values.image.color},
-                  {"silhouette", values.image.silhouette},
-                  {"laplacian", values.regularizers.laplacian},
-                  {"flatness", values.regularizers.flatness},
-                  {"edge_length", values.regularizers.edge_length},
-                  {"delta", schedule.delta},
-                  {"factor", static_cast<double>(schedule.factor)}};
-  return log_->Append(entry);
-}
-
-// Pictures are spread evenly over the run, the start and the end included.
-bool Session::ShowsAt(std::int64_t step) const {
-  const std::int64_t count = job_.config.timelapse - 1, steps = job_.config.steps;
-  if (job_.config.timelapse <= 0) return false;
-  if (step == 0 || step == steps || count <= 0) return step == 0 || step == steps;
-  return step * count / steps != (step - 1) * count / steps;
-}
-
-Path Session::PictureOf(std::int64_t step) const {
-  return job_.out / "timelapse" / fmt::format("{:08}.png", step);
-}
-
-Status Session::Show() {
-  FitRenderer renderer(workers_);
+Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
+  FitRenderer renderer(context_.workers());
   FitRenderer::Job job;
   job.views = std::span(job_.input.training).first(1);
   job.alpha = false;
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return io::SavePng(PictureOf(step_), OverWhite(renderer.frame(), 0));
+  return OverWhite(renderer.frame(), 0);
 }
 
-Status Session::Run(const ProgressSink& progress, const StopFlag& stop, FitOutcome* outcome) {
-  const FitConfig& config = job_.config;
-  if (step_ == 0 && ShowsAt(0)) TILEGRAD_TRY(Show());
-  while (step_ < config.steps) {
-    if (stop) {
-      TILEGRAD_TRY(Save());
-      return Cancelled("stopped and saved at step {} of {}; the same command with --resume goes on",
-                       step_, config.steps);
-    }
-    const FitSchedule schedule = ScheduleAt(config, step_, SizeOf(job_.input));
-    const std::vector<int> views = ViewsAt(config, step_, job_.input.training);
-    auto values = fitter_.Step(StepOf(config, schedule, Targets(schedule.factor), views));
-    if (!values.ok()) return values.status().Within(fmt::format("step {}", step_));
-    ++step_;
-    outcome->last = *values;
-    if (step_ % kLogEvery == 0) TILEGRAD_TRY(Log(*values, schedule));
-    if (ShowsAt(step_)) TILEGRAD_TRY(Show());
-    if (step_ % config.checkpoint_every == 0 || step_ == config.steps) TILEGRAD_TRY(Save());
-    if (progress) {
-      progress({"fitting", static_cast<std::uint64_t>(step_),
-                static_cast<std::uint64_t>(config.steps),
-                fmt::format("loss {:.4f}", values->total)});
-    }
-  }
-  outcome->last_step = step_;
-  outcome->seconds = Seconds();
-  return {};
-}
+// The scene at the end, its scores and what is written of both.
+class FitResult {
+ public:
+  FitResult(const FitJob& job, const FitScene& scene, const Workers& workers)
+      : job_(job), scene_(scene), workers_(workers) {}
+  Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
+
+ private:
+  Result<ImageU8> Sheet(const RunPlan& plan) const;
+  Status Score(FitOutcome* outcome) const;
+  Status ScoreCameras(FitOutcome* outcome) const;
+  Status WriteCameras() const;
+
+  const FitJob& job_;
+  const FitScene& scene_;
+  const Workers& workers_;
+};
 
 // All of this fit in one picture. There may be others in the folder: of a fit that was killed
 // before its first checkpoint, so that another could begin here.
-Result<ImageU8> Session::Sheet() const {
-  std::vector<Path> files;
+Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
+  std::vector<ImageU8> pictures;
   std::error_code error;
   for (std::int64_t step = 0; step <= job_.config.steps; ++step) {
-    if (ShowsAt(step) && std::filesystem::exists(PictureOf(step), error))
-      files.push_back(PictureOf(step));
-  }
-  if (files.empty()) return ImageU8();
-  std::vector<ImageU8> pictures;
-  for (const Path& file : files) {
+    const Path file = PictureFile(plan, step);
+    if (!ShowsAt(job_.config, step) || !std::filesystem::exists(file, error)) continue;
     TILEGRAD_ASSIGN(ImageU8 picture, io::LoadImage(file));
     if (picture.width != job_.input.images.width || picture.channels != 3) continue;
     pictures.push_back(std::move(picture));
   }
-  return TileImages(pictures, kSheetColumns);
+  return pictures.empty() ? ImageU8() : TileImages(pictures, kSheetColumns);
 }
 
-Status Session::WriteCameras() const {
+Status FitResult::WriteCameras() const {
   std::vector<TransformsView> views;
   for (std::size_t i = 0; i < job_.input.names.size(); ++i) {
-    views.push_back({job_.input.names[i], fitter_.scene().cameras[i]});
+    views.push_back({job_.input.names[i], scene_.cameras[i]});
   }
   return WriteTextAtomic(job_.out / "transforms_fitted.json",
                          WriteTransforms(views, SizeOf(job_.input)));
@@ -228,25 +179,25 @@ double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
   return a.empty() ? 0 : sum / static_cast<double>(a.size());
 }
 
-Status Session::ScoreCameras(const FitScene& start, FitOutcome* outcome) const {
+Status FitResult::ScoreCameras(FitOutcome* outcome) const {
   if (job_.config.perturb_cameras == 0) return {};
+  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_));
   const std::vector<int>& views = job_.input.training;
   const std::vector<Camera> truth = Choose(job_.input.cameras, views);
-  outcome->camera_error_before = MeanAngle(Choose(start.cameras, views), truth);
-  std::vector<Camera> fitted = Choose(fitter_.scene().cameras, views);
+  outcome->camera_error_before = MeanAngle(Choose(start.scene.cameras, views), truth);
+  std::vector<Camera> fitted = Choose(scene_.cameras, views);
   const Alignment alignment = AlignCameras(fitted, truth);
   for (Camera& camera : fitted) camera = Moved(camera, alignment);
   outcome->camera_error_after = MeanAngle(fitted, truth);
   return {};
 }
 
-Status Session::Score(FitOutcome* outcome) const {
+Status FitResult::Score(FitOutcome* outcome) const {
   const FitInput& input = job_.input;
-  const std::vector<Camera> fitted = Choose(fitter_.scene().cameras, input.training);
-  TILEGRAD_ASSIGN(outcome->training,
-                  ScoreViews(fitter_.scene(), input, input.training, fitted, workers_));
+  const std::vector<Camera> fitted = Choose(scene_.cameras, input.training);
+  TILEGRAD_ASSIGN(outcome->training, ScoreViews(scene_, input, input.training, fitted, workers_));
   // Cameras that moved fix the scene only up to a similarity; held-out ones did not move.
-  FitScene scene = fitter_.scene();
+  FitScene scene = scene_;
   if (job_.config.parameters[Parameter::kCamera]) {
     Move(AlignCameras(fitted, Choose(input.cameras, input.training)), &scene.positions);
   }
@@ -262,13 +213,12 @@ Status Session::Score(FitOutcome* outcome) const {
   return {};
 }
 
-Status Session::Finish(FitOutcome* outcome) {
-  TILEGRAD_TRY(io::SaveGlb(job_.out / "mesh.glb", MeshOfScene(fitter_.scene())));
+Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
+  TILEGRAD_TRY(io::SaveGlb(job_.out / "mesh.glb", MeshOfScene(scene_)));
   TILEGRAD_TRY(WriteCameras());
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_));
-  TILEGRAD_TRY(ScoreCameras(start.scene, outcome));
+  TILEGRAD_TRY(ScoreCameras(outcome));
   TILEGRAD_TRY(Score(outcome));
-  TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet());
+  TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet(plan));
   if (!sheet.empty()) TILEGRAD_TRY(io::SavePng(job_.out / "timelapse.png", sheet));
   TILEGRAD_ASSIGN(const std::string page, FitReport(job_, *outcome, sheet));
   return WriteTextAtomic(job_.out / "report.html", page);
@@ -302,10 +252,12 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseFit(job, workers));
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
-  Session session(job, workers, std::move(fitter));
-  TILEGRAD_TRY(session.Open(&outcome));
-  TILEGRAD_TRY(session.Run(progress, stop, &outcome));
-  TILEGRAD_TRY(session.Finish(&outcome));
+  nn::Context context(workers);
+  FitWork work(job, context, std::move(fitter));
+  const RunPlan plan = PlanOf(job);
+  TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
+                  ExecuteRun(plan, &work, context, progress, stop));
+  TILEGRAD_TRY(FitResult(job, work.scene(), workers).Finish(plan, &outcome));
   return outcome;
 }
 

@@ -19,6 +19,7 @@
 #include "fit/doctor.h"
 #include "fit/input.h"
 #include "fit/score.h"
+#include "train/run/run.h"
 
 namespace tilegrad::train {
 
@@ -28,23 +29,19 @@ struct FitJob {
   std::optional<Mesh> start;  // none: a sphere about as large as the object
   std::optional<Mesh> truth;  // to compare with
   Path out;
-  bool resume = false;         // goes on from the newest whole checkpoint; starts if there is none
+  ExistingRun existing = ExistingRun::kRefuse;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };
 
-struct FitOutcome {
-  std::int64_t first_step = 0, last_step = 0;
-  double seconds = 0;             // of all sessions, with checkpoints and timelapse
-  FitValues last;                 // of the last step taken
+struct FitOutcome : RunOutcome {
   std::vector<Finding> findings;  // of the doctor, at the start
   std::vector<ViewScore> training, held_out;
   std::optional<double> voxel_iou;  // at 32 voxels a side, where a truth is known
   std::optional<double> camera_error_before, camera_error_after;  // degrees, means; if perturbed
 };
 
-// Saves before it returns, also when asked to stop (then kCancelled, with how to go on). A resumed
-// fit ends in the bits of one that was not interrupted, for any number of workers. Errors say what
-// in the configuration or the input does not fit.
+// As ExecuteRun: a continued fit ends in the bits of one that was not interrupted, for any number
+// of workers. Errors say what in the configuration or the input does not fit.
 Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop);
 

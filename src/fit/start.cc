@@ -19,28 +19,9 @@ namespace {
 constexpr float kGrey = 0.5f;                 // what is to be coloured
 constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
 
-Status CheckRange(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return {};
-  return InvalidArgument("{} is {}, must be in [{}, {}]", name, value, low, high);
-}
-
-Status CheckConfig(const FitConfig& c) {
-  TILEGRAD_TRY(CheckRange("steps", static_cast<double>(c.steps), 1, 1e7));
-  TILEGRAD_TRY(CheckRange("views_per_step", c.views_per_step, 1, 1e6));
-  TILEGRAD_TRY(CheckRange("levels", c.levels, 1, 8));
-  TILEGRAD_TRY(CheckRange("template_level", c.template_level, 0, 7));
-  TILEGRAD_TRY(CheckRange("texture_size", c.texture_size, 2, 8192));
-  TILEGRAD_TRY(CheckRange("delta_start", c.delta_start, 1e-9, 1e3));
-  TILEGRAD_TRY(CheckRange("delta", c.delta, 0, 1e3));
-  TILEGRAD_TRY(CheckRange("smoothing", c.smoothing, 0, 1e4));
-  TILEGRAD_TRY(CheckRange("color_weight", c.loss.color_weight, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("silhouette_weight", c.loss.silhouette_weight, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("laplacian", c.regularizers.laplacian, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("flatness", c.regularizers.flatness, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("edge_length", c.regularizers.edge_length, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("perturb_cameras", c.perturb_cameras, 0, 180));
-  TILEGRAD_TRY(CheckRange("timelapse", c.timelapse, 0, 1e6));
-  TILEGRAD_TRY(CheckRange("checkpoint_every", static_cast<double>(c.checkpoint_every), 1, 1e9));
+Status CheckConfig(const FitConfig& config) {
+  FitConfig c = config;
+  TILEGRAD_TRY(CheckFields(FieldsOf(&c)));
   if (c.loss.color_weight + c.loss.silhouette_weight == 0) {
     return InvalidArgument("both weights, of colour and silhouette, are 0: nothing is left to fit");
   }
@@ -134,7 +115,7 @@ void SetCameras(const FitJob& job, FitScene* scene) {
   scene->cameras = job.input.cameras;
   if (job.config.perturb_cameras == 0) return;
   constexpr std::uint64_t kStream = 0x6361'6d65'7261;  // apart from those of the steps
-  Rng rng(job.config.seed, kStream);
+  Rng rng(static_cast<std::uint64_t>(job.config.seed), kStream);
   const Bounds box = BoundsOf(*scene);
   const glm::dvec3 middle = 0.5 * (glm::dvec3(box.low) + glm::dvec3(box.high));
   for (const int i : job.input.training) {

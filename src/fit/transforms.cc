@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "train/data/json_fields.h"
+#include "train/json_fields.h"
 
 namespace tilegrad::train {
 namespace {

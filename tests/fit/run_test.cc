@@ -81,7 +81,7 @@ TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   EXPECT_NE(stopped.status().message().find("--resume"), std::string::npos);
   stop_ = false;
   EXPECT_EQ(Run(job).status().code(), StatusCode::kInvalidArgument);  // refuses without resume
-  job.resume = true;
+  job.existing = ExistingRun::kContinue;
   const auto resumed = Run(job, 7);
   ASSERT_TRUE(resumed.ok()) << resumed.status().message();
   EXPECT_EQ(resumed->first_step, 27);
@@ -101,7 +101,7 @@ TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
   std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);
   std::vector<std::string> warnings;
   job.warn = [&](const std::string& warning) { warnings.push_back(warning); };
-  job.resume = true, stop_ = false;
+  job.existing = ExistingRun::kContinue, stop_ = false;
   EXPECT_EQ(stop_at(13).status().code(), StatusCode::kCancelled);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
@@ -123,7 +123,7 @@ TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
 TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   FitJob job = Job("run");
   ASSERT_TRUE(Run(job).ok());
-  job.resume = true, job.config.smoothing = 3;
+  job.existing = ExistingRun::kContinue, job.config.smoothing = 3;
   ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
 }
 
@@ -131,7 +131,7 @@ TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
   FitJob job = Job("run");
   job.config.steps = 20;
   ASSERT_TRUE(Run(job).ok());
-  job.resume = true;
+  job.existing = ExistingRun::kContinue;
   job.input.images.color[5] += 0.1f;
   ExpectMessage(Run(job).status(), "input = ");
   job.input.images.color[5] -= 0.1f;

@@ -39,7 +39,7 @@ TEST(MeshNetwork, PredictionsFillTheirBox) {
 
 // Two objects, two views of 16 x 16, a small network: everything of a real step.
 struct SmallProblem {
-  TrainConfig config;
+  SingleImageConfig config;
   ImageStore store;
   std::vector<Sample> samples = {{0, {0, 1}}, {1, {2, 0}}, {0, {2, 1}}};
 
@@ -52,7 +52,7 @@ struct SmallProblem {
                       .fc_deviation = 0,
                       .color_bias = 0.4};
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
-    config.schedule.batch = 3;
+    config.batch = 3;
     store.models = 2, store.views = 3, store.size = 16;
     CameraRule rule;
     rule.lens.width = rule.lens.height = store.size;
@@ -75,6 +75,14 @@ struct SmallProblem {
     }
   }
 };
+
+// A whole step.
+Result<LossValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int64_t number) {
+  LossValues values;
+  TILEGRAD_ASSIGN(const auto gradients, step.Backward(batch, number, &values));
+  TILEGRAD_TRY(step.Update(gradients, number));
+  return values;
+}
 
 // Central differences in float64 on weights of every layer. The chain is piecewise smooth (ReLU,
 // visibility, L1, the box): h = 1e-6 keeps crossings of a kink improbable, truncation is O(h^2) =
@@ -157,11 +165,11 @@ TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
   for (const int count : {1, 2, 7}) {
     const Workers workers(count);
     nn::Context context(workers);
-    TrainConfig config = p.config;
+    SingleImageConfig config = p.config;
     config.optimizer.learning_rate = 3e-3;
     TrainStep step(context, config, p.store.size);
     for (std::int64_t s = 0; s < 60; ++s) {
-      const auto values = step.Run(GatherBatch(context, p.store, p.samples), s);
+      const auto values = RunStep(step, GatherBatch(context, p.store, p.samples), s);
       ASSERT_TRUE(values.ok()) << values.status().message();
       (s == 0 ? first : last) = values->total;
     }
@@ -184,7 +192,7 @@ TEST(Chain, WhatIsNotFiniteIsRefusedBeforeAnythingChanges) {
   nn::Context context(workers);
   TrainStep step(context, p.config, p.store.size);
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
-  ASSERT_TRUE(step.Run(batch, 0).ok());
+  ASSERT_TRUE(RunStep(step, batch, 0).ok());
   const auto bits = [&] {  // of weights and moments
     std::vector<nn::NamedTensor> all = step.adam().State();
     for (const nn::NamedVar& weight : nn::Parameters(step.network().module())) {
@@ -196,14 +204,14 @@ TEST(Chain, WhatIsNotFiniteIsRefusedBeforeAnythingChanges) {
   for (nn::NamedVar& parameter : nn::Parameters(step.network().module())) {
     float& weight = *parameter.value.value().data<float>();
     const float finite = std::exchange(weight, std::numeric_limits<float>::infinity());
-    EXPECT_FALSE(step.Run(batch, 1).ok()) << parameter.name;
+    EXPECT_FALSE(RunStep(step, batch, 1).ok()) << parameter.name;
     weight = finite;
     EXPECT_EQ(bits(), before) << parameter.name;
   }
 }
 
 TEST(Schedules, LearningRateAndSharpness) {
-  TrainConfig c;
+  SingleImageConfig c;
   c.schedule.steps = 100;
   c.optimizer = {.learning_rate = 1, .final_factor = 0.1, .warmup = 10};
   EXPECT_NEAR(LearningRateAt(c, 0), 0.1, 1e-9);

@@ -9,8 +9,10 @@
 
 #include "support/temp_folder.h"
 #include "tiny_run.h"
+#include "train/eval/evaluation.h"
 #include "train/report/html.h"
 #include "train/report/page_data.h"
+#include "train/tasks/held_out.h"
 #include "train/trainer.h"
 
 namespace tilegrad::train {
@@ -78,8 +80,9 @@ class ReportTest : public TempFolderTest {
       return EvaluationRow{method, {{iou, std::nullopt}}, {iou, std::nullopt}};
     };
     e.rows = {row("undeformed template", 0.25), row(kEvil, 0.5), row("tilegrad", own)};
-    e.models = {{dataset.Select(Split::kTest)[0], {0.123, 0.456}}};
-    ASSERT_TRUE(WriteEvaluation(job_.run, e, dataset).ok());
+    const int first = dataset.Select(Split::kTest)[0];
+    e.models = {{"noise", dataset.models()[static_cast<std::size_t>(first)].id, {0.123, 0.456}}};
+    ASSERT_TRUE(WriteEvaluation(job_.run, e).ok());
   }
 
   Workers workers_;
@@ -106,6 +109,11 @@ TEST_F(ReportTest, DataParsesAndHoldsCurvesAndMeshes) {
   ASSERT_TRUE(json.is_object());
   EXPECT_EQ(json["curves"]["step"], (nlohmann::json{1, 2, 3}));
   EXPECT_EQ(json["curves"]["iou"].size(), 3u);
+  // Every term of the log has a chart, under the task's words.
+  EXPECT_EQ(json["charts"][0], (nlohmann::json{{"key", "loss"}, {"title", "Total loss"}}));
+  EXPECT_EQ(json["charts"][2]["key"], "color");
+  EXPECT_EQ(json["charts"][2]["title"], "Colour loss (mean L1)");
+  EXPECT_EQ(json["charts"].size() + 1, json["curves"].size());
   ASSERT_EQ(json["models"].size(), 2u);
   EXPECT_EQ(json["models"][1]["name"], kEvil);
   EXPECT_EQ(json["models"][0]["prediction"]["index_bytes"], 2);

@@ -7,6 +7,7 @@
 #include "nn/nn.h"
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
+#include "tiny_run.h"
 #include "train/config.h"
 #include "train/data/batches.h"
 #include "train/run/checkpoint.h"
@@ -24,15 +25,15 @@ class RunTest : public TempFolderTest {
 };
 
 TEST_F(RunTest, ConfigRoundTrip) {
-  TrainConfig config;
+  TrainConfig config = ParseConfig("", "defaults").value();
   config.name = "odd \"name\"";
-  config.optimizer.learning_rate = 3.3e-5;
-  config.network.channels = 7;
-  const auto back = ParseConfig(WriteConfig(config), "c");
+  ValueOf<double>(config, "optimizer.learning_rate") = 3.3e-5;
+  ValueOf<std::int64_t>(config, "network.channels") = 7;
+  auto back = ParseConfig(WriteConfig(config), "c");
   ASSERT_TRUE(back.ok()) << back.status().message();
   EXPECT_EQ(WriteConfig(*back), WriteConfig(config));
   EXPECT_EQ(back->name, config.name);
-  EXPECT_EQ(back->optimizer.learning_rate, 3.3e-5);
+  EXPECT_EQ(ValueOf<double>(*back, "optimizer.learning_rate"), 3.3e-5);
 }
 
 TEST_F(RunTest, ConfigsOfTheProjectAreValid) {
@@ -67,16 +68,16 @@ TEST_F(RunTest, ConfigsOfDeepKeys) {
 }
 
 TEST_F(RunTest, WholeNumbersWhereFractionsAreAllowed) {
-  const auto config = ParseConfig("[loss]\ncolor = 2\n", "a");
+  auto config = ParseConfig("[loss]\ncolor = 2\n", "a");
   ASSERT_TRUE(config.ok()) << config.status().message();
-  EXPECT_EQ(config->loss.color, 2);
+  EXPECT_EQ(ValueOf<double>(*config, "loss.color"), 2);
   // 2^53 + 1 is no double: what stood here by chance was taken, in the range or not.
   ExpectMessage(ParseConfig("[loss]\ncolor = 9007199254740993\n", "b").status(),
                 "loss.color is 9007199254740992");
 }
 
 TEST_F(RunTest, Overrides) {
-  TrainConfig config;
+  TrainConfig config = ParseConfig("", "defaults").value();
   EXPECT_TRUE(ApplyOverrides({"schedule.steps=5", "name=me", "loss.color=0.5"}, &config).ok());
   EXPECT_EQ(config.schedule.steps, 5);
   EXPECT_EQ(config.name, "me");
@@ -93,6 +94,43 @@ TEST_F(RunTest, Overrides) {
   ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
   ExpectMessage(ApplyOverrides({"name=caf\xe9"}, &config), "name", "UTF-8");
+  ExpectMessage(ApplyOverrides({"task.kind=other"}, &config), "task.kind");
+  EXPECT_EQ(config.kind, "single_image");
+}
+
+TEST_F(RunTest, TheTaskDecidesWhichKeysThereAre) {
+  const auto config = ParseConfig("[task]\nkind = \"single_image\"\n", "named");
+  ASSERT_TRUE(config.ok()) << config.status().message();
+  EXPECT_EQ(WriteConfig(*config), WriteConfig(ParseConfig("", "default").value()));
+  ExpectMessage(ParseConfig("[task]\nkind = \"sculpture\"\n", "c.toml").status(), "c.toml",
+                "\"sculpture\"", "\"single_image\"");
+  ExpectMessage(ParseConfig("[task]\nkind = 3\n", "c.toml").status(), "task.kind", "string");
+}
+
+TEST_F(RunTest, FieldsOfEveryType) {
+  std::string word = "a";
+  std::int64_t large = 1;
+  int small = 2;
+  double number = 3;
+  bool flag = false;
+  const ConfigFields fields = {{"t.word", &word, 0, 0, "text"},
+                               {"large", &large, 0, kNoLimit, "whole", Affects::kReporting},
+                               {"t.small", &small, 0, 9, "whole"},
+                               {"u.number", &number, 0, 9, "any"},
+                               {"t.flag", &flag, 0, 0, "on or off"}};
+  ASSERT_TRUE(ReadFields("large = 7\nt.word = \"b\"\n[u]\nnumber = 0.5\n", fields).ok());
+  ASSERT_TRUE(OverrideFields({"t.flag=true", "t.small=4"}, fields).ok());
+  EXPECT_EQ(ResultSettings(fields), "t.word = b\nt.small = 4\nu.number = 0.5\nt.flag = true\n");
+  const std::string text = WriteFields(fields);
+  word = "", large = 0, small = 0, number = 0, flag = false;
+  ASSERT_TRUE(ReadFields(text, fields).ok());
+  EXPECT_EQ(WriteFields(fields), text);
+  EXPECT_EQ(large, 7);
+  ExpectMessage(ReadFields("t.flag = 1", fields), "t.flag", "true or false");
+  ExpectMessage(ReadFields("t.small = 4294967300", fields), "t.small", "[0, 9]");
+  EXPECT_EQ(small, 4);
+  number = 10;
+  ExpectMessage(CheckFields(fields), "u.number is 10");
 }
 
 std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {

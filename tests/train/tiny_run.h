@@ -3,10 +3,12 @@
 // does not matter there) and a network of a few thousand weights.
 #pragma once
 
+#include <cstdlib>
 #include <string>
 #include <vector>
 
 #include "base/rng.h"
+#include "train/config.h"
 #include "train/data/dataset_files.h"
 
 namespace tilegrad::train {
@@ -30,6 +32,15 @@ sample_every = 10
 checkpoint_every = 3
 keep_checkpoints = 2
 )";
+
+// The value behind a key of a configuration.
+template <class T>
+T& ValueOf(TrainConfig& config, const std::string& key) {
+  for (const ConfigField& field : config.Fields()) {
+    if (field.key == key) return *std::get<T*>(field.target);
+  }
+  std::abort();
+}
 
 inline Status WriteNoiseDataset(const Path& folder) {
   constexpr int kModels = 12, kSize = 32, kViews = 4;

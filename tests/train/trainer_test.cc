@@ -12,9 +12,9 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
+#include "train/data/trained_models.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
-#include "train/run/trained_models.h"
 
 namespace tilegrad::train {
 namespace {
@@ -50,11 +50,11 @@ class TrainerTest : public TempFolderTest {
     job_.config.schedule.steps = 12;
   }
 
-  Result<TrainOutcome> Run(const ProgressSink& progress, int workers = 1) {
+  Result<RunOutcome> Run(const ProgressSink& progress, int workers = 1) {
     const Workers count(workers);
     return Train(job_, count, progress, stop_);
   }
-  Result<TrainOutcome> Run() { return Run(kSilent); }
+  Result<RunOutcome> Run() { return Run(kSilent); }
   // Stops by the flag once `step` steps are done.
   void StopAfter(std::uint64_t step) {
     const auto outcome = Run([&](const Progress& p) {
@@ -127,7 +127,7 @@ TEST_F(TrainerTest, RefusesAnExistingRun) {
 TEST_F(TrainerTest, RefusesAnotherConfiguration) {
   StopAfter(2);
   job_.existing = ExistingRun::kContinue;
-  job_.config.optimizer.learning_rate *= 2;
+  ValueOf<double>(job_.config, "optimizer.learning_rate") *= 2;
   const Status refusal = Run().status();
   ExpectMessage(refusal, "learning_rate", "another configuration");
   EXPECT_EQ(refusal.message().find("  "), std::string::npos) << refusal.message();
@@ -176,9 +176,9 @@ TEST_F(TrainerTest, CheckpointsAloneAreARun) {
   std::filesystem::remove(job_.run / "config.toml");
   ExpectMessage(Run().status(), "--resume");
   job_.existing = ExistingRun::kContinue;
-  job_.config.optimizer.learning_rate *= 2;
+  ValueOf<double>(job_.config, "optimizer.learning_rate") *= 2;
   ExpectMessage(Run().status(), "learning_rate", "another configuration");
-  job_.config.optimizer.learning_rate /= 2;
+  ValueOf<double>(job_.config, "optimizer.learning_rate") /= 2;
   ExpectFinishes();
 }
 
@@ -247,9 +247,9 @@ TEST_F(TrainerTest, BadDatasetsAreNamed) {
   job_.data = folder_ / "nothing";
   ExpectMessage(Run().status(), "nothing");
   job_.data = folder_ / "data";
-  job_.config.schedule.views = 5;
+  ValueOf<std::int64_t>(job_.config, "schedule.views") = 5;
   ExpectMessage(Run().status(), "schedule.views", "4 views");
-  job_.config.schedule.views = 2;
+  ValueOf<std::int64_t>(job_.config, "schedule.views") = 2;
   CutInHalf(ModelFilePath(job_.data, "noise", "m3"));
   ExpectMessage(Run().status(), "m3.npz");
 }

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "train/data/dataset_files.h"
-#include "train/data/json_fields.h"
+#include "train/json_fields.h"
 
 namespace tilegrad::train {
 namespace {

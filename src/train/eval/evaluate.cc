@@ -80,7 +80,8 @@ class Evaluator {
       single_scores_.push_back(Compare(single, truth));
       TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], truth));
       predicted_scores_.push_back(score);
-      out_.models.push_back({held_out[i], score});
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
+      out_.models.push_back({ClassOf(info), info.id, score});
     }
     Fill(held_out);
     return std::move(out_);
@@ -145,6 +146,10 @@ class Evaluator {
     return row;
   }
 
+  const std::string& ClassOf(const ModelInfo& info) const {
+    return data_.info().classes[static_cast<std::size_t>(info.class_index)];
+  }
+
   void Fill(std::span<const int> held_out) {
     std::map<int, std::vector<std::size_t>> members;  // class -> positions in held_out
     for (std::size_t i = 0; i < held_out.size(); ++i) {
@@ -159,6 +164,7 @@ class Evaluator {
                  Row("tilegrad", predicted_scores_, members)};
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
+    out_.dataset_source = data_.info().source;
     out_.views_per_model = static_cast<int>(views_.size());
   }
 

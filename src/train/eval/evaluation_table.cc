@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "train/eval/evaluate.h"
+#include "train/eval/evaluation.h"
 
 namespace tilegrad::train {
 namespace {
@@ -74,9 +74,9 @@ Json ToJson(const Score& score) {
   return json;
 }
 
-Json ToJson(const Evaluation& evaluation, const Dataset& dataset) {
+Json ToJson(const Evaluation& evaluation) {
   Json json = {{"predictor", evaluation.predictor},
-               {"dataset", dataset.info().source},
+               {"dataset", evaluation.dataset_source},
                {"split", evaluation.split},
                {"views_per_model", evaluation.views_per_model},
                {"f_score_threshold", kFScoreThreshold},
@@ -92,11 +92,10 @@ Json ToJson(const Evaluation& evaluation, const Dataset& dataset) {
     json["rows"].push_back(
         {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}});
   }
-  for (const auto& [model, score] : evaluation.models) {
-    const auto& info = dataset.models()[static_cast<std::size_t>(model)];
-    Json entry = ToJson(score);
-    entry["class"] = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
-    entry["id"] = info.id;
+  for (const ModelScore& model : evaluation.models) {
+    Json entry = ToJson(model.score);
+    entry["class"] = model.class_name;
+    entry["id"] = model.id;
     json["models"].push_back(std::move(entry));
   }
   return json;
@@ -132,8 +131,8 @@ std::string FormatMarkdown(const Evaluation& evaluation) {
   return out + "\n" + Notes(evaluation) + "\n";
 }
 
-Status WriteEvaluation(const Path& run, const Evaluation& evaluation, const Dataset& dataset) {
-  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", ToJson(evaluation, dataset).dump(1) + "\n"));
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
+  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", ToJson(evaluation).dump(1) + "\n"));
   return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
 }
 

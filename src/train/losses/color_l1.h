@@ -4,9 +4,9 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 
 #include "nn/tape.h"
-#include "train/losses/image_batch.h"
 
 namespace tilegrad::train {
 

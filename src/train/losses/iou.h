@@ -2,8 +2,9 @@
 // Equation 12: the silhouette loss, L = mean over images of 1 - |S S'|_1 / |S + S' - S S'|_1.
 #pragma once
 
+#include <span>
+
 #include "nn/tape.h"
-#include "train/losses/image_batch.h"
 
 namespace tilegrad::train {
 

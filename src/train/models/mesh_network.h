@@ -6,9 +6,24 @@
 
 #include "nn/layers.h"
 #include "scene/mesh.h"
-#include "train/config.h"
 
 namespace tilegrad::train {
+
+// The network of section 5.1; the defaults are the paper's, 34,115,916 parameters at 64
+// x 64 with the 642-vertex template.
+struct NetworkConfig {
+  std::int64_t channels = 64;   // of the first convolution; the next two have 2x and 4x
+  std::int64_t code = 1024;     // width of the encoder's three fully connected layers
+  std::int64_t hidden1 = 1024;  // widths of each decoder
+  std::int64_t hidden2 = 2048;
+  std::int64_t template_level = 3;  // subdivisions of the icosahedron: 3 gives 642 vertices
+  double template_radius = 0.175;   // world units
+  double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
+                                    // prediction is nearly the template
+  double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
+                                    // fan-in, as convolutions
+  double color_bias = 0.0;          // what vertex colours start at
+};
 
 // At 64 x 64 with NetworkConfig's defaults.
 inline constexpr std::int64_t kPaperParameters = 34'115'916;

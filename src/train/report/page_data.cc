@@ -15,7 +15,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kCurvePoints = 1000;
-constexpr const char* kCurves[] = {"loss", "iou", "color", "images_per_second"};
 
 void Append(std::uint32_t value, std::size_t bytes, Bytes* out) {
   for (std::size_t i = 0; i < bytes; ++i) out->push_back(static_cast<std::uint8_t>(value >> 8 * i));
@@ -60,12 +59,25 @@ double SixDigits(double value) {
   return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
 }
 
-Json CurvesJson(const std::vector<LogEntry>& log) {
+// The log's names in their order; later entries may bring new ones. What only counts on with the
+// steps makes no curve.
+std::vector<std::string> CurveNames(const std::vector<LogEntry>& log) {
+  std::vector<std::string> names;
+  for (const LogEntry& entry : log) {
+    for (const auto& [name, value] : entry.values) {
+      if (name == "epoch" || name == "seconds") continue;
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  }
+  return names;
+}
+
+Json CurvesJson(const std::vector<LogEntry>& log, const std::vector<std::string>& names) {
   Json curves = {{"step", Json::array()}};
-  for (const char* name : kCurves) curves[name] = Json::array();
+  for (const std::string& name : names) curves[name] = Json::array();
   for (const LogEntry& entry : Thin(log, kCurvePoints)) {
     curves["step"].push_back(entry.step);
-    for (const char* name : kCurves) {
+    for (const std::string& name : names) {
       const auto at = std::find_if(entry.values.begin(), entry.values.end(),
                                    [&](const auto& value) { return value.first == name; });
       curves[name].push_back(at == entry.values.end() ? Json() : Json(SixDigits(at->second)));
@@ -74,11 +86,23 @@ Json CurvesJson(const std::vector<LogEntry>& log) {
   return curves;
 }
 
-Json CameraJson(const DatasetInfo& info) {
-  return {{"fov_y", info.camera.lens.fov_y},
-          {"azimuth", info.camera.azimuth_step * ShownViews(info)[0]},
-          {"elevation", info.camera.elevation},
-          {"distance", info.camera.distance}};
+std::string TitleOf(const std::string& name, const std::vector<TermLabel>& labels) {
+  if (name == "loss") return "Total loss";
+  for (const TermLabel& label : labels) {
+    if (name == label.name) return label.label;
+  }
+  std::string words = name;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  if (!words.empty())
+    words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
+  return words;
+}
+
+Json ModelJson(const Example& example) {
+  return {{"name", example.name},
+          {"class", example.class_name},
+          {"prediction", MeshJson(example.prediction)},
+          {"truth", MeshJson(example.truth)}};
 }
 
 }  // namespace
@@ -95,18 +119,21 @@ Json MeshJson(const Mesh& mesh) {
           {"index_bytes", index_bytes}};
 }
 
-Json PageData(const RunFacts& run, const Dataset& dataset, std::span<const ShownModel> models) {
-  Json out = {{"curves", CurvesJson(run.log)},
-              {"camera", CameraJson(dataset.info())},
+Json PageData(const ReportFacts& facts) {
+  const Showcase& show = facts.showcase;
+  const std::vector<std::string> names = CurveNames(facts.run.log);
+  Json out = {{"curves", CurvesJson(facts.run.log, names)},
+              {"charts", Json::array()},
+              {"camera",
+               {{"fov_y", show.fov_y},
+                {"azimuth", show.azimuth},
+                {"elevation", show.elevation},
+                {"distance", show.distance}}},
               {"models", Json::array()}};
-  for (const ShownModel& shown : models) {
-    const ModelInfo& info = dataset.models()[static_cast<std::size_t>(shown.model)];
-    out["models"].push_back(
-        {{"name", info.name.empty() ? info.id : info.name},
-         {"class", dataset.info().classes[static_cast<std::size_t>(info.class_index)]},
-         {"prediction", MeshJson(shown.prediction)},
-         {"truth", MeshJson(shown.truth)}});
-  }
+  const auto labels = facts.run.config.task->Labels();
+  for (const std::string& name : names)
+    out["charts"].push_back({{"key", name}, {"title", TitleOf(name, labels)}});
+  for (const Example& example : show.examples) out["models"].push_back(ModelJson(example));
   return out;
 }
 

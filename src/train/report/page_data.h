@@ -3,10 +3,9 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
-#include <span>
 
-#include "train/report/run_facts.h"
-#include "train/report/shown_models.h"
+#include "scene/mesh.h"
+#include "train/report/sections.h"
 
 namespace tilegrad::train {
 
@@ -15,8 +14,8 @@ namespace tilegrad::train {
 // `index_bytes` bytes; all little-endian. An error never grows from a mesh that is valid.
 nlohmann::ordered_json MeshJson(const Mesh& mesh);
 
-// {"curves": {"step": [], "loss": [], ...}, "camera": {...}, "models": [...]}.
-nlohmann::ordered_json PageData(const RunFacts& run, const Dataset& dataset,
-                                std::span<const ShownModel> models);
+// {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}], "camera": {...},
+// "models": [...]}: a chart for each value of the log but the clock's.
+nlohmann::ordered_json PageData(const ReportFacts& facts);
 
 }  // namespace tilegrad::train

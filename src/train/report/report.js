@@ -254,10 +254,6 @@ function showModel([prediction, truth], index) {
 
 // ---- Curves: small charts that share one cursor.
 
-const charts = [
-  {key: 'loss', title: 'Total loss'}, {key: 'iou', title: 'IoU loss (1 − soft IoU of silhouettes)'},
-  {key: 'color', title: 'Colour loss (mean L1)'}, {key: 'images_per_second', title: 'Images per second'},
-];
 const margin = {left: 46, right: 10, top: 10, bottom: 36}, height = 200;
 
 function svg(name, attributes, parent, text) {
@@ -374,7 +370,7 @@ function startCurves() {
   }
   const drawn = [];
   const moved = (index) => drawn.forEach((chart) => chart.point(index));
-  for (const chart of charts) drawn.push(new Chart(chart, steps, moved));
+  for (const chart of data.charts) drawn.push(new Chart(chart, steps, moved));
   host.append(...drawn.map((chart) => chart.element));
   new ResizeObserver(() => requestAnimationFrame(() => drawn.forEach((chart) => chart.draw()))).observe(host);
 }

@@ -1,29 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/report/run_facts.h"
 
-#include <algorithm>
-#include <limits>
-
-#include "train/data/json_fields.h"
+#include <span>
 
 namespace tilegrad::train {
 namespace {
-
-Status ReadRunJson(RunFacts* facts) {
-  const std::string place = (facts->folder / "run.json").string();
-  TILEGRAD_ASSIGN(const std::string text, ReadText(place));
-  TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(text, place));
-  JsonFields fields(json, place);
-  const int most = std::numeric_limits<int>::max();
-  fields.Read("dataset", &facts->dataset);
-  fields.Read("dataset_source", &facts->dataset_source);
-  fields.Read("training_models", 0, most, &facts->training_models);
-  fields.Read("parameters", 0, most, &facts->parameters);
-  if (!fields.status().ok() || !json.contains("machine")) return fields.status();
-  for (const auto& [key, value] : json["machine"].items())
-    facts->machine.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
-  return {};
-}
 
 // The means of a stretch of entries that have the same values.
 LogEntry MeanEntry(std::span<const LogEntry> stretch) {
@@ -46,7 +27,7 @@ LogEntry MeanEntry(std::span<const LogEntry> stretch) {
 Result<RunFacts> ReadRun(const Path& run) {
   RunFacts facts;
   facts.folder = run;
-  TILEGRAD_TRY(ReadRunJson(&facts));
+  TILEGRAD_ASSIGN(facts.header, ReadHeader(run));
   const Path config = run / "config.toml";
   TILEGRAD_ASSIGN(facts.config_text, ReadText(config));
   TILEGRAD_ASSIGN(facts.config, ParseConfig(facts.config_text, config.string()));

@@ -2,7 +2,6 @@
 #include "train/report/sections.h"
 
 #include <algorithm>
-#include <map>
 
 #include "base/error.h"
 #include "train/report/html.h"
@@ -16,17 +15,6 @@ std::string WithCommas(std::int64_t number) {
   for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3)
     digits.insert(static_cast<std::size_t>(at), ",");
   return digits;
-}
-
-std::string SourceName(const std::string& source) {
-  static const std::map<std::string, std::string> names = {
-      {"sweethome3d", "of the Sweet Home 3D furniture library"},
-      {"shapenet", "of ShapeNet"},
-      {"nmr", "of ShapeNet, as rendered for N3MR"},
-      {"folder", "of a folder of one's own"},
-      {"procedural", "made by the built-in generator"}};
-  const auto at = names.find(source);
-  return at == names.end() ? "of " + EscapeHtml(source) : at->second;
 }
 
 std::string Comparison(const Evaluation& evaluation) {
@@ -75,12 +63,10 @@ std::string SummaryHtml(const ReportFacts& facts) {
       step >= run.config.schedule.steps
           ? WithCommas(step)
           : fmt::format("{} of {}", WithCommas(step), WithCommas(run.config.schedule.steps));
-  const std::size_t classes = facts.dataset->info().classes.size();
-  return fmt::format(
-      "A network of {} parameters learned for {} steps to predict shape and colour of an object "
-      "from one image. It saw only rendered views of {} models in {} class{} {}, no 3D data. {}",
-      WithCommas(run.parameters), progress, WithCommas(run.training_models), classes,
-      classes == 1 ? "" : "es", SourceName(run.dataset_source), EvaluationSentence(facts));
+  return fmt::format("A network of {} parameters learned for {} steps {}. {} {}",
+                     WithCommas(run.header.parameters), progress,
+                     EscapeHtml(facts.showcase.purpose), EscapeHtml(facts.showcase.data),
+                     EvaluationSentence(facts));
 }
 
 std::string ComparisonHtml(const ReportFacts& facts) {
@@ -117,21 +103,18 @@ std::string MachineHtml(const ReportFacts& facts) {
                        EscapeHtml(value));
   };
   add("predictor", facts.predictor);
-  add("dataset", facts.data + " (" + facts.run.dataset_source + ")");
-  for (const auto& [name, value] : facts.run.machine) add(name, value);
+  add("dataset", facts.data + " (" + facts.run.header.dataset_source + ")");
+  for (const auto& [name, value] : facts.run.header.machine) add(name, value);
   return out;
 }
 
 std::string CreditsHtml(const ReportFacts& facts) {
   std::string out = "<ul>\n";
-  for (const auto& credit : facts.dataset->info().credits)
-    out += "<li>" + EscapeHtml(credit) + "</li>\n";
-  for (const auto& shown : facts.models) {
-    const ModelInfo& info = facts.dataset->models()[static_cast<std::size_t>(shown.model)];
-    out += fmt::format("<li><b>{}</b>, by {}, licence: {}</li>\n",
-                       EscapeHtml(info.name.empty() ? info.id : info.name),
-                       info.creator.empty() ? "an unnamed creator" : EscapeHtml(info.creator),
-                       info.license.empty() ? "not stated" : EscapeHtml(info.license));
+  for (const auto& credit : facts.showcase.credits) out += "<li>" + EscapeHtml(credit) + "</li>\n";
+  for (const Example& shown : facts.showcase.examples) {
+    out += fmt::format("<li><b>{}</b>, by {}, licence: {}</li>\n", EscapeHtml(shown.name),
+                       shown.creator.empty() ? "an unnamed creator" : EscapeHtml(shown.creator),
+                       shown.license.empty() ? "not stated" : EscapeHtml(shown.license));
   }
   return out + "</ul>";
 }

@@ -6,18 +6,17 @@
 #include <string>
 
 #include "train/report/run_facts.h"
-#include "train/report/shown_models.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::train {
 
-// Everything that a report tells about, gathered from the run and its dataset.
+// Everything that a report tells about, gathered from the run and its task.
 struct ReportFacts {
   RunFacts run;
-  const Dataset* dataset = nullptr;
   std::string data;       // the dataset's folder, as it was given
   std::string predictor;  // Predictor::description
   std::optional<Evaluation> evaluation;
-  std::vector<ShownModel> models;
+  Showcase showcase;
 };
 
 std::string SummaryHtml(const ReportFacts& facts);  // what was trained on what, and how good it is

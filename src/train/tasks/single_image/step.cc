@@ -60,20 +60,20 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
   return out;
 }
 
-double LearningRateAt(const TrainConfig& config, std::int64_t step) {
+double LearningRateAt(const SingleImageConfig& config, std::int64_t step) {
   const OptimizerConfig& o = config.optimizer;
   const nn::CosineSchedule cosine{config.schedule.steps, o.final_factor};
   return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
 }
 
-double SharpnessAt(const TrainConfig& config, std::int64_t step) {
+double SharpnessAt(const SingleImageConfig& config, std::int64_t step) {
   const double share =
       std::min(1.0, 2.0 * static_cast<double>(step) / static_cast<double>(config.schedule.steps));
   return config.render.sharpness_start *
          std::pow(config.render.sharpness / config.render.sharpness_start, share);
 }
 
-TrainStep::TrainStep(nn::Context& context, const TrainConfig& config, int image_size)
+TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size)
     : context_(context),
       config_(config),
       image_size_(image_size),
@@ -119,22 +119,30 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
   return total;
 }
 
-Result<LossValues> TrainStep::Run(const BatchTensors& batch, std::int64_t step) {
-  LossValues values;
-  const nn::Var loss = Loss(batch, step, &values);
-  const auto gradients = nn::Gradients(loss, adam_.parameters());
+void TrainStep::AddTerms(const LossValues& v, std::vector<LossTerm>* terms) const {
+  const LossConfig& w = config_.loss;
+  terms->insert(terms->end(), {{"iou", w.iou, v.iou},
+                               {"color", w.color, v.color},
+                               {"smoothness", w.smoothness, v.smoothness},
+                               {"laplacian", w.laplacian, v.laplacian}});
+}
+
+Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& batch,
+                                                         std::int64_t step, LossValues* values) {
+  const nn::Var loss = Loss(batch, step, values);
+  auto gradients = nn::Gradients(loss, adam_.parameters());
   TILEGRAD_TRY(context_.TakeStatus());
-  if (!std::isfinite(values.total) || !nn::IsFinite(context_, gradients)) {
-    return InternalError(
-        "step {}: the loss is {} (iou {}, color {}, smoothness {}, laplacian {}), the gradient's "
-        "norm {}; a smaller "
-        "optimizer.learning_rate may help",
-        step, values.total, values.iou, values.color, values.smoothness, values.laplacian,
-        nn::GlobalNorm(context_, gradients));
-  }
+  if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
+  StepValues described;
+  AddTerms(*values, &described.terms);
+  return InternalError(
+      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
+      values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
+}
+
+Status TrainStep::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
   adam_.options().learning_rate = LearningRateAt(config_, step);
-  TILEGRAD_TRY(adam_.Step(gradients));
-  return values;
+  return adam_.Step(gradients);
 }
 
 }  // namespace tilegrad::train

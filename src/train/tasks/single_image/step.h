@@ -7,10 +7,10 @@
 
 #include "nn/optim.h"
 #include "scene/topology.h"
-#include "train/config.h"
 #include "train/data/batches.h"
-#include "train/models/mesh_network.h"
 #include "train/ops/render_op.h"
+#include "train/run/step_values.h"
+#include "train/tasks/single_image/config.h"
 
 namespace tilegrad::train {
 
@@ -29,19 +29,23 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch);
 
 // The learning rate and 1/delta of a step: both follow schedules of the configuration.
-double LearningRateAt(const TrainConfig& config, std::int64_t step);
-double SharpnessAt(const TrainConfig& config, std::int64_t step);
+double LearningRateAt(const SingleImageConfig& config, std::int64_t step);
+double SharpnessAt(const SingleImageConfig& config, std::int64_t step);
 
 // Network, optimiser and renderer of a run.
 class TrainStep {
  public:
-  TrainStep(nn::Context& context, const TrainConfig& config, int image_size);
+  TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size);
 
   // Equation 14 of a batch, on the tape; `values` gets the parts.
   nn::Var Loss(const BatchTensors& batch, std::int64_t step, LossValues* values);
-  // Loss, gradients and one step of Adam. A loss or gradient that is not finite is an error, before
-  // any weight changes.
-  Result<LossValues> Run(const BatchTensors& batch, std::int64_t step);
+  // Gradients of the loss. A loss or gradient that is not finite is an error.
+  Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, std::int64_t step,
+                                                LossValues* values);
+  // One step of Adam.
+  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
+  // Appends the same by name and weight.
+  void AddTerms(const LossValues& values, std::vector<LossTerm>* terms) const;
 
   MeshNetwork& network() { return network_; }
   nn::Adam& adam() { return adam_; }
@@ -51,7 +55,7 @@ class TrainStep {
 
  private:
   nn::Context& context_;
-  TrainConfig config_;
+  SingleImageConfig config_;
   int image_size_;
   MeshNetwork network_;
   nn::Adam adam_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/run/trained_models.h"
+#include "train/data/trained_models.h"
 
 #include <sstream>
 #include <unordered_set>

@@ -2,8 +2,8 @@
 // eval.json back into an Evaluation.
 #include <limits>
 
-#include "train/data/json_fields.h"
-#include "train/report/run_facts.h"
+#include "train/eval/evaluation.h"
+#include "train/json_fields.h"
 
 namespace tilegrad::train {
 namespace {
@@ -64,35 +64,23 @@ Status ReadClassModels(const Json& json, const std::string& place, Evaluation* o
   return DataLoss("{}: \"class_models\" and \"classes\" differ in length", place);
 }
 
-int FindModel(const Dataset& dataset, const std::string& class_name, const std::string& id) {
-  const auto& models = dataset.models();
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    const auto& name = dataset.info().classes[static_cast<std::size_t>(models[i].class_index)];
-    if (models[i].id == id && name == class_name) return static_cast<int>(i);
-  }
-  return -1;
-}
-
-Status ReadModelScores(const Json& json, const std::string& place, const Dataset& dataset,
-                       Evaluation* out) {
+Status ReadModelScores(const Json& json, const std::string& place, Evaluation* out) {
   TILEGRAD_ASSIGN(const Json* models, Array(json, "models", place));
   for (const Json& item : *models) {
     const std::string entry = place + ": an entry of \"models\"";
-    TILEGRAD_ASSIGN(const Score score, ReadScore(item, entry));
-    std::string class_name, id;
+    ModelScore& model = out->models.emplace_back();
+    TILEGRAD_ASSIGN(model.score, ReadScore(item, entry));
     JsonFields fields(item, entry);
-    fields.Read("class", &class_name);
-    fields.Read("id", &id);
+    fields.Read("class", &model.class_name);
+    fields.Read("id", &model.id);
     if (!fields.status().ok()) return fields.status();
-    if (const int model = FindModel(dataset, class_name, id); model >= 0)
-      out->models.push_back({model, score});
   }
   return {};
 }
 
 }  // namespace
 
-Result<std::optional<Evaluation>> ReadEvaluation(const Path& run, const Dataset& dataset) {
+Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   const Path file = run / "eval.json";
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return std::optional<Evaluation>();
@@ -111,7 +99,7 @@ Result<std::optional<Evaluation>> ReadEvaluation(const Path& run, const Dataset&
   if (!fields.status().ok()) return fields.status();
   TILEGRAD_TRY(ReadClassModels(json, place, &out));
   TILEGRAD_TRY(ReadRows(json, place, &out));
-  TILEGRAD_TRY(ReadModelScores(json, place, dataset, &out));
+  TILEGRAD_TRY(ReadModelScores(json, place, &out));
   return std::optional(std::move(out));
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A trained 5.1 network, ready to predict: the one way in for eval, predict and reports.
+// What a run has trained, ready to predict, whatever its task: the one way in for eval, predict and
+// reports.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +17,8 @@
 
 namespace tilegrad::train {
 
+class Task;
+
 class Predictor {
  public:
   // `path`: a run folder (its newest whole checkpoint is taken) or one checkpoint. Errors name the
@@ -31,11 +34,10 @@ class Predictor {
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"
-  const Mesh& template_mesh() const;  // the sphere, normalised as predictions are
+  const Mesh& template_mesh() const;  // Model::template_mesh
+  Task& task() const;                 // with the configuration of the run
 
-  // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N meshes: the template's
-  // faces, predicted positions (largest half-extent 0.45, centred) and vertex colours in [0, 1].
-  // Batch statistics are those of training (eval mode).
+  // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes.
   Result<std::vector<Mesh>> Predict(std::span<const std::uint8_t> images) const;
 
  private:

@@ -13,7 +13,7 @@ namespace tilegrad::train {
 
 enum class RunStart {
   kNew,      // no step is done yet
-  kGoingOn,  // from a checkpoint
+  kContinued,  // from a checkpoint
 };
 
 // Writes the list of a new run; compares with that of a run that goes on: InvalidArgument names the

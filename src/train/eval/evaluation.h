@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scores of a prediction beside baselines: by method and class, and by model. Written by
+// `tilegrad eval`, read by reports.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tilegrad::train {
+
+inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
+
+struct Score {
+  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]
+  std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
+};
+
+struct EvaluationRow {
+  std::string method;
+  std::vector<Score> classes;  // as Evaluation::classes
+  Score mean;                  // of the class means
+};
+
+struct ModelScore {
+  std::string class_name, id;  // as the dataset has them
+  Score score;                 // mean over its views
+};
+
+struct Evaluation {
+  std::string predictor, split;
+  std::string dataset_source;
+  int views_per_model = 0;
+  std::vector<std::string> classes;  // those that have models in the split
+  std::vector<int> class_models;     // how many
+  std::vector<EvaluationRow> rows;   // baselines, and last the prediction
+  std::vector<ModelScore> models;    // of the prediction
+  double shape_threshold = 0;    // share of training models above which the single shape is solid
+  int unusable_predictions = 0;  // without extent or area: they score 0
+};
+
+// The table with methods as rows and classes as columns, each cell "IoU / F-score" in percent.
+std::string FormatTable(const Evaluation& evaluation);
+std::string FormatMarkdown(const Evaluation& evaluation);
+// <run>/eval.json and <run>/eval.md, each whole or not at all.
+Status WriteEvaluation(const Path& run, const Evaluation& evaluation);
+// What WriteEvaluation wrote; nothing if there is no eval.json.
+Result<std::optional<Evaluation>> ReadEvaluation(const Path& run);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run/header.h"
+
+#include <limits>
+
+#include "train/json_fields.h"
+
+namespace tilegrad::train {
+
+Status WriteHeader(const Path& run, const RunHeader& header) {
+  nlohmann::ordered_json json = {{"name", header.name},
+                                 {"dataset", header.dataset},
+                                 {"dataset_source", header.dataset_source},
+                                 {"training_models", header.training_models},
+                                 {"parameters", header.parameters}};
+  for (const auto& [key, value] : header.machine) json["machine"][key] = value;
+  // Paths need be no UTF-8: then a replacement character, not an exception.
+  const std::string text =
+      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return WriteTextAtomic(run / "run.json", text + "\n");
+}
+
+Result<RunHeader> ReadHeader(const Path& run) {
+  const std::string place = (run / "run.json").string();
+  TILEGRAD_ASSIGN(const std::string text, ReadText(place));
+  TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(text, place));
+  JsonFields fields(json, place);
+  RunHeader header;
+  const int most = std::numeric_limits<int>::max();
+  int parameters = 0;
+  fields.Read("dataset", &header.dataset);
+  fields.Read("dataset_source", &header.dataset_source);
+  fields.Read("training_models", 0, most, &header.training_models);
+  fields.Read("parameters", 0, most, &parameters);
+  if (!fields.status().ok()) return fields.status();
+  header.parameters = parameters;
+  if (!json.contains("machine")) return header;
+  for (const auto& [key, value] : json["machine"].items())
+    header.machine.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
+  return header;
+}
+
+}  // namespace tilegrad::train

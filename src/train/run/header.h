@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// <run>/run.json: what a run is, for people and for the commands that look at it.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tilegrad::train {
+
+struct RunHeader {
+  std::string name;            // the configuration's
+  std::string dataset;         // folder, as training was given it
+  std::string dataset_source;  // where its models are from
+  int training_models = 0;
+  std::int64_t parameters = 0;                               // numbers that are trained
+  std::vector<std::pair<std::string, std::string>> machine;  // as DescribeMachine
+};
+
+Status WriteHeader(const Path& run, const RunHeader& header);
+// Errors name the file and the key or line.
+Result<RunHeader> ReadHeader(const Path& run);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run/run.h"
+
+#include <chrono>
+
+#include "base/error.h"
+#include "base/folder_lock.h"
+#include "io/image_file.h"
+#include "train/run/checkpoint.h"
+#include "train/run/first_difference.h"
+#include "train/run/log.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// `before`: settings that `place` holds.
+Status CheckSettings(const RunPlan& plan, const RunWork& work, const std::string& before,
+                     const Path& place) {
+  TILEGRAD_ASSIGN(const std::string then, work.ResultSettings(before, place.string()));
+  TILEGRAD_ASSIGN(const std::string now, work.ResultSettings(plan.settings, "this run"));
+  if (then == now) return {};
+  return InvalidArgument(
+      "{}: this run was started with another configuration: {}; continue with the same, or give "
+      "another --out",
+      place.string(), FirstDifference(then, now));
+}
+
+class Session {
+ public:
+  Session(const RunPlan& plan, RunWork* work, nn::Context& context)
+      : plan_(plan), work_(*work), context_(context) {}
+
+  Status Open();
+  Status Loop(const ProgressSink& progress, const StopFlag& stop);
+  RunOutcome outcome() const;
+
+ private:
+  Status Restore();
+  Status OneStep();
+  Status Draw();
+  Status Log();
+  Status Save();
+  double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
+  bool OutOfTime() const {
+    return plan_.max_minutes > 0 && SecondsSince(loop_start_) > 60 * plan_.max_minutes;
+  }
+
+  const RunPlan& plan_;
+  RunWork& work_;
+  nn::Context& context_;
+  FolderLock lock_;
+  std::optional<RunLog> log_;
+  StepValues values_;                       // of the last step
+  std::int64_t first_step_ = 0, done_ = 0;  // steps
+  std::int64_t saved_ = -1;
+  double seconds_before_ = 0;
+  Clock::time_point loop_start_, last_log_;
+  std::int64_t images_ = 0;  // since the last log
+  std::string note_;
+};
+
+Status Session::Open() {
+  TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
+  TILEGRAD_TRY(CheckExistingRun(plan_, work_));
+  RemoveHalfWritten(plan_.folder);
+  TILEGRAD_TRY(Restore());
+  TILEGRAD_TRY(work_.Begin(first_step_));
+  PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
+  TILEGRAD_ASSIGN(log_, RunLog::Open(plan_.folder, first_step_));
+  return {};
+}
+
+Status Session::Restore() {
+  auto found = LoadNewestCheckpoint(context_, plan_.folder);
+  if (!found.ok())
+    return found.status().code() == StatusCode::kNotFound ? Status() : found.status();
+  for (const auto& warning : found->warnings) {
+    if (plan_.warn) plan_.warn("passed over: " + warning);
+  }
+  const CheckpointInfo& info = found->checkpoint.info;
+  const std::string file = found->file.string();
+  TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file));
+  if (info.image_size != plan_.image_size) {
+    return InvalidArgument("{}: its images had {} pixels a side, now there are {}", file,
+                           info.image_size, plan_.image_size);
+  }
+  TILEGRAD_TRY(work_.LoadState(found->checkpoint.tensors, info.step).Within(file));
+  SetAside(found->broken);
+  first_step_ = done_ = saved_ = info.step;
+  seconds_before_ = info.seconds;
+  return {};
+}
+
+Status Session::Save() {
+  if (saved_ == done_) return {};
+  TILEGRAD_TRY(SaveCheckpoint(plan_.folder, {done_, plan_.image_size, plan_.settings, Seconds()},
+                              work_.State()));
+  saved_ = done_;
+  PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
+  return {};
+}
+
+Status Session::Log() {
+  const double elapsed = SecondsSince(last_log_);
+  const double rate = elapsed > 0 ? static_cast<double>(images_) / elapsed : 0;
+  last_log_ = Clock::now();
+  images_ = 0;
+  note_ = values_.ForConsole() + fmt::format("  {:.0f} images/s", rate);
+  LogEntry entry{done_, values_.ForLog()};
+  entry.values.emplace_back("images_per_second", rate);
+  entry.values.emplace_back("seconds", Seconds());
+  return log_->Append(entry);
+}
+
+Status Session::Draw() {
+  if (!work_.HasPicture(done_)) return {};
+  TILEGRAD_ASSIGN(const ImageU8 picture, work_.Picture(done_));
+  return picture.empty() ? Status() : io::SavePng(PictureFile(plan_, done_), picture);
+}
+
+Status Session::OneStep() {
+  const Schedule& s = plan_.schedule;
+  values_.terms.clear(), values_.also.clear();
+  TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
+  ++done_;
+  images_ += values_.images;
+  const bool last = done_ == s.steps;
+  if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
+  TILEGRAD_TRY(Draw());
+  if (done_ % s.checkpoint_every == 0 || last) TILEGRAD_TRY(Save());
+  return {};
+}
+
+Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
+  loop_start_ = last_log_ = Clock::now();
+  const std::int64_t steps = plan_.schedule.steps;
+  if (done_ == 0) TILEGRAD_TRY(Draw());
+  while (done_ < steps && !stop && !OutOfTime()) {
+    TILEGRAD_TRY(OneStep());
+    if (!progress) continue;
+    progress(
+        {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(steps), note_});
+  }
+  TILEGRAD_TRY(Save());
+  if (!stop || done_ == steps) return {};
+  return Cancelled("stopped at step {} of {}; everything is saved, continue with --resume", done_,
+                   steps);
+}
+
+RunOutcome Session::outcome() const {
+  return {first_step_, done_, Seconds(), done_ == plan_.schedule.steps};
+}
+
+}  // namespace
+
+Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
+  const Path config_file = plan.folder / "config.toml";
+  const bool started = std::filesystem::exists(config_file);
+  // Checkpoints alone are a run, too.
+  if ((started || !ListCheckpoints(plan.folder).empty()) && plan.existing == ExistingRun::kRefuse) {
+    return InvalidArgument(
+        "{}: already holds a run; give --resume to continue it, or another --out",
+        plan.folder.string());
+  }
+  if (!started) return {};
+  TILEGRAD_ASSIGN(const std::string before, ReadText(config_file));
+  return CheckSettings(plan, work, before, config_file);
+}
+
+Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
+                              const ProgressSink& progress, const StopFlag& stop) {
+  Session session(plan, work, context);
+  TILEGRAD_TRY(session.Open());
+  TILEGRAD_TRY(session.Loop(progress, stop));
+  return session.outcome();
+}
+
+Path PictureFile(const RunPlan& plan, std::int64_t steps) {
+  return plan.folder / fmt::format("{}{:08}.png", plan.pictures, steps);
+}
+
+}  // namespace tilegrad::train

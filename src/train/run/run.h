@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// A run: a folder, and steps that are taken in it from the start, or from where they stopped, to
+// the end. This is all of a run's life that does not depend on what is computed: the lock, refusing
+// or continuing what is there, comparing configurations, restoring, logging, pictures, saving,
+// pruning, stopping. Training (train/trainer.h) and fitting (fit/run.h) are two kinds of work.
+//
+//   <run>/config.toml                    if the work writes one: what a run is continued with
+//   <run>/metrics.jsonl, tensorboard/    the curves
+//   <run>/checkpoints/                   see checkpoint.h
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "base/progress.h"
+#include "nn/context.h"
+#include "nn/named_tensors.h"
+#include "scene/image.h"
+#include "train/run/schedule.h"
+#include "train/run/step_values.h"
+
+namespace tilegrad::train {
+
+enum class ExistingRun {
+  kRefuse,    // an error that says what the choices are
+  kContinue,  // continues from its newest whole checkpoint; starts if there is no run yet
+};
+
+struct RunPlan {
+  std::string stage;            // what the progress line calls it: "training"
+  Path folder;                  // of the run
+  std::string settings;         // text that every checkpoint keeps
+  std::string pictures;         // how their names begin, in the folder: "samples/step_"
+  std::int64_t image_size = 0;  // pixels; a run continues with the same
+  Schedule schedule;
+  ExistingRun existing = ExistingRun::kRefuse;
+  double max_minutes = 0;      // > 0: save and stop after this long
+  WarningSink warn = nullptr;  // broken checkpoints that were passed over
+};
+
+// What is computed in a run.
+class RunWork {
+ public:
+  virtual ~RunWork() = default;
+
+  // The lines of such a text as RunPlan::settings on which the result depends. `place` is the file
+  // that holds it, for errors.
+  virtual Result<std::string> ResultSettings(const std::string& settings,
+                                             const std::string& place) const = 0;
+  // Once, when it is certain that the run starts or continues, and after LoadState: files that
+  // stand beside the checkpoints. `first_step` steps are done.
+  virtual Status Begin(std::int64_t first_step) = 0;
+
+  // Step number `step`, from 0. An error leaves everything as it was before the step.
+  virtual Status Step(std::int64_t step, StepValues* values) = 0;
+
+  // Everything that later steps depend on, under unique names, after `steps` steps.
+  virtual std::vector<nn::NamedTensor> State() = 0;
+  virtual Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) = 0;
+
+  // Whether there is a picture after `steps` steps (0: before the first), and the picture. An empty
+  // one is not written.
+  virtual bool HasPicture(std::int64_t steps) const = 0;
+  virtual Result<ImageU8> Picture(std::int64_t steps) = 0;
+};
+
+struct RunOutcome {
+  std::int64_t first_step = 0, last_step = 0;  // steps done before and after
+  double seconds = 0;                          // of all sessions of this run
+  bool finished = false;                       // last_step is the schedule's
+};
+
+// Refuses or accepts what is in the folder, before anything expensive: ExecuteRun does it again.
+Status CheckExistingRun(const RunPlan& plan, const RunWork& work);
+
+// Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled
+// and a message how to continue). A run that was stopped or killed and continued ends in the bits
+// of one that was not. Errors: another process works in the folder; settings or image size are not
+// those that the run was started with, naming the first line that differs; what `work` returns.
+Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
+                              const ProgressSink& progress, const StopFlag& stop);
+
+Path PictureFile(const RunPlan& plan, std::int64_t steps);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "train/run/config_fields.h"
+
+namespace tilegrad::train {
+
+// How long a run is, and what it leaves behind on the way.
+struct Schedule {
+  std::int64_t steps = 50000;
+  std::int64_t seed = 1;        // of everything that is random
+  std::int64_t log_every = 20;  // steps
+  std::int64_t sample_every = 1000;
+  std::int64_t checkpoint_every = 500;
+  std::int64_t keep_checkpoints = 3;  // the newest ones
+};
+
+// Its keys, in table [schedule].
+inline ConfigFields FieldsOf(Schedule* s) {
+  const auto reporting = Affects::kReporting;
+  return {{"schedule.steps", &s->steps, 1, kNoLimit, "steps of the whole run"},
+          {"schedule.seed", &s->seed, 0, kNoLimit, "of weights, order and views"},
+          {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
+          {"schedule.sample_every", &s->sample_every, 1, kNoLimit, "steps", reporting},
+          {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},
+          {"schedule.keep_checkpoints", &s->keep_checkpoints, 1, kNoLimit,
+           "the newest ones are kept", reporting}};
+}
+
+}  // namespace tilegrad::train

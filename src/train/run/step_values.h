@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a step says about itself. The log, TensorBoard, the console and the report show whatever
+// terms there are; none of them knows one by name.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "train/run/tensorboard.h"
+
+namespace tilegrad::train {
+
+struct LossTerm {
+  const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second", "seconds"
+  double weight;     // in the loss; 0: only watched
+  double value;      // before the weight
+};
+
+// Cleared and filled anew by each step: a steady state keeps the memory.
+struct StepValues {
+  double loss = 0;  // what the step went down on
+  std::vector<LossTerm> terms;
+  std::vector<std::pair<const char*, double>> also;  // for the log: learning rate, epoch, ...
+  std::int64_t images = 0;                           // that the step worked on
+
+  // The loss and each term's share of it: "loss 0.6320  iou 0.521  color 0.111".
+  std::string ForConsole() const;
+  // "iou 0.5 x 1, color nan x 1".
+  std::string DescribeTerms() const;
+  // "loss", the terms without their weights, then `also`.
+  Scalars ForLog() const;
+};
+
+}  // namespace tilegrad::train

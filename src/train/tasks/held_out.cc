@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/error.h"
+#include "train/data/trained_models.h"
+#include "train/eval/evaluate.h"
+#include "train/pictures.h"
+#include "train/predictor.h"
+
+namespace tilegrad::train {
+namespace {
+
+std::string SourceName(const std::string& source) {
+  static const std::map<std::string, std::string> names = {
+      {"sweethome3d", "of the Sweet Home 3D furniture library"},
+      {"shapenet", "of ShapeNet"},
+      {"nmr", "of ShapeNet, as rendered for N3MR"},
+      {"folder", "of a folder of one's own"},
+      {"procedural", "made by the built-in generator"}};
+  const auto at = names.find(source);
+  return at == names.end() ? "of " + source : at->second;
+}
+
+// How far the camera of a shown view has gone around from the first, in whole degrees.
+int TurnTo(const DatasetInfo& info, int view) {
+  const int steps = (view - ShownViews(info.views)[0] + info.views) % info.views;
+  return static_cast<int>(std::lround(std::abs(info.camera.azimuth_step) * steps)) % 360;
+}
+
+// The captions of a truth and of the prediction beside it.
+std::pair<Picture, Picture> Captions(const std::string& name, int turn, bool input) {
+  const std::string view = input ? "" : fmt::format(", camera turned by {}°", turn);
+  return {{{},
+           input ? "input" : fmt::format("truth, +{}°", turn),
+           name + (input ? ": the image that the network sees" : ": truth") + view},
+          {{}, "predicted", name + ": predicted" + view}};
+}
+
+class Exhibitor {
+ public:
+  Exhibitor(const Dataset& dataset, const Predictor& predictor, const Workers& workers)
+      : dataset_(dataset), info_(dataset.info()), predictor_(predictor), workers_(workers) {}
+
+  Result<Example> Show(int model) const {
+    Example out = Named(model);
+    TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
+    out.truth = std::move(data.mesh);
+    const std::vector<int> views = ShownViews(info_.views);
+    TILEGRAD_ASSIGN(auto meshes, predictor_.Predict(ImageOf(data, views[0])));
+    out.prediction = std::move(meshes[0]);
+    std::vector<Camera> cameras;
+    for (const int view : views) cameras.push_back(info_.camera.View(view));
+    TILEGRAD_ASSIGN(
+        auto predicted,
+        DrawMesh(out.prediction, {cameras, info_.image_size, info_.image_size}, workers_));
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      auto [left, right] = Captions(out.name, TurnTo(info_, views[v]), v == 0);
+      left.image = CompositeOverPaper(ImageOf(data, views[v]), info_.image_size);
+      right.image = std::move(predicted[v]);
+      out.pictures.push_back(std::move(left)), out.pictures.push_back(std::move(right));
+    }
+    return out;
+  }
+
+ private:
+  Example Named(int index) const {
+    const ModelInfo& model = dataset_.models()[static_cast<std::size_t>(index)];
+    Example out;
+    out.name = model.name.empty() ? model.id : model.name;
+    out.class_name = info_.classes[static_cast<std::size_t>(model.class_index)];
+    out.id = model.id;
+    out.creator = model.creator, out.license = model.license;
+    return out;
+  }
+  std::span<const std::uint8_t> ImageOf(const ModelData& data, int view) const {
+    const std::size_t bytes = data.images.size() / static_cast<std::size_t>(info_.views);
+    return std::span(data.images).subspan(static_cast<std::size_t>(view) * bytes, bytes);
+  }
+
+  const Dataset& dataset_;
+  const DatasetInfo& info_;
+  const Predictor& predictor_;
+  const Workers& workers_;
+};
+
+Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
+  const DatasetInfo& info = dataset.info();
+  Showcase out;
+  const std::size_t classes = info.classes.size();
+  out.data = fmt::format("It learned from {} models in {} class{} {}.", header.training_models,
+                         classes, classes == 1 ? "" : "es", SourceName(header.dataset_source));
+  out.note =
+      "The network saw none of these in training. From the first picture alone it predicted one "
+      "mesh, here from three sides beside the truth. The models are spread over the classes in the "
+      "dataset's order, not picked by hand.";
+  out.credits = info.credits;
+  out.fov_y = info.camera.lens.fov_y;
+  out.azimuth = info.camera.azimuth_step * ShownViews(info.views)[0];
+  out.elevation = info.camera.elevation, out.distance = info.camera.distance;
+  return out;
+}
+
+}  // namespace
+
+std::vector<int> ChooseModels(const Dataset& dataset, int count) {
+  std::vector<std::vector<int>> rounds;  // rounds[r]: the r-th test model of each class that has it
+  std::vector<std::size_t> seen(dataset.info().classes.size(), 0);
+  for (const int model : dataset.Select(Split::kTest)) {
+    const ModelInfo& info = dataset.models()[static_cast<std::size_t>(model)];
+    const std::size_t round = seen[static_cast<std::size_t>(info.class_index)]++;
+    if (round == rounds.size()) rounds.emplace_back();
+    rounds[round].push_back(model);
+  }
+  std::vector<int> out;
+  for (const auto& round : rounds) {
+    const std::size_t left = static_cast<std::size_t>(count) - out.size();
+    const std::size_t taken = std::min(left, round.size());
+    for (std::size_t i = 0; i < taken; ++i) out.push_back(round[i * round.size() / taken]);
+  }
+  std::stable_sort(out.begin(), out.end(), [&](int a, int b) {
+    const auto class_of = [&](int m) {
+      return dataset.models()[static_cast<std::size_t>(m)].class_index;
+    };
+    return class_of(a) < class_of(b);
+  });
+  return out;
+}
+
+std::vector<int> ShownViews(int views) {
+  std::vector<int> out;
+  const int count = std::min(kShownViews, views);
+  for (int k = 0; k < count; ++k) out.push_back((5 * views / 6 + k * views / count) % views);
+  return out;
+}
+
+Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
+                             const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
+  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
+  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  Showcase out = AboutDataset(dataset, request.header);
+  const Exhibitor exhibitor(dataset, request.predictor, workers);
+  const std::vector<int> chosen = ChooseModels(dataset, request.examples);
+  for (const int model : chosen) {
+    if (stop) return Cancelled("stopped while predicting; nothing was written");
+    TILEGRAD_ASSIGN(Example example, exhibitor.Show(model));
+    out.examples.push_back(std::move(example));
+    if (progress) progress({"predicting", out.examples.size(), chosen.size(), ""});
+  }
+  return out;
+}
+
+Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
+                                     const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (!job.training_models) TILEGRAD_TRY(CheckHeldOut(job.run, dataset));
+  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  EvaluationJob evaluation;
+  evaluation.dataset = &dataset;
+  evaluation.split = job.training_models ? Split::kTrain : Split::kTest;
+  evaluation.predict = [&](auto images) { return job.predictor.Predict(images); };
+  evaluation.template_mesh = job.predictor.template_mesh();
+  evaluation.views_per_model = job.views_per_model;
+  evaluation.predictor = job.predictor.description();
+  return train::Evaluate(evaluation, workers, progress, stop);
+}
+
+}  // namespace tilegrad::train

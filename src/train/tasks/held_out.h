@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tasks share that learn from a dataset's images and predict a mesh from one: evaluation and
+// examples on its held-out models.
+#pragma once
+
+#include <vector>
+
+#include "train/data/dataset.h"
+#include "train/tasks/task.h"
+
+namespace tilegrad::train {
+
+inline constexpr int kShownViews = 3;
+
+// Scores of eval/evaluate.h. Errors: as CheckHeldOut and Evaluate; images of another size.
+Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
+                                     const ProgressSink& progress, const StopFlag& stop);
+
+// Showcase::data ("It learned from 299 models in 11 classes ..."), note, credits, camera and
+// examples of the test split: the truth of each shown view beside the prediction from the first.
+Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
+                             const ProgressSink& progress, const StopFlag& stop);
+
+// At most `count` models of the test split, spread over the classes: one of each class, then a
+// second of each, ...; where a round has more classes than are left to choose, evenly spaced ones.
+std::vector<int> ChooseModels(const Dataset& dataset, int count);
+
+// Which of `views` around a model are shown, kShownViews at most: the first at five sixths of the
+// circle, which sees models that face +z obliquely from the front; the others spread from there.
+std::vector<int> ShownViews(int views);
+
+}  // namespace tilegrad::train

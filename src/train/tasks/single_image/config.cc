@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/single_image/config.h"
+
+namespace tilegrad::train {
+
+ConfigFields FieldsOf(SingleImageConfig* c) {
+  return {
+      {"network.channels", &c->network.channels, 1, 4096,
+       "of the first convolution; then 2x and 4x"},
+      {"network.code", &c->network.code, 1, 65536, "width of the encoder's fully connected layers"},
+      {"network.hidden1", &c->network.hidden1, 1, 65536, "width of each decoder's first layer"},
+      {"network.hidden2", &c->network.hidden2, 1, 65536, "width of each decoder's second layer"},
+      {"network.template_level", &c->network.template_level, 0, 6,
+       "subdivisions of the icosahedron; 3: 642 vertices"},
+      {"network.template_radius", &c->network.template_radius, 1e-3, 10, "world units"},
+      {"network.fc_deviation", &c->network.fc_deviation, 0, 10,
+       "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
+      {"network.output_deviation", &c->network.output_deviation, 0, 10,
+       "the decoders' last weights start as N(0, this^2)"},
+      {"network.color_bias", &c->network.color_bias, -1, 2, "what vertex colours start at"},
+      {"loss.iou", &c->loss.iou, 0, kNoLimit, "weight of equation 12"},
+      {"loss.color", &c->loss.color, 0, kNoLimit, "weight of equation 13"},
+      {"loss.smoothness", &c->loss.smoothness, 0, kNoLimit,
+       "weight of the normal difference of neighbouring faces"},
+      {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
+       "weight of the Laplacian of the movement"},
+      {"render.sharpness", &c->render.sharpness, 1e-3, 1e9,
+       "1/delta of equation 5, per squared NDC unit"},
+      {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,
+       "at step 0; reaches sharpness geometrically at half of the run"},
+      {"render.max_alpha_error", &c->render.max_alpha_error, 0, 1, "bound on the error of alpha"},
+      {"optimizer.learning_rate", &c->optimizer.learning_rate, 0, 1, "of Adam"},
+      {"optimizer.final_factor", &c->optimizer.final_factor, 0, 1,
+       "share of the rate at the end (half cosine); 1: constant"},
+      {"optimizer.warmup", &c->optimizer.warmup, 0, kNoLimit, "steps of linear rise"},
+      {"optimizer.beta1", &c->optimizer.beta1, 0, 0.999999, "of Adam"},
+      {"optimizer.beta2", &c->optimizer.beta2, 0, 0.99999999, "of Adam"},
+      {"schedule.batch", &c->batch, 2, 65536, "objects a step; batch norm needs two"},
+      {"schedule.views", &c->views, 1, 64, "rendered per object: its own view and random others"},
+  };
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys of `task.kind = "single_image"`. What each does: config.cc, one line a key.
+#pragma once
+
+#include "train/models/mesh_network.h"
+#include "train/run/schedule.h"
+
+namespace tilegrad::train {
+
+// Weights of equation 14.
+struct LossConfig {
+  double iou = 1.0;
+  double color = 1.0;
+  double smoothness = 0.001;
+  double laplacian = 0.01;
+};
+
+struct RenderConfig {
+  double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
+  double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
+                                  // run: a wide band first
+  double max_alpha_error = 1e-5;
+};
+
+struct OptimizerConfig {
+  double learning_rate = 1e-4;
+  // The rate falls to this share by a half cosine over the run; 1: constant.
+  double final_factor = 1.0;
+  std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
+  double beta1 = 0.9;
+  double beta2 = 0.999;
+};
+
+struct SingleImageConfig {
+  NetworkConfig network;
+  LossConfig loss;
+  RenderConfig render;
+  OptimizerConfig optimizer;
+  std::int64_t batch = 64;  // objects a step
+  std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
+  Schedule schedule;        // of the run; no keys of the task
+};
+
+ConfigFields FieldsOf(SingleImageConfig* config);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/single_image/model.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "nn/nn.h"
+
+namespace tilegrad::train {
+namespace {
+
+class SingleImageModel : public Model {
+ public:
+  SingleImageModel(nn::Context& context, const NetworkConfig& config, int image_size)
+      : context_(context),
+        image_size_(image_size),
+        network_(context, config, image_size, /*seed=*/0),
+        template_(network_.template_mesh()) {}
+
+  Status Load(const std::vector<nn::NamedTensor>& state) {
+    TILEGRAD_TRY(context_.TakeStatus());
+    TILEGRAD_TRY(nn::LoadState(network_.module(), state));
+    parameters_ = nn::CountParameters(network_.module());
+    return NormalizeToBox(template_, kPredictionHalfExtent);
+  }
+
+  std::int64_t parameters() const override { return parameters_; }
+  const Mesh& template_mesh() const override { return template_; }
+  Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
+
+ private:
+  Mesh MeshOf(const float* positions, const float* colors) const;
+
+  nn::Context& context_;
+  int image_size_;
+  MeshNetwork network_;
+  Mesh template_;
+  std::int64_t parameters_ = 0;
+};
+
+Mesh SingleImageModel::MeshOf(const float* p, const float* c) const {
+  const auto unit = [](float x) { return std::clamp(x, 0.0f, 1.0f); };
+  Mesh mesh;
+  mesh.faces = template_.faces;
+  for (std::size_t v = 0; v < template_.positions.size(); ++v, p += 3, c += 3) {
+    mesh.positions.emplace_back(p[0], p[1], p[2]);
+    mesh.colors.emplace_back(unit(c[0]), unit(c[1]), unit(c[2]), 1.0f);
+  }
+  return mesh;
+}
+
+Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
+  const nn::NoGrad off(context_);
+  const std::size_t bytes = 4 * static_cast<std::size_t>(image_size_ * image_size_);
+  const std::size_t count = images.size() / bytes;
+  nn::Tensor input =
+      context_.Empty({static_cast<std::int64_t>(count), 4, image_size_, image_size_});
+  std::transform(images.begin(), images.end(), input.data<float>(),
+                 [](std::uint8_t b) { return static_cast<float>(b) / 255; });
+  const PredictedMeshes predicted =
+      network_.Forward(nn::Constant(context_, std::move(input)), nn::Mode::kEval);
+  TILEGRAD_TRY(context_.TakeStatus());
+  const std::size_t numbers = 3 * template_.positions.size();  // of a mesh
+  for (std::size_t i = 0; i < count; ++i) {
+    Mesh mesh = MeshOf(predicted.positions.value().data<float>() + i * numbers,
+                       predicted.colors.value().data<float>() + i * numbers);
+    if (const Status valid = Validate(mesh); !valid.ok())
+      return InternalError("the prediction is broken: {}", valid.message());
+    meshes->push_back(std::move(mesh));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Model>> LoadSingleImageModel(nn::Context& context,
+                                                    const NetworkConfig& config,
+                                                    const Checkpoint& checkpoint) {
+  const std::int64_t size = checkpoint.info.image_size;
+  if (size % 8 != 0) return DataLoss("image size {} is not possible", size);
+  auto model = std::make_unique<SingleImageModel>(context, config, static_cast<int>(size));
+  TILEGRAD_TRY(model->Load(checkpoint.tensors));
+  return std::unique_ptr<Model>(std::move(model));
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/single_image/task.h"
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/data/trained_models.h"
+#include "train/tasks/held_out.h"
+#include "train/tasks/single_image/model.h"
+#include "train/tasks/single_image/sample_images.h"
+#include "train/tasks/single_image/step.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::size_t kSampleRows = 8;
+
+class SingleImageTask : public Task {
+ public:
+  ConfigFields Fields() override { return FieldsOf(&config_); }
+  std::vector<TermLabel> Labels() const override {
+    return {{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
+            {"color", "Colour loss (mean L1)"},
+            {"smoothness", "Smoothness (normals of neighbouring faces)"},
+            {"laplacian", "Laplacian of the movement"}};
+  }
+
+  Status Start(const TaskStart& start) override;
+  int image_size() const override { return train_.size; }
+  RunHeader Header() override;
+  Status Begin(const Path& run, std::int64_t first_step) override {
+    return RememberTrainedModels(run, *dataset_,
+                                 first_step == 0 ? RunStart::kNew : RunStart::kContinued);
+  }
+
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
+    return step_->Update(gradients, at.step);
+  }
+
+  std::vector<nn::NamedTensor> State() override;
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+  Result<ImageU8> SamplePicture(std::int64_t steps) override {
+    if (samples_.empty()) return ImageU8();
+    return SampleSheet(*context_, *step_, held_out_, samples_, steps);
+  }
+
+  Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                           const Checkpoint& checkpoint) override {
+    return LoadSingleImageModel(context, config_.network, checkpoint);
+  }
+  Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                              const ProgressSink& progress, const StopFlag& stop) override {
+    return EvaluateOnDataset(job, workers, progress, stop);
+  }
+  Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
+                        const ProgressSink& progress, const StopFlag& stop) override;
+
+ private:
+  Status CheckDataset() const;
+  Status LoadImages(const TaskStart& start);
+
+  SingleImageConfig config_;
+  nn::Context* context_ = nullptr;
+  std::optional<Dataset> dataset_;
+  ImageStore train_, held_out_;
+  std::vector<Sample> samples_;  // of held_out_, for pictures
+  std::optional<TrainStep> step_;
+  std::optional<BatchOrder> order_;
+};
+
+Status SingleImageTask::Start(const TaskStart& start) {
+  context_ = &start.context;
+  config_.schedule = start.schedule;
+  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(CheckDataset());
+  TILEGRAD_TRY(LoadImages(start));
+  step_.emplace(*context_, config_, train_.size);
+  order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed));
+  return {};
+}
+
+Status SingleImageTask::CheckDataset() const {
+  const std::string folder = dataset_->folder().string();
+  const DatasetInfo& info = dataset_->info();
+  if (dataset_->Select(Split::kTrain).empty())
+    return InvalidArgument("{}: no training models in it", folder);
+  if (config_.views > info.views) {
+    return InvalidArgument("schedule.views is {}, but the dataset has {} views a model",
+                           config_.views, info.views);
+  }
+  if (info.image_size % 8 != 0) {
+    return InvalidArgument("{}: images are {} pixels a side; the network needs a multiple of 8",
+                           folder, info.image_size);
+  }
+  return {};
+}
+
+Status SingleImageTask::LoadImages(const TaskStart& start) {
+  std::vector<int> test = dataset_->Select(Split::kTest);
+  // The pictures show models spread over the held-out ones, which stand in the order of their
+  // classes.
+  if (test.size() > kSampleRows) {
+    for (std::size_t i = 0; i < kSampleRows; ++i) test[i] = test[i * test.size() / kSampleRows];
+    test.resize(kSampleRows);
+  }
+  const Workers& workers = start.context.workers();
+  TILEGRAD_ASSIGN(train_, LoadImageStore(*dataset_, dataset_->Select(Split::kTrain), workers,
+                                         start.progress, start.stop));
+  TILEGRAD_ASSIGN(held_out_, LoadImageStore(*dataset_, test, workers, start.progress, start.stop));
+  for (int m = 0; m < held_out_.models; ++m) samples_.push_back({m, ShownViews(held_out_.views)});
+  return {};
+}
+
+RunHeader SingleImageTask::Header() {
+  RunHeader header;
+  header.dataset_source = dataset_->info().source;
+  header.training_models = train_.models;
+  header.parameters = nn::CountParameters(step_->network().module());
+  return header;
+}
+
+Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex& at,
+                                                               StepValues* out) {
+  const auto batch =
+      order_->Batch(at.step, static_cast<int>(config_.batch), static_cast<int>(config_.views));
+  LossValues values;
+  TILEGRAD_ASSIGN(auto gradients,
+                  step_->Backward(GatherBatch(*context_, train_, batch), at.step, &values));
+  out->loss = values.total;
+  step_->AddTerms(values, &out->terms);
+  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
+  out->also.emplace_back("epoch", seen / train_.models);
+  out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));
+  out->images = config_.batch;
+  return gradients;
+}
+
+std::vector<nn::NamedTensor> SingleImageTask::State() {
+  std::vector<nn::NamedTensor> tensors = nn::State(step_->network().module());
+  const std::vector<nn::NamedTensor> moments = step_->adam().State();
+  tensors.insert(tensors.end(), moments.begin(), moments.end());
+  return tensors;
+}
+
+Status SingleImageTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
+  TILEGRAD_TRY(nn::LoadState(step_->network().module(), state));
+  TILEGRAD_TRY(step_->adam().LoadState(state));
+  if (step_->adam().steps() == steps) return {};
+  return InvalidArgument("the optimizer has taken {} steps, the run {}", step_->adam().steps(),
+                         steps);
+}
+
+Result<Showcase> SingleImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
+                                       const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(Showcase out, ShowHeldOut(request, workers, progress, stop));
+  out.purpose = "to predict shape and colour of an object from one image";
+  out.data += " It saw only rendered views, no 3D data.";
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Task> MakeSingleImageTask() { return std::make_unique<SingleImageTask>(); }
+
+}  // namespace tilegrad::train

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a task is to the rest of the program: its configuration, its steps, its state, its
+// predictions, its scores and what a report shows. Training, eval, predict and report know tasks
+// through this file only. How to add one: docs/adding/task.md.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "nn/tape.h"
+#include "scene/image.h"
+#include "scene/mesh.h"
+#include "train/eval/evaluation.h"
+#include "train/run/checkpoint.h"
+#include "train/run/config_fields.h"
+#include "train/run/header.h"
+#include "train/run/schedule.h"
+#include "train/run/step_values.h"
+
+namespace tilegrad::train {
+
+class Predictor;
+
+// What a task starts training with.
+struct TaskStart {
+  nn::Context& context;  // outlives the task
+  Schedule schedule;
+  Path data;  // dataset folder
+  const ProgressSink& progress;
+  const StopFlag& stop;
+};
+
+// A step is one or more updates, each of some parameters: a task with an adversary takes several of
+// its critic and one of its generator.
+struct UpdateIndex {
+  std::int64_t step = 0;  // from 0
+  int update = 0;         // of the step, from 0
+};
+
+// A trained network as a predictor uses it: images in, meshes out.
+class Model {
+ public:
+  virtual ~Model() = default;
+  virtual std::int64_t parameters() const = 0;
+  // What it predicts before it has learned anything, normalised as predictions are.
+  virtual const Mesh& template_mesh() const = 0;
+  // images: [N][4][size][size] planar RGBA bytes, RGB over black, of the size it was trained on;
+  // N at most kImagesAtOnce. Appends N valid meshes.
+  virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) = 0;
+
+  static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
+};
+
+struct TaskEvaluation {
+  Path run, data;
+  const Predictor& predictor;
+  bool training_models = false;  // scores what it was trained on instead of what it never saw
+  int views_per_model = 24;
+};
+
+// A picture of a report.
+struct Picture {
+  ImageU8 image;
+  std::string caption, alt;
+};
+
+// One object that a report shows: pictures in a row, and up to two meshes to turn.
+struct Example {
+  std::string name, class_name, id;  // class_name and id: of its score in Evaluation::models
+  std::string creator, license;      // empty where unknown
+  Mesh prediction, truth;            // without faces: none
+  std::vector<Picture> pictures;     // the first is what the network sees
+};
+
+struct ShowcaseRequest {
+  Path run, data;
+  const RunHeader& header;
+  const Predictor& predictor;
+  int examples = 8;
+};
+
+// What a report shows of a run, as plain text, images and meshes.
+struct Showcase {
+  std::string purpose;  // "to predict shape and colour of an object from one image"
+  std::string data;     // sentences: what it was trained on
+  std::string note;     // sentences: what the pictures are
+  std::vector<std::string> credits;
+  std::vector<Example> examples;
+  double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the view on meshes; degrees
+};
+
+struct TermLabel {
+  const char* name;  // in metrics.jsonl
+  const char* label;
+};
+
+class Task {
+ public:
+  virtual ~Task() = default;
+
+  // Its keys. They point into the task, which is made with their defaults.
+  virtual ConfigFields Fields() = 0;
+  // What people read for the names in its log; other names stand for themselves.
+  virtual std::vector<TermLabel> Labels() const = 0;
+
+  // ---- Training. Start comes first, once, when the fields have their values.
+
+  // Opens the data and builds networks and optimisers; all that is random follows from the seed.
+  virtual Status Start(const TaskStart& start) = 0;
+  // Side of its images in pixels; a run continues with the same.
+  virtual int image_size() const = 0;
+  virtual RunHeader Header() = 0;  // without name, dataset folder and machine
+  // Files of its own in the run's folder; an error if a run cannot continue with what is there now.
+  virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
+
+  virtual int Updates(std::int64_t /*step*/) const { return 1; }
+  // The loss of an update and the gradients of what it moves. Adds to `values`. A loss or gradient
+  // that is not finite is an error. Nothing is changed that a later step would notice, but running
+  // statistics of batch norm.
+  virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
+                                                        StepValues* values) = 0;
+  // Steps along `gradients`, of which the caller may have made sums over processes.
+  virtual Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) = 0;
+
+  // Everything that later steps depend on, under unique names: weights, statistics, moments of each
+  // optimiser, moving averages.
+  virtual std::vector<nn::NamedTensor> State() = 0;
+  virtual Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) = 0;
+
+  // What the networks do after `steps` steps, in one picture; an empty one if there is nothing to
+  // show.
+  virtual Result<ImageU8> SamplePicture(std::int64_t steps) = 0;
+
+  // ---- Afterwards. Start was not called; the fields have their values.
+
+  virtual Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                                   const Checkpoint& checkpoint) = 0;
+  // kCancelled when `stop` is set.
+  virtual Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                                      const ProgressSink& progress, const StopFlag& stop) = 0;
+  virtual Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
+                                const ProgressSink& progress, const StopFlag& stop) = 0;
+};
+
+}  // namespace tilegrad::train
