@@ -18,8 +18,9 @@ NAMES_IN_FILE = re.compile(r"`([\w./-]+\.(?:h|cc|py))`: ((?:`\w+`(?:, )?)+)")
 COMMENT = re.compile(r"(?://|#).*")
 # Of other projects, or written by the program.
 FOREIGN = {"app.cc"}
-# Names that stand for any: x.h, x_ref.h; and softras, the example of how to add an alpha rule.
-ANY = re.compile(r"(.*/)?(x|softras)(_ref|-inl|_test|_bench)?\.(h|cc)")
+# Names that stand for any: x.h, x_ref.h; and mine and softras, the
+# examples of the pages on adding things.
+ANY = re.compile(r"(.*/)?((x|mine|softras)(_ref|-inl|_test|_bench)?|cmd_mine|mine/\w+)\.(h|cc)")
 REWRITTEN = ("src/render/", "tests/render/")  # moves with the rewriting of the renderer; then to be removed
 
 

@@ -31,21 +31,19 @@ VECTOR_BODY = "one vector body: its helpers share register types and are inlined
 REWRITTEN = "part of code that is being rewritten"
 KEYWORDS = "documents each keyword argument of a public class"
 LONG_FILES = {
-    "python/bindings/bind_deferred.cc": (339, REWRITTEN),
+    "python/bindings/compat/bind_nvdiffrast.cc": (342, "one binding a function of nvdiffrast's"),
     "python/tilegrad/_renderer.py": (326, KEYWORDS),
     "python/tilegrad/_scene.py": (311, KEYWORDS),
     "python/tilegrad/torch.py": (314, KEYWORDS),
-    "src/fit/run.cc": (312, REWRITTEN),
     "src/nn/kernels/conv2d/winograd_tiles-inl.h": (394, VECTOR_BODY),
     "src/raster/drawn_faces-inl.h": (399, VECTOR_BODY),
     "src/raster/soft_mask/gradient-inl.h": (404, VECTOR_BODY),
     "src/raster/visibility-inl.h": (364, VECTOR_BODY),
-    "src/render/pipeline/pipeline.cc": (349, REWRITTEN),
+    "src/render/pipeline/pipeline.cc": (357, REWRITTEN),
     "src/render/renderer_ref.h": (302, REWRITTEN),
     "src/render/shading/stage.cc": (338, REWRITTEN),
     "src/render/shading/validate.cc": (319, REWRITTEN),
     "src/shade/texture-inl.h": (330, VECTOR_BODY),
-    "src/train/trainer.cc": (302, REWRITTEN),
     "tests/python/test_kaolin.py": (535, "one class a function of Kaolin's, with shared inputs"),
 }
 

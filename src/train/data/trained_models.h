@@ -12,7 +12,7 @@
 namespace tilegrad::train {
 
 enum class RunStart {
-  kNew,      // no step is done yet
+  kNew,        // no step is done yet
   kContinued,  // from a checkpoint
 };
 
