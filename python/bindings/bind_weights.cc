@@ -102,19 +102,11 @@ void SaveNpz(const Path& path, const py::dict& dict) {
   ThrowIfError(WithoutGil([&] { return io::SaveNpz(path, arrays); }));
 }
 
-// A run folder's newest whole checkpoint, or one file.
-Result<train::FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return train::LoadNewestCheckpoint(context, path);
-  TILEGRAD_ASSIGN(train::Checkpoint checkpoint, train::LoadCheckpoint(context, path));
-  return train::FoundCheckpoint{std::move(checkpoint), path, {}, {}};
-}
-
 py::dict LoadCheckpoint(const Path& path) {
   const Workers workers(1);
   nn::Context context(workers);
   const train::FoundCheckpoint found =
-      ValueOrThrow(WithoutGil([&] { return FindCheckpoint(context, path); }));
+      ValueOrThrow(WithoutGil([&] { return train::FindCheckpoint(context, path); }));
   const train::CheckpointInfo& info = found.checkpoint.info;
   return py::dict(py::arg("file") = found.file, py::arg("step") = info.step,
                   py::arg("image_size") = info.image_size, py::arg("config") = Text(info.config),

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <sstream>
 #include <utility>
 
 #include "base/error.h"
@@ -67,9 +69,13 @@ class FitWork : public RunWork {
   FitWork(const FitJob& job, nn::Context& context, Fitter fitter)
       : job_(job), context_(context), fitter_(std::move(fitter)) {}
 
+  // All lines count; earlier versions wrote them in another order.
   Result<std::string> ResultSettings(const std::string& settings,
                                      const std::string& /*place*/) const override {
-    return settings;
+    std::istringstream text(settings);
+    std::set<std::string> lines;
+    for (std::string line; std::getline(text, line);) lines.insert(line);
+    return fmt::format("{}\n", fmt::join(lines, "\n"));
   }
   Status Begin(std::int64_t /*first_step*/) override { return {}; }
   Status Step(std::int64_t step, StepValues* values) override;

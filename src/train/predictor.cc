@@ -8,20 +8,6 @@
 #include "train/run/checkpoint.h"
 
 namespace tilegrad::train {
-namespace {
-
-// A run folder's newest whole checkpoint, or the one file.
-Result<Checkpoint> FindCheckpoint(nn::Context& context, const Path& path,
-                                  std::vector<std::string>* warnings) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(path, error)) return LoadCheckpoint(context, path);
-  TILEGRAD_ASSIGN(FoundCheckpoint found, LoadNewestCheckpoint(context, path));
-  *warnings = std::move(found.warnings);
-  return std::move(found.checkpoint);
-}
-
-}  // namespace
-
 struct Predictor::Impl {
   explicit Impl(const Workers& workers) : context(workers) {}
   nn::Context context;
@@ -40,13 +26,14 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   Predictor out;
   out.impl_ = std::make_unique<Impl>(workers);
   Impl& impl = *out.impl_;
-  TILEGRAD_ASSIGN(const Checkpoint checkpoint, FindCheckpoint(impl.context, path, &impl.warnings));
-  impl.info = checkpoint.info;
+  TILEGRAD_ASSIGN(FoundCheckpoint found, FindCheckpoint(impl.context, path));
+  impl.warnings = std::move(found.warnings);
+  impl.info = found.checkpoint.info;
   if (impl.info.image_size < 1 || impl.info.image_size > 4096)
     return DataLoss("{}: image size {} is not possible", path.string(), impl.info.image_size);
   TILEGRAD_ASSIGN(impl.config,
                   ParseConfig(impl.info.config, path.string() + ": its configuration"));
-  auto model = impl.config.task->LoadModel(impl.context, checkpoint);
+  auto model = impl.config.task->LoadModel(impl.context, found.checkpoint);
   if (!model.ok()) return model.status().Within(path.string());
   impl.model = std::move(model).value();
   return out;

@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "fit/make_views.h"
 #include "fit/transforms.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
+#include "nn/context.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
@@ -125,6 +127,24 @@ TEST_F(Fit, ResumingWithOtherSettingsNamesTheFirst) {
   ASSERT_TRUE(Run(job).ok());
   job.existing = ExistingRun::kContinue, job.config.smoothing = 3;
   ExpectMessage(Run(job).status(), "smoothing = 10", "smoothing = 3");
+}
+
+// As earlier versions wrote them.
+TEST_F(Fit, SettingsInAnotherOrderAreTheSame) {
+  FitJob job = Job("run");
+  ASSERT_TRUE(Run(job).ok());
+  const Workers workers(1);
+  nn::Context context(workers);
+  Checkpoint newest = LoadNewestCheckpoint(context, job.out)->checkpoint;
+  std::istringstream lines(newest.info.config);
+  newest.info.config.clear();
+  for (std::string line; std::getline(lines, line);)
+    newest.info.config = line + "\n" + newest.info.config;
+  ASSERT_TRUE(SaveCheckpoint(job.out, newest.info, std::move(newest.tensors)).ok());
+  job.existing = ExistingRun::kContinue;
+  const auto continued = Run(job);
+  ASSERT_TRUE(continued.ok()) << continued.status().message();
+  EXPECT_EQ(continued->first_step, job.config.steps);
 }
 
 TEST_F(Fit, ResumingWithOtherImagesIsRefused) {

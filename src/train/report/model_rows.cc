@@ -7,7 +7,7 @@
 namespace tilegrad::train {
 namespace {
 
-Result<std::string> FigureHtml(const Picture& picture) {
+Result<std::string> FigureHtml(const ShownPicture& picture) {
   TILEGRAD_ASSIGN(const std::string address, PngAddress(picture.image));
   return fmt::format(
       "<figure><img src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\"><figcaption>{}</figcaption>"
@@ -32,7 +32,7 @@ std::string ModelScoreHtml(const ReportFacts& facts, const Example& example) {
 Result<std::string> RowHtml(const ReportFacts& facts, std::size_t index) {
   const Example& example = facts.showcase.examples[index];
   std::string pictures;
-  for (const Picture& picture : example.pictures) {
+  for (const ShownPicture& picture : example.pictures) {
     TILEGRAD_ASSIGN(const std::string figure, FigureHtml(picture));
     pictures += figure;
   }

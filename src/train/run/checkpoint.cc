@@ -120,6 +120,13 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
   return first_failure;
 }
 
+Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return LoadNewestCheckpoint(context, path);
+  TILEGRAD_ASSIGN(Checkpoint checkpoint, LoadCheckpoint(context, path));
+  return FoundCheckpoint{std::move(checkpoint), path, {}, {}};
+}
+
 void SetAside(const std::vector<Path>& broken) {
   std::error_code error;
   for (const Path& file : broken) {

@@ -41,6 +41,9 @@ struct FoundCheckpoint {
 // there are only broken ones.
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
 
+// The newest one of a run's folder, or the one file that `path` is.
+Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path);
+
 // Renames files, "step_00000012.safetensors.broken", for whoever goes on from an older one: they
 // would count among those that are kept, and push out what is whole.
 void SetAside(const std::vector<Path>& broken);

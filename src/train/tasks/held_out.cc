@@ -32,7 +32,7 @@ int TurnTo(const DatasetInfo& info, int view) {
 }
 
 // The captions of a truth and of the prediction beside it.
-std::pair<Picture, Picture> Captions(const std::string& name, int turn, bool input) {
+std::pair<ShownPicture, ShownPicture> Captions(const std::string& name, int turn, bool input) {
   const std::string view = input ? "" : fmt::format(", camera turned by {}°", turn);
   return {{{},
            input ? "input" : fmt::format("truth, +{}°", turn),

@@ -64,17 +64,17 @@ struct TaskEvaluation {
 };
 
 // A picture of a report.
-struct Picture {
+struct ShownPicture {
   ImageU8 image;
   std::string caption, alt;
 };
 
 // One object that a report shows: pictures in a row, and up to two meshes to turn.
 struct Example {
-  std::string name, class_name, id;  // class_name and id: of its score in Evaluation::models
-  std::string creator, license;      // empty where unknown
-  Mesh prediction, truth;            // without faces: none
-  std::vector<Picture> pictures;     // the first is what the network sees
+  std::string name, class_name, id;    // class_name and id: of its score in Evaluation::models
+  std::string creator, license;        // empty where unknown
+  Mesh prediction, truth;              // without faces: none
+  std::vector<ShownPicture> pictures;  // the first is what the network sees
 };
 
 struct ShowcaseRequest {
@@ -119,9 +119,9 @@ class Task {
   virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
 
   virtual int Updates(std::int64_t /*step*/) const { return 1; }
-  // The loss of an update and the gradients of what it moves. Adds to `values`. A loss or gradient
-  // that is not finite is an error. Nothing is changed that a later step would notice, but running
-  // statistics of batch norm.
+  // The gradients of what an update moves. Sets values->loss and images, and appends terms. A loss
+  // or gradient that is not finite is an error. Changes nothing that a later step would notice, but
+  // running statistics of batch norm.
   virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
                                                         StepValues* values) = 0;
   // Steps along `gradients`, of which the caller may have made sums over processes.
