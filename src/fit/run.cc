@@ -156,7 +156,7 @@ Status Session::Show() {
   job.alpha = false;
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return io::SavePng(PictureOf(step_), OverWhite(renderer.frame(), 0));
+  return io::SavePng(PictureOf(step_), OverWhite(renderer.images(), 0));
 }
 
 Status Session::Run(const ProgressSink& progress, const StopFlag& stop, FitOutcome* outcome) {

@@ -18,7 +18,7 @@ struct PaperImage {
   std::vector<std::int32_t> ids;
   std::vector<raster::NdcFace<float>> faces;
 
-  PaperImage(const SceneView& scene, const RenderOptions& options) {
+  PaperImage(const PipelineScene& scene, const RenderOptions& options) {
     raster::Project(FaceSourceOf(scene, options), options.width, options.height, &buffers);
     mesh = buffers.View();
     for (std::size_t f = 0; f < mesh.faces(); ++f) {
@@ -30,7 +30,7 @@ struct PaperImage {
 };
 
 // Image n of the batch.
-PaperTile TileOf(const raster::PixelRect& rect, const Frame& frame, std::size_t n) {
+PaperTile TileOf(const raster::PixelRect& rect, const PipelineFrame& frame, std::size_t n) {
   return {rect, frame.width, frame.height,
           frame.face_ids.data() +
               n * static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height)};
@@ -48,8 +48,8 @@ void AddCamera(const Camera& b, Camera* a) {
   a->fx += b.fx, a->fy += b.fy, a->cx += b.cx, a->cy += b.cy;
 }
 
-void AddToScene(const SceneView& scene, const RenderOptions& options, const PaperImage& image,
-                std::span<const NearFacesT<float>> tiles, SceneGradients* d_scene) {
+void AddToScene(const PipelineScene& scene, const RenderOptions& options, const PaperImage& image,
+                std::span<const NearFacesT<float>> tiles, PipelineGradients* d_scene) {
   std::vector<float> d_x(image.mesh.vertices()), d_y(d_x.size()), d_z(d_x.size());
   for (const NearFacesT<float>& tile : tiles) {
     for (std::size_t n = 0; n < tile.source.size(); ++n) {
@@ -72,18 +72,18 @@ void AddToScene(const SceneView& scene, const RenderOptions& options, const Pape
   if (d_scene->camera) AddCamera(d_camera, &d_scene->d_camera);
 }
 
-std::vector<PaperImage> ProjectAll(std::span<const SceneView> scenes,
+std::vector<PaperImage> ProjectAll(std::span<const PipelineScene> scenes,
                                    const RenderOptions& options) {
   std::vector<PaperImage> images;
   images.reserve(scenes.size());
-  for (const SceneView& scene : scenes) images.emplace_back(scene, options);
+  for (const PipelineScene& scene : scenes) images.emplace_back(scene, options);
   return images;
 }
 
 }  // namespace
 
-void PaperAlpha(std::span<const SceneView> scenes, const RenderOptions& options,
-                const Workers& workers, Frame* frame) {
+void PaperAlpha(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                const Workers& workers, PipelineFrame* frame) {
   const auto images = ProjectAll(scenes, options);
   const raster::SquareGrid grid = raster::TileGrid(options.width, options.height);
   std::fill(frame->alpha.begin(), frame->alpha.end(), 1.0f);
@@ -92,14 +92,14 @@ void PaperAlpha(std::span<const SceneView> scenes, const RenderOptions& options,
   workers.For(scenes.size() * grid.cells(), [&](std::size_t task, std::size_t) {
     const std::size_t n = task / grid.cells();
     const raster::PixelRect rect = grid.rect(task % grid.cells());
-    PaperTileAlpha(FacesNearTile(images[n], rect, options.paper.box), PaperRuleOf(options),
+    PaperTileAlpha(FacesNearTile(images[n], rect, options.paper_box), PaperRuleOf(options),
                    TileOf(rect, *frame, n), frame->alpha.data() + n * pixels);
   });
 }
 
-void PaperAlphaBackward(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const Workers& workers, const Frame& frame, std::span<const float> d_alpha,
-                        std::span<SceneGradients> d_scenes) {
+void PaperAlphaBackward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                        const Workers& workers, const PipelineFrame& frame,
+                        std::span<const float> d_alpha, std::span<PipelineGradients> d_scenes) {
   const auto images = ProjectAll(scenes, options);
   const raster::SquareGrid grid = raster::TileGrid(options.width, options.height);
   std::vector<NearFacesT<float>> tiles(scenes.size() * grid.cells());
@@ -109,7 +109,7 @@ void PaperAlphaBackward(std::span<const SceneView> scenes, const RenderOptions& 
     const std::size_t n = task / grid.cells();
     const raster::PixelRect rect = grid.rect(task % grid.cells());
     tiles[task] =
-        PaperTileBackward(FacesNearTile(images[n], rect, options.paper.box), PaperRuleOf(options),
+        PaperTileBackward(FacesNearTile(images[n], rect, options.paper_box), PaperRuleOf(options),
                           TileOf(rect, frame, n), d_alpha.data() + n * pixels);
   });
   workers.For(scenes.size(), [&](std::size_t n, std::size_t) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alpha by the rule of the paper's implementations (SoftRule::kPaper), forward and backward: for
+// Alpha by the rule of the paper's implementations (AlphaRule::kPaper), forward and backward: for
 // comparisons, so scalar code. Independent of the renderer's own soft mask.
 #pragma once
 
@@ -12,7 +12,7 @@
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask/paper_ref.h"
 #include "render/alpha/paper_tile.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -22,8 +22,8 @@ inline double InverseDelta(double delta) { return std::min(1 / delta, 1e30); }
 
 inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
   return {.inverse_delta = InverseDelta(options.delta),
-          .box = options.paper.box,
-          .max_faces = options.paper.max_faces};
+          .box = options.paper_box,
+          .max_faces = options.paper_faces};
 }
 
 template <class T>
@@ -37,12 +37,12 @@ raster::NdcFace<T> NdcFaceOf(const raster::ScreenMeshT<T>& mesh, std::size_t fac
 }
 
 // Fills frame->alpha [N,H,W], given frame->face_ids. `scenes` are valid.
-void PaperAlpha(std::span<const SceneView> scenes, const RenderOptions& options,
-                const Workers& workers, Frame* frame);
+void PaperAlpha(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                const Workers& workers, PipelineFrame* frame);
 
 // Adds the gradient of alpha to positions and cameras. d_alpha [N,H,W].
-void PaperAlphaBackward(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const Workers& workers, const Frame& frame, std::span<const float> d_alpha,
-                        std::span<SceneGradients> d_scenes);
+void PaperAlphaBackward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                        const Workers& workers, const PipelineFrame& frame,
+                        std::span<const float> d_alpha, std::span<PipelineGradients> d_scenes);
 
 }  // namespace tilegrad

@@ -17,8 +17,9 @@
 #include "raster/screen_mesh.h"
 #include "raster/soft_mask/soft_mask.h"
 #include "raster/visibility.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 #include "render/pipeline/topologies.h"
+#include "render/pipeline/work.h"
 
 namespace tilegrad {
 

@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -27,8 +27,8 @@ struct BandGrid {
 // What a task of the backward pass reads.
 struct BackwardInput {
   const RenderOptions& options;
-  const Frame& frame;
-  const FrameGradients& d_frame;
+  const PipelineFrame& frame;
+  const PipelineCotangents& d_frame;
   PixelStage* stage;  // null: cotangents of attributes are images themselves
 };
 

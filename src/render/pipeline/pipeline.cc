@@ -24,18 +24,18 @@ namespace {
 
 // A call of Render or Backward.
 struct ForwardCall {
-  std::span<const SceneView> scenes;
+  std::span<const PipelineScene> scenes;
   const RenderOptions& options;
   PrepareRequest request;
-  Frame* frame;
+  PipelineFrame* frame;
   PixelStage* stage;
 };
 
 struct BackwardCall {
-  std::span<const SceneView> scenes;
+  std::span<const PipelineScene> scenes;
   BackwardInput input;
   PrepareRequest request;
-  std::span<SceneGradients> d_scenes;
+  std::span<PipelineGradients> d_scenes;
   raster::SquareGrid grid;  // of bins
   std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
 
@@ -61,7 +61,7 @@ Status FindError(const BackwardCall& call) {
 // How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
 // cache of its worker from beginning to end; so are larger ones as long as there are enough of them
 // for all workers, who share the parts of the last ones.
-struct Renderer::Impl {
+struct Pipeline::Impl {
   explicit Impl(const Workers& w)
       : workers(&w), worker_scratch(static_cast<std::size_t>(w.count())) {
     for (std::size_t i = 0; i < worker_scratch.size(); ++i) worker_scratch[i].index = i;
@@ -70,8 +70,8 @@ struct Renderer::Impl {
   Status Render(const ForwardCall& call);
   Status Backward(const BackwardCall& call);
 
-  bool Prepare(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
-               std::size_t n, WorkerScratch* worker);
+  bool Prepare(const PipelineScene& scene, const RenderOptions& options,
+               const PrepareRequest& request, std::size_t n, WorkerScratch* worker);
   void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
   void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
   void RenderOneBin(const ForwardCall& call, const BinTask& bin, WorkerScratch* worker);
@@ -79,7 +79,7 @@ struct Renderer::Impl {
   void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
   void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
-                SceneGradients* d_scene);
+                PipelineGradients* d_scene);
   void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
                     BandGradients* out);
@@ -87,7 +87,7 @@ struct Renderer::Impl {
                    BinGradients* out);
 
   // Returns whether the indices of all scenes are in range.
-  bool Begin(std::span<const SceneView> scenes) {
+  bool Begin(std::span<const PipelineScene> scenes) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
     for (WorkerScratch& worker : worker_scratch) {
@@ -110,7 +110,7 @@ struct Renderer::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& options,
+bool Pipeline::Impl::Prepare(const PipelineScene& scene, const RenderOptions& options,
                              const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
   StageClock clock;
   const bool done = PrepareImage({scene, topologies.of(n)}, options, request, *workers, &images[n],
@@ -120,7 +120,7 @@ bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& option
   return done;
 }
 
-void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
+void Pipeline::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
   bin_errors[bin.image * bins + bin.bin] =
@@ -129,7 +129,7 @@ void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
 }
 
 // The list of drawn faces, the largest thing of all, is the worker's, not the image's.
-void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
+void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
@@ -142,7 +142,7 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
   std::swap(image.drawn_buffers, worker->drawn_buffers);
 }
 
-void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
+void Pipeline::Impl::RenderImage(const ForwardCall& call, std::size_t n,
                                  const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
   if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
@@ -152,7 +152,7 @@ void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
   });
 }
 
-Status Renderer::Impl::Render(const ForwardCall& call) {
+Status Pipeline::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
   if (!Begin(call.scenes)) return ValidateSceneNumbers(call.scenes);
@@ -172,14 +172,14 @@ Status Renderer::Impl::Render(const ForwardCall& call) {
   return {};
 }
 
-void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
+void Pipeline::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
                                   WorkerScratch* worker, BandGradients* out) {
   const ImageScratch& image = images[task.image];
   Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
                              worker, out));
 }
 
-void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
+void Pipeline::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
                                  WorkerScratch* worker, BinGradients* out) {
   if (!call.wants_geometry(n)) return;
   StageClock clock;
@@ -187,10 +187,10 @@ void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::s
   clock.Lap(&worker->times.alpha);
 }
 
-void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
+void Pipeline::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
-  const SceneView& scene = call.scenes[n];
+  const PipelineScene& scene = call.scenes[n];
   if (!Prepare(scene, call.input.options, call.request, n, worker)) return;
   PrepareRecomputed(call.input.stage, scene, n, &image);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
@@ -198,7 +198,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
   const ImageGradients gradients{{&worker->band_gradients, 1},
                                  {&worker->bin_gradients, call.bins},
                                  call.request_of(n, image.mesh)};
-  SceneGradients* d_scene = &call.d_scenes[n];
+  PipelineGradients* d_scene = &call.d_scenes[n];
   AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
   StageClock clock;
   if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
@@ -208,7 +208,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
 }
 
 // Bands and bins together.
-void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
+void Pipeline::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
                                    const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
   if (!Prepare(call.scenes[n], call.input.options, call.request, n, own)) return;
@@ -227,8 +227,8 @@ void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
 }
 
 // Three sums that can be made at once, for the sake of a batch of one: the longest first.
-void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
-                              const Workers::Part& part, SceneGradients* d_scene) {
+void Pipeline::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
+                              const Workers::Part& part, PipelineGradients* d_scene) {
   ImageScratch& image = images[n];
   const bool geometry = gradients.request.geometry;
   part.For(3, [&](std::size_t i, std::size_t w) {
@@ -244,10 +244,10 @@ void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
   });
 }
 
-void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+void Pipeline::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
   ImageScratch& image = images[n];
   WorkerScratch* const worker = &worker_scratch[part.worker()];
-  SceneGradients* const d_scene = &call.d_scenes[n];
+  PipelineGradients* const d_scene = &call.d_scenes[n];
   const ImageGradients gradients{std::span(band_gradients).subspan(n * call.bands, call.bands),
                                  std::span(bin_gradients).subspan(n * call.bins, call.bins),
                                  call.request_of(n, image.mesh)};
@@ -262,7 +262,7 @@ void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
   clock.Lap(&worker->times.merge);
 }
 
-Status Renderer::Impl::Backward(const BackwardCall& call) {
+Status Pipeline::Impl::Backward(const BackwardCall& call) {
   if (!Begin(call.scenes)) return FindError(call);
   const std::size_t count = call.scenes.size();
   if (call.grid.cells() == 1 && call.bands == 1) {
@@ -278,19 +278,19 @@ Status Renderer::Impl::Backward(const BackwardCall& call) {
   return sound ? Status() : FindError(call);
 }
 
-Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
-Renderer::~Renderer() = default;
-Renderer::Renderer(Renderer&&) noexcept = default;
-Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Pipeline::Pipeline(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
+Pipeline::~Pipeline() = default;
+Pipeline::Pipeline(Pipeline&&) noexcept = default;
+Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
-Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const RenderRequest& request, Frame* frame, PixelStage* stage) {
+Status Pipeline::Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                        const Outputs& request, PipelineFrame* frame, PixelStage* stage) {
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  frame->transmittance.resize(options.soft_rule == SoftRule::kAllFaces ? frame->alpha.size() : 0);
-  if (options.soft_rule == SoftRule::kAllFaces || !request.alpha) {
+  frame->transmittance.resize(options.alpha_rule == AlphaRule::kAllFaces ? frame->alpha.size() : 0);
+  if (options.alpha_rule == AlphaRule::kAllFaces || !request.alpha) {
     return impl_->Render({scenes, options, {true, request.alpha, false}, frame, stage});
   }
   AlignedVector<float> alpha;  // kept away from the tiles
@@ -302,15 +302,15 @@ Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& 
   return {};
 }
 
-Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
-                          const Frame& frame, const FrameGradients& d_frame,
-                          std::span<SceneGradients> d_scenes, PixelStage* stage) {
+Status Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                          const PipelineFrame& frame, const PipelineCotangents& d_frame,
+                          std::span<PipelineGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
-  const bool paper = options.soft_rule == SoftRule::kPaper && !d_frame.alpha.empty();
+  const bool paper = options.alpha_rule == AlphaRule::kPaper && !d_frame.alpha.empty();
   const bool alpha = !d_frame.alpha.empty() && !paper;
-  const FrameGradients d_parts{d_frame.attributes,
-                               alpha ? d_frame.alpha : std::span<const float>()};
+  const PipelineCotangents d_parts{d_frame.attributes,
+                                   alpha ? d_frame.alpha : std::span<const float>()};
   const Status status = impl_->Backward({scenes,
                                          {options, frame, d_parts, stage},
                                          {false, alpha, true},
@@ -324,7 +324,7 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
   return ValidateResult(d_scenes);
 }
 
-RenderStats Renderer::stats() const {
+RenderStats Pipeline::stats() const {
   RenderStats sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
@@ -335,7 +335,7 @@ RenderStats Renderer::stats() const {
   return sum;
 }
 
-RenderTimes Renderer::times() const {
+RenderTimes Pipeline::times() const {
   RenderTimes sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     const RenderTimes& t = worker.times;
