@@ -67,7 +67,7 @@ BenchBatch::BenchBatch(const SceneSpec& spec) {
     d_colors.emplace_back(colors.size());
   }
   for (std::size_t n = 0; n < positions.size(); ++n) {
-    scenes.push_back({positions[n], faces, colors, 3, AttributeRate::kVertex, camera});
+    scenes.push_back({positions[n], faces, colors, 3, Rate::kVertex, camera});
     d_scenes.push_back({d_positions[n], d_colors[n], false, {}});
   }
   const std::size_t pixels = static_cast<std::size_t>(spec.images) *
@@ -84,7 +84,7 @@ CulledBatch::CulledBatch(const BenchBatch& batch)
   const std::size_t n = batch.scenes.size();
   const auto pixels = static_cast<std::size_t>(o.width) * static_cast<std::size_t>(o.height);
   frames.resize(n);
-  for (const SceneView& scene : batch.scenes) {
+  for (const PipelineScene& scene : batch.scenes) {
     raster::ScreenMeshBuffers screen;
     raster::Project(FaceSourceOf(scene, o), o.width, o.height, &screen);
     std::vector<float>& xy = ndc.emplace_back();

@@ -34,10 +34,10 @@ struct BenchBatch {
   std::vector<std::int32_t> faces;
   std::vector<float> colors;
   std::vector<std::vector<float>> positions;  // per image
-  std::vector<SceneView> scenes;
+  std::vector<PipelineScene> scenes;
   std::vector<float> d_attributes, d_alpha;
   std::vector<std::vector<float>> d_positions, d_colors;
-  std::vector<SceneGradients> d_scenes;
+  std::vector<PipelineGradients> d_scenes;
 };
 
 // The same batch for the yardstick, which starts on the screen.

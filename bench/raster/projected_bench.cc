@@ -29,7 +29,7 @@ struct ProjectedBench {
   explicit ProjectedBench(const SceneSpec& spec) : batch(spec) {
     raster.size = mask.size = {spec.size, spec.size};
     mask.delta = batch.options.delta;
-    for (const SceneView& scene : batch.scenes) Append(scene, spec.size);
+    for (const PipelineScene& scene : batch.scenes) Append(scene, spec.size);
     const std::size_t pixels = compat::PixelCount(raster.size) * batch.scenes.size();
     features.assign(z.size() * kChannels, T(0.5)), d_features.resize(features.size());
     ids.resize(pixels), alpha.resize(pixels), d_alpha.assign(pixels, T(1));
@@ -60,7 +60,7 @@ struct ProjectedBench {
   bool failed = false;
 
  private:
-  void Append(const SceneView& scene, int size) {
+  void Append(const PipelineScene& scene, int size) {
     raster::ScreenMeshBuffers buffers;
     raster::Project(FaceSourceOf(scene, batch.options), size, size, &buffers);
     const raster::ScreenMesh screen = buffers.View();

@@ -26,10 +26,10 @@ BenchBatch MakeBatch(const RunSpec& spec) {
 
 CulledParts PartsOf(const RunSpec& spec) { return {spec.color, spec.alpha}; }
 
-RenderRequest RequestOf(const RunSpec& spec) { return {spec.color, spec.alpha, false, false}; }
+Outputs RequestOf(const RunSpec& spec) { return {.alpha = spec.alpha, .attributes = spec.color}; }
 
-FrameGradients CotangentsOf(const RunSpec& spec, const BenchBatch& batch) {
-  FrameGradients d_frame;
+PipelineCotangents CotangentsOf(const RunSpec& spec, const BenchBatch& batch) {
+  PipelineCotangents d_frame;
   if (spec.color) d_frame.attributes = batch.d_attributes;
   if (spec.alpha) d_frame.alpha = batch.d_alpha;
   return d_frame;
@@ -78,7 +78,7 @@ void SetCounters(benchmark::State& state, const RunSpec& spec, Direction directi
 }
 
 // What the last call of the renderer evaluated for alpha.
-void SetEvaluated(benchmark::State& state, const RunSpec& spec, const Renderer& renderer) {
+void SetEvaluated(benchmark::State& state, const RunSpec& spec, const Pipeline& renderer) {
   if (!spec.alpha) return;
   state.counters["evaluated_pairs"] = static_cast<double>(renderer.stats().pairs);
   state.counters["evaluated_exps"] = static_cast<double>(renderer.stats().powers);
@@ -87,9 +87,9 @@ void SetEvaluated(benchmark::State& state, const RunSpec& spec, const Renderer& 
 void Forward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const Workers workers(spec.workers);
-  Renderer renderer(workers);
-  Frame frame;
-  const RenderRequest request = RequestOf(spec);
+  Pipeline renderer(workers);
+  PipelineFrame frame;
+  const Outputs request = RequestOf(spec);
   // The first frame finds its memory: not what a steady state costs.
   Check(renderer.Render(batch.scenes, batch.options, request, &frame), state);
   for (auto _ : state) {
@@ -101,10 +101,10 @@ void Forward(benchmark::State& state, const RunSpec& spec) {
 void Backward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const Workers workers(spec.workers);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   Check(renderer.Render(batch.scenes, batch.options, {}, &frame), state);
-  const FrameGradients d_frame = CotangentsOf(spec, batch);
+  const PipelineCotangents d_frame = CotangentsOf(spec, batch);
   Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
   for (auto _ : state) {
     Check(renderer.Backward(batch.scenes, batch.options, frame, d_frame, batch.d_scenes), state);
@@ -127,7 +127,7 @@ void CulledBackwardRun(benchmark::State& state, const RunSpec& spec) {
 void NaiveForward(benchmark::State& state, const RunSpec& spec) {
   const BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
-  Frame frame;
+  PipelineFrame frame;
   for (auto _ : state) {
     const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
     RenderRefWithFaces<float>(batch.scenes[0], batch.options, RequestOf(spec), ids, rows, &frame);
@@ -138,7 +138,7 @@ void NaiveBackward(benchmark::State& state, const RunSpec& spec) {
   BenchBatch batch = MakeBatch(spec);
   const RowRange rows = SampleRows(spec.scene);
   const auto ids = FaceIdsRef(batch.scenes[0], batch.options, rows);
-  const FrameGradients d_frame = CotangentsOf(spec, batch);
+  const PipelineCotangents d_frame = CotangentsOf(spec, batch);
   for (auto _ : state) {
     RenderRefBackward<float>(batch.scenes[0], batch.options, ids, d_frame, rows,
                              &batch.d_scenes[0]);

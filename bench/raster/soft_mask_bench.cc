@@ -20,14 +20,14 @@ namespace {
 struct SoftBench {
   SoftBench(const SceneSpec& spec, double delta, double error) : batch(spec) {
     batch.options.delta = delta, batch.options.max_alpha_error = error;
-    const SceneView& scene = batch.scenes[0];
+    const PipelineScene& scene = batch.scenes[0];
     raster::Project(FaceSourceOf(scene, batch.options), spec.size, spec.size, &buffers);
     mesh = buffers.View();
     grid = raster::BinGrid(spec.size, spec.size);
     Workers one(1);
-    Renderer renderer(one);
+    Pipeline renderer(one);
     const Status status =
-        renderer.Render({&scene, 1}, batch.options, {false, false, false, false}, &frame);
+        renderer.Render({&scene, 1}, batch.options, {.alpha = false, .attributes = false}, &frame);
     failed = !status.ok();
     Build();
     alpha.resize(frame.face_ids.size()), transmittance.resize(alpha.size());
@@ -62,7 +62,7 @@ struct SoftBench {
   BenchBatch batch;
   raster::ScreenMeshBuffers buffers;
   raster::ScreenMesh mesh;
-  Frame frame;
+  PipelineFrame frame;
   bool failed = false;
   raster::SoftMaskPlan plan;
   raster::SquareGrid grid;

@@ -21,7 +21,7 @@ namespace {
 struct RequestSpec {
   const char* name;
   bool color = true, textured = false;
-  shade::Filter filter = shade::Filter::kBilinear;
+  Filter filter = Filter::kBilinear;
   Lighting lighting = Lighting::kNone;
 };
 
@@ -29,11 +29,11 @@ constexpr RequestSpec kRequests[] = {
     {"silhouette", false},
     {"color"},
     {"texture", true, true},
-    {"trilinear texture", true, true, shade::Filter::kTrilinear},
-    {"Lambert", true, false, shade::Filter::kBilinear, Lighting::kLambert},
-    {"Phong", true, false, shade::Filter::kBilinear, Lighting::kPhong},
-    {"harmonics", true, false, shade::Filter::kBilinear, Lighting::kSphericalHarmonics},
-    {"texture and Phong", true, true, shade::Filter::kBilinear, Lighting::kPhong},
+    {"trilinear texture", true, true, Filter::kTrilinear},
+    {"Lambert", true, false, Filter::kBilinear, Lighting::kLambert},
+    {"Phong", true, false, Filter::kBilinear, Lighting::kPhong},
+    {"harmonics", true, false, Filter::kBilinear, Lighting::kSphericalHarmonics},
+    {"texture and Phong", true, true, Filter::kBilinear, Lighting::kPhong},
 };
 
 constexpr int kTextureSize = 256;
@@ -48,7 +48,7 @@ class ShadedBatch {
     Rng rng(11, 2);
     Fill(2 * batch_.positions[0].size() / 3, &rng, &uvs_);
     Fill(3 * kTextureSize * kTextureSize, &rng, &texels_);
-    texture_ = {texels_, kTextureSize, kTextureSize, 3, shade::Wrap::kRepeat, request.filter};
+    texture_ = {texels_, kTextureSize, kTextureSize, Wrap::kRepeat, request.filter};
     d_texture_.resize(texels_.size()), d_uvs_.resize(uvs_.size());
     d_texture_views_ = {d_texture_};
     d_colors_.resize(batch_.colors.size());
@@ -58,9 +58,7 @@ class ShadedBatch {
   }
 
   Status Forward() { return renderer_.Render(scenes_, batch_.options, request_, &frame_); }
-  Status Backward() {
-    return renderer_.Backward(scenes_, batch_.options, frame_, d_frame_, d_scenes_);
-  }
+  Status Backward() { return renderer_.Backward(frame_, d_frame_, d_scenes_); }
 
  private:
   static void Fill(std::size_t count, Rng* rng, std::vector<float>* out) {
@@ -69,19 +67,19 @@ class ShadedBatch {
   }
 
   void AddScene(std::size_t n) {
-    ShadedScene scene;
-    static_cast<SceneView&>(scene) = batch_.scenes[n];
-    scene.attributes = {}, scene.channels = 0;
-    ShadedGradients d;
+    Scene scene;
+    const PipelineScene& mesh = batch_.scenes[n];
+    scene.positions = mesh.positions, scene.faces = mesh.faces, scene.camera = mesh.camera;
+    SceneGradients d;
     d.positions = batch_.d_positions[n];
     if (request_spec_.textured) {
-      scene.uvs = {uvs_, AttributeRate::kVertex}, scene.textures = {&texture_, 1};
+      scene.uvs = {uvs_, Rate::kVertex}, scene.textures = {&texture_, 1};
       d.uvs = d_uvs_, d.textures = d_texture_views_;
     } else if (request_spec_.color) {
-      scene.colors = {batch_.colors, AttributeRate::kVertex};
+      scene.colors = {batch_.colors, Rate::kVertex};
       d.colors = d_colors_;
     }
-    scene.model.lighting = request_spec_.lighting;
+    scene.shading.lighting = request_spec_.lighting;
     if (request_spec_.lighting == Lighting::kSphericalHarmonics) {
       scene.sh = sh_, d.sh = d_sh_;
     } else if (request_spec_.lighting != Lighting::kNone) {
@@ -92,21 +90,21 @@ class ShadedBatch {
 
   BenchBatch batch_;
   RequestSpec request_spec_;
-  ShadedRequest request_;
+  Outputs request_;
   std::vector<float> uvs_, texels_, d_uvs_, d_texture_, d_colors_;
-  shade::TextureView texture_;
+  Texture texture_;
   std::vector<std::span<float>> d_texture_views_;
   std::vector<float> sh_ = {1, 0.5f, 0.2f, 0.1f, 0.1f, 0.2f, 0.3f, 0.1f, 0.1f};
   std::vector<float> d_sh_ = std::vector<float>(9);
-  std::vector<shade::DirectionalLight> lights_ = {{{1, 1, 1}, 1}};
-  std::vector<shade::DirectionalLight> d_lights_ = {{}};
+  std::vector<Light> lights_ = {{{1, 1, 1}, 1}};
+  std::vector<Light> d_lights_ = {{}};
   std::vector<Surface> d_surfaces_ = std::vector<Surface>(1);
-  std::vector<ShadedScene> scenes_;
-  std::vector<ShadedGradients> d_scenes_;
-  ShadedFrameGradients d_frame_;
+  std::vector<Scene> scenes_;
+  std::vector<SceneGradients> d_scenes_;
+  FrameGradients d_frame_;
   Workers workers_{1};
-  ShadedRenderer renderer_{workers_};
-  ShadedFrame frame_;
+  Renderer renderer_ = RendererOn(workers_);
+  Frame frame_;
 };
 
 void Run(benchmark::State& state, const SceneSpec& scene, const RequestSpec& request,

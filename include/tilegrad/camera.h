@@ -7,7 +7,7 @@
 #include "tilegrad/abi.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::TILEGRAD_ABI {
+namespace tilegrad::inline v0 {
 
 // Pinhole camera: world to camera, then camera to pixels.
 //
@@ -34,8 +34,10 @@ using Camera = CameraT<float>;
 
 // The principal point is the middle of the image, pixels are square.
 struct Lens {
-  double fov_y = 49.13434207744484;  // degrees, the whole vertical field of view, (0, 180)
-  int width = 64, height = 64;       // pixels
+  // Degrees, the whole vertical field of view, (0, 180). Blender's default (f = 35/16 of half the
+  // image's height), with which the paper's images were rendered.
+  double fov_y = 49.13434207744484;
+  int width = 64, height = 64;  // pixels
 };
 
 // A camera at distance * (cos el cos az, sin el, cos el sin az) that looks at the origin, y up.
@@ -65,8 +67,8 @@ using CameraParameters = CameraParametersT<float>;
 template <class T = float>
 TILEGRAD_API CameraParametersT<T> ParametersOf(const CameraT<T>& camera);
 
-// Errors: a number that is not finite; rows so short or so nearly parallel that they give no
-// rotation; a focal length or near plane that is not positive.
+// Errors: a number that is not finite; rows so short (1e-6 of a unit) or so nearly parallel (1e-6
+// rad) that they give no rotation; a focal length or near plane that is not positive.
 template <class T = float>
 TILEGRAD_API Result<CameraT<T>> CameraFromParameters(const CameraParametersT<T>& parameters,
                                                      std::type_identity_t<T> near_plane = T(1e-2));
@@ -76,4 +78,4 @@ template <class T = float>
 TILEGRAD_API CameraParametersT<T> PullBack(const CameraParametersT<T>& parameters,
                                            const std::type_identity_t<CameraT<T>>& d_camera);
 
-}  // namespace tilegrad::TILEGRAD_ABI
+}  // namespace tilegrad::inline v0

@@ -16,49 +16,11 @@
 #include <span>
 
 #include "tilegrad/abi.h"
+#include "tilegrad/options.h"
 #include "tilegrad/scene.h"
 #include "tilegrad/status.h"
 
-namespace tilegrad::TILEGRAD_ABI {
-
-enum class Interpolation {
-  kPerspective,   // attributes are linear on the face in space: what a camera sees
-  kScreenLinear,  // linear on the screen: the implementation of the DIB-R paper
-};
-enum class FaceCulling {
-  kNone,
-  kBack,  // clockwise faces are not drawn, but take part in alpha
-};
-enum class AlphaRule {
-  kAllFaces,  // equation 6 of the paper over all faces, within max_alpha_error
-  // As the paper's implementations: faces whose box, grown by paper_box, holds the pixel, and of
-  // these the first paper_faces in the order of the mesh. No bound, slow: for comparisons.
-  kPaper,
-};
-
-struct RenderOptions {
-  int width = 64, height = 64;  // pixels, 1..16384; of all images of a call
-  // alpha = 1 - prod over faces (1 - exp(-d^2 / delta)), with d the distance to the face in NDC,
-  // in which the image spans [-1, 1] in each axis. > 0; larger is softer.
-  double delta = 1.0 / 7000;
-  double max_alpha_error = 1e-6;  // of alpha, absolute, [0, 1]; larger is faster, 0 drops nothing
-  Interpolation interpolation = Interpolation::kPerspective;
-  FaceCulling culling = FaceCulling::kNone;
-  AlphaRule alpha_rule = AlphaRule::kAllFaces;
-  double paper_box = 0.02;  // NDC, >= 0
-  int paper_faces = 30;     // >= 0
-};
-
-// Which images are wanted. What is not wanted is not computed and takes no memory.
-struct Outputs {
-  bool color = true;  // faces are white in a scene that has nothing to colour them by
-  bool alpha = true;
-  bool attributes = true;  // where the scene has them
-  bool depth = false;
-  bool normals = false;
-  bool uv = false;
-  bool barycentrics = false;
-};
+namespace tilegrad::inline v0 {
 
 // The images of N scenes: planar, row 0 on top. Empty where not wanted.
 template <class T>
@@ -86,6 +48,7 @@ struct FrameGradientsT {
 
 template <class T>
 class TILEGRAD_API RendererT;
+struct RendererAccess;  // of the library itself
 
 // The result of a Render: its images, the views of its scenes, and what Backward needs. The next
 // Render into it reuses its memory: rendering the same sizes again allocates nothing.
@@ -103,6 +66,7 @@ class TILEGRAD_API FrameT {
 
  private:
   friend class RendererT<T>;
+  friend struct RendererAccess;
   struct Impl;
   std::unique_ptr<Impl> impl_;
   ImagesT<T> images_;
@@ -149,6 +113,7 @@ class TILEGRAD_API RendererT {
                   GradientMode mode = GradientMode::kOverwrite);
 
  private:
+  friend struct RendererAccess;
   struct Impl;
   Status Start();
   void DropAfter(const Status& status);
@@ -167,4 +132,4 @@ extern template class FrameT<double>;
 extern template class RendererT<float>;
 extern template class RendererT<double>;
 
-}  // namespace tilegrad::TILEGRAD_ABI
+}  // namespace tilegrad::inline v0

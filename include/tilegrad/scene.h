@@ -14,7 +14,7 @@
 #include "tilegrad/abi.h"
 #include "tilegrad/camera.h"
 
-namespace tilegrad::TILEGRAD_ABI {
+namespace tilegrad::inline v0 {
 
 enum class Rate { kVertex, kCorner };
 
@@ -63,6 +63,7 @@ struct ShadingModel {
   Normals normals = Normals::kSmooth;
   bool two_sided = false;  // normals of faces that are seen from behind are turned
   bool clamp = false;      // colours to [0, 1]; what is beyond has no gradient
+  bool operator==(const ShadingModel&) const = default;
 };
 
 // colour = base_color * texture * vertex colour * (ambient + diffuse * light) + specular *
@@ -128,4 +129,4 @@ struct SceneGradientsT {
 };
 using SceneGradients = SceneGradientsT<float>;
 
-}  // namespace tilegrad::TILEGRAD_ABI
+}  // namespace tilegrad::inline v0

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tilegrad/camera.h"    // IWYU pragma: export
+#include "tilegrad/options.h"   // IWYU pragma: export
 #include "tilegrad/renderer.h"  // IWYU pragma: export
 #include "tilegrad/scene.h"     // IWYU pragma: export
 #include "tilegrad/status.h"    // IWYU pragma: export

@@ -85,9 +85,9 @@ ImageSize SizeOf(Size size) { return {size.first, size.second}; }
 
 // `size`: of the image. The lens is checked with a camera of the public interface.
 Lens LensOf(const char* function, double fov_y, Size size) {
-  const v0::Lens lens{fov_y, size.first, size.second};
-  ThrowIfError(v0::MakeCamera(lens, {}).status().Within(function));
-  return {lens.fov_y, lens.width, lens.height};
+  const Lens lens{fov_y, size.first, size.second};
+  ThrowIfError(MakeCamera(lens, {}).status().Within(function));
+  return lens;
 }
 
 py::array LookAt(double fov_y, Size size, const py::object& eyes, const py::object& targets,
@@ -110,8 +110,7 @@ py::array Orbit(double fov_y, Size size, const py::object& orbits) {
   const Rows<3> rows(function, "orbits", orbits);
   return MakeAll(function, rows.count(), [&](std::size_t i) -> Result<Camera64> {
     const auto [azimuth, elevation, distance] = rows[i];
-    TILEGRAD_TRY(v0::MakeCamera({}, {azimuth, elevation, distance}).status());
-    return OrbitCamera<double>(lens, azimuth, elevation, distance);
+    return MakeCamera<double>(lens, {azimuth, elevation, distance});
   });
 }
 

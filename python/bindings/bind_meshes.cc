@@ -43,10 +43,10 @@ constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};
 constexpr const char* kWraps[] = {"repeat", "clamp", "mirror"};
 constexpr const char* kFilters[] = {"nearest", "bilinear", "trilinear"};
 
-py::object Stream(const AttributeStreamT<float>& stream, py::ssize_t channels) {
+py::object StreamArray(const StreamT<float>& stream, py::ssize_t channels) {
   if (stream.values.empty()) return py::none();
   const auto count = static_cast<py::ssize_t>(stream.values.size()) / channels;
-  if (stream.rate == AttributeRate::kVertex) return CopyOf(stream.values, {count, channels});
+  if (stream.rate == Rate::kVertex) return CopyOf(stream.values, {count, channels});
   return CopyOf(stream.values, {count / 3, 3, channels});
 }
 
@@ -60,10 +60,10 @@ py::list SurfaceList(std::span<const Surface> surfaces) {
   return out;
 }
 
-py::list TextureList(std::span<const shade::TextureView> textures) {
+py::list TextureList(std::span<const Texture> textures) {
   py::list out;
-  for (const shade::TextureView& t : textures) {
-    out.append(py::dict(py::arg("texels") = CopyOf(t.texels, {t.height, t.width, t.channels}),
+  for (const Texture& t : textures) {
+    out.append(py::dict(py::arg("texels") = CopyOf(t.texels, {t.height, t.width, 3}),
                         py::arg("wrap") = kWraps[static_cast<std::size_t>(t.wrap)],
                         py::arg("filter") = kFilters[static_cast<std::size_t>(t.filter)]));
   }
@@ -81,14 +81,14 @@ py::dict SceneOfMesh(const py::dict& dict, bool linear, const std::string& norma
                     : normals == "flat" ? NormalSource::kFlat
                                         : NormalSource::kAuto;
   const MeshScene made(mesh, options);
-  const ShadedScene& scene = made.scene();
+  const Scene& scene = made.scene();
   py::dict out;
-  out["colors"] = Stream(scene.colors, 3);
-  out["uvs"] = Stream(scene.uvs, 2);
-  out["normals"] = Stream(scene.normals, 3);
+  out["colors"] = StreamArray(scene.colors, 3);
+  out["uvs"] = StreamArray(scene.uvs, 2);
+  out["normals"] = StreamArray(scene.normals, 3);
   out["textures"] = TextureList(scene.textures);
   out["surfaces"] = SurfaceList(scene.surfaces);
-  out["normal_kind"] = kNormalKinds[static_cast<std::size_t>(scene.model.normals)];
+  out["normal_kind"] = kNormalKinds[static_cast<std::size_t>(scene.shading.normals)];
   out["single_sided"] = made.single_sided();
   return out;
 }

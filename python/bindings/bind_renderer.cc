@@ -15,46 +15,52 @@ void BindRenderer(py::module_& m);
 
 namespace {
 
-// The images of a frame.
-enum Image { kColor, kAlpha, kAttributes, kDepth, kNormals, kUv, kBarycentrics, kImages };
-constexpr const char* kImageNames[kImages] = {"color",   "alpha", "attributes",  "depth",
-                                              "normals", "uv",    "barycentrics"};
-using Wanted = std::array<bool, kImages>;
-
-v0::Outputs OutputsOf(const Wanted& w) {
-  return {w[kColor], w[kAlpha], w[kAttributes], w[kDepth], w[kNormals], w[kUv], w[kBarycentrics]};
-}
+// What is known of an image, by its name.
+template <class T>
+struct NamedImage {
+  std::span<const T> values;
+  std::vector<py::ssize_t> shape;  // [N,C,H,W], or [N,H,W] of images of one number
+};
 
 template <class T>
-std::span<const T> ImageOf(const v0::ImagesT<T>& images, int image) {
-  const std::span<const T> all[kImages] = {images.color,       images.alpha,   images.attributes,
-                                           images.depth,       images.normals, images.uv,
-                                           images.barycentrics};
-  return all[image];
+NamedImage<T> ImageNamed(std::string_view name, const ImagesT<T>& images) {
+  NamedImage<T> out;
+  ForEachOutput(
+      images.channels,
+      [&](const char* known, int planes, std::span<const T> values) {
+        if (name != known) return;
+        out = {values, {images.count, images.height, images.width}};
+        const bool one = name == "alpha" || name == "depth";
+        if (!one) out.shape.insert(out.shape.begin() + 1, planes);
+      },
+      images);
+  if (out.shape.empty()) throw py::value_error(fmt::format("no image is called {}", name));
+  return out;
 }
 
-// [N,C,H,W], or [N,H,W] of images of one number.
-template <class T>
-std::vector<py::ssize_t> ShapeOf(const v0::ImagesT<T>& images, int image) {
-  const int channels[kImages] = {3, 0, images.channels, 0, 3, 2, 2};
-  std::vector<py::ssize_t> shape = {images.count, images.height, images.width};
-  if (image != kAlpha && image != kDepth) shape.insert(shape.begin() + 1, channels[image]);
-  return shape;
+std::vector<const char*> ImageNames() {
+  std::vector<const char*> out;
+  const Outputs outputs;
+  ForEachOutput(
+      0, [&](const char* name, int, bool) { out.push_back(name); }, outputs);
+  return out;
 }
 
-int ImageNamed(std::string_view name) {
-  for (int i = 0; i < kImages; ++i) {
-    if (name == kImageNames[i]) return i;
-  }
-  throw py::value_error(fmt::format("no image is called {}", name));
+// Whether each of ImageNames is wanted.
+Outputs OutputsOf(const std::vector<bool>& wanted) {
+  Outputs out;
+  std::size_t i = 0;
+  ForEachOutput(
+      0, [&](const char*, int, bool& image) { image = i < wanted.size() && wanted[i++]; }, out);
+  return out;
 }
 
 // The image of a frame as a view that keeps it alive.
 template <class T>
 py::array View(const py::object& self, std::string_view name, bool writeable) {
   const auto& images = py::cast<const FrameObject<T>&>(self).images();
-  const int image = ImageNamed(name);
-  return ViewOf<T>(ImageOf(images, image), ShapeOf(images, image), self, writeable);
+  const NamedImage<T> image = ImageNamed(name, images);
+  return ViewOf<T>(image.values, image.shape, self, writeable);
 }
 
 template <class T>
@@ -64,16 +70,20 @@ py::array FaceIds(const py::object& self) {
 }
 
 template <class T>
-v0::FrameGradientsT<T> CotangentsOf(const FrameObject<T>& frame, const py::dict& arrays) {
-  v0::FrameGradientsT<T> out;
-  std::span<const T>* const to[kImages] = {&out.color,   &out.alpha, &out.attributes, &out.depth,
-                                           &out.normals, &out.uv,    nullptr};
+FrameGradientsT<T> CotangentsOf(const FrameObject<T>& frame, const py::dict& arrays) {
+  FrameGradientsT<T> out;
   for (const std::pair<py::handle, py::handle> entry : arrays) {
     const std::string name = py::str(entry.first);
-    const int image = ImageNamed(name);
-    if (to[image] == nullptr) throw py::value_error("backward: barycentrics have no gradient");
-    *to[image] = SpanOf<T>(py::reinterpret_borrow<py::object>(entry.second), "backward",
-                           name.c_str(), ShapeOf(frame.images(), image));
+    const NamedImage<T> image = ImageNamed(name, frame.images());
+    if (name == "barycentrics") throw py::value_error("backward: barycentrics have no gradient");
+    ForEachImage(
+        0,
+        [&](const char* known, int, std::span<const T>& to) {
+          if (name != known) return;
+          to = SpanOf<T>(py::reinterpret_borrow<py::object>(entry.second), "backward", known,
+                         image.shape);
+        },
+        out);
   }
   return out;
 }
@@ -91,10 +101,10 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
     return [member](const Frame& f) { return f.images().*member; };
   };
   py::class_<Frame>(m, ("Frame" + suffix).c_str(), "The record of a render.")
-      .def_property_readonly("count", number(&v0::ImagesT<T>::count), "N, images.")
-      .def_property_readonly("height", number(&v0::ImagesT<T>::height), "Pixels.")
-      .def_property_readonly("width", number(&v0::ImagesT<T>::width), "Pixels.")
-      .def_property_readonly("alpha_error_bound", number(&v0::ImagesT<T>::alpha_error_bound),
+      .def_property_readonly("count", number(&ImagesT<T>::count), "N, images.")
+      .def_property_readonly("height", number(&ImagesT<T>::height), "Pixels.")
+      .def_property_readonly("width", number(&ImagesT<T>::width), "Pixels.")
+      .def_property_readonly("alpha_error_bound", number(&ImagesT<T>::alpha_error_bound),
                              "No alpha is farther than this from equation 6.")
       .def_property_readonly("face_ids", &FaceIds<T>, "(N, H, W) int32, -1: background.")
       .def("view", &View<T>, py::arg("name"), py::arg("writeable") = false,
@@ -103,7 +113,7 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
       .def(
           "render",
           [](RendererObject& r, std::vector<std::shared_ptr<Scene>> scenes,
-             const v0::RenderOptions& options, const Wanted& outputs) {
+             const RenderOptions& options, const std::vector<bool>& outputs) {
             return r.Render(std::move(scenes), options, OutputsOf(outputs));
           },
           py::arg("scenes"), py::arg("options"), py::arg("outputs"),
@@ -113,7 +123,7 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
           [](RendererObject& r, const Frame& frame, const py::dict& cotangents,
              const std::vector<py::dict>& gradients, bool add) {
             r.Backward(frame, CotangentsOf(frame, cotangents), gradients,
-                       add ? v0::GradientMode::kAdd : v0::GradientMode::kOverwrite);
+                       add ? GradientMode::kAdd : GradientMode::kOverwrite);
           },
           py::arg("frame"), py::arg("cotangents"), py::arg("gradients"), py::arg("add") = false,
           "Fills the arrays of gradients, a dictionary by name for each scene.");
@@ -122,32 +132,18 @@ void BindNumbers(py::module_& m, py::class_<RendererObject>& renderer, const std
 void BindSceneArrays(py::module_& m) {
   py::class_<SceneArrays>(m, "SceneArrays", "What a scene is made of; None: not there.")
       .def(py::init<>())
-      .def_readwrite("positions", &SceneArrays::positions, "([N,] V, 3)")
-      .def_readwrite("faces", &SceneArrays::faces, "(F, 3) int32")
-      .def_readwrite("camera", &SceneArrays::camera, "([N,] 17)")
-      .def_readwrite("colors", &SceneArrays::colors, "([N,] V, 3), or corners: ([N,] F, 3, 3)")
-      .def_readwrite("uvs", &SceneArrays::uvs, "([N,] V, 2), or corners: ([N,] F, 3, 2)")
-      .def_readwrite("normals", &SceneArrays::normals, "([N,] V, 3), or corners: ([N,] F, 3, 3)")
-      .def_readwrite("attributes", &SceneArrays::attributes,
-                     "([N,] V, C), or corners: ([N,] F, 3, C)")
-      .def_readwrite("per_corner", &SceneArrays::per_corner, "Of the four above, in that order.")
+      .def_readwrite("fields", &SceneArrays::fields, "Arrays, by name.")
+      .def_readwrite("per_corner", &SceneArrays::per_corner, "Names of those of corners.")
       .def_readwrite("textures", &SceneArrays::textures, "Each ([N,] Ht, Wt, 3)")
       .def_readwrite("wraps", &SceneArrays::wraps, "Of textures: indices into WRAPS.")
       .def_readwrite("filters", &SceneArrays::filters, "Of textures: indices into FILTERS.")
-      .def_readwrite("surfaces", &SceneArrays::surfaces, "(S, 13)")
       .def_readwrite("surface_textures", &SceneArrays::surface_textures, "S indices, -1: none.")
-      .def_readwrite("face_surfaces", &SceneArrays::face_surfaces, "(F,) int32")
-      .def_readwrite("lights", &SceneArrays::lights, "([N,] L, 4)")
-      .def_readwrite("light_directions", &SceneArrays::light_directions, "([N,] V, 3)")
-      .def_readwrite("sh", &SceneArrays::sh, "([N,] 9)")
-      .def_readwrite("lighting", &SceneArrays::lighting, "Index into LIGHTINGS.")
-      .def_readwrite("normal_kind", &SceneArrays::normal_kind, "Index into NORMAL_KINDS.")
-      .def_readwrite("two_sided", &SceneArrays::two_sided, "Turn normals to the eye.")
-      .def_readwrite("clamp", &SceneArrays::clamp, "Colours to [0, 1].");
+      .def_readwrite("shading", &SceneArrays::shading,
+                     "Indices into LIGHTINGS and NORMAL_KINDS, two-sided, clamped.");
 }
 
 void BindOptions(py::module_& m) {
-  using Options = v0::RenderOptions;
+  using Options = RenderOptions;
   // Enumerations by number: tilegrad._renderer has their names.
   const auto number = [](auto member) {
     return std::pair([member](const Options& o) { return static_cast<int>(o.*member); },
@@ -182,9 +178,7 @@ void BindNames(py::module_& m) {
   m.attr("FILTERS") = py::make_tuple("nearest", "bilinear", "trilinear");
   m.attr("LIGHTINGS") = py::make_tuple("none", "lambert", "phong", "spherical_harmonics");
   m.attr("NORMAL_KINDS") = py::make_tuple("smooth", "flat", "given");
-  py::tuple images(static_cast<std::size_t>(kImages));
-  for (std::size_t i = 0; i < kImages; ++i) images[i] = kImageNames[i];
-  m.attr("IMAGES") = images;
+  m.attr("IMAGES") = py::tuple(py::cast(ImageNames()));
 }
 
 // Defaults of records that are plain numbers in Python.
@@ -194,10 +188,10 @@ void BindDefaults(py::module_& m) {
   m.attr("CAMERA") = py::cast(camera);
   m.attr("SURFACE") = py::cast(surface);
   m.attr("LIGHT") = py::cast(light);
-  const v0::TextureT<double> texture;
+  const TextureT<double> texture;
   m.attr("TEXTURE") =
       py::make_tuple(static_cast<int>(texture.wrap), static_cast<int>(texture.filter));
-  const v0::Lens lens;
+  const Lens lens;
   m.attr("FOV_Y") = lens.fov_y;
 }
 

@@ -16,19 +16,19 @@ namespace tilegrad::python {
 template <class T>
 class FramePool {
  public:
-  v0::FrameT<T> Take() {
+  FrameT<T> Take() {
     if (spare_.empty()) return {};
-    v0::FrameT<T> frame = std::move(spare_.back());
+    FrameT<T> frame = std::move(spare_.back());
     spare_.pop_back();
     return frame;
   }
-  void Give(v0::FrameT<T> frame) {
+  void Give(FrameT<T> frame) {
     if (spare_.size() < kMost) spare_.push_back(std::move(frame));
   }
 
  private:
   static constexpr std::size_t kMost = 2;  // one that a loop overwrites, one that it looks at
-  std::vector<v0::FrameT<T>> spare_;
+  std::vector<FrameT<T>> spare_;
 };
 
 template <class T>
@@ -43,14 +43,14 @@ class FrameObject {
   FrameObject& operator=(const FrameObject&) = delete;
 
   const std::vector<std::shared_ptr<Record>>& scenes() const { return scenes_; }
-  v0::FrameT<T>& frame() { return frame_; }
-  const v0::FrameT<T>& frame() const { return frame_; }
-  const v0::ImagesT<T>& images() const { return frame_.images(); }
+  FrameT<T>& frame() { return frame_; }
+  const FrameT<T>& frame() const { return frame_; }
+  const ImagesT<T>& images() const { return frame_.images(); }
 
  private:
   std::vector<std::shared_ptr<Record>> scenes_;
   std::shared_ptr<FramePool<T>> pool_;
-  v0::FrameT<T> frame_;
+  FrameT<T> frame_;
 };
 
 }  // namespace tilegrad::python

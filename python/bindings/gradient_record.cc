@@ -62,31 +62,18 @@ Field<T> GradientRecord<T>::Take(const char* name, const std::vector<py::ssize_t
 
 template <class T>
 void GradientRecord<T>::SetStreams(const SceneRecord<T>& scene) {
-  using Gradients = v0::SceneGradientsT<T>;
+  SceneGradientsT<T> names;
   const SceneArrays& a = scene.arrays();
-  struct Stream {
-    const char* name;
-    const py::object& of;
-    bool corner;
-    std::span<T> Gradients::*member;
-  };
-  const Stream streams[] = {
-      {"positions", a.positions, false, &Gradients::positions},
-      {"colors", a.colors, a.per_corner[0], &Gradients::colors},
-      {"uvs", a.uvs, a.per_corner[1], &Gradients::uvs},
-      {"normals", a.normals, a.per_corner[2], &Gradients::normals},
-      {"attributes", a.attributes, a.per_corner[3], &Gradients::attributes},
-      {"light_directions", a.light_directions, false, &Gradients::light_directions},
-  };
-  for (const Stream& s : streams) {
-    if (Find(s.name) == nullptr) continue;
-    const auto field = Take(s.name, ShapeOfOne(s.of, s.corner ? 3 : 2));
+  ForEachPlainArray(names, [&](const char* name, auto&) {
+    if (Find(name) == nullptr) return;
+    const std::size_t axes = a.at_corners(name) ? 3 : name == std::string_view("sh") ? 1 : 2;
+    const auto field = Take(name, ShapeOfOne(a[name], axes));
     for (std::size_t n = 0; field.given() && n < gradients_.size(); ++n) {
-      gradients_[n].*s.member = field.Of(n);
+      ForEachPlainArray(gradients_[n], [&](std::string_view to, std::span<T>& array) {
+        if (to == name) array = field.Of(n);
+      });
     }
-  }
-  const auto sh = Take("sh", ShapeOfOne(a.sh, 1));
-  for (std::size_t n = 0; sh.given() && n < gradients_.size(); ++n) gradients_[n].sh = sh.Of(n);
+  });
 }
 
 template <class T>
@@ -118,7 +105,7 @@ void GradientRecord<T>::SetRecords(const SceneRecord<T>& scene) {
                                               1);  // none: the default
   camera_ = Take("camera", {kCameraNumbers});
   surface_ = Take("surfaces", {surfaces, kSurfaceNumbers});
-  light_ = Take("lights", ShapeOfOne(a.lights, 2));
+  light_ = Take("lights", ShapeOfOne(a["lights"], 2));
   ReadAll(camera_, kCameraNumbers, &cameras_, CameraOf<T>);
   ReadAll(surface_, kSurfaceNumbers, &surfaces_, SurfaceOf<T>);
   ReadAll(light_, kLightNumbers, &lights_, LightOf<T>);

@@ -13,14 +13,14 @@ namespace tilegrad::python {
 template <class T>
 class GradientRecord {
  public:
-  // `arrays`: from the names of SceneArrays' members (textures: a list with None
-  // for what is not wanted) to arrays of the same shapes, or with a leading axis more for a
+  // `arrays`: from the names of SceneArrays' fields, and textures (a list with None
+  // for what is not wanted), to arrays of the same shapes, or with a leading axis more for a
   // gradient of each image. What is missing is not wanted. ValueError or TypeError for an array of
   // another shape or dtype, or one that is read-only.
   GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays);
   GradientRecord(GradientRecord&&) noexcept = default;
 
-  const std::vector<v0::SceneGradientsT<T>>& gradients() const { return gradients_; }
+  const std::vector<SceneGradientsT<T>>& gradients() const { return gradients_; }
   // What is not a plain array in C++, from the records to the arrays.
   void Store() const;
 
@@ -34,12 +34,12 @@ class GradientRecord {
   const py::object* Find(std::string_view name) const;  // null: not wanted
 
   std::vector<std::pair<std::string_view, py::object>> arrays_;
-  std::vector<v0::SceneGradientsT<T>> gradients_;
+  std::vector<SceneGradientsT<T>> gradients_;
   std::vector<std::span<T>> textures_;
   Field<T> camera_, surface_, light_;
-  std::vector<v0::CameraT<T>> cameras_;
-  std::vector<v0::SurfaceT<T>> surfaces_;
-  std::vector<v0::LightT<T>> lights_;
+  std::vector<CameraT<T>> cameras_;
+  std::vector<SurfaceT<T>> surfaces_;
+  std::vector<LightT<T>> lights_;
 };
 
 }  // namespace tilegrad::python

@@ -59,7 +59,7 @@ Material MaterialFromDict(const char* function, const py::dict& dict) {
   return m;
 }
 
-py::dict TextureToDict(Texture texture) {
+py::dict TextureToDict(MeshTexture texture) {
   ImageU8& image = texture.image;
   std::vector<py::ssize_t> shape = {image.height, image.width, image.channels};
   return py::dict(
@@ -67,7 +67,7 @@ py::dict TextureToDict(Texture texture) {
       py::arg("image") = OwnedArray<std::uint8_t>(std::move(image.pixels), std::move(shape)));
 }
 
-Texture TextureFromDict(const char* function, const py::dict& dict) {
+MeshTexture TextureFromDict(const char* function, const py::dict& dict) {
   const py::object image = dict["image"];
   const auto texels = SpanOf<std::uint8_t>(image, function, "image", {kAny, kAny, kAny});
   const auto array = py::reinterpret_borrow<py::array>(image);
@@ -76,7 +76,7 @@ Texture TextureFromDict(const char* function, const py::dict& dict) {
     throw py::value_error(
         fmt::format("{}: a texture has 3 or 4 channels, got {}", function, side(2)));
   }
-  Texture out;
+  MeshTexture out;
   out.name = py::cast<std::string>(dict["name"]);
   out.image = ImageU8(side(1), side(0), side(2));
   std::copy(texels.begin(), texels.end(), out.image.pixels.begin());
@@ -101,7 +101,7 @@ py::dict MeshToDict(Mesh mesh) {
              faces = static_cast<py::ssize_t>(mesh.faces.size());
   py::list materials, textures;
   for (const Material& m : mesh.materials) materials.append(MaterialToDict(m));
-  for (Texture& t : mesh.textures) textures.append(TextureToDict(std::move(t)));
+  for (MeshTexture& t : mesh.textures) textures.append(TextureToDict(std::move(t)));
   py::dict out;
   out["positions"] = OwnedArray<float>(std::move(mesh.positions), {vertices, 3});
   out["faces"] = OwnedArray<std::int32_t>(std::move(mesh.faces), {faces, 3});

@@ -20,7 +20,7 @@ RendererObject::Session& RendererObject::session() {
 }
 
 template <class T>
-v0::RendererT<T>& RendererObject::EngineOf(Session& session) {
+RendererT<T>& RendererObject::EngineOf(Session& session) {
   if constexpr (std::is_same_v<T, float>) {
     return session.floats;
   } else {
@@ -58,45 +58,44 @@ Status InPython(const Status& status) {
 
 template <class T>
 std::unique_ptr<FrameObject<T>> RendererObject::Render(
-    std::vector<std::shared_ptr<SceneRecord<T>>> scenes, const v0::RenderOptions& options,
-    const v0::Outputs& outputs) {
-  std::vector<v0::SceneT<T>> views;
+    std::vector<std::shared_ptr<SceneRecord<T>>> scenes, const RenderOptions& options,
+    const Outputs& outputs) {
+  std::vector<SceneT<T>> views;
   for (const auto& scene : scenes) {
     views.insert(views.end(), scene->scenes().begin(), scene->scenes().end());
   }
   auto out = std::make_unique<FrameObject<T>>(std::move(scenes), pool<T>());
-  const Status status = Run<T>([&](v0::RendererT<T>& engine) {
-    return engine.Render(views, options, outputs, &out->frame());
-  });
+  const Status status = Run<T>(
+      [&](RendererT<T>& engine) { return engine.Render(views, options, outputs, &out->frame()); });
   ThrowIfError(InPython(status).Within("render"));
   return out;
 }
 
 template <class T>
-void RendererObject::Backward(const FrameObject<T>& frame, const v0::FrameGradientsT<T>& d_frame,
-                              const std::vector<py::dict>& gradients, v0::GradientMode mode) {
+void RendererObject::Backward(const FrameObject<T>& frame, const FrameGradientsT<T>& d_frame,
+                              const std::vector<py::dict>& gradients, GradientMode mode) {
   if (gradients.size() != frame.scenes().size()) {
     throw py::value_error(fmt::format("backward: {} gradients, the frame has {} scenes",
                                       gradients.size(), frame.scenes().size()));
   }
   std::vector<GradientRecord<T>> records;
-  std::vector<v0::SceneGradientsT<T>> views;
+  std::vector<SceneGradientsT<T>> views;
   for (std::size_t i = 0; i < gradients.size(); ++i) {
     records.emplace_back(*frame.scenes()[i], gradients[i]);
     const auto& own = records.back().gradients();
     views.insert(views.end(), own.begin(), own.end());
   }
-  ThrowIfError(Run<T>([&](v0::RendererT<T>& engine) {
+  ThrowIfError(Run<T>([&](RendererT<T>& engine) {
                  return engine.Backward(frame.frame(), d_frame, views, mode);
                }).Within("backward"));
   for (const GradientRecord<T>& record : records) record.Store();
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                                                    \
-  template std::unique_ptr<FrameObject<T>> RendererObject::Render(                                 \
-      std::vector<std::shared_ptr<SceneRecord<T>>>, const v0::RenderOptions&, const v0::Outputs&); \
-  template void RendererObject::Backward(const FrameObject<T>&, const v0::FrameGradientsT<T>&,     \
-                                         const std::vector<py::dict>&, v0::GradientMode);
+#define TILEGRAD_INSTANTIATE(T)                                                            \
+  template std::unique_ptr<FrameObject<T>> RendererObject::Render(                         \
+      std::vector<std::shared_ptr<SceneRecord<T>>>, const RenderOptions&, const Outputs&); \
+  template void RendererObject::Backward(const FrameObject<T>&, const FrameGradientsT<T>&, \
+                                         const std::vector<py::dict>&, GradientMode);
 TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE

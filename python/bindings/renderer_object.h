@@ -24,13 +24,12 @@ class RendererObject {
 
   template <class T>
   std::unique_ptr<FrameObject<T>> Render(std::vector<std::shared_ptr<SceneRecord<T>>> scenes,
-                                         const v0::RenderOptions& options,
-                                         const v0::Outputs& outputs);
+                                         const RenderOptions& options, const Outputs& outputs);
 
   // `gradients`: a dictionary for each scene record of the frame (GradientRecord).
   template <class T>
-  void Backward(const FrameObject<T>& frame, const v0::FrameGradientsT<T>& d_frame,
-                const std::vector<py::dict>& gradients, v0::GradientMode mode);
+  void Backward(const FrameObject<T>& frame, const FrameGradientsT<T>& d_frame,
+                const std::vector<py::dict>& gradients, GradientMode mode);
 
   int threads() const { return threads_; }
 
@@ -41,15 +40,15 @@ class RendererObject {
 
     const pid_t process = getpid();
     std::mutex mutex;  // one call at a time
-    v0::RendererT<float> floats;
-    v0::RendererT<double> doubles;
+    RendererT<float> floats;
+    RendererT<double> doubles;
   };
   Session& session();
   void DropForeignSession();
   template <class T, class Call>
   Status Run(const Call& call);
   template <class T>
-  static v0::RendererT<T>& EngineOf(Session& session);
+  static RendererT<T>& EngineOf(Session& session);
   template <class T>
   std::shared_ptr<FramePool<T>>& pool();
 

@@ -8,48 +8,18 @@
 namespace tilegrad::python {
 namespace {
 
-// Copies runs of numbers between a record's members and an array.
+// Copy the parts of a record, in their order, from and to a run of numbers.
 template <class T>
-class Reader {
- public:
-  explicit Reader(std::span<const T> from) : from_(from.data()) {}
-  template <class Out>
-  void operator()(Out& out) {
-    for (T& x : out) x = *from_++;
-  }
-  void operator()(T& out) { out = *from_++; }
-
- private:
-  const T* from_;
-};
-
+auto Reader(const T*& next) {
+  return [&next](const char*, std::span<T> part) {
+    for (T& x : part) x = *next++;
+  };
+}
 template <class T>
-class Writer {
- public:
-  explicit Writer(std::span<T> to) : to_(to.data()) {}
-  template <class In>
-  void operator()(const In& in) {
-    for (const T x : in) *to_++ = x;
-  }
-  void operator()(const T& in) { *to_++ = in; }
-
- private:
-  T* to_;
-};
-
-// The order of a record's numbers, for both directions.
-template <class Move, class Camera>
-void MoveCamera(Move move, Camera& c) {
-  move(c.rotation), move(c.translation), move(c.fx), move(c.fy), move(c.cx), move(c.cy);
-  move(c.near_plane);
-}
-template <class Move, class Surface>
-void MoveSurface(Move move, Surface& s) {
-  move(s.base_color), move(s.ambient), move(s.diffuse), move(s.specular), move(s.shininess);
-}
-template <class Move, class Light>
-void MoveLight(Move move, Light& light) {
-  move(light.direction), move(light.intensity);
+auto Writer(T*& next) {
+  return [&next](const char*, std::span<const T> part) {
+    for (const T x : part) *next++ = x;
+  };
 }
 
 py::ssize_t Length(const py::object& array, py::ssize_t axis_from_end) {
@@ -60,84 +30,104 @@ py::ssize_t Length(const py::object& array, py::ssize_t axis_from_end) {
 
 }  // namespace
 
+py::object SceneArrays::operator[](const char* name) const {
+  return fields.contains(name) ? py::object(fields[name]) : py::none();
+}
+
+bool SceneArrays::at_corners(std::string_view name) const {
+  return std::find(per_corner.begin(), per_corner.end(), name) != per_corner.end();
+}
+
 template <class T>
-v0::CameraT<T> CameraOf(std::span<const T> numbers) {
-  v0::CameraT<T> out;
-  MoveCamera(Reader<T>(numbers), out);
+CameraT<T> CameraOf(std::span<const T> numbers) {
+  CameraT<T> out;
+  const T* next = numbers.data();
+  ForEachCameraPart(Reader<T>(next), out);
+  out.near_plane = numbers.back();
   return out;
 }
 template <class T>
-void PutCamera(const v0::CameraT<T>& camera, std::span<T> numbers) {
-  MoveCamera(Writer<T>(numbers), camera);
+void PutCamera(const CameraT<T>& camera, std::span<T> numbers) {
+  T* next = numbers.data();
+  ForEachCameraPart(Writer<T>(next), camera);
+  numbers.back() = camera.near_plane;
 }
 template <class T>
-v0::SurfaceT<T> SurfaceOf(std::span<const T> numbers) {
-  v0::SurfaceT<T> out;
-  MoveSurface(Reader<T>(numbers), out);
+SurfaceT<T> SurfaceOf(std::span<const T> numbers) {
+  SurfaceT<T> out;
+  const T* next = numbers.data();
+  ForEachSurfacePart(Reader<T>(next), out);
   return out;
 }
 template <class T>
-void PutSurface(const v0::SurfaceT<T>& surface, std::span<T> numbers) {
-  MoveSurface(Writer<T>(numbers), surface);
+void PutSurface(const SurfaceT<T>& surface, std::span<T> numbers) {
+  T* next = numbers.data();
+  ForEachSurfacePart(Writer<T>(next), surface);
 }
 template <class T>
-v0::LightT<T> LightOf(std::span<const T> numbers) {
-  v0::LightT<T> out;
-  MoveLight(Reader<T>(numbers), out);
+LightT<T> LightOf(std::span<const T> numbers) {
+  LightT<T> out;
+  const T* next = numbers.data();
+  ForEachLightPart(Reader<T>(next), out);
   return out;
 }
 template <class T>
-void PutLight(const v0::LightT<T>& light, std::span<T> numbers) {
-  MoveLight(Writer<T>(numbers), light);
+void PutLight(const LightT<T>& light, std::span<T> numbers) {
+  T* next = numbers.data();
+  ForEachLightPart(Writer<T>(next), light);
 }
 
 template <class T>
 SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
     : arrays_(std::move(arrays)),
-      vertices_(Length(arrays_.positions, 2)),
-      faces_(Length(arrays_.faces, 2)),
+      vertices_(Length(arrays_["positions"], 2)),
+      faces_(Length(arrays_["faces"], 2)),
       scenes_(count) {
-  const auto positions = Take<T>("positions", arrays_.positions, {vertices_, 3});
-  const auto faces = Take<std::int32_t>("faces", arrays_.faces, {faces_, 3});
-  const auto cameras = Take<T>("camera", arrays_.camera, {kCameraNumbers});
+  const auto faces = Take<std::int32_t>("faces", {faces_, 3});
+  const auto cameras = Take<T>("camera", {kCameraNumbers});
+  const auto [lighting, normals, two_sided, clamp] = arrays_.shading;
   for (std::size_t n = 0; n < count; ++n) {
-    v0::SceneT<T>& scene = scenes_[n];
-    scene.positions = positions.Of(n), scene.faces = faces.Of(n);
-    scene.camera = CameraOf(cameras.Of(n));
-    scene.shading = {static_cast<v0::Lighting>(arrays_.lighting),
-                     static_cast<v0::Normals>(arrays_.normal_kind), arrays_.two_sided,
-                     arrays_.clamp};
+    SceneT<T>& scene = scenes_[n];
+    scene.faces = faces.Of(n), scene.camera = CameraOf(cameras.Of(n));
+    scene.shading = {static_cast<Lighting>(lighting), static_cast<Normals>(normals), two_sided,
+                     clamp};
   }
   SetStreams(), SetTextures(), SetSurfaces(), SetLights();
 }
 
+namespace {
+
+template <class T>
+void SetField(std::span<const T> values, Rate, std::span<const T>* to) {
+  *to = values;
+}
+template <class T>
+void SetField(std::span<const T> values, Rate rate, StreamT<T>* to) {
+  *to = {values, rate};
+}
+
+}  // namespace
+
 template <class T>
 void SceneRecord<T>::SetStreams() {
-  struct Stream {
-    const char* name;
-    const py::object& array;
-    py::ssize_t width;
-    v0::StreamT<T> v0::SceneT<T>::*member;
-  };
-  const py::ssize_t channels = Length(arrays_.attributes, 1);
-  const Stream streams[] = {
-      {"colors", arrays_.colors, 3, &v0::SceneT<T>::colors},
-      {"uvs", arrays_.uvs, 2, &v0::SceneT<T>::uvs},
-      {"normals", arrays_.normals, 3, &v0::SceneT<T>::normals},
-      {"attributes", arrays_.attributes, channels, &v0::SceneT<T>::attributes}};
-  arrays_.per_corner.resize(std::size(streams));
-  for (std::size_t i = 0; i < std::size(streams); ++i) {
-    const Stream& s = streams[i];
-    const bool corner = arrays_.per_corner[i];
-    const auto field = corner ? Take<T>(s.name, s.array, {faces_, 3, s.width})
-                              : Take<T>(s.name, s.array, {vertices_, s.width});
-    if (!field.given()) continue;
-    for (std::size_t n = 0; n < scenes_.size(); ++n) {
-      scenes_[n].*s.member = {field.Of(n), corner ? v0::Rate::kCorner : v0::Rate::kVertex};
-    }
-  }
+  const py::ssize_t channels = Length(arrays_["attributes"], 1);
   constexpr py::ssize_t kMost = std::numeric_limits<int>::max();  // more than the engine takes
-  for (v0::SceneT<T>& scene : scenes_) scene.channels = static_cast<int>(std::min(channels, kMost));
+  for (SceneT<T>& scene : scenes_) scene.channels = static_cast<int>(std::min(channels, kMost));
+  SceneT<T> names;
+  ForEachStream(names, {}, [&](const SceneStream<T>& s) {
+    const py::ssize_t width = s.what == Varying::kUser ? channels : s.width;
+    const bool corner = arrays_.at_corners(s.name);
+    const auto field =
+        corner ? Take<T>(s.name, {faces_, 3, width}) : Take<T>(s.name, {vertices_, width});
+    if (!field.given()) return;
+    const Rate rate = corner ? Rate::kCorner : Rate::kVertex;
+    for (std::size_t n = 0; n < scenes_.size(); ++n) {
+      ForEachStreamField<T>(scenes_[n], scenes_[n],
+                            [&](const char*, Varying what, int, auto& to, auto&) {
+                              if (what == s.what) SetField<T>(field.Of(n), rate, &to);
+                            });
+    }
+  });
 }
 
 template <class T>
@@ -153,21 +143,21 @@ void SceneRecord<T>::SetTextures() {
     const auto field = Take<T>("textures", texels, {height, width, 3});
     for (std::size_t n = 0; n < scenes_.size(); ++n) {
       textures_[n * each + i] = {field.Of(n), static_cast<int>(width), static_cast<int>(height),
-                                 static_cast<v0::Wrap>(arrays_.wraps[i]),
-                                 static_cast<v0::Filter>(arrays_.filters[i])};
+                                 static_cast<Wrap>(arrays_.wraps[i]),
+                                 static_cast<Filter>(arrays_.filters[i])};
     }
   }
   for (std::size_t n = 0; n < scenes_.size(); ++n) {
-    scenes_[n].textures = std::span<const v0::TextureT<T>>(textures_).subspan(n * each, each);
+    scenes_[n].textures = std::span<const TextureT<T>>(textures_).subspan(n * each, each);
   }
 }
 
 template <class T>
 void SceneRecord<T>::SetSurfaces() {
-  const auto indices = Take<std::int32_t>("face_surfaces", arrays_.face_surfaces, {faces_});
+  const auto indices = Take<std::int32_t>("face_surfaces", {faces_});
   const auto count = static_cast<py::ssize_t>(arrays_.surface_textures.size());
-  if (!arrays_.surfaces.is_none()) {
-    const auto numbers = SpanOf<T>(arrays_.surfaces, "Scene", "surfaces",
+  if (const py::object surfaces = arrays_["surfaces"]; !surfaces.is_none()) {
+    const auto numbers = SpanOf<T>(surfaces, "Scene", "surfaces",
                                    {count, static_cast<py::ssize_t>(kSurfaceNumbers)});
     for (std::size_t i = 0; i < arrays_.surface_textures.size(); ++i) {
       surfaces_.push_back(SurfaceOf<T>(numbers.subspan(i * kSurfaceNumbers, kSurfaceNumbers)));
@@ -182,10 +172,9 @@ void SceneRecord<T>::SetSurfaces() {
 
 template <class T>
 void SceneRecord<T>::SetLights() {
-  const py::ssize_t each = Length(arrays_.lights, 2);
-  const auto lights = Take<T>("lights", arrays_.lights, {each, kLightNumbers});
-  const auto directions = Take<T>("light_directions", arrays_.light_directions, {vertices_, 3});
-  const auto sh = Take<T>("sh", arrays_.sh, {9});
+  const py::ssize_t each = Length(arrays_["lights"], 2);
+  const auto lights = Take<T>("lights", {each, kLightNumbers});
+  const auto sh = Take<T>("sh", {9});
   lights_.resize(static_cast<std::size_t>(each) * lights.arrays());
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     lights_[i] = LightOf<T>(lights.all().subspan(i * kLightNumbers, kLightNumbers));
@@ -193,19 +182,18 @@ void SceneRecord<T>::SetLights() {
   const auto length = static_cast<std::size_t>(each);
   for (std::size_t n = 0; n < scenes_.size(); ++n) {
     scenes_[n].lights =
-        std::span<const v0::LightT<T>>(lights_).subspan(lights.own() ? n * length : 0, length);
-    if (directions.given()) scenes_[n].light_directions = directions.Of(n);
+        std::span<const LightT<T>>(lights_).subspan(lights.own() ? n * length : 0, length);
     if (sh.given()) scenes_[n].sh = sh.Of(n);
   }
 }
 
-#define TILEGRAD_INSTANTIATE(T)                                   \
-  template v0::CameraT<T> CameraOf(std::span<const T>);           \
-  template void PutCamera(const v0::CameraT<T>&, std::span<T>);   \
-  template v0::SurfaceT<T> SurfaceOf(std::span<const T>);         \
-  template void PutSurface(const v0::SurfaceT<T>&, std::span<T>); \
-  template v0::LightT<T> LightOf(std::span<const T>);             \
-  template void PutLight(const v0::LightT<T>&, std::span<T>);     \
+#define TILEGRAD_INSTANTIATE(T)                               \
+  template CameraT<T> CameraOf(std::span<const T>);           \
+  template void PutCamera(const CameraT<T>&, std::span<T>);   \
+  template SurfaceT<T> SurfaceOf(std::span<const T>);         \
+  template void PutSurface(const SurfaceT<T>&, std::span<T>); \
+  template LightT<T> LightOf(std::span<const T>);             \
+  template void PutLight(const LightT<T>&, std::span<T>);     \
   template class SceneRecord<T>;
 TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)

@@ -3,11 +3,15 @@
 // caller's arrays.
 #pragma once
 
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "bindings/camera_numbers.h"
 #include "bindings/field.h"
-#include "tilegrad/renderer.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad::python {
 
@@ -16,34 +20,31 @@ inline constexpr std::size_t kLightNumbers = 4;     // direction, intensity
 
 // The plain numbers of a record, in the order above. Surfaces: all but the texture.
 template <class T>
-v0::CameraT<T> CameraOf(std::span<const T> numbers);
+CameraT<T> CameraOf(std::span<const T> numbers);
 template <class T>
-void PutCamera(const v0::CameraT<T>& camera, std::span<T> numbers);
+void PutCamera(const CameraT<T>& camera, std::span<T> numbers);
 template <class T>
-v0::SurfaceT<T> SurfaceOf(std::span<const T> numbers);
+SurfaceT<T> SurfaceOf(std::span<const T> numbers);
 template <class T>
-void PutSurface(const v0::SurfaceT<T>& surface, std::span<T> numbers);
+void PutSurface(const SurfaceT<T>& surface, std::span<T> numbers);
 template <class T>
-v0::LightT<T> LightOf(std::span<const T> numbers);
+LightT<T> LightOf(std::span<const T> numbers);
 template <class T>
-void PutLight(const v0::LightT<T>& light, std::span<T> numbers);
+void PutLight(const LightT<T>& light, std::span<T> numbers);
 
-// What Python hands over; None: not there. A leading axis of `count` numbers is each image's own.
+// What Python hands over. Shapes are those of include/tilegrad/scene.h; a leading axis of `count`
+// numbers is each image's own.
 struct SceneArrays {
-  py::object positions = py::none(), faces = py::none();  // [V,3], [F,3] int32
-  py::object camera = py::none();                         // [17]
-  // [V,C], or [F,3,C] if per corner.
-  py::object colors = py::none(), uvs = py::none(), normals = py::none(), attributes = py::none();
-  std::vector<bool> per_corner;           // of the four above
-  std::vector<py::object> textures;       // [height,width,3]
-  std::vector<int> wraps, filters;        // of textures
-  py::object surfaces = py::none();       // [S,13]
-  std::vector<int> surface_textures;      // [S]
-  py::object face_surfaces = py::none();  // [F] int32
-  // [L,4], [V,3], [9]
-  py::object lights = py::none(), light_directions = py::none(), sh = py::none();
-  int lighting = 0, normal_kind = 0;
-  bool two_sided = false, clamp = false;
+  py::dict fields;  // by the names of SceneT's members: positions, faces, streams, sh,
+                    // face_surfaces; camera [17], lights [L,4], surfaces [S,13]
+  std::vector<std::string> per_corner;  // which streams are [F,3,C], not [V,C]
+  std::vector<py::object> textures;     // [height,width,3]
+  std::vector<int> wraps, filters;      // of textures
+  std::vector<int> surface_textures;    // [S]
+  std::tuple<int, int, bool, bool> shading = {0, 0, false, false};  // members of ShadingModel
+
+  py::object operator[](const char* name) const;  // None: not there
+  bool at_corners(std::string_view name) const;
 };
 
 template <class T>
@@ -54,7 +55,7 @@ class SceneRecord {
   SceneRecord(const SceneRecord&) = delete;  // `scenes_` looks at the other members
   SceneRecord& operator=(const SceneRecord&) = delete;
 
-  const std::vector<v0::SceneT<T>>& scenes() const { return scenes_; }
+  const std::vector<SceneT<T>>& scenes() const { return scenes_; }
   std::size_t count() const { return scenes_.size(); }
   const SceneArrays& arrays() const { return arrays_; }
 
@@ -67,13 +68,17 @@ class SceneRecord {
   Field<const U> Take(const char* name, const py::object& array, std::vector<py::ssize_t> shape) {
     return Field<const U>("Scene", name, array, shape, scenes_.size());
   }
+  template <class U>
+  Field<const U> Take(const char* name, std::vector<py::ssize_t> shape) {
+    return Take<U>(name, arrays_[name], std::move(shape));
+  }
 
   SceneArrays arrays_;  // keeps them alive
   py::ssize_t vertices_ = 0, faces_ = 0;
-  std::vector<v0::SceneT<T>> scenes_;
-  std::vector<v0::TextureT<T>> textures_;  // of image 0, of image 1, ...
-  std::vector<v0::SurfaceT<T>> surfaces_;
-  std::vector<v0::LightT<T>> lights_;  // as textures_
+  std::vector<SceneT<T>> scenes_;
+  std::vector<TextureT<T>> textures_;  // of image 0, of image 1, ...
+  std::vector<SurfaceT<T>> surfaces_;
+  std::vector<LightT<T>> lights_;  // as textures_
 };
 
 }  // namespace tilegrad::python

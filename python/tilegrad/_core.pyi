@@ -63,27 +63,13 @@ class RenderOptions:
     def __init__(self) -> None: ...
 
 class SceneArrays:
-    positions: np.ndarray
-    faces: np.ndarray
-    camera: np.ndarray
-    colors: Optional[np.ndarray]
-    uvs: Optional[np.ndarray]
-    normals: Optional[np.ndarray]
-    attributes: Optional[np.ndarray]
-    per_corner: list[bool]
+    fields: dict[str, np.ndarray]
+    per_corner: list[str]
     textures: list[np.ndarray]
     wraps: list[int]
     filters: list[int]
-    surfaces: Optional[np.ndarray]
     surface_textures: list[int]
-    face_surfaces: Optional[np.ndarray]
-    lights: Optional[np.ndarray]
-    light_directions: Optional[np.ndarray]
-    sh: Optional[np.ndarray]
-    lighting: int
-    normal_kind: int
-    two_sided: bool
-    clamp: bool
+    shading: tuple[int, int, bool, bool]
     def __init__(self) -> None: ...
 
 class Scene32:

@@ -181,10 +181,10 @@ class Scene:
         self._surface = (None, []) if surfaces is None else self._surfaces(surfaces)
         self._count = sizes.get("N", 1)
         arrays = self._core_arrays(corners)
-        arrays.lighting = _arrays.check_choice("Scene", "lighting", lighting, _core.LIGHTINGS)
-        arrays.normal_kind = self._normal_kind(normals)
-        arrays.two_sided = _arrays.as_flag("Scene", "two_sided", two_sided)
-        arrays.clamp = _arrays.as_flag("Scene", "clamp", clamp)
+        arrays.shading = (_arrays.check_choice("Scene", "lighting", lighting, _core.LIGHTINGS),
+                          self._normal_kind(normals),
+                          _arrays.as_flag("Scene", "two_sided", two_sided),
+                          _arrays.as_flag("Scene", "clamp", clamp))
         kind = _core.Scene64 if self._dtype == np.float64 else _core.Scene32
         self._record = kind(self._count, arrays)
 
@@ -229,16 +229,15 @@ class Scene:
 
     def _core_arrays(self, corners: Sequence[str]) -> _core.SceneArrays:
         a = _core.SceneArrays()
-        for name, array in self._fields.items():
-            setattr(a, name, array)
+        a.fields = {**self._fields}
         if corners:
-            a.per_corner = [name in corners for name in _CORNER_SHAPES]
+            a.per_corner = list(corners)
         if self._textures:
             a.textures = [texels for texels, _, _ in self._textures]
             a.wraps = [_core.WRAPS.index(wrap) for _, wrap, _ in self._textures]
             a.filters = [_core.FILTERS.index(filter) for _, _, filter in self._textures]
         if self._surface[1]:
-            a.surfaces, a.surface_textures = self._surface
+            a.fields["surfaces"], a.surface_textures = self._surface
         return a
 
     @staticmethod

@@ -8,28 +8,28 @@
 #include <vector>
 
 #include "api/c_records.h"
-#include "api/guarded.h"
+#include "base/guarded.h"
 
 using tilegrad::InvalidArgument;
 using tilegrad::Status;
 using tilegrad::StatusCode;
-namespace api = tilegrad::v0;
+namespace api = tilegrad::api;
 
 struct tilegrad_renderer {
   explicit tilegrad_renderer(int32_t threads) : renderer({threads}) {}
 
-  api::Renderer renderer;
+  tilegrad::Renderer renderer;
   std::string error;
   std::vector<tilegrad_scene_gradients> wanted;
   std::vector<api::CGradients> gradients;
-  std::vector<api::SceneGradients> views;
+  std::vector<tilegrad::SceneGradients> views;
 };
 
 struct tilegrad_frame {
-  api::Frame frame;
+  tilegrad::Frame frame;
   std::vector<api::CScene> scenes;  // of the last render, and spare ones
   std::size_t count = 0;
-  std::vector<api::Scene> views;
+  std::vector<tilegrad::Scene> views;
 };
 
 namespace {
@@ -51,8 +51,8 @@ tilegrad_status CodeOf(const Status& status) {
 template <class Call>
 tilegrad_status Run(tilegrad_renderer* renderer, const Call& call) {
   if (renderer == nullptr) return TILEGRAD_INVALID_ARGUMENT;
-  Status status = api::Guarded(call);
-  const Status kept = api::Guarded([&]() -> Status {
+  Status status = tilegrad::Guarded(call);
+  const Status kept = tilegrad::Guarded([&]() -> Status {
     renderer->error = status.message();
     return {};
   });
@@ -61,12 +61,12 @@ tilegrad_status Run(tilegrad_renderer* renderer, const Call& call) {
 
 tilegrad_scene DefaultScene() {
   tilegrad_scene scene = {};
-  scene.camera = api::CameraOf(api::Camera());
+  scene.camera = api::CameraOf(tilegrad::Camera());
   return scene;
 }
 
 tilegrad_options DefaultOptions() {
-  const api::RenderOptions from;
+  const tilegrad::RenderOptions from;
   tilegrad_options to = {};
   to.width = from.width, to.height = from.height, to.delta = from.delta;
   to.max_alpha_error = from.max_alpha_error;
@@ -121,9 +121,9 @@ Status Backward(tilegrad_renderer* r, const tilegrad_frame* frame,
     r->gradients[n].Set(r->wanted[n], frame->views[n]);
     r->views.push_back(r->gradients[n].gradients);
   }
-  TILEGRAD_TRY(r->renderer.Backward(frame->frame, FrameGradientsOf(d_images, frame->frame.images()),
-                                    r->views,
-                                    add ? api::GradientMode::kAdd : api::GradientMode::kOverwrite));
+  TILEGRAD_TRY(r->renderer.Backward(
+      frame->frame, api::FrameGradientsOf(d_images, frame->frame.images()), r->views,
+      add ? tilegrad::GradientMode::kAdd : tilegrad::GradientMode::kOverwrite));
   for (std::size_t n = 0; n < count && !add; ++n) {
     api::CGradients::Clear(r->wanted[n], frame->views[n]);
   }
@@ -170,7 +170,7 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
   return Run(renderer, [&]() -> Status {
     if (frame == nullptr) return InvalidArgument("frame is NULL");
     tilegrad_options known = DefaultOptions();
-    const Status status = api::Guarded([&]() -> Status {
+    const Status status = tilegrad::Guarded([&]() -> Status {
       TILEGRAD_TRY(api::ReadSized("options", options, &known));
       return ReadScenes(scenes, count, frame);
     });
@@ -186,8 +186,8 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
 tilegrad_status tilegrad_frame_images(const tilegrad_frame* frame, tilegrad_images* images) {
   if (frame == nullptr || images == nullptr) return TILEGRAD_INVALID_ARGUMENT;
   const std::size_t size = images->struct_size;
-  const Status status = api::Guarded([&] { return api::CheckStructSize("images", size); });
-  if (status.ok()) WriteSized(ImagesOf(frame->frame.images()), size, images);
+  const Status status = tilegrad::Guarded([&] { return api::CheckStructSize("images", size); });
+  if (status.ok()) WriteSized(api::ImagesOf(frame->frame.images()), size, images);
   return CodeOf(status);
 }
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "api/c_records.h"
 
+#include <array>
 #include <cstdint>
 #include <limits>
 
-#include "api/convert.h"
+#include "render/gradient_records.h"
+#include "render/scene_fields.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad::api {
 namespace {
 
 template <class T>
@@ -24,37 +26,55 @@ std::size_t SurfacesOf(const Scene& scene) {
   return std::max<std::size_t>(scene.surfaces.size(), 1);
 }
 
-Camera CameraOf(const tilegrad_camera& from) {
-  Camera to;
-  std::copy_n(from.rotation, 9, to.rotation), std::copy_n(from.translation, 3, to.translation);
-  to.fx = from.fx, to.fy = from.fy, to.cx = from.cx, to.cy = from.cy;
+// For the parts of two records of the same members, here and there.
+constexpr auto kCopy = [](const char*, std::span<const float> from, std::span<float> to) {
+  std::copy(from.begin(), from.end(), to.begin());
+};
+constexpr auto kAdd = [](const char*, std::span<const float> from, std::span<float> to) {
+  for (std::size_t i = 0; i < from.size(); ++i) to[i] += from[i];
+};
+
+template <class To, class From>
+To CopyCamera(const From& from) {
+  To to = {};
+  ForEachCameraPart(kCopy, from, to);
   to.near_plane = from.near_plane;
   return to;
 }
 
 Surface SurfaceOf(const tilegrad_surface& from) {
   Surface to;
-  std::copy_n(from.base_color, 3, to.base_color.begin());
-  std::copy_n(from.ambient, 3, to.ambient.begin());
-  std::copy_n(from.diffuse, 3, to.diffuse.begin());
-  std::copy_n(from.specular, 3, to.specular.begin());
-  to.shininess = from.shininess, to.texture = from.texture;
+  ForEachSurfacePart(kCopy, from, to);
+  to.texture = from.texture;
   return to;
 }
 
-void Add(std::span<const float> from, float* to) {
-  for (std::size_t i = 0; i < from.size(); ++i) to[i] += from[i];
+Light LightOf(const tilegrad_light& from) {
+  Light to;
+  ForEachLightPart(kCopy, from, to);
+  return to;
 }
 
-void AddSurface(const Surface& from, tilegrad_surface* to) {
-  Add(from.base_color, to->base_color), Add(from.ambient, to->ambient);
-  Add(from.diffuse, to->diffuse), Add(from.specular, to->specular);
-  to->shininess += from.shininess;
+struct RowCounts {
+  std::size_t vertices, corners;
+};
+
+void Set(const float* from, std::size_t width, RowCounts rows, std::span<const float>* to) {
+  *to = SpanOf(from, rows.vertices * width);
+}
+void Set(const tilegrad_stream& from, std::size_t width, RowCounts rows, Stream* to) {
+  const bool corner = from.per_corner != 0;
+  to->values = SpanOf(from.values, (corner ? rows.corners : rows.vertices) * width);
+  to->rate = corner ? Rate::kCorner : Rate::kVertex;
 }
 
-void AddCamera(const Camera& from, tilegrad_camera* to) {
-  Add(from.rotation, to->rotation), Add(from.translation, to->translation);
-  to->fx += from.fx, to->fy += from.fy, to->cx += from.cx, to->cy += from.cy;
+// Of as many rows as there are vertices or corners.
+void SetStreams(const tilegrad_scene& from, Scene* to) {
+  const RowCounts rows{from.vertices, 3 * from.face_count};
+  ForEachStreamField<float>(
+      *to, from, [&](const char*, Varying, int width, auto& field, const auto& values) {
+        Set(values, static_cast<std::size_t>(std::max(width, 0)), rows, &field);
+      });
 }
 
 // NULL of an empty list, whatever memory it has.
@@ -99,32 +119,23 @@ Status CheckCounts(const tilegrad_scene& scene) {
 }
 
 Status CheckWanted(const tilegrad_scene_gradients& wanted, const Scene& scene) {
-  const struct {
-    const char* array;
-    const void *wanted, *given;
-  } all[] = {{"colors", wanted.colors, scene.colors.values.data()},
-             {"uvs", wanted.uvs, scene.uvs.values.data()},
-             {"normals", wanted.normals, scene.normals.values.data()},
-             {"attributes", wanted.attributes, scene.attributes.values.data()},
-             {"light_directions", wanted.light_directions, scene.light_directions.data()},
-             {"sh", wanted.sh, scene.sh.data()},
-             {"textures", wanted.textures, ItemsOf(scene.textures)},
-             {"lights", wanted.lights, ItemsOf(scene.lights)}};
-  for (const auto& a : all) {
-    if (a.wanted == nullptr || a.given != nullptr) continue;
-    return InvalidArgument("d_scene.{} is wanted, but the scene has none", a.array);
-  }
-  return {};
+  const char* missing = nullptr;
+  const auto check = [&](const char* name, const void* array, const void* given) {
+    if (missing == nullptr && array != nullptr && given == nullptr) missing = name;
+  };
+  ForEachStreamField<float>(
+      scene, wanted,
+      [&](const char* name, Varying what, int, const auto& field, const float* gradient) {
+        if (what != Varying::kPosition) check(name, gradient, AsStream<float>(field).values.data());
+      });
+  check("sh", wanted.sh, scene.sh.data());
+  check("textures", wanted.textures, ItemsOf(scene.textures));
+  check("lights", wanted.lights, ItemsOf(scene.lights));
+  if (missing == nullptr) return {};
+  return InvalidArgument("d_scene.{} is wanted, but the scene has none", missing);
 }
 
 void CScene::Set(const tilegrad_scene& from) {
-  const std::size_t vertices = from.vertices, corners = 3 * from.face_count;
-  const auto channels = static_cast<std::size_t>(std::max(from.channels, 0));
-  const auto stream = [&](const tilegrad_stream& s, std::size_t width) {
-    const bool corner = s.per_corner != 0;
-    return Stream{SpanOf(s.values, (corner ? corners : vertices) * width),
-                  corner ? Rate::kCorner : Rate::kVertex};
-  };
   textures.clear(), surfaces.clear(), lights.clear();
   for (const tilegrad_texture& t : SpanOf(from.textures, from.texture_count)) {
     textures.push_back({SpanOf(t.texels, TexelsOf(t)), t.width, t.height, static_cast<Wrap>(t.wrap),
@@ -134,21 +145,36 @@ void CScene::Set(const tilegrad_scene& from) {
     surfaces.push_back(SurfaceOf(s));
   }
   for (const tilegrad_light& l : SpanOf(from.lights, from.light_count)) {
-    lights.push_back({{l.direction[0], l.direction[1], l.direction[2]}, l.intensity});
+    lights.push_back(LightOf(l));
   }
-  scene.positions = SpanOf(from.positions, 3 * vertices);
-  scene.faces = SpanOf(from.faces, corners);
-  scene.camera = CameraOf(from.camera);
-  scene.colors = stream(from.colors, 3), scene.uvs = stream(from.uvs, 2);
-  scene.normals = stream(from.normals, 3), scene.attributes = stream(from.attributes, channels);
+  scene.faces = SpanOf(from.faces, 3 * from.face_count);
   scene.channels = from.channels;
+  SetStreams(from, &scene);
+  scene.camera = CopyCamera<Camera>(from.camera);
   scene.textures = textures, scene.surfaces = surfaces, scene.lights = lights;
   scene.face_surfaces = SpanOf(from.face_surfaces, from.face_count);
   scene.shading = {static_cast<Lighting>(from.lighting), static_cast<Normals>(from.normal_kind),
                    from.two_sided != 0, from.clamp != 0};
-  scene.light_directions = SpanOf(from.light_directions, 3 * vertices);
   scene.sh = SpanOf(from.sh, 9);
 }
+
+namespace {
+
+void SetArrays(const tilegrad_scene_gradients& from, const Scene& scene, SceneGradients* to) {
+  std::array<float*, kVaryings> arrays = {};
+  ForEachStreamField<float>(scene, from,
+                            [&](const char*, Varying what, int, const auto&, float* gradient) {
+                              arrays[static_cast<std::size_t>(what)] = gradient;
+                            });
+  ForEachStreamField<float>(
+      scene, *to,
+      [&](const char*, Varying what, int, const auto& field, std::span<float>& gradient) {
+        gradient =
+            SpanOf(arrays[static_cast<std::size_t>(what)], AsStream<float>(field).values.size());
+      });
+}
+
+}  // namespace
 
 void CGradients::Set(const tilegrad_scene_gradients& from, const Scene& scene) {
   textures.clear();
@@ -157,16 +183,11 @@ void CGradients::Set(const tilegrad_scene_gradients& from, const Scene& scene) {
   }
   surfaces.resize(from.surfaces == nullptr ? 0 : SurfacesOf(scene));
   lights.resize(from.lights == nullptr ? 0 : scene.lights.size());
-  gradients.positions = SpanOf(from.positions, scene.positions.size());
   gradients.camera = from.camera == nullptr ? nullptr : &camera;
-  gradients.colors = SpanOf(from.colors, scene.colors.values.size());
-  gradients.uvs = SpanOf(from.uvs, scene.uvs.values.size());
-  gradients.normals = SpanOf(from.normals, scene.normals.values.size());
   gradients.textures = textures, gradients.surfaces = surfaces, gradients.lights = lights;
-  gradients.light_directions = SpanOf(from.light_directions, scene.light_directions.size());
   gradients.sh = SpanOf(from.sh, scene.sh.size());
-  gradients.attributes = SpanOf(from.attributes, scene.attributes.values.size());
-  ClearRecords(gradients);
+  SetArrays(from, scene, &gradients);
+  GradientRecords<float>::Clear(gradients);
 }
 
 void CGradients::Clear(const tilegrad_scene_gradients& to, const Scene& scene) {
@@ -180,11 +201,12 @@ void CGradients::Clear(const tilegrad_scene_gradients& to, const Scene& scene) {
 }
 
 void CGradients::AddTo(const tilegrad_scene_gradients& to) const {
-  if (to.camera != nullptr) AddCamera(camera, to.camera);
-  for (std::size_t i = 0; i < surfaces.size(); ++i) AddSurface(surfaces[i], &to.surfaces[i]);
+  if (to.camera != nullptr) ForEachCameraPart(kAdd, camera, *to.camera);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    ForEachSurfacePart(kAdd, surfaces[i], to.surfaces[i]);
+  }
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    Add(lights[i].direction, to.lights[i].direction);
-    to.lights[i].intensity += lights[i].intensity;
+    ForEachLightPart(kAdd, lights[i], to.lights[i]);
   }
 }
 
@@ -201,24 +223,22 @@ RenderOptions OptionsOf(const tilegrad_options& from) {
 }
 
 Outputs OutputsOf(const tilegrad_options& from) {
-  return {from.color != 0,   from.alpha != 0, from.attributes != 0,  from.depth != 0,
-          from.normals != 0, from.uv != 0,    from.barycentrics != 0};
-}
-
-tilegrad_camera CameraOf(const Camera& from) {
-  tilegrad_camera to = {};
-  AddCamera(from, &to);
-  to.near_plane = from.near_plane;
+  Outputs to;
+  ForEachOutput(
+      0, [](const char*, int, std::int32_t wanted, bool& out) { out = wanted != 0; }, from, to);
   return to;
 }
 
+tilegrad_camera CameraOf(const Camera& from) { return CopyCamera<tilegrad_camera>(from); }
+
 FrameGradients FrameGradientsOf(const tilegrad_frame_gradients& from, const Images& images) {
-  const std::size_t pixels = images.face_ids.size();
   FrameGradients to;
-  to.color = SpanOf(from.color, 3 * pixels), to.alpha = SpanOf(from.alpha, pixels);
-  to.attributes = SpanOf(from.attributes, static_cast<std::size_t>(images.channels) * pixels);
-  to.depth = SpanOf(from.depth, pixels), to.normals = SpanOf(from.normals, 3 * pixels);
-  to.uv = SpanOf(from.uv, 2 * pixels);
+  ForEachImage(
+      images.channels,
+      [&](const char*, int planes, const float* image, std::span<const float>& out) {
+        out = SpanOf(image, static_cast<std::size_t>(planes) * images.face_ids.size());
+      },
+      from, to);
   return to;
 }
 
@@ -227,12 +247,14 @@ tilegrad_images ImagesOf(const Images& from) {
   to.count = from.count, to.height = from.height, to.width = from.width;
   to.channels = from.channels;
   to.face_ids = from.face_ids.empty() ? nullptr : from.face_ids.data();
-  to.color = DataOf(from.color), to.alpha = DataOf(from.alpha);
-  to.attributes = DataOf(from.attributes), to.depth = DataOf(from.depth);
-  to.normals = DataOf(from.normals), to.uv = DataOf(from.uv);
-  to.barycentrics = DataOf(from.barycentrics);
+  ForEachOutput(
+      from.channels,
+      [](const char*, int, std::span<const float> image, const float*& out) {
+        out = DataOf(image);
+      },
+      from, to);
   to.alpha_error_bound = from.alpha_error_bound;
   return to;
 }
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad::api

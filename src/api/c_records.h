@@ -12,7 +12,7 @@
 #include "tilegrad/c.h"
 #include "tilegrad/tilegrad.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad::api {
 
 // Of a struct or an array of structs, which may stand anywhere.
 inline std::size_t StructSize(const void* from) {
@@ -90,4 +90,4 @@ tilegrad_camera CameraOf(const Camera& from);
 FrameGradients FrameGradientsOf(const tilegrad_frame_gradients& from, const Images& images);
 tilegrad_images ImagesOf(const Images& from);
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad::api

@@ -93,8 +93,7 @@ Status SetConfig(const Options& options, FitConfig* config) {
                                                             {"phong", Lighting::kPhong},
                                                             {"sh", Lighting::kSphericalHarmonics}};
   config->lighting = lightings.at(options.lighting);  // CLI11 has checked it
-  config->filter =
-      options.filter == "trilinear" ? shade::Filter::kTrilinear : shade::Filter::kBilinear;
+  config->filter = options.filter == "trilinear" ? Filter::kTrilinear : Filter::kBilinear;
   if (!options.light_direction.empty()) {
     if (options.lighting != "lambert" && options.lighting != "phong") {
       return InvalidArgument("--light-direction: --lighting {} has none; give lambert or phong",

@@ -28,10 +28,9 @@ std::array<float, 3> ToWorld(const Camera& camera, const std::array<float, 3>& v
   return out;
 }
 
-std::vector<shade::DirectionalLight> LightsOf(const RenderSettings& settings,
-                                              const Camera& camera) {
+std::vector<Light> LightsOf(const RenderSettings& settings, const Camera& camera) {
   if (settings.lights.empty()) return {{ToWorld(camera, kKeyLight), kKeyIntensity}};
-  std::vector<shade::DirectionalLight> lights;
+  std::vector<Light> lights;
   for (const auto& [x, y, z, intensity] : settings.lights) {
     const std::array<float, 3> direction = {x, y, z};
     lights.push_back({settings.camera_light ? ToWorld(camera, direction) : direction, intensity});
@@ -95,9 +94,9 @@ void RenderRun::Explain(const Picture& picture, const std::string& name) const {
 
 Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
                        const PictureName& name) {
-  ShadedScene scene = mesh_scene.scene();
+  Scene scene = mesh_scene.scene();
   scene.camera = CameraCast<float>(view.camera);
-  scene.model.lighting = settings_.lighting;
+  scene.shading.lighting = settings_.lighting;
   const auto lights = LightsOf(settings_, scene.camera);
   if (settings_.lighting == Lighting::kLambert || settings_.lighting == Lighting::kPhong)
     scene.lights = lights;

@@ -89,11 +89,11 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
                            {"smooth", NormalSource::kSmooth},
                            {"flat", NormalSource::kFlat}},
                           "auto (default): the file's own, flat where it has none");
-  AddChoice<shade::Filter>(command, "--filter", &s->scene.filter,
-                           {{"nearest", shade::Filter::kNearest},
-                            {"bilinear", shade::Filter::kBilinear},
-                            {"trilinear", shade::Filter::kTrilinear}},
-                           "texture lookup: nearest, bilinear or trilinear (default)");
+  AddChoice<Filter>(command, "--filter", &s->scene.filter,
+                    {{"nearest", Filter::kNearest},
+                     {"bilinear", Filter::kBilinear},
+                     {"trilinear", Filter::kTrilinear}},
+                    "texture lookup: nearest, bilinear or trilinear (default)");
   AddChoice<ColorSpace>(command, "--color-space", &s->scene.color_space,
                         {{"linear", ColorSpace::kLinear}, {"srgb", ColorSpace::kSrgb}},
                         "light is added in linear colours (default), as viewers do, or in the "

@@ -15,7 +15,7 @@ struct FitConfig {
   ParameterSet parameters;  // none: positions, and the texture or colours that the start has
   Lighting lighting = Lighting::kNone;
   std::array<float, 3> light_direction = {0.3f, 1.0f, 0.5f};  // towards it, world
-  shade::Filter filter = shade::Filter::kBilinear;
+  Filter filter = Filter::kBilinear;
 
   // The start, if no mesh is given.
   int template_level = 4;      // subdivisions of the icosahedron: 4 has 2,562 vertices

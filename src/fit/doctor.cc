@@ -69,8 +69,7 @@ std::vector<int> StepsToDrawn(std::span<const std::int32_t> faces, int width, in
   return steps;
 }
 
-void LookAtPixels(const ShadedFrame& frame, std::size_t n, std::span<const float> truth,
-                  Sight* sight) {
+void LookAtPixels(const Images& frame, std::size_t n, std::span<const float> truth, Sight* sight) {
   const std::size_t plane = truth.size();
   const auto faces = std::span<const std::int32_t>(frame.face_ids).subspan(n * plane, plane);
   const std::vector<int> steps = StepsToDrawn(faces, frame.width, frame.height);
@@ -97,7 +96,7 @@ Sight Look(const Fitter& fitter, const FitStep& step) {
     LookAtVertices(fitter.scene(), ScaledCamera(fitter.scene().cameras[view], step.job.scale),
                    {targets.width, targets.height}, &sight);
     LookAtPixels(
-        fitter.frame(), n,
+        fitter.images(), n,
         std::span<const float>(targets.alpha).subspan(view * targets.pixels(), targets.pixels()),
         &sight);
   }

@@ -26,9 +26,12 @@ Result<TargetImages> RenderTarget(const Figure2Case& one, const FitRenderer::Job
                                   const Workers& workers, ImageU8* picture) {
   FitRenderer renderer(workers);
   TILEGRAD_TRY(renderer.Render(one.target, job));
-  *picture = OverWhite(renderer.frame(), 0);
-  return TargetImages{job.options.width, job.options.height, renderer.frame().color,
-                      renderer.frame().alpha};
+  *picture = OverWhite(renderer.images(), 0);
+  const Images& images = renderer.images();
+  return TargetImages{images.width,
+                      images.height,
+                      {images.color.begin(), images.color.end()},
+                      {images.alpha.begin(), images.alpha.end()}};
 }
 
 // A half cosine from 1 to kFinalRate.
@@ -53,11 +56,11 @@ Status Descend(Fitter* fitter, FitStep step, int steps, Figure2Result* result) {
     step.rate_factor = RateAt(i, steps);
     TILEGRAD_ASSIGN(const FitValues values, fitter->Step(step));
     result->losses.push_back(values.image.total);
-    if (i == 0) result->start = OverWhite(fitter->frame(), 0);
+    if (i == 0) result->start = OverWhite(fitter->images(), 0);
   }
   TILEGRAD_ASSIGN(const FitValues last, fitter->Evaluate(step));
   result->losses.push_back(last.image.total);
-  result->result = OverWhite(fitter->frame(), 0);
+  result->result = OverWhite(fitter->images(), 0);
   return {};
 }
 

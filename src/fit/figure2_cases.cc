@@ -80,7 +80,7 @@ FitScene LitScene(const Mesh& mesh, int size, Lighting lighting) {
   for (std::size_t i = 0; i < scene.colors.size(); i += 3) {
     scene.colors[i] = 0.9f, scene.colors[i + 1] = 0.75f, scene.colors[i + 2] = 0.6f;
   }
-  scene.model.lighting = lighting;
+  scene.shading.lighting = lighting;
   scene.lights = {{{0.6f, 0.7f, 0.4f}, 1}};
   return scene;
 }

@@ -86,8 +86,8 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   job.alpha = options_.loss.silhouette_weight > 0;
   TILEGRAD_TRY(renderer_->Render(scene_, job));
   FitValues values;
-  values.image = rule_.Evaluate(options_.loss, *step.targets, step.views, frame(), *workers_);
-  ShadedFrameGradients d_frame;
+  values.image = rule_.Evaluate(options_.loss, *step.targets, step.views, images(), *workers_);
+  FrameGradients d_frame;
   d_frame.color = rule_.d_color(), d_frame.alpha = rule_.d_alpha();
   TILEGRAD_TRY(renderer_->Backward(scene_, job, d_frame, options_.parameters, &gradients_));
   const RegularizerTerms& w = options_.regularizers;

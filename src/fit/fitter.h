@@ -58,7 +58,7 @@ class Fitter {
   Result<FitValues> Evaluate(const FitStep& step);
 
   const FitScene& scene() const { return scene_; }
-  const ShadedFrame& frame() const { return renderer_->frame(); }  // of the last step
+  const Images& images() const { return renderer_->images(); }  // of the last step
   const ImageLossRule& rule() const { return rule_; }
   std::span<const ParameterBlock> blocks() const { return blocks_; }
 

@@ -68,7 +68,7 @@ ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double 
 }  // namespace
 
 ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages& targets,
-                                       std::span<const int> views, const ShadedFrame& frame,
+                                       std::span<const int> views, const Images& frame,
                                        const Workers& workers) {
   const std::size_t plane = targets.pixels(), images = views.size();
   d_color_.resize(loss.color_weight > 0 ? 3 * plane * images : 0);

@@ -7,7 +7,7 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "render/scene.h"
+#include "render/frame_images.h"
 
 namespace tilegrad::train {
 
@@ -46,8 +46,7 @@ class ImageLossRule {
   // Image i of the frame is held to image views[i] of `targets`. Fills d_color and d_alpha with
   // the gradient of the total.
   ImageLossValue Evaluate(const ImageLoss& loss, const TargetImages& targets,
-                          std::span<const int> views, const ShadedFrame& frame,
-                          const Workers& workers);
+                          std::span<const int> views, const Images& frame, const Workers& workers);
   const AlignedVector<float>& d_color() const { return d_color_; }
   const AlignedVector<float>& d_alpha() const { return d_alpha_; }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "scene/camera_parameters.h"
+#include "tilegrad/camera.h"
 
 namespace tilegrad::train {
 namespace {
@@ -14,15 +14,15 @@ constexpr float kMostShininess = 1e5f;
 constexpr std::size_t kMaterialNumbers = 10, kCameraNumbers = 9;
 
 void PutCamera(const CameraParameters& p, float* to) {
-  std::copy(p.rotation.begin(), p.rotation.end(), to);
-  std::copy(p.translation.begin(), p.translation.end(), to + 6);
+  std::copy_n(p.rotation, 6, to);
+  std::copy_n(p.translation, 3, to + 6);
 }
 
 // Intrinsics stay those of `camera`.
 CameraParameters CameraOf(const Camera& camera, const float* from) {
   CameraParameters p = ParametersOf(camera);
-  std::copy_n(from, 6, p.rotation.begin());
-  std::copy_n(from + 6, 3, p.translation.begin());
+  std::copy_n(from, 6, p.rotation);
+  std::copy_n(from + 6, 3, p.translation);
   return p;
 }
 
@@ -156,10 +156,9 @@ void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t
       d[9] = gradients.surface.shininess * (scene.surface.shininess + 1);
       return;
     case Parameter::kCamera: {
-      CameraParameters d_camera;
-      PullBack(CameraOf(scene.cameras[static_cast<std::size_t>(block->view)], block->values.data()),
-               gradients.cameras[rendered], &d_camera);
-      return PutCamera(d_camera, d.data());
+      const Camera& camera = scene.cameras[static_cast<std::size_t>(block->view)];
+      return PutCamera(
+          PullBack(CameraOf(camera, block->values.data()), gradients.cameras[rendered]), d.data());
     }
   }
 }

@@ -23,7 +23,7 @@ struct ParameterBlock {
 };
 
 // kPositions, kColors, kTexture, kUv: as they are. kCamera: the six numbers of rotation, then the
-// translation (scene/camera_parameters.h). kLight: directions. kMaterial: ambient, diffuse,
+// translation (tilegrad/camera.h). kLight: directions. kMaterial: ambient, diffuse,
 // specular, and the logarithm of shininess + 1.
 ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate,
                          int view = -1);

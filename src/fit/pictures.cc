@@ -6,7 +6,7 @@
 
 namespace tilegrad::train {
 
-ImageU8 OverWhite(const ShadedFrame& frame, std::size_t n) {
+ImageU8 OverWhite(const Images& frame, std::size_t n) {
   ImageU8 out(frame.width, frame.height, 3);
   const std::size_t plane = out.pixels.size() / 3;
   for (std::size_t p = 0; p < plane; ++p) {

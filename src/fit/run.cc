@@ -128,7 +128,7 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
   job.alpha = false;
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return OverWhite(renderer.frame(), 0);
+  return OverWhite(renderer.images(), 0);
 }
 
 // The scene at the end, its scores and what is written of both.

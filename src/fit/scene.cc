@@ -36,14 +36,14 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter) {
       return textured ? "" : "the scene has no texture";
     case Parameter::kUv:
       if (!textured) return "the scene has no texture to look up";
-      return scene.filter == shade::Filter::kNearest
+      return scene.filter == Filter::kNearest
                  ? "the nearest texel does not depend on where in it a lookup falls: choose the "
                    "bilinear or trilinear filter"
                  : "";
     case Parameter::kLight:
       return scene.uses_lights() ? "" : "only Lambert and Phong light have a direction";
     case Parameter::kSh:
-      return scene.model.lighting == Lighting::kSphericalHarmonics
+      return scene.shading.lighting == Lighting::kSphericalHarmonics
                  ? ""
                  : "the light is not made of spherical harmonics";
     case Parameter::kMaterial:
@@ -59,19 +59,19 @@ Camera ScaledCamera(Camera camera, float scale) {
 }
 
 void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {
-  ShadedScene one;
+  Scene one;
   one.positions = scene.positions, one.faces = scene.faces;
-  one.model = scene.model;
-  if (!scene.colors.empty()) one.colors = {scene.colors, AttributeRate::kVertex};
+  one.shading = scene.shading;
+  if (!scene.colors.empty()) one.colors = {scene.colors, Rate::kVertex};
   if (!scene.texture.empty()) {
     corner_uvs_.resize(2 * scene.uv_indices.size());
     for (std::size_t i = 0; i < scene.uv_indices.size(); ++i) {
       const auto u = 2 * static_cast<std::size_t>(scene.uv_indices[i]);
       corner_uvs_[2 * i] = scene.uvs[u], corner_uvs_[2 * i + 1] = scene.uvs[u + 1];
     }
-    one.uvs = {corner_uvs_, AttributeRate::kCorner};
-    texture_ = {scene.texture.pixels, scene.texture.width, scene.texture.height, 3,
-                scene.wrap,           scene.filter};
+    one.uvs = {corner_uvs_, Rate::kCorner};
+    texture_ = {scene.texture.pixels, scene.texture.width, scene.texture.height, scene.wrap,
+                scene.filter};
     one.textures = {&texture_, 1};
   }
   if (scene.uses_lights()) {
@@ -80,7 +80,7 @@ void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {
     one.surfaces = {&surface_, 1};
     one.lights = scene.lights;
   }
-  if (scene.model.lighting == Lighting::kSphericalHarmonics) one.sh = scene.sh;
+  if (scene.shading.lighting == Lighting::kSphericalHarmonics) one.sh = scene.sh;
   scenes_.assign(job.views.size(), one);
   for (std::size_t n = 0; n < job.views.size(); ++n) {
     scenes_[n].camera =
@@ -90,14 +90,14 @@ void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {
 
 Status FitRenderer::Render(const FitScene& scene, const Job& job) {
   SetScenes(scene, job);
-  ShadedRequest request;
+  Outputs request;
   request.attributes = false, request.alpha = job.alpha;
   return renderer_.Render(scenes_, job.options, request, &frame_);
 }
 
 void FitRenderer::SetGradients(const FitScene& scene, const ParameterSet& wanted,
                                FitGradients* gradients) {
-  ShadedGradients d;
+  SceneGradients d;
   d.positions =
       Wanted(wanted[Parameter::kPositions], scene.positions.size(), &gradients->positions);
   d.colors = Wanted(wanted[Parameter::kColors], scene.colors.size(), &gradients->colors);
@@ -111,11 +111,13 @@ void FitRenderer::SetGradients(const FitScene& scene, const ParameterSet& wanted
     gradients->lights.resize(scene.lights.size());
     d.lights = gradients->lights;
   }
-  if (scene.model.lighting == Lighting::kSphericalHarmonics && wanted[Parameter::kSh]) {
+  if (scene.shading.lighting == Lighting::kSphericalHarmonics && wanted[Parameter::kSh]) {
     d.sh = gradients->sh;
   }
-  d.camera = wanted[Parameter::kCamera];
   d_scenes_.assign(scenes_.size(), d);
+  if (!wanted[Parameter::kCamera]) return;
+  gradients->cameras.resize(scenes_.size());
+  for (std::size_t n = 0; n < scenes_.size(); ++n) d_scenes_[n].camera = &gradients->cameras[n];
 }
 
 // Corners that share coordinates add up, in the order of corners.
@@ -128,18 +130,14 @@ void FitRenderer::GatherUvs(const FitScene& scene, FitGradients* gradients) cons
   }
 }
 
-Status FitRenderer::Backward(const FitScene& scene, const Job& job,
-                             const ShadedFrameGradients& d_frame, const ParameterSet& wanted,
-                             FitGradients* gradients) {
+Status FitRenderer::Backward(const FitScene& scene, const Job& job, const FrameGradients& d_frame,
+                             const ParameterSet& wanted, FitGradients* gradients) {
   SetGradients(scene, wanted, gradients);
-  TILEGRAD_TRY(renderer_.Backward(scenes_, job.options, frame_, d_frame, d_scenes_));
+  TILEGRAD_TRY(renderer_.Backward(frame_, d_frame, d_scenes_));
   if (wanted[Parameter::kUv] && !scene.texture.empty()) GatherUvs(scene, gradients);
   if (!wanted[Parameter::kCamera]) return {};
-  gradients->cameras.resize(scenes_.size());
-  for (std::size_t n = 0; n < scenes_.size(); ++n) {
-    // Intrinsics were multiplied by the scale.
-    gradients->cameras[n] = ScaledCamera(d_scenes_[n].d_camera, job.scale);
-  }
+  // Intrinsics were multiplied by the scale.
+  for (Camera& d_camera : gradients->cameras) d_camera = ScaledCamera(d_camera, job.scale);
   return {};
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/aligned.h"
 #include "render/renderer.h"
+#include "scene/camera.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
 
@@ -23,17 +24,17 @@ struct FitScene {
   std::vector<float> uvs;                // [U,2]
   std::vector<std::int32_t> uv_indices;  // [F,3]: corners that share one move together
   Image texture;                         // of 3 channels
-  shade::Filter filter = shade::Filter::kBilinear;
-  shade::Wrap wrap = shade::Wrap::kRepeat;
+  Filter filter = Filter::kBilinear;
+  Wrap wrap = Wrap::kRepeat;
   Surface surface;  // of the whole mesh; read under Lambert and Phong light
-  std::vector<shade::DirectionalLight> lights;
+  std::vector<Light> lights;
   std::array<float, 9> sh = {};
-  ShadingModel model;
+  ShadingModel shading;
   std::vector<Camera> cameras;  // one for each view
 
   std::size_t vertices() const { return positions.size() / 3; }
   bool uses_lights() const {
-    return model.lighting == Lighting::kLambert || model.lighting == Lighting::kPhong;
+    return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
   }
 };
 
@@ -59,7 +60,7 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter);
 struct FitGradients {
   AlignedVector<float> positions, colors, uvs, texture;
   Surface surface;
-  std::vector<shade::DirectionalLight> lights;
+  std::vector<Light> lights;
   std::array<float, 9> sh = {};
   std::vector<Camera> cameras;
 };
@@ -68,7 +69,7 @@ struct FitGradients {
 // the sizes. One call at a time.
 class FitRenderer {
  public:
-  explicit FitRenderer(const Workers& workers) : renderer_(workers) {}
+  explicit FitRenderer(const Workers& workers) : renderer_(RendererOn(workers)) {}
 
   // `scale`: pixels of the images wanted for a pixel of the cameras. `views` index into
   // scene.cameras.
@@ -79,10 +80,10 @@ class FitRenderer {
     bool alpha = true;
   };
   Status Render(const FitScene& scene, const Job& job);
-  const ShadedFrame& frame() const { return frame_; }
+  const Images& images() const { return frame_.images(); }
 
-  // `scene` and `job` as in the last Render; d_frame in the shapes of its frame.
-  Status Backward(const FitScene& scene, const Job& job, const ShadedFrameGradients& d_frame,
+  // `scene` and `job` as in the last Render; d_frame in the shapes of its images.
+  Status Backward(const FitScene& scene, const Job& job, const FrameGradients& d_frame,
                   const ParameterSet& wanted, FitGradients* gradients);
 
  private:
@@ -90,12 +91,12 @@ class FitRenderer {
   void SetGradients(const FitScene& scene, const ParameterSet& wanted, FitGradients* gradients);
   void GatherUvs(const FitScene& scene, FitGradients* gradients) const;
 
-  ShadedRenderer renderer_;
-  ShadedFrame frame_;
-  std::vector<ShadedScene> scenes_;
-  std::vector<ShadedGradients> d_scenes_;
+  Renderer renderer_;
+  Frame frame_;
+  std::vector<Scene> scenes_;
+  std::vector<SceneGradients> d_scenes_;
   AlignedVector<float> corner_uvs_, d_corner_uvs_;  // [F,3,2]
-  shade::TextureView texture_;
+  Texture texture_;
   Surface surface_;
   std::span<float> d_texture_;
 };

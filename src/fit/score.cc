@@ -15,7 +15,7 @@ constexpr int kSamples = 3;  // a side of a pixel
 constexpr double kBestPsnr = 99;
 
 // Means of samples, over white; alpha is the covered share.
-void Resolve(const ShadedFrame& frame, ImageSize size, Image* rgb, std::vector<float>* alpha) {
+void Resolve(const Images& frame, ImageSize size, Image* rgb, std::vector<float>* alpha) {
   *rgb = Image(size.width, size.height, 3);
   alpha->assign(rgb->pixels.size() / 3, 0.0f);
   const auto wide = static_cast<std::size_t>(frame.width);
@@ -128,7 +128,7 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     const auto view = static_cast<std::size_t>(score.view);
     Image rendered;
     std::vector<float> alpha;
-    Resolve(renderer.frame(), size, &rendered, &alpha);
+    Resolve(renderer.images(), size, &rendered, &alpha);
     const Image truth = TruthOverWhite(input.images, view);
     score.psnr = Psnr(truth, rendered);
     const std::size_t plane = input.images.pixels();

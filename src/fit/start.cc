@@ -125,7 +125,7 @@ void SetCameras(const FitJob& job, FitScene* scene) {
 }
 
 void SetLight(const FitConfig& config, FitScene* scene) {
-  scene->model.lighting = config.lighting;
+  scene->shading.lighting = config.lighting;
   scene->filter = config.filter;
   if (scene->uses_lights()) scene->lights = {{config.light_direction, 1}};
   scene->sh[0] = kFirstHarmonic;
@@ -134,7 +134,7 @@ void SetLight(const FitConfig& config, FitScene* scene) {
 void AddMesh(const Mesh& mesh, Hash* hash) {
   hash->AddAll(mesh.positions), hash->AddAll(mesh.faces);
   hash->AddAll(mesh.colors), hash->AddAll(mesh.corner_uvs);
-  for (const Texture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
+  for (const MeshTexture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
 }
 
 // Of the images, the cameras, which of them are held out, and the mesh to start from.

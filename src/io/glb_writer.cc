@@ -169,7 +169,7 @@ Json MaterialJson(const Material& m, const std::vector<TextureUse>& uses) {
 }
 
 Status AddImages(GlbBuilder& glb, const Mesh& mesh) {
-  for (const Texture& texture : mesh.textures) {
+  for (const MeshTexture& texture : mesh.textures) {
     auto png = EncodePng(texture.image);
     if (!png.ok()) return png.status().Within("texture " + texture.name);
     const int view = glb.AddView(png->data(), png->size(), 0);

@@ -20,7 +20,7 @@ namespace tilegrad {
 struct SlopeProblem {
   const OwnedScene<float>& scene;
   const RenderOptions& options;
-  const ShadedRequest& request;
+  const Outputs& request;
   std::span<const std::int32_t> face_ids;  // [H,W] of the scene's faces
   const OwnedCotangents<double>& d_frame;
 };
@@ -36,8 +36,8 @@ struct Slope {
 inline std::complex<double> SlopeLoss(const SlopeProblem& p,
                                       OwnedScene<std::complex<double>>& scene) {
   using Complex = std::complex<double>;
-  ShadedFrameT<Complex> frame;
-  ShadedRenderRef<Complex>(scene.View(), p.options, p.request, p.face_ids, &frame);
+  FrameImagesT<Complex> frame;
+  ReferenceRender<Complex>(scene.View(), p.options, p.request, p.face_ids, &frame);
   Complex sum = 0;
   const auto add = [&](const AlignedVector<Complex>& image, const std::vector<double>& weights) {
     for (std::size_t i = 0; i < image.size(); ++i) {

@@ -1,33 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // The images of an owned scene and the gradients of the sum of images times cotangents, by the
-// ShadedRenderer and by the reference.
+// Engine and by the reference.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
 #include "proof/owned_scene.h"
-#include "render/renderer.h"
-#include "render/renderer_ref.h"
+#include "render/engine.h"
+#include "render/reference.h"
 
 namespace tilegrad {
 
 template <class T>
 struct OwnedRendering {
-  ShadedFrameT<T> frame;
+  FrameImagesT<T> frame;
   OwnedScene<T> d;  // gradients
 };
 
 inline Status RenderOwned(OwnedScene<float>& scene, const RenderOptions& options,
-                          const ShadedRequest& request, const OwnedCotangents<float>& d_frame,
+                          const Outputs& request, const OwnedCotangents<float>& d_frame,
                           const Workers& workers, OwnedRendering<float>* out) {
-  ShadedRenderer renderer(workers);
-  const ShadedScene view = scene.View();
-  TILEGRAD_TRY(renderer.Render({&view, 1}, options, request, &out->frame));
+  Engine engine(workers);
+  const Scene view = scene.View();
+  TILEGRAD_TRY(engine.Render({&view, 1}, options, request, &out->frame));
   OwnedGradients<float> gradients(scene);
-  auto d_scene = gradients.View();
-  TILEGRAD_TRY(renderer.Backward({&view, 1}, options, out->frame, d_frame.View(), {&d_scene, 1}));
-  gradients.TakeCamera(d_scene);
+  const SceneGradients d_scene = gradients.View();
+  TILEGRAD_TRY(engine.Backward({&view, 1}, options, out->frame, d_frame.View(), {&d_scene, 1}));
   out->d = gradients.d;
   return {};
 }
@@ -38,18 +37,16 @@ OwnedScene<T> OwnedRefBackward(OwnedScene<T>& scene, const RenderOptions& option
                                const OwnedCotangents<T>& d_frame,
                                std::span<const std::int32_t> face_ids) {
   OwnedGradients<T> gradients(scene);
-  auto d_scene = gradients.View();
-  ShadedRenderRefBackward<T>(scene.View(), options, face_ids, d_frame.View(), &d_scene);
-  gradients.TakeCamera(d_scene);
+  ReferenceRenderBackward<T>(scene.View(), options, face_ids, d_frame.View(), gradients.View());
   return gradients.d;
 }
 
 template <class T>
 OwnedRendering<T> RenderOwnedRef(OwnedScene<T>& scene, const RenderOptions& options,
-                                 const ShadedRequest& request, const OwnedCotangents<T>& d_frame,
+                                 const Outputs& request, const OwnedCotangents<T>& d_frame,
                                  std::span<const std::int32_t> face_ids) {
   OwnedRendering<T> out;
-  ShadedRenderRef<T>(scene.View(), options, request, face_ids, &out.frame);
+  ReferenceRender<T>(scene.View(), options, request, face_ids, &out.frame);
   out.d = OwnedRefBackward<T>(scene, options, d_frame, face_ids);
   return out;
 }

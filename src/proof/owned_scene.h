@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes that own their arrays, in any scalar type, with their gradients and cotangents, and all
-// their numbers by name: what proofs need that hold the ShadedRenderer to the reference, and the
+// their numbers by name: what proofs need that hold the Renderer to the reference, and the
 // reference to differences (tests/render, src/proof/selftest).
 #pragma once
 
@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "base/rng.h"
-#include "render/scene.h"
+#include "render/pipeline/records.h"
+#include "scene/camera.h"
+#include "tilegrad/renderer.h"
 
 namespace tilegrad {
 
@@ -22,10 +24,10 @@ struct OwnedMesh {
   std::vector<std::int32_t> faces;
   std::vector<T> attributes;
   int channels = 3;
-  AttributeRate rate = AttributeRate::kVertex;
+  Rate rate = Rate::kVertex;
   CameraT<T> camera;
 
-  SceneViewT<T> View() const { return {positions, faces, attributes, channels, rate, camera}; }
+  PipelineSceneT<T> View() const { return {positions, faces, attributes, channels, rate, camera}; }
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t face_count() const { return faces.size() / 3; }
 };
@@ -44,32 +46,33 @@ template <class T>
 struct OwnedTexture {
   std::vector<T> texels;
   int width = 1, height = 1;
-  shade::Wrap wrap = shade::Wrap::kRepeat;
-  shade::Filter filter = shade::Filter::kBilinear;
+  Wrap wrap = Wrap::kRepeat;
+  Filter filter = Filter::kBilinear;
 };
 
-// Owns what a ShadedScene looks at.
+// Owns what a Scene looks at.
 template <class T>
 struct OwnedScene {
-  ShadingModel model;
+  ShadingModel shading;
   OwnedMesh<T> mesh;  // its attributes are the user's channels
   std::vector<T> colors, uvs, normals, light_directions, sh;
-  AttributeRate colors_rate = AttributeRate::kVertex, uvs_rate = AttributeRate::kCorner;
-  AttributeRate normals_rate = AttributeRate::kVertex;
+  Rate colors_rate = Rate::kVertex, uvs_rate = Rate::kCorner;
+  Rate normals_rate = Rate::kVertex;
   std::vector<OwnedTexture<T>> textures;
   std::vector<SurfaceT<T>> surfaces;
   std::vector<std::int32_t> face_surfaces;
-  std::vector<shade::DirectionalLightT<T>> lights;
-  std::vector<shade::TextureViewT<T>> texture_views;  // made by View
+  std::vector<LightT<T>> lights;
+  std::vector<TextureT<T>> texture_views;  // made by View
 
-  ShadedSceneT<T> View() {
+  SceneT<T> View() {
     texture_views.clear();
     for (const auto& t : textures) {
-      texture_views.push_back({t.texels, t.width, t.height, 3, t.wrap, t.filter});
+      texture_views.push_back({t.texels, t.width, t.height, t.wrap, t.filter});
     }
-    ShadedSceneT<T> view;
-    static_cast<SceneViewT<T>&>(view) = mesh.View();
-    view.model = model;
+    SceneT<T> view;
+    view.positions = mesh.positions, view.faces = mesh.faces, view.camera = mesh.camera;
+    view.attributes = {mesh.attributes, mesh.rate}, view.channels = mesh.channels;
+    view.shading = shading;
     view.colors = {colors, colors_rate}, view.uvs = {uvs, uvs_rate};
     view.normals = {normals, normals_rate}, view.textures = texture_views;
     view.surfaces = surfaces, view.face_surfaces = face_surfaces, view.lights = lights;
@@ -106,7 +109,7 @@ OwnedScene<T> OwnedCast(const OwnedScene<U>& s) {
     return std::array<T, 3>{T(v[0]), T(v[1]), T(v[2])};
   };
   OwnedScene<T> out;
-  out.model = s.model, out.mesh = MeshCast<T>(s.mesh);
+  out.shading = s.shading, out.mesh = MeshCast<T>(s.mesh);
   out.colors = cast(s.colors), out.uvs = cast(s.uvs), out.normals = cast(s.normals);
   out.light_directions = cast(s.light_directions), out.sh = cast(s.sh);
   out.colors_rate = s.colors_rate, out.uvs_rate = s.uvs_rate, out.normals_rate = s.normals_rate;
@@ -132,16 +135,15 @@ struct OwnedGradients {
     ForEachNumber(d, [](const char*, T& v) { v = T(0); });
     for (auto& t : d.textures) textures.push_back(t.texels);
   }
-  ShadedGradientsT<T> View() {
-    ShadedGradientsT<T> view;
-    view.positions = d.mesh.positions, view.attributes = d.mesh.attributes, view.camera = true;
+  SceneGradientsT<T> View() {
+    SceneGradientsT<T> view;
+    view.positions = d.mesh.positions, view.attributes = d.mesh.attributes;
+    view.camera = &d.mesh.camera;
     view.colors = d.colors, view.uvs = d.uvs, view.light_directions = d.light_directions;
-    if (d.model.normals == NormalKind::kGiven) view.normals = d.normals;
+    if (d.shading.normals == Normals::kGiven) view.normals = d.normals;
     view.textures = textures, view.surfaces = d.surfaces, view.lights = d.lights, view.sh = d.sh;
     return view;
   }
-  // After the renderer.
-  void TakeCamera(const ShadedGradientsT<T>& view) { d.mesh.camera = view.d_camera; }
 };
 
 // Cotangents of all images, random in [-1, 1].
@@ -169,8 +171,8 @@ struct OwnedCotangents {
     out.uv = cast(uv), out.depth = cast(depth), out.attributes = cast(attributes);
     return out;
   }
-  ShadedFrameGradientsT<T> View() const {
-    ShadedFrameGradientsT<T> view;
+  FrameGradientsT<T> View() const {
+    FrameGradientsT<T> view;
     view.color = color, view.alpha = alpha, view.normals = normals, view.uv = uv;
     view.depth = depth, view.attributes = attributes;
     return view;

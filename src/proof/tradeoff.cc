@@ -55,7 +55,7 @@ class Measurement {
     for (const double error : job.errors) settings_.push_back(WithError(error));
     if (job.paper_rule) {
       settings_.push_back(job.options);
-      settings_.back().soft_rule = SoftRule::kPaper;
+      settings_.back().alpha_rule = AlphaRule::kPaper;
     }
     total_ = settings_.size() * static_cast<std::size_t>(job.repetitions + 1);
   }
@@ -77,7 +77,7 @@ class Measurement {
  private:
   RenderOptions WithError(double error) const {
     RenderOptions options = job_.options;
-    options.soft_rule = SoftRule::kAllFaces, options.max_alpha_error = error;
+    options.alpha_rule = AlphaRule::kAllFaces, options.max_alpha_error = error;
     return options;
   }
   Status Step(const char* stage, std::size_t done, std::size_t total) {
@@ -95,11 +95,12 @@ class Measurement {
   Status AddAccuracy(const RenderOptions& setting);
   Status Time();
   Status Forward(const RenderOptions& setting) {
-    return renderer_.Render({&job_.scene, 1}, setting, {false, true, false, false}, &frame_);
+    return renderer_.Render({&job_.scene, 1}, setting, {.color = false, .attributes = false},
+                            &frame_);
   }
   // d_positions_ <- the gradient of L with upstream gradients `d_alpha`.
   Status Backward(const RenderOptions& setting, const std::vector<float>& d_alpha) {
-    SceneGradients d_scene{d_positions_, {}, false, {}};
+    PipelineGradients d_scene{d_positions_, {}, false, {}};
     return renderer_.Backward({&job_.scene, 1}, setting, frame_, {{}, d_alpha}, {&d_scene, 1});
   }
 
@@ -107,9 +108,9 @@ class Measurement {
   const ProgressSink& progress_;
   const StopFlag& stop_;
   const Workers one_{1};
-  Renderer renderer_;
+  Pipeline renderer_;
   std::vector<RenderOptions> settings_;
-  Frame frame_;
+  PipelineFrame frame_;
   std::vector<std::int32_t> ids_;
   std::vector<float> d_alpha_, d_alpha_truth_;  // [H,W]; the second only where there is a truth
   std::vector<float> d_positions_;
@@ -138,14 +139,14 @@ Status Measurement::FindIds() {
 
 Status Measurement::FindTruth() {
   const std::vector<double> positions(job_.scene.positions.begin(), job_.scene.positions.end());
-  SceneViewT<double> scene;
+  PipelineSceneT<double> scene;
   scene.positions = positions, scene.faces = job_.scene.faces;
   scene.camera = CameraCast<double>(job_.scene.camera);
   PreparedScene<double> prepared;
   PrepareRef(scene, job_.options, &prepared);
   PreparedGradients<double> gradients(scene, prepared);
-  FrameT<double> frame;
-  SizeFrame(1, 0, job_.options, {false, true, false, false}, &frame);
+  PipelineFrameT<double> frame;
+  SizeFrame(1, 0, job_.options, {.color = false, .attributes = false}, &frame);
   const std::vector<double> d_alpha(d_alpha_truth_.begin(), d_alpha_truth_.end());
   std::size_t done = 0;
   const auto for_row = [&](int row, const auto& visit) {
@@ -168,7 +169,7 @@ Status Measurement::FindTruth() {
   }
   truth_.alpha.assign(frame.alpha.begin(), frame.alpha.end());
   truth_.d_positions.resize(positions.size());
-  SceneGradientsT<double> d_scene{truth_.d_positions, {}, false, {}};
+  PipelineGradientsT<double> d_scene{truth_.d_positions, {}, false, {}};
   PrepareRefBackward(scene, job_.options, prepared, gradients, &d_scene);
   if (Dot(truth_.d_positions, truth_.d_positions) == 0) {
     return InvalidArgument("alpha of this scene has no gradient: nothing is near its background");
@@ -179,8 +180,8 @@ Status Measurement::FindTruth() {
 Status Measurement::AddAccuracy(const RenderOptions& setting) {
   TILEGRAD_TRY(Step("measuring", out_.rows.size(), total_));
   TradeoffRow row;
-  row.rule = setting.soft_rule;
-  row.max_alpha_error = setting.soft_rule == SoftRule::kPaper
+  row.rule = setting.alpha_rule;
+  row.max_alpha_error = setting.alpha_rule == AlphaRule::kPaper
                             ? std::numeric_limits<double>::infinity()
                             : setting.max_alpha_error;
   TILEGRAD_TRY(Forward(setting));

@@ -13,10 +13,10 @@
 namespace tilegrad {
 
 struct TradeoffJob {
-  SceneView scene;             // its positions, faces and camera; attributes are not looked at
+  PipelineScene scene;         // its positions, faces and camera; attributes are not looked at
   RenderOptions options;       // max_alpha_error is replaced
   std::vector<double> errors;  // values of max_alpha_error to try, each in [0, 1]
-  bool paper_rule = true;      // also try SoftRule::kPaper, last
+  bool paper_rule = true;      // also try AlphaRule::kPaper, last
   int repetitions = 7;         // timings of each setting, taken in turns
   // Pairs of pixel and face that the truth may cost, twice (forward, backward): where the whole
   // image would cost more, evenly spread rows stand for it.
@@ -25,10 +25,10 @@ struct TradeoffJob {
 
 // One setting. Errors are over the background pixels of the rows that have a truth.
 struct TradeoffRow {
-  SoftRule rule = SoftRule::kAllFaces;
-  double max_alpha_error = 0;              // infinite with SoftRule::kPaper
+  AlphaRule rule = AlphaRule::kAllFaces;
+  double max_alpha_error = 0;              // infinite with AlphaRule::kPaper
   double forward_ms = 0, backward_ms = 0;  // median CPU time of the whole image, one thread
-  double reported = 0;                     // Frame::alpha_error_bound
+  double reported = 0;                     // PipelineFrame::alpha_error_bound
   double largest = 0, mean = 0;            // |alpha - truth|
   double gradient_angle = 0;  // degrees, between dL/d(positions) and its truth; L a random sum
   double gradient_error = 0;  // |difference| / |truth|

@@ -12,8 +12,8 @@ namespace {
 double Cost(const TradeoffRow& row) { return row.forward_ms + row.backward_ms; }
 
 std::string Setting(const TradeoffRow& row) {
-  return row.rule == SoftRule::kPaper ? "the paper's rule"
-                                      : fmt::format("{:g}", row.max_alpha_error);
+  return row.rule == AlphaRule::kPaper ? "the paper's rule"
+                                       : fmt::format("{:g}", row.max_alpha_error);
 }
 
 std::string Heading(const StudyResult& r) {
@@ -90,7 +90,7 @@ std::string StudyPicture(const std::vector<StudyResult>& results) {
                       fmt::format("{} pixels, delta = {:.3g}", r.size, r.delta)},
                      {}};
     for (const TradeoffRow& row : r.tradeoff.rows) {
-      if (row.rule == SoftRule::kPaper) continue;  // no curve goes through it
+      if (row.rule == AlphaRule::kPaper) continue;  // no curve goes through it
       series.points.push_back({std::max(Cost(row), 1e-3), Shown(row.largest),
                                fmt::format("max_alpha_error = {:g}", row.max_alpha_error)});
     }

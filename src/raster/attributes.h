@@ -7,33 +7,25 @@
 #include <span>
 
 #include "raster/screen_mesh.h"
+#include "tilegrad/options.h"
+#include "tilegrad/scene.h"
 
-namespace tilegrad {
-
-enum class AttributeRate { kVertex, kCorner };
-enum class Interpolation {
-  kPerspective,   // attributes are linear on the face in space: what a camera sees
-  kScreenLinear,  // linear on the screen: the paper's implementation
-};
-
-namespace raster {
+namespace tilegrad::raster {
 
 // Attributes in the layout of a ScreenMesh, i.e. after near clipping. T may be const.
 template <class T>
 struct AttributeViewT {
   std::span<T> values;  // [V,C] or [F,3,C] by rate
   int channels = 0;
-  AttributeRate rate = AttributeRate::kVertex;
+  Rate rate = Rate::kVertex;
 
   // The C values of a face's corner.
   template <class U>
   T* corner(const ScreenMeshT<U>& mesh, std::size_t face, int k) const {
-    const std::size_t row = rate == AttributeRate::kVertex
-                                ? static_cast<std::size_t>(mesh.vertex(face, k))
-                                : 3 * face + static_cast<std::size_t>(k);
+    const std::size_t row = rate == Rate::kVertex ? static_cast<std::size_t>(mesh.vertex(face, k))
+                                                  : 3 * face + static_cast<std::size_t>(k);
     return values.data() + row * static_cast<std::size_t>(channels);
   }
 };
 
-}  // namespace raster
-}  // namespace tilegrad
+}  // namespace tilegrad::raster

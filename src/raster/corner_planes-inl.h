@@ -164,7 +164,7 @@ inline HWY_NOINLINE void SetSteepWeights(const CornerLanes& c, Lane origin_x, La
 // Where the corners' attributes begin.
 HWY_INLINE CornerIndices AttributesAt(const InterpolateInput& input, const std::int32_t* faces,
                                       const CornerIndices& vertices) {
-  const bool by_vertex = input.attributes.rate == AttributeRate::kVertex;
+  const bool by_vertex = input.attributes.rate == Rate::kVertex;
   CornerIndices out;
   for (int k = 0; k < 3; ++k) {
     for (std::size_t i = 0; i < hn::Lanes(LaneIntTag()); ++i) {

@@ -205,12 +205,12 @@ SourceRows<T> CornerRows(const ScreenMeshT<T>& mesh, std::span<const std::int32_
 // Calls visit(row, source_rows, clip_index) for each row of attributes in the mesh's layout;
 // clip_index selects ScreenGradients::d_clip_t, or is -1.
 template <class T, class Visit>
-void ForEachAttributeRow(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces,
-                         AttributeRate rate, const Visit& visit) {
+void ForEachAttributeRow(const ScreenMeshT<T>& mesh, std::span<const std::int32_t> faces, Rate rate,
+                         const Visit& visit) {
   const auto clip_index = [&](std::size_t v) {
     return static_cast<std::ptrdiff_t>(v) - mesh.source_vertices;
   };
-  if (rate == AttributeRate::kVertex) {
+  if (rate == Rate::kVertex) {
     for (std::size_t v = 0; v < mesh.vertices(); ++v) {
       visit(v, VertexRows(mesh, v), clip_index(v));
     }
@@ -225,8 +225,8 @@ void ForEachAttributeRow(const ScreenMeshT<T>& mesh, std::span<const std::int32_
 }
 
 template <class T>
-std::size_t AttributeRows(const ScreenMeshT<T>& mesh, AttributeRate rate) {
-  return rate == AttributeRate::kVertex ? mesh.vertices() : 3 * mesh.faces();
+std::size_t AttributeRows(const ScreenMeshT<T>& mesh, Rate rate) {
+  return rate == Rate::kVertex ? mesh.vertices() : 3 * mesh.faces();
 }
 
 // out [rows,C] <- attributes of the source mesh, in the layout of the cut mesh.

@@ -2,200 +2,212 @@
 #include "render/renderer.h"
 
 #include <cstddef>
+#include <optional>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
-#include "base/stage_clock.h"
-#include "render/pipeline/validate.h"
-#include "render/shading/gradients.h"
-#include "render/shading/inputs.h"
-#include "render/shading/merge.h"
-#include "render/shading/report.h"
-#include "render/shading/stage.h"
-#include "render/shading/validate.h"
+#include "base/error.h"
+#include "base/guarded.h"
+#include "render/engine.h"
+#include "render/gradient_arrays.h"
+#include "render/gradient_records.h"
+#include "render/reference_renderer.h"
+#include "render/saved_gradients.h"
+#include "render/validate.h"
 
 namespace tilegrad {
-namespace {
+inline namespace v0 {
 
-GradientWishes WishesOf(const ShadedFrameGradients& d_frame,
-                        std::span<const ShadedGradients> d_scenes) {
-  GradientWishes w;
-  w.d_color = !d_frame.color.empty(), w.d_normals = !d_frame.normals.empty();
-  w.d_uv = !d_frame.uv.empty(), w.d_depth = !d_frame.depth.empty();
-  w.d_user = !d_frame.attributes.empty(), w.d_alpha = !d_frame.alpha.empty();
-  for (const ShadedGradients& d : d_scenes) {
-    w.positions |= !d.positions.empty(), w.camera |= d.camera;
-    w.colors |= !d.colors.empty(), w.uvs |= !d.uvs.empty(), w.normals |= !d.normals.empty();
-    w.light_directions |= !d.light_directions.empty(), w.user |= !d.attributes.empty();
-    w.surfaces |= !d.surfaces.empty(), w.lights |= !d.lights.empty(), w.sh |= !d.sh.empty();
-    for (const auto& texture : d.textures) w.textures |= !texture.empty();
+template <class T>
+struct FrameT<T>::Impl {
+  // The lists of a scene, kept for Backward.
+  struct Lists {
+    std::vector<TextureT<T>> textures;
+    std::vector<SurfaceT<T>> surfaces;
+    std::vector<LightT<T>> lights;
+  };
+
+  void Keep(std::span<const SceneT<T>> from) {
+    if (lists.size() < from.size()) lists.resize(from.size());
+    scenes.assign(from.begin(), from.end());
+    for (std::size_t n = 0; n < from.size(); ++n) {
+      const auto keep = [](auto& list, auto& view) {
+        list.assign(view.begin(), view.end());
+        view = list;
+      };
+      keep(lists[n].textures, scenes[n].textures), keep(lists[n].surfaces, scenes[n].surfaces);
+      keep(lists[n].lights, scenes[n].lights);
+    }
   }
-  return w;
-}
 
-}  // namespace
-
-struct ShadedRenderer::Impl {
-  explicit Impl(const Workers& w)
-      : workers(&w),
-        renderer(w),
-        stage(static_cast<std::size_t>(w.count())),
-        inputs(w),
-        gradients(w) {}
-
-  Status RenderStaged(const RenderOptions& options, ShadedFrame* frame);
-  Status RenderPlain(const RenderOptions& options, ShadedFrame* frame);
-  Status Render(std::span<const ShadedScene> scenes, const RenderOptions& options,
-                const ShadedRequest& request, ShadedFrame* frame);
-
-  // The renderer's own backward pass, with the stage if there is one.
-  Status RunBackward(const RenderOptions& options, const ShadedFrame& frame,
-                     const ShadedFrameGradients& d_frame, std::span<SceneGradients> d_views);
-  // From what that pass has summed to gradients of the scenes' arrays.
-  void MergeBackward(std::span<const ShadedScene> scenes, std::span<ShadedGradients> d_scenes);
-  Status Backward(std::span<const ShadedScene> scenes, const RenderOptions& options,
-                  const ShadedFrame& frame, const ShadedFrameGradients& d_frame,
-                  std::span<ShadedGradients> d_scenes);
-
-  PlanReport Explain() const;
-
-  const Workers* workers;
-  Renderer renderer;
-  ShadeStage stage;
-  bool staged = false, was_backward = false;  // of the last call
-  ForwardPlan forward;
-  BackwardPlan backward;
-  ShadeInputs inputs;
-  ShadeGradients gradients;
-  TextureMerge texture_merge;
-  SceneSums scene_sums;
-  double merge_ms = 0;
+  std::vector<SceneT<T>> scenes;  // look at the caller's arrays and at `lists`
+  std::vector<Lists> lists;
+  RenderOptions options;
+  FrameImagesT<T> images;
 };
 
-Status ShadedRenderer::Impl::RenderStaged(const RenderOptions& options, ShadedFrame* frame) {
-  const std::size_t pixels = inputs.views().size() * static_cast<std::size_t>(options.width) *
-                             static_cast<std::size_t>(options.height);
-  const ShadedRequest& request = forward.request;
-  frame->channels = forward.varyings.width(Varying::kUser);
-  frame->color.resize(request.color ? 3 * pixels : 0);
-  frame->normals.resize(request.normals ? 3 * pixels : 0);
-  frame->uv.resize(request.uv ? 2 * pixels : 0);
-  stage.BeginForward(forward, inputs.scenes(), options, frame);
-  return renderer.Render(inputs.views(), options, request, frame, &stage);
+// What a failed call may have left between two states.
+template <class T>
+struct RendererScratch {
+  using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
+
+  explicit RendererScratch(const Workers& workers) : engine(workers) {}
+
+  EngineOf engine;
+  std::vector<GradientRecords<T>> records;
+  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
+  GradientArrays<T> arrays;
+  SavedGradients<T> saved;
+};
+
+template <class T>
+struct RendererT<T>::Impl {
+  explicit Impl(int threads) : own_workers(threads), workers(&*own_workers) {}
+  explicit Impl(const Workers& shared) : workers(&shared) {}
+
+  Status Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                const Outputs& outputs, typename FrameT<T>::Impl* frame);
+  Status Backward(const typename FrameT<T>::Impl& frame, const FrameGradientsT<T>& d_frame,
+                  std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode);
+
+  std::optional<Workers> own_workers;
+  const Workers* workers;
+  std::optional<RendererScratch<T>> scratch;  // from Start on
+};
+
+template <class T>
+Status RendererT<T>::Impl::Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                                  const Outputs& outputs, typename FrameT<T>::Impl* frame) {
+  TILEGRAD_TRY(ValidateEnumerators(scenes, options));
+  frame->options = options;
+  frame->Keep(scenes);
+  return scratch->engine.Render(frame->scenes, frame->options, outputs, &frame->images);
 }
 
-// Attributes are the images themselves, or there are none.
-Status ShadedRenderer::Impl::RenderPlain(const RenderOptions& options, ShadedFrame* frame) {
-  RenderRequest request = forward.request;
-  request.attributes = forward.colors_only || forward.user_only;
-  frame->normals.clear(), frame->uv.clear();
-  if (!forward.colors_only) {
-    frame->color.clear();
-    return renderer.Render(inputs.views(), options, request, frame);
+template <class T>
+Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
+                                    const FrameGradientsT<T>& d_frame,
+                                    std::span<const SceneGradientsT<T>> d_scenes,
+                                    GradientMode mode) {
+  auto& [engine, records, gradients, arrays, saved] = *scratch;
+  TILEGRAD_TRY(arrays.Check(frame.scenes, d_scenes));
+  const bool add = mode == GradientMode::kAdd;
+  if (records.size() < d_scenes.size()) records.resize(d_scenes.size());
+  gradients.clear();
+  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
+    gradients.push_back(records[n].Begin(d_scenes[n]));
   }
-  frame->attributes.swap(frame->color);
-  const Status status = renderer.Render(inputs.views(), options, request, frame);
-  frame->attributes.swap(frame->color);
-  frame->attributes.clear();
-  frame->channels = 0;
+  if (add) saved.Save(d_scenes);
+  const Status status =
+      engine.Backward(frame.scenes, frame.options, frame.images, d_frame, gradients);
+  if (!status.ok()) {
+    if (add) saved.Restore();
+    return status;
+  }
+  if (add && !saved.Add()) return InvalidArgument("a sum of gradients overflows");
+  for (std::size_t n = 0; n < d_scenes.size() && !add; ++n) records[n].Clear(d_scenes[n]);
+  for (std::size_t n = 0; n < d_scenes.size(); ++n) records[n].AddTo(d_scenes[n]);
+  return {};
+}
+
+template <class T>
+FrameT<T>::FrameT() noexcept = default;
+template <class T>
+FrameT<T>::~FrameT() = default;
+template <class T>
+FrameT<T>::FrameT(FrameT&& other) noexcept
+    : impl_(std::move(other.impl_)), images_(std::exchange(other.images_, {})) {}
+template <class T>
+FrameT<T>& FrameT<T>::operator=(FrameT&& other) noexcept {
+  impl_ = std::move(other.impl_);
+  images_ = std::exchange(other.images_, {});
+  return *this;
+}
+
+template <class T>
+RendererT<T>::RendererT(const RendererOptions& options) noexcept : options_(options) {}
+template <class T>
+RendererT<T>::~RendererT() = default;
+template <class T>
+RendererT<T>::RendererT(RendererT&&) noexcept = default;
+template <class T>
+RendererT<T>& RendererT<T>::operator=(RendererT&&) noexcept = default;
+
+template <class T>
+Status RendererT<T>::Start() {
+  constexpr int kMostThreads = 1024;
+  if (impl_ == nullptr) {
+    if (options_.threads < 0 || options_.threads > kMostThreads) {
+      return InvalidArgument("options.threads is {}, must be in 0..{}", options_.threads,
+                             kMostThreads);
+    }
+    impl_ = std::make_unique<Impl>(options_.threads);
+  }
+  if (!impl_->scratch) impl_->scratch.emplace(*impl_->workers);
+  return {};
+}
+
+template <class T>
+Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                            const Outputs& outputs, FrameT<T>* frame) {
+  if (frame == nullptr) return Guarded([] { return InvalidArgument("frame is null"); });
+  frame->images_ = {};
+  const Status status = Guarded([&] {
+    TILEGRAD_TRY(Start());
+    if (frame->impl_ == nullptr) frame->impl_ = std::make_unique<typename FrameT<T>::Impl>();
+    return impl_->Render(scenes, options, outputs, frame->impl_.get());
+  });
+  if (status.ok()) {
+    frame->images_ = ImagesOf(frame->impl_->images);
+  } else {
+    DropAfter(status);
+  }
   return status;
 }
 
-Status ShadedRenderer::Impl::Render(std::span<const ShadedScene> scenes,
-                                    const RenderOptions& options, const ShadedRequest& request,
-                                    ShadedFrame* frame) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateShadedScenes(scenes));
-  forward = PlanForward(parts, request);
-  staged = forward.staged() && !scenes.empty(), was_backward = false, merge_ms = 0;
-  inputs.Begin(scenes, staged && forward.steps.texture);
-  if (staged) {
-    inputs.Pack(scenes, {forward.varyings, forward.varyings[Varying::kNormal]});
-  } else {
-    inputs.UsePlain(scenes, forward.colors_only, forward.user_only);
-  }
-  return staged ? RenderStaged(options, frame) : RenderPlain(options, frame);
-}
-
-PlanReport ShadedRenderer::Impl::Explain() const {
-  CallWork call{renderer.stats(), renderer.times(), staged ? stage.work() : ShadeWork(),
-                inputs.work()};
-  call.scene.merge_ms = merge_ms;
-  return was_backward ? ReportBackward(backward, call) : ReportForward(forward, call);
-}
-
-Status ShadedRenderer::Impl::Backward(std::span<const ShadedScene> scenes,
-                                      const RenderOptions& options, const ShadedFrame& frame,
-                                      const ShadedFrameGradients& d_frame,
-                                      std::span<ShadedGradients> d_scenes) {
-  TILEGRAD_TRY(ValidateOptions(options));
-  TILEGRAD_ASSIGN(const SceneParts parts, ValidateShadedScenes(scenes));
-  TILEGRAD_TRY(ValidateShadedBackward(scenes, options, d_frame, d_scenes));
-  backward = PlanBackward(parts, WishesOf(d_frame, d_scenes));
-  staged = backward.staged() && !scenes.empty(), was_backward = true;
-  inputs.Begin(scenes, staged && backward.steps.texture);
-  if (staged) {
-    const bool normals = backward.pulled[Varying::kNormal] || backward.recomputed[Varying::kNormal];
-    const bool same = backward.pulled == backward.recomputed;
-    inputs.Pack(scenes, {backward.pulled, normals, same ? nullptr : &backward.recomputed});
-    stage.BeginBackward(backward, inputs.scenes(), options, d_frame);
-  } else {
-    inputs.UsePlain(scenes, backward.colors_only, backward.user_only);
-  }
-  const std::span<SceneGradients> d_views = gradients.Begin(backward, inputs.views(), d_scenes);
-  TILEGRAD_TRY(RunBackward(options, frame, d_frame, d_views));
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    if (d_scenes[n].camera) d_scenes[n].d_camera = d_views[n].d_camera;
-  }
-  MergeBackward(scenes, d_scenes);
-  return ValidateShadedResult(d_scenes);
-}
-
-Status ShadedRenderer::Impl::RunBackward(const RenderOptions& options, const ShadedFrame& frame,
-                                         const ShadedFrameGradients& d_frame,
-                                         std::span<SceneGradients> d_views) {
-  FrameGradients d_images{{}, d_frame.alpha};
-  if (backward.colors_only) d_images.attributes = d_frame.color;
-  if (backward.user_only) d_images.attributes = d_frame.attributes;
-  const Status status = renderer.Backward(inputs.views(), options, frame, d_images, d_views,
-                                          staged ? &stage : nullptr);
-  // Cotangents that pull nothing have been looked at by nobody.
-  const bool unseen = !staged && !backward.colors_only && !backward.user_only;
-  if (!status.ok() || unseen || (staged && !stage.sound())) {
-    TILEGRAD_TRY(ValidateShadedCotangents(d_frame, frame.face_ids));
-  }
+template <class T>
+Status RendererT<T>::Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
+                              std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode) {
+  const Status status = Guarded([&]() -> Status {
+    if (frame.images_.width == 0) {
+      return InvalidArgument("the frame holds nothing: Render into it first");
+    }
+    TILEGRAD_TRY(Start());
+    return impl_->Backward(*frame.impl_, d_frame, d_scenes, mode);
+  });
+  DropAfter(status);
   return status;
 }
 
-void ShadedRenderer::Impl::MergeBackward(std::span<const ShadedScene> scenes,
-                                         std::span<ShadedGradients> d_scenes) {
-  StageClock clock;
-  ClearUniforms(d_scenes);
-  if (staged) MergeUniforms(stage, inputs.scenes(), d_scenes, &scene_sums);
-  if (staged && backward.to_texture) {
-    texture_merge.Run(stage, inputs.scenes(), *workers, d_scenes);
-  } else {
-    ClearTextures(d_scenes);
+// An exception may have left scratch memory between two states.
+template <class T>
+void RendererT<T>::DropAfter(const Status& status) {
+  const StatusCode code = status.code();
+  const bool thrown = code == StatusCode::kResourceExhausted || code == StatusCode::kInternal;
+  if (thrown && impl_ != nullptr) impl_->scratch.reset();
+}
+
+struct RendererAccess {
+  static Renderer On(const Workers& workers) {
+    Renderer renderer;
+    renderer.impl_ = std::make_unique<Renderer::Impl>(workers);
+    return renderer;
   }
-  gradients.Merge(backward, inputs, scenes, d_scenes);
-  clock.Lap(&merge_ms);
-}
+  static PlanReport Explain(const Renderer& renderer) {
+    const bool ran = renderer.impl_ != nullptr && renderer.impl_->scratch;
+    return ran ? renderer.impl_->scratch->engine.Explain() : PlanReport();
+  }
+};
 
-ShadedRenderer::ShadedRenderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
-ShadedRenderer::~ShadedRenderer() = default;
-ShadedRenderer::ShadedRenderer(ShadedRenderer&&) noexcept = default;
-ShadedRenderer& ShadedRenderer::operator=(ShadedRenderer&&) noexcept = default;
+template class FrameT<float>;
+template class FrameT<double>;
+template class RendererT<float>;
+template class RendererT<double>;
 
-Status ShadedRenderer::Render(std::span<const ShadedScene> scenes, const RenderOptions& options,
-                              const ShadedRequest& request, ShadedFrame* frame) {
-  return impl_->Render(scenes, options, request, frame);
-}
+}  // namespace v0
 
-Status ShadedRenderer::Backward(std::span<const ShadedScene> scenes, const RenderOptions& options,
-                                const ShadedFrame& frame, const ShadedFrameGradients& d_frame,
-                                std::span<ShadedGradients> d_scenes) {
-  return impl_->Backward(scenes, options, frame, d_frame, d_scenes);
-}
-
-PlanReport ShadedRenderer::Explain() const { return impl_->Explain(); }
+Renderer RendererOn(const Workers& workers) { return RendererAccess::On(workers); }
+PlanReport Explain(const Renderer& renderer) { return RendererAccess::Explain(renderer); }
 
 }  // namespace tilegrad

@@ -20,13 +20,6 @@
 
 namespace tilegrad {
 
-template <class T>
-struct CameraParametersT {
-  std::array<T, 6> rotation = {T(1), T(0), T(0), T(0), T(1), T(0)};  // a, b
-  std::array<T, 3> translation = {};                                 // as Camera
-  T fx = T(64), fy = T(64), cx = T(32), cy = T(32);                  // as Camera
-};
-
 namespace camera_ref {
 
 template <class T>
@@ -63,7 +56,7 @@ struct GramSchmidt {
   V3<T> a, b, x, u, y, z;
 };
 template <class T>
-GramSchmidt<T> Orthogonalize(const std::array<T, 6>& r) {
+GramSchmidt<T> Orthogonalize(const T (&r)[6]) {
   GramSchmidt<T> g;
   g.a = {r[0], r[1], r[2]}, g.b = {r[3], r[4], r[5]};
   g.x = Unit(g.a);

@@ -14,7 +14,7 @@
 
 namespace tilegrad {
 
-struct Texture {
+struct MeshTexture {
   std::string name;  // file name or label, for messages
   ImageU8 image;     // 3 or 4 channels; row 0 on top is v = 1
 };
@@ -55,7 +55,7 @@ struct Mesh {
 
   std::vector<std::int32_t> face_materials;  // empty (all 0) or [F], indices into materials
   std::vector<Material> materials;
-  std::vector<Texture> textures;
+  std::vector<MeshTexture> textures;
 };
 
 // OK, or an error that names the array and the index: sizes that do not match, an index out of

@@ -3,38 +3,35 @@
 // intensity * max(0, N . L). combine.h applies it to surfaces.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 
 #include "shade/pixel_run.h"
+#include "tilegrad/scene.h"
 
 namespace tilegrad::shade {
 
+// A gradient of a light, to be added to.
 template <class T>
-struct DirectionalLightT {
-  std::array<T, 3> direction;  // from the surface towards the light, world
-  T intensity;
-};
-using DirectionalLight = DirectionalLightT<float>;
+constexpr LightT<T> kNoLight = {{T(0), T(0), T(0)}, T(0)};
 
 template <class T>
 struct LambertLightT {
   T ambient = T(0);
-  std::span<const DirectionalLightT<T>> lights;  // unit directions
+  std::span<const LightT<T>> lights;  // unit directions
 };
 
 // The lights of a run of pixels: the same for all, or one direction for each pixel, of intensity 1.
 struct RunLights {
-  std::span<const DirectionalLight> uniform;  // unit directions
-  const RunPlane* per_pixel = nullptr;        // [3] unit; then `uniform` is empty
+  std::span<const Light> uniform;       // unit directions
+  const RunPlane* per_pixel = nullptr;  // [3] unit; then `uniform` is empty
 };
 
 // Where gradients of lights and normals go. Null or empty: not wanted.
 struct RunLightAdjoint {
-  RunPlane* d_normal = nullptr;                  // [3] adds
-  std::span<DirectionalLightT<double>> uniform;  // adds; as RunLights::uniform, or empty
-  RunPlane* per_pixel = nullptr;                 // [3] adds
+  RunPlane* d_normal = nullptr;       // [3] adds
+  std::span<LightT<double>> uniform;  // adds; as RunLights::uniform, or empty
+  RunPlane* per_pixel = nullptr;      // [3] adds
 };
 
 // *light <- the sum above, for the unit normals [3] of a run. A normal of 0 gets no light.

@@ -26,7 +26,7 @@ T LambertRef(const LambertLightT<T>& light, const Vec3<T>& n) {
 // empty). dL/d(ambient) is d_light itself.
 template <class T>
 void LambertAdjointRef(const LambertLightT<T>& light, const Vec3<T>& n, T d_light, Vec3<T>& d_n,
-                       std::span<DirectionalLightT<T>> d_lights) {
+                       std::span<LightT<T>> d_lights) {
   for (std::size_t k = 0; k < light.lights.size(); ++k) {
     const auto& l = light.lights[k];
     const T cosine = Dot(n, l.direction);

@@ -11,8 +11,6 @@ namespace {
 
 constexpr float kAmbient = 0.45f, kKey = 0.45f, kFill = 0.2f;
 
-using Light = DirectionalLightT<float>;
-
 Light MakeLight(glm::vec3 towards, float intensity) {
   const glm::vec3 d = glm::normalize(towards);
   return {{d.x, d.y, d.z}, intensity};

@@ -32,7 +32,7 @@ struct LightLanes {
 HWY_INLINE LightLanes LightAt(const RunLights& lights, std::size_t k, std::size_t i) {
   const RunTag d;
   if (lights.per_pixel != nullptr) return {LoadRun3(lights.per_pixel, i), hn::Set(d, 1.0f)};
-  const DirectionalLight& l = lights.uniform[k];
+  const Light& l = lights.uniform[k];
   return {SetRun3(l.direction.data()), hn::Set(d, l.intensity)};
 }
 
@@ -42,7 +42,7 @@ struct LightSums {
   RunVec intensity;
 
   HWY_INLINE LightSums() : direction(ZeroRun3()), intensity(hn::Zero(RunTag())) {}
-  HWY_INLINE void AddTo(DirectionalLightT<double>* light) const {
+  HWY_INLINE void AddTo(LightT<double>* light) const {
     light->direction[0] += SumOf(direction.x), light->direction[1] += SumOf(direction.y);
     light->direction[2] += SumOf(direction.z), light->intensity += SumOf(intensity);
   }

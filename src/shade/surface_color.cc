@@ -30,7 +30,7 @@ ImageU8 Halve(const ImageU8& image) {
 }  // namespace
 
 SurfaceColor::SurfaceColor(const Mesh& mesh) : mesh_(mesh) {
-  for (const Texture& texture : mesh.textures) textures_.push_back(Prepare(texture.image));
+  for (const MeshTexture& texture : mesh.textures) textures_.push_back(Prepare(texture.image));
 }
 
 SurfaceColor::Texels SurfaceColor::Prepare(const ImageU8& image) {

@@ -73,7 +73,8 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, const TextureInput& inp
                         AxisRun* out) {
   const RunTag d;
   const RunIntTag di;
-  const bool corners = input.wrap == Wrap::kRepeatCorners;
+  const bool corners = input.outer_centres;
+  const Wrap wrap = corners ? Wrap::kClamp : input.wrap;  // of indices
   const bool nearest = input.filter == Filter::kNearest;
   const auto most = hn::Sub(n, hn::Set(di, 1));
   const auto scale = hn::ConvertTo(d, corners ? most : n);
@@ -87,9 +88,9 @@ HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, const TextureInput& inp
     hn::Store(hn::Zero(d), d, out->weight + i), hn::Store(hn::Zero(d), d, out->slope + i);
     return;
   }
-  hn::Store(WrapLaneIndex(low, most, input.wrap), di, out->low + i);
+  hn::Store(WrapLaneIndex(low, most, wrap), di, out->low + i);
   const auto high = hn::Add(low, hn::Set(di, 1));
-  hn::Store(WrapLaneIndex(high, most, input.wrap), di, out->high + i);
+  hn::Store(WrapLaneIndex(high, most, wrap), di, out->high + i);
   hn::Store(hn::Sub(x, cell), d, out->weight + i);
   hn::Store(hn::Mul(u.slope, scale), d, out->slope + i);
 }

@@ -14,31 +14,29 @@
 #include <cstdint>
 #include <span>
 
-#include "scene/image.h"
 #include "shade/pixel_run.h"
+#include "tilegrad/scene.h"
 
 namespace tilegrad::shade {
 
-enum class Wrap {
-  kRepeat,  // the texture tiles the plane
-  kClamp,   // outside [0, 1] the border texels go on
-  kMirror,  // tiles of the texture and its mirror image alternate
-  // As an older implementation (Kaolin 0.1 with PyTorch 1.2): repeats, but with the centres of the
-  // outer texels at 0 and 1, so that u = 1 jumps to the first. For models trained with it.
-  kRepeatCorners,
-};
-
-enum class Filter { kNearest, kBilinear, kTrilinear };
-
-// Texels of the caller: [height][width][channels], width and height >= 1.
+// What kernels see of a texture: [height][width][channels], width and height >= 1.
 template <class T>
 struct TextureViewT {
   std::span<const T> texels;
   int width = 0, height = 0, channels = 0;
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
+  // With Wrap::kRepeat: as an older implementation (Kaolin 0.1 with PyTorch 1.2) repeats, with the
+  // centres of the outer texels at 0 and 1, so that u = 1 jumps to the first. For models trained
+  // with it.
+  bool outer_centres = false;
 };
 using TextureView = TextureViewT<float>;
+
+template <class T>
+TextureViewT<T> ViewOf(const TextureT<T>& t) {
+  return {t.texels, t.width, t.height, 3, t.wrap, t.filter};
+}
 
 inline constexpr int kMaxTextureSize = 16384;  // texels, each axis
 
@@ -54,6 +52,7 @@ struct TextureInput {
   Filter filter;
   const RunPlane* uv;     // [2]
   const RunPlane* level;  // if trilinear: log2 of texels for a pixel, 0 is the finest; any number
+  bool outer_centres = false;  // as in TextureView
 };
 
 // A pixel's gradient to up to four texels of a level: (1-a)(1-b), a(1-b), (1-a)b and ab of d_color

@@ -52,8 +52,9 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
 
 // Along u; for v, call it with 1 - v.
 template <class T>
-Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap wrap, bool nearest) {
-  const bool corners = wrap == Wrap::kRepeatCorners;
+Axis<T> MakeAxis(const Wrapped<T>& u, int n, const TextureViewT<T>& texture) {
+  const bool corners = texture.outer_centres, nearest = texture.filter == Filter::kNearest;
+  const Wrap wrap = corners ? Wrap::kClamp : texture.wrap;  // of indices
   const float scale = static_cast<float>(corners ? n - 1 : n);
   const T x = corners || nearest ? u.at * T(scale) : u.at * T(scale) - T(0.5f);
   if (nearest) {
@@ -74,11 +75,10 @@ struct Footprint {
 
 template <class T>
 Footprint<T> MakeFootprint(const TextureViewT<T>& texture, const T& u, const T& v) {
-  const bool nearest = texture.filter == Filter::kNearest;
   Wrapped<T> down = WrapCoordinate(v, texture.wrap);
   down = {T(1) - down.at, -down.slope};
-  Footprint<T> out{MakeAxis(WrapCoordinate(u, texture.wrap), texture.width, texture.wrap, nearest),
-                   MakeAxis(down, texture.height, texture.wrap, nearest),
+  Footprint<T> out{MakeAxis(WrapCoordinate(u, texture.wrap), texture.width, texture),
+                   MakeAxis(down, texture.height, texture),
                    {}};
   const int rows[2] = {out.row.low, out.row.high}, columns[2] = {out.column.low, out.column.high};
   for (int k = 0; k < 4; ++k) {

@@ -21,7 +21,7 @@ std::uint8_t ToByte(float unit) {
 }
 
 // The mean over kSamples^2 samples of image n of the frame; samples without a face show the paper.
-ImageU8 Resolve(const Frame& frame, std::size_t n, int size) {
+ImageU8 Resolve(const PipelineFrame& frame, std::size_t n, int size) {
   ImageU8 out(size, size, 3);
   const auto wide = static_cast<std::size_t>(frame.width),
              plane = wide * static_cast<std::size_t>(frame.height);
@@ -56,12 +56,12 @@ Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& re
                                       const Workers& workers) {
   TILEGRAD_TRY(Validate(mesh));
   const std::vector<float> colors = Colors(mesh);
-  SceneView scene;
+  PipelineScene scene;
   scene.channels = 3;
   scene.attributes = colors;
   if (!mesh.positions.empty()) scene.positions = {&mesh.positions[0].x, 3 * mesh.positions.size()};
   if (!mesh.faces.empty()) scene.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};
-  std::vector<SceneView> scenes;
+  std::vector<PipelineScene> scenes;
   for (const Camera& camera : request.cameras) {
     scene.camera = Scaled(camera, static_cast<float>(request.size * kSamples) /
                                       static_cast<float>(request.camera_size));
@@ -69,8 +69,8 @@ Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& re
   }
   RenderOptions options;
   options.width = options.height = request.size * kSamples;
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   TILEGRAD_TRY(renderer.Render(scenes, options, {.alpha = false}, &frame));
   std::vector<ImageU8> out;
   for (std::size_t n = 0; n < scenes.size(); ++n) out.push_back(Resolve(frame, n, request.size));

@@ -31,7 +31,7 @@ double Distance(std::vector<float> a, const std::vector<float>& b) {
 // From dL/d(NDC) to dL/d(positions).
 std::vector<float> ToWorld(const BenchBatch& batch, std::size_t image,
                            const std::vector<float>& d_ndc) {
-  const SceneView& scene = batch.scenes[image];
+  const PipelineScene& scene = batch.scenes[image];
   raster::ScreenMeshBuffers screen;
   raster::Project(FaceSourceOf(scene, batch.options), batch.options.width, batch.options.height,
                   &screen);
@@ -53,8 +53,8 @@ TEST(Culled, AgreesWithTheRenderer) {
   culled.Forward({});
   culled.Backward({});
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
   const std::size_t pixels = culled.frames[0].face_ids.size();
   std::size_t different = 0, covered = 0;
@@ -90,8 +90,8 @@ TEST(Culled, GradientsAgreeWithTheRenderer) {
   culled.Forward({});
   culled.Backward({});
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
   ASSERT_TRUE(renderer
                   .Backward(batch.scenes, batch.options, frame, {batch.d_attributes, batch.d_alpha},

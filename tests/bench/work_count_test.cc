@@ -75,8 +75,8 @@ TEST(WorkCount, TheRendererEvaluatesLittleElse) {
     }
     for (const std::string& target : RunnableTargets()) {
       ASSERT_TRUE(ForceTarget(target).ok());
-      Renderer renderer(workers);
-      Frame frame;
+      Pipeline renderer(workers);
+      PipelineFrame frame;
       ASSERT_TRUE(renderer.Render(batch.scenes, batch.options, {}, &frame).ok());
       const RenderStats forward = renderer.stats();
       ASSERT_TRUE(renderer

@@ -40,8 +40,8 @@ struct Patient {
     FitRenderer::Job job = Step().job;
     job.views = {&kView, 1};
     ASSERT_TRUE(renderer.Render(truth, job).ok());
-    targets = {kSize, kSize, renderer.frame().color, {}};
-    for (const std::int32_t face : renderer.frame().face_ids) {
+    targets = {kSize, kSize, renderer.images().color, {}};
+    for (const std::int32_t face : renderer.images().face_ids) {
       targets.alpha.push_back(face >= 0 ? 1.0f : 0.0f);
     }
   }
@@ -115,7 +115,7 @@ TEST(Doctor, DrawnWhereTheMaskHasNothing) {
 
 TEST(Doctor, FacesAwayFromTheLight) {
   Patient patient;
-  patient.scene.model.lighting = Lighting::kLambert;
+  patient.scene.shading.lighting = Lighting::kLambert;
   patient.scene.lights = {{{0, 0, -1}, 1}};
   ExpectBlocked(patient.Ask(Parameter::kLight), "faces away from the light");
 }

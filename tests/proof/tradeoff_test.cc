@@ -33,7 +33,7 @@ TEST(Tradeoff, ErrorsStayBelowWhatIsReportedAndWhatIsAsked) {
   const auto result = MeasureTradeoff(sphere.job, {}, kGo);
   ASSERT_TRUE(result.ok()) << result.status().message();
   ASSERT_EQ(result->rows.size(), 4u);
-  EXPECT_EQ(result->rows[3].rule, SoftRule::kPaper);
+  EXPECT_EQ(result->rows[3].rule, AlphaRule::kPaper);
   EXPECT_GT(result->rows[3].largest, 1e-3);  // it leaves out what is farther than its box
   EXPECT_EQ(result->faces, 320u);
   EXPECT_EQ(result->truth_rows, 32);

@@ -71,7 +71,7 @@ ScreenMeshBuffersT<double> ToDouble(const ScreenMeshBuffers& m) {
 struct Case {
   int width, row_begin, row_end, channels;
   Interpolation mode;
-  AttributeRate rate;
+  Rate rate;
   ScreenMeshBuffers mesh;
   std::vector<float> attributes, d_out;          // [rows,C], [C][band]
   std::vector<std::int32_t> faces;               // [band]
@@ -82,11 +82,9 @@ struct Case {
   std::size_t band_pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(row_end - row_begin);
   }
-  std::size_t rows() const {
-    return rate == AttributeRate::kVertex ? mesh.x.size() : 3 * mesh.v0.size();
-  }
+  std::size_t rows() const { return rate == Rate::kVertex ? mesh.x.size() : 3 * mesh.v0.size(); }
 
-  Case(int w, int c, Interpolation m, AttributeRate r, Rng* rng)
+  Case(int w, int c, Interpolation m, Rate r, Rng* rng)
       : width(w), row_begin(3), row_end(16), channels(c), mode(m), rate(r) {
     mesh = JitteredGrid(width, 20, rng);
     attributes.resize(rows() * static_cast<std::size_t>(channels));
@@ -163,9 +161,8 @@ Gradients Differentiate(const Case& c, const BackwardRequest& request, BandSums*
     }
     for (int group = 0; 3 * group < c.channels && request.attributes; ++group) {
       for (int k = 0; k < 3; ++k, from += 4 * stride) {
-        const auto row = c.rate == AttributeRate::kVertex
-                             ? static_cast<std::size_t>(mesh.vertex(f, k))
-                             : 3 * f + static_cast<std::size_t>(k);
+        const auto row = c.rate == Rate::kVertex ? static_cast<std::size_t>(mesh.vertex(f, k))
+                                                 : 3 * f + static_cast<std::size_t>(k);
         for (int i = 3 * group; i < std::min(3 * group + 3, c.channels); ++i) {
           out.d_attributes[row * static_cast<std::size_t>(c.channels) +
                            static_cast<std::size_t>(i)] += from[i - 3 * group];
@@ -209,7 +206,7 @@ TEST_F(InterpolateBackward, EqualsTheReferenceForAnyWidthAndChannels) {
   BandSums sums;  // of one worker: bands of all sizes follow each other
   for (int width = 1; width <= 40; ++width) {
     const auto mode = width % 2 == 0 ? Interpolation::kPerspective : Interpolation::kScreenLinear;
-    const auto rate = width % 3 == 0 ? AttributeRate::kCorner : AttributeRate::kVertex;
+    const auto rate = width % 3 == 0 ? Rate::kCorner : Rate::kVertex;
     const Case c(width, 1 + width % 8, mode, rate, &rng);
     for (const auto& target : RunnableTargets()) {
       ASSERT_TRUE(ForceTarget(target).ok());
@@ -223,7 +220,7 @@ TEST_F(InterpolateBackward, EqualsTheReferenceForAnyWidthAndChannels) {
 
 TEST_F(InterpolateBackward, ABandOfBackgroundSeesNoFace) {
   Rng rng(32, 1);
-  Case c(17, 3, Interpolation::kPerspective, AttributeRate::kVertex, &rng);
+  Case c(17, 3, Interpolation::kPerspective, Rate::kVertex, &rng);
   c.faces.assign(c.faces.size(), kNoFace);
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());

@@ -156,7 +156,7 @@ TEST(NearClip, AttributesWithoutChannelsAreNotRead) {
   ScreenMeshBuffers buffers;
   Project(points.source(false), 80, 60, &buffers);
   ASSERT_TRUE(buffers.View().was_clipped());
-  for (const AttributeRate rate : {AttributeRate::kVertex, AttributeRate::kCorner}) {
+  for (const Rate rate : {Rate::kVertex, Rate::kCorner}) {
     AttributeViewT<const float> none;
     none.channels = 0, none.rate = rate;
     ClipAttributes<float>(buffers.View(), points.faces, none, {});

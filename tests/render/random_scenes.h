@@ -33,15 +33,15 @@ inline std::array<float, 3> RandomTriple(double low, double high, Rng* rng) {
 }
 
 inline void AddTextures(Rng* rng, OwnedScene<float>* s) {
-  s->uvs_rate = rng->Below(2) == 0 ? AttributeRate::kCorner : AttributeRate::kVertex;
+  s->uvs_rate = rng->Below(2) == 0 ? Rate::kCorner : Rate::kVertex;
   const std::size_t rows =
-      s->uvs_rate == AttributeRate::kCorner ? s->mesh.faces.size() : s->mesh.vertex_count();
+      s->uvs_rate == Rate::kCorner ? s->mesh.faces.size() : s->mesh.vertex_count();
   RandomVectors(rows, -0.7, 1.7, 2, rng, &s->uvs);
   for (int k = 0; k < 2; ++k) {
     OwnedTexture<float> t;
     t.width = 1 + static_cast<int>(rng->Below(6)), t.height = 1 + static_cast<int>(rng->Below(6));
-    t.wrap = static_cast<shade::Wrap>(rng->Below(4));
-    t.filter = static_cast<shade::Filter>(rng->Below(3));
+    t.wrap = static_cast<Wrap>(rng->Below(4) % 3);
+    t.filter = static_cast<Filter>(rng->Below(3));
     RandomVectors(static_cast<std::size_t>(t.width * t.height), 0, 1, 3, rng, &t.texels);
     s->textures.push_back(std::move(t));
   }
@@ -60,11 +60,10 @@ inline void AddSurfaces(Rng* rng, OwnedScene<float>* s) {
 }
 
 inline void AddLights(const SceneRecipe& recipe, Rng* rng, OwnedScene<float>* s) {
-  s->model.lighting = recipe.lighting;
-  s->model.normals = static_cast<NormalKind>(rng->Below(3));
-  s->model.two_sided = rng->Below(2) == 0;
-  s->model.sh_basis = static_cast<shade::ShBasis>(rng->Below(4));
-  if (s->model.normals == NormalKind::kGiven) {
+  s->shading.lighting = recipe.lighting;
+  s->shading.normals = static_cast<Normals>(rng->Below(3));
+  s->shading.two_sided = rng->Below(2) == 0;
+  if (s->shading.normals == Normals::kGiven) {
     RandomVectors(s->mesh.vertex_count(), -1, 1, 3, rng, &s->normals);
   }
   if (recipe.lighting == Lighting::kSphericalHarmonics) {
@@ -93,13 +92,12 @@ inline OwnedScene<float> RandomShadedScene(const SceneRecipe& recipe, int width,
     default:
       s.mesh = BumpySphere(3, 5, width, height, rng);
   }
-  RandomAttributes(2, rng->Below(2) == 0 ? AttributeRate::kVertex : AttributeRate::kCorner, rng,
-                   &s.mesh);
+  RandomAttributes(2, rng->Below(2) == 0 ? Rate::kVertex : Rate::kCorner, rng, &s.mesh);
   if (recipe.colors) RandomVectors(s.mesh.vertex_count(), 0, 1, 3, rng, &s.colors);
   if (recipe.textured) AddTextures(rng, &s);
   AddSurfaces(rng, &s);
   AddLights(recipe, rng, &s);
-  s.model.clamp = rng->Below(4) == 0;
+  s.shading.clamp = rng->Below(4) == 0;
   return s;
 }
 

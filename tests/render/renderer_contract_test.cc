@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "render/renderer.h"
+#include "render/engine.h"
 #include "render/trial.h"
 #include "support/allocation_count.h"
 
@@ -32,15 +32,15 @@ OwnedScene<float> Sphere(Lighting lighting, std::uint64_t seed = 3) {
   Rng rng(seed, 1);
   OwnedScene<float> s;
   s.mesh = test::BumpySphere(12, 16, kWidth, kHeight, &rng);
-  test::RandomAttributes(2, AttributeRate::kVertex, &rng, &s.mesh);
+  test::RandomAttributes(2, Rate::kVertex, &rng, &s.mesh);
   test::RandomVectors(s.mesh.vertex_count(), 0, 1, 3, &rng, &s.colors);
   test::RandomVectors(s.mesh.faces.size(), 0, 1, 2, &rng, &s.uvs);
   s.textures.resize(1);
   auto& t = s.textures[0];
-  t.width = 16, t.height = 8, t.filter = shade::Filter::kTrilinear;
+  t.width = 16, t.height = 8, t.filter = Filter::kTrilinear;
   test::RandomVectors(128, 0, 1, 3, &rng, &t.texels);
   s.surfaces.push_back({{1, 1, 1}, 0, {0.1f, 0.1f, 0.1f}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
-  s.model.lighting = lighting;
+  s.shading.lighting = lighting;
   if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
   if (lighting == Lighting::kPhong || lighting == Lighting::kLambert) {
     s.lights = {{{1, 1, 1}, 0.7f}, {{-1, 0.5f, 1}, 0.3f}};
@@ -55,13 +55,13 @@ OwnedScene<float> Bare() {
   return s;
 }
 
-ShadedRequest Request(bool color, bool alpha) {
-  ShadedRequest request;
+Outputs Request(bool color, bool alpha) {
+  Outputs request;
   request.color = color, request.alpha = alpha, request.attributes = false;
   return request;
 }
 
-std::int64_t Foreground(const Frame& frame) {
+std::int64_t Foreground(const PipelineFrame& frame) {
   std::int64_t seen = 0;
   for (const std::int32_t id : frame.face_ids) seen += id >= 0;
   return seen;
@@ -70,34 +70,34 @@ std::int64_t Foreground(const Frame& frame) {
 // A renderer with one scene.
 struct Session {
   Workers workers{2};
-  ShadedRenderer renderer{workers};
+  Engine renderer{workers};
   OwnedScene<float> scene;
-  ShadedScene view;
-  ShadedFrame frame;
+  Scene view;
+  FrameImages frame;
 
   explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
-  PlanReport Render(const ShadedRequest& request) {
+  PlanReport Render(const Outputs& request) {
     const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
     EXPECT_TRUE(status.ok()) << status.message();
     return renderer.Explain();
   }
   // With the cotangents and gradients that are left after `choose`.
-  PlanReport Backward(const std::function<void(ShadedFrameGradients&, ShadedGradients&)>& choose) {
+  PlanReport Backward(const std::function<void(FrameGradients&, SceneGradients&)>& choose) {
     Rng rng(4, 4);
     const OwnedCotangents<float> all(kPixels, 2, &rng);
     OwnedGradients<float> gradients(scene);
     auto d_frame = all.View();
     d_frame.uv = {}, d_frame.normals = {}, d_frame.depth = {}, d_frame.attributes = {};
     d_frame.alpha = {};
-    const ShadedGradients every_gradient = gradients.View();
-    ShadedGradients d_scene;
+    const SceneGradients every_gradient = gradients.View();
+    SceneGradients d_scene;
     chosen = &every_gradient;
     choose(d_frame, d_scene);
     const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
     EXPECT_TRUE(status.ok()) << status.message();
     return renderer.Explain();
   }
-  const ShadedGradients* chosen = nullptr;  // all gradients there are, to choose from
+  const SceneGradients* chosen = nullptr;  // all gradients there are, to choose from
 };
 
 TEST(ShadedPlan, SilhouetteTouchesNoAttribute) {
@@ -214,17 +214,17 @@ struct Pair {
   }
 
   // All numbers of the gradients, of scene 0 then 1; `shared`: all go to those of scene 0.
-  std::vector<float> Run(ShadedRenderer* renderer, bool shared, ShadedFrame* frame) {
-    ShadedScene views[2] = {scenes[0].View(), scenes[shared ? 0 : 1].View()};
+  std::vector<float> Run(Engine* renderer, bool shared, FrameImages* frame) {
+    Scene views[2] = {scenes[0].View(), scenes[shared ? 0 : 1].View()};
     views[1].camera = scenes[1].mesh.camera;
     EXPECT_TRUE(renderer->Render(views, Options(), test::EveryImage(), frame).ok());
     OwnedGradients<float> gradients[2] = {OwnedGradients<float>(scenes[0]),
                                           OwnedGradients<float>(scenes[1])};
-    ShadedGradients d[2] = {gradients[0].View(), gradients[shared ? 0 : 1].View()};
+    SceneGradients d[2] = {gradients[0].View(), gradients[shared ? 0 : 1].View()};
+    d[1].camera = &gradients[1].d.mesh.camera;
     EXPECT_TRUE(renderer->Backward(views, Options(), *frame, d_frame.View(), d).ok());
     std::vector<float> out;
     for (int n = 0; n < 2; ++n) {
-      gradients[n].TakeCamera(d[n]);
       ForEachNumber(gradients[n].d, [&](const char*, float v) { out.push_back(v); });
     }
     return out;
@@ -239,13 +239,13 @@ bool SameBits(const T& a, const T& b) {
 TEST(ShadedBits, SameForAnyWorkerCountAndRun) {
   for (const auto lighting : {Lighting::kPhong, Lighting::kSphericalHarmonics}) {
     Pair pair(lighting);
-    ShadedFrame first;
+    FrameImages first;
     std::vector<float> first_gradients;
     for (const int count : {1, 2, 7}) {
       const Workers workers(count);
-      ShadedRenderer renderer(workers);
+      Engine renderer(workers);
       for (int run = 0; run < 2; ++run) {
-        ShadedFrame frame;
+        FrameImages frame;
         const auto gradients = pair.Run(&renderer, true, &frame);
         if (first.color.empty()) first = frame, first_gradients = gradients;
         EXPECT_TRUE(SameBits(frame.color, first.color)) << count;
@@ -259,8 +259,8 @@ TEST(ShadedBits, SameForAnyWorkerCountAndRun) {
 TEST(ShadedGradientArrays, ScenesThatShareAnArrayGetTheSum) {
   Pair pair(Lighting::kPhong);
   const Workers workers(2);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
+  Engine renderer(workers);
+  FrameImages frame;
   const auto apart = pair.Run(&renderer, false, &frame);
   const auto together = pair.Run(&renderer, true, &frame);
   const std::size_t count = apart.size() / 2, camera = 16;  // cameras are never shared
@@ -279,14 +279,14 @@ TEST(ShadedMemory, SteadyStateAllocatesNothing) {
   for (const auto lighting :
        {Lighting::kLambert, Lighting::kPhong, Lighting::kSphericalHarmonics}) {
     OwnedScene<float> scene = Sphere(lighting);
-    const ShadedScene view = scene.View();
+    const Scene view = scene.View();
     Rng rng(1, 2);
     const OwnedCotangents<float> d_frame(kPixels, 2, &rng);
     OwnedGradients<float> gradients(scene);
-    ShadedGradients d_scene = gradients.View();
+    SceneGradients d_scene = gradients.View();
     const Workers workers(1);
-    ShadedRenderer renderer(workers);
-    ShadedFrame frame;
+    Engine renderer(workers);
+    FrameImages frame;
     const auto step = [&] {
       ASSERT_TRUE(renderer.Render({&view, 1}, Options(), test::EveryImage(), &frame).ok());
       ASSERT_TRUE(
@@ -321,10 +321,10 @@ const BadScene kBadScenes[] = {
     {"no_lights", [](auto& s) { s.lights.clear(); }, "neither"},
     {"inf_light", [](auto& s) { s.lights[1].direction[2] = INFINITY; }, "lights[1]"},
     {"face", [](auto& s) { s.mesh.faces[7] = 100000; }, "faces[7] is 100000"},
-    {"no_normals", [](auto& s) { s.model.normals = NormalKind::kGiven; }, "no normals"},
+    {"no_normals", [](auto& s) { s.shading.normals = Normals::kGiven; }, "no normals"},
     {"sh",
      [](auto& s) {
-       s.model.lighting = Lighting::kSphericalHarmonics;
+       s.shading.lighting = Lighting::kSphericalHarmonics;
        s.sh.assign(4, 1.0f);
      },
      "sh has 4"},
@@ -332,12 +332,12 @@ const BadScene kBadScenes[] = {
 
 TEST(ShadedErrors, NameWhatIsWrong) {
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
+  Engine renderer(workers);
   for (const BadScene& bad : kBadScenes) {
     OwnedScene<float> scene = Sphere(Lighting::kPhong);
     bad.spoil(scene);
-    const ShadedScene view = scene.View();
-    ShadedFrame frame;
+    const Scene view = scene.View();
+    FrameImages frame;
     const Status status = renderer.Render({&view, 1}, Options(), {}, &frame);
     ASSERT_FALSE(status.ok()) << bad.name;
     EXPECT_NE(status.message().find(bad.says), std::string::npos)
@@ -348,10 +348,10 @@ TEST(ShadedErrors, NameWhatIsWrong) {
 
 TEST(ShadedErrors, ScenesOfABatchMustAgree) {
   OwnedScene<float> a = Sphere(Lighting::kPhong), b = Sphere(Lighting::kLambert);
-  const ShadedScene views[] = {a.View(), b.View()};
+  const Scene views[] = {a.View(), b.View()};
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
+  Engine renderer(workers);
+  FrameImages frame;
   const Status status = renderer.Render(views, Options(), {}, &frame);
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.message().find("scene 1"), std::string::npos) << status.message();
@@ -360,28 +360,27 @@ TEST(ShadedErrors, ScenesOfABatchMustAgree) {
 // A sphere under Phong's light, and the frame of what is asked of it.
 class ShadedErrorsOfPhong : public ::testing::Test {
  protected:
-  Status Render(const ShadedScene& view, const ShadedRequest& request = {}) {
+  Status Render(const Scene& view, const Outputs& request = {}) {
     return renderer_.Render({&view, 1}, Options(), request, &frame_);
   }
-  Status Backward(const ShadedScene& view, const ShadedFrameGradients& d_frame,
-                  ShadedGradients* d_scene) {
+  Status Backward(const Scene& view, const FrameGradients& d_frame, SceneGradients* d_scene) {
     return renderer_.Backward({&view, 1}, Options(), frame_, d_frame, {d_scene, 1});
   }
 
   OwnedScene<float> scene_ = Sphere(Lighting::kPhong);
   const Workers workers_ = Workers(1);
-  ShadedRenderer renderer_ = ShadedRenderer(workers_);
-  ShadedFrame frame_;
+  Engine renderer_ = Engine(workers_);
+  FrameImages frame_;
 };
 
 TEST_F(ShadedErrorsOfPhong, CotangentsAreChecked) {
-  const ShadedScene view = scene_.View();
+  const Scene view = scene_.View();
   ASSERT_TRUE(Render(view).ok());
   OwnedGradients<float> gradients(scene_);
-  ShadedGradients d_scene = gradients.View();
+  SceneGradients d_scene = gradients.View();
   std::vector<float> d_color(3 * kPixels, 1.0f);
   d_color[70] = NAN;
-  ShadedFrameGradients d_frame;
+  FrameGradients d_frame;
   d_frame.color = d_color;
   Status status = Backward(view, d_frame, &d_scene);
   EXPECT_NE(status.message().find("d_frame.color[70]"), std::string::npos) << status.message();
@@ -392,8 +391,8 @@ TEST_F(ShadedErrorsOfPhong, CotangentsAreChecked) {
 
 // The depth of background pixels is infinite, and what a loss makes of that is often NaN.
 TEST_F(ShadedErrorsOfPhong, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
-  const ShadedScene view = scene_.View();
-  ShadedRequest request;
+  const Scene view = scene_.View();
+  Outputs request;
   request.depth = true;
   ASSERT_TRUE(Render(view, request).ok());
   std::vector<float> nan(kPixels, NAN), zero(kPixels, 0.0f);
@@ -405,8 +404,8 @@ TEST_F(ShadedErrorsOfPhong, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
   }
   ASSERT_LT(seen, kPixels);
   OwnedGradients<float> gradients(scene_), expected(scene_);
-  ShadedGradients d_scene = gradients.View(), d_expected = expected.View();
-  ShadedFrameGradients d_frame;
+  SceneGradients d_scene = gradients.View(), d_expected = expected.View();
+  FrameGradients d_frame;
   d_frame.depth = zero;
   ASSERT_TRUE(Backward(view, d_frame, &d_expected).ok());
   d_frame.depth = nan;
@@ -421,15 +420,15 @@ TEST_F(ShadedErrorsOfPhong, CotangentsOfDepthAreLookedAtWhereThereIsAFace) {
 
 // White has no gradient, but its cotangent is an error as any other.
 TEST_F(ShadedErrorsOfPhong, CotangentsThatPullNothingAreChecked) {
-  ShadedScene view;
+  Scene view;
   view.positions = scene_.mesh.positions, view.faces = scene_.mesh.faces;
   view.camera = scene_.mesh.camera;
   ASSERT_TRUE(Render(view).ok());
   std::vector<float> d_color(3 * kPixels, 1.0f), d_positions(view.positions.size());
   d_color[70] = NAN;
-  ShadedFrameGradients d_frame;
+  FrameGradients d_frame;
   d_frame.color = d_color;
-  ShadedGradients d_scene;
+  SceneGradients d_scene;
   d_scene.positions = d_positions;
   const Status status = Backward(view, d_frame, &d_scene);
   EXPECT_EQ(status.message(), "d_frame.color[70] is nan");
@@ -437,11 +436,11 @@ TEST_F(ShadedErrorsOfPhong, CotangentsThatPullNothingAreChecked) {
 
 // Numbers that nobody asked for are looked at, too.
 TEST_F(ShadedErrorsOfPhong, AttributesAreCheckedWhateverIsWanted) {
-  ShadedScene view = scene_.View();
+  Scene view = scene_.View();
   std::vector<float> attributes(view.positions.size() / 3, 0.5f);
   attributes[2] = NAN;
-  view.attributes = attributes, view.channels = 1, view.rate = AttributeRate::kVertex;
-  ShadedRequest request;
+  view.attributes = {attributes, Rate::kVertex}, view.channels = 1;
+  Outputs request;
   request.attributes = false;
   const Status status = Render(view, request);
   EXPECT_EQ(status.message(), "scene 0: attributes[2] is nan");

@@ -18,14 +18,14 @@ OwnedScene<float> Sphere(Lighting lighting = Lighting::kPhong) {
   OwnedScene<float> s;
   s.mesh = test::BumpySphere(6, 8, test::kTrialWidth, test::kTrialHeight, &rng);
   s.mesh.attributes.clear(), s.mesh.channels = 0;
-  s.uvs_rate = AttributeRate::kVertex;
+  s.uvs_rate = Rate::kVertex;
   test::RandomVectors(s.mesh.vertex_count(), 0, 1, 2, &rng, &s.uvs);
   s.textures.resize(1);
   auto& t = s.textures[0];
-  t.width = 4, t.height = 3, t.filter = shade::Filter::kTrilinear;
+  t.width = 4, t.height = 3, t.filter = Filter::kTrilinear;
   test::RandomVectors(12, 0, 1, 3, &rng, &t.texels);
   s.surfaces.push_back({{1, 1, 1}, 0, {0, 0, 0}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
-  s.model.lighting = lighting;
+  s.shading.lighting = lighting;
   if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
   if (lighting == Lighting::kPhong) s.lights = {{{1, 1, 1}, 1}};
   return s;
@@ -55,7 +55,7 @@ struct Extreme {
 };
 
 void SetGiven(OwnedScene<float>& s, float x, float y, float z) {
-  s.model.normals = NormalKind::kGiven;
+  s.shading.normals = Normals::kGiven;
   s.normals.clear();
   for (std::size_t v = 0; v < s.mesh.vertex_count(); ++v) {
     s.normals.insert(s.normals.end(), {x, y, z});
@@ -118,9 +118,9 @@ const Extreme kExtremes[] = {
        s.lights[0].direction = {0, -1, 0};
      }},
     {"uv_1e6", [](auto& s) { SetUvs(s, 1e6f); }},
-    {"uv_1e6_clamp", [](auto& s) { SetUvs(s, -1e6f), s.textures[0].wrap = shade::Wrap::kClamp; }},
-    {"uv_1e6_mirror", [](auto& s) { SetUvs(s, 1e6f), s.textures[0].wrap = shade::Wrap::kMirror; }},
-    {"uv_1e30", [](auto& s) { SetUvs(s, 1e30f), s.textures[0].filter = shade::Filter::kBilinear; }},
+    {"uv_1e6_clamp", [](auto& s) { SetUvs(s, -1e6f), s.textures[0].wrap = Wrap::kClamp; }},
+    {"uv_1e6_mirror", [](auto& s) { SetUvs(s, 1e6f), s.textures[0].wrap = Wrap::kMirror; }},
+    {"uv_1e30", [](auto& s) { SetUvs(s, 1e30f), s.textures[0].filter = Filter::kBilinear; }},
     {"one_texel",
      [](auto& s) {
        s.textures[0].width = s.textures[0].height = 1;

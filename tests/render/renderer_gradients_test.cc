@@ -21,7 +21,7 @@ void CheckComplexStep(const SceneRecipe& recipe, std::uint64_t seed, SeenKinds* 
   test::Trial trial(recipe, seed);
   if (!trial.seen) return;
   const RenderOptions options = test::TrialOptions();
-  const ShadedRequest request = test::EveryImage();
+  const Outputs request = test::EveryImage();
   const SlopeProblem problem{trial.scene, options, request, trial.ids, trial.d_frame};
   auto scene = OwnedCast<double>(trial.scene);
   OwnedScene<double> gradients = OwnedRefBackward<double>(scene, options, trial.d_frame, trial.ids);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a scene looks like, by values that are known without a renderer.
-#include "render/renderer.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
+
+#include "render/engine.h"
 
 namespace tilegrad {
 namespace {
@@ -23,8 +23,8 @@ struct Square {
   std::vector<float> uvs = {0, 0, 1, 0, 1, 1, 0, 1};
   std::vector<float> colors = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
 
-  ShadedScene Scene() const {
-    ShadedScene scene;
+  Scene View() const {
+    Scene scene;
     scene.positions = positions, scene.faces = faces;
     const float eye[3] = {0, 0, 2}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
     scene.camera = LookAtCamera({2 * std::atan(0.5) * 180 / M_PI, kSize, kSize}, eye, target, up);
@@ -38,16 +38,16 @@ RenderOptions Options() {
   return options;
 }
 
-ShadedFrame Draw(const ShadedScene& scene, const ShadedRequest& request = {}) {
+FrameImages Draw(const Scene& scene, const Outputs& request = {}) {
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
+  Engine renderer(workers);
+  FrameImages frame;
   const Status status = renderer.Render({&scene, 1}, Options(), request, &frame);
   EXPECT_TRUE(status.ok()) << status.message();
   return frame;
 }
 
-std::array<float, 3> ColorAt(const ShadedFrame& frame, int x, int y) {
+std::array<float, 3> ColorAt(const FrameImages& frame, int x, int y) {
   const auto pixel = static_cast<std::size_t>(y * kSize + x);
   return {frame.color[pixel], frame.color[kPixels + pixel], frame.color[2 * kPixels + pixel]};
 }
@@ -55,33 +55,32 @@ std::array<float, 3> ColorAt(const ShadedFrame& frame, int x, int y) {
 // A few roundings of numbers of the size of 1.
 constexpr float kTolerance = 1e-5f;
 
-void ExpectColor(const ShadedFrame& frame, int x, int y, std::array<float, 3> expected) {
+void ExpectColor(const FrameImages& frame, int x, int y, std::array<float, 3> expected) {
   for (std::size_t c = 0; c < 3; ++c) {
     EXPECT_NEAR(ColorAt(frame, x, y)[c], expected[c], kTolerance) << x << " " << y << " " << c;
   }
 }
 
-TEST(ShadedRenderer, VertexColoursAreInterpolated) {
+TEST(Engine, VertexColoursAreInterpolated) {
   const Square square;
-  ShadedScene scene = square.Scene();
-  scene.colors = {square.colors, AttributeRate::kVertex};
-  const ShadedFrame frame = Draw(scene);
+  Scene scene = square.View();
+  scene.colors = {square.colors, Rate::kVertex};
+  const FrameImages frame = Draw(scene);
   // Pixel (0, 15) has its centre at (1/32, 1/32) of the square, from its lower left corner.
   ExpectColor(frame, 0, 15, {15.0f / 16, 1.0f / 32, 0});
 }
 
 // Texels are as large as pixels, so pixel centres are texel centres; row 0 is the top, v = 1.
-TEST(ShadedRenderer, TexelCentresAreWhereTheConventionSays) {
+TEST(Engine, TexelCentresAreWhereTheConventionSays) {
   const Square square;
   std::vector<float> texels;
   for (std::size_t i = 0; i < 3 * kPixels; ++i) texels.push_back(static_cast<float>(i % 97) / 97);
-  for (const auto filter :
-       {shade::Filter::kNearest, shade::Filter::kBilinear, shade::Filter::kTrilinear}) {
-    const shade::TextureView texture{texels, kSize, kSize, 3, shade::Wrap::kRepeat, filter};
-    ShadedScene scene = square.Scene();
-    scene.uvs = {square.uvs, AttributeRate::kVertex};
+  for (const auto filter : {Filter::kNearest, Filter::kBilinear, Filter::kTrilinear}) {
+    const Texture texture{texels, kSize, kSize, Wrap::kRepeat, filter};
+    Scene scene = square.View();
+    scene.uvs = {square.uvs, Rate::kVertex};
     scene.textures = {&texture, 1};
-    const ShadedFrame frame = Draw(scene);
+    const FrameImages frame = Draw(scene);
     for (int y = 0; y < kSize; ++y) {
       for (int x = 0; x < kSize; ++x) {
         const float* t = &texels[static_cast<std::size_t>(3 * (y * kSize + x))];
@@ -93,39 +92,39 @@ TEST(ShadedRenderer, TexelCentresAreWhereTheConventionSays) {
   }
 }
 
-TEST(ShadedRenderer, LightFromTheSideGivesItsCosine) {
+TEST(Engine, LightFromTheSideGivesItsCosine) {
   const Square square;
-  ShadedScene scene = square.Scene();
-  const shade::DirectionalLight light{{3, 0, 4}, 1};  // of length 5: cosine 0.8
+  Scene scene = square.View();
+  const Light light{{3, 0, 4}, 1};  // of length 5: cosine 0.8
   scene.lights = {&light, 1};
-  scene.model.lighting = Lighting::kLambert;
+  scene.shading.lighting = Lighting::kLambert;
   ExpectColor(Draw(scene), 8, 8, {0.8f, 0.8f, 0.8f});
-  scene.model.normals = NormalKind::kFlat;
+  scene.shading.normals = Normals::kFlat;
   ExpectColor(Draw(scene), 3, 12, {0.8f, 0.8f, 0.8f});
 }
 
 // Normals that are sums over tiny faces, and light directions, need not be near 1: their lengths
 // are powers of two here, so that nothing is rounded, and the gradient is as much larger as they
 // are smaller.
-TEST(ShadedRenderer, DirectionsThatAreGivenMayHaveAnyLength) {
+TEST(Engine, DirectionsThatAreGivenMayHaveAnyLength) {
   const Square square;
   const std::vector<float> normals = {0, 0, 1, 0.25f, 0, 1, 0, 0.5f, 1, 0.5f, 0.5f, 0.75f};
   const std::vector<float> lights = {1, 0, 1, 0, 1, 1, 0.5f, 0, 1, 0, 0, 1};
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
+  Engine renderer(workers);
   std::vector<float> color, d_normals, d_lights;
   for (const int power : {0, -20, -60, -100, 20, 60, 100}) {
     std::vector<float> n = normals, l = lights, d_n(12), d_l(12);
     for (float& x : n) x = std::ldexp(x, power);
     for (float& x : l) x = std::ldexp(x, -power);
-    ShadedScene scene = square.Scene();
-    scene.normals = {n, AttributeRate::kVertex}, scene.light_directions = l;
-    scene.model.normals = NormalKind::kGiven, scene.model.lighting = Lighting::kLambert;
-    const ShadedFrame frame = Draw(scene);
+    Scene scene = square.View();
+    scene.normals = {n, Rate::kVertex}, scene.light_directions = l;
+    scene.shading.normals = Normals::kGiven, scene.shading.lighting = Lighting::kLambert;
+    const FrameImages frame = Draw(scene);
     const std::vector<float> d_color(3 * kPixels, 0x1p-10f);
-    ShadedFrameGradients d_frame;
+    FrameGradients d_frame;
     d_frame.color = d_color;
-    ShadedGradients d_scene;
+    SceneGradients d_scene;
     d_scene.normals = d_n, d_scene.light_directions = d_l;
     const Status status = renderer.Backward({&scene, 1}, Options(), frame, d_frame, {&d_scene, 1});
     ASSERT_TRUE(status.ok()) << status.message();
@@ -143,17 +142,17 @@ TEST(ShadedRenderer, DirectionsThatAreGivenMayHaveAnyLength) {
   }
 }
 
-TEST(ShadedRenderer, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
+TEST(Engine, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
   Square square;
   for (float& p : square.positions) p *= 0.5f;
   std::swap(square.faces[0], square.faces[1]), std::swap(square.faces[3], square.faces[4]);
-  ShadedScene scene = square.Scene();
-  const shade::DirectionalLight light{{0, 0, 1}, 1};
+  Scene scene = square.View();
+  const Light light{{0, 0, 1}, 1};
   scene.lights = {&light, 1};
-  scene.model.lighting = Lighting::kLambert;
+  scene.shading.lighting = Lighting::kLambert;
   ExpectColor(Draw(scene), 8, 8, {0, 0, 0});
-  scene.model.two_sided = true;
-  const ShadedFrame frame = Draw(scene, {});
+  scene.shading.two_sided = true;
+  const FrameImages frame = Draw(scene, {});
   ExpectColor(frame, 8, 8, {1, 1, 1});
   ExpectColor(frame, 1, 1, {0, 0, 0});
 }

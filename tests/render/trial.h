@@ -36,8 +36,8 @@ inline RenderOptions TrialOptions() {
   return options;
 }
 
-inline ShadedRequest EveryImage() {
-  ShadedRequest request;
+inline Outputs EveryImage() {
+  Outputs request;
   request.depth = request.normals = request.uv = true;
   return request;
 }

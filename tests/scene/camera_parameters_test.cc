@@ -2,8 +2,6 @@
 // The adjoint of a camera's parameters against a complex step through them and the projection of a
 // point. Tolerance: a complex step has no truncation error; both sides are some 100 roundings of
 // terms up to the largest entry of the gradient's own terms: 1e-12 of it.
-#include "scene/camera_parameters.h"
-
 #include <gtest/gtest.h>
 
 #include <complex>
@@ -12,6 +10,7 @@
 
 #include "base/rng.h"
 #include "raster/project_ref.h"
+#include "scene/camera_ref.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -64,7 +63,7 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
   for (int trial = 0; trial < 1000; ++trial) {
     P64 p;
     for (double& x : p.rotation) x = random();
-    p.translation = {random(), random(), -3};
+    p.translation[0] = random(), p.translation[1] = random(), p.translation[2] = -3;
     p.fx = 100 + 50 * random(), p.fy = 100 + 50 * random(), p.cx = 32, p.cy = 24;
     std::array<double, 3> point = {random(), random(), random()};
     std::array<double, 11> w;
@@ -72,8 +71,8 @@ TEST(CameraParameters, AdjointIsTheComplexStep) {
     P64 d;
     CameraFromParametersAdjointRef(p, CameraAdjoint(p, point, w), &d);
     PC step;
-    std::copy(p.rotation.begin(), p.rotation.end(), step.rotation.begin());
-    std::copy(p.translation.begin(), p.translation.end(), step.translation.begin());
+    std::copy_n(p.rotation, 6, step.rotation);
+    std::copy_n(p.translation, 3, step.translation);
     step.fx = p.fx, step.fy = p.fy, step.cx = p.cx, step.cy = p.cy;
     const auto entries = Entries<Complex>(step);
     const auto gradient = Entries<double>(d);
@@ -110,8 +109,8 @@ TEST(CameraParameters, OfDoubleHaveTheDigitsOfDouble) {
   p.rotation[4] += 0.3;
   Camera64 d_camera;
   for (int i = 0; i < 9; ++i) d_camera.rotation[i] = 0.1 * i - 0.3;
-  CameraParametersT<double> d, expected;
-  PullBack(p, d_camera, &d);
+  CameraParametersT<double> expected;
+  const CameraParametersT<double> d = PullBack(p, d_camera);
   CameraFromParametersAdjointRef(p, d_camera, &expected);
   for (int i = 0; i < 6; ++i) EXPECT_EQ(d.rotation[i], expected.rotation[i]);
 }
@@ -122,20 +121,19 @@ TEST(CameraParameters, PullBackIsTheReference) {
   Camera d_camera;
   for (int i = 0; i < 9; ++i) d_camera.rotation[i] = static_cast<float>(i) - 3;
   d_camera.fx = 7;
-  CameraParameters d, expected;
-  PullBack(p, d_camera, &d);
+  CameraParameters expected;
+  const CameraParameters d = PullBack(p, d_camera);
   CameraFromParametersAdjointRef(p, d_camera, &expected);
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(d.rotation[i], expected.rotation[i], 1e-5);
   EXPECT_EQ(d.fx, 7);
 }
 
 TEST(CameraParameters, WhatGivesNoRotationIsRefused) {
-  CameraParameters p;
-  p.rotation = {1, 2, 3, 2, 4, 6};
+  CameraParameters p{.rotation = {1, 2, 3, 2, 4, 6}};
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "parallel");
-  p.rotation = {0, 0, 0, 0, 1, 0};
+  p = {.rotation = {0, 0, 0, 0, 1, 0}};
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "rotation");
-  p.rotation = {1, 0, 0, 0, 0, 0};
+  p = {.rotation = {1, 0, 0, 0, 0, 0}};
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "rotation");
   p.rotation[0] = std::numeric_limits<float>::infinity();
   ExpectMessage(CameraFromParameters(p, 0.1f).status(), "finite");

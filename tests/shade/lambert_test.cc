@@ -12,9 +12,8 @@ using Complex = std::complex<double>;
 constexpr double kStep = 1e-30;
 
 template <class T>
-std::array<DirectionalLightT<T>, 2> Lights() {
-  return {DirectionalLightT<T>{{T(0), T(1), T(0)}, T(0.5)},
-          DirectionalLightT<T>{{T(0.6), T(0), T(0.8)}, T(0.25)}};
+std::array<LightT<T>, 2> Lights() {
+  return {LightT<T>{{T(0), T(1), T(0)}, T(0.5)}, LightT<T>{{T(0.6), T(0), T(0.8)}, T(0.25)}};
 }
 
 TEST(Lambert, FacingLightAddsItsIntensityAndAvertedOneNothing) {
@@ -29,7 +28,7 @@ TEST(Lambert, AdjointIsTheComplexStepDerivative) {
   const auto lights = Lights<double>();
   const std::array<double, 3> n = {0.48, 0.6, 0.64};
   std::array<double, 3> d_n = {};
-  std::array<DirectionalLightT<double>, 2> d_lights = {};
+  std::array<LightT<double>, 2> d_lights = {kNoLight<double>, kNoLight<double>};
   LambertAdjointRef<double>({0.3, lights}, n, 1.7, d_n, d_lights);
 
   const auto step = [&](auto move) {

@@ -171,8 +171,8 @@ void BindMaskOptions(py::module_& m) {
           "paper",
           [](double delta, double boxlen, int knum, double edge_eps) {
             kaolin::ProjectedMaskOptions options;
-            options.delta = delta, options.rule = SoftRule::kPaper;
-            options.paper = {boxlen, knum}, options.paper_eps = edge_eps;
+            options.delta = delta, options.rule = AlphaRule::kPaper;
+            options.paper_box = boxlen, options.paper_faces = knum, options.paper_eps = edge_eps;
             return options;
           },
           py::kw_only(), py::arg("delta"), py::arg("boxlen"), py::arg("knum"), py::arg("edge_eps"),

@@ -134,8 +134,8 @@ void VectorMaskBackward(const ProjectedBatchT<float>& batch, const ProjectedMask
 // so far that what is outside of them adds up to no more than max_alpha_error, and without its eps.
 
 raster::PaperSoftMask ScalarRule(const ProjectedMaskOptions& options, std::size_t faces) {
-  if (options.rule == SoftRule::kPaper) {
-    return {1 / options.delta, options.paper.box, options.paper.max_faces, options.paper_eps};
+  if (options.rule == AlphaRule::kPaper) {
+    return {1 / options.delta, options.paper_box, options.paper_faces, options.paper_eps};
   }
   constexpr double kUnderflow = 746;  // exp(-746) is 0
   const double dropped =
@@ -178,7 +178,7 @@ double ScalarMask(const ProjectedBatchT<T>& batch, const ProjectedMaskOptions& o
     PaperForward<T>(faces[bins.image(task)], rule, bins.region(task, face_ids),
                     alpha.data() + bins.first(task));
   });
-  if (options.rule == SoftRule::kPaper) return std::numeric_limits<double>::infinity();
+  if (options.rule == AlphaRule::kPaper) return std::numeric_limits<double>::infinity();
   return options.max_alpha_error;
 }
 
@@ -221,9 +221,9 @@ Status ValidateMaskOptions(const ProjectedMaskOptions& options) {
   if (!(options.max_alpha_error >= 0 && options.max_alpha_error <= 1)) {
     return InvalidArgument("max_alpha_error is {}, must be in [0, 1]", options.max_alpha_error);
   }
-  TILEGRAD_TRY(CheckNotNegative("boxlen", options.paper.box));
-  if (options.paper.max_faces < 0) {
-    return InvalidArgument("knum is {}, must be >= 0", options.paper.max_faces);
+  TILEGRAD_TRY(CheckNotNegative("boxlen", options.paper_box));
+  if (options.paper_faces < 0) {
+    return InvalidArgument("knum is {}, must be >= 0", options.paper_faces);
   }
   return CheckNotNegative("paper_eps", options.paper_eps);
 }
@@ -240,7 +240,7 @@ Result<double> ProjectedSoftMask(const ProjectedBatchT<T>& batch,
   TILEGRAD_TRY(CheckSize("face_idx", face_ids.size(), batch.images * PixelCount(options.size)));
   TILEGRAD_TRY(CheckSize("the mask", alpha.size(), face_ids.size()));
   if constexpr (std::is_same_v<T, float>) {
-    if (options.rule == SoftRule::kAllFaces) {
+    if (options.rule == AlphaRule::kAllFaces) {
       return VectorMask(batch, options, face_ids, workers, alpha);
     }
   }
@@ -262,7 +262,7 @@ Status ProjectedSoftMaskBackward(const ProjectedBatchT<T>& batch,
   std::fill(adjoint.d_xy.begin(), adjoint.d_xy.end(), T(0));
   bool done = false;
   if constexpr (std::is_same_v<T, float>) {
-    if (options.rule == SoftRule::kAllFaces) {
+    if (options.rule == AlphaRule::kAllFaces) {
       VectorMaskBackward(batch, options, workers, adjoint);
       done = true;
     }

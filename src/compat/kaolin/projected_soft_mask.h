@@ -15,9 +15,10 @@ namespace tilegrad::compat::kaolin {
 struct ProjectedMaskOptions {
   ImageSize size;             // pixels, 1..16384
   double delta = 1.0 / 7000;  // equation 5, NDC^2; > 0
-  SoftRule rule = SoftRule::kAllFaces;
+  AlphaRule rule = AlphaRule::kAllFaces;
   double max_alpha_error = 1e-6;  // with kAllFaces, in [0, 1]; 0 drops nothing
-  PaperSoftRule paper;            // with kPaper
+  double paper_box = 0.02;        // with kPaper, as RenderOptions
+  int paper_faces = 30;
   double paper_eps = 1e-13;  // with kPaper: NDC^2, added to the squared length of an edge; >= 0
 };
 

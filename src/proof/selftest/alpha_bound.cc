@@ -7,6 +7,7 @@
 
 #include "proof/selftest/checks.h"
 #include "proof/selftest/sphere_scene.h"
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 
 namespace tilegrad::selftest {
@@ -49,8 +50,8 @@ struct BoundScene {
 
 Result<std::vector<double>> TrueAlpha(const BoundScene& scene) {
   const auto mesh = MeshCast<double>(scene.mesh);
-  const RenderRequest request{.attributes = false};
-  FrameT<double> frame;
+  const Outputs request{.attributes = false};
+  PipelineFrameT<double> frame;
   RenderRef<double>(mesh.View(), scene.options, request, &frame);
   const auto between = std::count_if(frame.alpha.begin(), frame.alpha.end(),
                                      [](double a) { return a > 0.01 && a < 0.99; });
@@ -61,9 +62,9 @@ Result<std::vector<double>> TrueAlpha(const BoundScene& scene) {
 // What is dropped lowers alpha, so that above it there is only rounding.
 Status CheckBound(const CheckContext& context, const BoundScene& scene, double rounding,
                   const std::vector<double>& want, Gauge* gauge) {
-  Renderer renderer(context.workers);
-  Frame frame;
-  const SceneView views[] = {scene.mesh.View()};
+  Pipeline renderer(context.workers);
+  PipelineFrame frame;
+  const PipelineScene views[] = {scene.mesh.View()};
   TILEGRAD_TRY(renderer.Render(views, scene.options, {.attributes = false}, &frame));
   std::vector<double> spent = {frame.alpha_error_bound};
   context.Take("alpha", frame.alpha), context.Take("alpha_error_bound", spent);

@@ -7,6 +7,7 @@
 #include "proof/owned_rendering.h"
 #include "proof/selftest/checks.h"
 #include "proof/selftest/sphere_scene.h"
+#include "render/renderer.h"
 
 namespace tilegrad::selftest {
 namespace {
@@ -37,7 +38,7 @@ Status ExpectFinite(const CheckContext& context, const std::string& what, Vector
 Status CheckFinite(const CheckContext& context, OwnedScene<float> scene, double delta) {
   RenderOptions options;
   options.delta = delta;
-  ShadedRequest request;
+  Outputs request;
   OwnedCotangents<float> d_frame;
   d_frame.color.assign(3 * 64 * 64, 1.0f), d_frame.alpha.assign(64 * 64, 1.0f);
   OwnedRendering<float> out;
@@ -78,9 +79,9 @@ constexpr BadNumber kBadNumbers[] = {
 Status CheckRefused(const CheckContext& context, const BadNumber& bad, float value) {
   auto scene = MakeSphere({});
   *bad.number(&scene) = value;
-  ShadedRenderer renderer(context.workers);
-  const ShadedScene view = scene.View();
-  ShadedFrame frame;
+  Renderer renderer = RendererOn(context.workers);
+  const Scene view = scene.View();
+  Frame frame;
   const Status status = renderer.Render({&view, 1}, SphereOptions({}), {}, &frame);
   std::string message = status.message();
   std::vector<std::uint8_t> text(message.begin(), message.end());

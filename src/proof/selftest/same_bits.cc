@@ -42,7 +42,7 @@ void AppendImage(const Image& images, std::size_t n, std::size_t count, std::vec
               images.begin() + static_cast<std::ptrdiff_t>((n + 1) * size));
 }
 
-std::vector<float> BitsOf(const ShadedFrame& frame, std::size_t n, std::size_t count,
+std::vector<float> BitsOf(const Images& frame, std::size_t n, std::size_t count,
                           OwnedScene<float>& d) {
   std::vector<float> out;
   AppendImage(frame.face_ids, n, count, &out);  // fewer than 2^24: exact
@@ -66,22 +66,21 @@ OwnedCotangents<float> Repeated(const OwnedCotangents<float>& one, std::size_t c
 // Of some scenes of the batch, in one call.
 Status RenderTogether(Batch& batch, std::span<OwnedScene<float>> scenes, const Workers& workers,
                       Bits* bits) {
-  std::vector<ShadedScene> views;
+  std::vector<Scene> views;
   std::vector<OwnedGradients<float>> gradients;
-  std::vector<ShadedGradients> d_scenes;
+  std::vector<SceneGradients> d_scenes;
   gradients.reserve(scenes.size());  // views look at them
   for (auto& scene : scenes) {
     views.push_back(scene.View());
     d_scenes.push_back(gradients.emplace_back(scene).View());
   }
   const auto d_frame = Repeated(batch.d_frame, scenes.size());
-  ShadedRenderer renderer(workers);
-  ShadedFrame frame;
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
   TILEGRAD_TRY(renderer.Render(views, batch.options, ImagesWithGradients(), &frame));
-  TILEGRAD_TRY(renderer.Backward(views, batch.options, frame, d_frame.View(), d_scenes));
+  TILEGRAD_TRY(renderer.Backward(frame, d_frame.View(), d_scenes));
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    gradients[n].TakeCamera(d_scenes[n]);
-    bits->push_back(BitsOf(frame, n, scenes.size(), gradients[n].d));
+    bits->push_back(BitsOf(frame.images(), n, scenes.size(), gradients[n].d));
   }
   return {};
 }

@@ -90,7 +90,7 @@ Status CheckSphere(const CheckContext& context, const SphereShape& shape, Gauge*
                                      both.got.frame.face_ids);
   TILEGRAD_TRY(ExpectReference(context, shape.lighting, &both, gauge));
   return ExpectFaceIds(both.got.frame.face_ids,
-                       FaceIdsRef<double>(scene64.View(), options, {0, shape.height}));
+                       FaceIdsRef<double>(scene64.mesh.View(), options, {0, shape.height}));
 }
 
 Result<Finding> EngineIsTheReference(const CheckContext& context) {
@@ -114,11 +114,11 @@ Status CheckSteps(const CheckContext& context, SphereShape shape, Gauge* gauge) 
   const RenderOptions options = SphereOptions(shape);
   const auto scene = MakeSphere(shape);
   auto scene64 = OwnedCast<double>(scene);
-  const auto ids = FaceIdsRef<double>(scene64.View(), options, {0, shape.height});
+  const auto ids = FaceIdsRef<double>(scene64.mesh.View(), options, {0, shape.height});
   Rng rng(3, 21);
   const OwnedCotangents<double> d_frame(ids.size(), 0, &rng);
   auto d = OwnedRefBackward<double>(scene64, options, d_frame, ids);
-  const ShadedRequest request = ImagesWithGradients();
+  const Outputs request = ImagesWithGradients();
   const SlopeProblem problem{scene, options, request, ids, d_frame};
   for (const auto& [kind, gradient] : TakeGradients(context, d)) {
     TILEGRAD_TRY(

@@ -52,15 +52,14 @@ void AddMesh(const SphereShape& shape, Rng* rng, OwnedScene<float>* scene) {
 }
 
 // Coordinates from x and y, so that a texel is several pixels.
-void AddTexture(shade::Filter filter, Rng* rng, OwnedScene<float>* scene) {
+void AddTexture(Filter filter, Rng* rng, OwnedScene<float>* scene) {
   for (std::size_t v = 0; v < scene->mesh.vertex_count(); ++v) {
     for (const std::size_t k : {0u, 1u}) {
       scene->uvs.push_back(0.5f + 0.4f * scene->mesh.positions[3 * v + k]);
     }
   }
-  scene->uvs_rate = AttributeRate::kVertex;
-  scene->textures.push_back(
-      {RandomNumbers(8 * 7 * 3, 0.2, 0.9, rng), 8, 7, shade::Wrap::kRepeat, filter});
+  scene->uvs_rate = Rate::kVertex;
+  scene->textures.push_back({RandomNumbers(8 * 7 * 3, 0.2, 0.9, rng), 8, 7, Wrap::kRepeat, filter});
 }
 
 void AddSurfaces(Rng* rng, OwnedScene<float>* scene) {
@@ -75,8 +74,8 @@ void AddSurfaces(Rng* rng, OwnedScene<float>* scene) {
 }
 
 void AddLight(const SphereShape& shape, Rng* rng, OwnedScene<float>* scene) {
-  const Lighting lighting = scene->model.lighting = shape.lighting;
-  scene->model.normals = shape.normals, scene->model.two_sided = true;
+  const Lighting lighting = scene->shading.lighting = shape.lighting;
+  scene->shading.normals = shape.normals, scene->shading.two_sided = true;
   if (lighting == Lighting::kSphericalHarmonics) scene->sh = RandomNumbers(9, 0.1, 0.5, rng);
   if (lighting != Lighting::kLambert && lighting != Lighting::kPhong) return;
   scene->lights = {{{0.3f, 0.5f, 1.0f}, 0.8f}, {{-1.0f, 0.7f, 0.9f}, 0.4f}};
@@ -95,8 +94,8 @@ OwnedScene<float> MakeSphere(const SphereShape& shape) {
   return scene;
 }
 
-ShadedRequest ImagesWithGradients() {
-  ShadedRequest request;
+Outputs ImagesWithGradients() {
+  Outputs request;
   request.depth = request.normals = request.uv = true;
   return request;
 }

@@ -13,8 +13,8 @@ namespace tilegrad::selftest {
 
 struct SphereShape {
   Lighting lighting = Lighting::kPhong;
-  NormalKind normals = NormalKind::kSmooth;
-  shade::Filter filter = shade::Filter::kBilinear;
+  Normals normals = Normals::kSmooth;
+  Filter filter = Filter::kBilinear;
   float near_plane = 0.01f;     // the sphere begins at a depth of 2.2
   int level = 2;                // of the icosphere: 20 * 4^level faces
   int width = 32, height = 32;  // pixels of the camera's image
@@ -36,10 +36,10 @@ inline constexpr NamedSphere kSpheres[] = {
     {"Phong", {.lighting = Lighting::kPhong}},
     {"harmonics, flat, trilinear",
      {.lighting = Lighting::kSphericalHarmonics,
-      .normals = NormalKind::kFlat,
-      .filter = shade::Filter::kTrilinear}}};
+      .normals = Normals::kFlat,
+      .filter = Filter::kTrilinear}}};
 
-ShadedRequest ImagesWithGradients();  // color, alpha, depth, normals, uv
+Outputs ImagesWithGradients();  // color, alpha, depth, normals, uv
 
 RenderOptions SphereOptions(const SphereShape& shape);
 

@@ -75,19 +75,19 @@ OwnedScene<T> TriangleScene() {
 }
 
 template <class T>
-Result<ShadedFrameT<T>> RenderTriangle(const Workers& workers) {
+Result<FrameImagesT<T>> RenderTriangle(const Workers& workers) {
   auto scene = TriangleScene<T>();
   RenderOptions options;
   options.width = options.height = kSize, options.delta = kDelta;
-  ShadedRequest request;
+  Outputs request;
   request.depth = true;
-  ShadedFrameT<T> frame;
+  FrameImagesT<T> frame;
   if constexpr (std::is_same_v<T, float>) {
-    const ShadedScene view = scene.View();
-    TILEGRAD_TRY(ShadedRenderer(workers).Render({&view, 1}, options, request, &frame));
+    const Scene view = scene.View();
+    TILEGRAD_TRY(Engine(workers).Render({&view, 1}, options, request, &frame));
   } else {
-    const auto ids = FaceIdsRef<T>(scene.View(), options, {0, kSize});
-    ShadedRenderRef<T>(scene.View(), options, request, ids, &frame);
+    const auto ids = FaceIdsRef<T>(scene.mesh.View(), options, {0, kSize});
+    ReferenceRender<T>(scene.View(), options, request, ids, &frame);
   }
   return frame;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equation 6 over all faces, within RenderOptions::max_alpha_error (SoftRule::kAllFaces): the
+// Equation 6 over all faces, within RenderOptions::max_alpha_error (AlphaRule::kAllFaces): the
 // vector kernels of raster/soft_mask/soft_mask.h. Alpha is 1 in the foreground.
 #pragma once
 

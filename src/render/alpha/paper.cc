@@ -72,8 +72,8 @@ void PaperAlpha::Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinG
                            adjoint.d_alpha.data());
 }
 
-void PaperAlpha::AddToScene(const SceneView& scene, std::size_t n, const ImageScratch& scratch,
-                            SceneGradients* d_scene) const {
+void PaperAlpha::AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& scratch,
+                            PipelineGradients* d_scene) const {
   const Image& image = images_[n];
   const raster::ScreenMesh& mesh = scratch.mesh;
   const raster::SquareGrid tiles = raster::TileGrid(mesh.width, mesh.height);

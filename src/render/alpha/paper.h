@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alpha by the truncated rule of the paper's implementations (SoftRule::kPaper,
+// Alpha by the truncated rule of the paper's implementations (AlphaRule::kPaper,
 // raster/soft_mask/paper_ref.h): for comparisons, so scalar code. Alpha is 1 in the foreground.
 #pragma once
 
@@ -20,8 +20,8 @@ inline double InverseDelta(double delta) { return std::min(1 / delta, 1e30); }
 
 inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
   return {.inverse_delta = InverseDelta(options.delta),
-          .box = options.paper.box,
-          .max_faces = options.paper.max_faces};
+          .box = options.paper_box,
+          .max_faces = options.paper_faces};
 }
 
 // Sums its gradients by itself, tile after tile of the image.
@@ -32,8 +32,8 @@ class PaperAlpha final : public AlphaStage {
   void Prepare(std::size_t n, const ImageScratch& image) override;
   double Forward(const AlphaBin& bin, const AlphaImages& out) override;
   void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) override;
-  void AddToScene(const SceneView& scene, std::size_t n, const ImageScratch& image,
-                  SceneGradients* d_scene) const override;
+  void AddToScene(const PipelineScene& scene, std::size_t n, const ImageScratch& image,
+                  PipelineGradients* d_scene) const override;
 
  private:
   // The faces that take part, in their order, and the gradients of those near the tiles of a bin.

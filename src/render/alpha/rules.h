@@ -13,11 +13,11 @@ class AlphaRules {
  public:
   explicit AlphaRules(std::size_t workers) : all_faces_(workers) {}
 
-  AlphaStage* Of(SoftRule rule) {
+  AlphaStage* Of(AlphaRule rule) {
     switch (rule) {
-      case SoftRule::kAllFaces:
+      case AlphaRule::kAllFaces:
         return &all_faces_;
-      case SoftRule::kPaper:
+      case AlphaRule::kPaper:
         return &paper_;
     }
     return nullptr;

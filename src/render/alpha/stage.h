@@ -12,14 +12,14 @@
 
 #include "raster/soft_mask/setup.h"
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
 // What a rule asks of the pipeline, the same in every call.
 struct AlphaNeeds {
   bool soft_tree = false;      // ImageScratch::soft is built before Prepare
-  bool transmittance = false;  // Frame::transmittance has room, and comes back in AlphaAdjoint
+  bool transmittance = false;  // PipelineFrame::transmittance has room, and comes back in AlphaAdjoint
   bool bounded = true;         // false: Frame::alpha_error_bound is infinite, whatever Forward says
   bool own_sums = false;       // gradients go through AddToScene, not through BinGradients
 };
@@ -66,8 +66,8 @@ class AlphaStage {
   virtual void Backward(const AlphaBin& bin, const AlphaAdjoint& adjoint, BinGradients* out) = 0;
   // With needs().own_sums: adds the gradients of an image's bins to positions and d_camera, where
   // they are wanted, after those of attributes.
-  virtual void AddToScene(const SceneView& /*scene*/, std::size_t /*n*/,
-                          const ImageScratch& /*image*/, SceneGradients* /*d_scene*/) const {}
+  virtual void AddToScene(const PipelineScene& /*scene*/, std::size_t /*n*/,
+                          const ImageScratch& /*image*/, PipelineGradients* /*d_scene*/) const {}
   // What was evaluated in this call.
   virtual raster::SoftWork work() const { return {}; }
 };

@@ -28,13 +28,13 @@ Camera Enlarge(Camera camera, float factor) {
   return camera;
 }
 
-SceneView ViewOf(const Mesh& mesh, const LitSurface& surface, const Camera& camera) {
-  SceneView view;
+PipelineScene ViewOf(const Mesh& mesh, const LitSurface& surface, const Camera& camera) {
+  PipelineScene view;
   view.positions = {&mesh.positions[0].x, 3 * mesh.positions.size()};
   view.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};
   view.attributes = surface.attributes();
   view.channels = LitSurface::kChannels;
-  view.rate = AttributeRate::kCorner;
+  view.rate = Rate::kCorner;
   view.camera = camera;
   return view;
 }
@@ -47,8 +47,8 @@ std::uint8_t ToByte(float value) {
 
 struct LitRenderer::Impl {
   Workers workers{1};
-  Renderer renderer{workers};
-  Frame frame;
+  Pipeline renderer{workers};
+  PipelineFrame frame;
   std::vector<float> sums;  // [4][size][size]
 
   LitSurface::Sample SampleAt(std::size_t sample) const {
@@ -90,11 +90,11 @@ Result<std::vector<std::uint8_t>> LitRenderer::Render(const Mesh& mesh,
   const LitSurface surface(mesh);
   RenderOptions options;
   options.width = options.height = size * kSupersampling;
-  const RenderRequest request{.attributes = true, .alpha = false};
+  const Outputs request{.color = false, .alpha = false};
   const auto side = static_cast<std::size_t>(size);
   std::vector<std::uint8_t> out(cameras.size() * 4 * side * side);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const SceneView view = ViewOf(mesh, surface, Enlarge(cameras[i], kSupersampling));
+    const PipelineScene view = ViewOf(mesh, surface, Enlarge(cameras[i], kSupersampling));
     TILEGRAD_TRY(impl_->renderer.Render({&view, 1}, options, request, &impl_->frame));
     impl_->Resolve(surface, EyeOf(cameras[i]), side, out.data() + i * 4 * side * side);
   }

@@ -32,10 +32,10 @@ std::vector<float> DecodeTexels(const ImageU8& image, ColorSpace space) {
   return out;
 }
 
-shade::Wrap WrapOf(TextureWrap wrap) {
-  return wrap == TextureWrap::kClamp    ? shade::Wrap::kClamp
-         : wrap == TextureWrap::kMirror ? shade::Wrap::kMirror
-                                        : shade::Wrap::kRepeat;
+Wrap WrapOf(TextureWrap wrap) {
+  return wrap == TextureWrap::kClamp    ? Wrap::kClamp
+         : wrap == TextureWrap::kMirror ? Wrap::kMirror
+                                        : Wrap::kRepeat;
 }
 
 }  // namespace
@@ -44,31 +44,31 @@ MeshScene::MeshScene(const Mesh& mesh, const MeshSceneOptions& options)
     : mesh_(mesh), options_(options), texels_(mesh.textures.size()) {
   scene_.positions = Flat(mesh.positions);
   scene_.faces = {mesh.faces.data()->data(), 3 * mesh.faces.size()};
-  scene_.model.two_sided = true;
+  scene_.shading.two_sided = true;
   AddNormals();
   for (const glm::vec4& color : mesh.colors) {
     for (int c = 0; c < 3; ++c) colors_.push_back(Decode(color[c], options.color_space));
   }
-  scene_.colors = {colors_, AttributeRate::kVertex};
+  scene_.colors = {colors_, Rate::kVertex};
   AddSurfaces();
   if (!textures_.empty()) {
-    scene_.uvs = {Flat(mesh.corner_uvs), AttributeRate::kCorner};
+    scene_.uvs = {Flat(mesh.corner_uvs), Rate::kCorner};
     scene_.textures = textures_;
   }
 }
 
 void MeshScene::AddNormals() {
-  scene_.model.normals =
-      options_.normals == NormalSource::kSmooth ? NormalKind::kSmooth : NormalKind::kFlat;
+  scene_.shading.normals =
+      options_.normals == NormalSource::kSmooth ? Normals::kSmooth : Normals::kFlat;
   if (options_.normals != NormalSource::kAuto) return;
   if (!mesh_.corner_normals.empty()) {
-    scene_.normals = {Flat(mesh_.corner_normals), AttributeRate::kCorner};
+    scene_.normals = {Flat(mesh_.corner_normals), Rate::kCorner};
   } else if (!mesh_.normals.empty()) {
-    scene_.normals = {Flat(mesh_.normals), AttributeRate::kVertex};
+    scene_.normals = {Flat(mesh_.normals), Rate::kVertex};
   } else {
     return;
   }
-  scene_.model.normals = NormalKind::kGiven;
+  scene_.shading.normals = Normals::kGiven;
 }
 
 // The view of a material's texture, one for each way of looking it up.
@@ -77,11 +77,9 @@ int MeshScene::AddTexture(const Material& material) {
   const auto index = static_cast<std::size_t>(material.base_color_texture);
   const ImageU8& image = mesh_.textures[index].image;
   if (texels_[index].empty()) texels_[index] = DecodeTexels(image, options_.color_space);
-  const shade::TextureView view = {
-      texels_[index],        image.width,
-      image.height,          3,
-      WrapOf(material.wrap), material.nearest ? shade::Filter::kNearest : options_.filter};
-  const auto same = [&](const shade::TextureView& v) {
+  const Texture view = {texels_[index], image.width, image.height, WrapOf(material.wrap),
+                        material.nearest ? Filter::kNearest : options_.filter};
+  const auto same = [&](const Texture& v) {
     return v.texels.data() == view.texels.data() && v.wrap == view.wrap && v.filter == view.filter;
   };
   const auto found = std::find_if(textures_.begin(), textures_.end(), same);

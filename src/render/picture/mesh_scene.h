@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Mesh, as files give it, made ready for the ShadedRenderer: materials become surfaces, images
+// A Mesh, as files give it, made ready for the Renderer: materials become surfaces, images
 // textures.
 #pragma once
 
 #include <vector>
 
-#include "render/scene.h"
 #include "scene/mesh.h"
+#include "tilegrad/scene.h"
 
 namespace tilegrad {
 
@@ -25,7 +25,7 @@ enum class NormalSource {
 struct MeshSceneOptions {
   ColorSpace color_space = ColorSpace::kLinear;
   NormalSource normals = NormalSource::kAuto;
-  shade::Filter filter = shade::Filter::kTrilinear;  // of textures that do not ask for nearest
+  Filter filter = Filter::kTrilinear;  // of textures that do not ask for nearest
   // Of all surfaces; those that are unlit have ambient 1 and nothing else.
   std::array<float, 3> ambient = {0, 0, 0}, diffuse = {1, 1, 1}, specular = {0, 0, 0};
   float shininess = 10;
@@ -39,7 +39,7 @@ class MeshScene {
   MeshScene& operator=(const MeshScene&) = delete;
 
   // Everything but the camera and the light; views into this and the mesh.
-  const ShadedScene& scene() const { return scene_; }
+  const Scene& scene() const { return scene_; }
   // Whether every material asks that back faces are not drawn.
   bool single_sided() const { return single_sided_; }
 
@@ -50,12 +50,12 @@ class MeshScene {
 
   const Mesh& mesh_;
   MeshSceneOptions options_;
-  ShadedScene scene_;
+  Scene scene_;
   bool single_sided_ = false;
-  std::vector<float> colors_;                 // [V,3]
-  std::vector<std::vector<float>> texels_;    // by the mesh's texture; empty: not used
-  std::vector<shade::TextureView> textures_;  // by use: texture, wrap, filter
-  std::vector<Surface> surfaces_;             // by the mesh's material
+  std::vector<float> colors_;               // [V,3]
+  std::vector<std::vector<float>> texels_;  // by the mesh's texture; empty: not used
+  std::vector<Texture> textures_;           // by use: texture, wrap, filter
+  std::vector<Surface> surfaces_;           // by the mesh's material
 };
 
 }  // namespace tilegrad

@@ -38,7 +38,7 @@ struct Square {
   float rgb[3] = {}, covered = 0, alpha = 0;
 };
 
-Square SumSamples(const ShadedFrame& frame, int x, int y, int scale) {
+Square SumSamples(const Images& frame, int x, int y, int scale) {
   Square sum;
   const auto pixels =
       static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
@@ -63,13 +63,12 @@ void Copy(const From& from, To* to) {
 
 }  // namespace
 
-Status PictureRenderer::RenderColor(ShadedScene scene, const PictureRequest& request,
-                                    Picture* picture) {
+Status PictureRenderer::RenderColor(Scene scene, const PictureRequest& request, Picture* picture) {
   const int scale = request.supersampling;
   const auto s = static_cast<float>(scale);
   Camera& camera = scene.camera;
   camera.fx *= s, camera.fy *= s, camera.cx *= s, camera.cy *= s;
-  ShadedRequest images;
+  Outputs images;
   images.color = request.color, images.attributes = false, images.alpha = request.soft_delta > 0;
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, scale), images, &frame_));
   const std::size_t pixels = PixelCount(request);
@@ -77,7 +76,7 @@ Status PictureRenderer::RenderColor(ShadedScene scene, const PictureRequest& req
   picture->alpha.assign(pixels, 0);
   for (int y = 0; y < request.height; ++y) {
     for (int x = 0; x < request.width; ++x) {
-      const Square sum = SumSamples(frame_, x, y, scale);
+      const Square sum = SumSamples(frame_.images(), x, y, scale);
       const auto at = static_cast<std::size_t>(y * request.width + x);
       picture->alpha[at] = (images.alpha ? sum.alpha : sum.covered) / (s * s);
       for (std::size_t c = 0; c < 3 && request.color && sum.covered > 0; ++c)
@@ -87,33 +86,33 @@ Status PictureRenderer::RenderColor(ShadedScene scene, const PictureRequest& req
   return {};
 }
 
-Status PictureRenderer::RenderExact(const ShadedScene& scene, const PictureRequest& request,
+Status PictureRenderer::RenderExact(const Scene& scene, const PictureRequest& request,
                                     Picture* picture) {
-  ShadedRequest images;
+  Outputs images;
   images.color = images.attributes = images.alpha = false;
   images.depth = request.depth, images.normals = request.normals;
   images.uv = request.uv && !scene.uvs.values.empty();
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, 1), images, &frame_));
-  if (request.depth) Copy(frame_.depth, &picture->depth);
-  if (request.normals) Copy(frame_.normals, &picture->normals);
-  if (request.uv) Copy(frame_.uv, &picture->uv);
+  if (request.depth) Copy(frame_.images().depth, &picture->depth);
+  if (request.normals) Copy(frame_.images().normals, &picture->normals);
+  if (request.uv) Copy(frame_.images().uv, &picture->uv);
   if (request.uv && !images.uv) picture->uv.assign(2 * PixelCount(request), 0);
-  if (request.face_ids) Copy(frame_.face_ids, &picture->face_ids);
+  if (request.face_ids) Copy(frame_.images().face_ids, &picture->face_ids);
   return {};
 }
 
-Status PictureRenderer::Render(const ShadedScene& scene, const PictureRequest& request,
+Status PictureRenderer::Render(const Scene& scene, const PictureRequest& request,
                                Picture* picture) {
   TILEGRAD_TRY(Check(request));
   *picture = Picture{};
   picture->width = request.width, picture->height = request.height;
   if (request.color || request.alpha) {
     TILEGRAD_TRY(RenderColor(scene, request, picture));
-    picture->plans.push_back(renderer_.Explain());
+    picture->plans.push_back(Explain(renderer_));
   }
   if (request.depth || request.normals || request.uv || request.face_ids) {
     TILEGRAD_TRY(RenderExact(scene, request, picture));
-    picture->plans.push_back(renderer_.Explain());
+    picture->plans.push_back(Explain(renderer_));
   }
   return {};
 }

@@ -39,18 +39,18 @@ struct Picture {
 
 class PictureRenderer {
  public:
-  explicit PictureRenderer(const Workers& workers) : renderer_(workers) {}
+  explicit PictureRenderer(const Workers& workers) : renderer_(RendererOn(workers)) {}
 
-  // `scene.camera` is that of the picture's size. Errors: those of ShadedRenderer::Render, and a
+  // `scene.camera` is that of the picture's size. Errors: those of Renderer::Render, and a
   // request out of range.
-  Status Render(const ShadedScene& scene, const PictureRequest& request, Picture* picture);
+  Status Render(const Scene& scene, const PictureRequest& request, Picture* picture);
 
  private:
-  Status RenderColor(ShadedScene scene, const PictureRequest& request, Picture* picture);
-  Status RenderExact(const ShadedScene& scene, const PictureRequest& request, Picture* picture);
+  Status RenderColor(Scene scene, const PictureRequest& request, Picture* picture);
+  Status RenderExact(const Scene& scene, const PictureRequest& request, Picture* picture);
 
-  ShadedRenderer renderer_;
-  ShadedFrame frame_;
+  Renderer renderer_;
+  Frame frame_;
 };
 
 }  // namespace tilegrad

@@ -60,7 +60,7 @@ void WriteDepth(const raster::PixelRect& rect, int width, const float* inverse, 
 }
 
 // Turns the weights of a cut piece's corners into those of its source face.
-void MixCutWeights(const SceneView& scene, const raster::ScreenMesh& mesh,
+void MixCutWeights(const PipelineScene& scene, const raster::ScreenMesh& mesh,
                    const raster::PixelRect& rect, const std::int32_t* faces, float* w1, float* w2) {
   ForEachPixel(rect, mesh.width, [&](std::size_t from, std::size_t to) {
     if (faces[from] == raster::kNoFace) return;
@@ -90,7 +90,7 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
 // Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
 // then only the frame's are written.
 bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
-                     WorkerScratch* worker, Frame* frame) {
+                     WorkerScratch* worker, PipelineFrame* frame) {
   const raster::PixelRect& rect = task.rect;
   const ImageScratch& image = input.image;
   const int width = input.options.width;
@@ -111,7 +111,7 @@ bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFr
 // Where a bin's attributes go: into the frame, or to the stage.
 raster::PlanarView<float> AttributeTarget(const BinInput& input, const BinTask& task,
                                           const ImageOfFrame& part, WorkerScratch* worker,
-                                          Frame* frame) {
+                                          PipelineFrame* frame) {
   if (input.stage != nullptr) {
     const auto plane = static_cast<std::size_t>(raster::kBinSize * (task.rect.y1 - task.rect.y0));
     const std::size_t size = static_cast<std::size_t>(input.image.attributes.channels) * plane;
@@ -125,7 +125,7 @@ raster::PlanarView<float> AttributeTarget(const BinInput& input, const BinTask& 
 }
 
 void InterpolateBin(const BinInput& bin, const BinTask& task, const ImageOfFrame& part, bool drawn,
-                    WorkerScratch* worker, Frame* frame) {
+                    WorkerScratch* worker, PipelineFrame* frame) {
   const auto row = static_cast<std::ptrdiff_t>(bin.options.width);
   const raster::PixelRect& rect = task.rect;
   const raster::PlanarView<float> target = AttributeTarget(bin, task, part, worker, frame);
@@ -169,7 +169,7 @@ void RunStage(const BinInput& bin, const BinTask& task, bool any_face, WorkerScr
 
 // Alpha of a bin. Returns the error spent.
 double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
-                WorkerScratch* worker, Frame* frame) {
+                WorkerScratch* worker, PipelineFrame* frame) {
   const auto plane = [&](auto& batch) {
     return std::span(part.plane(batch, 1), batch.empty() ? 0 : part.pixels);
   };
@@ -181,7 +181,7 @@ double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& 
 
 }  // namespace
 
-double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, Frame* frame) {
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, PipelineFrame* frame) {
   RenderTimes* const times = &worker->times;
   StageClock clock;
   const ImageOfFrame part{

@@ -4,14 +4,14 @@
 
 #include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
 // What the bins of an image have in common.
 struct BinInput {
-  const SceneView& scene;
+  const PipelineScene& scene;
   const RenderOptions& options;
   const ImageScratch& image;
   PixelStage* stage;  // null: attributes are images themselves
@@ -20,6 +20,7 @@ struct BinInput {
 
 // Writes the bin's pixels into every image that `frame` has. Returns the error that alpha spent.
 // task.bin and task.rect are those of raster::BinGrid.
-double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, Frame* frame);
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker,
+                 PipelineFrame* frame);
 
 }  // namespace tilegrad

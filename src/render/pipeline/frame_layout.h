@@ -7,23 +7,23 @@
 
 #include "raster/attributes.h"
 #include "raster/near_clip.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
 template <class T>
-raster::FaceSource<T> FaceSourceOf(const SceneViewT<T>& scene, const RenderOptions& options) {
+raster::FaceSource<T> FaceSourceOf(const PipelineSceneT<T>& scene, const RenderOptions& options) {
   return {scene.positions, scene.faces, &scene.camera, options.culling == FaceCulling::kBack};
 }
 
 template <class T>
-raster::AttributeViewT<const T> AttributesOf(const SceneViewT<T>& scene) {
+raster::AttributeViewT<const T> AttributesOf(const PipelineSceneT<T>& scene) {
   return {scene.attributes, scene.channels, scene.rate};
 }
 
 template <class T>
-void SizeFrame(int images, int channels, const RenderOptions& options, const RenderRequest& request,
-               FrameT<T>* frame) {
+void SizeFrame(int images, int channels, const RenderOptions& options, const Outputs& request,
+               PipelineFrameT<T>* frame) {
   frame->images = images, frame->channels = request.attributes ? channels : 0;
   frame->height = options.height, frame->width = options.width;
   const std::size_t pixels = static_cast<std::size_t>(images) *

@@ -18,8 +18,9 @@
 #include "raster/soft_mask/setup.h"
 #include "raster/soft_mask/tree.h"
 #include "raster/visibility.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 #include "render/pipeline/topologies.h"
+#include "render/pipeline/work.h"
 
 namespace tilegrad {
 

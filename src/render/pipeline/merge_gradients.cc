@@ -51,7 +51,7 @@ void AddBinGeometry(const raster::ScreenMesh& mesh, const BinGradients& bin, flo
 void AddBandAttributes(const ImageScratch& image, bool geometry, const BandGradients& band,
                        float* d_rows) {
   const std::size_t groups = raster::ChannelGroups(image.attributes.channels);
-  const bool by_vertex = image.attributes.rate == AttributeRate::kVertex;
+  const bool by_vertex = image.attributes.rate == Rate::kVertex;
   ForEachBandFace(band, [&](std::size_t face, std::size_t slot) {
     const float* from = band.values.data() + 4 * slot + (geometry ? 12 * band.stride : 0);
     for (std::size_t g = 0; g < groups; ++g) {
@@ -98,9 +98,9 @@ void SumAttributes(const ImageScratch& image, const ImageGradients& gradients,
 }
 
 // Attributes of a mesh that was cut; d_clip_t is wanted wherever geometry is.
-void MergeClippedAttributes(const SceneView& scene, const ImageScratch& image,
+void MergeClippedAttributes(const PipelineScene& scene, const ImageScratch& image,
                             const ImageGradients& gradients, MergeScratch* scratch,
-                            SceneGradients* d_scene) {
+                            PipelineGradients* d_scene) {
   std::fill(d_scene->attributes.begin(), d_scene->attributes.end(), 0.0f);
   scratch->d_clip_t.assign(image.mesh.clipped.size(), 0.0f);
   scratch->d_attributes.resize(raster::AttributeRows(image.mesh, scene.rate) *
@@ -124,9 +124,10 @@ void SumGeometry(const ImageScratch& image, const ImageGradients& gradients,
   }
 }
 
-bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                   const ImageGradients& gradients, std::span<const float> d_vertices,
-                   WorkerScratch* worker, SceneGradients* d_scene) {
+bool MergeGeometry(const PipelineScene& scene, const RenderOptions& options,
+                   const ImageScratch& image, const ImageGradients& gradients,
+                   std::span<const float> d_vertices, WorkerScratch* worker,
+                   PipelineGradients* d_scene) {
   MergeScratch* const scratch = &worker->merge;
   bool finite = true;
   if (image.mesh.was_clipped() && gradients.request.attributes) {
@@ -142,12 +143,12 @@ bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const I
   return finite && IsFiniteGeometry(*d_scene);
 }
 
-bool IsFiniteGeometry(const SceneGradients& d_scene) {
+bool IsFiniteGeometry(const PipelineGradients& d_scene) {
   return AllFinite(d_scene.positions) && (!d_scene.camera || IsFiniteCamera(d_scene.d_camera));
 }
 
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
-                     WorkerScratch* worker, SceneGradients* d_scene) {
+                     WorkerScratch* worker, PipelineGradients* d_scene) {
   if (d_scene->attributes.empty() || image.mesh.was_clipped()) return true;
   ++worker->stats.merged;
   SumAttributes(image, gradients, &worker->merge.d_rows, d_scene->attributes);

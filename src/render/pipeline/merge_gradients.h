@@ -6,7 +6,7 @@
 #include <span>
 
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -26,16 +26,17 @@ void SumGeometry(const ImageScratch& image, const ImageGradients& gradients,
 
 // From such sums of all bands and bins: overwrites d_scene's positions and d_camera, where they are
 // wanted. Returns whether all that it has written is finite.
-bool MergeGeometry(const SceneView& scene, const RenderOptions& options, const ImageScratch& image,
-                   const ImageGradients& gradients, std::span<const float> d_vertices,
-                   WorkerScratch* worker, SceneGradients* d_scene);
+bool MergeGeometry(const PipelineScene& scene, const RenderOptions& options,
+                   const ImageScratch& image, const ImageGradients& gradients,
+                   std::span<const float> d_vertices, WorkerScratch* worker,
+                   PipelineGradients* d_scene);
 
 // Whether what was written of positions and the camera is finite.
-bool IsFiniteGeometry(const SceneGradients& d_scene);
+bool IsFiniteGeometry(const PipelineGradients& d_scene);
 
 // Overwrites d_scene's attributes, if they are wanted. Of a mesh that was cut, that is done by
 // MergeGeometry, since attributes at the cut depend on geometry.
 bool MergeAttributes(const ImageScratch& image, const ImageGradients& gradients,
-                     WorkerScratch* worker, SceneGradients* d_scene);
+                     WorkerScratch* worker, PipelineGradients* d_scene);
 
 }  // namespace tilegrad

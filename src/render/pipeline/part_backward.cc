@@ -51,7 +51,7 @@ bool IsSoundBand(const BackwardInput& input, const raster::ScreenMesh& mesh, std
                  const BandPlace& place) {
   const std::span<const std::int32_t> ids(input.frame.face_ids);
   if (!AllWithin(place.Of(ids, 1, 0), raster::kNoFace, mesh.source_faces)) return false;
-  const FrameGradients& d_frame = input.d_frame;
+  const PipelineCotangents& d_frame = input.d_frame;
   if (!d_frame.alpha.empty() && !AllFinite(place.Of(d_frame.alpha, 1, 0))) return false;
   for (std::size_t c = 0; c < channels && !d_frame.attributes.empty(); ++c) {
     if (!AllFinite(place.Of(d_frame.attributes, channels, c))) return false;

@@ -8,8 +8,8 @@
 
 #include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -28,8 +28,8 @@ struct BandGrid {
 // What a task of the backward pass reads.
 struct BackwardInput {
   const RenderOptions& options;
-  const Frame& frame;
-  const FrameGradients& d_frame;
+  const PipelineFrame& frame;
+  const PipelineCotangents& d_frame;
   PixelStage* stage;  // null: cotangents of attributes are images themselves
   AlphaStage* alpha;  // null: alpha has no gradient
 };

@@ -24,18 +24,18 @@ namespace {
 
 // A call of Render or Backward.
 struct ForwardCall {
-  std::span<const SceneView> scenes;
+  std::span<const PipelineScene> scenes;
   const RenderOptions& options;
   PrepareRequest request;  // and the rule of alpha
-  Frame* frame;
+  PipelineFrame* frame;
   PixelStage* stage;
 };
 
 struct BackwardCall {
-  std::span<const SceneView> scenes;
+  std::span<const PipelineScene> scenes;
   BackwardInput input;
   PrepareRequest request;
-  std::span<SceneGradients> d_scenes;
+  std::span<PipelineGradients> d_scenes;
   raster::SquareGrid grid;  // of bins
   std::size_t bands, bins;  // of each image; no bins where alpha has no gradient
 
@@ -63,7 +63,7 @@ Status FindError(const BackwardCall& call) {
 // How the stages of a batch become tasks. An image of one bin is one task, so that it stays in the
 // cache of its worker from beginning to end; so are larger ones as long as there are enough of them
 // for all workers, who share the parts of the last ones.
-struct Renderer::Impl {
+struct Pipeline::Impl {
   explicit Impl(const Workers& w)
       : workers(&w),
         alpha_rules(static_cast<std::size_t>(w.count())),
@@ -74,8 +74,8 @@ struct Renderer::Impl {
   Status Render(const ForwardCall& call);
   Status Backward(const BackwardCall& call);
 
-  bool Prepare(const SceneView& scene, const RenderOptions& options, const PrepareRequest& request,
-               std::size_t n, WorkerScratch* worker);
+  bool Prepare(const PipelineScene& scene, const RenderOptions& options,
+               const PrepareRequest& request, std::size_t n, WorkerScratch* worker);
   void RenderWholeImage(const ForwardCall& call, std::size_t n, WorkerScratch* worker);
   void RenderImage(const ForwardCall& call, std::size_t n, const Workers::Part& part);
   void RenderOneBin(const ForwardCall& call, const BinTask& bin, WorkerScratch* worker);
@@ -83,7 +83,7 @@ struct Renderer::Impl {
   void BackwardWholeImage(const BackwardCall& call, std::size_t n, WorkerScratch* worker);
   void BackwardImage(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void SumParts(const ImageGradients& gradients, std::size_t n, const Workers::Part& part,
-                SceneGradients* d_scene);
+                PipelineGradients* d_scene);
   void Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part);
   void MergeOwnSums(const BackwardCall& call, std::size_t n);
   void BackwardBand(const BackwardCall& call, const BandTask& task, WorkerScratch* worker,
@@ -92,7 +92,7 @@ struct Renderer::Impl {
                    BinGradients* out);
 
   // Returns whether the indices of all scenes are in range.
-  bool Begin(std::span<const SceneView> scenes, const RenderOptions& options, AlphaStage* rule) {
+  bool Begin(std::span<const PipelineScene> scenes, const RenderOptions& options, AlphaStage* rule) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
     for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};
@@ -117,7 +117,7 @@ struct Renderer::Impl {
   std::vector<BinGradients> bin_gradients;    // [image][bin]
 };
 
-bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& options,
+bool Pipeline::Impl::Prepare(const PipelineScene& scene, const RenderOptions& options,
                              const PrepareRequest& request, std::size_t n, WorkerScratch* worker) {
   StageClock clock;
   const bool done = PrepareImage({n, scene, topologies.of(n)}, options, request, *workers,
@@ -127,7 +127,7 @@ bool Renderer::Impl::Prepare(const SceneView& scene, const RenderOptions& option
   return done;
 }
 
-void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
+void Pipeline::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
                                   WorkerScratch* worker) {
   const std::size_t bins = bin_errors.size() / call.scenes.size();
   bin_errors[bin.image * bins + bin.bin] = RenderBin(
@@ -136,7 +136,7 @@ void Renderer::Impl::RenderOneBin(const ForwardCall& call, const BinTask& bin,
 }
 
 // The list of drawn faces, the largest thing of all, is the worker's, not the image's.
-void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
+void Pipeline::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
                                       WorkerScratch* worker) {
   ImageScratch& image = images[n];
   std::swap(image.drawn_faces, worker->drawn_faces);
@@ -149,7 +149,7 @@ void Renderer::Impl::RenderWholeImage(const ForwardCall& call, std::size_t n,
   std::swap(image.drawn_buffers, worker->drawn_buffers);
 }
 
-void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
+void Pipeline::Impl::RenderImage(const ForwardCall& call, std::size_t n,
                                  const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
   if (!Prepare(call.scenes[n], call.options, call.request, n, own)) return;
@@ -159,7 +159,7 @@ void Renderer::Impl::RenderImage(const ForwardCall& call, std::size_t n,
   });
 }
 
-Status Renderer::Impl::Render(const ForwardCall& call) {
+Status Pipeline::Impl::Render(const ForwardCall& call) {
   const std::size_t count = call.scenes.size();
   const raster::SquareGrid bins = raster::BinGrid(call.options.width, call.options.height);
   if (!Begin(call.scenes, call.options, call.request.alpha))
@@ -180,14 +180,14 @@ Status Renderer::Impl::Render(const ForwardCall& call) {
   return {};
 }
 
-void Renderer::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
+void Pipeline::Impl::BackwardBand(const BackwardCall& call, const BandTask& task,
                                   WorkerScratch* worker, BandGradients* out) {
   const ImageScratch& image = images[task.image];
   Require(RenderBandBackward(call.input, image, task, call.request_of(task.image, image.mesh),
                              worker, out));
 }
 
-void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
+void Pipeline::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::size_t bin,
                                  WorkerScratch* worker, BinGradients* out) {
   if (!call.wants_geometry(n)) return;
   StageClock clock;
@@ -195,10 +195,10 @@ void Renderer::Impl::BackwardBin(const BackwardCall& call, std::size_t n, std::s
   clock.Lap(&worker->times.alpha);
 }
 
-void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
+void Pipeline::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
                                         WorkerScratch* worker) {
   ImageScratch& image = images[n];
-  const SceneView& scene = call.scenes[n];
+  const PipelineScene& scene = call.scenes[n];
   if (!Prepare(scene, call.input.options, call.request, n, worker)) return;
   PrepareRecomputed(call.input.stage, scene, n, &image);
   BackwardBand(call, {n, 0}, worker, &worker->band_gradients);
@@ -206,7 +206,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
   const ImageGradients gradients{{&worker->band_gradients, 1},
                                  {&worker->bin_gradients, call.summed_bins()},
                                  call.request_of(n, image.mesh)};
-  SceneGradients* d_scene = &call.d_scenes[n];
+  PipelineGradients* d_scene = &call.d_scenes[n];
   AlignedVector<float>* const d_vertices = &worker->merge.d_vertices;
   StageClock clock;
   if (gradients.request.geometry) SumGeometry(image, gradients, d_vertices);
@@ -217,7 +217,7 @@ void Renderer::Impl::BackwardWholeImage(const BackwardCall& call, std::size_t n,
 }
 
 // Bands and bins together.
-void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
+void Pipeline::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
                                    const Workers::Part& part) {
   WorkerScratch* const own = &worker_scratch[part.worker()];
   if (!Prepare(call.scenes[n], call.input.options, call.request, n, own)) return;
@@ -236,8 +236,8 @@ void Renderer::Impl::BackwardImage(const BackwardCall& call, std::size_t n,
 }
 
 // Three sums that can be made at once, for the sake of a batch of one: the longest first.
-void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
-                              const Workers::Part& part, SceneGradients* d_scene) {
+void Pipeline::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
+                              const Workers::Part& part, PipelineGradients* d_scene) {
   ImageScratch& image = images[n];
   const bool geometry = gradients.request.geometry;
   part.For(3, [&](std::size_t i, std::size_t w) {
@@ -253,10 +253,10 @@ void Renderer::Impl::SumParts(const ImageGradients& gradients, std::size_t n,
   });
 }
 
-void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
+void Pipeline::Impl::Merge(const BackwardCall& call, std::size_t n, const Workers::Part& part) {
   ImageScratch& image = images[n];
   WorkerScratch* const worker = &worker_scratch[part.worker()];
-  SceneGradients* const d_scene = &call.d_scenes[n];
+  PipelineGradients* const d_scene = &call.d_scenes[n];
   const ImageGradients gradients{
       std::span(band_gradients).subspan(n * call.bands, call.bands),
       std::span(bin_gradients).subspan(n * call.bins, call.summed_bins()),
@@ -274,13 +274,13 @@ void Renderer::Impl::Merge(const BackwardCall& call, std::size_t n, const Worker
 }
 
 // Of a rule that does not hand its sums to MergeGeometry.
-void Renderer::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
+void Pipeline::Impl::MergeOwnSums(const BackwardCall& call, std::size_t n) {
   if (call.bins == call.summed_bins() || !call.wants_geometry(n)) return;
   alpha->AddToScene(call.scenes[n], n, images[n], &call.d_scenes[n]);
   Require(IsFiniteGeometry(call.d_scenes[n]));
 }
 
-Status Renderer::Impl::Backward(const BackwardCall& call) {
+Status Pipeline::Impl::Backward(const BackwardCall& call) {
   if (!Begin(call.scenes, call.input.options, call.request.alpha)) return FindError(call);
   const std::size_t count = call.scenes.size();
   if (call.grid.cells() == 1 && call.bands == 1) {
@@ -296,30 +296,30 @@ Status Renderer::Impl::Backward(const BackwardCall& call) {
   return sound ? Status() : FindError(call);
 }
 
-Renderer::Renderer(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
-Renderer::~Renderer() = default;
-Renderer::Renderer(Renderer&&) noexcept = default;
-Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Pipeline::Pipeline(const Workers& workers) : impl_(std::make_unique<Impl>(workers)) {}
+Pipeline::~Pipeline() = default;
+Pipeline::Pipeline(Pipeline&&) noexcept = default;
+Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
-Status Renderer::Render(std::span<const SceneView> scenes, const RenderOptions& options,
-                        const RenderRequest& request, Frame* frame, PixelStage* stage) {
+Status Pipeline::Render(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                        const Outputs& request, PipelineFrame* frame, PixelStage* stage) {
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   const int channels = stage != nullptr ? frame->channels : scenes.empty() ? 0 : scenes[0].channels;
   SizeFrame(static_cast<int>(scenes.size()), channels, options, request, frame);
-  AlphaStage* const alpha = request.alpha ? impl_->alpha_rules.Of(options.soft_rule) : nullptr;
+  AlphaStage* const alpha = request.alpha ? impl_->alpha_rules.Of(options.alpha_rule) : nullptr;
   const bool transmittance = alpha != nullptr && alpha->needs().transmittance;
   frame->transmittance.resize(transmittance ? frame->alpha.size() : 0);
   return impl_->Render({scenes, options, {true, alpha, false}, frame, stage});
 }
 
-Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions& options,
-                          const Frame& frame, const FrameGradients& d_frame,
-                          std::span<SceneGradients> d_scenes, PixelStage* stage) {
+Status Pipeline::Backward(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                          const PipelineFrame& frame, const PipelineCotangents& d_frame,
+                          std::span<PipelineGradients> d_scenes, PixelStage* stage) {
   TILEGRAD_TRY(ValidateBackwardSizes(scenes, options, frame, d_frame, d_scenes));
   const raster::SquareGrid grid = raster::BinGrid(options.width, options.height);
   AlphaStage* const alpha =
-      d_frame.alpha.empty() ? nullptr : impl_->alpha_rules.Of(options.soft_rule);
+      d_frame.alpha.empty() ? nullptr : impl_->alpha_rules.Of(options.alpha_rule);
   return impl_->Backward({scenes,
                           {options, frame, d_frame, stage, alpha},
                           {false, alpha, true},
@@ -329,7 +329,7 @@ Status Renderer::Backward(std::span<const SceneView> scenes, const RenderOptions
                           alpha != nullptr ? grid.cells() : 0});
 }
 
-RenderStats Renderer::stats() const {
+RenderStats Pipeline::stats() const {
   RenderStats sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     sum.prepared += worker.stats.prepared, sum.drawn += worker.stats.drawn;
@@ -343,7 +343,7 @@ RenderStats Renderer::stats() const {
   return sum;
 }
 
-RenderTimes Renderer::times() const {
+RenderTimes Pipeline::times() const {
   RenderTimes sum;
   for (const WorkerScratch& worker : impl_->worker_scratch) {
     const RenderTimes& t = worker.times;

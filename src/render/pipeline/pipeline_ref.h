@@ -18,7 +18,7 @@
 #include "raster/visibility_ref.h"
 #include "render/alpha/paper.h"
 #include "render/pipeline/frame_layout.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -31,11 +31,12 @@ struct PreparedScene {
   raster::AttributeViewT<const T> attributes;
   std::vector<std::int32_t> soft_faces;  // that take part in alpha
   raster::SoftScale<T> scale;
-  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, where SoftRule::kPaper asks for them
+  std::vector<raster::NdcFace<T>> paper_faces;  // soft_faces, where AlphaRule::kPaper asks for them
 };
 
 template <class T>
-void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, PreparedScene<T>* out) {
+void PrepareRef(const PipelineSceneT<T>& scene, const RenderOptions& options,
+                PreparedScene<T>* out) {
   raster::ProjectRef(FaceSourceOf(scene, options), options.width, options.height, &out->buffers);
   out->mesh = out->buffers.View();
   out->attributes = AttributesOf(scene);
@@ -43,7 +44,8 @@ void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, Prepar
   for (std::size_t f = 0; f < out->mesh.faces(); ++f) {
     if ((out->mesh.reject[f] & raster::kFaceNotInSoftMask) != 0) continue;
     out->soft_faces.push_back(static_cast<std::int32_t>(f));
-    if (options.soft_rule == SoftRule::kPaper) out->paper_faces.push_back(NdcFaceOf(out->mesh, f));
+    if (options.alpha_rule == AlphaRule::kPaper)
+      out->paper_faces.push_back(NdcFaceOf(out->mesh, f));
   }
   if (!out->mesh.was_clipped()) return;
   out->clipped_attributes.resize(raster::AttributeRows(out->mesh, scene.rate) *
@@ -56,7 +58,7 @@ void PrepareRef(const SceneViewT<T>& scene, const RenderOptions& options, Prepar
 template <class T>
 T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& options, const T& px,
                      const T& py) {
-  if (options.soft_rule == SoftRule::kPaper) {
+  if (options.alpha_rule == AlphaRule::kPaper) {
     return raster::PaperAlphaRef<T>(prepared.paper_faces, NdcX(px, options.width),
                                     NdcY(py, options.height), PaperRuleOf(options));
   }
@@ -65,9 +67,9 @@ T BackgroundAlphaRef(const PreparedScene<T>& prepared, const RenderOptions& opti
 
 // One pixel of the smooth images, given its face of the prepared mesh. `frame` holds one image.
 template <class T>
-void ShadePixelRef(const SceneViewT<T>& scene, const PreparedScene<T>& prepared,
+void ShadePixelRef(const PipelineSceneT<T>& scene, const PreparedScene<T>& prepared,
                    const RenderOptions& options, int column, int row, std::int32_t face,
-                   FrameT<T>* frame) {
+                   PipelineFrameT<T>* frame) {
   const auto width = static_cast<std::size_t>(options.width);
   const std::size_t plane = width * static_cast<std::size_t>(options.height);
   const std::size_t pixel =
@@ -101,9 +103,9 @@ struct RowRange {
 
 // The smooth images of rows [begin, end), with visibility given as ids of the scene's faces [H,W].
 template <class T>
-void RenderRefWithFaces(const SceneViewT<T>& scene, const RenderOptions& options,
-                        const RenderRequest& request, std::span<const std::int32_t> face_ids,
-                        RowRange rows, FrameT<T>* frame) {
+void RenderRefWithFaces(const PipelineSceneT<T>& scene, const RenderOptions& options,
+                        const Outputs& request, std::span<const std::int32_t> face_ids,
+                        RowRange rows, PipelineFrameT<T>* frame) {
   PreparedScene<T> prepared;
   PrepareRef(scene, options, &prepared);
   SizeFrame(1, scene.channels, options, request, frame);
@@ -119,7 +121,7 @@ void RenderRefWithFaces(const SceneViewT<T>& scene, const RenderOptions& options
 
 // Ids of the scene's faces [H,W] seen in rows [begin, end); -1 elsewhere.
 template <class T>
-std::vector<std::int32_t> FaceIdsRef(const SceneViewT<T>& scene, const RenderOptions& options,
+std::vector<std::int32_t> FaceIdsRef(const PipelineSceneT<T>& scene, const RenderOptions& options,
                                      RowRange rows) {
   PreparedScene<T> prepared;
   PrepareRef(scene, options, &prepared);
@@ -133,8 +135,8 @@ std::vector<std::int32_t> FaceIdsRef(const SceneViewT<T>& scene, const RenderOpt
 }
 
 template <class T>
-void RenderRef(const SceneViewT<T>& scene, const RenderOptions& options,
-               const RenderRequest& request, FrameT<T>* frame) {
+void RenderRef(const PipelineSceneT<T>& scene, const RenderOptions& options, const Outputs& request,
+               PipelineFrameT<T>* frame) {
   const RowRange all{0, options.height};
   RenderRefWithFaces<T>(scene, options, request, FaceIdsRef(scene, options, all), all, frame);
 }
@@ -147,7 +149,7 @@ struct PreparedGradients {
   std::vector<T> attribute_storage;
   raster::AttributeViewT<T> attributes;
 
-  PreparedGradients(const SceneViewT<T>& scene, const PreparedScene<T>& prepared) {
+  PreparedGradients(const PipelineSceneT<T>& scene, const PreparedScene<T>& prepared) {
     for (auto& array : storage) array.assign(prepared.mesh.vertices(), T(0));
     screen = {storage[0], storage[1], storage[2],
               std::span<T>(storage[3]).first(prepared.mesh.clipped.size())};
@@ -167,7 +169,7 @@ void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOp
     const auto v = static_cast<std::size_t>(prepared.mesh.vertex(f, corner));
     d->screen.d_x[v] += d_x, d->screen.d_y[v] += d_y;
   };
-  if (options.soft_rule == SoftRule::kAllFaces) {
+  if (options.alpha_rule == AlphaRule::kAllFaces) {
     raster::SoftAlphaRefBackward<T>(prepared.mesh, prepared.soft_faces, px, py, prepared.scale,
                                     d_alpha, add);
     return;
@@ -187,7 +189,7 @@ void BackgroundAlphaRefBackward(const PreparedScene<T>& prepared, const RenderOp
 template <class T>
 void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions& options,
                            int column, int row, std::int32_t face,
-                           const FrameGradientsT<T>& d_frame, PreparedGradients<T>* d) {
+                           const PipelineCotangentsT<T>& d_frame, PreparedGradients<T>* d) {
   const auto width = static_cast<std::size_t>(options.width);
   const std::size_t plane = width * static_cast<std::size_t>(options.height);
   const std::size_t pixel =
@@ -212,9 +214,9 @@ void ShadePixelRefBackward(const PreparedScene<T>& prepared, const RenderOptions
 
 // From the screen back to the scene; overwrites what `d_scene` asks for.
 template <class T>
-void PrepareRefBackward(const SceneViewT<T>& scene, const RenderOptions& options,
+void PrepareRefBackward(const PipelineSceneT<T>& scene, const RenderOptions& options,
                         const PreparedScene<T>& prepared, const PreparedGradients<T>& d,
-                        SceneGradientsT<T>* d_scene) {
+                        PipelineGradientsT<T>* d_scene) {
   if (prepared.mesh.was_clipped()) {
     for (T& x : d_scene->attributes) x = T(0);
     raster::ClipAttributesBackward<T>(prepared.mesh, scene.faces, AttributesOf(scene),
@@ -234,9 +236,10 @@ void PrepareRefBackward(const SceneViewT<T>& scene, const RenderOptions& options
 
 // As Renderer::Backward, for rows [begin, end) of one image.
 template <class T>
-void RenderRefBackward(const SceneViewT<T>& scene, const RenderOptions& options,
-                       std::span<const std::int32_t> face_ids, const FrameGradientsT<T>& d_frame,
-                       RowRange rows, SceneGradientsT<T>* d_scene) {
+void RenderRefBackward(const PipelineSceneT<T>& scene, const RenderOptions& options,
+                       std::span<const std::int32_t> face_ids,
+                       const PipelineCotangentsT<T>& d_frame, RowRange rows,
+                       PipelineGradientsT<T>* d_scene) {
   PreparedScene<T> prepared;
   PrepareRef(scene, options, &prepared);
   PreparedGradients<T> d(scene, prepared);

@@ -12,7 +12,7 @@ namespace tilegrad {
 namespace {
 
 // `attributes` of the scene, in the layout of the mesh; `storage` is for a mesh that was cut.
-raster::AttributeViewT<const float> InMeshLayout(const SceneView& scene,
+raster::AttributeViewT<const float> InMeshLayout(const PipelineScene& scene,
                                                  const raster::ScreenMesh& mesh,
                                                  raster::AttributeViewT<const float> attributes,
                                                  AlignedVector<float>* storage) {
@@ -35,7 +35,7 @@ bool SameCamera(const Camera& a, const Camera& b) {
   return std::memcmp(&a, &b, sizeof(Camera)) == 0;
 }
 
-bool IsSoundScene(const SceneView& scene, bool same_positions) {
+bool IsSoundScene(const PipelineScene& scene, bool same_positions) {
   return (same_positions || AllFinite(scene.positions)) && AllFinite(scene.attributes) &&
          IsSoundCamera(scene.camera);
 }
@@ -49,7 +49,7 @@ bool IsPrepared(const SceneToPrepare& in, const RenderOptions& options,
 
 void RememberPrepared(const SceneToPrepare& in, const RenderOptions& options,
                       const PrepareRequest& request, PreparedFrom* from) {
-  const SceneView& scene = in.scene;
+  const PipelineScene& scene = in.scene;
   from->valid = true, from->drawn_bins = request.drawn_bins;
   from->alpha = request.alpha != nullptr;
   from->positions.assign(scene.positions.begin(), scene.positions.end());
@@ -82,7 +82,7 @@ void PrepareMesh(const SceneToPrepare& in, const RenderOptions& options,
 bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   const PrepareRequest& request, const Workers& workers, ImageScratch* image,
                   RenderStats* stats) {
-  const SceneView& scene = in.scene;
+  const PipelineScene& scene = in.scene;
   // Compared only if that may save something: positions change from frame to frame. By bits, not
   // hashes: what was kept is what would be computed again.
   const bool same_positions = request.reuse && SameBits(scene.positions, image->prepared.positions);
@@ -98,7 +98,7 @@ bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
   return true;
 }
 
-void PrepareRecomputed(const PixelStage* stage, const SceneView& scene, std::size_t n,
+void PrepareRecomputed(const PixelStage* stage, const PipelineScene& scene, std::size_t n,
                        ImageScratch* image) {
   if (stage == nullptr) return;
   image->recomputed =

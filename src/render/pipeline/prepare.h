@@ -6,8 +6,9 @@
 
 #include "render/alpha/stage.h"
 #include "render/pipeline/image_scratch.h"
-#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pixel_stage.h"
+#include "render/pipeline/records.h"
+#include "render/pipeline/work.h"
 
 namespace tilegrad {
 
@@ -19,7 +20,7 @@ struct PrepareRequest {
 
 struct SceneToPrepare {
   std::size_t n;  // of the batch
-  const SceneView& scene;
+  const PipelineScene& scene;
   const Topology& topology;  // of its faces
 };
 
@@ -29,7 +30,7 @@ bool PrepareImage(const SceneToPrepare& in, const RenderOptions& options,
                   RenderStats* stats);
 
 // The attributes that a stage needs again on the way back; null: none. `image` is prepared.
-void PrepareRecomputed(const PixelStage* stage, const SceneView& scene, std::size_t n,
+void PrepareRecomputed(const PixelStage* stage, const PipelineScene& scene, std::size_t n,
                        ImageScratch* image);
 
 }  // namespace tilegrad

@@ -10,15 +10,15 @@
 namespace tilegrad {
 namespace {
 
-std::size_t VerticesOf(const SceneView& scene) { return scene.positions.size() / 3; }
+std::size_t VerticesOf(const PipelineScene& scene) { return scene.positions.size() / 3; }
 
 // The very same array: its numbers need not be looked at.
-bool ShareFaces(const SceneView& a, const SceneView& b) {
+bool ShareFaces(const PipelineScene& a, const PipelineScene& b) {
   return a.faces.data() == b.faces.data() && a.faces.size() == b.faces.size() &&
          VerticesOf(a) == VerticesOf(b);
 }
 
-bool HasFacesOf(const Topology& topology, const SceneView& scene) {
+bool HasFacesOf(const Topology& topology, const PipelineScene& scene) {
   return topology.id.version != 0 && topology.vertices == VerticesOf(scene) &&
          topology.faces.size() == scene.faces.size() &&
          (scene.faces.empty() ||
@@ -28,7 +28,7 @@ bool HasFacesOf(const Topology& topology, const SceneView& scene) {
 }  // namespace
 
 // Only neighbours are compared, so that a batch of all different meshes costs no more.
-void Topologies::Group(std::span<const SceneView> scenes) {
+void Topologies::Group(std::span<const PipelineScene> scenes) {
   of_scene_.resize(scenes.size()), first_scene_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (n == 0 || !ShareFaces(scenes[n - 1], scenes[n])) first_scene_.push_back(n);
@@ -37,11 +37,11 @@ void Topologies::Group(std::span<const SceneView> scenes) {
   if (topologies_.size() < first_scene_.size()) topologies_.resize(first_scene_.size());
 }
 
-bool Topologies::Update(std::span<const SceneView> scenes, const Workers& workers) {
+bool Topologies::Update(std::span<const PipelineScene> scenes, const Workers& workers) {
   Group(scenes), ++updates_;
   std::atomic<bool> sound = true;
   workers.For(first_scene_.size(), [&](std::size_t i, std::size_t) {
-    const SceneView& scene = scenes[first_scene_[i]];
+    const PipelineScene& scene = scenes[first_scene_[i]];
     Topology& topology = topologies_[i];
     if (HasFacesOf(topology, scene)) return;
     topology.id = {};

@@ -12,7 +12,7 @@
 #include "base/aligned.h"
 #include "base/parallel.h"
 #include "raster/screen_mesh.h"
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 
 namespace tilegrad {
 
@@ -35,13 +35,13 @@ class Topologies {
  public:
   // Makes the topologies of a batch, if they are not those of the last one. Returns false if a
   // vertex index is out of range.
-  bool Update(std::span<const SceneView> scenes, const Workers& workers);
+  bool Update(std::span<const PipelineScene> scenes, const Workers& workers);
 
   // That of scene n. Images may look at its corners as long as it has the same id.
   const Topology& of(std::size_t n) const { return topologies_[of_scene_[n]]; }
 
  private:
-  void Group(std::span<const SceneView> scenes);
+  void Group(std::span<const PipelineScene> scenes);
 
   std::deque<Topology> topologies_;       // stay where they are as more come
   std::vector<std::size_t> of_scene_;     // which of them

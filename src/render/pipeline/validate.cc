@@ -40,6 +40,17 @@ Status CheckCameraGradient(const Camera& d_camera) {
   return CheckFinite("d_scene.d_camera.{fx, fy, cx, cy}", numbers);
 }
 
+template <class T>
+Camera InFloat(const CameraT<T>& c) {
+  const auto cast = [](T x) { return tilegrad::InFloat(x); };
+  Camera out;
+  std::transform(std::begin(c.rotation), std::end(c.rotation), out.rotation, cast);
+  std::transform(std::begin(c.translation), std::end(c.translation), out.translation, cast);
+  out.fx = cast(c.fx), out.fy = cast(c.fy), out.cx = cast(c.cx), out.cy = cast(c.cy);
+  out.near_plane = cast(c.near_plane);
+  return out;
+}
+
 Status CheckCamera(const Camera& camera) {
   TILEGRAD_TRY(CheckFinite("camera.rotation", camera.rotation));
   TILEGRAD_TRY(CheckFinite("camera.translation", camera.translation));
@@ -63,7 +74,7 @@ Status CheckCamera(const Camera& camera) {
   return {};
 }
 
-Status CheckGradients(const SceneView& scene, const SceneGradients& d_scene) {
+Status CheckGradients(const PipelineScene& scene, const PipelineGradients& d_scene) {
   if (!d_scene.positions.empty()) {
     TILEGRAD_TRY(CheckSize("d_scene.positions", d_scene.positions.size(), scene.positions.size()));
   }
@@ -74,8 +85,8 @@ Status CheckGradients(const SceneView& scene, const SceneGradients& d_scene) {
   return {};
 }
 
-Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const Frame& frame,
-                       const FrameGradients& d_frame) {
+Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const PipelineFrame& frame,
+                       const PipelineCotangents& d_frame) {
   const std::size_t pixels =
       images * static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   TILEGRAD_TRY(CheckSize("frame.face_ids", frame.face_ids.size(), pixels));
@@ -89,7 +100,7 @@ Status CheckFrameSizes(std::size_t images, const RenderOptions& options, const F
   return {};
 }
 
-Status CheckFaceIds(const SceneView& scene, std::span<const std::int32_t> ids) {
+Status CheckFaceIds(const PipelineScene& scene, std::span<const std::int32_t> ids) {
   const auto faces = static_cast<std::int32_t>(scene.faces.size() / 3);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     if (ids[i] < -1 || ids[i] >= faces) {
@@ -132,6 +143,22 @@ Status CheckFinite(const char* array, std::span<const double> values) {
   return FirstNotFinite(array, values);
 }
 
+float InFloat(double x) {
+  if (std::abs(x) <= std::numeric_limits<float>::max()) return static_cast<float>(x);
+  return std::isnan(x) ? NAN : x > 0 ? INFINITY : -INFINITY;
+}
+
+Status CheckNumbers(const char* array, std::span<const float> values) {
+  return CheckFinite(array, values);
+}
+Status CheckNumbers(const char* array, std::span<const double> values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float x = InFloat(values[i]);
+    if (!std::isfinite(x)) return InvalidArgument("{}[{}] is {}", array, i, x);
+  }
+  return {};
+}
+
 Status ValidateOptions(const RenderOptions& options) {
   TILEGRAD_TRY(CheckImageSize("width", options.width));
   TILEGRAD_TRY(CheckImageSize("height", options.height));
@@ -142,12 +169,13 @@ Status ValidateOptions(const RenderOptions& options) {
     return InvalidArgument("options.max_alpha_error is {}, must be in [0, 1]",
                            options.max_alpha_error);
   }
-  TILEGRAD_TRY(CheckNotNegative("options.paper_box", options.paper.box));
-  if (options.paper.max_faces >= 0) return {};
-  return InvalidArgument("options.paper_faces is {}, must be >= 0", options.paper.max_faces);
+  TILEGRAD_TRY(CheckNotNegative("options.paper_box", options.paper_box));
+  if (options.paper_faces >= 0) return {};
+  return InvalidArgument("options.paper_faces is {}, must be >= 0", options.paper_faces);
 }
 
-Status ValidateSceneSizes(const SceneView& scene) {
+template <class T>
+Status ValidateSceneSizes(const PipelineSceneT<T>& scene) {
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max() / 8;
   if (scene.positions.size() % 3 != 0) {
     return InvalidArgument("positions must be [V,3], got {} numbers", scene.positions.size());
@@ -165,19 +193,25 @@ Status ValidateSceneSizes(const SceneView& scene) {
   if (static_cast<std::size_t>(scene.channels) > kMost) {
     return ResourceExhausted("{} channels: the limit is {}", scene.channels, kMost);
   }
-  const std::size_t rows = scene.rate == AttributeRate::kVertex ? vertices : scene.faces.size();
+  const std::size_t rows = scene.rate == Rate::kVertex ? vertices : scene.faces.size();
   return CheckShape("attributes", scene.attributes.size(), rows,
                     static_cast<std::size_t>(scene.channels));
 }
 
-Status ValidateSceneNumbers(const SceneView& scene) {
+template <class T>
+Status ValidateSceneNumbers(const PipelineSceneT<T>& scene) {
   TILEGRAD_TRY(CheckFaces(scene.faces, scene.positions.size() / 3));
-  TILEGRAD_TRY(CheckFinite("positions", scene.positions));
-  TILEGRAD_TRY(CheckFinite("attributes", scene.attributes));
-  return CheckCamera(scene.camera);
+  TILEGRAD_TRY(CheckNumbers("positions", scene.positions));
+  TILEGRAD_TRY(CheckNumbers("attributes", scene.attributes));
+  return CheckCamera(InFloat(scene.camera));
 }
 
-Status ValidateSceneSizes(std::span<const SceneView> scenes) {
+template Status ValidateSceneSizes(const PipelineScene&);
+template Status ValidateSceneSizes(const PipelineSceneT<double>&);
+template Status ValidateSceneNumbers(const PipelineScene&);
+template Status ValidateSceneNumbers(const PipelineSceneT<double>&);
+
+Status ValidateSceneSizes(std::span<const PipelineScene> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (const Status status = ValidateSceneSizes(scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
@@ -190,7 +224,7 @@ Status ValidateSceneSizes(std::span<const SceneView> scenes) {
   return {};
 }
 
-Status ValidateSceneNumbers(std::span<const SceneView> scenes) {
+Status ValidateSceneNumbers(std::span<const PipelineScene> scenes) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (const Status status = ValidateSceneNumbers(scenes[n]); !status.ok()) {
       return status.Within(SceneName(n));
@@ -199,9 +233,9 @@ Status ValidateSceneNumbers(std::span<const SceneView> scenes) {
   return {};
 }
 
-Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOptions& options,
-                             const Frame& frame, const FrameGradients& d_frame,
-                             std::span<const SceneGradients> d_scenes) {
+Status ValidateBackwardSizes(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                             const PipelineFrame& frame, const PipelineCotangents& d_frame,
+                             std::span<const PipelineGradients> d_scenes) {
   TILEGRAD_TRY(ValidateOptions(options));
   TILEGRAD_TRY(ValidateSceneSizes(scenes));
   if (d_scenes.size() != scenes.size()) {
@@ -220,8 +254,8 @@ Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOpti
   return {};
 }
 
-Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& frame,
-                               const FrameGradients& d_frame) {
+Status ValidateBackwardNumbers(std::span<const PipelineScene> scenes, const PipelineFrame& frame,
+                               const PipelineCotangents& d_frame) {
   TILEGRAD_TRY(CheckFinite("d_frame.alpha", d_frame.alpha));
   TILEGRAD_TRY(CheckFinite("d_frame.attributes", d_frame.attributes));
   for (std::size_t n = 0; n < scenes.size(); ++n) {
@@ -233,16 +267,20 @@ Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& f
   return {};
 }
 
-Status ValidateResult(const SceneGradients& d_scene) {
+namespace {
+
+Status CheckResult(const PipelineGradients& d_scene) {
   Status status = CheckFinite("d_scene.positions", d_scene.positions);
   if (status.ok()) status = CheckFinite("d_scene.attributes", d_scene.attributes);
   if (status.ok() && d_scene.camera) status = CheckCameraGradient(d_scene.d_camera);
   return status.ok() ? status : status.Within("the gradient overflows");  // no string if not needed
 }
 
-Status ValidateResult(std::span<const SceneGradients> d_scenes) {
+}  // namespace
+
+Status ValidateResult(std::span<const PipelineGradients> d_scenes) {
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    const Status status = ValidateResult(d_scenes[n]);
+    const Status status = CheckResult(d_scenes[n]);
     if (!status.ok()) return status.Within(SceneName(n));
   }
   return {};

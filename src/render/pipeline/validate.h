@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
@@ -15,6 +15,13 @@ namespace tilegrad {
 // OK if all values are finite, else an error that names the first one that is not.
 Status CheckFinite(const char* array, std::span<const float> values);
 Status CheckFinite(const char* array, std::span<const double> values);
+
+// A number as float sees it: beyond its range it is infinite. Scenes in double are held to it, too.
+inline float InFloat(float x) { return x; }
+float InFloat(double x);
+// CheckFinite of such numbers.
+Status CheckNumbers(const char* array, std::span<const float> values);
+Status CheckNumbers(const char* array, std::span<const double> values);
 
 // An error that says the shape, [rows,width], unless there are that many numbers.
 Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::size_t width);
@@ -30,18 +37,19 @@ Status CheckImageSize(const char* axis, int pixels);
 
 // Errors name the scene, the array, the index and what was expected.
 Status ValidateOptions(const RenderOptions& options);
-Status ValidateSceneSizes(std::span<const SceneView> scenes);
-Status ValidateSceneNumbers(std::span<const SceneView> scenes);
-// Of one scene, whom the errors do not name.
-Status ValidateSceneSizes(const SceneView& scene);
-Status ValidateSceneNumbers(const SceneView& scene);
-Status ValidateBackwardSizes(std::span<const SceneView> scenes, const RenderOptions& options,
-                             const Frame& frame, const FrameGradients& d_frame,
-                             std::span<const SceneGradients> d_scenes);
-Status ValidateBackwardNumbers(std::span<const SceneView> scenes, const Frame& frame,
-                               const FrameGradients& d_frame);
+Status ValidateSceneSizes(std::span<const PipelineScene> scenes);
+Status ValidateSceneNumbers(std::span<const PipelineScene> scenes);
+// Of one scene, whom the errors do not name. T: float or double.
+template <class T>
+Status ValidateSceneSizes(const PipelineSceneT<T>& scene);
+template <class T>
+Status ValidateSceneNumbers(const PipelineSceneT<T>& scene);
+Status ValidateBackwardSizes(std::span<const PipelineScene> scenes, const RenderOptions& options,
+                             const PipelineFrame& frame, const PipelineCotangents& d_frame,
+                             std::span<const PipelineGradients> d_scenes);
+Status ValidateBackwardNumbers(std::span<const PipelineScene> scenes, const PipelineFrame& frame,
+                               const PipelineCotangents& d_frame);
 // Gradients that overflow float are an error, not an Inf that spreads.
-Status ValidateResult(std::span<const SceneGradients> d_scenes);
-Status ValidateResult(const SceneGradients& d_scene);  // of one scene, whom the error does not name
+Status ValidateResult(std::span<const PipelineGradients> d_scenes);
 
 }  // namespace tilegrad

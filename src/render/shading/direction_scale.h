@@ -8,8 +8,7 @@
 #include <span>
 
 #include "base/scalar.h"
-#include "render/scene.h"
-#include "render/shading/plan.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad {
 
@@ -26,10 +25,10 @@ auto DirectionScale(std::span<const T> directions) {
 
 // What a stream of a scene is multiplied by before it is interpolated, and its gradient after.
 template <class T>
-auto StreamScale(const ShadedSceneT<T>& scene, Varying what) {
-  if (what == Varying::kLightDirection) return DirectionScale(scene.light_directions);
-  const bool given = what == Varying::kNormal && scene.model.normals == NormalKind::kGiven;
-  return DirectionScale(given ? scene.normals.values : std::span<const T>());
+auto StreamScale(const SceneT<T>& scene, Varying what) {
+  const bool directions = what == Varying::kLightDirection ||
+                          (what == Varying::kNormal && scene.shading.normals == Normals::kGiven);
+  return DirectionScale(directions ? StreamOf(scene, what).values : std::span<const T>());
 }
 
 }  // namespace tilegrad

@@ -6,31 +6,9 @@
 #include "render/shading/pack.h"
 
 namespace tilegrad {
-namespace {
-
-// The array of a gradient that a stream of a scene goes to.
-std::span<float> TargetOf(const ShadedGradients& d, Varying what) {
-  switch (what) {
-    case Varying::kColor:
-      return d.colors;
-    case Varying::kUv:
-      return d.uvs;
-    case Varying::kNormal:
-      return d.normals;
-    case Varying::kLightDirection:
-      return d.light_directions;
-    case Varying::kUser:
-      return d.attributes;
-    default:
-      return {};
-  }
-}
-
-}  // namespace
-
-std::span<SceneGradients> ShadeGradients::Begin(const BackwardPlan& plan,
-                                                std::span<const SceneView> views,
-                                                std::span<const ShadedGradients> d_scenes) {
+std::span<PipelineGradients> ShadeGradients::Begin(const BackwardPlan& plan,
+                                                   std::span<const PipelineScene> views,
+                                                   std::span<const SceneGradients> d_scenes) {
   d_views_.clear();
   if (scratch_.size() < views.size()) scratch_.resize(views.size());
   const bool attributes = plan.pulled.channels() > 0;
@@ -38,14 +16,14 @@ std::span<SceneGradients> ShadeGradients::Begin(const BackwardPlan& plan,
     SceneScratch& s = scratch_[n];
     s.d_positions.resize(d_scenes[n].positions.size());
     s.d_varyings.resize(attributes ? views[n].attributes.size() : 0);
-    d_views_.push_back({s.d_positions, s.d_varyings, d_scenes[n].camera, {}});
+    d_views_.push_back({s.d_positions, s.d_varyings, d_scenes[n].camera != nullptr, {}});
   }
   return d_views_;
 }
 
 void ShadeGradients::Merge(const BackwardPlan& plan, const ShadeInputs& inputs,
-                           std::span<const ShadedScene> scenes,
-                           std::span<ShadedGradients> d_scenes) {
+                           std::span<const Scene> scenes,
+                           std::span<const SceneGradients> d_scenes) {
   const Batch batch{plan, inputs, scenes, d_scenes};
   if (plan.staged()) {
     workers_->For(scenes.size(), [&](std::size_t n, std::size_t) { AddToPositions(batch, n); });
@@ -62,7 +40,7 @@ void ShadeGradients::AddToPositions(const Batch& batch, std::size_t scene) {
   if (set[Varying::kPosition]) {
     AddStream(batch.scenes[scene], set, Varying::kPosition, s.d_varyings, s.d_positions);
   }
-  if (!set[Varying::kNormal] || batch.plan.parts.model.normals == NormalKind::kGiven) return;
+  if (!set[Varying::kNormal] || batch.plan.parts.shading.normals == Normals::kGiven) return;
   const SceneNormals& normals = batch.inputs.normals(scene);
   s.d_units.assign(normals.size(), {0, 0, 0});
   AddStream(batch.scenes[scene], set, Varying::kNormal, s.d_varyings,
@@ -70,38 +48,34 @@ void ShadeGradients::AddToPositions(const Batch& batch, std::size_t scene) {
   AddNormalsAdjoint(batch.scenes[scene], normals, s.d_units, s.d_positions);
 }
 
-void ShadeGradients::FindSinks(std::span<const ShadedGradients> d_scenes) {
+void ShadeGradients::FindSinks(std::span<const SceneGradients> d_scenes) {
   sinks_.clear();
-  const auto add = [&](std::span<float> out, Varying what) {
-    const bool known = std::any_of(sinks_.begin(), sinks_.end(),
-                                   [&](const Sink& s) { return s.out.data() == out.data(); });
-    if (!out.empty() && !known) sinks_.push_back({out, what});
-  };
-  for (const ShadedGradients& d : d_scenes) {
-    add(d.positions, Varying::kPosition);
-    for (std::size_t i = 0; i < kVaryings; ++i) {
-      add(TargetOf(d, static_cast<Varying>(i)), static_cast<Varying>(i));
-    }
+  for (const SceneGradients& d : d_scenes) {
+    ForEachStream(Scene(), d, [&](const SceneStream<float>& stream) {
+      const std::span<float> out = stream.gradient;
+      const bool known = std::any_of(sinks_.begin(), sinks_.end(),
+                                     [&](const Sink& s) { return s.out.data() == out.data(); });
+      if (!out.empty() && !known) sinks_.push_back({out, stream.what});
+    });
   }
 }
 
 void ShadeGradients::FillSink(const Batch& batch, const Sink& sink) const {
   std::fill(sink.out.begin(), sink.out.end(), 0.0f);
   for (std::size_t n = 0; n < batch.scenes.size(); ++n) {
-    const ShadedGradients& d = batch.d_scenes[n];
+    const Scene& scene = batch.scenes[n];
     const SceneScratch& s = scratch_[n];
+    if (StreamOf(scene, sink.what, batch.d_scenes[n]).gradient.data() != sink.out.data()) continue;
     if (sink.what == Varying::kPosition) {
-      if (d.positions.data() != sink.out.data()) continue;
       for (std::size_t i = 0; i < sink.out.size(); ++i) sink.out[i] += s.d_positions[i];
       continue;
     }
-    if (TargetOf(d, sink.what).data() != sink.out.data()) continue;
     if (!batch.plan.pulled[sink.what]) continue;
     // Normals of positions are pulled; those that the scene has besides are not used.
-    if (sink.what == Varying::kNormal && batch.plan.parts.model.normals != NormalKind::kGiven) {
+    if (sink.what == Varying::kNormal && batch.plan.parts.shading.normals != Normals::kGiven) {
       continue;
     }
-    AddStream(batch.scenes[n], batch.plan.pulled, sink.what, s.d_varyings, sink.out);
+    AddStream(scene, batch.plan.pulled, sink.what, s.d_varyings, sink.out);
   }
 }
 

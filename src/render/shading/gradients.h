@@ -9,8 +9,7 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "render/pipeline/pipeline.h"
-#include "render/scene.h"
+#include "render/pipeline/records.h"
 #include "render/shading/inputs.h"
 #include "render/shading/plan.h"
 
@@ -20,14 +19,14 @@ class ShadeGradients {
  public:
   explicit ShadeGradients(const Workers& workers) : workers_(&workers) {}
 
-  // Where Renderer::Backward is to write, given the views that it gets. Cameras are asked for as
+  // Where Pipeline::Backward is to write, given the views that it gets. Cameras are asked for as
   // d_scenes do.
-  std::span<SceneGradients> Begin(const BackwardPlan& plan, std::span<const SceneView> views,
-                                  std::span<const ShadedGradients> d_scenes);
+  std::span<PipelineGradients> Begin(const BackwardPlan& plan, std::span<const PipelineScene> views,
+                                     std::span<const SceneGradients> d_scenes);
   // Sums what it has written into the arrays of d_scenes, which are overwritten: in the order of
   // scenes, whatever the number of workers.
-  void Merge(const BackwardPlan& plan, const ShadeInputs& inputs,
-             std::span<const ShadedScene> scenes, std::span<ShadedGradients> d_scenes);
+  void Merge(const BackwardPlan& plan, const ShadeInputs& inputs, std::span<const Scene> scenes,
+             std::span<const SceneGradients> d_scenes);
 
  private:
   // Of one scene before they are merged.
@@ -44,17 +43,17 @@ class ShadeGradients {
   struct Batch {
     const BackwardPlan& plan;
     const ShadeInputs& inputs;
-    std::span<const ShadedScene> scenes;
-    std::span<const ShadedGradients> d_scenes;
+    std::span<const Scene> scenes;
+    std::span<const SceneGradients> d_scenes;
   };
 
   void AddToPositions(const Batch& batch, std::size_t scene);
-  void FindSinks(std::span<const ShadedGradients> d_scenes);
+  void FindSinks(std::span<const SceneGradients> d_scenes);
   void FillSink(const Batch& batch, const Sink& sink) const;
 
   const Workers* workers_;
   std::vector<SceneScratch> scratch_;
-  std::vector<SceneGradients> d_views_;
+  std::vector<PipelineGradients> d_views_;
   std::vector<Sink> sinks_;
 };
 

@@ -12,15 +12,16 @@ namespace tilegrad {
 namespace {
 
 // The arrays of a scene that are packed. Scenes with the same ones share what is packed.
-bool SameSources(const ShadedScene& a, const ShadedScene& b) {
-  const auto same = [](auto x, auto y) { return x.data() == y.data() && x.size() == y.size(); };
-  return same(a.positions, b.positions) && same(a.faces, b.faces) &&
-         same(a.attributes, b.attributes) && same(a.colors.values, b.colors.values) &&
-         same(a.uvs.values, b.uvs.values) && same(a.normals.values, b.normals.values) &&
-         same(a.light_directions, b.light_directions);
+bool SameSources(const Scene& a, const Scene& b) {
+  bool same = a.faces.data() == b.faces.data() && a.faces.size() == b.faces.size();
+  ForEachStream(a, {}, [&](const SceneStream<float>& x) {
+    const SceneStream<float> y = StreamOf(b, x.what);
+    same &= x.values.data() == y.values.data() && x.values.size() == y.values.size();
+  });
+  return same;
 }
 
-void SetLights(const ShadedScene& scene, StageScene* out) {
+void SetLights(const Scene& scene, StageScene* out) {
   out->lights.assign(scene.lights.begin(), scene.lights.end());
   out->inverse_lengths.clear();
   for (auto& light : out->lights) {
@@ -28,11 +29,11 @@ void SetLights(const ShadedScene& scene, StageScene* out) {
     light.direction = unit.unit;
     out->inverse_lengths.push_back(unit.inverse_length);
   }
-  if (scene.model.lighting != Lighting::kSphericalHarmonics) return;
-  out->sh = shade::ShPolynomialOf<float>(scene.model.sh_basis, scene.sh);
+  if (scene.shading.lighting != Lighting::kSphericalHarmonics) return;
+  out->sh = shade::ShPolynomialOf<float>(shade::ShBasis::kOrthonormal, scene.sh);
 }
 
-void SetSurfaces(const ShadedScene& scene, StageScene* out) {
+void SetSurfaces(const Scene& scene, StageScene* out) {
   out->surfaces.assign(scene.surfaces.begin(), scene.surfaces.end());
   if (!out->surfaces.empty()) return;
   Surface surface;
@@ -56,10 +57,11 @@ bool SameTexture(const shade::TextureView& a, const shade::TextureView& b) {
 
 }  // namespace
 
-void ShadeInputs::PrepareTextures(std::span<const ShadedScene> scenes) {
+void ShadeInputs::PrepareTextures(std::span<const Scene> scenes) {
   pyramid_views_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    for (const shade::TextureView& view : scenes[n].textures) {
+    for (const Texture& texture : scenes[n].textures) {
+      const shade::TextureView view = shade::ViewOf(texture);
       std::size_t i = 0;
       while (i < pyramid_views_.size() && !SameTexture(pyramid_views_[i], view)) ++i;
       if (i == pyramid_views_.size()) pyramid_views_.push_back(view);
@@ -77,7 +79,7 @@ void ShadeInputs::PrepareTextures(std::span<const ShadedScene> scenes) {
   }
 }
 
-void ShadeInputs::Begin(std::span<const ShadedScene> scenes, bool textures) {
+void ShadeInputs::Begin(std::span<const Scene> scenes, bool textures) {
   work_ = {};
   stage_scenes_.resize(scenes.size());
   for (std::size_t n = 0; n < scenes.size(); ++n) {
@@ -90,7 +92,7 @@ void ShadeInputs::Begin(std::span<const ShadedScene> scenes, bool textures) {
   if (textures) PrepareTextures(scenes);
 }
 
-void ShadeInputs::FindPacks(std::span<const ShadedScene> scenes) {
+void ShadeInputs::FindPacks(std::span<const Scene> scenes) {
   first_of_pack_.clear(), pack_of_scene_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     if (n == 0 || !SameSources(scenes[n - 1], scenes[n])) first_of_pack_.push_back(n);
@@ -99,7 +101,7 @@ void ShadeInputs::FindPacks(std::span<const ShadedScene> scenes) {
   if (packs_.size() < first_of_pack_.size()) packs_.resize(first_of_pack_.size());
 }
 
-void ShadeInputs::DerivePackNormals(std::span<const ShadedScene> scenes) {
+void ShadeInputs::DerivePackNormals(std::span<const Scene> scenes) {
   StageClock clock;
   workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
     DeriveNormals(scenes[first_of_pack_[i]], &packs_[i].normals);
@@ -110,11 +112,11 @@ void ShadeInputs::DerivePackNormals(std::span<const ShadedScene> scenes) {
   clock.Lap(&work_.normals_ms);
 }
 
-void ShadeInputs::PackStreams(std::span<const ShadedScene> scenes, const StreamSets& sets) {
+void ShadeInputs::PackStreams(std::span<const Scene> scenes, const StreamSets& sets) {
   StageClock clock;
   workers_->For(first_of_pack_.size(), [&](std::size_t i, std::size_t) {
     ScenePack& pack = packs_[i];
-    const ShadedScene& scene = scenes[first_of_pack_[i]];
+    const Scene& scene = scenes[first_of_pack_[i]];
     PackVaryings(scene, sets.varyings, pack.normals, &pack.varyings);
     if (sets.recomputed == nullptr) return;
     PackVaryings(scene, *sets.recomputed, pack.normals, &pack.recomputed);
@@ -127,9 +129,9 @@ void ShadeInputs::PackStreams(std::span<const ShadedScene> scenes, const StreamS
   clock.Lap(&work_.pack_ms);
 }
 
-void ShadeInputs::Pack(std::span<const ShadedScene> scenes, const StreamSets& sets) {
+void ShadeInputs::Pack(std::span<const Scene> scenes, const StreamSets& sets) {
   FindPacks(scenes);
-  if (sets.normals && scenes[0].model.normals != NormalKind::kGiven) DerivePackNormals(scenes);
+  if (sets.normals && scenes[0].shading.normals != Normals::kGiven) DerivePackNormals(scenes);
   PackStreams(scenes, sets);
   const VaryingSet& set = sets.varyings;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
@@ -143,20 +145,20 @@ void ShadeInputs::Pack(std::span<const ShadedScene> scenes, const StreamSets& se
   SetViews(scenes);
 }
 
-void ShadeInputs::UsePlain(std::span<const ShadedScene> scenes, bool colors, bool user) {
+void ShadeInputs::UsePlain(std::span<const Scene> scenes, bool colors, bool user) {
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const ShadedScene& s = scenes[n];
+    const Scene& s = scenes[n];
     stage_scenes_[n].varyings = {};
     if (colors) stage_scenes_[n].varyings = {s.colors.values, 3, s.colors.rate};
-    if (user) stage_scenes_[n].varyings = {s.attributes, s.channels, s.rate};
+    if (user) stage_scenes_[n].varyings = {s.attributes.values, s.channels, s.attributes.rate};
   }
   SetViews(scenes);
 }
 
-void ShadeInputs::SetViews(std::span<const ShadedScene> scenes) {
+void ShadeInputs::SetViews(std::span<const Scene> scenes) {
   views_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    SceneView view = scenes[n];
+    PipelineScene view = PipelineSceneOf(scenes[n]);
     view.attributes = stage_scenes_[n].varyings.values;
     view.channels = stage_scenes_[n].varyings.channels, view.rate = stage_scenes_[n].varyings.rate;
     views_.push_back(view);

@@ -11,8 +11,8 @@
 
 #include "base/aligned.h"
 #include "base/parallel.h"
-#include "render/pipeline/pipeline.h"
-#include "render/scene.h"
+#include "render/pipeline/records.h"
+#include "render/scene_fields.h"
 #include "render/shading/pack.h"
 #include "render/shading/plan.h"
 #include "render/shading/report.h"
@@ -23,7 +23,7 @@ namespace tilegrad {
 // What to lay side by side.
 struct StreamSets {
   const VaryingSet& varyings;              // forward, or what is pulled on
-  bool normals = false;                    // normals are needed, derived if the model says so
+  bool normals = false;                    // normals are needed, derived if the scene says so
   const VaryingSet* recomputed = nullptr;  // on the way back, where it is not the same
 };
 
@@ -32,14 +32,14 @@ class ShadeInputs {
   explicit ShadeInputs(const Workers& workers) : workers_(&workers) {}
 
   // Everything but streams, which Pack or UsePlain adds. `textures`: whether they are sampled.
-  void Begin(std::span<const ShadedScene> scenes, bool textures);
+  void Begin(std::span<const Scene> scenes, bool textures);
   // Streams side by side.
-  void Pack(std::span<const ShadedScene> scenes, const StreamSets& sets);
+  void Pack(std::span<const Scene> scenes, const StreamSets& sets);
   // Streams as they are: colours, user attributes, or none.
-  void UsePlain(std::span<const ShadedScene> scenes, bool colors, bool user);
+  void UsePlain(std::span<const Scene> scenes, bool colors, bool user);
 
   std::span<const StageScene> scenes() const { return stage_scenes_; }
-  std::span<const SceneView> views() const { return views_; }  // with the streams as attributes
+  std::span<const PipelineScene> views() const { return views_; }  // with the streams as attributes
   // After Pack.
   const SceneNormals& normals(std::size_t scene) const {
     return packs_[pack_of_scene_[scene]].normals;
@@ -54,16 +54,16 @@ class ShadeInputs {
     AlignedVector<float> recomputed;  // where it is not the same
   };
 
-  void PrepareTextures(std::span<const ShadedScene> scenes);
-  void FindPacks(std::span<const ShadedScene> scenes);
-  void DerivePackNormals(std::span<const ShadedScene> scenes);
-  void PackStreams(std::span<const ShadedScene> scenes, const StreamSets& sets);
-  void SetViews(std::span<const ShadedScene> scenes);
+  void PrepareTextures(std::span<const Scene> scenes);
+  void FindPacks(std::span<const Scene> scenes);
+  void DerivePackNormals(std::span<const Scene> scenes);
+  void PackStreams(std::span<const Scene> scenes, const StreamSets& sets);
+  void SetViews(std::span<const Scene> scenes);
 
   const Workers* workers_;
   SceneWork work_;
   std::vector<StageScene> stage_scenes_;
-  std::vector<SceneView> views_;
+  std::vector<PipelineScene> views_;
   std::vector<ScenePack> packs_;
   std::vector<std::size_t> pack_of_scene_, first_of_pack_;
   std::vector<std::unique_ptr<shade::TexturePyramid>> pyramids_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string_view>
 
 #include "shade/spherical_harmonics_ref.h"
 
@@ -37,7 +38,7 @@ void AddBand(const SceneSums& from, SceneSums& to) {
 }
 
 void AddSurfaces(const StageScene& scene, const SceneSums& sums, std::span<Surface> d_surfaces) {
-  const Lighting lighting = scene.scene->model.lighting;
+  const Lighting lighting = scene.scene->shading.lighting;
   const bool lit = lighting == Lighting::kLambert || lighting == Lighting::kPhong;
   for (std::size_t i = 0; i < d_surfaces.size(); ++i) {
     const SurfaceSums& s = sums.surfaces[i];
@@ -51,8 +52,7 @@ void AddSurfaces(const StageScene& scene, const SceneSums& sums, std::span<Surfa
 }
 
 // From unit directions to those of the caller.
-void AddLights(const StageScene& scene, const SceneSums& sums,
-               std::span<shade::DirectionalLight> d_lights) {
+void AddLights(const StageScene& scene, const SceneSums& sums, std::span<Light> d_lights) {
   for (std::size_t k = 0; k < d_lights.size(); ++k) {
     const auto& unit = scene.lights[k].direction;
     const auto& d = sums.lights[k];
@@ -86,47 +86,45 @@ void AddCamera(const StageScene& scene, const SceneSums& sums, Camera* d_camera)
 }
 
 void AddSh(const StageScene& scene, const SceneSums& sums, std::span<float> d_sh) {
-  if (d_sh.empty() || scene.scene->model.lighting != Lighting::kSphericalHarmonics) return;
+  if (d_sh.empty() || scene.scene->shading.lighting != Lighting::kSphericalHarmonics) return;
   std::array<double, 9> d = {};
-  shade::ShPolynomialAdjoint<double>(scene.scene->model.sh_basis, sums.sh, d);
+  shade::ShPolynomialAdjoint<double>(shade::ShBasis::kOrthonormal, sums.sh, d);
   for (std::size_t i = 0; i < 9; ++i) d_sh[i] += static_cast<float>(d[i]);
 }
 
 }  // namespace
 
-void ClearUniforms(std::span<ShadedGradients> d_scenes) {
-  for (ShadedGradients& d : d_scenes) {
+void ClearUniforms(std::span<const SceneGradients> d_scenes) {
+  for (const SceneGradients& d : d_scenes) {
     std::fill(d.sh.begin(), d.sh.end(), 0.0f);
-    for (auto& light : d.lights) light.direction = {0, 0, 0}, light.intensity = 0;
-    for (Surface& s : d.surfaces) {
-      s.base_color = s.ambient = s.diffuse = s.specular = {0, 0, 0};
-      s.shininess = 0;
-    }
+    ForEachRecordPart(d, [](const char* record, const char*, std::span<float> part) {
+      if (record != std::string_view("camera")) std::fill(part.begin(), part.end(), 0.0f);
+    });
   }
 }
 
-void ClearTextures(std::span<ShadedGradients> d_scenes) {
-  for (ShadedGradients& d : d_scenes) {
+void ClearTextures(std::span<const SceneGradients> d_scenes) {
+  for (const SceneGradients& d : d_scenes) {
     for (const auto& texture : d.textures) std::fill(texture.begin(), texture.end(), 0.0f);
   }
 }
 
 void MergeUniforms(const ShadeStage& stage, std::span<const StageScene> scenes,
-                   std::span<ShadedGradients> d_scenes, SceneSums* scratch) {
+                   std::span<const SceneGradients> d_scenes, SceneSums* scratch) {
   SceneSums& sums = *scratch;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     sums.Clear(scenes[n].surfaces.size(), scenes[n].lights.size());
     for (const StageBand& band : stage.bands(n)) AddBand(band.sums, sums);
-    ShadedGradients& d = d_scenes[n];
+    const SceneGradients& d = d_scenes[n];
     AddSurfaces(scenes[n], sums, d.surfaces);
     AddLights(scenes[n], sums, d.lights);
     AddSh(scenes[n], sums, d.sh);
-    if (d.camera) AddCamera(scenes[n], sums, &d.d_camera);
+    if (d.camera != nullptr) AddCamera(scenes[n], sums, d.camera);
   }
 }
 
 void TextureMerge::FindTargets(std::span<const StageScene> scenes,
-                               std::span<ShadedGradients> d_scenes) {
+                               std::span<const SceneGradients> d_scenes) {
   targets_.clear();
   for (std::size_t n = 0; n < scenes.size(); ++n) {
     for (std::size_t t = 0; t < d_scenes[n].textures.size(); ++t) {
@@ -149,7 +147,7 @@ void TextureMerge::FindTargets(std::span<const StageScene> scenes,
 }
 
 void TextureMerge::Run(const ShadeStage& stage, std::span<const StageScene> scenes,
-                       const Workers& workers, std::span<ShadedGradients> d_scenes) {
+                       const Workers& workers, std::span<const SceneGradients> d_scenes) {
   FindTargets(scenes, d_scenes);
   workers.For(targets_.size(),
               [&](std::size_t i, std::size_t) { gradients_[i]->Clear(*targets_[i].pyramid); });

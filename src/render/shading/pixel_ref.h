@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The truth of shade_run.h: one pixel, from what was interpolated to colour, and back. T: float,
+// The truth of run.h: one pixel, from what was interpolated to colour, and back. T: float,
 // double, std::complex<double>.
 #pragma once
 
@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "render/scene.h"
+#include "render/scene_fields.h"
 #include "shade/combine_ref.h"
 #include "shade/lambert_ref.h"
 #include "shade/normalize_ref.h"
@@ -32,15 +32,15 @@ struct ShadePixel {
 template <class T>
 struct ShadeUniforms {
   std::vector<SurfaceT<T>> surfaces;
-  std::vector<shade::DirectionalLightT<T>> lights;  // unit; empty: ShadePixel::light_direction
+  std::vector<LightT<T>> lights;  // unit; empty: ShadePixel::light_direction
   shade::ShPolynomialT<T> sh = {};
   shade::Vec3<T> eye = {};
   std::vector<std::vector<T>> texels;  // gradients only: of all levels of each texture
 };
 
 template <class T>
-shade::ColorFactorsT<T> FactorsOf(const ShadingModel& model, const SurfaceT<T>& s) {
-  if (model.lighting != Lighting::kSphericalHarmonics) {
+shade::ColorFactorsT<T> FactorsOf(const ShadingModel& shading, const SurfaceT<T>& s) {
+  if (shading.lighting != Lighting::kSphericalHarmonics) {
     return {s.base_color, s.ambient, s.diffuse, s.specular};
   }
   return {s.base_color, {T(0), T(0), T(0)}, {T(1), T(1), T(1)}, {T(0), T(0), T(0)}};
@@ -50,7 +50,7 @@ shade::ColorFactorsT<T> FactorsOf(const ShadingModel& model, const SurfaceT<T>& 
 template <class T>
 struct PixelValues {
   shade::UnitVector<T> normal, eye, light;
-  std::vector<shade::DirectionalLightT<T>> lights;
+  std::vector<LightT<T>> lights;
   shade::ColorParts<T> parts;
   shade::Vec3<T> color;
 };
@@ -58,9 +58,9 @@ struct PixelValues {
 template <class T>
 class PixelShaderRef {
  public:
-  PixelShaderRef(const ShadingModel& model, const ShadeUniforms<T>& uniforms,
+  PixelShaderRef(const ShadingModel& shading, const ShadeUniforms<T>& uniforms,
                  std::span<const shade::PyramidRef<T>> pyramids)
-      : model_(model), uniforms_(uniforms), pyramids_(pyramids) {}
+      : shading_(shading), uniforms_(uniforms), pyramids_(pyramids) {}
 
   PixelValues<T> Forward(const ShadePixel<T>& p) const {
     PixelValues<T> v;
@@ -70,8 +70,8 @@ class PixelShaderRef {
       v.parts.texture = shade::SampleRef(*texture, p.uv[0], p.uv[1], p.level);
     }
     if (Lit()) Light(p, &v);
-    const auto factors = FactorsOf(model_, uniforms_.surfaces[p.surface]);
-    v.color = shade::CombineRef(factors, v.parts, Lit(), model_.clamp);
+    const auto factors = FactorsOf(shading_, uniforms_.surfaces[p.surface]);
+    v.color = shade::CombineRef(factors, v.parts, Lit(), shading_.clamp);
     return v;
   }
 
@@ -83,7 +83,7 @@ class PixelShaderRef {
     const SurfaceT<T>& surface = uniforms_.surfaces[p.surface];
     shade::ColorFactorsT<T> d_factors = {};
     shade::ColorParts<T> d_parts = Zero();
-    shade::CombineAdjointRef(FactorsOf(model_, surface), v.parts, Lit(), model_.clamp, d_color,
+    shade::CombineAdjointRef(FactorsOf(shading_, surface), v.parts, Lit(), shading_.clamp, d_color,
                              d_factors, d_parts);
     AddFactors(d_factors, &d_uniforms->surfaces[p.surface]);
     shade::AddScaled(T(1), d_parts.vertex_color, d->color);
@@ -100,9 +100,9 @@ class PixelShaderRef {
   }
 
  private:
-  bool Lit() const { return model_.lighting != Lighting::kNone; }
-  bool Phong() const { return model_.lighting == Lighting::kPhong; }
-  bool Sh() const { return model_.lighting == Lighting::kSphericalHarmonics; }
+  bool Lit() const { return shading_.lighting != Lighting::kNone; }
+  bool Phong() const { return shading_.lighting == Lighting::kPhong; }
+  bool Sh() const { return shading_.lighting == Lighting::kSphericalHarmonics; }
   bool PerPixel() const { return uniforms_.lights.empty(); }
 
   static shade::Vec3<T> Turned(const shade::Vec3<T>& n, float side) {
@@ -155,7 +155,7 @@ class PixelShaderRef {
       shade::ShLightAdjointRef(uniforms_.sh, v.normal.unit, d_parts.light, d_uniforms->sh, *d_unit);
       return;
     }
-    std::vector<shade::DirectionalLightT<T>> d_lights(v.lights.size());
+    std::vector<LightT<T>> d_lights(v.lights.size(), shade::kNoLight<T>);
     shade::LambertAdjointRef<T>({T(0), v.lights}, v.normal.unit, d_parts.light, *d_unit, d_lights);
     if (Phong()) HighlightBackward(p, v, d_parts.highlight, d_unit, d, d_uniforms, &d_lights);
     if (PerPixel()) {
@@ -170,7 +170,7 @@ class PixelShaderRef {
 
   void HighlightBackward(const ShadePixel<T>& p, const PixelValues<T>& v, const T& d_highlight,
                          shade::Vec3<T>* d_unit, ShadePixel<T>* d, ShadeUniforms<T>* d_uniforms,
-                         std::vector<shade::DirectionalLightT<T>>* d_lights) const {
+                         std::vector<LightT<T>>* d_lights) const {
     const T& shininess = uniforms_.surfaces[p.surface].shininess;
     shade::Vec3<T> d_eye = {};
     for (std::size_t k = 0; k < v.lights.size(); ++k) {
@@ -189,7 +189,7 @@ class PixelShaderRef {
     shade::AddScaled(T(1), d_toward, d_uniforms->eye);
   }
 
-  const ShadingModel& model_;
+  const ShadingModel& shading_;
   const ShadeUniforms<T>& uniforms_;
   std::span<const shade::PyramidRef<T>> pyramids_;
 };

@@ -4,21 +4,12 @@
 namespace tilegrad {
 namespace {
 
-AttributeRate RateOf(const SceneParts& parts, Varying v) {
-  switch (v) {
-    case Varying::kColor:
-      return parts.colors_rate;
-    case Varying::kUv:
-      return parts.uvs_rate;
-    case Varying::kUser:
-      return parts.user_rate;
-    case Varying::kNormal:
-      if (parts.model.normals == NormalKind::kFlat) return AttributeRate::kCorner;
-      return parts.model.normals == NormalKind::kGiven ? parts.normals_rate
-                                                       : AttributeRate::kVertex;
-    default:
-      return AttributeRate::kVertex;
+Rate RateOf(const SceneParts& parts, Varying v) {
+  const Normals normals = parts.shading.normals;
+  if (v != Varying::kNormal || normals == Normals::kGiven) {
+    return parts.rates[static_cast<std::size_t>(v)];
   }
+  return normals == Normals::kFlat ? Rate::kCorner : Rate::kVertex;
 }
 
 // Corner rate as soon as one of them has it.
@@ -27,15 +18,16 @@ void Finish(const SceneParts& parts, VaryingSet* set) {
   for (std::size_t i = 0; i < kVaryings; ++i) {
     const auto v = static_cast<Varying>(i);
     if (set->width(v) == 0) set->has[i] = false;
-    if (set->has[i] && RateOf(parts, v) == AttributeRate::kCorner) {
-      set->rate = AttributeRate::kCorner;
+    if (set->has[i] && RateOf(parts, v) == Rate::kCorner) {
+      set->rate = Rate::kCorner;
     }
   }
 }
 
 // Whether an image of colour is nothing but the interpolated colours.
 bool IsPlainColor(const SceneParts& parts) {
-  return parts.colors && !parts.textures && !parts.surfaces && !parts.lit() && !parts.model.clamp;
+  return parts[Varying::kColor] && !parts.textures && !parts.surfaces && !parts.lit() &&
+         !parts.shading.clamp;
 }
 
 bool IsOnly(const VaryingSet& set, Varying v) {
@@ -51,29 +43,34 @@ ShadeSteps ColorSteps(const SceneParts& parts) {
           .level = parts.textures && parts.trilinear,
           .normal = parts.lit(),
           .light = parts.lit(),
-          .highlight = parts.model.lighting == Lighting::kPhong};
+          .highlight = parts.shading.lighting == Lighting::kPhong};
+}
+
+// Whose normals are computed in the end.
+void TurnNormals(const SceneParts& parts, ShadeSteps* steps) {
+  steps->turn = steps->normal && parts.shading.two_sided;
 }
 
 // Whether somebody wants a gradient that normals hand on.
 bool WantsNormals(const BackwardPlan& plan) {
-  const bool given = plan.parts.model.normals == NormalKind::kGiven;
-  return plan.geometry || (given ? plan.wishes.normals : plan.wishes.positions);
+  const bool given = plan.parts.shading.normals == Normals::kGiven;
+  return plan.geometry || (plan.wishes[given ? Varying::kNormal : Varying::kPosition]);
 }
 
 void SetColorTargets(BackwardPlan* plan) {
   const SceneParts& parts = plan->parts;
   const GradientWishes& wishes = plan->wishes;
   const bool geometry = plan->geometry;
-  plan->to_colors = parts.colors && (geometry || wishes.colors);
-  plan->to_uv = parts.textures && parts.bilinear && (geometry || wishes.uvs);
+  plan->to_colors = parts[Varying::kColor] && (geometry || wishes[Varying::kColor]);
+  plan->to_uv = parts.textures && parts.bilinear && (geometry || wishes[Varying::kUv]);
   plan->to_texture = parts.textures && wishes.textures;
   plan->to_normal = parts.lit() && WantsNormals(*plan);
-  plan->to_eye = parts.model.lighting == Lighting::kPhong && geometry;
+  plan->to_eye = parts.shading.lighting == Lighting::kPhong && geometry;
   plan->to_light_vectors =
-      parts.uses_lights() &&
-      (wishes.lights || (parts.light_directions && (geometry || wishes.light_directions)));
+      parts.uses_lights() && (wishes.lights || (parts[Varying::kLightDirection] &&
+                                                (geometry || wishes[Varying::kLightDirection])));
   plan->to_light = plan->to_normal || plan->to_eye || plan->to_light_vectors ||
-                   (parts.model.lighting == Lighting::kSphericalHarmonics && wishes.sh);
+                   (parts.shading.lighting == Lighting::kSphericalHarmonics && wishes.sh);
   plan->to_surfaces = wishes.surfaces;
 }
 
@@ -82,12 +79,12 @@ VaryingSet PulledVaryings(const BackwardPlan& plan) {
   const bool geometry = plan.geometry;
   VaryingSet set;
   set[Varying::kColor] = plan.to_colors;
-  set[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes.uvs));
+  set[Varying::kUv] = plan.to_uv || (wishes.d_uv && (geometry || wishes[Varying::kUv]));
   set[Varying::kNormal] = plan.to_normal || (wishes.d_normals && WantsNormals(plan));
   set[Varying::kPosition] = plan.to_eye || (wishes.d_depth && geometry);
-  set[Varying::kLightDirection] =
-      plan.to_light_vectors && plan.parts.light_directions && (geometry || wishes.light_directions);
-  set[Varying::kUser] = wishes.d_user && (geometry || wishes.user);
+  set[Varying::kLightDirection] = plan.to_light_vectors && plan.parts[Varying::kLightDirection] &&
+                                  (geometry || wishes[Varying::kLightDirection]);
+  set[Varying::kUser] = wishes.d_user && (geometry || wishes[Varying::kUser]);
   Finish(plan.parts, &set);
   return set;
 }
@@ -102,9 +99,10 @@ ShadeSteps RecomputedSteps(const BackwardPlan& plan) {
   if (plan.to_colors || PullsOnTexture(plan) || PullsOnFactors(plan)) {
     steps = ColorSteps(parts);
     // The highlight is a sum of its own: colours and textures do not need its value.
-    steps.highlight = steps.highlight && (parts.model.clamp || PullsOnFactors(plan));
+    steps.highlight = steps.highlight && (parts.shading.clamp || PullsOnFactors(plan));
   }
   if (plan.wishes.d_normals && WantsNormals(plan)) steps.normal = true;
+  TurnNormals(parts, &steps);
   return steps;
 }
 
@@ -112,12 +110,13 @@ VaryingSet RecomputedVaryings(const BackwardPlan& plan) {
   const SceneParts& parts = plan.parts;
   const ShadeSteps& steps = plan.steps;
   VaryingSet set;
-  set[Varying::kColor] = steps.color && parts.colors &&
-                         (parts.model.clamp || PullsOnTexture(plan) || PullsOnFactors(plan));
+  set[Varying::kColor] = steps.color && parts[Varying::kColor] &&
+                         (parts.shading.clamp || PullsOnTexture(plan) || PullsOnFactors(plan));
   set[Varying::kUv] = steps.texture;
   set[Varying::kNormal] = steps.normal;
   set[Varying::kPosition] = steps.highlight || (plan.wishes.d_depth && plan.wishes.camera);
-  set[Varying::kLightDirection] = steps.light && parts.uses_lights() && parts.light_directions;
+  set[Varying::kLightDirection] =
+      steps.light && parts.uses_lights() && parts[Varying::kLightDirection];
   Finish(parts, &set);
   return set;
 }
@@ -138,17 +137,19 @@ int VaryingSet::first(Varying v) const {
 
 int VaryingSet::channels() const { return first(Varying::kUser) + width(Varying::kUser); }
 
-ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request) {
+ForwardPlan PlanForward(const SceneParts& parts, const Outputs& request) {
   ForwardPlan plan;
   plan.parts = parts, plan.request = request;
   if (request.color) plan.steps = ColorSteps(parts);
   if (request.normals) plan.steps.normal = true;
+  TurnNormals(parts, &plan.steps);
   VaryingSet& set = plan.varyings;
-  set[Varying::kColor] = plan.steps.color && parts.colors;
-  set[Varying::kUv] = plan.steps.texture || (request.uv && parts.uvs);
+  set[Varying::kColor] = plan.steps.color && parts[Varying::kColor];
+  set[Varying::kUv] = plan.steps.texture || (request.uv && parts[Varying::kUv]);
   set[Varying::kNormal] = plan.steps.normal;
   set[Varying::kPosition] = plan.steps.highlight;
-  set[Varying::kLightDirection] = plan.steps.light && parts.uses_lights() && parts.light_directions;
+  set[Varying::kLightDirection] =
+      plan.steps.light && parts.uses_lights() && parts[Varying::kLightDirection];
   set[Varying::kUser] = request.attributes;
   Finish(parts, &set);
   plan.colors_only = IsPlainColor(parts) && IsOnly(set, Varying::kColor);
@@ -164,9 +165,9 @@ bool BackwardPlan::staged() const {
 
 BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes) {
   BackwardPlan plan;
-  wishes.d_uv = wishes.d_uv && parts.uvs;
+  wishes.d_uv = wishes.d_uv && parts[Varying::kUv];
   plan.parts = parts, plan.wishes = wishes;
-  plan.geometry = wishes.positions || wishes.camera;
+  plan.geometry = wishes[Varying::kPosition] || wishes.camera;
   if (wishes.d_color) SetColorTargets(&plan);
   plan.pulled = PulledVaryings(plan);
   plan.steps = RecomputedSteps(plan);

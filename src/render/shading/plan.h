@@ -10,18 +10,14 @@
 #include <string_view>
 #include <vector>
 
-#include "render/scene.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad {
 
-// What is interpolated over faces.
-enum class Varying { kColor, kUv, kNormal, kPosition, kLightDirection, kUser };
-inline constexpr std::size_t kVaryings = 6;
-
-// Which of them, and where their channels stand: in the order above.
+// Which of the varyings, and where their channels stand: in their order.
 struct VaryingSet {
   std::array<bool, kVaryings> has = {};
-  AttributeRate rate = AttributeRate::kVertex;  // of the array that holds them
+  Rate rate = Rate::kVertex;  // of the array that holds them
   int user_channels = 0;
 
   bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
@@ -34,18 +30,18 @@ struct VaryingSet {
 
 // What a batch of scenes is made of; they must agree.
 struct SceneParts {
-  ShadingModel model;
-  bool colors = false, uvs = false, normals = false, textures = false, surfaces = false;
-  bool light_directions = false;
+  ShadingModel shading;
+  std::array<bool, kVaryings> has = {};    // which streams
+  std::array<Rate, kVaryings> rates = {};  // of them
+  bool textures = false, surfaces = false;
   bool bilinear = false;  // some texture is filtered: coordinates have a gradient
   bool trilinear = false;
-  AttributeRate colors_rate = AttributeRate::kVertex, uvs_rate = AttributeRate::kVertex;
-  AttributeRate normals_rate = AttributeRate::kVertex, user_rate = AttributeRate::kVertex;
   int user_channels = 0;
 
-  bool lit() const { return model.lighting != Lighting::kNone; }
+  bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
+  bool lit() const { return shading.lighting != Lighting::kNone; }
   bool uses_lights() const {
-    return model.lighting == Lighting::kLambert || model.lighting == Lighting::kPhong;
+    return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
   }
 };
 
@@ -53,6 +49,7 @@ struct SceneParts {
 struct ShadeSteps {
   bool color = false, texture = false, level = false, normal = false, light = false;
   bool highlight = false;
+  bool turn = false;  // normals of faces that are seen from behind
 
   bool any() const { return color || texture || normal; }
 };
@@ -60,7 +57,7 @@ struct ShadeSteps {
 // `color`: that is the image wanted, or pulled on.
 struct ForwardPlan {
   SceneParts parts;
-  ShadedRequest request;
+  Outputs request;
   VaryingSet varyings;
   ShadeSteps steps;
   // Attributes are images themselves: the colours, or the user's channels. Nothing is packed.
@@ -75,9 +72,10 @@ struct ForwardPlan {
 struct GradientWishes {
   bool d_color = false, d_normals = false, d_uv = false, d_depth = false, d_user = false,
        d_alpha = false;
-  bool positions = false, camera = false, colors = false, uvs = false, normals = false,
-       light_directions = false, user = false, textures = false, surfaces = false, lights = false,
-       sh = false;
+  std::array<bool, kVaryings> streams = {};
+  bool camera = false, textures = false, surfaces = false, lights = false, sh = false;
+
+  bool operator[](Varying v) const { return streams[static_cast<std::size_t>(v)]; }
 };
 
 struct BackwardPlan {
@@ -96,7 +94,7 @@ struct BackwardPlan {
   bool staged() const;
 };
 
-ForwardPlan PlanForward(const SceneParts& parts, const ShadedRequest& request);
+ForwardPlan PlanForward(const SceneParts& parts, const Outputs& request);
 BackwardPlan PlanBackward(const SceneParts& parts, GradientWishes wishes);
 
 // One stage of a call, as it was run.
@@ -108,7 +106,7 @@ struct StageReport {
   std::string what;         // on what, or what spares it
 };
 
-// A call of ShadedRenderer: its stages in their order, those too that did not run.
+// A call of Renderer: its stages in their order, those too that did not run.
 struct PlanReport {
   bool backward = false;
   std::vector<StageReport> stages;

@@ -34,13 +34,13 @@ const char* LightingName(Lighting lighting) {
   return "";
 }
 
-const char* NormalName(NormalKind kind) {
+const char* NormalName(Normals kind) {
   switch (kind) {
-    case NormalKind::kSmooth:
+    case Normals::kSmooth:
       return "smooth, from positions";
-    case NormalKind::kFlat:
+    case Normals::kFlat:
       return "flat, from positions";
-    case NormalKind::kGiven:
+    case Normals::kGiven:
       return "given by the scene";
   }
   return "";
@@ -60,14 +60,14 @@ void AddShading(const SceneParts& parts, const ShadeWork& w, std::vector<StageRe
       Only("normalise", w.normals, "pixels", w.normal, "normals", "no normal is needed"));
   out->push_back(Only("texture", w.lookups, "lookups", w.texture,
                       parts.trilinear ? "between levels" : "one level", "no texture is needed"));
-  const std::string light = LightingName(parts.model.lighting);
+  const std::string light = LightingName(parts.shading.lighting);
   out->push_back(Only("light", w.lit, "pixels", w.light,
                       w.highlights > 0 ? light + " with highlight" : light, "nothing is lit"));
 }
 
 void AddScene(const SceneParts& parts, const SceneWork& w, std::vector<StageReport>* out) {
-  out->push_back(Only("normals", w.normals, "faces", w.normals_ms, NormalName(parts.model.normals),
-                      "none is derived"));
+  out->push_back(Only("normals", w.normals, "faces", w.normals_ms,
+                      NormalName(parts.shading.normals), "none is derived"));
   out->push_back(Only("textures", w.texels, "texels", w.textures_ms,
                       parts.trilinear ? "with their levels" : "level 0 only", "none is needed"));
 }

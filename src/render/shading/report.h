@@ -4,7 +4,8 @@
 
 #include <cstdint>
 
-#include "render/pipeline/pipeline.h"
+#include "render/pipeline/records.h"
+#include "render/pipeline/work.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
 

@@ -41,7 +41,9 @@ shade::PhongInput PhongInputOf(const RunScene& scene, const RunValues& v) {
   return {v.unit, v.eye, LightsOf(scene, v), scene.surface->shininess};
 }
 
-bool HasSh(const RunScene& scene) { return scene.model->lighting == Lighting::kSphericalHarmonics; }
+bool HasSh(const RunScene& scene) {
+  return scene.shading->lighting == Lighting::kSphericalHarmonics;
+}
 
 void LightRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene, RunValues* v) {
   if (HasSh(scene)) {
@@ -70,7 +72,7 @@ shade::CombineInput CombineInputOf(const ShadeSteps& steps, const RunScene& scen
           .vertex_color = vertex_color ? v.vertex_color : nullptr,
           .light = steps.light ? &v.light : nullptr,
           .highlight = steps.highlight ? &v.highlight : nullptr,
-          .clamp = scene.model->clamp};
+          .clamp = scene.shading->clamp};
 }
 
 // From I_l and I_s to normals, lights and the eye. d->unit is added to.
@@ -141,7 +143,7 @@ void ColorAdjoint(std::size_t count, const BackwardPlan& plan, const RunScene& s
 shade::ColorFactors RunScene::factors() const {
   shade::ColorFactors out{surface->base_color, surface->ambient, surface->diffuse,
                           surface->specular};
-  if (model->lighting == Lighting::kSphericalHarmonics) {
+  if (shading->lighting == Lighting::kSphericalHarmonics) {
     out.ambient = {0, 0, 0}, out.diffuse = {1, 1, 1};
   }
   return out;
@@ -154,7 +156,7 @@ void ColorRun(std::size_t count, const ForwardPlan& plan, const RunScene& scene,
 
 void SceneSums::Clear(std::size_t surface_count, std::size_t light_count) {
   surfaces.assign(surface_count, {});
-  lights.assign(light_count, {});
+  lights.assign(light_count, shade::kNoLight<double>);
   sh = {}, eye = {}, depth_axis = {};
   depth_shift = 0;
 }
@@ -171,7 +173,7 @@ void ShadeRun(std::size_t count, const ShadeSteps& steps, const RunScene& scene,
   StageClock clock;
   const auto pixels = static_cast<std::int64_t>(count);
   if (steps.normal) {
-    if (scene.model->two_sided) Multiply(count, v->side, v->normal);
+    if (steps.turn) Multiply(count, v->side, v->normal);
     shade::Normalize(count, v->normal, shade::kLeastUnitSquare, v->unit, &v->inverse_length);
     work->normals += pixels;
     clock.Lap(&work->normal);
@@ -199,7 +201,7 @@ void ShadeRunAdjoint(std::size_t count, const BackwardPlan& plan, const RunScene
   }
   if (!plan.pulled[Varying::kNormal]) return;
   shade::NormalizeAdjoint(count, v.unit, v.inverse_length, d->unit, d->normal);
-  if (scene.model->two_sided) Multiply(count, v.side, d->normal);
+  if (plan.steps.turn) Multiply(count, v.side, d->normal);
 }
 
 }  // namespace tilegrad

@@ -21,9 +21,9 @@ namespace tilegrad {
 
 // What the pixels of a surface in an image have in common.
 struct RunScene {
-  const ShadingModel* model;
+  const ShadingModel* shading;
   const Surface* surface;
-  std::span<const shade::DirectionalLight> lights;  // unit directions; empty: one for each pixel
+  std::span<const Light> lights;  // unit directions; empty: one for each pixel
   const shade::ShPolynomial* sh;
   const shade::TexturePyramid* texture;  // null: none
   shade::Vec3<float> eye;                // the camera's position
@@ -35,7 +35,7 @@ struct RunScene {
 // others.
 struct RunValues {
   shade::RunPlane vertex_color[3], uv[2], normal[3], position[3], light_direction[3];
-  shade::RunPlane side;   // 1 or -1: normals are turned by it; with ShadingModel::two_sided
+  shade::RunPlane side;   // 1 or -1: normals are turned by it; with ShadeSteps::turn
   shade::RunPlane level;  // of the texture
   shade::RunPlane texture[3], unit[3], inverse_length, eye[3], inverse_eye, unit_light[3],
       inverse_light, light, highlight, color[3];
@@ -55,7 +55,7 @@ struct SurfaceSums {
 };
 struct SceneSums {
   std::vector<SurfaceSums> surfaces;
-  std::vector<shade::DirectionalLightT<double>> lights;  // on unit directions
+  std::vector<LightT<double>> lights;  // on unit directions
   shade::ShPolynomialT<double> sh = {};
   shade::Vec3<double> eye = {};
   // Of depth = -(z . p + t_z), z the third row of the rotation.

@@ -92,13 +92,13 @@ void ShadeStage::Begin(std::span<const StageScene> scenes, const RenderOptions& 
 }
 
 void ShadeStage::BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
-                              const RenderOptions& options, ShadedFrame* frame) {
+                              const RenderOptions& options, FrameImages* frame) {
   forward_ = &plan, frame_ = frame;
   Begin(scenes, options);
 }
 
 void ShadeStage::BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
-                               const RenderOptions& options, const ShadedFrameGradients& d_frame) {
+                               const RenderOptions& options, const FrameGradients& d_frame) {
   backward_ = &plan, d_frame_ = &d_frame;
   Begin(scenes, options);
   bands_of_image_ = BandGrid(options.width, options.height).count();
@@ -116,7 +116,7 @@ ShadeWork ShadeStage::work() const {
 RunScene ShadeStage::RunSceneOf(const StageScene& scene, std::int32_t surface) const {
   const Surface& s = scene.surfaces[static_cast<std::size_t>(surface)];
   const auto texture = static_cast<std::size_t>(s.texture);
-  return {.model = &scene.scene->model,
+  return {.shading = &scene.scene->shading,
           .surface = &s,
           .lights = scene.lights,
           .sh = &scene.sh,
@@ -134,7 +134,7 @@ void ShadeStage::GatherInputs(const PixelStrip& strip, const PixelRun& run, cons
   gather(Varying::kNormal, v->normal), gather(Varying::kPosition, v->position);
   gather(Varying::kLightDirection, v->light_direction);
   const StageScene& scene = scenes_[strip.image];
-  if (steps.normal && scene.scene->model.two_sided) SetSides(strip, run, &v->side);
+  if (steps.turn) SetSides(strip, run, &v->side);
   if (!steps.level) return;
   const RunScene run_scene = RunSceneOf(scene, run.surface());
   if (run_scene.texture == nullptr) return;
@@ -164,7 +164,7 @@ void ShadeStage::ForwardRun(const PixelStrip& strip, const PixelRun& run, StageW
     scatter(frame_->color, v->color);
   }
   if (plan.request.normals) scatter(frame_->normals, v->unit);
-  if (plan.request.uv && plan.parts.uvs) scatter(frame_->uv, v->uv);
+  if (plan.request.uv && plan.parts[Varying::kUv]) scatter(frame_->uv, v->uv);
   const auto user = static_cast<std::size_t>(plan.varyings.width(Varying::kUser));
   const auto first = static_cast<std::size_t>(plan.varyings.first(Varying::kUser));
   for (std::size_t c = 0; c < user; ++c) {

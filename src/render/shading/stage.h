@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "render/frame_images.h"
 #include "render/pipeline/pixel_stage.h"
-#include "render/scene.h"
 #include "render/shading/pixel_segments.h"
 #include "render/shading/plan.h"
 #include "render/shading/run.h"
@@ -21,10 +21,10 @@ namespace tilegrad {
 
 // A scene of the batch, ready for its pixels.
 struct StageScene {
-  const ShadedScene* scene = nullptr;
+  const Scene* scene = nullptr;
   std::vector<Surface> surfaces;
-  std::vector<shade::DirectionalLight> lights;  // unit directions
-  std::vector<float> inverse_lengths;           // of the lights' directions
+  std::vector<Light> lights;           // unit directions
+  std::vector<float> inverse_lengths;  // of the lights' directions
   shade::ShPolynomial sh = {};
   shade::Vec3<float> eye = {};
   std::vector<const shade::TexturePyramid*> textures;
@@ -52,9 +52,9 @@ class ShadeStage : public PixelStage {
 
   // What the next call is about; all is kept by the caller.
   void BeginForward(const ForwardPlan& plan, std::span<const StageScene> scenes,
-                    const RenderOptions& options, ShadedFrame* frame);
+                    const RenderOptions& options, FrameImages* frame);
   void BeginBackward(const BackwardPlan& plan, std::span<const StageScene> scenes,
-                     const RenderOptions& options, const ShadedFrameGradients& d_frame);
+                     const RenderOptions& options, const FrameGradients& d_frame);
 
   void Forward(const PixelStrip& strip) override;
   raster::AttributeViewT<const float> recomputed(std::size_t image) const override;
@@ -89,8 +89,8 @@ class ShadeStage : public PixelStage {
   std::span<const StageScene> scenes_;
   const RenderOptions* options_ = nullptr;
   std::size_t pixels_ = 0;  // of an image
-  ShadedFrame* frame_ = nullptr;
-  const ShadedFrameGradients* d_frame_ = nullptr;
+  FrameImages* frame_ = nullptr;
+  const FrameGradients* d_frame_ = nullptr;
   std::vector<std::unique_ptr<StageWorker>> workers_;
   std::vector<StageBand> bands_;  // [image][band]
   std::size_t bands_of_image_ = 0;

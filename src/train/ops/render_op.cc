@@ -9,8 +9,8 @@
 namespace tilegrad::train {
 namespace {
 
-Frame& FrameOf(MeshRenderer& renderer, float) { return renderer.frame; }
-FrameT<double>& FrameOf(MeshRenderer& renderer, double) { return renderer.frame64; }
+PipelineFrame& FrameOf(MeshRenderer& renderer, float) { return renderer.frame; }
+PipelineFrameT<double>& FrameOf(MeshRenderer& renderer, double) { return renderer.frame64; }
 
 // One rendering of a batch and what its way back needs. Lives in the tape's closure.
 template <class T>
@@ -34,11 +34,11 @@ class BatchRender {
   }
 
   Status Forward();
-  Status Backward(const FrameGradientsT<T>& d_frame, std::span<SceneGradientsT<T>> d_scenes);
+  Status Backward(const PipelineCotangentsT<T>& d_frame, std::span<PipelineGradientsT<T>> d_scenes);
   Status Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs,
                    std::span<nn::Tensor> d_inputs);
 
-  const FrameT<T>& frame() const { return frame_; }
+  const PipelineFrameT<T>& frame() const { return frame_; }
 
  private:
   std::span<const T> Positions() const { return std::as_const(positions_).template span<T>(); }
@@ -47,18 +47,18 @@ class BatchRender {
   MeshRenderer& renderer_;
   RenderJob job_;
   nn::Tensor positions_, colors_;
-  std::vector<SceneViewT<T>> scenes_;
-  FrameT<T>& frame_;
+  std::vector<PipelineSceneT<T>> scenes_;
+  PipelineFrameT<T>& frame_;
 };
 
 template <>
 Status BatchRender<float>::Forward() {
-  return renderer_.renderer.Render(scenes_, job_.options, RenderRequest{}, &frame_);
+  return renderer_.renderer.Render(scenes_, job_.options, Outputs{}, &frame_);
 }
 
 template <>
-Status BatchRender<float>::Backward(const FrameGradients& d_frame,
-                                    std::span<SceneGradients> d_scenes) {
+Status BatchRender<float>::Backward(const PipelineCotangents& d_frame,
+                                    std::span<PipelineGradients> d_scenes) {
   return renderer_.renderer.Backward(scenes_, job_.options, frame_, d_frame, d_scenes);
 }
 
@@ -67,8 +67,8 @@ template <>
 Status BatchRender<double>::Forward() {
   frame_ = {};
   for (const auto& scene : scenes_) {
-    FrameT<double> one;
-    RenderRef(scene, job_.options, RenderRequest{}, &one);
+    PipelineFrameT<double> one;
+    RenderRef(scene, job_.options, Outputs{}, &one);
     frame_.face_ids.insert(frame_.face_ids.end(), one.face_ids.begin(), one.face_ids.end());
     frame_.attributes.insert(frame_.attributes.end(), one.attributes.begin(), one.attributes.end());
     frame_.alpha.insert(frame_.alpha.end(), one.alpha.begin(), one.alpha.end());
@@ -77,12 +77,12 @@ Status BatchRender<double>::Forward() {
 }
 
 template <>
-Status BatchRender<double>::Backward(const FrameGradientsT<double>& d_frame,
-                                     std::span<SceneGradientsT<double>> d_scenes) {
+Status BatchRender<double>::Backward(const PipelineCotangentsT<double>& d_frame,
+                                     std::span<PipelineGradientsT<double>> d_scenes) {
   const std::size_t plane =
       static_cast<std::size_t>(job_.options.width) * static_cast<std::size_t>(job_.options.height);
   for (std::size_t n = 0; n < scenes_.size(); ++n) {
-    FrameGradientsT<double> one;
+    PipelineCotangentsT<double> one;
     if (!d_frame.attributes.empty())
       one.attributes = d_frame.attributes.subspan(3 * n * plane, 3 * plane);
     if (!d_frame.alpha.empty()) one.alpha = d_frame.alpha.subspan(n * plane, plane);
@@ -110,12 +110,12 @@ Status BatchRender<T>::Gradients(nn::Context& context, std::span<const nn::Tenso
   nn::Tensor positions = context.Empty(all, nn::kDTypeOf<T>),
              colors = context.Empty(all, nn::kDTypeOf<T>);
   const auto size = static_cast<std::size_t>(positions_.shape()[1] * 3);
-  std::vector<SceneGradientsT<T>> d_scenes(scenes_.size());
+  std::vector<PipelineGradientsT<T>> d_scenes(scenes_.size());
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {
     d_scenes[n].positions = positions.span<T>().subspan(n * size, size);
     d_scenes[n].attributes = colors.span<T>().subspan(n * size, size);
   }
-  FrameGradientsT<T> d_frame;
+  PipelineCotangentsT<T> d_frame;
   if (!d_outputs[0].empty()) d_frame.attributes = d_outputs[0].template span<T>();
   if (!d_outputs[1].empty()) d_frame.alpha = d_outputs[1].template span<T>();
   TILEGRAD_TRY(Backward(d_frame, d_scenes));
@@ -145,7 +145,7 @@ RenderedImages Render(MeshRenderer& renderer, const nn::Var& positions, const nn
       context.Fail(std::move(status));
     return d_inputs;
   };
-  const FrameT<T>& frame = batch->frame();
+  const PipelineFrameT<T>& frame = batch->frame();
   const std::vector<nn::Var> out = nn::External(
       context,
       {.name = "render",

@@ -27,9 +27,9 @@ struct RenderedImages {
 // before the next RenderMeshes.
 struct MeshRenderer {
   explicit MeshRenderer(const Workers& workers) : renderer(workers) {}
-  Renderer renderer;
-  Frame frame;
-  FrameT<double> frame64;
+  Pipeline renderer;
+  PipelineFrame frame;
+  PipelineFrameT<double> frame64;
 };
 
 // positions and colors: [B, V, 3]. f32 renders with `renderer`, f64 with the scalar reference (for

@@ -150,9 +150,10 @@ TEST(Projected, GradientsOfFeaturesAndCornersAreThoseOfDifferences) {
 TEST(Projected, GradientsOfTheMaskAreThoseOfDifferences) {
   Rng rng(8);
   const Workers workers(2);
-  for (const SoftRule rule : {SoftRule::kAllFaces, SoftRule::kPaper}) {
+  for (const AlphaRule rule : {AlphaRule::kAllFaces, AlphaRule::kPaper}) {
     Case c;
-    c.mask.rule = rule, c.mask.paper = {0.5, 4}, c.mask.max_alpha_error = 1e-14;
+    c.mask.rule = rule, c.mask.paper_box = 0.5, c.mask.paper_faces = 4,
+    c.mask.max_alpha_error = 1e-14;
     auto faces = Cast<double>(RandomFaces(2, 6, 0, 0.3, &rng));
     const auto images = Render(faces, c, workers);
     const auto d_mask = Random<double>(images.mask.size(), &rng);
@@ -169,7 +170,7 @@ TEST(Projected, GradientsOfTheMaskAreThoseOfDifferences) {
              1e-5 * (1 + std::abs(d.mask_xy[i]));
     }
     // With the paper's rule a step moves boxes over centres now and then, and alpha jumps.
-    EXPECT_LE(off, rule == SoftRule::kPaper ? 1 : 0);
+    EXPECT_LE(off, rule == AlphaRule::kPaper ? 1 : 0);
   }
 }
 
@@ -264,7 +265,7 @@ TEST(Projected, MaskStaysWithinItsBound) {
 TEST(Projected, SameBitsForAnyNumberOfWorkers) {
   Rng rng(11);
   const auto faces = RandomFaces(3, 700, 4, 0.15, &rng);
-  for (const SoftRule rule : {SoftRule::kAllFaces, SoftRule::kPaper}) {
+  for (const AlphaRule rule : {AlphaRule::kAllFaces, AlphaRule::kPaper}) {
     Case c({150, 90}, 1000);
     c.mask.rule = rule;
     const Workers one(1);
@@ -316,7 +317,8 @@ void CheckGolden(const Json& vectors, double mask_tolerance) {
   const auto faces = FacesOf<T>(vectors);
   for (const Json& golden : vectors["cases"]) {
     Case c({vectors["width"], vectors["height"]}, golden["sigmainv"]);
-    c.mask.rule = SoftRule::kPaper, c.mask.paper = {golden["boxlen"], vectors["knum"]};
+    c.mask.rule = AlphaRule::kPaper, c.mask.paper_box = golden["boxlen"],
+    c.mask.paper_faces = vectors["knum"];
     const auto images = Render(faces, c, workers);
     EXPECT_EQ(std::vector<double>(images.ids.begin(), images.ids.end()),
               Flat(vectors["selected_face_idx"]));
@@ -368,7 +370,7 @@ TEST(Projected, Errors) {
   EXPECT_EQ(soften(), "delta is 0, must be finite and > 0");
   c.mask.delta = 1, c.mask.max_alpha_error = 2;
   EXPECT_EQ(soften(), "max_alpha_error is 2, must be in [0, 1]");
-  c.mask.max_alpha_error = 0, c.mask.paper.max_faces = -1;
+  c.mask.max_alpha_error = 0, c.mask.paper_faces = -1;
   EXPECT_EQ(soften(), "knum is -1, must be >= 0");
 }
 

@@ -91,12 +91,12 @@ struct BoundSummary {
 
 class BoundCheck {
  public:
-  BoundCheck(std::uint64_t number, Renderer* renderer)
+  BoundCheck(std::uint64_t number, Pipeline* renderer)
       : rng_(number, 5), scene_(MakeBoundScene(number)), renderer_(renderer) {}
 
   BoundSummary Run() {
     const RenderOptions& o = scene_.options;
-    const SceneView view = scene_.scene.View();
+    const PipelineScene view = scene_.scene.View();
     raster::ScreenMeshBuffers mesh;
     raster::Project(FaceSourceOf(view, o), o.width, o.height, &mesh);
     const SoftScene soft = SoftSceneOf(mesh, o);
@@ -108,9 +108,9 @@ class BoundCheck {
   }
 
  private:
-  void Draw(Frame* frame) {
-    const SceneView views[] = {scene_.scene.View()};
-    EXPECT_TRUE(renderer_->Render(views, scene_.options, {false, true, false, false}, frame).ok());
+  void Draw(PipelineFrame* frame) {
+    const PipelineScene views[] = {scene_.scene.View()};
+    EXPECT_TRUE(renderer_->Render(views, scene_.options, {.attributes = false}, frame).ok());
     const double e = scene_.options.max_alpha_error;
     // exp(-87) per face is what E = 0 means ("Budget").
     const double allowed = e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(out_.faces);
@@ -136,7 +136,7 @@ class BoundCheck {
     const double e = scene_.options.max_alpha_error;
     ++out_.pixels;
     out_.between += truth.alpha > 1e-6 && truth.alpha < 1 - 1e-6;
-    for (const Frame* frame : {&first_, &permuted_}) {
+    for (const PipelineFrame* frame : {&first_, &permuted_}) {
       const double error = std::abs(static_cast<double>(frame->alpha[i]) - truth.alpha);
       const double beyond = error - truth.rounding;
       out_.over_budget = std::max(out_.over_budget, beyond - e - 1e-37);
@@ -151,15 +151,15 @@ class BoundCheck {
 
   Rng rng_;
   BoundScene scene_;
-  Renderer* renderer_;
-  Frame first_, permuted_;
+  Pipeline* renderer_;
+  PipelineFrame first_, permuted_;
   BoundSummary out_;
 };
 
 void CheckBound(std::uint64_t first, std::size_t count) {
   const Workers workers, one(1);
-  std::vector<std::unique_ptr<Renderer>> renderers;
-  for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Renderer>(one));
+  std::vector<std::unique_ptr<Pipeline>> renderers;
+  for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Pipeline>(one));
   std::vector<BoundSummary> scenes(count);
   workers.For(count, [&](std::size_t n, std::size_t w) {
     scenes[n] = BoundCheck(first + n, renderers[w].get()).Run();

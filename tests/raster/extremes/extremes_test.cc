@@ -30,8 +30,8 @@ struct SceneRange {
 CheckCounts CheckScenes(const SceneRange& range) {
   const Workers workers, one(1);
   const auto count = static_cast<std::size_t>(workers.count());
-  std::vector<std::unique_ptr<Renderer>> renderers;
-  for (std::size_t w = 0; w < count; ++w) renderers.push_back(std::make_unique<Renderer>(one));
+  std::vector<std::unique_ptr<Pipeline>> renderers;
+  for (std::size_t w = 0; w < count; ++w) renderers.push_back(std::make_unique<Pipeline>(one));
   std::vector<CheckCounts> counts(count);
   std::vector<std::string> failures(range.count);
   workers.For(range.count, [&](std::size_t n, std::size_t w) {
@@ -79,7 +79,7 @@ TEST(ExtremesLong, HundredThousandScenes) { CheckOnTargets(1000000, 35000, 50000
 
 void CheckHeap(std::size_t faces) {
   const Workers one(1);
-  Renderer renderer(one);
+  Pipeline renderer(one);
   CheckCounts counts;
   EXPECT_EQ(CheckExtremeScene(MakeHeap(1, faces), 1, &renderer, &counts), "");
   EXPECT_GT(counts.compared, 0u);
@@ -100,16 +100,16 @@ TEST(ExtremesLong, FaceIdsBeyondWhatFloatsCount) {
   RenderOptions options;
   options.width = options.height = 8;
   const Workers workers;
-  Renderer renderer(workers);
-  Frame frame;
-  const SceneView views[] = {scene.View()};
+  Pipeline renderer(workers);
+  PipelineFrame frame;
+  const PipelineScene views[] = {scene.View()};
   ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
   const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), id);
   EXPECT_GT(covered, 10);
   EXPECT_EQ(covered + std::count(frame.face_ids.begin(), frame.face_ids.end(), -1), 64);
   const std::vector<float> d_attributes(64, 1.0f), d_alpha(64, 1.0f);
   std::vector<float> d_positions(scene.positions.size()), d_rows(scene.vertex_count());
-  SceneGradients d[] = {{d_positions, d_rows, false, {}}};
+  PipelineGradients d[] = {{d_positions, d_rows, false, {}}};
   ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d).ok());
   EXPECT_EQ(d_rows[0], 0);
   EXPECT_NEAR(d_rows[1] + d_rows[2] + d_rows[3], static_cast<double>(covered), 1e-4);
@@ -127,13 +127,13 @@ class NonFinite : public testing::TestWithParam<float> {
   }
   std::string Run() {
     const Workers one(1);
-    Renderer renderer(one);
-    Frame frame;
-    const SceneView views[] = {e_.scene.View()};
+    Pipeline renderer(one);
+    PipelineFrame frame;
+    const PipelineScene views[] = {e_.scene.View()};
     Status status = renderer.Render(views, e_.options, {}, &frame);
     if (!status.ok()) return status.message();
     std::vector<float> d_positions(e_.scene.positions.size());
-    SceneGradients d[] = {{d_positions, {}, true, {}}};
+    PipelineGradients d[] = {{d_positions, {}, true, {}}};
     return renderer.Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, d).message();
   }
   // Spoils one number after the other.

@@ -202,8 +202,7 @@ void RandomOptions(RenderOptions* o, Rng* rng) {
 
 void RandomChannels(Rng* rng, TestScene<float>* scene) {
   RandomAttributes(static_cast<int>(rng->Below(5)),
-                   rng->Below(2) == 0 ? AttributeRate::kVertex : AttributeRate::kCorner, rng,
-                   scene);
+                   rng->Below(2) == 0 ? Rate::kVertex : Rate::kCorner, rng, scene);
   const double scale = rng->Below(8) == 0 ? Log(rng, -30, 30) : 1;
   for (float& a : scene->attributes) a = static_cast<float>(a * scale * Sign(rng));
 }

@@ -101,7 +101,7 @@ class Truth {
  public:
   Truth(const ExtremeScene& e, std::uint64_t number)
       : e_(e), rng_(number, 99), scene_(MeshCast<Bounded>(e.scene)) {
-    const SceneView view = e.scene.View();
+    const PipelineScene view = e.scene.View();
     raster::Project(FaceSourceOf(view, e.options), e.options.width, e.options.height, &buffers_);
     mesh_ = buffers_.View();
     soft_ = SoftSceneOf(buffers_, e.options);
@@ -118,8 +118,8 @@ class Truth {
   }
 
   void CheckProjection(Comparison* comparison);
-  void CheckForward(const Frame& frame, Comparison* comparison);
-  void CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
+  void CheckForward(const PipelineFrame& frame, Comparison* comparison);
+  void CheckBackward(const PipelineFrame& frame, Pipeline* renderer, Comparison* comparison,
                      CheckCounts* counts);
 
  private:
@@ -134,15 +134,15 @@ class Truth {
     prepared_.attributes.values = prepared_.clipped_attributes;
   }
   PixelTruth At(std::size_t pixel, std::int32_t id) const;
-  void CheckFaceIds(const Frame& frame, Comparison* comparison) const;
-  void CheckForeground(const Frame& frame, std::size_t pixel, Comparison* comparison) const;
+  void CheckFaceIds(const PipelineFrame& frame, Comparison* comparison) const;
+  void CheckForeground(const PipelineFrame& frame, std::size_t pixel, Comparison* comparison) const;
   bool SameVerticesVisible() const;
   PixelAdjoints AdjointSizes(const PixelTruth& at, const std::vector<Bounded>& d_out) const;
-  void Mask(const Frame& frame, const SoftTruth& soft);
-  void AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const;
+  void Mask(const PipelineFrame& frame, const SoftTruth& soft);
+  void AddInterpolated(const PipelineFrame& frame, PreparedGradients<Bounded>* d) const;
   void AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const;
-  void CompareGradients(const Frame& frame, const SoftTruth& soft, const Status& status,
-                        const SceneGradients& got, Comparison* comparison, CheckCounts* counts);
+  void CompareGradients(const PipelineFrame& frame, const SoftTruth& soft, const Status& status,
+                        const PipelineGradients& got, Comparison* comparison, CheckCounts* counts);
 
   const ExtremeScene& e_;
   Rng rng_;
@@ -233,7 +233,7 @@ PixelTruth Truth::At(std::size_t pixel, std::int32_t id) const {
   return out;
 }
 
-void Truth::CheckFaceIds(const Frame& frame, Comparison* comparison) const {
+void Truth::CheckFaceIds(const PipelineFrame& frame, Comparison* comparison) const {
   std::vector<std::int32_t> ids(e_.pixels(), raster::kNoFace);
   raster::VisibilityRef<float>(mesh_, 0, e_.options.height, ids);
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -243,7 +243,8 @@ void Truth::CheckFaceIds(const Frame& frame, Comparison* comparison) const {
   }
 }
 
-void Truth::CheckForeground(const Frame& frame, std::size_t pixel, Comparison* comparison) const {
+void Truth::CheckForeground(const PipelineFrame& frame, std::size_t pixel,
+                            Comparison* comparison) const {
   const PixelTruth at = this->At(pixel, frame.face_ids[pixel]);
   const auto check = [&](const char* array, std::size_t index, float got, const Bounded& expected) {
     if (at.decided) return comparison->Check(array, index, got, expected);
@@ -274,7 +275,7 @@ void Truth::CheckForeground(const Frame& frame, std::size_t pixel, Comparison* c
   check("inverse depth", pixel, static_cast<float>(1 / d), {kept, z.error + 2 * kBits * kept});
 }
 
-void Truth::CheckForward(const Frame& frame, Comparison* comparison) {
+void Truth::CheckForward(const PipelineFrame& frame, Comparison* comparison) {
   CheckFaceIds(frame, comparison);
   soft_.face_ids.assign(frame.face_ids.begin(), frame.face_ids.end());
   const SoftTruth soft(soft_);
@@ -310,7 +311,7 @@ bool Truth::SameVerticesVisible() const {
 }
 
 // Takes the gradient away from pixels where it does not exist, or depends on rounding.
-void Truth::Mask(const Frame& frame, const SoftTruth& soft) {
+void Truth::Mask(const PipelineFrame& frame, const SoftTruth& soft) {
   for (const std::size_t i : pixels_) {
     if (frame.face_ids[i] < 0) {
       if (!soft.Resolved(i) || soft.Ambiguous(i, true)) d_alpha_[i] = 0;
@@ -352,7 +353,7 @@ void AllowLateDifferences(const raster::ScreenMesh& mesh, const PixelTruth& at, 
   }
 }
 
-void Truth::AddInterpolated(const Frame& frame, PreparedGradients<Bounded>* d) const {
+void Truth::AddInterpolated(const PipelineFrame& frame, PreparedGradients<Bounded>* d) const {
   std::vector<Bounded> d_out(Channels());
   for (const std::size_t i : pixels_) {
     if (frame.face_ids[i] < 0) continue;
@@ -385,7 +386,7 @@ void Truth::AddSoft(const SoftTruth& soft, PreparedGradients<Bounded>* d) const 
 
 struct GradientStorage {
   std::vector<float> positions, attributes;
-  SceneGradients d;
+  PipelineGradients d;
 
   explicit GradientStorage(const TestScene<float>& scene)
       : positions(scene.positions.size()),
@@ -399,14 +400,14 @@ bool NamesWhatOverflows(const Status& status) {
   return at != std::string::npos && m.find('[', at) != std::string::npos;
 }
 
-void Truth::CompareGradients(const Frame& frame, const SoftTruth& soft, const Status& status,
-                             const SceneGradients& got, Comparison* comparison,
-                             CheckCounts* counts) {
+void Truth::CompareGradients(const PipelineFrame& frame, const SoftTruth& soft,
+                             const Status& status, const PipelineGradients& got,
+                             Comparison* comparison, CheckCounts* counts) {
   PreparedGradients<Bounded> d(scene_.View(), prepared_);
   AddInterpolated(frame, &d);
   AddSoft(soft, &d);
   std::vector<Bounded> positions(scene_.positions.size()), attributes(scene_.attributes.size());
-  SceneGradientsT<Bounded> expected{positions, attributes, true, {}};
+  PipelineGradientsT<Bounded> expected{positions, attributes, true, {}};
   PrepareRefBackward(scene_.View(), e_.options, prepared_, d, &expected);
   const CameraT<Bounded>& c = expected.d_camera;
   const Bounded lens[] = {c.fx, c.fy, c.cx, c.cy};
@@ -436,9 +437,9 @@ void Truth::CompareGradients(const Frame& frame, const SoftTruth& soft, const St
   check("d_{fx, fy, cx, cy}", got_lens, lens);
 }
 
-void Truth::CheckBackward(const Frame& frame, Renderer* renderer, Comparison* comparison,
+void Truth::CheckBackward(const PipelineFrame& frame, Pipeline* renderer, Comparison* comparison,
                           CheckCounts* counts) {
-  const SceneView views[] = {e_.scene.View()};
+  const PipelineScene views[] = {e_.scene.View()};
   GradientStorage storage(e_.scene);
   const auto run = [&] {
     return renderer->Backward(views, e_.options, frame, {d_attributes_, d_alpha_}, {&storage.d, 1});
@@ -460,11 +461,12 @@ void CheckCounts::Add(const CheckCounts& other) {
   worst = std::max(worst, other.worst);
 }
 
-std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Renderer* renderer,
+std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Pipeline* renderer,
                               CheckCounts* counts) {
-  Frame frame;
-  const SceneView views[] = {scene.scene.View()};
-  const Status status = renderer->Render(views, scene.options, {true, true, true, true}, &frame);
+  PipelineFrame frame;
+  const PipelineScene views[] = {scene.scene.View()};
+  const Status status =
+      renderer->Render(views, scene.options, {.depth = true, .barycentrics = true}, &frame);
   if (!status.ok()) return "Render: " + status.message();
   Comparison comparison(counts);
   Truth truth(scene, number);

@@ -28,7 +28,7 @@ struct CheckCounts {
 };
 
 // What is wrong, or an empty string. `number` seeds the gradients and the choice of pixels.
-std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Renderer* renderer,
+std::string CheckExtremeScene(const ExtremeScene& scene, std::uint64_t number, Pipeline* renderer,
                               CheckCounts* counts);
 
 }  // namespace tilegrad::test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SoftRule::kPaper through the Renderer: published golden numbers, the reference in double, and
+// AlphaRule::kPaper through the Renderer: published golden numbers, the reference in double, and
 // that it is what it says it is (cut off, and dependent on the order of the faces).
 #include "render/alpha/paper.h"
 
@@ -44,8 +44,8 @@ RenderOptions OptionsOf(const Json& vectors, const Json& c) {
   RenderOptions options;
   options.width = vectors["width"], options.height = vectors["height"];
   options.delta = 1 / c["sigmainv"].get<double>();
-  options.soft_rule = SoftRule::kPaper;
-  options.paper = {c["boxlen"], vectors["knum"]};
+  options.alpha_rule = AlphaRule::kPaper;
+  options.paper_box = c["boxlen"], options.paper_faces = vectors["knum"];
   return options;
 }
 
@@ -67,7 +67,7 @@ void CheckMask(std::span<const double> alpha, const Json& golden, double toleran
 }
 
 // The rule as a stage, with visibility given.
-std::vector<float> AlphaOf(const SceneView& scene, const RenderOptions& options,
+std::vector<float> AlphaOf(const PipelineScene& scene, const RenderOptions& options,
                            std::span<const std::int32_t> face_ids) {
   ImageScratch image;
   raster::Project(FaceSourceOf(scene, options), options.width, options.height, &image.buffers);
@@ -94,8 +94,8 @@ TEST(PaperAlpha, GoldenNumbers) {
       SCOPED_TRACE("sigmainv " + c["sigmainv"].dump() + " boxlen " + c["boxlen"].dump());
       const auto ids = FaceIds(vectors, image);
       const auto truth = SceneOf<double>(vectors, image);
-      FrameT<double> exact;
-      RenderRefWithFaces<double>(truth.View(), options, {false, true, false, false}, ids,
+      PipelineFrameT<double> exact;
+      RenderRefWithFaces<double>(truth.View(), options, {.attributes = false}, ids,
                                  {0, options.height}, &exact);
       CheckMask(exact.alpha, c["soft_mask_golden"][image], 1e-10);
 
@@ -110,8 +110,8 @@ TEST(PaperAlpha, GoldenNumbers) {
 RenderOptions PaperOptions() {
   RenderOptions options;
   options.width = 37, options.height = 41;
-  options.delta = 1e-3, options.soft_rule = SoftRule::kPaper;
-  options.paper = {0.1, 5};
+  options.delta = 1e-3, options.alpha_rule = AlphaRule::kPaper;
+  options.paper_box = 0.1, options.paper_faces = 5;
   return options;
 }
 
@@ -121,12 +121,12 @@ struct Gradients {
 };
 
 Gradients BackwardOf(const TestScene<float>& scene, const RenderOptions& options,
-                     const Frame& frame, std::span<const float> d_alpha, int worker_count) {
+                     const PipelineFrame& frame, std::span<const float> d_alpha, int worker_count) {
   const Workers workers(worker_count);
-  Renderer renderer(workers);
-  const SceneView views[] = {scene.View()};
+  Pipeline renderer(workers);
+  const PipelineScene views[] = {scene.View()};
   Gradients out{std::vector<float>(scene.positions.size()), {}};
-  SceneGradients d[] = {{out.positions, {}, true, {}}};
+  PipelineGradients d[] = {{out.positions, {}, true, {}}};
   EXPECT_TRUE(renderer.Backward(views, options, frame, {{}, d_alpha}, d).ok());
   out.camera = d[0].d_camera;
   return out;
@@ -139,12 +139,12 @@ void CheckAgainstReference(const RenderOptions& options, std::size_t most_differ
   const auto scene = test::TriangleSoup(40, 0.15, options.width, options.height, &rng);
   const auto truth_scene = MeshCast<double>(scene);
   const Workers workers(2);
-  Renderer renderer(workers);
-  const SceneView views[] = {scene.View()};
-  Frame frame;
+  Pipeline renderer(workers);
+  const PipelineScene views[] = {scene.View()};
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
   EXPECT_TRUE(std::isinf(frame.alpha_error_bound));
-  FrameT<double> truth;
+  PipelineFrameT<double> truth;
   RenderRefWithFaces<double>(truth_scene.View(), options, {}, frame.face_ids, {0, options.height},
                              &truth);
   std::vector<float> d_alpha(frame.alpha.size());
@@ -159,7 +159,7 @@ void CheckAgainstReference(const RenderOptions& options, std::size_t most_differ
   EXPECT_GT(between, 100u);
   const std::vector<double> t_d_alpha(d_alpha.begin(), d_alpha.end());
   std::vector<double> t_positions(scene.positions.size());
-  SceneGradientsT<double> t{t_positions, {}, true, {}};
+  PipelineGradientsT<double> t{t_positions, {}, true, {}};
   RenderRefBackward<double>(truth_scene.View(), options, frame.face_ids, {{}, t_d_alpha},
                             {0, options.height}, &t);
   const Gradients got = BackwardOf(scene, options, frame, d_alpha, 2);
@@ -190,14 +190,14 @@ TEST(PaperAlpha, AddsToTheGradientOfAttributes) {
   Rng rng(5);
   const auto scene = test::BumpySphere(4, 6, options.width, options.height, &rng);
   const Workers workers(1);
-  Renderer renderer(workers);
-  const SceneView views[] = {scene.View()};
-  Frame frame;
+  Pipeline renderer(workers);
+  const PipelineScene views[] = {scene.View()};
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
   const std::vector<float> d_alpha(frame.alpha.size(), 1.0f),
       d_attributes(3 * d_alpha.size(), 0.5f);
   std::vector<float> both(scene.positions.size()), one(both.size());
-  SceneGradients d_both[] = {{both, {}, false, {}}}, d_one[] = {{one, {}, false, {}}};
+  PipelineGradients d_both[] = {{both, {}, false, {}}}, d_one[] = {{one, {}, false, {}}};
   ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d_both).ok());
   ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, {}}, d_one).ok());
   const Gradients alpha = BackwardOf(scene, options, frame, d_alpha, 1);
@@ -206,14 +206,14 @@ TEST(PaperAlpha, AddsToTheGradientOfAttributes) {
 
 TEST(PaperAlpha, IsCutOffAndDependsOnTheOrderOfFaces) {
   RenderOptions options = PaperOptions();
-  options.paper = {0.2, 1};
+  options.paper_box = 0.2, options.paper_faces = 1;
   Rng rng(6);
   auto scene = test::TriangleSoup(30, 0.1, options.width, options.height, &rng);
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const auto alpha = [&] {
-    const SceneView views[] = {scene.View()};
+    const PipelineScene views[] = {scene.View()};
     EXPECT_TRUE(renderer.Render(views, options, {}, &frame).ok());
     return frame.alpha;
   };
@@ -232,16 +232,16 @@ TEST(PaperAlpha, BadOptionsAndGradientsAreErrors) {
   Rng rng(7);
   const auto scene = test::TriangleSoup(3, 0.2, options.width, options.height, &rng);
   const Workers workers(1);
-  Renderer renderer(workers);
-  const SceneView views[] = {scene.View()};
-  Frame frame;
+  Pipeline renderer(workers);
+  const PipelineScene views[] = {scene.View()};
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
   std::vector<float> d_alpha(frame.alpha.size()), d_positions(scene.positions.size());
   d_alpha[3] = std::numeric_limits<float>::quiet_NaN();
-  SceneGradients d[] = {{d_positions, {}, false, {}}};
+  PipelineGradients d[] = {{d_positions, {}, false, {}}};
   EXPECT_EQ(renderer.Backward(views, options, frame, {{}, d_alpha}, d).message(),
             "d_frame.alpha[3] is nan");
-  options.paper.box = -1;
+  options.paper_box = -1;
   EXPECT_EQ(renderer.Render(views, options, {}, &frame).message(),
             "options.paper_box is -1, must be finite and >= 0");
 }

@@ -14,15 +14,16 @@ using test::Batch;
 using test::Options;
 
 // Everything a forward and a backward pass put out, as bytes.
-std::string Bytes(Renderer* renderer, Batch* batch, std::size_t first, std::size_t count) {
-  Frame frame;
+std::string Bytes(Pipeline* renderer, Batch* batch, std::size_t first, std::size_t count) {
+  PipelineFrame frame;
   const auto views = std::span(batch->views).subspan(first, count);
   const auto d_scenes = std::span(batch->d_scenes).subspan(first, count);
   const auto part = [&](const std::vector<float>& values) {
     const std::size_t one = values.size() / batch->views.size();
     return std::span<const float>(values).subspan(first * one, count * one);
   };
-  EXPECT_TRUE(renderer->Render(views, batch->options, {true, true, true, true}, &frame).ok());
+  EXPECT_TRUE(
+      renderer->Render(views, batch->options, {.depth = true, .barycentrics = true}, &frame).ok());
   EXPECT_TRUE(renderer
                   ->Backward(views, batch->options, frame,
                              {part(batch->d_attributes), part(batch->d_alpha)}, d_scenes)
@@ -50,7 +51,7 @@ void ExpectSameForAnyWorkerCount(Batch batch) {
   std::string first;
   for (const int count : {1, 2, 3, 7, 16}) {
     const Workers workers(count);
-    Renderer renderer(workers);
+    Pipeline renderer(workers);
     for (int run = 0; run < 3; ++run) {
       const std::string bytes = Bytes(&renderer, &batch, 0, batch.scenes.size());
       if (first.empty()) first = bytes;
@@ -68,7 +69,7 @@ TEST(RendererBits, SameForAnyWorkerCountWhereImagesAreShared) {
 void ExpectSameBatchedAndOneByOne(Batch batch) {
   for (const int count : {1, 2, 3, 7, 16}) {
     const Workers workers(count);
-    Renderer renderer(workers);
+    Pipeline renderer(workers);
     const std::string together = Bytes(&renderer, &batch, 0, batch.scenes.size());
     std::string single;
     for (std::size_t n = 0; n < batch.scenes.size(); ++n) single += Bytes(&renderer, &batch, n, 1);
@@ -86,8 +87,8 @@ TEST(RendererBits, SameBatchedAndOneByOneWhereImagesAreShared) {
 TEST(RendererBits, BackwardDoesNotDependOnWhatWasRenderedLast) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame, other;
+  Pipeline renderer(workers);
+  PipelineFrame frame, other;
   const auto backward = [&] {
     return renderer.Backward(batch.views, Options(), frame, {batch.d_attributes, batch.d_alpha},
                              batch.d_scenes);

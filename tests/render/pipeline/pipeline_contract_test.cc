@@ -38,10 +38,12 @@ bool IsSteadySoon(const std::function<void()>& step) {
 
 void ExpectSteadyStateAllocatesNothing(Batch batch, int count) {
   const Workers workers(count);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const auto step = [&] {
-    ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
+    ASSERT_TRUE(
+        renderer.Render(batch.views, batch.options, {.depth = true, .barycentrics = true}, &frame)
+            .ok());
     ASSERT_TRUE(renderer
                     .Backward(batch.views, batch.options, frame,
                               {batch.d_attributes, batch.d_alpha}, batch.d_scenes)
@@ -70,14 +72,16 @@ TEST(RendererMemory, SteadyStateAllocatesNothing) {
 TEST(RendererMemory, BackwardNeedsFaceIdsAndWhatAlphaLeaves) {
   Batch batch = Batch::Large();
   const Workers workers(1);
-  Frame frame;
+  PipelineFrame frame;
   const auto backward = [&] {  // by a renderer that has not seen the batch before
-    Renderer renderer(workers);
+    Pipeline renderer(workers);
     return renderer.Backward(batch.views, batch.options, frame, {batch.d_attributes, batch.d_alpha},
                              batch.d_scenes);
   };
-  Renderer renderer(workers);
-  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true, true, true}, &frame).ok());
+  Pipeline renderer(workers);
+  ASSERT_TRUE(
+      renderer.Render(batch.views, batch.options, {.depth = true, .barycentrics = true}, &frame)
+          .ok());
   ASSERT_TRUE(backward().ok());
   const auto positions = batch.positions, attributes = batch.attributes;
   frame.attributes.clear(), frame.depth.clear(), frame.barycentrics.clear();
@@ -94,8 +98,8 @@ TEST(RendererMemory, BackwardNeedsFaceIdsAndWhatAlphaLeaves) {
 TEST(RendererMemory, BackwardWithoutTransmittanceIsTheSame) {
   Batch batch = Batch::Large();
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const auto backward = [&] {
     EXPECT_TRUE(renderer
                     .Backward(batch.views, batch.options, frame,
@@ -103,7 +107,7 @@ TEST(RendererMemory, BackwardWithoutTransmittanceIsTheSame) {
                     .ok());
     return batch.positions;
   };
-  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {true, true}, &frame).ok());
+  ASSERT_TRUE(renderer.Render(batch.views, batch.options, {}, &frame).ok());
   ASSERT_EQ(frame.transmittance.size(), frame.alpha.size());
   const auto with = backward();
   frame.transmittance.clear();
@@ -131,19 +135,20 @@ TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
   Batch batch = Batch::Large();
   for (const int count : {1, 3}) {
     const Workers workers(count);
-    Renderer renderer(workers);
-    Frame frame;
-    const auto forward = [&](const RenderRequest& request) {
+    Pipeline renderer(workers);
+    PipelineFrame frame;
+    const auto forward = [&](const Outputs& request) {
       EXPECT_TRUE(renderer.Render(batch.views, batch.options, request, &frame).ok());
       return renderer.stats();
     };
-    EXPECT_TRUE(forward({false, false, false, false}) == (RenderStats{3, 27, 0, 0, 0}));
-    EXPECT_TRUE(forward({false, false, true, false}) == (RenderStats{3, 27, 0, 0, 0}));
-    EXPECT_TRUE(forward({true, false, false, false}) == (RenderStats{3, 27, 27, 0, 0}));
-    EXPECT_TRUE(forward({false, true, false, false}) == (RenderStats{3, 27, 0, 27, 0}));
-    EXPECT_TRUE(forward({true, true, true, true}) == (RenderStats{3, 27, 27, 27, 0}));
-    const auto backward = [&](const FrameGradients& d_frame, bool positions, bool attributes) {
-      std::vector<SceneGradients> wanted(3);
+    EXPECT_TRUE(forward({.alpha = false, .attributes = false}) == (RenderStats{3, 27, 0, 0, 0}));
+    EXPECT_TRUE(forward({.alpha = false, .attributes = false, .depth = true}) ==
+                (RenderStats{3, 27, 0, 0, 0}));
+    EXPECT_TRUE(forward({.alpha = false}) == (RenderStats{3, 27, 27, 0, 0}));
+    EXPECT_TRUE(forward({.attributes = false}) == (RenderStats{3, 27, 0, 27, 0}));
+    EXPECT_TRUE(forward({.depth = true, .barycentrics = true}) == (RenderStats{3, 27, 27, 27, 0}));
+    const auto backward = [&](const PipelineCotangents& d_frame, bool positions, bool attributes) {
+      std::vector<PipelineGradients> wanted(3);
       for (std::size_t n = 0; n < 3; ++n) {
         if (positions) wanted[n].positions = batch.positions[n];
         if (attributes) wanted[n].attributes = batch.attributes[n];
@@ -151,8 +156,8 @@ TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
       EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, wanted).ok());
       return renderer.stats();
     };
-    const FrameGradients colour{batch.d_attributes, {}}, alpha{{}, batch.d_alpha};
-    const FrameGradients both{batch.d_attributes, batch.d_alpha};
+    const PipelineCotangents colour{batch.d_attributes, {}}, alpha{{}, batch.d_alpha};
+    const PipelineCotangents both{batch.d_attributes, batch.d_alpha};
     EXPECT_TRUE(backward(colour, true, true) == (RenderStats{0, 0, 9, 0, 6}));
     EXPECT_TRUE(backward(colour, false, true) == (RenderStats{0, 0, 9, 0, 3}));
     EXPECT_TRUE(backward(alpha, true, false).interpolated == 0);
@@ -166,12 +171,12 @@ TEST(RendererRequest, WhatIsNotWantedIsNotComputed) {
 TEST(RendererRequest, PairsOfAlphaAreCounted) {
   Batch batch = Batch::Large();
   const Workers workers(2);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const auto forward = [&](bool alpha, double error) {
     RenderOptions options = batch.options;
     options.max_alpha_error = error;
-    EXPECT_TRUE(renderer.Render(batch.views, options, {true, alpha}, &frame).ok());
+    EXPECT_TRUE(renderer.Render(batch.views, options, {.alpha = alpha}, &frame).ok());
     return renderer.stats();
   };
   EXPECT_EQ(forward(false, 0).pairs, 0);
@@ -185,7 +190,7 @@ TEST(RendererRequest, PairsOfAlphaAreCounted) {
     before = stats.pairs;
   }
   EXPECT_GT(forward(true, 1e-6).pairs, 0);
-  const auto backward = [&](const FrameGradients& d_frame) {
+  const auto backward = [&](const PipelineCotangents& d_frame) {
     EXPECT_TRUE(renderer.Backward(batch.views, batch.options, frame, d_frame, batch.d_scenes).ok());
     return renderer.stats().pairs;
   };
@@ -196,15 +201,17 @@ TEST(RendererRequest, PairsOfAlphaAreCounted) {
 TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const std::size_t pixels = batch.d_alpha.size();
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, false, false}, &frame).ok());
+  ASSERT_TRUE(
+      renderer.Render(batch.views, Options(), {.alpha = false, .attributes = false}, &frame).ok());
   EXPECT_EQ(frame.face_ids.size(), pixels);
   EXPECT_TRUE(frame.attributes.empty() && frame.alpha.empty() && frame.depth.empty() &&
               frame.barycentrics.empty());
   EXPECT_EQ(frame.channels, 0);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &frame).ok());
+  ASSERT_TRUE(
+      renderer.Render(batch.views, Options(), {.depth = true, .barycentrics = true}, &frame).ok());
   EXPECT_EQ(frame.attributes.size(), 3 * pixels);
   EXPECT_EQ(frame.alpha.size(), pixels);
   EXPECT_EQ(frame.depth.size(), pixels);
@@ -214,14 +221,19 @@ TEST(RendererRequest, WhatIsNotWantedTakesNoMemory) {
 TEST(RendererRequest, ImagesDoNotDependOnWhatElseIsWanted) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame all, one;
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, true, true, true}, &all).ok());
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {true, false, false, false}, &one).ok());
+  Pipeline renderer(workers);
+  PipelineFrame all, one;
+  ASSERT_TRUE(
+      renderer.Render(batch.views, Options(), {.depth = true, .barycentrics = true}, &all).ok());
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {.alpha = false}, &one).ok());
   EXPECT_EQ(one.attributes, all.attributes);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, true, false, false}, &one).ok());
+  ASSERT_TRUE(renderer.Render(batch.views, Options(), {.attributes = false}, &one).ok());
   EXPECT_EQ(one.alpha, all.alpha);
-  ASSERT_TRUE(renderer.Render(batch.views, Options(), {false, false, true, true}, &one).ok());
+  ASSERT_TRUE(
+      renderer
+          .Render(batch.views, Options(),
+                  {.alpha = false, .attributes = false, .depth = true, .barycentrics = true}, &one)
+          .ok());
   EXPECT_EQ(one.depth, all.depth);
   EXPECT_EQ(one.barycentrics, all.barycentrics);
 }
@@ -229,10 +241,10 @@ TEST(RendererRequest, ImagesDoNotDependOnWhatElseIsWanted) {
 TEST(RendererRequest, GradientsThatAreNotWantedAreLeftAlone) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  const FrameGradients d_frame{batch.d_attributes, batch.d_alpha};
+  const PipelineCotangents d_frame{batch.d_attributes, batch.d_alpha};
   ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).ok());
   const auto positions = batch.positions;
   const auto attributes = batch.attributes;
@@ -248,8 +260,8 @@ TEST(RendererRequest, GradientsThatAreNotWantedAreLeftAlone) {
 TEST(RendererRequest, AnEmptyImageGradientIsZero) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
   for (auto& d : batch.positions) std::fill(d.begin(), d.end(), 5.0f);
   ASSERT_TRUE(renderer.Backward(batch.views, Options(), frame, {}, batch.d_scenes).ok());
@@ -266,11 +278,11 @@ std::string ErrorOf(const Spoil& spoil) {
   Batch batch;
   RenderOptions options = Options();
   spoil(&batch, &options);
-  std::vector<SceneView> views;
+  std::vector<PipelineScene> views;
   for (const auto& scene : batch.scenes) views.push_back(scene.View());
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const Status status = renderer.Render(views, options, {}, &frame);
   return status.ok() ? "ok" : status.message();
 }
@@ -312,10 +324,10 @@ TEST(RendererErrors, NameSceneArrayAndIndex) {
 TEST(RendererErrors, BackwardChecksTheFrame) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
-  const auto error = [&](const FrameGradients& d_frame) {
+  const auto error = [&](const PipelineCotangents& d_frame) {
     return renderer.Backward(batch.views, Options(), frame, d_frame, batch.d_scenes).message();
   };
   EXPECT_EQ(error({std::span(batch.d_attributes).first(3), {}}),
@@ -333,8 +345,8 @@ TEST(RendererErrors, BackwardChecksTheFrame) {
 TEST(RendererErrors, AnOverflowingGradientIsNotReturnedSilently) {
   Batch batch;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render(batch.views, Options(), {}, &frame).ok());
   for (float& d : batch.d_attributes) d = std::numeric_limits<float>::max();
   const Status status =
@@ -346,16 +358,17 @@ TEST(RendererErrors, AnOverflowingGradientIsNotReturnedSilently) {
 
 TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   ASSERT_TRUE(renderer.Render({}, Options(), {}, &frame).ok());
   EXPECT_TRUE(frame.face_ids.empty());
-  const SceneView empty[] = {SceneView{}};
-  ASSERT_TRUE(renderer.Render(empty, Options(), {true, true, true, true}, &frame).ok());
+  const PipelineScene empty[] = {PipelineScene{}};
+  ASSERT_TRUE(
+      renderer.Render(empty, Options(), {.depth = true, .barycentrics = true}, &frame).ok());
   for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
   for (const float alpha : frame.alpha) EXPECT_EQ(alpha, 0);
   for (const float depth : frame.depth) EXPECT_TRUE(std::isinf(depth));
-  SceneGradients d[] = {{{}, {}, true, {}}};
+  PipelineGradients d[] = {{{}, {}, true, {}}};
   const std::vector<float> d_alpha(frame.alpha.size(), 1.0f);
   ASSERT_TRUE(renderer.Backward(empty, Options(), frame, {{}, d_alpha}, d).ok());
   EXPECT_EQ(d[0].d_camera.fx, 0);
@@ -368,16 +381,16 @@ TEST(RendererEdgeCases, TheSmallestAndTheLongestImages) {
   const std::vector<std::int32_t> faces = {0, 1, 2};
   const std::vector<float> attributes = {0.1f, 0.5f, 0.9f};
   const Workers workers(3);
-  Renderer renderer(workers);
+  Pipeline renderer(workers);
   for (const auto& [width, height] : {std::pair{1, 1}, {16384, 1}, {1, 16384}, {16384, 5}}) {
     const Camera camera = OrbitCamera({40.0, width, height}, 90, 0, 3);
-    const SceneView scenes[] = {{positions, faces, attributes, 1, AttributeRate::kVertex, camera}};
+    const PipelineScene scenes[] = {{positions, faces, attributes, 1, Rate::kVertex, camera}};
     const RenderOptions options = Options(width, height);
-    Frame frame;
+    PipelineFrame frame;
     ASSERT_TRUE(renderer.Render(scenes, options, {}, &frame).ok());
     const std::vector<float> d_attributes(frame.face_ids.size(), 0.25f);
     std::vector<float> d_positions(9), d_rows(3);
-    SceneGradients d[] = {{d_positions, d_rows, false, {}}};
+    PipelineGradients d[] = {{d_positions, d_rows, false, {}}};
     ASSERT_TRUE(renderer.Backward(scenes, options, frame, {d_attributes, {}}, d).ok());
     const auto covered = std::count(frame.face_ids.begin(), frame.face_ids.end(), 0);
     EXPECT_GT(covered, 0);
@@ -397,16 +410,17 @@ TEST(RendererEdgeCases, BehindOffScreenAndDegenerateFacesAreFiniteBackground) {
   for (int v = 0; v < 12; ++v) scene.faces.push_back(v);
   scene.attributes.assign(12, 1.0f);
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const SceneView views[] = {scene.View()};
-  ASSERT_TRUE(renderer.Render(views, Options(), {true, true, true, true}, &frame).ok());
+  Pipeline renderer(workers);
+  PipelineFrame frame;
+  const PipelineScene views[] = {scene.View()};
+  ASSERT_TRUE(
+      renderer.Render(views, Options(), {.depth = true, .barycentrics = true}, &frame).ok());
   float most = 0;
   for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);
   for (const float alpha : frame.alpha) most = std::max(most, alpha);
   EXPECT_GT(most, 0.1f);  // lines and points are in the soft mask
   std::vector<float> d_positions(scene.positions.size()), d_alpha(frame.alpha.size(), 1.0f);
-  SceneGradients d[] = {{d_positions, {}, true, {}}};
+  PipelineGradients d[] = {{d_positions, {}, true, {}}};
   ASSERT_TRUE(renderer.Backward(views, Options(), frame, {{}, d_alpha}, d).ok());
   for (std::size_t i = 0; i < d_positions.size(); ++i) {
     EXPECT_TRUE(std::isfinite(d_positions[i])) << i;
@@ -424,9 +438,9 @@ TEST(RendererEdgeCases, CulledFacesAreBackgroundWithAlpha) {
   RenderOptions options = Options();
   options.culling = FaceCulling::kBack;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
-  const SceneView views[] = {scene.View()};
+  Pipeline renderer(workers);
+  PipelineFrame frame;
+  const PipelineScene views[] = {scene.View()};
   ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
   float most = 0;
   for (const auto id : frame.face_ids) EXPECT_EQ(id, -1);

@@ -39,7 +39,7 @@ const Case kCases[] = {
     {"corners",
      [](Rng* r) {
        auto scene = test::TriangleSoup(8, 0.5, 8, 8, r);
-       test::RandomAttributes(2, AttributeRate::kCorner, r, &scene);
+       test::RandomAttributes(2, Rate::kCorner, r, &scene);
        return scene;
      },
      Options(8, 8, Interpolation::kPerspective, 1e-2)},
@@ -48,7 +48,7 @@ const Case kCases[] = {
     {"near_clip_corners",
      [](Rng* r) {
        auto scene = test::SoupAroundCamera(24, 9, 7, r);
-       test::RandomAttributes(2, AttributeRate::kCorner, r, &scene);
+       test::RandomAttributes(2, Rate::kCorner, r, &scene);
        return scene;
      },
      Options(9, 7, Interpolation::kScreenLinear, 1e-1)},
@@ -63,7 +63,7 @@ struct Loss {
     for (double& d : d_attributes) d = rng->Uniform(-1, 1);
     for (double& d : d_alpha) d = rng->Uniform(-1, 1);
   }
-  Complex operator()(const FrameT<Complex>& frame) const {
+  Complex operator()(const PipelineFrameT<Complex>& frame) const {
     Complex sum = 0;
     for (std::size_t i = 0; i < d_attributes.size(); ++i)
       sum += d_attributes[i] * frame.attributes[i];
@@ -107,14 +107,14 @@ TEST_P(ReferenceGradient, EqualsComplexStep) {
     EXPECT_GT(CutPixels(scene, options, ids), 5);
   }
   std::vector<double> d_positions(scene.positions.size()), d_attributes(scene.attributes.size());
-  SceneGradientsT<double> d{d_positions, d_attributes, true, {}};
+  PipelineGradientsT<double> d{d_positions, d_attributes, true, {}};
   RenderRefBackward<double>(scene.View(), options, ids, {loss.d_attributes, loss.d_alpha},
                             {0, options.height}, &d);
 
   const auto derivative = [&](Complex* input) {
     const Complex kept = *input;
     *input += Complex(0, kStep);
-    FrameT<Complex> frame;
+    PipelineFrameT<Complex> frame;
     RenderRefWithFaces<Complex>(stepped.View(), options, {}, ids, {0, options.height}, &frame);
     *input = kept;
     return loss(frame).imag() / kStep;

@@ -29,7 +29,7 @@ struct Case {
 
 TestScene<float> CornerSoup(int w, int h, Rng* r) {
   auto scene = test::TriangleSoup(30, 0.3, w, h, r);
-  test::RandomAttributes(5, AttributeRate::kCorner, r, &scene);
+  test::RandomAttributes(5, Rate::kCorner, r, &scene);
   return scene;
 }
 TestScene<float> Soup(int w, int h, Rng* r) { return test::TriangleSoup(60, 0.25, w, h, r); }
@@ -37,12 +37,12 @@ TestScene<float> Sphere(int w, int h, Rng* r) { return test::BumpySphere(14, 20,
 TestScene<float> ClippedSoup(int w, int h, Rng* r) { return test::SoupAroundCamera(30, w, h, r); }
 TestScene<float> ClippedCorners(int w, int h, Rng* r) {
   auto scene = test::SoupAroundCamera(30, w, h, r);
-  test::RandomAttributes(2, AttributeRate::kCorner, r, &scene);
+  test::RandomAttributes(2, Rate::kCorner, r, &scene);
   return scene;
 }
 TestScene<float> ManyChannels(int w, int h, Rng* r) {
   auto scene = test::BumpySphere(8, 10, w, h, r);
-  test::RandomAttributes(17, AttributeRate::kVertex, r, &scene);
+  test::RandomAttributes(17, Rate::kVertex, r, &scene);
   return scene;
 }
 
@@ -66,7 +66,7 @@ RenderOptions OptionsOf(const Case& c) {
   return options;
 }
 
-constexpr RenderRequest kEverything{true, true, true, true};
+constexpr Outputs kEverything{.depth = true, .barycentrics = true};
 
 double MaxAbs(const auto& values) {
   double most = 0;
@@ -108,11 +108,11 @@ TEST_P(AgainstReference, ForwardImages) {
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     const Workers workers(1);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
+    Pipeline renderer(workers);
+    PipelineFrame frame;
+    const PipelineScene views[] = {scene.View()};
     ASSERT_TRUE(renderer.Render(views, options, kEverything, &frame).ok());
-    FrameT<double> truth;
+    PipelineFrameT<double> truth;
     RenderRefWithFaces<double>(truth_scene.View(), options, kEverything, frame.face_ids,
                                {0, options.height}, &truth);
     // A pixel on a sliver may be off by much more than others: those are counted.
@@ -148,10 +148,11 @@ TEST_P(AgainstReference, FaceIds) {
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     const Workers workers(1);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
-    ASSERT_TRUE(renderer.Render(views, options, {false, false, false, false}, &frame).ok());
+    Pipeline renderer(workers);
+    PipelineFrame frame;
+    const PipelineScene views[] = {scene.View()};
+    ASSERT_TRUE(
+        renderer.Render(views, options, {.alpha = false, .attributes = false}, &frame).ok());
     // The double reference rounds vertices to subpixels from better coordinates: a pixel may differ
     // where a coordinate sits at the boundary of rounding and a centre within 1/1024 pixel. With
     // edges of about 1/4 of the pixels' number in length, 1/1024 of those centres are that near.
@@ -177,15 +178,15 @@ TEST_P(AgainstReference, Gradients) {
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     const Workers workers(2);
-    Renderer renderer(workers);
-    Frame frame;
-    const SceneView views[] = {scene.View()};
+    Pipeline renderer(workers);
+    PipelineFrame frame;
+    const PipelineScene views[] = {scene.View()};
     ASSERT_TRUE(renderer.Render(views, options, {}, &frame).ok());
     std::vector<float> positions(scene.positions.size()), attributes(scene.attributes.size());
-    SceneGradients d[] = {{positions, attributes, true, {}}};
+    PipelineGradients d[] = {{positions, attributes, true, {}}};
     ASSERT_TRUE(renderer.Backward(views, options, frame, {d_attributes, d_alpha}, d).ok());
     std::vector<double> t_positions(positions.size()), t_attributes(attributes.size());
-    SceneGradientsT<double> t{t_positions, t_attributes, true, {}};
+    PipelineGradientsT<double> t{t_positions, t_attributes, true, {}};
     RenderRefBackward<double>(truth_scene.View(), options, frame.face_ids,
                               {td_attributes, td_alpha}, {0, options.height}, &t);
     const auto check = [&](const char* what, const auto& got, const auto& expected, double bound) {

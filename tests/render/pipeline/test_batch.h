@@ -21,10 +21,10 @@ inline RenderOptions Options(int width = kWidth, int height = kHeight) {
 struct Batch {
   RenderOptions options;
   std::vector<TestScene<float>> scenes;
-  std::vector<SceneView> views;
+  std::vector<PipelineScene> views;
   std::vector<float> d_attributes, d_alpha;
   std::vector<std::vector<float>> positions, attributes;
-  std::vector<SceneGradients> d_scenes;
+  std::vector<PipelineGradients> d_scenes;
 
   // A sphere, soups, one of them cut by the near plane; each image is one task.
   Batch() : options(Options()) {

@@ -15,10 +15,9 @@ namespace tilegrad::test {
 template <class T>
 using TestScene = OwnedMesh<T>;
 
-inline void RandomAttributes(int channels, AttributeRate rate, Rng* rng, TestScene<float>* scene) {
+inline void RandomAttributes(int channels, Rate rate, Rng* rng, TestScene<float>* scene) {
   scene->channels = channels, scene->rate = rate;
-  const std::size_t rows =
-      rate == AttributeRate::kVertex ? scene->vertex_count() : scene->faces.size();
+  const std::size_t rows = rate == Rate::kVertex ? scene->vertex_count() : scene->faces.size();
   scene->attributes.resize(rows * static_cast<std::size_t>(channels));
   for (float& a : scene->attributes) a = static_cast<float>(rng->Uniform());
 }
@@ -39,7 +38,7 @@ inline TestScene<float> TriangleSoup(std::size_t faces, double size, int width, 
       scene.faces.push_back(static_cast<std::int32_t>(3 * f) + k);
     }
   }
-  RandomAttributes(3, AttributeRate::kVertex, rng, &scene);
+  RandomAttributes(3, Rate::kVertex, rng, &scene);
   return scene;
 }
 
@@ -64,7 +63,7 @@ inline TestScene<float> BumpySphere(int rings, int segments, int width, int heig
       for (const int v : {a, c, b, b, c, d}) scene.faces.push_back(v);
     }
   }
-  RandomAttributes(3, AttributeRate::kVertex, rng, &scene);
+  RandomAttributes(3, Rate::kVertex, rng, &scene);
   return scene;
 }
 

@@ -36,13 +36,13 @@ struct Pool {
     faces_of = {0, 0, 1, 2, 3, 3};
     for (const std::size_t n : {0, 2, 3, 4}) faces.push_back(scenes[n].faces);
   }
-  SceneView View(std::size_t n) const {
-    SceneView view = scenes[n].View();
+  PipelineScene View(std::size_t n) const {
+    PipelineScene view = scenes[n].View();
     view.faces = faces[faces_of[n]];
     return view;
   }
-  std::vector<SceneView> Views(const std::vector<std::size_t>& which) const {
-    std::vector<SceneView> out;
+  std::vector<PipelineScene> Views(const std::vector<std::size_t>& which) const {
+    std::vector<PipelineScene> out;
     for (const std::size_t n : which) out.push_back(View(n));
     return out;
   }
@@ -88,16 +88,16 @@ TEST(Topologies, KnowWhenFacesHaveChanged) {
 }
 
 // Everything that a scene's image and gradients are, as bytes.
-std::string Bytes(Renderer* renderer, const std::vector<SceneView>& views) {
+std::string Bytes(Pipeline* renderer, const std::vector<PipelineScene>& views) {
   const RenderOptions options = test::Options();
-  Frame frame;
+  PipelineFrame frame;
   EXPECT_TRUE(renderer->Render(views, options, {}, &frame).ok());
   std::vector<std::vector<float>> positions, attributes;
-  for (const SceneView& view : views) {
+  for (const PipelineScene& view : views) {
     positions.emplace_back(view.positions.size());
     attributes.emplace_back(view.attributes.size());
   }
-  std::vector<SceneGradients> d_scenes;
+  std::vector<PipelineGradients> d_scenes;
   for (std::size_t n = 0; n < views.size(); ++n) {
     d_scenes.push_back({positions[n], attributes[n], false, {}});
   }
@@ -125,7 +125,7 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
   Rng rng(6, 1);
   for (const int count : {1, 3}) {
     const Workers workers(count);
-    Renderer renderer(workers);
+    Pipeline renderer(workers);
     for (int round = 0; round < 120; ++round) {
       std::vector<std::size_t> which(1 + rng.Below(6));
       for (std::size_t& n : which) n = rng.Below(pool.scenes.size());
@@ -136,7 +136,7 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
       }
       std::string one_by_one;
       for (const std::size_t n : which) {
-        Renderer fresh(workers);
+        Pipeline fresh(workers);
         one_by_one += Bytes(&fresh, {pool.View(n)});
       }
       ASSERT_TRUE(Bytes(&renderer, pool.Views(which)) == one_by_one)
@@ -148,8 +148,8 @@ TEST(Topologies, WhatWasRenderedBeforeDoesNotMatter) {
 TEST(Topologies, AnIndexOutOfRangeIsNamedAndForgotten) {
   Pool pool;
   const Workers workers(1);
-  Renderer renderer(workers);
-  Frame frame;
+  Pipeline renderer(workers);
+  PipelineFrame frame;
   const std::string before = Bytes(&renderer, pool.Views({0, 1, 3}));
   const std::int32_t good = std::exchange(pool.faces[2][7], 1 << 20);
   const Status status = renderer.Render(pool.Views({0, 1, 3}), test::Options(), {}, &frame);

@@ -9,9 +9,9 @@
 
 #include "base/rng.h"
 #include "raster/interpolate_ref.h"
+#include "render/engine.h"
 #include "render/pipeline/pipeline_ref.h"
-#include "render/renderer.h"
-#include "render/renderer_ref.h"
+#include "render/reference.h"
 
 namespace tilegrad {
 namespace {
@@ -40,7 +40,7 @@ struct Wall {
   // What float holds.
   static T Number(double x) { return static_cast<T>(static_cast<float>(x)); }
 
-  SceneViewT<T> View() const { return {positions, faces, uvs, 2, AttributeRate::kVertex, camera}; }
+  PipelineSceneT<T> View() const { return {positions, faces, uvs, 2, Rate::kVertex, camera}; }
 };
 
 // A screen mesh in double, number for number.
@@ -68,7 +68,7 @@ TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
     const raster::ScreenMeshT<double> mesh = buffers.View();
     const std::vector<double> values(scene.attributes.values.begin(),
                                      scene.attributes.values.end());
-    const raster::AttributeViewT<const double> attributes{values, 2, AttributeRate::kVertex};
+    const raster::AttributeViewT<const double> attributes{values, 2, Rate::kVertex};
     for (std::size_t f = 0; f < mesh.faces(); ++f) {
       if (mesh.reject[f] != raster::kFaceDrawn) continue;
       const auto mode = Interpolation::kPerspective;
@@ -91,11 +91,11 @@ TEST(UvLevels, OfFloatMeshesLoseNothingInTheSetUp) {
 }
 
 template <class T>
-ShadedSceneT<T> TwoSided(const Wall<T>& wall) {
-  ShadedSceneT<T> scene;
-  static_cast<SceneViewT<T>&>(scene) = wall.View();
-  scene.attributes = {}, scene.channels = 0;
-  scene.model.normals = NormalKind::kFlat, scene.model.two_sided = true;
+SceneT<T> TwoSided(const Wall<T>& wall) {
+  SceneT<T> scene;
+  const PipelineSceneT<T> mesh = wall.View();
+  scene.positions = mesh.positions, scene.faces = mesh.faces, scene.camera = mesh.camera;
+  scene.shading.normals = Normals::kFlat, scene.shading.two_sided = true;
   return scene;
 }
 
@@ -103,19 +103,19 @@ ShadedSceneT<T> TwoSided(const Wall<T>& wall) {
 // their area there is beyond float. A normal turned the wrong way would be off by 2.
 TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
   const Workers workers(1);
-  ShadedRenderer renderer(workers);
-  ShadedRequest request;
+  Engine renderer(workers);
+  Outputs request;
   request.color = request.alpha = false, request.normals = true;
   int pixels = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     Rng rng(seed, 2), same(seed, 2);
     const Wall<float> wall(100, 1e-6, &rng);
     const Wall<double> wide(100, 1e-6, &same);
-    const ShadedScene scene = TwoSided(wall);
-    ShadedFrame frame;
+    const Scene scene = TwoSided(wall);
+    FrameImages frame;
     ASSERT_TRUE(renderer.Render({&scene, 1}, Options(), request, &frame).ok());
-    ShadedFrameT<double> truth;
-    ShadedRenderRef<double>(TwoSided(wide), Options(), request, frame.face_ids, &truth);
+    FrameImagesT<double> truth;
+    ReferenceRender<double>(TwoSided(wide), Options(), request, frame.face_ids, &truth);
     int off = 0;
     for (std::size_t i = 0; i < frame.normals.size(); ++i) {
       off += std::abs(static_cast<double>(frame.normals[i]) - truth.normals[i]) > 1e-3;

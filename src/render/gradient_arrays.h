@@ -11,22 +11,25 @@
 #include <string_view>
 #include <vector>
 
-#include "api/convert.h"
 #include "base/error.h"
-#include "tilegrad/scene.h"
+#include "render/scene_fields.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad {
 
 template <class T>
 class GradientArrays {
  public:
   // Errors: two arrays that have memory in common and are not the same array for the same thing.
-  Status Check(std::span<const engine::ShadedSceneT<T>> scenes,
-               std::span<const SceneGradientsT<T>> gradients) {
+  Status Check(std::span<const SceneT<T>> scenes, std::span<const SceneGradientsT<T>> gradients) {
     arrays_.clear();
+    const SceneT<T> nothing;
     for (std::size_t n = 0; n < gradients.size(); ++n) {
-      AddAll(n, gradients[n]);
-      if (n < scenes.size()) AddTextures(n, scenes[n], gradients[n]);
+      const SceneT<T>& scene = n < scenes.size() ? scenes[n] : nothing;
+      ForEachGradientArray(scene, gradients[n],
+                           [&](const char* name, std::span<T> array, int width) {
+                             if (!array.empty())
+                               arrays_.push_back({array.data(), array.size(), n, name, width});
+                           });
     }
     std::sort(arrays_.begin(), arrays_.end(), Before);
     for (std::size_t i = 1; i < arrays_.size(); ++i) {
@@ -56,22 +59,7 @@ class GradientArrays {
     return a.scene < b.scene;
   }
 
-  void Add(std::string_view name, std::size_t scene, std::span<T> array, int width = 0) {
-    if (!array.empty()) arrays_.push_back({array.data(), array.size(), scene, name, width});
-  }
-  void AddAll(std::size_t scene, const SceneGradientsT<T>& d) {
-    Add("positions", scene, d.positions), Add("colors", scene, d.colors), Add("uvs", scene, d.uvs);
-    Add("normals", scene, d.normals), Add("light_directions", scene, d.light_directions);
-    Add("sh", scene, d.sh), Add("attributes", scene, d.attributes);
-  }
-  void AddTextures(std::size_t n, const engine::ShadedSceneT<T>& scene,
-                   const SceneGradientsT<T>& d) {
-    for (std::size_t t = 0; t < std::min(d.textures.size(), scene.textures.size()); ++t) {
-      Add("textures", n, d.textures[t], scene.textures[t].width);
-    }
-  }
-
   std::vector<Array> arrays_;
 };
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive shaded renderer: renderer_ref.h with every attribute interpolated at every corner, and
-// shade_pixel_ref.h at every pixel. It is the truth that tests hold the ShadedRenderer to, with T =
-// double or std::complex<double> (complex step). One scene at a time; inputs are not checked.
+// The naive renderer: pipeline_ref.h with every attribute interpolated at every corner, and
+// pixel_ref.h at every pixel. It is the truth that tests hold the Renderer to, with T = double or
+// std::complex<double> (complex step). One scene at a time; inputs are not checked.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +31,8 @@ struct RefPixel {
 };
 
 template <class T>
-RefPixel<T> InterpolatePixelRef(const ShadedRefScene<T>& s, const RenderOptions& options, int j,
-                                int i, std::int32_t face) {
+RefPixel<T> InterpolatePixelRef(const RefScene<T>& s, const RenderOptions& options, int j, int i,
+                                std::int32_t face) {
   RefPixel<T> out;
   out.face = static_cast<std::size_t>(face);
   out.index = static_cast<std::size_t>(i) * static_cast<std::size_t>(options.width) +
@@ -60,7 +60,7 @@ void ForEachPixelPart(const VaryingSet& set, ShadePixel<T>* p, const Visit& visi
 }
 
 template <class T>
-ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& options,
+ShadePixel<T> ShadePixelOf(const RefScene<T>& s, const RenderOptions& options,
                            const RefPixel<T>& at) {
   ShadePixel<T> p;
   ForEachPixelPart(s.set, &p, [&](int first, std::span<T> part) {
@@ -70,7 +70,7 @@ ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& opti
   const auto source = static_cast<std::size_t>(mesh.source_face[at.face]);
   const auto& surfaces = s.scene->face_surfaces;
   p.surface = surfaces.empty() ? 0 : static_cast<std::size_t>(surfaces[source]);
-  if (s.scene->model.two_sided) {
+  if (s.scene->shading.two_sided) {
     const auto c = raster::CornersOf(mesh, at.face);
     const T area = (c.x[1] - c.x[0]) * (c.y[2] - c.y[0]) - (c.x[2] - c.x[0]) * (c.y[1] - c.y[0]);
     p.side = RealPart(area) <= 0 ? 1.0f : -1.0f;
@@ -89,7 +89,7 @@ ShadePixel<T> ShadePixelOf(const ShadedRefScene<T>& s, const RenderOptions& opti
 
 // Calls visit(pixel) for each foreground pixel.
 template <class T, class Visit>
-void ForEachPixelRef(const ShadedRefScene<T>& s, const RenderOptions& options,
+void ForEachPixelRef(const RefScene<T>& s, const RenderOptions& options,
                      std::span<const std::int32_t> face_ids, const Visit& visit) {
   for (int i = 0; i < options.height; ++i) {
     for (int j = 0; j < options.width; ++j) {
@@ -101,10 +101,10 @@ void ForEachPixelRef(const ShadedRefScene<T>& s, const RenderOptions& options,
 }
 
 template <class T>
-void ShadePixelIntoFrame(const ShadedRefScene<T>& s, const RenderOptions& options,
-                         const RefPixel<T>& at, ShadedFrameT<T>* frame) {
+void ShadePixelIntoFrame(const RefScene<T>& s, const RenderOptions& options, const RefPixel<T>& at,
+                         FrameImagesT<T>* frame) {
   const ShadePixel<T> p = ShadePixelOf(s, options, at);
-  const PixelValues<T> v = PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids).Forward(p);
+  const PixelValues<T> v = PixelShaderRef<T>(s.scene->shading, s.uniforms, s.pyramids).Forward(p);
   const std::size_t plane = frame->face_ids.size();
   const auto write = [&](AlignedVector<T>& image, std::span<const T> values) {
     for (std::size_t c = 0; c < values.size() && !image.empty(); ++c) {
@@ -122,11 +122,10 @@ void ShadePixelIntoFrame(const ShadedRefScene<T>& s, const RenderOptions& option
 
 // All images that `request` asks for, with visibility given as ids of the scene's faces [H,W].
 template <class T>
-void ShadedRenderRef(const ShadedSceneT<T>& scene, const RenderOptions& options,
-                     const ShadedRequest& request, std::span<const std::int32_t> face_ids,
-                     ShadedFrameT<T>* frame) {
-  ShadedRefScene<T> s;
-  PrepareShadedRef(scene, options, &s);
+void ReferenceRender(const SceneT<T>& scene, const RenderOptions& options, const Outputs& request,
+                     std::span<const std::int32_t> face_ids, FrameImagesT<T>* frame) {
+  RefScene<T> s;
+  PrepareRefScene(scene, options, &s);
   SizeFrame(1, scene.channels, options, request, frame);
   frame->face_ids.assign(face_ids.begin(), face_ids.end());
   const std::size_t plane = face_ids.size();
@@ -146,19 +145,19 @@ void ShadedRenderRef(const ShadedSceneT<T>& scene, const RenderOptions& options,
 
 // Gradients of a scene before they are brought back to its arrays.
 template <class T>
-struct ShadedRefGradients {
+struct RefGradients {
   PreparedGradients<T> prepared;
   ShadeUniforms<T> uniforms;
   shade::Vec3<T> depth_axis = {};
   T depth_shift = T(0);
 
-  explicit ShadedRefGradients(const ShadedRefScene<T>& s) : prepared(s.view, s.prepared) {
+  explicit RefGradients(const RefScene<T>& s) : prepared(s.view, s.prepared) {
     uniforms.surfaces.resize(s.uniforms.surfaces.size());
     for (auto& surface : uniforms.surfaces) {
       surface.base_color = surface.ambient = surface.diffuse = surface.specular = {};
       surface.shininess = T(0);
     }
-    uniforms.lights.resize(s.uniforms.lights.size());
+    uniforms.lights.resize(s.uniforms.lights.size(), shade::kNoLight<T>);
     for (const auto& pyramid : s.pyramids) {
       uniforms.texels.emplace_back(pyramid.texels.size(), T(0));
     }
@@ -167,9 +166,9 @@ struct ShadedRefGradients {
 
 // Adds the adjoint of one foreground pixel.
 template <class T>
-void ShadePixelBackward(const ShadedRefScene<T>& s, const RenderOptions& options,
-                        const ShadedFrameGradientsT<T>& d_frame, const RefPixel<T>& at,
-                        ShadedRefGradients<T>* d) {
+void ShadePixelBackward(const RefScene<T>& s, const RenderOptions& options,
+                        const FrameGradientsT<T>& d_frame, const RefPixel<T>& at,
+                        RefGradients<T>* d) {
   const std::size_t plane =
       static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   const auto read = [&](std::span<const T> image, std::span<T> out) {
@@ -188,7 +187,7 @@ void ShadePixelBackward(const ShadedRefScene<T>& s, const RenderOptions& options
   const ShadePixel<T> p = ShadePixelOf(s, options, at);
   ShadePixel<T> d_p;
   d_p.color = {}, d_p.uv = d_uv;
-  PixelShaderRef<T>(s.scene->model, s.uniforms, s.pyramids)
+  PixelShaderRef<T>(s.scene->shading, s.uniforms, s.pyramids)
       .Backward(p, d_color, d_normal, &d_p, &d->uniforms);
   for (std::size_t c = 0; c < 3; ++c) {
     d_p.position[c] -= s.scene->camera.rotation[6 + c] * d_depth[0];
@@ -207,27 +206,26 @@ void ShadePixelBackward(const ShadedRefScene<T>& s, const RenderOptions& options
 
 // From packed attributes to the scene's arrays; d_positions is complete.
 template <class T>
-void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::span<T> d_positions,
-               ShadedGradientsT<T>* d_scene) {
-  const ShadedSceneT<T>& scene = *s.scene;
+void UnpackRef(const RefScene<T>& s, std::span<const T> d_packed, std::span<T> d_positions,
+               const SceneGradientsT<T>& d_scene) {
+  const SceneT<T>& scene = *s.scene;
   const auto channels = static_cast<std::size_t>(s.set.channels());
-  for (const auto stream : {d_scene->colors, d_scene->uvs, d_scene->normals,
-                            d_scene->light_directions, d_scene->attributes}) {
-    std::fill(stream.begin(), stream.end(), T(0));
-  }
-  const RefStreams<T> streams{d_positions,      d_scene->colors,           d_scene->uvs,
-                              d_scene->normals, d_scene->light_directions, d_scene->attributes};
-  ForEachRefStream(scene, streams, [&](Varying v, AttributeRate rate, std::span<T> stream) {
-    const auto width = static_cast<std::size_t>(s.set.width(v));
-    const T scale = T(StreamScale(scene, v));
-    for (std::size_t i = 0; i < scene.faces.size() && !stream.empty(); ++i) {
+  SceneGradientsT<T> d = d_scene;
+  d.positions = d_positions;
+  ForEachStream(scene, d, [&](const SceneStream<T>& stream) {
+    const std::span<T> out = stream.gradient;
+    if (stream.what != Varying::kPosition) std::fill(out.begin(), out.end(), T(0));
+    if (stream.what == Varying::kNormal && scene.shading.normals != Normals::kGiven) return;
+    const auto width = static_cast<std::size_t>(s.set.width(stream.what));
+    const T scale = T(StreamScale(scene, stream.what));
+    for (std::size_t i = 0; i < scene.faces.size() && !out.empty(); ++i) {
       for (std::size_t c = 0; c < width; ++c) {
-        stream[StreamRow(scene, rate, i) * width + c] +=
-            scale * d_packed[i * channels + static_cast<std::size_t>(s.set.first(v)) + c];
+        out[StreamRow(scene, stream.rate, i) * width + c] +=
+            scale * d_packed[i * channels + static_cast<std::size_t>(s.set.first(stream.what)) + c];
       }
     }
   });
-  if (scene.model.normals == NormalKind::kGiven) return;
+  if (scene.shading.normals == Normals::kGiven) return;
   std::vector<shade::Vec3<T>> d_units(s.normals.size());
   const auto first = static_cast<std::size_t>(s.set.first(Varying::kNormal));
   for (std::size_t i = 0; i < scene.faces.size(); ++i) {
@@ -236,7 +234,7 @@ void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::spa
     }
   }
   const shade::TriangleMeshT<T> mesh{scene.positions, scene.faces};
-  if (scene.model.normals == NormalKind::kSmooth) {
+  if (scene.shading.normals == Normals::kSmooth) {
     shade::SmoothNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
   } else {
     shade::FlatNormalsAdjointRef<T>(mesh, s.normals, d_units, d_positions);
@@ -244,44 +242,45 @@ void UnpackRef(const ShadedRefScene<T>& s, std::span<const T> d_packed, std::spa
 }
 
 template <class T>
-void UniformsBackRef(const ShadedRefScene<T>& s, const ShadedRefGradients<T>& d,
-                     ShadedGradientsT<T>* d_scene) {
+void UniformsBackRef(const RefScene<T>& s, const RefGradients<T>& d,
+                     const SceneGradientsT<T>& d_scene) {
   const ShadeUniforms<T>& u = d.uniforms;
-  std::copy_n(u.surfaces.begin(), d_scene->surfaces.size(), d_scene->surfaces.begin());
-  for (std::size_t k = 0; k < d_scene->lights.size(); ++k) {
-    d_scene->lights[k] = {{}, u.lights[k].intensity};
+  std::copy_n(u.surfaces.begin(), d_scene.surfaces.size(), d_scene.surfaces.begin());
+  for (std::size_t k = 0; k < d_scene.lights.size(); ++k) {
+    d_scene.lights[k] = {{}, u.lights[k].intensity};
     shade::NormalizeAdjointRef<T>({s.uniforms.lights[k].direction, s.inverse_lengths[k]},
-                                  u.lights[k].direction, d_scene->lights[k].direction);
+                                  u.lights[k].direction, d_scene.lights[k].direction);
   }
-  std::fill(d_scene->sh.begin(), d_scene->sh.end(), T(0));
-  if (!d_scene->sh.empty()) {
-    shade::ShPolynomialAdjoint<T>(s.scene->model.sh_basis, u.sh, d_scene->sh);
+  std::fill(d_scene.sh.begin(), d_scene.sh.end(), T(0));
+  if (!d_scene.sh.empty()) {
+    shade::ShPolynomialAdjoint<T>(shade::ShBasis::kOrthonormal, u.sh, d_scene.sh);
   }
-  for (std::size_t t = 0; t < d_scene->textures.size(); ++t) {
+  for (std::size_t t = 0; t < d_scene.textures.size(); ++t) {
     std::vector<T> texels = u.texels[t];
     s.pyramids[t].Fold(texels);
-    std::copy_n(texels.begin(), d_scene->textures[t].size(), d_scene->textures[t].begin());
+    std::copy_n(texels.begin(), d_scene.textures[t].size(), d_scene.textures[t].begin());
   }
+  CameraT<T>* const d_camera = d_scene.camera;
+  if (d_camera == nullptr) return;
   const CameraT<T>& camera = s.scene->camera;
   for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t c = 0; c < 3; ++c) {
-      d_scene->d_camera.rotation[3 * r + c] -= camera.translation[r] * u.eye[c];
-      d_scene->d_camera.translation[r] -= camera.rotation[3 * r + c] * u.eye[c];
+      d_camera->rotation[3 * r + c] -= camera.translation[r] * u.eye[c];
+      d_camera->translation[r] -= camera.rotation[3 * r + c] * u.eye[c];
     }
-    d_scene->d_camera.rotation[6 + r] += d.depth_axis[r];
+    d_camera->rotation[6 + r] += d.depth_axis[r];
   }
-  d_scene->d_camera.translation[2] += d.depth_shift;
+  d_camera->translation[2] += d.depth_shift;
 }
 
-// As ShadedRenderer::Backward, for one image. d_scene->d_camera is always filled.
+// As RendererT::Backward, for one image.
 template <class T>
-void ShadedRenderRefBackward(const ShadedSceneT<T>& scene, const RenderOptions& options,
+void ReferenceRenderBackward(const SceneT<T>& scene, const RenderOptions& options,
                              std::span<const std::int32_t> face_ids,
-                             const ShadedFrameGradientsT<T>& d_frame,
-                             ShadedGradientsT<T>* d_scene) {
-  ShadedRefScene<T> s;
-  PrepareShadedRef(scene, options, &s);
-  ShadedRefGradients<T> d(s);
+                             const FrameGradientsT<T>& d_frame, const SceneGradientsT<T>& d_scene) {
+  RefScene<T> s;
+  PrepareRefScene(scene, options, &s);
+  RefGradients<T> d(s);
   ForEachPixelRef(s, options, face_ids,
                   [&](const RefPixel<T>& at) { ShadePixelBackward(s, options, d_frame, at, &d); });
   for (std::size_t k = 0; k < face_ids.size() && !d_frame.alpha.empty(); ++k) {
@@ -291,11 +290,11 @@ void ShadedRenderRefBackward(const ShadedSceneT<T>& scene, const RenderOptions& 
     BackgroundAlphaRefBackward(s.prepared, options, px, py, d_frame.alpha[k], &d.prepared);
   }
   std::vector<T> d_positions(scene.positions.size(), T(0)), d_packed(s.packed.size(), T(0));
-  SceneGradientsT<T> d_view{d_positions, d_packed, true, {}};
+  PipelineGradientsT<T> d_view{d_positions, d_packed, true, {}};
   PrepareRefBackward(s.view, options, s.prepared, d.prepared, &d_view);
-  d_scene->d_camera = d_view.d_camera;
+  if (d_scene.camera != nullptr) *d_scene.camera = d_view.d_camera;
   UnpackRef<T>(s, d_packed, d_positions, d_scene);
-  std::copy_n(d_positions.begin(), d_scene->positions.size(), d_scene->positions.begin());
+  std::copy_n(d_positions.begin(), d_scene.positions.size(), d_scene.positions.begin());
   UniformsBackRef(s, d, d_scene);
 }
 

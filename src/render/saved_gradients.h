@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// GradientMode::kAdd over an engine that overwrites: what the caller's arrays hold is kept aside,
+// GradientMode::kAdd over a renderer that overwrites: what the caller's arrays hold is kept aside,
 // and added when the gradients are there.
 #pragma once
 
@@ -11,24 +11,20 @@
 #include <vector>
 
 #include "base/aligned.h"
-#include "tilegrad/scene.h"
+#include "render/scene_fields.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad {
 
 template <class T>
-class PriorValues {
+class SavedGradients {
  public:
   // Each array once, whoever shares it.
   void Save(std::span<const SceneGradientsT<T>> gradients) {
     arrays_.clear();
     for (const SceneGradientsT<T>& d : gradients) {
-      for (const std::span<T> array :
-           {d.positions, d.colors, d.uvs, d.normals, d.light_directions, d.sh, d.attributes}) {
+      ForEachGradientArray(SceneT<T>(), d, [&](const char*, std::span<T> array, int) {
         if (!array.empty()) arrays_.push_back(array);
-      }
-      for (const std::span<T> array : d.textures) {
-        if (!array.empty()) arrays_.push_back(array);
-      }
+      });
     }
     const auto before = [](auto a, auto b) { return std::less<T*>()(a.data(), b.data()); };
     const auto same = [](auto a, auto b) { return a.data() == b.data(); };
@@ -66,4 +62,4 @@ class PriorValues {
   AlignedVector<T> values_;
 };
 
-}  // namespace tilegrad::v0
+}  // namespace tilegrad

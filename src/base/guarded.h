@@ -5,10 +5,11 @@
 #include <exception>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include "tilegrad/status.h"
 
-namespace tilegrad::v0 {
+namespace tilegrad {
 
 // What `call` returns. The messages fit into a std::string without memory of its own.
 template <class Call>
@@ -24,4 +25,17 @@ Status Guarded(const Call& call) noexcept {
   }
 }
 
-}  // namespace tilegrad::v0
+template <class T, class Call>
+Result<T> GuardedResult(const Call& call) noexcept {
+  T value;
+  const Status status = Guarded([&]() -> Status {
+    Result<T> result = call();
+    if (!result.ok()) return result.status();
+    value = std::move(*result);
+    return {};
+  });
+  if (!status.ok()) return status;
+  return value;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fields of a scene and of its images, each named once: whoever has to visit all of them does
+// so here, and learns of a new one by itself.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "tilegrad/renderer.h"
+#include "tilegrad/scene.h"
+
+namespace tilegrad {
+
+// What is interpolated over faces.
+enum class Varying { kColor, kUv, kNormal, kPosition, kLightDirection, kUser };
+inline constexpr std::size_t kVaryings = 6;
+
+// An array of a scene with a row for each vertex or corner, and its gradient.
+template <class T>
+struct SceneStream {
+  const char* name;
+  Varying what;
+  int width;  // numbers of a row
+  Rate rate;
+  std::span<const T> values;
+  std::span<T> gradient;
+
+  std::size_t rows(const SceneT<T>& scene) const {
+    return rate == Rate::kVertex ? scene.positions.size() / 3 : scene.faces.size();
+  }
+};
+
+// The list of streams: calls visit(name, what, width, field of the scene, field of the gradients),
+// the fields by reference. A field is a StreamT, or a span where there is no choice of rates.
+template <class T, class Scene, class Gradients, class Visit>
+void ForEachStreamField(Scene& s, Gradients& d, const Visit& visit) {
+  visit("positions", Varying::kPosition, 3, s.positions, d.positions);
+  visit("attributes", Varying::kUser, s.channels, s.attributes, d.attributes);
+  visit("colors", Varying::kColor, 3, s.colors, d.colors);
+  visit("uvs", Varying::kUv, 2, s.uvs, d.uvs);
+  visit("normals", Varying::kNormal, 3, s.normals, d.normals);
+  visit("light_directions", Varying::kLightDirection, 3, s.light_directions, d.light_directions);
+}
+
+template <class T>
+const StreamT<T>& AsStream(const StreamT<T>& stream) {
+  return stream;
+}
+template <class T>
+StreamT<T> AsStream(std::span<const T> values) {
+  return {values};
+}
+
+// Calls visit(SceneStream) for every stream, those that the scene does not have included.
+template <class T, class Visit>
+void ForEachStream(const SceneT<T>& s, const SceneGradientsT<T>& d, const Visit& visit) {
+  ForEachStreamField<T>(
+      s, d,
+      [&](const char* name, Varying what, int width, const auto& field, std::span<T> gradient) {
+        const StreamT<T> stream = AsStream<T>(field);
+        visit(SceneStream<T>{name, what, width, stream.rate, stream.values, gradient});
+      });
+}
+
+// The one that is interpolated as `what`.
+template <class T>
+SceneStream<T> StreamOf(const SceneT<T>& scene, Varying what,
+                        const SceneGradientsT<T>& gradients = {}) {
+  SceneStream<T> out = {};
+  ForEachStream(scene, gradients, [&](const SceneStream<T>& stream) {
+    if (stream.what == what) out = stream;
+  });
+  return out;
+}
+
+// Calls visit(name, array) for every array of gradients but those of textures, empty ones included;
+// gradients may be const.
+template <class Gradients, class Visit>
+void ForEachPlainArray(Gradients& d, const Visit& visit) {
+  using T = typename decltype(d.positions)::element_type;
+  SceneT<T> nothing;
+  ForEachStreamField<T>(nothing, d, [&](const char* name, Varying, int, auto&, auto& gradient) {
+    visit(name, gradient);
+  });
+  visit("sh", d.sh);
+}
+
+// Calls visit(name, array, width) for all of them; width: of a texture, whose gradients only mean
+// the same in one of the same width.
+template <class T, class Visit>
+void ForEachGradientArray(const SceneT<T>& scene, const SceneGradientsT<T>& d, const Visit& visit) {
+  ForEachPlainArray(d, [&](const char* name, std::span<T> array) { visit(name, array, 0); });
+  for (std::size_t t = 0; t < d.textures.size(); ++t) {
+    visit("textures", d.textures[t], t < scene.textures.size() ? scene.textures[t].width : 0);
+  }
+}
+
+// Calls visit(name, numbers of a record...) for the parts of records that have a gradient. Records
+// of one kind are visited side by side: a gradient and what is added to it, say.
+template <class Visit, class... Cameras>
+void ForEachCameraPart(const Visit& visit, Cameras&... camera) {
+  visit("rotation", std::span(camera.rotation)...);
+  visit("translation", std::span(camera.translation)...);
+  visit("fx", std::span(&camera.fx, 1)...), visit("fy", std::span(&camera.fy, 1)...);
+  visit("cx", std::span(&camera.cx, 1)...), visit("cy", std::span(&camera.cy, 1)...);
+}
+
+template <class Visit, class... Surfaces>
+void ForEachSurfacePart(const Visit& visit, Surfaces&... surface) {
+  visit("base_color", std::span(surface.base_color)...);
+  visit("ambient", std::span(surface.ambient)...), visit("diffuse", std::span(surface.diffuse)...);
+  visit("specular", std::span(surface.specular)...);
+  visit("shininess", std::span(&surface.shininess, 1)...);
+}
+
+template <class Visit, class... Lights>
+void ForEachLightPart(const Visit& visit, Lights&... light) {
+  visit("direction", std::span(light.direction)...);
+  visit("intensity", std::span(&light.intensity, 1)...);
+}
+
+// Calls visit(record's parts as above) for all records of some gradients.
+template <class T, class Visit>
+void ForEachRecordPart(const SceneGradientsT<T>& d, const Visit& visit) {
+  if (d.camera != nullptr) {
+    ForEachCameraPart([&](const char* name, auto part) { visit("camera", name, part); }, *d.camera);
+  }
+  for (SurfaceT<T>& s : d.surfaces) {
+    ForEachSurfacePart([&](const char* name, auto part) { visit("surfaces", name, part); }, s);
+  }
+  for (LightT<T>& l : d.lights) {
+    ForEachLightPart([&](const char* name, auto part) { visit("lights", name, part); }, l);
+  }
+}
+
+// Calls visit(name, planes, field of a record...) for the images that have a gradient, of records
+// that have them as members: Outputs, ImagesT, FrameImagesT, FrameGradientsT, structs of C.
+template <class Visit, class... Records>
+void ForEachImage(int channels, const Visit& visit, Records&... record) {
+  visit("color", 3, record.color...), visit("alpha", 1, record.alpha...);
+  visit("attributes", channels, record.attributes...), visit("depth", 1, record.depth...);
+  visit("normals", 3, record.normals...), visit("uv", 2, record.uv...);
+}
+
+// For all images, of what is not a gradient.
+template <class Visit, class... Records>
+void ForEachOutput(int channels, const Visit& visit, Records&... record) {
+  ForEachImage(channels, visit, record...);
+  visit("barycentrics", 2, record.barycentrics...);
+}
+
+}  // namespace tilegrad

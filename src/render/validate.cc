@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/validate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "base/array_checks.h"
+#include "base/error.h"
+#include "render/pipeline/validate.h"
+#include "render/scene_fields.h"
+#include "shade/normalize.h"
+#include "shade/texture.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr float kMostShininess = 1e6f;
+
+std::string SceneName(std::size_t n) { return fmt::format("scene {}", n); }
+
+bool UsesLights(const ShadingModel& shading) {
+  return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
+}
+
+template <class Enum>
+Status CheckEnumerator(const char* name, Enum value, Enum last) {
+  const int number = static_cast<int>(value), end = static_cast<int>(last);
+  if (number >= 0 && number <= end) return {};
+  return InvalidArgument("{} is {}, must be in 0..{}", name, number, end);
+}
+
+Status CheckEnumerators(const RenderOptions& options) {
+  TILEGRAD_TRY(CheckEnumerator("options.interpolation", options.interpolation,
+                               Interpolation::kScreenLinear));
+  TILEGRAD_TRY(CheckEnumerator("options.culling", options.culling, FaceCulling::kBack));
+  return CheckEnumerator("options.alpha_rule", options.alpha_rule, AlphaRule::kPaper);
+}
+
+template <class T>
+Status CheckEnumerators(const SceneT<T>& scene) {
+  Status status;
+  ForEachStream(scene, {}, [&](const SceneStream<T>& stream) {
+    const int rate = static_cast<int>(stream.rate);
+    if (!status.ok() || rate == 0 || rate == 1) return;
+    status = InvalidArgument("{}.rate is {}, must be in 0..1", stream.name, rate);
+  });
+  TILEGRAD_TRY(status);
+  TILEGRAD_TRY(
+      CheckEnumerator("shading.lighting", scene.shading.lighting, Lighting::kSphericalHarmonics));
+  TILEGRAD_TRY(CheckEnumerator("shading.normals", scene.shading.normals, Normals::kGiven));
+  for (const TextureT<T>& texture : scene.textures) {
+    TILEGRAD_TRY(CheckEnumerator("texture.wrap", texture.wrap, Wrap::kMirror));
+    TILEGRAD_TRY(CheckEnumerator("texture.filter", texture.filter, Filter::kTrilinear));
+  }
+  return {};
+}
+
+template <class T>
+Status CheckDirections(const SceneT<T>& scene) {
+  if (!UsesLights(scene.shading)) return {};
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const auto& d = scene.lights[i].direction;
+    if (std::all_of(d.begin(), d.end(),
+                    [](T x) { return std::abs(x) <= shade::kLeastComponent; })) {
+      return InvalidArgument("lights[{}]: direction is {} {} {}, must not be 0", i, d[0], d[1],
+                             d[2]);
+    }
+  }
+  return {};
+}
+
+// Many views of one mesh share its arrays: what was checked for the scene before is not looked
+// through again.
+template <class T>
+bool SameArray(std::span<T> a, std::span<T> b) {
+  return a.data() == b.data() && a.size() == b.size();
+}
+
+template <class T>
+Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
+  const PipelineSceneT<T> mesh = PipelineSceneOf(scene);
+  TILEGRAD_TRY(ValidateSceneSizes(mesh));
+  if (SameArray(scene.positions, known.positions) && SameArray(scene.faces, known.faces)) return {};
+  if (AllWithin(scene.faces, 0, static_cast<std::int32_t>(scene.positions.size() / 3)) &&
+      CheckNumbers("positions", scene.positions).ok()) {
+    return {};
+  }
+  return ValidateSceneNumbers(mesh);
+}
+
+// What shading does not use may hold any numbers, but gradients of it have its shape.
+template <class T>
+Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known) {
+  Status status;
+  ForEachStream(scene, {}, [&](const SceneStream<T>& s) {
+    if (!status.ok() || s.what == Varying::kPosition || s.values.empty()) return;
+    status = CheckShape(s.name, s.values.size(), s.rows(scene), static_cast<std::size_t>(s.width));
+    if (s.what == Varying::kNormal && scene.shading.normals != Normals::kGiven) return;
+    if (s.what == Varying::kLightDirection && !UsesLights(scene.shading)) return;
+    if (!status.ok() || SameArray(s.values, StreamOf(known, s.what).values)) return;
+    status = CheckNumbers(s.name, s.values);
+  });
+  TILEGRAD_TRY(status);
+  if (scene.shading.normals != Normals::kGiven || !scene.normals.values.empty()) return {};
+  if (StreamOf(scene, Varying::kNormal).rows(scene) == 0) return {};
+  return InvalidArgument("model.normals is kGiven, but the scene has no normals");
+}
+
+template <class T>
+Status CheckTexture(const TextureT<T>& texture, std::span<const T> known) {
+  const auto in_range = [](int n) { return n >= 1 && n <= shade::kMaxTextureSize; };
+  if (!in_range(texture.width) || !in_range(texture.height)) {
+    return InvalidArgument("is {} x {} texels; each side must be in 1..{}", texture.width,
+                           texture.height, shade::kMaxTextureSize);
+  }
+  TILEGRAD_TRY(CheckSize(
+      "texels", texture.texels.size(),
+      3 * static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height)));
+  return SameArray(texture.texels, known) ? Status() : CheckNumbers("texels", texture.texels);
+}
+
+template <class T>
+Status CheckTextures(const SceneT<T>& scene, const SceneT<T>& known) {
+  for (std::size_t i = 0; i < scene.textures.size(); ++i) {
+    const auto texels = i < known.textures.size() ? known.textures[i].texels : std::span<const T>();
+    const Status status = CheckTexture(scene.textures[i], texels);
+    if (!status.ok()) return status.Within(fmt::format("textures[{}]", i));
+  }
+  if (!scene.textures.empty() && scene.uvs.values.empty()) {
+    return InvalidArgument("the scene has textures, but no uvs to look them up by");
+  }
+  return {};
+}
+
+template <class T>
+Status CheckSurface(const SurfaceT<T>& surface, std::size_t textures) {
+  if (surface.texture < -1 || surface.texture >= static_cast<int>(textures)) {
+    return InvalidArgument("texture is {}, but the scene has {}", surface.texture, textures);
+  }
+  if (!(surface.shininess >= 0 && surface.shininess <= T(kMostShininess))) {
+    return InvalidArgument("shininess is {}, must be in [0, {}]", InFloat(surface.shininess),
+                           kMostShininess);
+  }
+  Status status;
+  ForEachSurfacePart(
+      [&](const char* name, std::span<const T> part) {
+        if (status.ok()) status = CheckNumbers(name, part);
+      },
+      surface);
+  return status;
+}
+
+template <class T>
+Status CheckSurfaces(const SceneT<T>& scene) {
+  for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
+    TILEGRAD_TRY(CheckSurface(scene.surfaces[i], scene.textures.size())
+                     .Within(fmt::format("surfaces[{}]", i)));
+  }
+  if (scene.face_surfaces.empty()) return {};
+  TILEGRAD_TRY(CheckSize("face_surfaces", scene.face_surfaces.size(), scene.faces.size() / 3));
+  const std::size_t count = scene.surfaces.empty() ? 1 : scene.surfaces.size();
+  for (std::size_t i = 0; i < scene.face_surfaces.size(); ++i) {
+    const std::int32_t s = scene.face_surfaces[i];
+    if (s >= 0 && static_cast<std::size_t>(s) < count) continue;
+    return InvalidArgument("face_surfaces[{}] is {}, outside of [0, {})", i, s, count);
+  }
+  return {};
+}
+
+template <class T>
+Status CheckLights(const SceneT<T>& scene) {
+  const bool harmonics = scene.shading.lighting == Lighting::kSphericalHarmonics;
+  if (harmonics || !scene.sh.empty()) TILEGRAD_TRY(CheckSize("sh", scene.sh.size(), 9));
+  if (harmonics) return CheckNumbers("sh", scene.sh);
+  if (!UsesLights(scene.shading)) return {};
+  if (scene.lights.empty() == scene.light_directions.empty()) {
+    return InvalidArgument("lighting needs either lights or light_directions; the scene has {}",
+                           scene.lights.empty() ? "neither" : "both");
+  }
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const LightT<T>& l = scene.lights[i];
+    const T numbers[4] = {l.direction[0], l.direction[1], l.direction[2], l.intensity};
+    const Status status = CheckNumbers("direction, intensity", numbers);
+    if (!status.ok()) return status.Within(fmt::format("lights[{}]", i));
+  }
+  return {};
+}
+
+// `known`: the scene before, or an empty one.
+template <class T>
+Status CheckScene(const SceneT<T>& scene, const SceneT<T>& known) {
+  TILEGRAD_TRY(CheckMesh(scene, known));
+  TILEGRAD_TRY(CheckStreams(scene, known));
+  TILEGRAD_TRY(CheckTextures(scene, known));
+  TILEGRAD_TRY(CheckSurfaces(scene));
+  return CheckLights(scene);
+}
+
+template <class T>
+SceneParts PartsOf(const SceneT<T>& s) {
+  SceneParts out;
+  out.shading = s.shading;
+  ForEachStream(s, {}, [&](const SceneStream<T>& stream) {
+    const auto v = static_cast<std::size_t>(stream.what);
+    out.has[v] = !stream.values.empty(), out.rates[v] = stream.rate;
+  });
+  out.textures = !s.textures.empty(), out.surfaces = !s.surfaces.empty();
+  out.user_channels = s.channels;
+  for (const TextureT<T>& texture : s.textures) {
+    out.bilinear |= texture.filter != Filter::kNearest;
+    out.trilinear |= texture.filter == Filter::kTrilinear;
+  }
+  return out;
+}
+
+// `scene`: whose parts `b` are, for the names of its streams.
+template <class T>
+Status CheckAgreement(const SceneParts& a, const SceneParts& b, const SceneT<T>& scene) {
+  const char* what = nullptr;
+  ForEachStream(scene, {}, [&](const SceneStream<T>& stream) {
+    const auto v = static_cast<std::size_t>(stream.what);
+    const bool counts = stream.what != Varying::kPosition && stream.what != Varying::kUser;
+    if (what == nullptr && ((counts && a.has[v] != b.has[v]) || a.rates[v] != b.rates[v])) {
+      what = stream.name;
+    }
+  });
+  if (a.user_channels != b.user_channels) what = "attributes";
+  if (a.textures != b.textures) what = "textures";
+  if (a.surfaces != b.surfaces) what = "surfaces";
+  if (!(a.shading == b.shading)) what = "options of the shading model";
+  if (what == nullptr) return {};
+  return InvalidArgument("{} differ from those of scene 0: a batch must agree", what);
+}
+
+Status CheckWanted(const char* kind, const char* array, std::size_t got, std::size_t expected) {
+  if (got == 0 || got == expected) return {};
+  return InvalidArgument("{}.{} has {} numbers, expected {}", kind, array, got, expected);
+}
+
+template <class T>
+Status CheckGradients(const SceneT<T>& scene, const SceneGradientsT<T>& d) {
+  Status status;
+  const auto check = [&](const char* name, std::size_t got, std::size_t expected) {
+    if (status.ok()) status = CheckWanted("d_scene", name, got, expected);
+  };
+  ForEachStream(scene, d, [&](const SceneStream<T>& stream) {
+    check(stream.name, stream.gradient.size(), stream.values.size());
+  });
+  check("surfaces", d.surfaces.size(), scene.surfaces.empty() ? 1 : scene.surfaces.size());
+  check("lights", d.lights.size(), scene.lights.size());
+  check("sh", d.sh.size(), scene.sh.size());
+  check("textures", d.textures.size(), scene.textures.size());
+  for (std::size_t i = 0; i < d.textures.size() && status.ok(); ++i) {
+    check("textures[i]", d.textures[i].size(), scene.textures[i].texels.size());
+  }
+  return status;
+}
+
+Status CheckResult(const SceneGradients& d, const SceneGradients& known) {
+  Status status;
+  const auto check = [&](const char* name, std::span<const float> values) {
+    if (status.ok() && !AllFinite(values)) {
+      status = CheckFinite(fmt::format("d_scene.{}", name).c_str(), values);
+    }
+  };
+  std::size_t texture = 0;
+  ForEachGradientArray(Scene(), d, [&](const char* name, std::span<float> values, int) {
+    const bool of_texture = name == std::string_view("textures");
+    const std::size_t t = of_texture ? texture++ : 0;
+    if (of_texture && t < known.textures.size() && SameArray(values, known.textures[t])) return;
+    check(name, values);
+  });
+  ForEachRecordPart(d, [&](const char* record, const char* part, std::span<const float> values) {
+    if (!AllFinite(values)) check(fmt::format("{}.{}", record, part).c_str(), values);
+  });
+  return status;
+}
+
+}  // namespace
+
+template <class T>
+Status ValidateEnumerators(std::span<const SceneT<T>> scenes, const RenderOptions& options) {
+  TILEGRAD_TRY(CheckEnumerators(options));
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    Status status = CheckEnumerators(scenes[n]);
+    if (status.ok()) status = CheckDirections(scenes[n]);
+    if (!status.ok()) return status.Within(SceneName(n));
+  }
+  return {};
+}
+
+template <class T>
+Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
+  SceneParts parts;
+  const SceneT<T> nothing;
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    const Status sound = CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing);
+    if (!sound.ok()) return sound.Within(SceneName(n));
+    const SceneParts own = PartsOf(scenes[n]);
+    if (n == 0) parts = own;
+    if (const Status status = CheckAgreement(parts, own, scenes[n]); !status.ok()) {
+      return status.Within(SceneName(n));
+    }
+    parts.bilinear |= own.bilinear, parts.trilinear |= own.trilinear;
+  }
+  return parts;
+}
+
+template <class T>
+Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& options,
+                        const FrameGradientsT<T>& d_frame,
+                        std::span<const SceneGradientsT<T>> d_scenes) {
+  if (d_scenes.size() != scenes.size()) {
+    return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
+  }
+  const std::size_t pixels = scenes.size() * static_cast<std::size_t>(options.width) *
+                             static_cast<std::size_t>(options.height);
+  Status status;
+  ForEachImage(
+      scenes.empty() ? 0 : scenes[0].channels,
+      [&](std::string_view name, int planes, std::span<const T> image) {
+        if (!status.ok() || name == "alpha") return;  // against the frame's
+        status = CheckWanted("d_frame", name.data(), image.size(),
+                             static_cast<std::size_t>(planes) * pixels);
+      },
+      d_frame);
+  TILEGRAD_TRY(status);
+  if (!d_frame.depth.empty() && options.interpolation != Interpolation::kPerspective) {
+    return InvalidArgument("d_frame.depth needs options.interpolation kPerspective");
+  }
+  for (std::size_t n = 0; n < scenes.size(); ++n) {
+    status = CheckGradients(scenes[n], d_scenes[n]);
+    if (!status.ok()) return status.Within(SceneName(n));
+  }
+  return {};
+}
+
+template <class T>
+Status ValidateCotangents(const FrameGradientsT<T>& d_frame,
+                          std::span<const std::int32_t> face_ids) {
+  TILEGRAD_TRY(CheckNumbers("d_frame.color", d_frame.color));
+  TILEGRAD_TRY(CheckNumbers("d_frame.normals", d_frame.normals));
+  TILEGRAD_TRY(CheckNumbers("d_frame.uv", d_frame.uv));
+  for (std::size_t i = 0; i < d_frame.depth.size(); ++i) {
+    const bool background = i < face_ids.size() && face_ids[i] < 0;
+    const float d_depth = InFloat(d_frame.depth[i]);
+    if (background || std::isfinite(d_depth)) continue;
+    return InvalidArgument("d_frame.depth[{}] is {}", i, d_depth);
+  }
+  return CheckNumbers("d_frame.attributes", d_frame.attributes);
+}
+
+Status ValidateResult(std::span<const SceneGradients> d_scenes) {
+  const SceneGradients nothing;
+  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
+    const Status status = CheckResult(d_scenes[n], n > 0 ? d_scenes[n - 1] : nothing);
+    if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
+  }
+  return {};
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                          \
+  template Status ValidateEnumerators(std::span<const SceneT<T>>, const RenderOptions&); \
+  template Result<SceneParts> ValidateScenes(std::span<const SceneT<T>>);                \
+  template Status ValidateBackward(std::span<const SceneT<T>>, const RenderOptions&,     \
+                                   const FrameGradientsT<T>&,                            \
+                                   std::span<const SceneGradientsT<T>>);                 \
+  template Status ValidateCotangents(const FrameGradientsT<T>&, std::span<const std::int32_t>);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad
