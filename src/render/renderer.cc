@@ -189,9 +189,10 @@ void RendererT<T>::DropAfter(const Status& status) {
 }
 
 struct RendererAccess {
-  static Renderer On(const Workers& workers) {
-    Renderer renderer;
-    renderer.impl_ = std::make_unique<Renderer::Impl>(workers);
+  template <class T>
+  static RendererT<T> On(const Workers& workers) {
+    RendererT<T> renderer;
+    renderer.impl_ = std::make_unique<typename RendererT<T>::Impl>(workers);
     return renderer;
   }
   static PlanReport Explain(const Renderer& renderer) {
@@ -207,7 +208,13 @@ template class RendererT<double>;
 
 }  // namespace v0
 
-Renderer RendererOn(const Workers& workers) { return RendererAccess::On(workers); }
+template <class T>
+RendererT<T> RendererOn(const Workers& workers) {
+  return RendererAccess::On<T>(workers);
+}
+template RendererT<float> RendererOn(const Workers&);
+template RendererT<double> RendererOn(const Workers&);
+
 PlanReport Explain(const Renderer& renderer) { return RendererAccess::Explain(renderer); }
 
 }  // namespace tilegrad

@@ -30,6 +30,7 @@
 #include "api/fingerprint_cases.h"
 #include "api/fingerprint_scenes.h"
 #include "api/fingerprint_table.h"
+#include "support/source_dir.h"
 
 namespace tilegrad::test {
 namespace {

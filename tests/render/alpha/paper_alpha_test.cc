@@ -10,6 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 #include "render/pipeline/test_scenes.h"
 #include "support/shared_data.h"
