@@ -17,6 +17,21 @@
 #include "render/validate.h"
 
 namespace tilegrad {
+
+// What a failed call may have left between two states.
+template <class T>
+struct RendererScratch {
+  using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
+
+  explicit RendererScratch(const Workers& workers) : engine(workers) {}
+
+  EngineOf engine;
+  std::vector<GradientRecords<T>> records;
+  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
+  GradientArrays<T> arrays;
+  SavedGradients<T> saved;
+};
+
 inline namespace v0 {
 
 template <class T>
@@ -45,20 +60,6 @@ struct FrameT<T>::Impl {
   std::vector<Lists> lists;
   RenderOptions options;
   FrameImagesT<T> images;
-};
-
-// What a failed call may have left between two states.
-template <class T>
-struct RendererScratch {
-  using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
-
-  explicit RendererScratch(const Workers& workers) : engine(workers) {}
-
-  EngineOf engine;
-  std::vector<GradientRecords<T>> records;
-  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
-  GradientArrays<T> arrays;
-  SavedGradients<T> saved;
 };
 
 template <class T>
