@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "raster/work_count.h"
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 
 namespace tilegrad::bench {

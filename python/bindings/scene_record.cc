@@ -85,12 +85,13 @@ SceneRecord<T>::SceneRecord(std::size_t count, SceneArrays arrays)
       scenes_(count) {
   const auto faces = Take<std::int32_t>("faces", {faces_, 3});
   const auto cameras = Take<T>("camera", {kCameraNumbers});
-  const auto [lighting, normals, two_sided, clamp] = arrays_.shading;
+  const auto model = [](int lighting, int normals, auto... flags) {
+    return ShadingModel{static_cast<Lighting>(lighting), static_cast<Normals>(normals), flags...};
+  };
   for (std::size_t n = 0; n < count; ++n) {
     SceneT<T>& scene = scenes_[n];
     scene.faces = faces.Of(n), scene.camera = CameraOf(cameras.Of(n));
-    scene.shading = {static_cast<Lighting>(lighting), static_cast<Normals>(normals), two_sided,
-                     clamp};
+    scene.shading = std::apply(model, arrays_.shading);
   }
   SetStreams(), SetTextures(), SetSurfaces(), SetLights();
 }

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 
 namespace tilegrad {

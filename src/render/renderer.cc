@@ -17,6 +17,21 @@
 #include "render/validate.h"
 
 namespace tilegrad {
+
+// What a failed call may have left between two states.
+template <class T>
+struct RendererScratch {
+  using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
+
+  explicit RendererScratch(const Workers& workers) : engine(workers) {}
+
+  EngineOf engine;
+  std::vector<GradientRecords<T>> records;
+  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
+  GradientArrays<T> arrays;
+  SavedGradients<T> saved;
+};
+
 inline namespace v0 {
 
 template <class T>
@@ -45,20 +60,6 @@ struct FrameT<T>::Impl {
   std::vector<Lists> lists;
   RenderOptions options;
   FrameImagesT<T> images;
-};
-
-// What a failed call may have left between two states.
-template <class T>
-struct RendererScratch {
-  using EngineOf = std::conditional_t<std::is_same_v<T, float>, Engine, ReferenceRenderer>;
-
-  explicit RendererScratch(const Workers& workers) : engine(workers) {}
-
-  EngineOf engine;
-  std::vector<GradientRecords<T>> records;
-  std::vector<SceneGradientsT<T>> gradients;  // as the caller's, with `records`
-  GradientArrays<T> arrays;
-  SavedGradients<T> saved;
 };
 
 template <class T>
@@ -189,9 +190,10 @@ void RendererT<T>::DropAfter(const Status& status) {
 }
 
 struct RendererAccess {
-  static Renderer On(const Workers& workers) {
-    Renderer renderer;
-    renderer.impl_ = std::make_unique<Renderer::Impl>(workers);
+  template <class T>
+  static RendererT<T> On(const Workers& workers) {
+    RendererT<T> renderer;
+    renderer.impl_ = std::make_unique<typename RendererT<T>::Impl>(workers);
     return renderer;
   }
   static PlanReport Explain(const Renderer& renderer) {
@@ -207,7 +209,13 @@ template class RendererT<double>;
 
 }  // namespace v0
 
-Renderer RendererOn(const Workers& workers) { return RendererAccess::On(workers); }
+template <class T>
+RendererT<T> RendererOn(const Workers& workers) {
+  return RendererAccess::On<T>(workers);
+}
+template RendererT<float> RendererOn(const Workers&);
+template RendererT<double> RendererOn(const Workers&);
+
 PlanReport Explain(const Renderer& renderer) { return RendererAccess::Explain(renderer); }
 
 }  // namespace tilegrad

@@ -9,7 +9,9 @@
 
 namespace tilegrad {
 
-Renderer RendererOn(const Workers& workers);  // keeps a reference
+// Keeps a reference. T: float or double.
+template <class T = float>
+RendererT<T> RendererOn(const Workers& workers);
 
 // The last call, but one that failed for want of memory.
 PlanReport Explain(const Renderer& renderer);

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "render/pipeline/pipeline.h"
+#include "render/renderer.h"
 
 namespace tilegrad::train {
 namespace {
@@ -21,11 +21,11 @@ std::uint8_t ToByte(float unit) {
 }
 
 // The mean over kSamples^2 samples of image n of the frame; samples without a face show the paper.
-ImageU8 Resolve(const PipelineFrame& frame, std::size_t n, int size) {
+ImageU8 Resolve(const Images& frame, std::size_t n, int size) {
   ImageU8 out(size, size, 3);
   const auto wide = static_cast<std::size_t>(frame.width),
              plane = wide * static_cast<std::size_t>(frame.height);
-  const float* rgb = frame.attributes.data() + 3 * plane * n;
+  const float* rgb = frame.color.data() + 3 * plane * n;
   const std::int32_t* ids = frame.face_ids.data() + plane * n;
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
@@ -56,12 +56,11 @@ Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& re
                                       const Workers& workers) {
   TILEGRAD_TRY(Validate(mesh));
   const std::vector<float> colors = Colors(mesh);
-  PipelineScene scene;
-  scene.channels = 3;
-  scene.attributes = colors;
+  Scene scene;
+  scene.colors = {colors, Rate::kVertex};
   if (!mesh.positions.empty()) scene.positions = {&mesh.positions[0].x, 3 * mesh.positions.size()};
   if (!mesh.faces.empty()) scene.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};
-  std::vector<PipelineScene> scenes;
+  std::vector<Scene> scenes;
   for (const Camera& camera : request.cameras) {
     scene.camera = Scaled(camera, static_cast<float>(request.size * kSamples) /
                                       static_cast<float>(request.camera_size));
@@ -69,11 +68,12 @@ Result<std::vector<ImageU8>> DrawMesh(const Mesh& mesh, const PictureRequest& re
   }
   RenderOptions options;
   options.width = options.height = request.size * kSamples;
-  Pipeline renderer(workers);
-  PipelineFrame frame;
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
   TILEGRAD_TRY(renderer.Render(scenes, options, {.alpha = false}, &frame));
   std::vector<ImageU8> out;
-  for (std::size_t n = 0; n < scenes.size(); ++n) out.push_back(Resolve(frame, n, request.size));
+  for (std::size_t n = 0; n < scenes.size(); ++n)
+    out.push_back(Resolve(frame.images(), n, request.size));
   return out;
 }
 

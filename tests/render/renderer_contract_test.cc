@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What shaded_renderer.h promises besides numbers: only what is asked for, same bits, no
+// What engine.h promises besides numbers: only what is asked for, same bits, no
 // allocation, sums over scenes that share an array, errors.
 #include <gtest/gtest.h>
 

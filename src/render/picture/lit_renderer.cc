@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "render/pipeline/pipeline.h"
+#include "render/renderer.h"
 #include "shade/lit_surface.h"
 
 namespace tilegrad {
@@ -28,13 +28,12 @@ Camera Enlarge(Camera camera, float factor) {
   return camera;
 }
 
-PipelineScene ViewOf(const Mesh& mesh, const LitSurface& surface, const Camera& camera) {
-  PipelineScene view;
+Scene ViewOf(const Mesh& mesh, const LitSurface& surface, const Camera& camera) {
+  Scene view;
   view.positions = {&mesh.positions[0].x, 3 * mesh.positions.size()};
   view.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};
-  view.attributes = surface.attributes();
+  view.attributes = {surface.attributes(), Rate::kCorner};
   view.channels = LitSurface::kChannels;
-  view.rate = Rate::kCorner;
   view.camera = camera;
   return view;
 }
@@ -47,14 +46,15 @@ std::uint8_t ToByte(float value) {
 
 struct LitRenderer::Impl {
   Workers workers{1};
-  Pipeline renderer{workers};
-  PipelineFrame frame;
+  Renderer renderer = RendererOn(workers);
+  Frame frame;
   std::vector<float> sums;  // [4][size][size]
 
   LitSurface::Sample SampleAt(std::size_t sample) const {
+    const Images& images = frame.images();
     LitSurface::Sample out;
     for (std::size_t c = 0; c < out.size(); ++c) {
-      out[c] = frame.attributes[c * frame.face_ids.size() + sample];
+      out[c] = images.attributes[c * images.face_ids.size() + sample];
     }
     return out;
   }
@@ -62,12 +62,13 @@ struct LitRenderer::Impl {
   // Shades the frame's samples and averages them to `image`.
   void Resolve(const LitSurface& surface, glm::vec3 eye, std::size_t size, std::uint8_t* image) {
     const std::size_t pixels = size * size, width = size * kSupersampling;
+    const std::span<const std::int32_t> face_ids = frame.images().face_ids;
     sums.assign(4 * pixels, 0.0f);
-    for (std::size_t s = 0; s < frame.face_ids.size(); ++s) {
-      if (frame.face_ids[s] < 0) continue;
+    for (std::size_t s = 0; s < face_ids.size(); ++s) {
+      if (face_ids[s] < 0) continue;
       const std::size_t pixel = s / width / kSupersampling * size + s % width / kSupersampling;
       const glm::vec3 color =
-          surface.Shade(static_cast<std::size_t>(frame.face_ids[s]), SampleAt(s), eye);
+          surface.Shade(static_cast<std::size_t>(face_ids[s]), SampleAt(s), eye);
       for (int c = 0; c < 3; ++c) sums[static_cast<std::size_t>(c) * pixels + pixel] += color[c];
       sums[3 * pixels + pixel] += 1;
     }
@@ -94,7 +95,7 @@ Result<std::vector<std::uint8_t>> LitRenderer::Render(const Mesh& mesh,
   const auto side = static_cast<std::size_t>(size);
   std::vector<std::uint8_t> out(cameras.size() * 4 * side * side);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const PipelineScene view = ViewOf(mesh, surface, Enlarge(cameras[i], kSupersampling));
+    const Scene view = ViewOf(mesh, surface, Enlarge(cameras[i], kSupersampling));
     TILEGRAD_TRY(impl_->renderer.Render({&view, 1}, options, request, &impl_->frame));
     impl_->Resolve(surface, EyeOf(cameras[i]), side, out.data() + i * 4 * side * side);
   }

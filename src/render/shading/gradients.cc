@@ -28,7 +28,7 @@ void ShadeGradients::Merge(const BackwardPlan& plan, const ShadeInputs& inputs,
   if (plan.staged()) {
     workers_->For(scenes.size(), [&](std::size_t n, std::size_t) { AddToPositions(batch, n); });
   }
-  FindSinks(d_scenes);
+  FindTargets(d_scenes);
   workers_->For(sinks_.size(), [&](std::size_t i, std::size_t) { FillSink(batch, sinks_[i]); });
 }
 
@@ -48,34 +48,35 @@ void ShadeGradients::AddToPositions(const Batch& batch, std::size_t scene) {
   AddNormalsAdjoint(batch.scenes[scene], normals, s.d_units, s.d_positions);
 }
 
-void ShadeGradients::FindSinks(std::span<const SceneGradients> d_scenes) {
-  sinks_.clear();
-  for (const SceneGradients& d : d_scenes) {
-    ForEachStream(Scene(), d, [&](const SceneStream<float>& stream) {
+void ShadeGradients::FindTargets(std::span<const SceneGradients> d_scenes) {
+  targets_.clear(), sinks_.clear();
+  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
+    ForEachStream(Scene(), d_scenes[n], [&](const SceneStream<float>& stream) {
       const std::span<float> out = stream.gradient;
+      if (out.empty()) return;
+      targets_.push_back({out, stream.what, n});
       const bool known = std::any_of(sinks_.begin(), sinks_.end(),
-                                     [&](const Sink& s) { return s.out.data() == out.data(); });
-      if (!out.empty() && !known) sinks_.push_back({out, stream.what});
+                                     [&](const Target& s) { return s.out.data() == out.data(); });
+      if (!known) sinks_.push_back(targets_.back());
     });
   }
 }
 
-void ShadeGradients::FillSink(const Batch& batch, const Sink& sink) const {
+void ShadeGradients::FillSink(const Batch& batch, const Target& sink) const {
   std::fill(sink.out.begin(), sink.out.end(), 0.0f);
-  for (std::size_t n = 0; n < batch.scenes.size(); ++n) {
-    const Scene& scene = batch.scenes[n];
-    const SceneScratch& s = scratch_[n];
-    if (StreamOf(scene, sink.what, batch.d_scenes[n]).gradient.data() != sink.out.data()) continue;
-    if (sink.what == Varying::kPosition) {
+  // Normals of positions are pulled; those that the scene has besides are not used.
+  const bool unused =
+      sink.what == Varying::kNormal && batch.plan.parts.shading.normals != Normals::kGiven;
+  const bool position = sink.what == Varying::kPosition;
+  if (unused || (!position && !batch.plan.pulled[sink.what])) return;
+  for (const Target& target : targets_) {
+    if (target.out.data() != sink.out.data()) continue;
+    const SceneScratch& s = scratch_[target.scene];
+    if (position) {
       for (std::size_t i = 0; i < sink.out.size(); ++i) sink.out[i] += s.d_positions[i];
-      continue;
+    } else {
+      AddStream(batch.scenes[target.scene], batch.plan.pulled, sink.what, s.d_varyings, sink.out);
     }
-    if (!batch.plan.pulled[sink.what]) continue;
-    // Normals of positions are pulled; those that the scene has besides are not used.
-    if (sink.what == Varying::kNormal && batch.plan.parts.shading.normals != Normals::kGiven) {
-      continue;
-    }
-    AddStream(scene, batch.plan.pulled, sink.what, s.d_varyings, sink.out);
   }
 }
 

@@ -34,10 +34,11 @@ class ShadeGradients {
     AlignedVector<float> d_varyings, d_positions;
     AlignedVector<shade::Vec3<float>> d_units;
   };
-  // One array of the caller; scenes may share it.
-  struct Sink {
+  // One array of the caller, for a scene.
+  struct Target {
     std::span<float> out;
     Varying what;  // kPosition: positions
+    std::size_t scene;
   };
   // What a merge is about.
   struct Batch {
@@ -48,13 +49,14 @@ class ShadeGradients {
   };
 
   void AddToPositions(const Batch& batch, std::size_t scene);
-  void FindSinks(std::span<const SceneGradients> d_scenes);
-  void FillSink(const Batch& batch, const Sink& sink) const;
+  void FindTargets(std::span<const SceneGradients> d_scenes);
+  void FillSink(const Batch& batch, const Target& sink) const;
 
   const Workers* workers_;
   std::vector<SceneScratch> scratch_;
   std::vector<PipelineGradients> d_views_;
-  std::vector<Sink> sinks_;
+  std::vector<Target> targets_;  // in the order of scenes
+  std::vector<Target> sinks_;    // each array once, with the first scene that has it
 };
 
 }  // namespace tilegrad

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading as a stage of the renderer: the pixels of a strip are gathered into runs (shade_run.h)
+// Shading as a stage of the renderer: the pixels of a strip are gathered into runs (run.h)
 // and written to the images; on the way back, to cotangents of what was interpolated, and sums for
 // each band.
 #pragma once

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "nn/tape.h"
-#include "render/pipeline/pipeline.h"
+#include "render/renderer.h"
+#include "scene/camera.h"
 
 namespace tilegrad::train {
 
@@ -26,15 +27,16 @@ struct RenderedImages {
 // from the heap. Holds the state of one rendering at a time: its way back is taken, or given up,
 // before the next RenderMeshes.
 struct MeshRenderer {
-  explicit MeshRenderer(const Workers& workers) : renderer(workers) {}
-  Pipeline renderer;
-  PipelineFrame frame;
-  PipelineFrameT<double> frame64;
+  explicit MeshRenderer(const Workers& workers)
+      : renderer(RendererOn(workers)), renderer64(RendererOn<double>(workers)) {}
+  Renderer renderer;
+  RendererT<double> renderer64;
+  Frame frame;
+  FrameT<double> frame64;
 };
 
-// positions and colors: [B, V, 3]. f32 renders with `renderer`, f64 with the scalar reference (for
-// proofs). Errors of the renderer reach the context's status. One call of `renderer` at a time,
-// backward included.
+// positions and colors: [B, V, 3]. f64 renders with the scalar reference (for proofs). Errors of
+// the renderer reach the context's status. One call of `renderer` at a time, backward included.
 RenderedImages RenderMeshes(MeshRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
                             RenderJob job);
 

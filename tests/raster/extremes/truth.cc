@@ -11,6 +11,7 @@
 #include "raster/extremes/bounded.h"
 #include "raster/extremes/soft_scene.h"
 #include "raster/project.h"
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 
 namespace tilegrad::test {

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "raster/extremes/scenes.h"
+#include "render/pipeline/pipeline.h"
 
 namespace tilegrad::test {
 

@@ -12,6 +12,7 @@
 
 #include "raster/project.h"
 #include "render/pipeline/frame_layout.h"
+#include "render/pipeline/pipeline.h"
 #include "render/pipeline/pipeline_ref.h"
 #include "render/pipeline/test_scenes.h"
 #include "support/shared_data.h"

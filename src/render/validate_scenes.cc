@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/validate.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
-#include <string_view>
 
 #include "base/array_checks.h"
 #include "base/error.h"
 #include "render/pipeline/validate.h"
 #include "render/scene_fields.h"
+#include "render/validate.h"
 #include "shade/normalize.h"
 #include "shade/texture.h"
 
@@ -235,50 +233,6 @@ Status CheckAgreement(const SceneParts& a, const SceneParts& b, const SceneT<T>&
   return InvalidArgument("{} differ from those of scene 0: a batch must agree", what);
 }
 
-Status CheckWanted(const char* kind, const char* array, std::size_t got, std::size_t expected) {
-  if (got == 0 || got == expected) return {};
-  return InvalidArgument("{}.{} has {} numbers, expected {}", kind, array, got, expected);
-}
-
-template <class T>
-Status CheckGradients(const SceneT<T>& scene, const SceneGradientsT<T>& d) {
-  Status status;
-  const auto check = [&](const char* name, std::size_t got, std::size_t expected) {
-    if (status.ok()) status = CheckWanted("d_scene", name, got, expected);
-  };
-  ForEachStream(scene, d, [&](const SceneStream<T>& stream) {
-    check(stream.name, stream.gradient.size(), stream.values.size());
-  });
-  check("surfaces", d.surfaces.size(), scene.surfaces.empty() ? 1 : scene.surfaces.size());
-  check("lights", d.lights.size(), scene.lights.size());
-  check("sh", d.sh.size(), scene.sh.size());
-  check("textures", d.textures.size(), scene.textures.size());
-  for (std::size_t i = 0; i < d.textures.size() && status.ok(); ++i) {
-    check("textures[i]", d.textures[i].size(), scene.textures[i].texels.size());
-  }
-  return status;
-}
-
-Status CheckResult(const SceneGradients& d, const SceneGradients& known) {
-  Status status;
-  const auto check = [&](const char* name, std::span<const float> values) {
-    if (status.ok() && !AllFinite(values)) {
-      status = CheckFinite(fmt::format("d_scene.{}", name).c_str(), values);
-    }
-  };
-  std::size_t texture = 0;
-  ForEachGradientArray(Scene(), d, [&](const char* name, std::span<float> values, int) {
-    const bool of_texture = name == std::string_view("textures");
-    const std::size_t t = of_texture ? texture++ : 0;
-    if (of_texture && t < known.textures.size() && SameArray(values, known.textures[t])) return;
-    check(name, values);
-  });
-  ForEachRecordPart(d, [&](const char* record, const char* part, std::span<const float> values) {
-    if (!AllFinite(values)) check(fmt::format("{}.{}", record, part).c_str(), values);
-  });
-  return status;
-}
-
 }  // namespace
 
 template <class T>
@@ -309,66 +263,9 @@ Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
   return parts;
 }
 
-template <class T>
-Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& options,
-                        const FrameGradientsT<T>& d_frame,
-                        std::span<const SceneGradientsT<T>> d_scenes) {
-  if (d_scenes.size() != scenes.size()) {
-    return InvalidArgument("{} scenes, but {} d_scenes", scenes.size(), d_scenes.size());
-  }
-  const std::size_t pixels = scenes.size() * static_cast<std::size_t>(options.width) *
-                             static_cast<std::size_t>(options.height);
-  Status status;
-  ForEachImage(
-      scenes.empty() ? 0 : scenes[0].channels,
-      [&](std::string_view name, int planes, std::span<const T> image) {
-        if (!status.ok() || name == "alpha") return;  // against the frame's
-        status = CheckWanted("d_frame", name.data(), image.size(),
-                             static_cast<std::size_t>(planes) * pixels);
-      },
-      d_frame);
-  TILEGRAD_TRY(status);
-  if (!d_frame.depth.empty() && options.interpolation != Interpolation::kPerspective) {
-    return InvalidArgument("d_frame.depth needs options.interpolation kPerspective");
-  }
-  for (std::size_t n = 0; n < scenes.size(); ++n) {
-    status = CheckGradients(scenes[n], d_scenes[n]);
-    if (!status.ok()) return status.Within(SceneName(n));
-  }
-  return {};
-}
-
-template <class T>
-Status ValidateCotangents(const FrameGradientsT<T>& d_frame,
-                          std::span<const std::int32_t> face_ids) {
-  TILEGRAD_TRY(CheckNumbers("d_frame.color", d_frame.color));
-  TILEGRAD_TRY(CheckNumbers("d_frame.normals", d_frame.normals));
-  TILEGRAD_TRY(CheckNumbers("d_frame.uv", d_frame.uv));
-  for (std::size_t i = 0; i < d_frame.depth.size(); ++i) {
-    const bool background = i < face_ids.size() && face_ids[i] < 0;
-    const float d_depth = InFloat(d_frame.depth[i]);
-    if (background || std::isfinite(d_depth)) continue;
-    return InvalidArgument("d_frame.depth[{}] is {}", i, d_depth);
-  }
-  return CheckNumbers("d_frame.attributes", d_frame.attributes);
-}
-
-Status ValidateResult(std::span<const SceneGradients> d_scenes) {
-  const SceneGradients nothing;
-  for (std::size_t n = 0; n < d_scenes.size(); ++n) {
-    const Status status = CheckResult(d_scenes[n], n > 0 ? d_scenes[n - 1] : nothing);
-    if (!status.ok()) return status.Within(SceneName(n) + ": the gradient overflows");
-  }
-  return {};
-}
-
 #define TILEGRAD_INSTANTIATE(T)                                                          \
   template Status ValidateEnumerators(std::span<const SceneT<T>>, const RenderOptions&); \
-  template Result<SceneParts> ValidateScenes(std::span<const SceneT<T>>);                \
-  template Status ValidateBackward(std::span<const SceneT<T>>, const RenderOptions&,     \
-                                   const FrameGradientsT<T>&,                            \
-                                   std::span<const SceneGradientsT<T>>);                 \
-  template Status ValidateCotangents(const FrameGradientsT<T>&, std::span<const std::int32_t>);
+  template Result<SceneParts> ValidateScenes(std::span<const SceneT<T>>);
 TILEGRAD_INSTANTIATE(float)
 TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
