@@ -9,9 +9,10 @@
 #include "cli/unique_names.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
-#include "train/pictures.h"
 #include "train/predictor.h"
 
 namespace tilegrad::cli {
@@ -42,8 +43,8 @@ Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers)
         OrbitCamera(rule.lens, -360.0 * i / kTurntableViews, rule.elevation, rule.distance));
   }
   TILEGRAD_ASSIGN(const auto views,
-                  train::DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers));
-  return io::SavePng(file, train::TileImages(views, kTurntableColumns));
+                  DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers));
+  return io::SavePng(file, TileImages(views, kTurntableColumns));
 }
 
 // Image files and what their results are called: by the file, each name once.

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "base/error.h"
-#include "fit/pictures.h"
+#include "render/picture/composite.h"
 
 namespace tilegrad::train {
 namespace {
@@ -26,7 +26,7 @@ Result<TargetImages> RenderTarget(const Figure2Case& one, const FitRenderer::Job
                                   const Workers& workers, ImageU8* picture) {
   FitRenderer renderer(workers);
   TILEGRAD_TRY(renderer.Render(one.target, job));
-  *picture = OverWhite(renderer.images(), 0);
+  *picture = OverGrey(renderer.images(), 0, kWhite);
   const Images& images = renderer.images();
   return TargetImages{images.width,
                       images.height,
@@ -56,11 +56,11 @@ Status Descend(Fitter* fitter, FitStep step, int steps, Figure2Result* result) {
     step.rate_factor = RateAt(i, steps);
     TILEGRAD_ASSIGN(const FitValues values, fitter->Step(step));
     result->losses.push_back(values.image.total);
-    if (i == 0) result->start = OverWhite(fitter->images(), 0);
+    if (i == 0) result->start = OverGrey(fitter->images(), 0, kWhite);
   }
   TILEGRAD_ASSIGN(const FitValues last, fitter->Evaluate(step));
   result->losses.push_back(last.image.total);
-  result->result = OverWhite(fitter->images(), 0);
+  result->result = OverGrey(fitter->images(), 0, kWhite);
   return {};
 }
 

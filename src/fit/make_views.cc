@@ -12,7 +12,7 @@
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
-#include "render/picture/lit_renderer.h"
+#include "render/picture/mesh_pictures.h"
 #include "train/data/build/glass.h"
 
 namespace tilegrad::train {
@@ -50,21 +50,6 @@ Camera SpiralCamera(const ViewsOptions& o, int index) {
   const double golden = 180 * (3 - std::sqrt(5.0));
   return OrbitCamera({o.fov_y, o.size, o.size}, std::fmod(golden * index, 360),
                      std::asin(height) * kDegrees, o.distance);
-}
-
-// Planar, colours times alpha -> interleaved, straight.
-ImageU8 Straight(const std::vector<std::uint8_t>& planar, int size) {
-  ImageU8 out(size, size, 4);
-  const std::size_t plane = planar.size() / 4;
-  for (std::size_t p = 0; p < plane; ++p) {
-    const int alpha = planar[3 * plane + p];
-    for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
-      out.pixels[4 * p + c] = static_cast<std::uint8_t>(
-          std::min(255, (255 * planar[c * plane + p] + alpha / 2) / alpha));
-    }
-    out.pixels[4 * p + 3] = static_cast<std::uint8_t>(alpha);
-  }
-  return out;
 }
 
 // Whether image `index` of all is held out: evenly spread.
@@ -138,9 +123,9 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   for (int i = 0; i < all; ++i) {
     if (stop) return Cancelled("stopped; {} is not complete", folder.string());
     const Camera camera = SpiralCamera(options, i);
-    TILEGRAD_ASSIGN(const auto planar, renderer.Render(mesh, {&camera, 1}, options.size));
+    TILEGRAD_ASSIGN(const ImageU8 image, renderer.RenderStraight(mesh, camera, options.size));
     const std::string name = ImageName(i);
-    TILEGRAD_TRY(io::SavePng(folder / name, Straight(planar, options.size)));
+    TILEGRAD_TRY(io::SavePng(folder / name, image));
     (IsHeldOut(options, i) ? test : train).push_back({name, camera});
     if (progress) {
       progress(

@@ -9,14 +9,13 @@
 #include <utility>
 
 #include "base/error.h"
-#include "fit/pictures.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "nn/context.h"
+#include "render/picture/composite.h"
 #include "train/data/dataset.h"
 #include "train/metrics/metrics.h"
-#include "train/pictures.h"
 
 namespace tilegrad::train {
 namespace {
@@ -128,7 +127,7 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
   job.alpha = false;
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
-  return OverWhite(renderer.images(), 0);
+  return OverGrey(renderer.images(), 0, kWhite);
 }
 
 // The scene at the end, its scores and what is written of both.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "scene/camera_conventions.h"
 
 namespace tilegrad::train {
 namespace {
@@ -51,11 +52,6 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter) {
     default:
       return "";
   }
-}
-
-Camera ScaledCamera(Camera camera, float scale) {
-  camera.fx *= scale, camera.fy *= scale, camera.cx *= scale, camera.cy *= scale;
-  return camera;
 }
 
 void FitRenderer::SetScenes(const FitScene& scene, const Job& job) {

@@ -101,9 +101,6 @@ class FitRenderer {
   std::span<float> d_texture_;
 };
 
-// The camera of an image that has `scale` times as many pixels.
-Camera ScaledCamera(Camera camera, float scale);
-
 // A mesh with its first texture or its vertex colours, and back. Materials' factors are multiplied
 // into colours. An error says what a FitScene cannot hold: several textures, say.
 Result<FitScene> SceneOfMesh(const Mesh& mesh);

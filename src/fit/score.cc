@@ -8,54 +8,41 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "render/picture/composite.h"
+
 namespace tilegrad::train {
 namespace {
 
 constexpr int kSamples = 3;  // a side of a pixel
 constexpr double kBestPsnr = 99;
 
-// Means of samples, over white; alpha is the covered share.
-void Resolve(const Images& frame, ImageSize size, Image* rgb, std::vector<float>* alpha) {
-  *rgb = Image(size.width, size.height, 3);
-  alpha->assign(rgb->pixels.size() / 3, 0.0f);
-  const auto wide = static_cast<std::size_t>(frame.width);
-  const std::size_t plane = wide * static_cast<std::size_t>(frame.height);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y * size.width + x);
-      for (int s = 0; s < kSamples * kSamples; ++s) {
-        const std::size_t p = static_cast<std::size_t>(y * kSamples + s / kSamples) * wide +
-                              static_cast<std::size_t>(x * kSamples + s % kSamples);
-        const bool drawn = frame.face_ids[p] >= 0;
-        (*alpha)[pixel] += drawn ? 1.0f / (kSamples * kSamples) : 0.0f;
-        for (std::size_t c = 0; c < 3; ++c) {
-          const float value = drawn ? std::clamp(frame.color[c * plane + p], 0.0f, 1.0f) : 1.0f;
-          rgb->pixels[3 * pixel + c] += value / (kSamples * kSamples);
-        }
-      }
-    }
-  }
+Picture TruthOf(const TargetImages& images, std::size_t view) {
+  const std::size_t plane = images.pixels();
+  Picture out;
+  out.width = images.width, out.height = images.height;
+  const auto color = std::span(images.color).subspan(3 * view * plane, 3 * plane);
+  const auto alpha = std::span(images.alpha).subspan(view * plane, plane);
+  out.color.assign(color.begin(), color.end()), out.alpha.assign(alpha.begin(), alpha.end());
+  return out;
 }
 
-Image TruthOverWhite(const TargetImages& images, std::size_t view) {
-  Image out(images.width, images.height, 3);
-  const std::size_t plane = images.pixels();
-  for (std::size_t p = 0; p < plane; ++p) {
-    const float alpha = images.alpha[view * plane + p];
-    for (std::size_t c = 0; c < 3; ++c) {
-      out.pixels[3 * p + c] = alpha * images.color[(3 * view + c) * plane + p] + 1 - alpha;
-    }
+// The numbers behind OverGrey's bytes.
+std::vector<float> OverWhite(const Picture& picture) {
+  const std::size_t plane = picture.alpha.size();
+  std::vector<float> out(3 * plane);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = kWhite + picture.alpha[i % plane] * (picture.color[i] - kWhite);
   }
   return out;
 }
 
-double Psnr(const Image& a, const Image& b) {
+double Psnr(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
-  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
-    const double gap = static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double gap = static_cast<double>(a[i]) - static_cast<double>(b[i]);
     sum += gap * gap;
   }
-  const double mean = sum / static_cast<double>(a.pixels.size());
+  const double mean = sum / static_cast<double>(a.size());
   return mean > 0 ? std::min(kBestPsnr, -10 * std::log10(mean)) : kBestPsnr;
 }
 
@@ -66,14 +53,6 @@ double Iou(std::span<const float> a, std::span<const float> b) {
     either += static_cast<double>(a[i] + b[i] - a[i] * b[i]);
   }
   return either > 0 ? both / either : 1;
-}
-
-ImageU8 ToBytes(const Image& image) {
-  ImageU8 out(image.width, image.height, image.channels);
-  std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float v) {
-    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0f, 1.0f)));
-  });
-  return out;
 }
 
 // glm is column-major, cameras are row-major.
@@ -125,15 +104,12 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     TILEGRAD_TRY(renderer.Render(seen, job));
     ViewScore score;
     score.view = views[static_cast<std::size_t>(i)];
-    const auto view = static_cast<std::size_t>(score.view);
-    Image rendered;
-    std::vector<float> alpha;
-    Resolve(renderer.images(), size, &rendered, &alpha);
-    const Image truth = TruthOverWhite(input.images, view);
-    score.psnr = Psnr(truth, rendered);
-    const std::size_t plane = input.images.pixels();
-    score.iou = Iou(alpha, std::span(input.images.alpha).subspan(view * plane, plane));
-    score.truth = ToBytes(truth), score.rendered = ToBytes(rendered);
+    Picture rendered;
+    AverageSamples(renderer.images(), kSamples, &rendered);
+    const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
+    score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
+    score.iou = Iou(rendered.alpha, truth.alpha);
+    score.truth = OverGrey(truth, kWhite), score.rendered = OverGrey(rendered, kWhite);
     scores.push_back(std::move(score));
   }
   return scores;

@@ -111,6 +111,12 @@ inline Camera64 ResizeCamera(const Camera64& camera, ImageSize from, ImageSize t
   return out;
 }
 
+// The camera of the same image with `scale` times as many pixels along each side.
+inline Camera ScaledCamera(Camera camera, float scale) {
+  camera.fx *= scale, camera.fy *= scale, camera.cx *= scale, camera.cy *= scale;
+  return camera;
+}
+
 // Fails unless the camera is finite, its rotation is one, and its focal lengths and near plane are
 // positive. Every From... ends with it.
 Status Validate(const Camera64& camera);

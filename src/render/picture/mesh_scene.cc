@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/geometric.hpp>
 
 #include "scene/srgb.h"
 
@@ -60,6 +61,7 @@ MeshScene::MeshScene(const Mesh& mesh, const MeshSceneOptions& options)
 void MeshScene::AddNormals() {
   scene_.shading.normals =
       options_.normals == NormalSource::kSmooth ? Normals::kSmooth : Normals::kFlat;
+  if (options_.normals == NormalSource::kAligned) return AddAlignedNormals();
   if (options_.normals != NormalSource::kAuto) return;
   if (!mesh_.corner_normals.empty()) {
     scene_.normals = {Flat(mesh_.corner_normals), Rate::kCorner};
@@ -68,6 +70,23 @@ void MeshScene::AddNormals() {
   } else {
     return;
   }
+  scene_.shading.normals = Normals::kGiven;
+}
+
+void MeshScene::AddAlignedNormals() {
+  if (mesh_.corner_normals.empty() && mesh_.normals.empty()) return;
+  for (std::size_t f = 0; f < mesh_.faces.size(); ++f) {
+    const auto vertex = [&](std::size_t k) { return static_cast<std::size_t>(mesh_.faces[f][k]); };
+    const glm::vec3 a = mesh_.positions[vertex(0)];
+    const glm::vec3 winding =
+        glm::cross(mesh_.positions[vertex(1)] - a, mesh_.positions[vertex(2)] - a);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::vec3 n =
+          mesh_.corner_normals.empty() ? mesh_.normals[vertex(k)] : mesh_.corner_normals[3 * f + k];
+      aligned_normals_.push_back(glm::dot(n, winding) < 0 ? -n : n);
+    }
+  }
+  scene_.normals = {Flat(aligned_normals_), Rate::kCorner};
   scene_.shading.normals = Normals::kGiven;
 }
 

@@ -19,7 +19,8 @@ enum class ColorSpace {
 enum class NormalSource {
   kAuto,    // the mesh's own; flat where it has none, as glTF prescribes
   kSmooth,  // from positions
-  kFlat
+  kFlat,
+  kAligned  // as kAuto, turned to the side of the faces' winding: authors' point to either
 };
 
 struct MeshSceneOptions {
@@ -47,11 +48,13 @@ class MeshScene {
   int AddTexture(const Material& material);
   void AddSurfaces();
   void AddNormals();
+  void AddAlignedNormals();
 
   const Mesh& mesh_;
   MeshSceneOptions options_;
   Scene scene_;
   bool single_sided_ = false;
+  std::vector<glm::vec3> aligned_normals_;  // of corners
   std::vector<float> colors_;               // [V,3]
   std::vector<std::vector<float>> texels_;  // by the mesh's texture; empty: not used
   std::vector<Texture> textures_;           // by use: texture, wrap, filter

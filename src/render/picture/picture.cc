@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "raster/conventions.h"
+#include "scene/camera_conventions.h"
 
 namespace tilegrad {
 namespace {
@@ -63,26 +64,29 @@ void Copy(const From& from, To* to) {
 
 }  // namespace
 
+void AverageSamples(const Images& samples, int scale, Picture* picture) {
+  picture->width = samples.width / scale, picture->height = samples.height / scale;
+  const auto pixels =
+      static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
+  const auto count = static_cast<float>(scale * scale);
+  picture->color.assign(samples.color.empty() ? 0 : 3 * pixels, 0);
+  picture->alpha.assign(pixels, 0);
+  for (std::size_t at = 0; at < pixels; ++at) {
+    const int x = static_cast<int>(at) % picture->width, y = static_cast<int>(at) / picture->width;
+    const Square sum = SumSamples(samples, x, y, scale);
+    picture->alpha[at] = (samples.alpha.empty() ? sum.covered : sum.alpha) / count;
+    for (std::size_t c = 0; c < 3 && !samples.color.empty() && sum.covered > 0; ++c)
+      picture->color[c * pixels + at] = sum.rgb[c] / sum.covered;
+  }
+}
+
 Status PictureRenderer::RenderColor(Scene scene, const PictureRequest& request, Picture* picture) {
   const int scale = request.supersampling;
-  const auto s = static_cast<float>(scale);
-  Camera& camera = scene.camera;
-  camera.fx *= s, camera.fy *= s, camera.cx *= s, camera.cy *= s;
+  scene.camera = ScaledCamera(scene.camera, static_cast<float>(scale));
   Outputs images;
   images.color = request.color, images.attributes = false, images.alpha = request.soft_delta > 0;
   TILEGRAD_TRY(renderer_.Render({&scene, 1}, OptionsOf(request, scale), images, &frame_));
-  const std::size_t pixels = PixelCount(request);
-  if (request.color) picture->color.assign(3 * pixels, 0);
-  picture->alpha.assign(pixels, 0);
-  for (int y = 0; y < request.height; ++y) {
-    for (int x = 0; x < request.width; ++x) {
-      const Square sum = SumSamples(frame_.images(), x, y, scale);
-      const auto at = static_cast<std::size_t>(y * request.width + x);
-      picture->alpha[at] = (images.alpha ? sum.alpha : sum.covered) / (s * s);
-      for (std::size_t c = 0; c < 3 && request.color && sum.covered > 0; ++c)
-        picture->color[c * pixels + at] = sum.rgb[c] / sum.covered;
-    }
-  }
+  AverageSamples(frame_.images(), scale, picture);
   return {};
 }
 

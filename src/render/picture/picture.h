@@ -37,6 +37,10 @@ struct Picture {
   std::vector<PlanReport> plans;       // of each pass: colour and alpha, then the exact images
 };
 
+// The one supersampler: colour and alpha of image 0 of `samples`, averaged over squares of scale x
+// scale samples. Alpha is that of the samples if they have it, else the covered share.
+void AverageSamples(const Images& samples, int scale, Picture* picture);
+
 class PictureRenderer {
  public:
   explicit PictureRenderer(const Workers& workers) : renderer_(RendererOn(workers)) {}

@@ -6,9 +6,10 @@
 #include <map>
 
 #include "base/error.h"
+#include "render/picture/composite.h"
+#include "render/picture/mesh_pictures.h"
 #include "train/data/trained_models.h"
 #include "train/eval/evaluate.h"
-#include "train/pictures.h"
 #include "train/predictor.h"
 
 namespace tilegrad::train {
@@ -59,7 +60,11 @@ class Exhibitor {
         DrawMesh(out.prediction, {cameras, info_.image_size, info_.image_size}, workers_));
     for (std::size_t v = 0; v < views.size(); ++v) {
       auto [left, right] = Captions(out.name, TurnTo(info_, views[v]), v == 0);
-      left.image = CompositeOverPaper(ImageOf(data, views[v]), info_.image_size);
+      const int size = info_.image_size;
+      const auto planes = ImageOf(data, views[v]);
+      const std::size_t rgb = planes.size() / 4 * 3;
+      left.image = OverGrey(
+          PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), size, size}, kPaper);
       right.image = std::move(predicted[v]);
       out.pictures.push_back(std::move(left)), out.pictures.push_back(std::move(right));
     }

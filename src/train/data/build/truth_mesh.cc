@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "base/rng.h"
-#include "render/picture/lit_renderer.h"
+#include "render/picture/mesh_pictures.h"
 
 namespace tilegrad::train {
 namespace {

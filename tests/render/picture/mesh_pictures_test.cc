@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/picture/lit_renderer.h"
+#include "render/picture/mesh_pictures.h"
 
 #include <gtest/gtest.h>
 

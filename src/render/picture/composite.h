@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// From renders to images of bytes: over a flat grey, with alpha, and several in one sheet. The one
+// place that composites.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/picture/picture.h"
+#include "scene/image.h"
+#include "tilegrad/renderer.h"
+
+namespace tilegrad {
+
+// Behind pictures: greys of 0..1.
+inline constexpr float kPaper = 0.88f, kWhite = 1.0f;
+
+std::uint8_t ToByte(float unit);  // 0..1, cut there, to 0..255, rounded
+
+// RGB over black [3,H,W] and its alpha [H,W]: bytes of 0..255 as datasets hold them, or floats of
+// 0..1 as networks see them.
+template <class T>
+struct PlanarRgba {
+  std::span<const T> rgb, alpha;
+  int width = 0, height = 0;
+};
+
+// RGB of what is seen over the grey.
+ImageU8 OverGrey(const PlanarRgba<std::uint8_t>& image, float grey);
+ImageU8 OverGrey(const PlanarRgba<float>& image, float grey);
+ImageU8 OverGrey(const Picture& picture, float grey);
+// Of image n of a batch: colours where a face is drawn, hard edges.
+ImageU8 OverGrey(const Images& images, std::size_t n, float grey);
+
+std::vector<std::uint8_t> PremultipliedPlanes(const Picture& picture);  // [4,H,W], RGB over black
+ImageU8 StraightRgba(const Picture& picture);  // 4 channels; RGB is 0 where alpha is
+
+// Each pixel as a square of factor x factor.
+ImageU8 Enlarged(const ImageU8& image, int factor);
+// `image` onto `sheet`, which it fits into, its upper left corner at (left, top). Same channels.
+void Paste(const ImageU8& image, int left, int top, ImageU8* sheet);
+// RGB images of one size in rows of `columns`, with a white gap between them.
+ImageU8 TileImages(std::span<const ImageU8> images, int columns, int gap = 4);
+
+}  // namespace tilegrad
