@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The naive renderer: pipeline_ref.h with every attribute interpolated at every corner, and
-// pixel_ref.h at every pixel. It is the truth that tests hold the Renderer to, with T = double or
-// std::complex<double> (complex step). One scene at a time; inputs are not checked.
+// The naive renderer: pipeline_ref.h with every attribute at every corner, and pixel_ref.h at every
+// pixel: the truth of tests, with T = double or std::complex<double>. Inputs are not checked.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gradients of everything, of every shading model, over random scenes: the reference is held to
-// complex steps in double. The renderer is held to the reference in shaded_simd_test.cc.
+// complex steps in double. The renderer is held to the reference in renderer_simd_test.cc.
 #include <gtest/gtest.h>
 
 #include <map>

@@ -18,10 +18,11 @@ namespace tilegrad {
 
 // What a rule asks of the pipeline, the same in every call.
 struct AlphaNeeds {
-  bool soft_tree = false;      // ImageScratch::soft is built before Prepare
-  bool transmittance = false;  // PipelineFrame::transmittance has room, and comes back in AlphaAdjoint
-  bool bounded = true;         // false: Frame::alpha_error_bound is infinite, whatever Forward says
-  bool own_sums = false;       // gradients go through AddToScene, not through BinGradients
+  bool soft_tree = false;  // ImageScratch::soft is built before Prepare
+  bool transmittance =
+      false;              // PipelineFrame::transmittance has room, and comes back in AlphaAdjoint
+  bool bounded = true;    // false: Frame::alpha_error_bound is infinite, whatever Forward says
+  bool own_sums = false;  // gradients go through AddToScene, not through BinGradients
 };
 
 // A bin of an image, and the image on the screen: all of its faces (image.mesh), and those that

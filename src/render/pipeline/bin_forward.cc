@@ -181,7 +181,8 @@ double RunAlpha(const BinInput& input, const BinTask& task, const ImageOfFrame& 
 
 }  // namespace
 
-double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, PipelineFrame* frame) {
+double RenderBin(const BinInput& input, const BinTask& task, WorkerScratch* worker,
+                 PipelineFrame* frame) {
   RenderTimes* const times = &worker->times;
   StageClock clock;
   const ImageOfFrame part{

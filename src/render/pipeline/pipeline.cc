@@ -92,7 +92,8 @@ struct Pipeline::Impl {
                    BinGradients* out);
 
   // Returns whether the indices of all scenes are in range.
-  bool Begin(std::span<const PipelineScene> scenes, const RenderOptions& options, AlphaStage* rule) {
+  bool Begin(std::span<const PipelineScene> scenes, const RenderOptions& options,
+             AlphaStage* rule) {
     const std::size_t count = scenes.size();
     if (images.size() < count) images.resize(count);
     for (WorkerScratch& worker : worker_scratch) worker.stats = {}, worker.times = {};

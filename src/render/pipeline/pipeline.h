@@ -3,8 +3,9 @@
 //
 // A batch of N scenes, each with its own mesh and camera, is rendered to N images of one size.
 // Foreground pixels interpolate the attributes of the nearest face (equation 1); alpha is made by a
-// rule (AlphaRule; by default equation 6 over all faces, within `max_alpha_error`). The backward pass is
-// analytic and needs only the frame: face ids and alpha, and goes faster with its transmittance.
+// rule (AlphaRule; by default equation 6 over all faces, within `max_alpha_error`). The backward
+// pass is analytic and needs only the frame: face ids and alpha, and goes faster with its
+// transmittance.
 #pragma once
 
 #include <memory>
