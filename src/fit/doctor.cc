@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "base/error.h"
+#include "scene/camera_conventions.h"
 
 namespace tilegrad::train {
 namespace {
