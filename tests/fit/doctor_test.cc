@@ -40,7 +40,8 @@ struct Patient {
     FitRenderer::Job job = Step().job;
     job.views = {&kView, 1};
     ASSERT_TRUE(renderer.Render(truth, job).ok());
-    targets = {kSize, kSize, renderer.images().color, {}};
+    const std::span<const float> color = renderer.images().color;
+    targets = {kSize, kSize, {color.begin(), color.end()}, {}};
     for (const std::int32_t face : renderer.images().face_ids) {
       targets.alpha.push_back(face >= 0 ? 1.0f : 0.0f);
     }
