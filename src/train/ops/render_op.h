@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The renderer as an operation on the tape: predicted meshes in, images out, gradients back.
+// The renderer as an operation on the tape: scenes of tensors in, images out, gradients back.
 #pragma once
 
 #include <span>
@@ -11,23 +11,44 @@
 
 namespace tilegrad::train {
 
+// What the scenes of a batch are made of: B meshes of V vertices, each seen by `views` cameras, N =
+// B * views images. A Var that is left invalid is absent; one that is there gets its gradient.
+struct SceneVars {
+  nn::Var positions;         // [B,V,3]
+  nn::Var colors;            // [B,V,3]
+  nn::Var textures;          // [B,h,w,3], one for each mesh, looked up at RenderJob::uvs
+  nn::Var light_directions;  // [N,3] from the surface to the light, of any length > 0: one for each
+                             // image, for Lighting::kLambert and kPhong
+  nn::Var shininess;         // [N]; Lighting::kPhong
+  nn::Var sh;                // [N,9]; Lighting::kSphericalHarmonics
+  nn::Var cameras;           // [N,16] rotation, translation, fx, fy, cx, cy: instead of
+                             // RenderJob's, whose near planes are kept
+};
+
+// What is the same for all meshes, and no tensor.
 struct RenderJob {
-  std::span<const std::int32_t> faces;  // [F,3], shared by all meshes; must outlive the tape
-  std::vector<Camera> cameras;  // [B * views]: mesh b has cameras [b * views, (b + 1) * views)
+  std::span<const std::int32_t> faces;  // [F,3]; must outlive the tape
+  std::vector<Camera> cameras;          // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options;
+  std::span<const float>
+      uvs;  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape
+  Wrap wrap = Wrap::kRepeat;
+  Filter filter = Filter::kBilinear;
+  ShadingModel shading;
+  Surface surface;  // of all faces; its texture is SceneVars::textures if they are there
 };
 
 struct RenderedImages {
-  nn::Var colors;  // [B * views, 3, H, W], 0 at background pixels
-  nn::Var alpha;   // [B * views, H, W]
+  nn::Var colors;  // [N, 3, H, W], 0 at background pixels
+  nn::Var alpha;   // [N, H, W]
 };
 
 // A renderer with its images, reused from step to step so that a steady state takes nothing large
 // from the heap. Holds the state of one rendering at a time: its way back is taken, or given up,
-// before the next RenderMeshes.
-struct MeshRenderer {
-  explicit MeshRenderer(const Workers& workers)
+// before the next RenderScenes.
+struct SceneRenderer {
+  explicit SceneRenderer(const Workers& workers)
       : renderer(RendererOn(workers)), renderer64(RendererOn<double>(workers)) {}
   Renderer renderer;
   RendererT<double> renderer64;
@@ -35,9 +56,9 @@ struct MeshRenderer {
   FrameT<double> frame64;
 };
 
-// positions and colors: [B, V, 3]. f64 renders with the scalar reference (for proofs). Errors of
-// the renderer reach the context's status. One call of `renderer` at a time, backward included.
-RenderedImages RenderMeshes(MeshRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
-                            RenderJob job);
+// All tensors are of one type; f64 renders with the scalar reference (for proofs). Errors of shapes
+// and of the renderer reach the context's status. One call of `renderer` at a time, backward
+// included.
+RenderedImages RenderScenes(SceneRenderer& renderer, const SceneVars& scenes, RenderJob job);
 
 }  // namespace tilegrad::train

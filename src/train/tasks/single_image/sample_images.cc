@@ -28,7 +28,7 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
       step.network().Forward(nn::Constant(context, batch.input), nn::Mode::kEval);
   const int views = static_cast<int>(samples[0].views.size());
   const RenderedImages images =
-      RenderMeshes(step.renderer(), meshes.positions, meshes.colors,
+      RenderScenes(step.renderer(), {.positions = meshes.positions, .colors = meshes.colors},
                    {step.faces(), batch.cameras, views, step.OptionsAt(at_step)});
   TILEGRAD_TRY(context.TakeStatus());
   const std::size_t plane =

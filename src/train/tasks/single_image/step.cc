@@ -105,8 +105,9 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
       network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
   const int views =
       static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
-  const RenderedImages images = RenderMeshes(renderer_, meshes.positions, meshes.colors,
-                                             {faces(), batch.cameras, views, OptionsAt(step)});
+  const RenderedImages images =
+      RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
+                   {faces(), batch.cameras, views, OptionsAt(step)});
   const nn::Var iou = IouLoss(images.alpha, batch.truth_alpha);
   const nn::Var color = ColorL1Loss(images.colors, batch.truth_colors);
   const nn::Var smoothness =

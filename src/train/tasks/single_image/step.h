@@ -49,7 +49,7 @@ class TrainStep {
 
   MeshNetwork& network() { return network_; }
   nn::Adam& adam() { return adam_; }
-  MeshRenderer& renderer() { return renderer_; }
+  SceneRenderer& renderer() { return renderer_; }
   RenderOptions OptionsAt(std::int64_t step) const;
   std::span<const std::int32_t> faces() const;
 
@@ -60,7 +60,7 @@ class TrainStep {
   MeshNetwork network_;
   nn::Adam adam_;
   Topology topology_;
-  MeshRenderer renderer_;
+  SceneRenderer renderer_;
 };
 
 }  // namespace tilegrad::train
