@@ -14,29 +14,29 @@ namespace tilegrad::train {
 // What the scenes of a batch are made of: B meshes of V vertices, each seen by `views` cameras, N =
 // B * views images. A Var that is left invalid is absent; one that is there gets its gradient.
 struct SceneVars {
-  nn::Var positions;         // [B,V,3]
-  nn::Var colors;            // [B,V,3]
-  nn::Var textures;          // [B,h,w,3], one for each mesh, looked up at RenderJob::uvs
-  nn::Var light_directions;  // [N,3] from the surface to the light, of any length > 0: one for each
-                             // image, for Lighting::kLambert and kPhong
-  nn::Var shininess;         // [N]; Lighting::kPhong
-  nn::Var sh;                // [N,9]; Lighting::kSphericalHarmonics
-  nn::Var cameras;           // [N,16] rotation, translation, fx, fy, cx, cy: instead of
-                             // RenderJob's, whose near planes are kept
+  nn::Var positions{};         // [B,V,3]
+  nn::Var colors{};            // [B,V,3]
+  nn::Var textures{};          // [B,h,w,3], one for each mesh, looked up at RenderJob::uvs
+  nn::Var light_directions{};  // [N,3] from the surface to the light, of any length > 0: one for
+                               // each image, for Lighting::kLambert and kPhong
+  nn::Var shininess{};  // [N]; Lighting::kPhong
+  nn::Var sh{};         // [N,9]; Lighting::kSphericalHarmonics
+  nn::Var cameras{};    // [N,16] rotation, translation, fx, fy, cx, cy: instead of
+                        // RenderJob's, whose near planes are kept
 };
 
 // What is the same for all meshes, and no tensor.
 struct RenderJob {
-  std::span<const std::int32_t> faces;  // [F,3]; must outlive the tape
-  std::vector<Camera> cameras;          // [N]: mesh b has cameras [b * views, (b + 1) * views)
+  std::span<const std::int32_t> faces{};  // [F,3]; must outlive the tape
+  std::vector<Camera> cameras;            // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
-  RenderOptions options;
+  RenderOptions options{};
   std::span<const float>
-      uvs;  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape
+      uvs{};  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
-  ShadingModel shading;
-  Surface surface;  // of all faces; its texture is SceneVars::textures if they are there
+  ShadingModel shading{};
+  Surface surface{};  // of all faces; its texture is SceneVars::textures if they are there
 };
 
 struct RenderedImages {

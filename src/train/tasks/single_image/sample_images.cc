@@ -33,11 +33,11 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
   TILEGRAD_TRY(context.TakeStatus());
   const std::size_t plane =
       static_cast<std::size_t>(store.size) * static_cast<std::size_t>(store.size);
-  // Soft alpha is a signal for training; people see what is covered.
-  std::vector<float> covered(images.alpha.value().elements());
-  std::transform(images.alpha.value().data<float>(),
-                 images.alpha.value().data<float>() + covered.size(), covered.begin(),
-                 [](float alpha) { return alpha == 1 ? 1.0f : 0.0f; });
+  // Soft alpha is a signal for training, and rounds to 1 beside a face; people see what is covered.
+  const std::span<const std::int32_t> ids = step.renderer().frame.images().face_ids;
+  std::vector<float> covered(ids.size());
+  std::ranges::transform(ids, covered.begin(),
+                         [](std::int32_t id) { return id < 0 ? 0.0f : 1.0f; });
   std::vector<ImageU8> cells;
   for (std::size_t n = 0; n < samples.size() * static_cast<std::size_t>(views); ++n) {
     cells.push_back(Shown(batch.truth_colors.data<float>() + 3 * plane * n,
