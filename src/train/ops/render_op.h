@@ -31,8 +31,8 @@ struct RenderJob {
   std::vector<Camera> cameras;            // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options{};
-  std::span<const float>
-      uvs{};  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape
+  // [F,3,2] of corners, with SceneVars::textures; must outlive the tape.
+  std::span<const float> uvs{};
   Wrap wrap = Wrap::kRepeat;
   Filter filter = Filter::kBilinear;
   ShadingModel shading{};
