@@ -19,10 +19,10 @@ struct SceneVars {
   nn::Var textures{};          // [B,h,w,3], one for each mesh, looked up at RenderJob::uvs
   nn::Var light_directions{};  // [N,3] from the surface to the light, of any length > 0: one for
                                // each image, for Lighting::kLambert and kPhong
-  nn::Var shininess{};  // [N]; Lighting::kPhong
-  nn::Var sh{};         // [N,9]; Lighting::kSphericalHarmonics
-  nn::Var cameras{};    // [N,16] rotation, translation, fx, fy, cx, cy: instead of
-                        // RenderJob's, whose near planes are kept
+  nn::Var shininess{};         // [N]; Lighting::kPhong
+  nn::Var sh{};                // [N,9]; Lighting::kSphericalHarmonics
+  nn::Var cameras{};           // [N,16] rotation, translation, fx, fy, cx, cy: instead of
+                               // RenderJob's, whose near planes are kept
 };
 
 // What is the same for all meshes, and no tensor.
