@@ -31,4 +31,7 @@ class MovingAverage {
   std::vector<NamedTensor> tensors_, averages_;
 };
 
+// The averages in `state`, which may hold anything else too, under the names of their tensors.
+std::vector<NamedTensor> Averages(const std::vector<NamedTensor>& state);
+
 }  // namespace tilegrad::nn

@@ -66,6 +66,18 @@ TEST(Schedules, FollowTheirFormulas) {
   EXPECT_DOUBLE_EQ(WarmedUp(2, 4, 9), 2.0);
 }
 
+TEST_F(Optimisers, AveragesAreFoundInACheckpoint) {
+  const Var p = Parameter(context_, context_.Full({2}, 1.0));
+  const MovingAverage average(context_, {{"net.p", p.value()}}, 0.5);
+  std::vector<NamedTensor> state = average.State();
+  state.push_back({"net.p", p.value()});
+  state.push_back({"adam.m", p.value()});
+  const auto averages = Averages(state);
+  ASSERT_EQ(averages.size(), 1u);
+  EXPECT_EQ(averages[0].name, "net.p");
+  EXPECT_TRUE(Averages({{"net.p", p.value()}}).empty());
+}
+
 TEST_F(Optimisers, MovingAverageFollows) {
   Var p = Matrix(1.0);
   MovingAverage average(context_, {{"p", p.value()}}, 0.75);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "nn/nn.h"
+#include "scene/topology.h"
 #include "train/tasks/single_image/step.h"
 
 namespace tilegrad::train {
@@ -37,11 +38,47 @@ TEST(MeshNetwork, PredictionsFillTheirBox) {
     EXPECT_TRUE(std::isfinite(v));
 }
 
+// Offsets of one vertex spread over its neighbours, and a constant stays: rows of the diffusion sum
+// to 1. The adjoint is the transpose, which the chain's gradient tests below cover.
+TEST(MeshNetwork, SmoothingSpreadsOffsets) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  const auto roughness = [&](std::int64_t rounds) {
+    MeshNetwork network(context,
+                        {.channels = 2,
+                         .code = 6,
+                         .hidden1 = 5,
+                         .hidden2 = 7,
+                         .template_level = 2,
+                         .smoothing = rounds,
+                         .output_deviation = 1},
+                        16, 1);
+    const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
+    const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
+    const auto& mesh = network.template_mesh();
+    const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+    double differences = 0, squares = 0;
+    const float* const m = out.movement.value().data<float>();
+    for (const Edge& edge : topology.edges) {
+      for (int c = 0; c < 3; ++c) {
+        const double d = m[3 * edge.a + c] - m[3 * edge.b + c];
+        differences += d * d;
+        squares += m[3 * edge.a + c] * m[3 * edge.a + c];
+      }
+    }
+    return differences / squares;
+  };
+  // White noise: differences have twice the variance. Four rounds of (I + A) / 2 keep a 40th of the
+  // highest frequencies' amplitude and most of the lowest.
+  EXPECT_NEAR(roughness(0), 2, 0.5);
+  EXPECT_LT(roughness(4), 0.5);
+}
+
 // Two objects, two views of 16 x 16, a small network: everything of a real step.
 struct SmallProblem {
   SingleImageConfig config;
   ImageStore store;
-  std::vector<Sample> samples = {{0, {0, 1}}, {1, {2, 0}}, {0, {2, 1}}};
+  std::vector<Sample> samples = {{0, {0, 1}}, {1, {2, 0}, true}, {0, {2, 1}}};
 
   SmallProblem() {
     config.network = {.channels = 2,
@@ -49,6 +86,7 @@ struct SmallProblem {
                       .hidden1 = 5,
                       .hidden2 = 7,
                       .template_level = 1,
+                      .smoothing = 2,
                       .fc_deviation = 0,
                       .color_bias = 0.4};
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};

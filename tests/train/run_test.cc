@@ -2,9 +2,11 @@
 // Configuration, checkpoints, logs, TensorBoard records, data order.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <set>
 
 #include "nn/nn.h"
+#include "scene/camera.h"
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
@@ -287,6 +289,45 @@ TEST(BatchOrder, EveryEpochShowsEachModelOnceAndViewsAreDistinct) {
   for (int m = 0; m < 10; ++m) EXPECT_EQ(seen.count(m), 2u);
   // A pure function of the step: asking for step 4 alone gives the same.
   EXPECT_EQ(again.Batch(4, 4, 3)[2].views, order.Batch(4, 4, 3)[2].views);
+}
+
+TEST(BatchOrder, MirrorsTheShareThatIsAskedForAndNothingElseChanges) {
+  BatchOrder plain(10, 6, 3), some(10, 6, 3, 0.25), all(10, 6, 3, 1.0);
+  int mirrored = 0;
+  for (std::int64_t step = 0; step < 100; ++step) {
+    const auto a = plain.Batch(step, 4, 2), b = some.Batch(step, 4, 2), c = all.Batch(step, 4, 2);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].model, b[i].model);
+      EXPECT_EQ(a[i].views, b[i].views);
+      EXPECT_FALSE(a[i].mirrored);
+      EXPECT_TRUE(c[i].mirrored);
+      mirrored += b[i].mirrored;
+    }
+  }
+  // 400 throws of 0.25: five standard deviations are 43.
+  EXPECT_NEAR(mirrored, 100, 43);
+}
+
+TEST(MirroredCamera, SeesTheMirroredWorldFlipped) {
+  const int size = 48;
+  Lens lens;
+  lens.width = lens.height = size;
+  Camera camera = OrbitCamera(lens, 37, 21, 1.7);
+  camera.cx += 3;  // off the middle
+  const Camera mirrored = MirroredCamera(camera, size);
+  const auto project = [](const Camera& c, std::array<float, 3> p) {
+    std::array<float, 3> q;
+    for (std::size_t r = 0; r < 3; ++r) {
+      q[r] = c.translation[r];
+      for (std::size_t k = 0; k < 3; ++k) q[r] += c.rotation[3 * r + k] * p[k];
+    }
+    return std::array<float, 2>{c.cx + c.fx * q[0] / q[2], q[2]};
+  };
+  for (const auto& p : {std::array<float, 3>{0.3f, 0.1f, -0.2f}, {-0.4f, 0.2f, 0.4f}}) {
+    const auto seen = project(camera, p), flipped = project(mirrored, {-p[0], p[1], p[2]});
+    EXPECT_NEAR(flipped[0], static_cast<float>(size) - seen[0], 2e-4);  // 48 pixels, 2^-24 a step
+    EXPECT_NEAR(flipped[1], seen[1], 1e-6);
+  }
 }
 
 }  // namespace

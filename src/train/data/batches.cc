@@ -12,7 +12,8 @@ namespace tilegrad::train {
 namespace {
 
 // Streams of the run's seed; the network's weights have theirs in models/.
-constexpr std::uint64_t kOrderStream = 0x6f72646572, kViewStream = 0x76696577;
+constexpr std::uint64_t kOrderStream = 0x6f72646572, kViewStream = 0x76696577,
+                        kMirrorStream = 0x6d6972726f72;
 
 }  // namespace
 
@@ -44,6 +45,14 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
   return store;
 }
 
+Camera MirroredCamera(const Camera& camera, int size) {
+  Camera out = camera;
+  for (const int entry : {1, 2, 3, 6}) out.rotation[entry] = -out.rotation[entry];
+  out.translation[0] = -out.translation[0];
+  out.cx = static_cast<float>(size) - out.cx;
+  return out;
+}
+
 const std::vector<int>& BatchOrder::Permutation(std::int64_t epoch) {
   if (epoch != cached_epoch_) {
     permutation_.resize(static_cast<std::size_t>(models_));
@@ -72,6 +81,8 @@ std::vector<Sample> BatchOrder::Batch(std::int64_t step, int size, int views) {
           all[static_cast<std::size_t>(v) + rng.Below(static_cast<std::uint64_t>(views_ - v))]);
       sample.views.push_back(all[static_cast<std::size_t>(v)]);
     }
+    sample.mirrored =
+        Rng(seed_ ^ kMirrorStream, static_cast<std::uint64_t>(position)).Uniform() < mirrored_;
     batch.push_back(std::move(sample));
   }
   return batch;

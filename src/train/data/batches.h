@@ -42,13 +42,21 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
 struct Sample {
   int model = 0;
   std::vector<int> views;
+  // Shown as its mirror image at the plane x = 0: pictures flipped from left to right, cameras with
+  // MirroredCamera.
+  bool mirrored = false;
 };
+
+// Sees a world mirrored at x = 0 as `camera` sees the world, flipped from left to right; `size`:
+// pixels a row. Projection is exact: u -> size - u, depth stays.
+Camera MirroredCamera(const Camera& camera, int size);
 
 // Every epoch shows each model once in a new order; the last batch of an epoch runs into the next.
 class BatchOrder {
  public:
-  BatchOrder(int models, int views, std::uint64_t seed)
-      : models_(models), views_(views), seed_(seed) {}
+  // `mirrored`: share of the samples that are mirrored, [0, 1].
+  BatchOrder(int models, int views, std::uint64_t seed, double mirrored = 0)
+      : models_(models), views_(views), seed_(seed), mirrored_(mirrored) {}
   // `views` is at most the number of views there are.
   std::vector<Sample> Batch(std::int64_t step, int size, int views);
 
@@ -56,6 +64,7 @@ class BatchOrder {
   const std::vector<int>& Permutation(std::int64_t epoch);
   int models_, views_;
   std::uint64_t seed_;
+  double mirrored_;
   std::int64_t cached_epoch_ = -1;
   std::vector<int> permutation_;
 };

@@ -3,6 +3,7 @@
 
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "scene/topology.h"
 
 namespace tilegrad::train {
 namespace {
@@ -54,6 +55,29 @@ nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t vert
   return output;
 }
 
+// Rows of D = ((I + A) / 2)^rounds, where A takes the mean over a vertex's neighbours: what
+// diffusion makes of an impulse. Noise from vertex to vertex dies out, and what is smooth stays.
+std::vector<float> DiffusionMatrix(const Topology& topology, std::int64_t rounds) {
+  const std::size_t n = topology.offsets.size() - 1;
+  std::vector<float> rows(n * n, 0.0f), next(n * n);
+  for (std::size_t v = 0; v < n; ++v) rows[v * n + v] = 1;
+  for (std::int64_t round = 0; round < rounds; ++round) {
+    for (std::size_t v = 0; v < n; ++v) {
+      const auto begin = static_cast<std::size_t>(topology.offsets[v]);
+      const auto end = static_cast<std::size_t>(topology.offsets[v + 1]);
+      const float share = 0.5f / static_cast<float>(end - begin);
+      for (std::size_t u = 0; u < n; ++u) {
+        float sum = 0;
+        for (std::size_t k = begin; k < end; ++k)
+          sum += rows[static_cast<std::size_t>(topology.neighbors[k]) * n + u];
+        next[v * n + u] = 0.5f * rows[v * n + u] + share * sum;
+      }
+    }
+    rows.swap(next);
+  }
+  return rows;
+}
+
 }  // namespace
 
 void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
@@ -75,13 +99,26 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
   nn::FillConstant(BuildDecoder(builder, all_.color, vertices).bias.value(), config.color_bias);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ = context.From({vertices, 3}, flat);
+  if (config.smoothing > 0) {
+    const Topology topology = BuildTopology(template_.faces, template_.positions.size());
+    diffusion_ = context.From({vertices, vertices}, DiffusionMatrix(topology, config.smoothing));
+  }
+}
+
+nn::Var MeshNetwork::Movement(const nn::Var& code, nn::Mode mode) {
+  const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
+  const nn::Var offsets = all_.shape.Forward(code, mode);
+  if (diffusion_.empty()) return nn::Reshape(offsets, {batch, vertices, 3});
+  const nn::Var smooth = nn::Matmul(nn::Reshape(offsets, {batch * 3, vertices}),
+                                    nn::Constant(context_, diffusion_), {.transpose_b = true});
+  return nn::Permute(nn::Reshape(smooth, {batch, 3, vertices}), {0, 2, 1});
 }
 
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const std::int64_t batch = images.shape()[0], vertices = template_positions_.shape()[0];
   const nn::Var code = all_.encoder.Forward(images, mode);
   PredictedMeshes out;
-  out.movement = nn::Reshape(all_.shape.Forward(code, mode), {batch, vertices, 3});
+  out.movement = Movement(code, mode);
   out.colors = nn::Reshape(all_.color.Forward(code, mode), {batch, vertices, 3});
   out.positions = NormalizeMeshes(out.movement + nn::Constant(context_, template_positions_),
                                   kPredictionHalfExtent);

@@ -18,6 +18,7 @@ struct NetworkConfig {
   std::int64_t hidden2 = 2048;
   std::int64_t template_level = 3;  // subdivisions of the icosahedron: 3 gives 642 vertices
   double template_radius = 0.175;   // world units
+  std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
@@ -51,9 +52,12 @@ class MeshNetwork {
   const Mesh& template_mesh() const { return template_; }
 
  private:
+  nn::Var Movement(const nn::Var& code, nn::Mode mode);
+
   nn::Context& context_;
   Mesh template_;
   nn::Tensor template_positions_;  // [V, 3]
+  nn::Tensor diffusion_;           // [V, V] of NetworkConfig::smoothing rounds; invalid without
   // The three parts, shown to visitors as one module.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;

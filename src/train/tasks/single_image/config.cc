@@ -13,6 +13,8 @@ ConfigFields FieldsOf(SingleImageConfig* c) {
       {"network.template_level", &c->network.template_level, 0, 6,
        "subdivisions of the icosahedron; 3: 642 vertices"},
       {"network.template_radius", &c->network.template_radius, 1e-3, 10, "world units"},
+      {"network.smoothing", &c->network.smoothing, 0, 64,
+       "rounds of diffusion over the template that offsets go through"},
       {"network.fc_deviation", &c->network.fc_deviation, 0, 10,
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
       {"network.output_deviation", &c->network.output_deviation, 0, 10,
@@ -35,8 +37,12 @@ ConfigFields FieldsOf(SingleImageConfig* c) {
       {"optimizer.warmup", &c->optimizer.warmup, 0, kNoLimit, "steps of linear rise"},
       {"optimizer.beta1", &c->optimizer.beta1, 0, 0.999999, "of Adam"},
       {"optimizer.beta2", &c->optimizer.beta2, 0, 0.99999999, "of Adam"},
+      {"optimizer.average", &c->optimizer.average, 0, 0.999999,
+       "decay of a moving average of the weights, which predicts; 0: none"},
       {"schedule.batch", &c->batch, 2, 65536, "objects a step; batch norm needs two"},
       {"schedule.views", &c->views, 1, 64, "rendered per object: its own view and random others"},
+      {"schedule.mirrored", &c->mirrored, 0, 1,
+       "share of the objects shown mirrored, left to right"},
   };
 }
 

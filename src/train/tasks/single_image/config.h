@@ -29,6 +29,7 @@ struct OptimizerConfig {
   std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
   double beta1 = 0.9;
   double beta2 = 0.999;
+  double average = 0;  // decay of a moving average of the weights, which is what predicts; 0: none
 };
 
 struct SingleImageConfig {
@@ -38,6 +39,7 @@ struct SingleImageConfig {
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
+  double mirrored = 0;      // share of the samples that are shown mirrored at x = 0
   Schedule schedule;        // of the run; no keys of the task
 };
 

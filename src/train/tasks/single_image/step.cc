@@ -15,18 +15,25 @@
 namespace tilegrad::train {
 namespace {
 
-template <class T>
-void BytesToUnit(std::span<const std::uint8_t> from, T* to) {
-  for (std::size_t i = 0; i < from.size(); ++i) to[i] = static_cast<T>(from[i]) * T(1.0 / 255);
-}
-
-// Where image n of a batch lies in its tensors.
-struct Places {
-  std::size_t plane;  // pixels
+// Bytes to [0, 1]; rows of `size` pixels, each from right to left if mirrored.
+struct Reader {
+  std::size_t size;
+  bool mirrored;
   template <class T>
-  void Truth(std::span<const std::uint8_t> image, std::size_t n, BatchTensors& out) const {
-    BytesToUnit(image.first(3 * plane), out.truth_colors.data<T>() + 3 * plane * n);
-    BytesToUnit(image.subspan(3 * plane), out.truth_alpha.data<T>() + plane * n);
+  void Read(std::span<const std::uint8_t> from, T* to) const {
+    for (std::size_t row = 0; row < from.size(); row += size) {
+      for (std::size_t x = 0; x < size; ++x) {
+        const std::size_t source = row + (mirrored ? size - 1 - x : x);
+        to[row + x] = static_cast<T>(from[source]) * T(1.0 / 255);
+      }
+    }
+  }
+  // What image n of a batch is held to.
+  template <class T>
+  void ReadTruth(std::span<const std::uint8_t> image, std::size_t n, BatchTensors& out) const {
+    const std::size_t plane = size * size;
+    Read(image.first(3 * plane), out.truth_colors.data<T>() + 3 * plane * n);
+    Read(image.subspan(3 * plane), out.truth_alpha.data<T>() + plane * n);
   }
 };
 
@@ -43,17 +50,19 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                    context.Empty({images, size, size}),
                    {}};
   for (const Sample& sample : batch) {
-    for (const int view : sample.views)
-      out.cameras.push_back(store.cameras[static_cast<std::size_t>(view)]);
+    for (const int view : sample.views) {
+      const Camera& camera = store.cameras[static_cast<std::size_t>(view)];
+      out.cameras.push_back(sample.mirrored ? MirroredCamera(camera, store.size) : camera);
+    }
   }
-  const Places places{static_cast<std::size_t>(size * size)};
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
     context.workers().For(batch.size(), [&](std::size_t b, std::size_t) {
       const Sample& sample = batch[b];
-      BytesToUnit(store.Image(sample.model, sample.views[0]),
+      const Reader reader{static_cast<std::size_t>(size), sample.mirrored};
+      reader.Read(store.Image(sample.model, sample.views[0]),
                   out.input.data<T>() + b * store.ImageBytes());
       for (std::size_t v = 0; v < views; ++v) {
-        places.Truth<T>(store.Image(sample.model, sample.views[v]), b * views + v, out);
+        reader.ReadTruth<T>(store.Image(sample.model, sample.views[v]), b * views + v, out);
       }
     });
   });
@@ -83,6 +92,10 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
             {.learning_rate = config.optimizer.learning_rate,
              .beta1 = config.optimizer.beta1,
              .beta2 = config.optimizer.beta2}),
+      average_(context,
+               config.optimizer.average > 0 ? nn::State(network_.module())
+                                            : std::vector<nn::NamedTensor>(),
+               config.optimizer.average),
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
       renderer_(context.workers()) {}
@@ -143,7 +156,9 @@ Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& bat
 
 Status TrainStep::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
   adam_.options().learning_rate = LearningRateAt(config_, step);
-  return adam_.Step(gradients);
+  TILEGRAD_TRY(adam_.Step(gradients));
+  average_.Update();
+  return {};
 }
 
 }  // namespace tilegrad::train

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "nn/moving_average.h"
 #include "nn/optim.h"
 #include "scene/topology.h"
 #include "train/data/batches.h"
@@ -42,13 +43,14 @@ class TrainStep {
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, std::int64_t step,
                                                 LossValues* values);
-  // One step of Adam.
+  // One step of Adam, and of the moving average of the weights if there is one.
   Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
   // Appends the same by name and weight.
   void AddTerms(const LossValues& values, std::vector<LossTerm>* terms) const;
 
   MeshNetwork& network() { return network_; }
   nn::Adam& adam() { return adam_; }
+  nn::MovingAverage& average() { return average_; }  // of no tensors without optimizer.average
   SceneRenderer& renderer() { return renderer_; }
   RenderOptions OptionsAt(std::int64_t step) const;
   std::span<const std::int32_t> faces() const;
@@ -59,6 +61,7 @@ class TrainStep {
   int image_size_;
   MeshNetwork network_;
   nn::Adam adam_;
+  nn::MovingAverage average_;
   Topology topology_;
   SceneRenderer renderer_;
 };

@@ -75,7 +75,8 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
   step_.emplace(*context_, config_, train_.size);
-  order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed));
+  order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed),
+                 config_.mirrored);
   return {};
 }
 
@@ -139,12 +140,15 @@ std::vector<nn::NamedTensor> SingleImageTask::State() {
   std::vector<nn::NamedTensor> tensors = nn::State(step_->network().module());
   const std::vector<nn::NamedTensor> moments = step_->adam().State();
   tensors.insert(tensors.end(), moments.begin(), moments.end());
+  const std::vector<nn::NamedTensor> averages = step_->average().State();
+  tensors.insert(tensors.end(), averages.begin(), averages.end());
   return tensors;
 }
 
 Status SingleImageTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
   TILEGRAD_TRY(nn::LoadState(step_->network().module(), state));
   TILEGRAD_TRY(step_->adam().LoadState(state));
+  TILEGRAD_TRY(step_->average().LoadState(state));
   if (step_->adam().steps() == steps) return {};
   return InvalidArgument("the optimizer has taken {} steps, the run {}", step_->adam().steps(),
                          steps);
