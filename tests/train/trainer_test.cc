@@ -7,6 +7,7 @@
 
 #include <csignal>
 #include <cstring>
+#include <limits>
 
 #include "base/folder_lock.h"
 #include "nn/nn.h"
@@ -117,6 +118,36 @@ TEST_F(TrainerTest, StoppedAndResumedIsTheSame) {
   EXPECT_EQ(LoadNewestCheckpoint(context_, job_.run)->checkpoint.info.step, 4);
   ExpectFinishes();
   ExpectSameBits("whole", "run");
+}
+
+// With everything that is off by default.
+TEST_F(TrainerTest, MirroredSmoothedAndAveragedRunsResumeToo) {
+  ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
+  ValueOf<double>(job_.config, "optimizer.average") = 0.9;
+  ValueOf<std::int64_t>(job_.config, "network.smoothing") = 2;
+  RunWhole("whole", 2);
+  StopAfter(4);
+  ExpectFinishes();
+  ExpectSameBits("whole", "run");
+}
+
+TEST_F(TrainerTest, TheAverageOfTheWeightsPredicts) {
+  ValueOf<double>(job_.config, "optimizer.average") = 0.9;
+  RunWhole("run", 1);
+  auto newest = LoadNewestCheckpoint(context_, folder_ / "run");
+  ASSERT_TRUE(newest.ok());
+  for (nn::NamedTensor& t : newest->checkpoint.tensors) {
+    if (t.name.starts_with("ema.") || t.value.dtype() != nn::DType::kF32) continue;
+    for (float& x : t.value.span<float>()) x = std::numeric_limits<float>::quiet_NaN();
+  }
+  auto model = job_.config.task->LoadModel(context_, newest->checkpoint);
+  ASSERT_TRUE(model.ok()) << model.status().message();
+  const auto side = static_cast<std::size_t>(newest->checkpoint.info.image_size);
+  const std::vector<std::uint8_t> image(4 * side * side, 128);
+  std::vector<Mesh> meshes;
+  const Status predicted = (*model)->Predict(image, &meshes);  // an error if the mesh is not finite
+  EXPECT_TRUE(predicted.ok()) << predicted.message();
+  EXPECT_EQ(meshes.size(), 1u);
 }
 
 TEST_F(TrainerTest, RefusesAnExistingRun) {

@@ -46,7 +46,7 @@ Result<ImageStore> LoadImageStore(const Dataset& dataset, const std::vector<int>
 }
 
 Camera MirroredCamera(const Camera& camera, int size) {
-  Camera out = camera;
+  Camera out = camera;  // M R M and M t, with M = diag(-1, 1, 1)
   for (const int entry : {1, 2, 3, 6}) out.rotation[entry] = -out.rotation[entry];
   out.translation[0] = -out.translation[0];
   out.cx = static_cast<float>(size) - out.cx;

@@ -55,27 +55,17 @@ nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t vert
   return output;
 }
 
-// Rows of D = ((I + A) / 2)^rounds, where A takes the mean over a vertex's neighbours: what
-// diffusion makes of an impulse. Noise from vertex to vertex dies out, and what is smooth stays.
-std::vector<float> DiffusionMatrix(const Topology& topology, std::int64_t rounds) {
-  const std::size_t n = topology.offsets.size() - 1;
-  std::vector<float> rows(n * n, 0.0f), next(n * n);
-  for (std::size_t v = 0; v < n; ++v) rows[v * n + v] = 1;
-  for (std::int64_t round = 0; round < rounds; ++round) {
-    for (std::size_t v = 0; v < n; ++v) {
-      const auto begin = static_cast<std::size_t>(topology.offsets[v]);
-      const auto end = static_cast<std::size_t>(topology.offsets[v + 1]);
-      const float share = 0.5f / static_cast<float>(end - begin);
-      for (std::size_t u = 0; u < n; ++u) {
-        float sum = 0;
-        for (std::size_t k = begin; k < end; ++k)
-          sum += rows[static_cast<std::size_t>(topology.neighbors[k]) * n + u];
-        next[v * n + u] = 0.5f * rows[v * n + u] + share * sum;
-      }
-    }
-    rows.swap(next);
-  }
-  return rows;
+// One round of diffusion over a mesh: each vertex goes halfway to the mean of its neighbours. Noise
+// from vertex to vertex dies out with the rounds, and what is smooth stays.
+nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
+  const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());
+  const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
+  return nn::MakeAxisMap(like, {vertices, vertices}, [&](std::int64_t v, nn::AxisTerms& terms) {
+    const auto at = topology.offsets.begin() + v;
+    terms.push_back({v, 0.5});
+    for (std::int32_t n = at[0]; n < at[1]; ++n)
+      terms.push_back({topology.neighbors[static_cast<std::size_t>(n)], 0.5 / (at[1] - at[0])});
+  });
 }
 
 }  // namespace
@@ -90,7 +80,8 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
                          std::uint64_t seed)
     : context_(context),
       template_(Icosphere(static_cast<int>(config.template_level),
-                          static_cast<float>(config.template_radius))) {
+                          static_cast<float>(config.template_radius))),
+      smoothing_(config.smoothing) {
   Rng rng(seed, /*stream=*/0x6e6574);
   Builder builder{context, config, rng};
   const auto vertices = static_cast<std::int64_t>(template_.positions.size());
@@ -99,19 +90,15 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
   nn::FillConstant(BuildDecoder(builder, all_.color, vertices).bias.value(), config.color_bias);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ = context.From({vertices, 3}, flat);
-  if (config.smoothing > 0) {
-    const Topology topology = BuildTopology(template_.faces, template_.positions.size());
-    diffusion_ = context.From({vertices, vertices}, DiffusionMatrix(topology, config.smoothing));
-  }
+  diffusion_ = DiffusionRound(nn::Constant(context, template_positions_), template_);
 }
 
 nn::Var MeshNetwork::Movement(const nn::Var& code, nn::Mode mode) {
   const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
-  const nn::Var offsets = all_.shape.Forward(code, mode);
-  if (diffusion_.empty()) return nn::Reshape(offsets, {batch, vertices, 3});
-  const nn::Var smooth = nn::Matmul(nn::Reshape(offsets, {batch * 3, vertices}),
-                                    nn::Constant(context_, diffusion_), {.transpose_b = true});
-  return nn::Permute(nn::Reshape(smooth, {batch, 3, vertices}), {0, 2, 1});
+  nn::Var movement = nn::Reshape(all_.shape.Forward(code, mode), {batch, vertices, 3});
+  for (std::int64_t round = 0; round < smoothing_; ++round)
+    movement = nn::MapAxis(movement, 1, diffusion_);
+  return movement;
 }
 
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "nn/layers.h"
+#include "nn/ops/axis_map.h"
 #include "scene/mesh.h"
 
 namespace tilegrad::train {
@@ -56,8 +57,9 @@ class MeshNetwork {
 
   nn::Context& context_;
   Mesh template_;
+  std::int64_t smoothing_;         // rounds of diffusion
   nn::Tensor template_positions_;  // [V, 3]
-  nn::Tensor diffusion_;           // [V, V] of NetworkConfig::smoothing rounds; invalid without
+  nn::AxisMap diffusion_;          // one round
   // The three parts, shown to visitors as one module.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;

@@ -39,7 +39,7 @@ struct SingleImageConfig {
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
-  double mirrored = 0;      // share of the samples that are shown mirrored at x = 0
+  double mirrored = 0;      // share of the samples that are shown mirrored at x = 0, light included
   Schedule schedule;        // of the run; no keys of the task
 };
 
