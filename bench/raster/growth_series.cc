@@ -28,8 +28,8 @@ void AddPixels() {
   }
 }
 
-// The plain program visits every pixel of boxes that widen with the kernel, and takes seconds from
-// 1e-2 on; it is not run beyond.
+// The scalar baseline visits every pixel of boxes that widen with the kernel, and takes seconds
+// from 1e-2 on; it is not run beyond.
 void AddDelta() {
   constexpr double kWidestCulled = 1e-2;
   for (const double delta : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the benchmarks of the whole renderer have in common: one pass over a batch by the renderer,
-// by the plain program with boxes ("culled") or by the naive reference, with the work counted.
+// by the scalar baseline ("culled") or by the naive reference, with the work counted.
 #pragma once
 
 #include <string>

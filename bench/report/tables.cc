@@ -59,8 +59,8 @@ constexpr Curve kCurves[] = {{"forward", "1", "tilegrad forward, E = 1e-7"},
                              {"backward", "1", "tilegrad backward, E = 1e-7"},
                              {"forward", "1-E1e-3", "tilegrad forward, E = 1e-3"},
                              {"backward", "1-E1e-3", "tilegrad backward, E = 1e-3"},
-                             {"forward", "culled", "plain with boxes, forward"},
-                             {"backward", "culled", "plain with boxes, backward"}};
+                             {"forward", "culled", "scalar baseline, forward"},
+                             {"backward", "culled", "scalar baseline, backward"}};
 
 LogSeries SeriesOf(const std::vector<Measurement>& all, const std::string& axis,
                    const Curve& curve) {
@@ -108,7 +108,7 @@ std::string MeasurementsCsv(const std::vector<Measurement>& all) {
 
 std::string SpeedTable(const std::vector<Measurement>& all) {
   std::string out =
-      "| scene | direction | what | ms, E = 1e-7 | ms, default E | x plain with boxes | x naive | "
+      "| scene | direction | what | ms, E = 1e-7 | ms, default E | x scalar baseline | x naive | "
       "two workers, x | limit ms | of the limit |\n|---|---|---|--:|--:|--:|--:|--:|--:|--:|\n";
   for (const Measurement& m : all) {
     if (m.who == "1" && !IsGrowth(m)) out += SpeedRow(all, m);

@@ -78,8 +78,7 @@ inline void AddLights(const SceneRecipe& recipe, Rng* rng, OwnedScene<float>* s)
 }
 
 // A sphere with bumps, or a soup; from outside, or (seldom) cut by the near plane.
-inline OwnedScene<float> RandomShadedScene(const SceneRecipe& recipe, int width, int height,
-                                           Rng* rng) {
+inline OwnedScene<float> RandomScene(const SceneRecipe& recipe, int width, int height, Rng* rng) {
   OwnedScene<float> s;
   switch (rng->Below(5)) {
     case 0:

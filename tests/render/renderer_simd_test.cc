@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shaded renderer against the reference in double, over random scenes of every shading model
+// The Renderer against the reference in double, over random scenes of every shading model
 // and on every instruction set: images, and gradients of everything.
 #include <gtest/gtest.h>
 

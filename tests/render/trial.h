@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A random scene with its visibility and cotangents, for tests of the shaded renderer.
+// A random scene with its visibility and cotangents, for tests of the Renderer.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +50,7 @@ struct Trial {
 
   Trial(const SceneRecipe& recipe, std::uint64_t seed) {
     Rng rng(seed, 77);
-    scene = RandomShadedScene(recipe, kTrialWidth, kTrialHeight, &rng);
+    scene = RandomScene(recipe, kTrialWidth, kTrialHeight, &rng);
     ids = FaceIdsRef<float>(scene.mesh.View(), TrialOptions(), {0, kTrialHeight});
     d_frame = OwnedCotangents<double>(kTrialPixels, 2, &rng);
     if (scene.uvs.empty()) std::fill(d_frame.uv.begin(), d_frame.uv.end(), 0.0);
