@@ -73,11 +73,12 @@ struct Session {
   Engine renderer{workers};
   OwnedScene<float> scene;
   Scene view;
+  RenderOptions options = Options();
   FrameImages frame;
 
   explicit Session(OwnedScene<float> s) : scene(std::move(s)), view(scene.View()) {}
   PlanReport Render(const Outputs& request) {
-    const Status status = renderer.Render({&view, 1}, Options(), request, &frame);
+    const Status status = renderer.Render({&view, 1}, options, request, &frame);
     EXPECT_TRUE(status.ok()) << status.message();
     return renderer.Explain();
   }
@@ -93,7 +94,7 @@ struct Session {
     SceneGradients d_scene;
     chosen = &every_gradient;
     choose(d_frame, d_scene);
-    const Status status = renderer.Backward({&view, 1}, Options(), frame, d_frame, {&d_scene, 1});
+    const Status status = renderer.Backward({&view, 1}, options, frame, d_frame, {&d_scene, 1});
     EXPECT_TRUE(status.ok()) << status.message();
     return renderer.Explain();
   }
@@ -183,6 +184,37 @@ TEST(ShadedPlan, NothingIsPulledThatDoesNotRequireIt) {
   report = session.Backward([](auto&, auto&) {});
   EXPECT_EQ(report.count("gather"), 0);
   EXPECT_EQ(report.count("merge"), 0);
+}
+
+const StageReport& StageOf(const PlanReport& report, std::string_view name) {
+  return *std::find_if(report.stages.begin(), report.stages.end(),
+                       [&](const StageReport& stage) { return stage.name == name; });
+}
+
+TEST(ShadedPlan, AlphaIsNamedByItsRule) {
+  const struct {
+    AlphaRule rule;
+    const char *forward, *backward;
+  } rules[] = {
+      {AlphaRule::kAllFaces, "equation 6: ", "equation 6, to geometry: "},
+      {AlphaRule::kPaper, "the paper's truncated rule", "the paper's truncated rule, to geometry"}};
+  const std::vector<float> d_alpha(kPixels, 1.0f);
+  for (const auto& [rule, forward, backward] : rules) {
+    Session session(Sphere(Lighting::kPhong));
+    session.options.alpha_rule = rule;
+    PlanReport report = session.Render(Request(false, true));
+    EXPECT_TRUE(StageOf(report, "alpha").what.starts_with(forward))
+        << StageOf(report, "alpha").what;
+    EXPECT_EQ(StageOf(report, "alpha").what.find("pairs") == std::string::npos,
+              rule == AlphaRule::kPaper);
+    report = session.Backward([&](auto& d_frame, auto& d) {
+      d_frame.color = {}, d_frame.alpha = d_alpha, d.positions = session.chosen->positions;
+    });
+    EXPECT_TRUE(StageOf(report, "alpha").what.starts_with(backward))
+        << StageOf(report, "alpha").what;
+    report = session.Render(Request(true, false));
+    EXPECT_EQ(StageOf(report, "alpha").what, "alpha is not wanted");
+  }
 }
 
 TEST(ShadedPlan, LinesNameEveryStageWithItsCount) {

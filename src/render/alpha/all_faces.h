@@ -16,6 +16,7 @@ class AllFacesAlpha final : public AlphaStage {
   explicit AllFacesAlpha(std::size_t workers) : scratch_(workers) {}
 
   AlphaNeeds needs() const override { return {.soft_tree = true, .transmittance = true}; }
+  const char* name() const override { return "equation 6"; }
   void Begin(const RenderOptions& options, std::size_t images) override;
   void Prepare(std::size_t n, const ImageScratch& image) override;
   double Forward(const AlphaBin& bin, const AlphaImages& out) override;

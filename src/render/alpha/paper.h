@@ -28,6 +28,7 @@ inline raster::PaperSoftMask PaperRuleOf(const RenderOptions& options) {
 class PaperAlpha final : public AlphaStage {
  public:
   AlphaNeeds needs() const override { return {.bounded = false, .own_sums = true}; }
+  const char* name() const override { return "the paper's truncated rule"; }
   void Begin(const RenderOptions& options, std::size_t images) override;
   void Prepare(std::size_t n, const ImageScratch& image) override;
   double Forward(const AlphaBin& bin, const AlphaImages& out) override;

@@ -53,6 +53,8 @@ class AlphaStage {
   virtual ~AlphaStage() = default;
 
   virtual AlphaNeeds needs() const = 0;
+  // What `--explain` calls the rule.
+  virtual const char* name() const = 0;
   // What the next call is about. `options` are valid, and the caller keeps them until it ends.
   virtual void Begin(const RenderOptions& options, std::size_t images) = 0;
   // Image n of the batch was put on the screen. Left out where it still is from the last call, for

@@ -338,6 +338,7 @@ RenderStats Pipeline::stats() const {
     sum.merged += worker.stats.merged;
   }
   if (impl_->alpha != nullptr) {
+    sum.alpha_rule = impl_->alpha->name();
     const raster::SoftWork work = impl_->alpha->work();
     sum.pairs = work.pairs, sum.powers = work.powers;
   }

@@ -16,8 +16,9 @@ struct RenderStats {
   std::int64_t merged = 0;        // arrays of gradients: positions and attributes count apart
   // Of the soft mask, forward or backward, lanes of vectors that had no face included. They depend
   // on the instruction set.
-  std::int64_t pairs = 0;   // of a face and a background pixel that were evaluated
-  std::int64_t powers = 0;  // exponentials
+  std::int64_t pairs = 0;       // of a face and a background pixel that were evaluated
+  std::int64_t powers = 0;      // exponentials
+  const char* alpha_rule = "";  // AlphaStage::name, where alpha was made or pulled on
 };
 
 // Milliseconds in the stages of a call, summed over workers.

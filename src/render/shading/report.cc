@@ -72,9 +72,11 @@ void AddScene(const SceneParts& parts, const SceneWork& w, std::vector<StageRepo
                       parts.trilinear ? "with their levels" : "level 0 only", "none is needed"));
 }
 
-std::string Evaluated(std::string_view what, const RenderStats& stats) {
-  return fmt::format("{}: {} pairs of face and pixel, {} exponentials", what, stats.pairs,
-                     stats.powers);
+// The rule, and what it evaluated if it counts that.
+std::string Evaluated(const RenderStats& stats, std::string_view where = "") {
+  if (stats.pairs == 0) return fmt::format("{}{}", stats.alpha_rule, where);
+  return fmt::format("{}{}: {} pairs of face and pixel, {} exponentials", stats.alpha_rule, where,
+                     stats.pairs, stats.powers);
 }
 
 std::int64_t Numbers(const ShadeWork& shade, const VaryingSet& set) {
@@ -102,7 +104,7 @@ PlanReport ReportForward(const ForwardPlan& plan, const CallWork& work) {
   out.push_back(Only("scatter", shade.pixels, "pixels", shade.scatter, "into images",
                      "attributes are the image"));
   out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
-                     Evaluated("equation 6", work.stats), "alpha is not wanted"));
+                     Evaluated(work.stats), "alpha is not wanted"));
   return report;
 }
 
@@ -127,7 +129,7 @@ PlanReport ReportBackward(const BackwardPlan& plan, const CallWork& work) {
                      plan.geometry ? "of attributes and geometry" : "of attributes",
                      "no attribute has a gradient"));
   out.push_back(Only("alpha", work.stats.alpha_parts, "bins", work.times.alpha,
-                     Evaluated("to geometry", work.stats), "alpha pulls on nothing"));
+                     Evaluated(work.stats, ", to geometry"), "alpha pulls on nothing"));
   out.push_back(Only("merge", work.stats.merged, "arrays", work.times.merge + work.scene.merge_ms,
                      "from faces to the scene", "nothing to merge"));
   return report;
