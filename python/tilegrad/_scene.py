@@ -159,13 +159,13 @@ class Scene:
         self._dtype = _arrays.float_dtype("Scene", "positions", positions)
         sizes: dict[str, int] = {}
         corners = self._corners(per_corner)
-        values = (("colors", colors), ("uvs", uvs),
-                  ("normals", None if isinstance(normals, str) else normals),
-                  ("attributes", attributes), ("light_directions", light_directions), ("sh", sh))
         fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
                   "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes),
                   "camera": self._camera(camera, sizes)}
-        for name, value in values:
+        for name in _SHAPES:
+            value = self._arguments[name]
+            if name == "normals" and isinstance(value, str):
+                value = None  # they are derived
             if value is None and name in corners:
                 raise ValueError(f"Scene: per_corner has {name!r}, but the scene has no {name}")
             if value is not None:

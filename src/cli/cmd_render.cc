@@ -11,6 +11,7 @@
 #include "cli/render_options.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -98,8 +99,7 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   scene.camera = CameraCast<float>(view.camera);
   scene.shading.lighting = settings_.lighting;
   const auto lights = LightsOf(settings_, scene.camera);
-  if (settings_.lighting == Lighting::kLambert || settings_.lighting == Lighting::kPhong)
-    scene.lights = lights;
+  if (UsesLights(scene.shading)) scene.lights = lights;
   if (settings_.lighting == Lighting::kSphericalHarmonics) scene.sh = settings_.sh;
   PictureRequest request{.width = view.size.width,
                          .height = view.size.height,

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "cli/run_folder.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -143,8 +144,7 @@ void AddRenderOptions(CLI::App* command, RenderSettings* settings) {
 }
 
 Status CheckRenderOptions(const CLI::App& command, const RenderSettings& s) {
-  const bool phong = s.lighting == Lighting::kPhong,
-             lit = phong || s.lighting == Lighting::kLambert;
+  const bool phong = s.lighting == Lighting::kPhong, lit = UsesLights({.lighting = s.lighting});
   const bool from_file = !s.view.camera_file.empty() || !s.view.gltf_camera.empty();
   const bool framed = !from_file && s.view.eye.empty();
   struct Effect {

@@ -10,6 +10,7 @@
 
 #include "base/aligned.h"
 #include "render/renderer.h"
+#include "render/scene_fields.h"
 #include "scene/camera.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
@@ -33,9 +34,7 @@ struct FitScene {
   std::vector<Camera> cameras;  // one for each view
 
   std::size_t vertices() const { return positions.size() / 3; }
-  bool uses_lights() const {
-    return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
-  }
+  bool uses_lights() const { return UsesLights(shading); }
 };
 
 // What can be fitted.

@@ -11,9 +11,14 @@
 
 namespace tilegrad {
 
-// What is interpolated over faces.
+// Whether light comes from `lights` or `light_directions`, and surfaces have k_a and k_d.
+inline bool UsesLights(const ShadingModel& shading) {
+  return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
+}
+
+// What is interpolated over faces. kUser is the last.
 enum class Varying { kColor, kUv, kNormal, kPosition, kLightDirection, kUser };
-inline constexpr std::size_t kVaryings = 6;
+inline constexpr std::size_t kVaryings = static_cast<std::size_t>(Varying::kUser) + 1;
 
 // An array of a scene with a row for each vertex or corner, and its gradient.
 template <class T>
@@ -33,7 +38,7 @@ struct SceneStream {
 // The list of streams: calls visit(name, what, width, field of the scene, field of the gradients),
 // the fields by reference. A field is a StreamT, or a span where there is no choice of rates.
 template <class T, class Scene, class Gradients, class Visit>
-void ForEachStreamField(Scene& s, Gradients& d, const Visit& visit) {
+constexpr void ForEachStreamField(Scene& s, Gradients& d, const Visit& visit) {
   visit("positions", Varying::kPosition, 3, s.positions, d.positions);
   visit("attributes", Varying::kUser, s.channels, s.attributes, d.attributes);
   visit("colors", Varying::kColor, 3, s.colors, d.colors);

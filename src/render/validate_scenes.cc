@@ -19,10 +19,6 @@ constexpr float kMostShininess = 1e6f;
 
 std::string SceneName(std::size_t n) { return fmt::format("scene {}", n); }
 
-bool UsesLights(const ShadingModel& shading) {
-  return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
-}
-
 template <class Enum>
 Status CheckEnumerator(const char* name, Enum value, Enum last) {
   const int number = static_cast<int>(value), end = static_cast<int>(last);

@@ -3,6 +3,7 @@
 // allocation, sums over scenes that share an array, errors.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
@@ -42,7 +43,7 @@ OwnedScene<float> Sphere(Lighting lighting, std::uint64_t seed = 3) {
   s.surfaces.push_back({{1, 1, 1}, 0, {0.1f, 0.1f, 0.1f}, {1, 1, 1}, {0.4f, 0.4f, 0.4f}, 10});
   s.shading.lighting = lighting;
   if (lighting == Lighting::kSphericalHarmonics) s.sh = {1, 0.5f, 0.2f, 0.1f, 0, 0, 0.3f, 0, 0};
-  if (lighting == Lighting::kPhong || lighting == Lighting::kLambert) {
+  if (UsesLights(s.shading)) {
     s.lights = {{{1, 1, 1}, 0.7f}, {{-1, 0.5f, 1}, 0.3f}};
   }
   return s;

@@ -64,7 +64,7 @@ inline std::vector<std::string> KindsOf(const SceneRecipe& recipe) {
                                     "translation", "lens",       "base_color"};
   if (recipe.colors) kinds.push_back("colors");
   if (recipe.textured) kinds.insert(kinds.end(), {"uvs", "texture"});
-  const bool lights = recipe.lighting == Lighting::kLambert || recipe.lighting == Lighting::kPhong;
+  const bool lights = UsesLights({.lighting = recipe.lighting});
   if (lights) kinds.insert(kinds.end(), {"ambient", "diffuse"});
   if (lights && !recipe.per_vertex_light) kinds.insert(kinds.end(), {"light", "intensity"});
   if (recipe.per_vertex_light) kinds.push_back("light_directions");

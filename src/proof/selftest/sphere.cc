@@ -6,6 +6,7 @@
 #include "proof/complex_step.h"
 #include "proof/selftest/checks.h"
 #include "proof/selftest/sphere_scene.h"
+#include "render/scene_fields.h"
 
 namespace tilegrad::selftest {
 namespace {
@@ -14,9 +15,8 @@ using Gradients = std::map<std::string, std::vector<double>>;
 
 // Whether numbers of the sphere have a gradient that is not 0 in some light.
 bool HasGradient(Lighting lighting, const std::string& kind) {
-  const bool phong = lighting == Lighting::kPhong;
-  if (kind == "specular" || kind == "shininess") return phong;
-  if (kind == "ambient" || kind == "diffuse") return phong || lighting == Lighting::kLambert;
+  if (kind == "specular" || kind == "shininess") return lighting == Lighting::kPhong;
+  if (kind == "ambient" || kind == "diffuse") return UsesLights({.lighting = lighting});
   return true;  // and only lights that are there have numbers
 }
 

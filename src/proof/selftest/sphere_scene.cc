@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "render/scene_fields.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::selftest {
@@ -74,10 +75,10 @@ void AddSurfaces(Rng* rng, OwnedScene<float>* scene) {
 }
 
 void AddLight(const SphereShape& shape, Rng* rng, OwnedScene<float>* scene) {
-  const Lighting lighting = scene->shading.lighting = shape.lighting;
+  scene->shading.lighting = shape.lighting;
   scene->shading.normals = shape.normals, scene->shading.two_sided = true;
-  if (lighting == Lighting::kSphericalHarmonics) scene->sh = RandomNumbers(9, 0.1, 0.5, rng);
-  if (lighting != Lighting::kLambert && lighting != Lighting::kPhong) return;
+  if (shape.lighting == Lighting::kSphericalHarmonics) scene->sh = RandomNumbers(9, 0.1, 0.5, rng);
+  if (!UsesLights(scene->shading)) return;
   scene->lights = {{{0.3f, 0.5f, 1.0f}, 0.8f}, {{-1.0f, 0.7f, 0.9f}, 0.4f}};
 }
 

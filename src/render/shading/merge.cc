@@ -38,14 +38,14 @@ void AddBand(const SceneSums& from, SceneSums& to) {
 }
 
 void AddSurfaces(const StageScene& scene, const SceneSums& sums, std::span<Surface> d_surfaces) {
-  const Lighting lighting = scene.scene->shading.lighting;
-  const bool lit = lighting == Lighting::kLambert || lighting == Lighting::kPhong;
+  const ShadingModel& shading = scene.scene->shading;
+  const bool lit = UsesLights(shading);
   for (std::size_t i = 0; i < d_surfaces.size(); ++i) {
     const SurfaceSums& s = sums.surfaces[i];
     AddAll(s.factors.base, d_surfaces[i].base_color);
     if (lit) AddAll(s.factors.ambient, d_surfaces[i].ambient);
     if (lit) AddAll(s.factors.diffuse, d_surfaces[i].diffuse);
-    if (lighting != Lighting::kPhong) continue;
+    if (shading.lighting != Lighting::kPhong) continue;
     AddAll(s.factors.specular, d_surfaces[i].specular);
     d_surfaces[i].shininess += static_cast<float>(s.shininess);
   }

@@ -121,11 +121,22 @@ VaryingSet RecomputedVaryings(const BackwardPlan& plan) {
   return set;
 }
 
+// Of all but the user's channels.
+constexpr std::array<int, kVaryings> kWidths = [] {
+  std::array<int, kVaryings> out = {};
+  Scene scene;
+  SceneGradients d;
+  ForEachStreamField<float>(scene, d, [&](const char*, Varying what, int width, auto&, auto&) {
+    out[static_cast<std::size_t>(what)] = width;
+  });
+  return out;
+}();
+
 }  // namespace
 
 int VaryingSet::width(Varying v) const {
   if (!(*this)[v]) return 0;
-  return v == Varying::kUser ? user_channels : v == Varying::kUv ? 2 : 3;
+  return v == Varying::kUser ? user_channels : kWidths[static_cast<std::size_t>(v)];
 }
 
 int VaryingSet::first(Varying v) const {

@@ -40,9 +40,7 @@ struct SceneParts {
 
   bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
   bool lit() const { return shading.lighting != Lighting::kNone; }
-  bool uses_lights() const {
-    return shading.lighting == Lighting::kLambert || shading.lighting == Lighting::kPhong;
-  }
+  bool uses_lights() const { return UsesLights(shading); }
 };
 
 // Steps for the pixels of a run.

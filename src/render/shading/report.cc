@@ -3,19 +3,16 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <utility>
 
 namespace tilegrad {
 namespace {
 
-constexpr std::array<const char*, kVaryings> kVaryingNames = {
-    "colour", "uv", "normal", "position", "light direction", "user's channels"};
-
 std::string NamesOf(const VaryingSet& set) {
   std::string out;
   for (std::size_t i = 0; i < kVaryings; ++i) {
-    if (set.has[i]) out += (out.empty() ? "" : ", ") + std::string(kVaryingNames[i]);
+    if (!set.has[i]) continue;
+    out += (out.empty() ? "" : ", ") + std::string(StreamOf(Scene(), static_cast<Varying>(i)).name);
   }
   return out.empty() ? "nothing" : out;
 }
