@@ -254,7 +254,7 @@ function showModel([prediction, truth], index) {
 
 // ---- Curves: small charts that share one cursor.
 
-const margin = {left: 46, right: 10, top: 10, bottom: 36}, height = 200;
+const margin = {right: 24, top: 10, bottom: 36}, height = 200;  // left: as wide as the labels
 
 function svg(name, attributes, parent, text) {
   const element = document.createElementNS('http://www.w3.org/2000/svg', name);
@@ -310,12 +310,12 @@ class Chart {
     });
   }
   nearest(clientX) {
-    const step = (clientX - this.drawing.getBoundingClientRect().left - margin.left) / this.inner * this.steps[this.steps.length - 1];
+    const step = (clientX - this.drawing.getBoundingClientRect().left - this.left) / this.inner * this.steps[this.steps.length - 1];
     let best = 0;
     this.steps.forEach((s, i) => { if (Math.abs(s - step) < Math.abs(this.steps[best] - step)) best = i; });
     return best;
   }
-  x(i) { return margin.left + this.inner * this.steps[i] / (this.steps[this.steps.length - 1] || 1); }
+  x(i) { return this.left + this.inner * this.steps[i] / (this.steps[this.steps.length - 1] || 1); }
   y(value) { return height - margin.bottom - (height - margin.top - margin.bottom) * value / this.high; }
   path(values) {
     let pen = 'M';
@@ -328,19 +328,20 @@ class Chart {
   axes() {
     for (const tick of ticks(this.high, 4)) {
       const y = this.y(tick);
-      svg('line', {class: 'grid', x1: margin.left, x2: this.width - margin.right, y1: y, y2: y}, this.drawing);
-      svg('text', {x: margin.left - 6, y: y + 4, 'text-anchor': 'end'}, this.drawing, format(tick));
+      svg('line', {class: 'grid', x1: this.left, x2: this.width - margin.right, y1: y, y2: y}, this.drawing);
+      svg('text', {x: this.left - 6, y: y + 4, 'text-anchor': 'end'}, this.drawing, format(tick));
     }
     const end = this.steps[this.steps.length - 1];
     for (const tick of ticks(end, this.width > 380 ? 6 : 4)) {
-      const x = margin.left + this.inner * tick / (end || 1);
+      const x = this.left + this.inner * tick / (end || 1);
       svg('text', {x, y: height - margin.bottom + 15, 'text-anchor': 'middle'}, this.drawing, tick.toLocaleString('en'));
     }
-    svg('text', {x: margin.left + this.inner / 2, y: height - 4, 'text-anchor': 'middle'}, this.drawing, 'step');
+    svg('text', {x: this.left + this.inner / 2, y: height - 4, 'text-anchor': 'middle'}, this.drawing, 'step');
   }
   draw() {
-    this.width = this.element.clientWidth, this.inner = this.width - margin.left - margin.right;
     this.high = Math.max(0, ...this.values) * 1.02 || 1;
+    this.left = 14 + 7 * Math.max(...ticks(this.high, 4).map((tick) => format(tick).length));
+    this.width = this.element.clientWidth, this.inner = this.width - this.left - margin.right;
     this.drawing.setAttribute('viewBox', `0 0 ${this.width} ${height}`);
     this.drawing.replaceChildren();
     this.axes();
