@@ -100,7 +100,7 @@ Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
     gradients.push_back(records[n].Begin(d_scenes[n]));
   }
   if (add) saved.Save(d_scenes);
-  const Status status =
+  Status status =
       engine.Backward(frame.scenes, frame.options, frame.images, d_frame, gradients);
   if (!status.ok()) {
     if (add) saved.Restore();
@@ -154,7 +154,7 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
                             const Outputs& outputs, FrameT<T>* frame) {
   if (frame == nullptr) return Guarded([] { return InvalidArgument("frame is null"); });
   frame->images_ = {};
-  const Status status = Guarded([&] {
+  Status status = Guarded([&] {
     TILEGRAD_TRY(Start());
     if (frame->impl_ == nullptr) frame->impl_ = std::make_unique<typename FrameT<T>::Impl>();
     return impl_->Render(scenes, options, outputs, frame->impl_.get());
@@ -170,7 +170,7 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
 template <class T>
 Status RendererT<T>::Backward(const FrameT<T>& frame, const FrameGradientsT<T>& d_frame,
                               std::span<const SceneGradientsT<T>> d_scenes, GradientMode mode) {
-  const Status status = Guarded([&]() -> Status {
+  Status status = Guarded([&]() -> Status {
     if (frame.images_.width == 0) {
       return InvalidArgument("the frame holds nothing: Render into it first");
     }

@@ -220,6 +220,7 @@ RenderedImages Render(SceneRenderer& renderer, const SceneVars& vars, RenderJob 
   }
   auto backward = [batch, &context, shapes](std::span<const nn::Tensor> d_outputs) {
     std::vector<nn::Tensor> d_inputs;
+    d_inputs.reserve(shapes.size());
     for (const nn::Shape& shape : shapes) {
       d_inputs.push_back(context.Empty(shape, nn::kDTypeOf<T>));
     }
