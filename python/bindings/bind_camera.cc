@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -51,34 +53,6 @@ py::array MakeAll(const char* function, std::size_t count, const Make& make) {
   return CopyOf<double>(out, {static_cast<py::ssize_t>(count), kCameraNumbers});
 }
 
-// The parts of cameras in another convention: read(camera) is a Result of a vector of numbers.
-template <class Read>
-py::array ReadAll(const char* function, const py::object& cameras, std::size_t width,
-                  const Read& read) {
-  const Rows<kCameraNumbers> rows(function, "cameras", cameras);
-  std::vector<double> out;
-  for (std::size_t i = 0; i < rows.count(); ++i) {
-    const Result<std::vector<double>> numbers = read(CameraOfNumbers(rows[i]));
-    ThrowIfError(numbers.status().Within(function));
-    out.insert(out.end(), numbers->begin(), numbers->end());
-  }
-  return CopyOf<double>(out,
-                        {static_cast<py::ssize_t>(rows.count()), static_cast<py::ssize_t>(width)});
-}
-
-// Numbers and arrays of numbers behind each other.
-void Append(std::vector<double>* out, double x) { out->push_back(x); }
-template <std::size_t K>
-void Append(std::vector<double>* out, const std::array<double, K>& values) {
-  out->insert(out->end(), values.begin(), values.end());
-}
-template <class... Parts>
-std::vector<double> Joined(const Parts&... parts) {
-  std::vector<double> out;
-  (Append(&out, parts), ...);
-  return out;
-}
-
 PixelCentre CentreOf(bool half) { return half ? PixelCentre::kHalf : PixelCentre::kInteger; }
 using Size = std::pair<int, int>;  // width, height
 ImageSize SizeOf(Size size) { return {size.first, size.second}; }
@@ -114,64 +88,6 @@ py::array Orbit(double fov_y, Size size, const py::object& orbits) {
   });
 }
 
-py::array OpenCv(const py::object& ks, const py::object& rotations, const py::object& translations,
-                 bool half) {
-  const char* function = "Camera.from_opencv";
-  const Rows<9> k(function, "k", ks), r(function, "rotation", rotations);
-  const Rows<3> t(function, "translation", translations);
-  return MakeAll(function, k.count(), [&](std::size_t i) {
-    return FromOpenCv({k[i], r[i], t[i], CentreOf(half)});
-  });
-}
-
-py::array Colmap(const py::object& quaternions, const py::object& translations,
-                 const py::object& intrinsics) {
-  const char* function = "Camera.from_colmap";
-  const Rows<4> q(function, "quaternion", quaternions), f(function, "intrinsics", intrinsics);
-  const Rows<3> t(function, "translation", translations);
-  return MakeAll(function, q.count(), [&](std::size_t i) {
-    return FromColmap({q[i], t[i], f[i][0], f[i][1], f[i][2], f[i][3]});
-  });
-}
-
-py::array OpenGl(const py::object& projections, const py::object& model_views, Size size) {
-  const char* function = "Camera.from_opengl";
-  const Rows<16> p(function, "projection", projections), v(function, "model_view", model_views);
-  return MakeAll(function, p.count(), [&](std::size_t i) {
-    return FromOpenGl({p[i], v[i]}, SizeOf(size));
-  });
-}
-
-py::array Kaolin(const py::object& rotations, const py::object& positions,
-                 const py::object& projections, Size size) {
-  const char* function = "Camera.from_kaolin";
-  const Rows<9> r(function, "rotation", rotations);
-  const Rows<3> p(function, "position", positions), f(function, "projection", projections);
-  return MakeAll(function, r.count(), [&](std::size_t i) {
-    return FromKaolin({r[i], p[i], f[i]}, SizeOf(size));
-  });
-}
-
-py::array PyTorch3d(const py::object& rs, const py::object& ts, const py::object& focals,
-                    const py::object& points, Size size) {
-  const char* function = "Camera.from_pytorch3d";
-  const Rows<9> r(function, "r", rs);
-  const Rows<3> t(function, "t", ts);
-  const Rows<2> f(function, "focal_length", focals), p(function, "principal_point", points);
-  return MakeAll(function, r.count(), [&](std::size_t i) {
-    return FromPyTorch3d({r[i], t[i], f[i], p[i]}, SizeOf(size));
-  });
-}
-
-py::array Nerf(const py::object& matrices, const py::object& intrinsics) {
-  const char* function = "Camera.from_nerf";
-  const Rows<16> m(function, "camera_to_world", matrices);
-  const Rows<4> f(function, "intrinsics", intrinsics);
-  return MakeAll(function, m.count(), [&](std::size_t i) {
-    return FromNerf({m[i], f[i][0], f[i][1], f[i][2], f[i][3]});
-  });
-}
-
 py::array Resize(const py::object& cameras, Size from, Size to) {
   const Rows<kCameraNumbers> rows("Camera.resize", "cameras", cameras);
   return MakeAll("Camera.resize", rows.count(), [&](std::size_t i) -> Result<Camera64> {
@@ -179,63 +95,109 @@ py::array Resize(const py::object& cameras, Size from, Size to) {
   });
 }
 
-using Numbers = Result<std::vector<double>>;
+// What a convention may need besides the numbers of its cameras.
+struct Extra {
+  ImageSize size;
+  PixelCentre centre;
+  double far_plane = 0;
+};
 
-py::array ToOpenCvNumbers(const py::object& cameras, bool half) {
-  return ReadAll("Camera.to_opencv", cameras, 21, [half](const Camera64& c) -> Numbers {
-    const OpenCvCamera out = ToOpenCv(c, CentreOf(half));
-    return Joined(out.k, out.rotation, out.translation);
+// A record of nothing but doubles, as the row of them and back.
+template <class Record>
+using RowOf = std::array<double, sizeof(Record) / sizeof(double)>;
+template <class Record>
+Record RecordAt(const double* numbers) {
+  RowOf<Record> row;
+  std::copy_n(numbers, row.size(), row.begin());
+  return std::bit_cast<Record>(row);
+}
+template <class Record>
+Status Append(const Result<Record>& record, std::vector<double>* out) {
+  TILEGRAD_TRY(record.status());
+  const auto row = std::bit_cast<RowOf<Record>>(*record);
+  out->insert(out->end(), row.begin(), row.end());
+  return {};
+}
+
+struct OpenCvRow {
+  Mat3Array k, rotation;
+  Vec3Array translation;
+};
+
+struct Convention {
+  std::string_view name;
+  std::size_t width;  // numbers of a camera: the arguments of Camera.from_..., in their order
+  Result<Camera64> (*from)(const double* numbers, const Extra& extra);
+  Status (*to)(const Camera64& camera, const Extra& extra, std::vector<double>* out);
+};
+
+constexpr Convention kConventions[] = {
+    {"opencv", 21,
+     [](const double* x, const Extra& e) {
+       const auto [k, rotation, translation] = RecordAt<OpenCvRow>(x);
+       return FromOpenCv({k, rotation, translation, e.centre});
+     },
+     [](const Camera64& c, const Extra& e, std::vector<double>* out) {
+       const OpenCvCamera cv = ToOpenCv(c, e.centre);
+       return Append<OpenCvRow>(OpenCvRow{cv.k, cv.rotation, cv.translation}, out);
+     }},
+    {"colmap", 11,
+     [](const double* x, const Extra&) { return FromColmap(RecordAt<ColmapCamera>(x)); },
+     [](const Camera64& c, const Extra&, std::vector<double>* out) {
+       return Append<ColmapCamera>(ToColmap(c), out);
+     }},
+    {"opengl", 32,
+     [](const double* x, const Extra& e) { return FromOpenGl(RecordAt<OpenGlCamera>(x), e.size); },
+     [](const Camera64& c, const Extra& e, std::vector<double>* out) {
+       return Append(ToOpenGl(c, e.size, e.far_plane), out);
+     }},
+    {"kaolin", 15,
+     [](const double* x, const Extra& e) { return FromKaolin(RecordAt<KaolinCamera>(x), e.size); },
+     [](const Camera64& c, const Extra& e, std::vector<double>* out) {
+       return Append(ToKaolin(c, e.size), out);
+     }},
+    {"pytorch3d", 16,
+     [](const double* x, const Extra& e) {
+       return FromPyTorch3d(RecordAt<PyTorch3dCamera>(x), e.size);
+     },
+     [](const Camera64& c, const Extra& e, std::vector<double>* out) {
+       return Append(ToPyTorch3d(c, e.size), out);
+     }},
+    {"nerf", 20, [](const double* x, const Extra&) { return FromNerf(RecordAt<NerfCamera>(x)); },
+     [](const Camera64& c, const Extra&, std::vector<double>* out) {
+       return Append<NerfCamera>(ToNerf(c), out);
+     }},
+};
+
+const Convention& ConventionOf(const std::string& name) {
+  for (const Convention& c : kConventions) {
+    if (c.name == name) return c;
+  }
+  throw py::value_error("no convention of cameras is called " + name);
+}
+
+py::array From(const std::string& name, const py::object& rows, Size size, bool half) {
+  const Convention& convention = ConventionOf(name);
+  const std::string function = "Camera.from_" + name;
+  const auto width = static_cast<py::ssize_t>(convention.width);
+  const auto numbers = SpanOf<double>(rows, function.c_str(), "rows", {kAny, width});
+  return MakeAll(function.c_str(), numbers.size() / convention.width, [&](std::size_t i) {
+    return convention.from(&numbers[i * convention.width], {SizeOf(size), CentreOf(half)});
   });
 }
 
-py::array ToColmapNumbers(const py::object& cameras) {
-  return ReadAll("Camera.to_colmap", cameras, 11, [](const Camera64& c) -> Numbers {
-    const ColmapCamera out = ToColmap(c);
-    return Joined(out.quaternion, out.translation, out.fx, out.fy, out.cx, out.cy);
-  });
-}
-
-py::array ToOpenGlNumbers(const py::object& cameras, Size size, double far_plane) {
-  return ReadAll("Camera.to_opengl", cameras, 32, [&](const Camera64& c) -> Numbers {
-    TILEGRAD_ASSIGN(const OpenGlCamera out, ToOpenGl(c, SizeOf(size), far_plane));
-    return Joined(out.projection, out.model_view);
-  });
-}
-
-py::array ToKaolinNumbers(const py::object& cameras, Size size) {
-  return ReadAll("Camera.to_kaolin", cameras, 15, [&](const Camera64& c) -> Numbers {
-    TILEGRAD_ASSIGN(const KaolinCamera out, ToKaolin(c, SizeOf(size)));
-    return Joined(out.rotation, out.position, out.projection);
-  });
-}
-
-py::array ToPyTorch3dNumbers(const py::object& cameras, Size size) {
-  return ReadAll("Camera.to_pytorch3d", cameras, 16, [&](const Camera64& c) -> Numbers {
-    TILEGRAD_ASSIGN(const PyTorch3dCamera out, ToPyTorch3d(c, SizeOf(size)));
-    return Joined(out.r, out.t, out.focal_length, out.principal_point);
-  });
-}
-
-py::array ToNerfNumbers(const py::object& cameras) {
-  return ReadAll("Camera.to_nerf", cameras, 20, [](const Camera64& c) -> Numbers {
-    const NerfCamera out = ToNerf(c);
-    return Joined(out.camera_to_world, out.fl_x, out.fl_y, out.cx, out.cy);
-  });
-}
-
-void BindTo(py::module_& m) {
-  m.def("camera_to_opencv", &ToOpenCvNumbers, py::arg("cameras"), py::arg("half"),
-        "(n, 21): k, rotation, translation.");
-  m.def("camera_to_colmap", &ToColmapNumbers, py::arg("cameras"),
-        "(n, 11): quaternion, translation, fx, fy, cx, cy.");
-  m.def("camera_to_opengl", &ToOpenGlNumbers, py::arg("cameras"), py::arg("size"),
-        py::arg("far_plane"), "(n, 32): projection, model_view.");
-  m.def("camera_to_kaolin", &ToKaolinNumbers, py::arg("cameras"), py::arg("size"),
-        "(n, 15): rotation, position, projection.");
-  m.def("camera_to_pytorch3d", &ToPyTorch3dNumbers, py::arg("cameras"), py::arg("size"),
-        "(n, 16): r, t, focal_length, principal_point.");
-  m.def("camera_to_nerf", &ToNerfNumbers, py::arg("cameras"),
-        "(n, 20): camera_to_world, fl_x, fl_y, cx, cy.");
+py::array To(const std::string& name, const py::object& cameras, Size size, bool half,
+             double far_plane) {
+  const Convention& convention = ConventionOf(name);
+  const std::string function = "Camera.to_" + name;
+  const Rows<kCameraNumbers> rows(function.c_str(), "cameras", cameras);
+  std::vector<double> out;
+  for (std::size_t i = 0; i < rows.count(); ++i) {
+    const Extra extra{SizeOf(size), CentreOf(half), far_plane};
+    ThrowIfError(convention.to(CameraOfNumbers(rows[i]), extra, &out).Within(function));
+  }
+  return CopyOf<double>(
+      out, {static_cast<py::ssize_t>(rows.count()), static_cast<py::ssize_t>(convention.width)});
 }
 
 }  // namespace
@@ -245,21 +207,12 @@ void BindCamera(py::module_& m) {
         py::arg("target"), py::arg("up"), "(n, 17) that look at targets.");
   m.def("camera_orbit", &Orbit, py::arg("fov_y"), py::arg("size"), py::arg("orbits"),
         "(n, 17) of azimuth, elevation, distance.");
-  m.def("camera_from_opencv", &OpenCv, py::arg("k"), py::arg("rotation"), py::arg("translation"),
-        py::arg("half"), "(n, 17) of OpenCV's.");
-  m.def("camera_from_colmap", &Colmap, py::arg("quaternion"), py::arg("translation"),
-        py::arg("intrinsics"), "(n, 17) of COLMAP's.");
-  m.def("camera_from_opengl", &OpenGl, py::arg("projection"), py::arg("model_view"),
-        py::arg("size"), "(n, 17) of OpenGL's.");
-  m.def("camera_from_kaolin", &Kaolin, py::arg("rotation"), py::arg("position"),
-        py::arg("projection"), py::arg("size"), "(n, 17) of Kaolin's.");
-  m.def("camera_from_pytorch3d", &PyTorch3d, py::arg("r"), py::arg("t"), py::arg("focal_length"),
-        py::arg("principal_point"), py::arg("size"), "(n, 17) of PyTorch3D's.");
-  m.def("camera_from_nerf", &Nerf, py::arg("camera_to_world"), py::arg("intrinsics"),
-        "(n, 17) of NeRF's.");
+  m.def("camera_from", &From, py::arg("convention"), py::arg("rows"), py::arg("size") = Size(0, 0),
+        py::arg("half") = false, "(n, 17) of the arguments of Camera.from_..., side by side.");
+  m.def("camera_to", &To, py::arg("convention"), py::arg("cameras"), py::arg("size") = Size(0, 0),
+        py::arg("half") = false, py::arg("far_plane") = 0.0, "The reverse.");
   m.def("camera_resize", &Resize, py::arg("cameras"), py::arg("from_size"), py::arg("to_size"),
         "(n, 17) of images of another size.");
-  BindTo(m);
 }
 
 }  // namespace tilegrad::python

@@ -44,6 +44,9 @@ class _Rows:
     def camera(self, make: Callable[..., np.ndarray], *arguments: Any) -> "Camera":
         return Camera.of_numbers(make(*arguments).reshape(self.lead + (Camera._SIZE,)))
 
+    def converted(self, convention: str, **extra: Any) -> "Camera":
+        return self.camera(lambda: _core.camera_from(convention, np.hstack(self.arrays), **extra))
+
 
 def _size(function: str, width: int, height: int) -> tuple[int, int]:
     return (_arrays.as_number(function, "width", width, int),
@@ -140,7 +143,7 @@ class Camera(Packed):
         function = "Camera.from_opencv"
         rows = _Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
                      translation=(translation, (3,)))
-        return rows.camera(_core.camera_from_opencv, *rows.arrays, _half(function, pixel_centre))
+        return rows.converted("opencv", half=_half(function, pixel_centre))
 
     @classmethod
     def from_colmap(cls, quaternion, translation, fx, fy, cx, cy) -> "Camera":
@@ -152,8 +155,7 @@ class Camera(Packed):
         rows = _Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
                      translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
                      cy=(cy, ()))
-        intrinsics = np.hstack(rows.arrays[2:])
-        return rows.camera(_core.camera_from_colmap, *rows.arrays[:2], intrinsics)
+        return rows.converted("colmap")
 
     @classmethod
     def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
@@ -164,8 +166,7 @@ class Camera(Packed):
         """
         function = "Camera.from_opengl"
         rows = _Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
-        size = _size(function, width, height)
-        return rows.camera(_core.camera_from_opengl, *rows.arrays, size)
+        return rows.converted("opengl", size=_size(function, width, height))
 
     @classmethod
     def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
@@ -177,8 +178,7 @@ class Camera(Packed):
         function = "Camera.from_kaolin"
         rows = _Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
                      projection=(projection, (3,)))
-        size = _size(function, width, height)
-        return rows.camera(_core.camera_from_kaolin, *rows.arrays, size)
+        return rows.converted("kaolin", size=_size(function, width, height))
 
     @classmethod
     def from_pytorch3d(cls, r, t, focal_length, principal_point=(0, 0), *, width: int,
@@ -191,8 +191,7 @@ class Camera(Packed):
         function = "Camera.from_pytorch3d"
         rows = _Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
                      principal_point=(principal_point, (2,)))
-        size = _size(function, width, height)
-        return rows.camera(_core.camera_from_pytorch3d, *rows.arrays, size)
+        return rows.converted("pytorch3d", size=_size(function, width, height))
 
     @classmethod
     def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy) -> "Camera":
@@ -202,46 +201,45 @@ class Camera(Packed):
         """
         rows = _Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
                      fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
-        intrinsics = np.hstack(rows.arrays[1:])
-        return rows.camera(_core.camera_from_nerf, rows.arrays[0], intrinsics)
+        return rows.converted("nerf")
 
     # And back: dictionaries of the arguments of the constructors above.
 
     def to_opencv(self, *, pixel_centre: str = "integer") -> Parts:
         """k, rotation, translation, as from_opencv takes them."""
         half = _half("Camera.to_opencv", pixel_centre)
-        return self._parts(_core.camera_to_opencv(self._rows(), half), k=(3, 3), rotation=(3, 3),
-                           translation=(3,))
+        return self._parts(_core.camera_to("opencv", self._rows(), half=half), k=(3, 3),
+                           rotation=(3, 3), translation=(3,))
 
     def to_colmap(self) -> Parts:
         """quaternion, translation, fx, fy, cx, cy, as from_colmap takes them."""
-        return self._parts(_core.camera_to_colmap(self._rows()), quaternion=(4,), translation=(3,),
-                           fx=(), fy=(), cx=(), cy=())
+        return self._parts(_core.camera_to("colmap", self._rows()), quaternion=(4,),
+                           translation=(3,), fx=(), fy=(), cx=(), cy=())
 
     def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
         """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
         near_plane; rendering here has none."""
         size = _size("Camera.to_opengl", width, height)
         far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
-        return self._parts(_core.camera_to_opengl(self._rows(), size, far_plane),
-                           projection=(4, 4), model_view=(4, 4))
+        rows = _core.camera_to("opengl", self._rows(), size, far_plane=far_plane)
+        return self._parts(rows, projection=(4, 4), model_view=(4, 4))
 
     def to_kaolin(self, *, width: int, height: int) -> Parts:
         """rotation, position, projection, as from_kaolin takes them. ValueError if the principal
         point is not the middle of the image."""
         size = _size("Camera.to_kaolin", width, height)
-        return self._parts(_core.camera_to_kaolin(self._rows(), size), rotation=(3, 3),
+        return self._parts(_core.camera_to("kaolin", self._rows(), size), rotation=(3, 3),
                            position=(3,), projection=(3,))
 
     def to_pytorch3d(self, *, width: int, height: int) -> Parts:
         """r, t, focal_length, principal_point, as from_pytorch3d takes them."""
         size = _size("Camera.to_pytorch3d", width, height)
-        return self._parts(_core.camera_to_pytorch3d(self._rows(), size), r=(3, 3), t=(3,),
+        return self._parts(_core.camera_to("pytorch3d", self._rows(), size), r=(3, 3), t=(3,),
                            focal_length=(2,), principal_point=(2,))
 
     def to_nerf(self) -> Parts:
         """camera_to_world, fl_x, fl_y, cx, cy, as from_nerf takes them."""
-        return self._parts(_core.camera_to_nerf(self._rows()), camera_to_world=(4, 4), fl_x=(),
+        return self._parts(_core.camera_to("nerf", self._rows()), camera_to_world=(4, 4), fl_x=(),
                            fl_y=(), cx=(), cy=())
 
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
