@@ -100,8 +100,7 @@ Status RendererT<T>::Impl::Backward(const typename FrameT<T>::Impl& frame,
     gradients.push_back(records[n].Begin(d_scenes[n]));
   }
   if (add) saved.Save(d_scenes);
-  Status status =
-      engine.Backward(frame.scenes, frame.options, frame.images, d_frame, gradients);
+  Status status = engine.Backward(frame.scenes, frame.options, frame.images, d_frame, gradients);
   if (!status.ok()) {
     if (add) saved.Restore();
     return status;
