@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <initializer_list>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -129,10 +130,20 @@ std::span<T> MutableSpanOf(const py::object& array, const char* function, const 
   return {static_cast<T*>(checked.mutable_data()), static_cast<std::size_t>(checked.size())};
 }
 
+// A bug, found before anybody reads or writes behind the end of an array.
+inline void CheckCount(std::size_t count, std::span<const py::ssize_t> shape) {
+  std::size_t numbers = 1;
+  for (const py::ssize_t axis : shape) numbers *= static_cast<std::size_t>(axis);
+  if (numbers == count) return;
+  throw std::runtime_error(
+      fmt::format("internal error: an array of shape {} with {} numbers", ShapeText(shape), count));
+}
+
 // `data` of `owner` as an array that keeps the owner alive. Not to be written to, unless told.
 template <class T>
 py::array ViewOf(std::span<const T> data, const std::vector<py::ssize_t>& shape,
                  const py::object& owner, bool writeable = false) {
+  CheckCount(data.size(), shape);
   py::array_t<T> view(shape, data.data(), owner);
   if (!writeable) {
     py::detail::array_proxy(view.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
@@ -143,6 +154,7 @@ py::array ViewOf(std::span<const T> data, const std::vector<py::ssize_t>& shape,
 // A new array with a copy of `values`.
 template <class T>
 py::array CopyOf(std::span<const T> values, const std::vector<py::ssize_t>& shape) {
+  CheckCount(values.size(), shape);
   return py::array_t<T>(shape, values.data());
 }
 

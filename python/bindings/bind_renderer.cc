@@ -15,7 +15,7 @@ void BindRenderer(py::module_& m);
 
 namespace {
 
-// What is known of an image, by its name.
+// What is known of an image, by its name: its numbers, and the one place that knows their shape.
 template <class T>
 struct NamedImage {
   std::span<const T> values;
@@ -23,10 +23,11 @@ struct NamedImage {
 };
 
 template <class T>
-NamedImage<T> ImageNamed(std::string_view name, const ImagesT<T>& images) {
+NamedImage<T> ImageNamed(std::string_view name, const FrameObject<T>& frame) {
+  const ImagesT<T>& images = frame.images();
   NamedImage<T> out;
   ForEachOutput(
-      images.channels,
+      frame.scenes().empty() ? 0 : frame.scenes()[0]->channels(),
       [&](const char* known, int planes, std::span<const T> values) {
         if (name != known) return;
         out = {values, {images.count, images.height, images.width}};
@@ -58,8 +59,7 @@ Outputs OutputsOf(const std::vector<bool>& wanted) {
 // The image of a frame as a view that keeps it alive.
 template <class T>
 py::array View(const py::object& self, std::string_view name, bool writeable) {
-  const auto& images = py::cast<const FrameObject<T>&>(self).images();
-  const NamedImage<T> image = ImageNamed(name, images);
+  const NamedImage<T> image = ImageNamed(name, py::cast<const FrameObject<T>&>(self));
   return ViewOf<T>(image.values, image.shape, self, writeable);
 }
 
@@ -74,7 +74,7 @@ FrameGradientsT<T> CotangentsOf(const FrameObject<T>& frame, const py::dict& arr
   FrameGradientsT<T> out;
   for (const std::pair<py::handle, py::handle> entry : arrays) {
     const std::string name = py::str(entry.first);
-    const NamedImage<T> image = ImageNamed(name, frame.images());
+    const NamedImage<T> image = ImageNamed(name, frame);
     if (name == "barycentrics") throw py::value_error("backward: barycentrics have no gradient");
     ForEachImage(
         0,

@@ -30,8 +30,9 @@ void PutAll(const std::vector<Record>& from, std::size_t numbers, const Field<T>
 }  // namespace
 
 template <class T>
-GradientRecord<T>::GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays)
-    : gradients_(scene.count()) {
+GradientRecord<T>::GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays,
+                                  GradientMode mode)
+    : mode_(mode), gradients_(scene.count()) {
   for (const std::pair<py::handle, py::handle> entry : arrays) {
     arrays_.emplace_back(py::cast<std::string_view>(entry.first),
                          py::reinterpret_borrow<py::object>(entry.second));
@@ -51,7 +52,11 @@ const py::object* GradientRecord<T>::Find(std::string_view name) const {
 template <class T>
 Field<T> GradientRecord<T>::Take(const char* name, const py::object& array,
                                  const std::vector<py::ssize_t>& shape) {
-  return Field<T>("backward", name, array, shape, gradients_.size());
+  const Field<T> field("backward", name, array, shape, gradients_.size());
+  // Without images nothing else writes what images share: their sum.
+  const bool clear = gradients_.empty() && mode_ == GradientMode::kOverwrite;
+  if (clear) std::fill(field.all().begin(), field.all().end(), T(0));
+  return field;
 }
 
 template <class T>

@@ -17,7 +17,7 @@ class GradientRecord {
   // for what is not wanted), to arrays of the same shapes, or with a leading axis more for a
   // gradient of each image. What is missing is not wanted. ValueError or TypeError for an array of
   // another shape or dtype, or one that is read-only.
-  GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays);
+  GradientRecord(const SceneRecord<T>& scene, const py::dict& arrays, GradientMode mode);
   GradientRecord(GradientRecord&&) noexcept = default;
 
   const std::vector<SceneGradientsT<T>>& gradients() const { return gradients_; }
@@ -33,6 +33,7 @@ class GradientRecord {
 
   const py::object* Find(std::string_view name) const;  // null: not wanted
 
+  GradientMode mode_;
   std::vector<std::pair<std::string_view, py::object>> arrays_;
   std::vector<SceneGradientsT<T>> gradients_;
   std::vector<std::span<T>> textures_;

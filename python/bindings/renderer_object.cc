@@ -81,7 +81,7 @@ void RendererObject::Backward(const FrameObject<T>& frame, const FrameGradientsT
   std::vector<GradientRecord<T>> records;
   std::vector<SceneGradientsT<T>> views;
   for (std::size_t i = 0; i < gradients.size(); ++i) {
-    records.emplace_back(*frame.scenes()[i], gradients[i]);
+    records.emplace_back(*frame.scenes()[i], gradients[i], mode);
     const auto& own = records.back().gradients();
     views.insert(views.end(), own.begin(), own.end());
   }

@@ -113,7 +113,8 @@ template <class T>
 void SceneRecord<T>::SetStreams() {
   const py::ssize_t channels = Length(arrays_["attributes"], 1);
   constexpr py::ssize_t kMost = std::numeric_limits<int>::max();  // more than the engine takes
-  for (SceneT<T>& scene : scenes_) scene.channels = static_cast<int>(std::min(channels, kMost));
+  channels_ = static_cast<int>(std::min(channels, kMost));
+  for (SceneT<T>& scene : scenes_) scene.channels = channels_;
   SceneT<T> names;
   ForEachStream(names, {}, [&](const SceneStream<T>& s) {
     const py::ssize_t width = s.what == Varying::kUser ? channels : s.width;

@@ -57,6 +57,7 @@ class SceneRecord {
 
   const std::vector<SceneT<T>>& scenes() const { return scenes_; }
   std::size_t count() const { return scenes_.size(); }
+  int channels() const { return channels_; }  // of attributes, where there is no image, too
   const SceneArrays& arrays() const { return arrays_; }
 
  private:
@@ -75,6 +76,7 @@ class SceneRecord {
 
   SceneArrays arrays_;  // keeps them alive
   py::ssize_t vertices_ = 0, faces_ = 0;
+  int channels_ = 0;
   std::vector<SceneT<T>> scenes_;
   std::vector<TextureT<T>> textures_;  // of image 0, of image 1, ...
   std::vector<SurfaceT<T>> surfaces_;

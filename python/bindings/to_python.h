@@ -14,6 +14,7 @@ namespace tilegrad::python {
 // `shape`.
 template <class T, class Vector>
 py::array OwnedArray(Vector values, std::vector<py::ssize_t> shape) {
+  CheckCount(values.size() * sizeof(values[0]) / sizeof(T), shape);
   auto owner = std::make_unique<Vector>(std::move(values));
   const void* data = owner->data();
   const py::capsule base(owner.get(), [](void* p) { delete static_cast<Vector*>(p); });

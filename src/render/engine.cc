@@ -43,6 +43,10 @@ struct Engine::Impl {
         inputs(w),
         gradients(w) {}
 
+  std::size_t PixelsOf(const RenderOptions& options) const {  // of all images
+    return inputs.views().size() * static_cast<std::size_t>(options.width) *
+           static_cast<std::size_t>(options.height);
+  }
   Status RenderStaged(const RenderOptions& options, FrameImages* frame);
   Status RenderPlain(const RenderOptions& options, FrameImages* frame);
   Status Render(std::span<const Scene> scenes, const RenderOptions& options, const Outputs& request,
@@ -73,8 +77,7 @@ struct Engine::Impl {
 };
 
 Status Engine::Impl::RenderStaged(const RenderOptions& options, FrameImages* frame) {
-  const std::size_t pixels = inputs.views().size() * static_cast<std::size_t>(options.width) *
-                             static_cast<std::size_t>(options.height);
+  const std::size_t pixels = PixelsOf(options);
   const Outputs& request = forward.request;
   frame->channels = forward.varyings.width(Varying::kUser);
   frame->color.resize(request.color ? 3 * pixels : 0);
@@ -88,7 +91,10 @@ Status Engine::Impl::RenderStaged(const RenderOptions& options, FrameImages* fra
 Status Engine::Impl::RenderPlain(const RenderOptions& options, FrameImages* frame) {
   Outputs request = forward.request;
   request.attributes = forward.colors_only || forward.user_only;
-  frame->normals.clear(), frame->uv.clear();
+  // Wanted, but of a scene that has none: background.
+  const std::size_t pixels = PixelsOf(options);
+  frame->normals.assign(request.normals ? 3 * pixels : 0, 0.0f);
+  frame->uv.assign(request.uv ? 2 * pixels : 0, 0.0f);
   if (!forward.colors_only) {
     frame->color.clear();
     return pipeline.Render(inputs.views(), options, request, frame);

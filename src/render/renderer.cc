@@ -77,6 +77,22 @@ struct RendererT<T>::Impl {
   std::optional<RendererScratch<T>> scratch;  // from Start on
 };
 
+// The border's own check: shape and numbers of each image agree, whichever path has drawn it.
+template <class T>
+Status CheckShapes(const ImagesT<T>& images, const Outputs& outputs) {
+  const std::size_t pixels = images.face_ids.size();
+  Status status;
+  ForEachOutput(
+      images.channels,
+      [&](const char* name, int planes, bool wanted, std::span<const T> image) {
+        const std::size_t expected = wanted ? static_cast<std::size_t>(planes) * pixels : 0;
+        if (!status.ok() || image.size() == expected) return;
+        status = InternalError("{} has {} numbers, expected {}", name, image.size(), expected);
+      },
+      outputs, images);
+  return status;
+}
+
 template <class T>
 Status RendererT<T>::Impl::Render(std::span<const SceneT<T>> scenes, const RenderOptions& options,
                                   const Outputs& outputs, typename FrameT<T>::Impl* frame) {
@@ -156,7 +172,8 @@ Status RendererT<T>::Render(std::span<const SceneT<T>> scenes, const RenderOptio
   Status status = Guarded([&] {
     TILEGRAD_TRY(Start());
     if (frame->impl_ == nullptr) frame->impl_ = std::make_unique<typename FrameT<T>::Impl>();
-    return impl_->Render(scenes, options, outputs, frame->impl_.get());
+    TILEGRAD_TRY(impl_->Render(scenes, options, outputs, frame->impl_.get()));
+    return CheckShapes(ImagesOf(frame->impl_->images), outputs);
   });
   if (status.ok()) {
     frame->images_ = ImagesOf(frame->impl_->images);

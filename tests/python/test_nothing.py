@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was asked for and is not there: images of a scene without the parts for them are background,
+whatever the frame's memory was used for before; gradients of them, and of no images, are 0."""
+
+import importlib.util
+import unittest
+
+import numpy as np
+
+from tilegrad import Camera, Light, Renderer
+from scenes import ALL, IMAGE, LIGHTINGS, patch
+
+SMALL, LARGE = {"width": 5, "height": 4}, {"width": 300, "height": 200}
+# Of a scene without uv and without attributes.
+IMAGES = tuple(name for name in ALL if name != "attributes")
+BARE = {"uvs": None, "per_corner": (), "textures": None, "surfaces": None,
+        "face_surfaces": None, "attributes": None}
+
+
+def bare(dtype=np.float32, **changes):
+    return patch(dtype, "none", **{**BARE, **changes})
+
+
+class Nothing(unittest.TestCase):
+    def check(self, scene, outputs):
+        """Renders after a smaller image of everything, whose memory the frame gets."""
+        renderer = Renderer(threads=1)
+        renderer.render(patch(scene.dtype), outputs=ALL, **SMALL)
+        frame = renderer.render(scene, outputs=outputs, **LARGE)
+        for name in outputs:
+            image = frame.shared(name)
+            self.assertEqual(image.shape[-2:], (200, 300), name)
+            known = image[np.isfinite(image)]
+            self.assertTrue((np.abs(known) < 10).all(), name)
+        return frame
+
+    def test_uv_of_a_scene_without_is_background(self):
+        for dtype in (np.float32, np.float64):
+            for outputs in (("uv",), ("uv", "depth"), ("uv", "color"), ("alpha", "uv"), IMAGES):
+                frame = self.check(bare(dtype), outputs)
+                self.assertFalse(frame.uv.any())
+                frame.shared("uv")[:] = 1  # memory of its own
+                self.assertTrue((frame.uv == 1).all())
+
+    def test_each_image_of_scenes_of_few_parts(self):
+        for dtype in (np.float32, np.float64):
+            for changes in ({}, {"colors": None}, {"normals": "flat"}):
+                for name in IMAGES:
+                    self.check(bare(dtype, **changes), (name,))
+
+    def test_no_face_is_background(self):
+        empty = bare(faces=np.zeros((0, 3), np.int32))
+        frame = self.check(empty, IMAGES)
+        self.assertTrue(np.isposinf(frame.depth).all())
+        self.assertFalse(any(getattr(frame, name).any() for name in IMAGES if name != "depth"))
+
+    def test_gradient_of_what_is_not_there_is_zero(self):
+        for dtype in (np.float32, np.float64):
+            renderer, scene = Renderer(threads=1), bare(dtype)
+            frame = renderer.render(scene, outputs=("uv",), **SMALL)
+            found = renderer.backward(frame, uv=np.ones_like(frame.uv), wrt=("positions", "camera"))
+            self.assertFalse(found.positions.any())
+            self.assertFalse(found.camera.numbers.any())
+
+    def test_an_image_that_was_not_rendered_has_no_view(self):
+        frame = Renderer(threads=1).render(bare(), outputs=("color",), **SMALL)
+        with self.assertRaises(AttributeError):
+            frame.shared("uv")
+        with self.assertRaises(RuntimeError):  # below the surface: no view of memory that is not
+            frame._frame.view("uv")
+
+
+class NoImages(unittest.TestCase):
+    WRT = ("positions", "camera", "colors", "uvs", "textures", "surfaces", "attributes")
+
+    def scene(self, dtype, lighting):
+        scene = patch(dtype, lighting, camera=Camera(translation=np.zeros((0, 3))))
+        if lighting in ("none", "spherical_harmonics"):
+            return scene
+        return scene.replace(lights=Light((0, 0, 1)))
+
+    def test_images_have_the_shapes_of_none(self):
+        for dtype in (np.float32, np.float64):
+            for lighting in LIGHTINGS:
+                frame = Renderer(threads=1).render(self.scene(dtype, lighting), outputs=ALL, **SMALL)
+                shapes = {name: getattr(frame, name).shape for name in ALL}
+                self.assertEqual(shapes, {
+                    "color": (0, 3, 4, 5), "alpha": (0, 4, 5), "attributes": (0, 2, 4, 5),
+                    "depth": (0, 4, 5), "normals": (0, 3, 4, 5), "uv": (0, 2, 4, 5),
+                    "barycentrics": (0, 2, 4, 5)})
+                self.assertEqual(frame.face_ids.shape, (0, 4, 5))
+
+    def gradients(self, dtype, lighting, out=None, **arguments):
+        renderer = Renderer(threads=1)
+        frame = renderer.render(self.scene(dtype, lighting), outputs=ALL, **SMALL)
+        extra = {"none": (), "spherical_harmonics": ("sh",)}.get(lighting, ("lights",))
+        return renderer.backward(frame, color=frame.color, alpha=frame.alpha, out=out,
+                                 wrt=self.WRT + extra, **arguments)
+
+    @staticmethod
+    def arrays(gradients):
+        for name in gradients:
+            yield from ([*gradients._arrays[name]] if name == "textures"
+                        else [gradients._arrays[name]])
+
+    def test_gradients_of_what_they_share_are_zero(self):
+        for dtype in (np.float32, np.float64):
+            for lighting in LIGHTINGS:
+                found = self.gradients(dtype, lighting)
+                for array in self.arrays(found):
+                    array[:] = 7
+                found = self.gradients(dtype, lighting, out=found)
+                self.assertEqual(found.positions.shape, (16, 3))
+                self.assertFalse(any(array.any() for array in self.arrays(found)))
+
+    def test_what_is_added_to_stays(self):
+        found = self.gradients(np.float32, "phong")
+        for array in self.arrays(found):
+            array[:] = 7
+        found = self.gradients(np.float32, "phong", out=found, accumulate=True)
+        self.assertTrue(all((array == 7).all() for array in self.arrays(found)))
+
+    def test_beside_scenes_with_images(self):
+        renderer = Renderer(threads=1)
+        none, some = self.scene(np.float32, "phong"), patch()
+        frame = renderer.render([none, some], outputs=ALL, **IMAGE)
+        self.assertEqual(frame.attributes.shape, (1, 2, 29, 34))
+        found = renderer.backward(frame, color=np.ones_like(frame.color), wrt=("positions",))
+        self.assertFalse(found[0].positions.any())
+        self.assertTrue(found[1].positions.any())
+
+
+@unittest.skipUnless(importlib.util.find_spec("torch"), "no torch")
+class InTorch(unittest.TestCase):
+    def render(self, camera, **arguments):
+        import torch
+        import tilegrad.torch
+        positions = torch.tensor(patch().positions, requires_grad=True)
+        images = tilegrad.torch.render(positions, patch().faces, camera, width=200, height=150,
+                                       **arguments)
+        return positions, images
+
+    def test_uv_of_a_scene_without(self):
+        for outputs in (("uv",), ("uv", "alpha"), ("depth", "uv")):
+            positions, images = self.render(patch().camera, outputs=outputs)
+            self.assertFalse(images.uv.any())
+            images.uv.sum().backward()
+            self.assertFalse(positions.grad.any())
+
+    def test_no_images(self):
+        positions, images = self.render(Camera(translation=np.zeros((0, 3))),
+                                        outputs=("color", "alpha", "attributes"),
+                                        attributes=np.ones((16, 5), np.float32))
+        self.assertEqual(tuple(images.attributes.shape), (0, 5, 150, 200))
+        (images.color.sum() + images.alpha.sum()).backward()
+        self.assertFalse(positions.grad.any())
+
+
+if __name__ == "__main__":
+    unittest.main()
