@@ -1,19 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 // The C interface under random calls, most of them wrong: pointers that are NULL, counts and sizes
 // of nothing, numbers that are not finite, calls in any order. Each is OK or an error with a
-// message, and a frame holds images only after a render that was OK. What must not happen shows
-// under valgrind or the address sanitizer: every array ends where its memory ends.
+// message, and a frame holds images only after a render that was OK: all that were asked for, every
+// number of them written, the same bits as from a renderer and a frame that are new. The same holds
+// of gradients. What must not happen shows under valgrind or the address sanitizer, too: every
+// array ends where its memory ends.
+//
+// A failure names its seed. More of them: TILEGRAD_SECONDS, TILEGRAD_SEED, and the test
+// api_c_hostile_long.
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <tilegrad/c.h>
 
 #include <algorithm>
+#include <bit>
+#include <chrono>
 #include <climits>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <iostream>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -181,6 +191,31 @@ std::unique_ptr<World> RandomWorld(Dice* dice) {
   return world;
 }
 
+// glibc fills what it hands out with the complement of this byte.
+constexpr int kPerturb = 0x01;
+constexpr std::uint32_t kNotWritten = 0xFEFEFEFE;
+
+bool IsWritten(float x) { return std::bit_cast<std::uint32_t>(x) != kNotWritten; }
+bool AllWritten(std::span<const float> values) {
+  return std::all_of(values.begin(), values.end(), IsWritten);
+}
+
+// Every image that was asked for, in the order of options.
+std::vector<std::span<const float>> Planes(const tilegrad_images& i) {
+  const auto pixels =
+      static_cast<std::size_t>(i.count) * static_cast<std::size_t>(i.height * i.width);
+  std::vector<std::span<const float>> out;
+  const struct {
+    const float* image;
+    int planes;
+  } all[] = {{i.color, 3},   {i.alpha, 1}, {i.attributes, i.channels}, {i.depth, 1},
+             {i.normals, 3}, {i.uv, 2},    {i.barycentrics, 2}};
+  for (const auto& a : all) {
+    out.emplace_back(a.image, a.image == nullptr ? 0 : static_cast<std::size_t>(a.planes) * pixels);
+  }
+  return out;
+}
+
 // A frame and what it looks at.
 struct Shot {
   tilegrad_frame* frame = tilegrad_frame_create();
@@ -247,6 +282,29 @@ class Caller {
     if (no_frame || renderer == nullptr) return;  // the frame was not touched
     shot->world = std::move(world);
     ExpectImages(*shot, status == TILEGRAD_OK);
+    if (status == TILEGRAD_OK && dice_.OneIn(4)) ExpectSameAnew(*shot, no_options);
+  }
+
+  // A renderer and a frame that are new give the same bits.
+  void ExpectSameAnew(const Shot& shot, bool no_options) {
+    const World& world = *shot.world;
+    tilegrad_renderer* const renderer = tilegrad_renderer_create(dice_.Of({1, 2}));
+    tilegrad_frame* const frame = tilegrad_frame_create();
+    EXPECT_EQ(tilegrad_render(renderer, world.scenes.data(), world.scenes.size(),
+                              no_options ? nullptr : &world.options, frame),
+              TILEGRAD_OK);
+    tilegrad_images anew, before;
+    tilegrad_images_init(&anew), tilegrad_images_init(&before);
+    ASSERT_EQ(tilegrad_frame_images(frame, &anew), TILEGRAD_OK);
+    ASSERT_EQ(tilegrad_frame_images(shot.frame, &before), TILEGRAD_OK);
+    const auto a = Planes(anew), b = Planes(before);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].size(), b[i].size()) << i;
+      EXPECT_TRUE(a[i].empty() || std::memcmp(a[i].data(), b[i].data(), a[i].size_bytes()) == 0)
+          << "image " << i;
+    }
+    tilegrad_frame_destroy(frame);
+    tilegrad_renderer_destroy(renderer);
   }
 
   void ExpectImages(const Shot& shot, bool rendered) {
@@ -259,6 +317,14 @@ class Caller {
     if (!some || images.struct_size != sizeof images) return;
     const auto pixels = static_cast<std::size_t>(images.count) *
                         static_cast<std::size_t>(images.height * images.width);
+    const tilegrad_options& o = shot.world->options;
+    if (o.struct_size == sizeof o && images.width == o.width) {  // not those of no options
+      EXPECT_EQ(images.color != nullptr, o.color != 0);
+      EXPECT_EQ(images.uv != nullptr, o.uv != 0);
+      EXPECT_EQ(images.normals != nullptr, o.normals != 0);
+      EXPECT_EQ(images.depth != nullptr, o.depth != 0);
+    }
+    for (const auto plane : Planes(images)) EXPECT_TRUE(AllWritten(plane));
     for (std::size_t i = 0; i < pixels; ++i) {
       ASSERT_GE(images.face_ids[i], -1);
       if (images.alpha == nullptr) continue;
@@ -270,10 +336,27 @@ class Caller {
   float* Wanted(World* scratch, std::size_t size, bool given) {
     if (!given && !dice_.OneIn(60)) return nullptr;
     if (dice_.OneIn(3)) return nullptr;
-    float* const own = scratch->Floats(&dice_, given ? size : 1);
-    if (!shared_.empty() && dice_.OneIn(30)) return shared_[Pick(shared_.size())];
+    const std::size_t numbers = given ? size : 1;
+    const std::span<float> own(scratch->Floats(&dice_, numbers), numbers);
+    if (!shared_.empty() && dice_.OneIn(30)) return shared_[Pick(shared_.size())].data();
     if (given && size > 0) shared_.push_back(own);
-    return own;
+    return own.data();
+  }
+
+  // The arrays that a backward pass is to write, behind each other.
+  std::vector<float> Written(const World& scratch) const {
+    std::vector<float> out;
+    for (const auto array : shared_) out.insert(out.end(), array.begin(), array.end());
+    for (const auto& list : scratch.lights) {
+      for (const tilegrad_light& l : list) out.push_back(l.intensity);
+    }
+    return out;
+  }
+  void FillGradients(World* scratch, float value) const {
+    for (const auto array : shared_) std::fill(array.begin(), array.end(), value);
+    for (auto& list : scratch->lights) {
+      for (tilegrad_light& l : list) l.intensity = value;
+    }
   }
 
   tilegrad_scene_gradients RandomGradients(World* scratch, const tilegrad_scene& s) {
@@ -317,6 +400,7 @@ class Caller {
       scratch.lights.emplace_back(s.light_count);
       if (dice_.OneIn(2)) d.back().surfaces = scratch.surfaces.back().data();
       if (dice_.OneIn(2)) d.back().lights = scratch.lights.back().data();
+      if (d.back().lights == nullptr) scratch.lights.back().clear();
     }
     tilegrad_frame_gradients d_frame;
     tilegrad_frame_gradients_init(&d_frame);
@@ -333,38 +417,73 @@ class Caller {
     if (dice_.OneIn(50)) d_frame.struct_size = dice_.Of<std::size_t>({0, 3, 8, SIZE_MAX});
     std::size_t count = d.size();
     if (dice_.OneIn(50)) count = dice_.Of<std::size_t>({0, 2, SIZE_MAX});
-    const tilegrad_status status = tilegrad_backward(
-        renderer, dice_.OneIn(50) ? nullptr : shot.frame, dice_.OneIn(50) ? nullptr : &d_frame,
-        dice_.OneIn(50) ? nullptr : d.data(), count, dice_.Of({0, 1, -1}));
+    const std::int32_t add = dice_.Of({0, 1, -1});
+    const bool no_frame = dice_.OneIn(50), no_d_frame = dice_.OneIn(50), no_d = dice_.OneIn(50);
+    const auto call = [&](tilegrad_renderer* on) {
+      return tilegrad_backward(on, no_frame ? nullptr : shot.frame, no_d_frame ? nullptr : &d_frame,
+                               no_d ? nullptr : d.data(), count, add);
+    };
+    if (add == 0) FillGradients(&scratch, NAN);
+    const tilegrad_status status = call(renderer);
     ExpectMessage(renderer, status);
+    if (status == TILEGRAD_OK && add == 0 && count > 0) ExpectSameGradientsAnew(call, &scratch);
     good_backwards_ += status == TILEGRAD_OK && count > 0;
+  }
+
+  // All are numbers, and the same ones from a renderer that is new.
+  template <class Call>
+  void ExpectSameGradientsAnew(const Call& call, World* scratch) {
+    const std::vector<float> before = Written(*scratch);
+    for (const float x : before) ASSERT_TRUE(std::isfinite(x) && IsWritten(x)) << x;
+    FillGradients(scratch, NAN);
+    tilegrad_renderer* const renderer = tilegrad_renderer_create(dice_.Of({1, 2}));
+    EXPECT_EQ(call(renderer), TILEGRAD_OK);
+    tilegrad_renderer_destroy(renderer);
+    const std::vector<float> anew = Written(*scratch);
+    EXPECT_TRUE(before.empty() ||
+                std::memcmp(before.data(), anew.data(), before.size() * sizeof(float)) == 0);
   }
 
   Dice dice_;
   std::vector<tilegrad_renderer*> renderers_;
   std::vector<Shot> shots_;
   tilegrad_camera camera_ = {};
-  std::vector<float*> shared_;
+  std::vector<std::span<float>> shared_;  // arrays of gradients
   int good_renders_ = 0, good_backwards_ = 0;
 };
 
-// TILEGRAD_CALLS: how many, for long runs; TILEGRAD_SEED.
 std::uint64_t FromEnvironment(const char* name, std::uint64_t otherwise) {
   const char* text = std::getenv(name);
   return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
-TEST(HostileC, CallsAreOkOrErrorsWithAMessage) {
-  const std::uint64_t calls = FromEnvironment("TILEGRAD_CALLS", 4000);
-  Caller caller(FromEnvironment("TILEGRAD_SEED", 1));
-  for (std::uint64_t i = 0; i < calls; ++i) {
+void CallAtRandom(std::uint64_t seed) {
+  constexpr int kCalls = 4000;
+  Caller caller(seed);
+  for (int i = 0; i < kCalls; ++i) {
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", call " + std::to_string(i));
     caller.Call();
-    ASSERT_FALSE(HasFatalFailure()) << "call " << i;
+    ASSERT_FALSE(testing::Test::HasFailure());
   }
   // Not all is refused.
-  EXPECT_GT(caller.good_renders(), static_cast<int>(calls / 10));
-  EXPECT_GT(caller.good_backwards(), static_cast<int>(calls / 40));
+  EXPECT_GT(caller.good_renders(), kCalls / 10);
+  EXPECT_GT(caller.good_backwards(), kCalls / 40);
 }
+
+// TILEGRAD_SECONDS: how long; TILEGRAD_SEED: the first.
+void CallFor(std::uint64_t seconds) {
+  mallopt(M_PERTURB, kPerturb);
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::seconds(FromEnvironment("TILEGRAD_SECONDS", seconds));
+  std::uint64_t seed = FromEnvironment("TILEGRAD_SEED", 1);
+  do {
+    std::cout << "seed " << seed << std::endl;
+    CallAtRandom(seed++);
+  } while (std::chrono::steady_clock::now() < end && !testing::Test::HasFailure());
+}
+
+TEST(HostileC, CallsAreOkOrErrorsWithAMessage) { CallFor(0); }
+TEST(HostileC, LongCallsAreToo) { CallFor(300); }
 
 TEST(HostileC, CallersOnSeveralThreadsDoNotMeet) {
   std::vector<std::thread> threads;

@@ -42,6 +42,7 @@ void ShadeGradients::AddToPositions(const Batch& batch, std::size_t scene) {
   }
   if (!set[Varying::kNormal] || batch.plan.parts.shading.normals == Normals::kGiven) return;
   const SceneNormals& normals = batch.inputs.normals(scene);
+  if (normals.empty()) return;  // of no faces
   s.d_units.assign(normals.size(), {0, 0, 0});
   AddStream(batch.scenes[scene], set, Varying::kNormal, s.d_varyings,
             {s.d_units[0].data(), 3 * s.d_units.size()});
