@@ -73,7 +73,9 @@ class TILEGRAD_API FrameT {
 };
 
 struct RendererOptions {
-  int threads = 0;  // 1..1024; 0: one for each core that the process may use; 1: only the caller's
+  // 1..1024; 0: one for each core that the process may use; 1: only the caller's. Where the system
+  // refuses some, fewer work.
+  int threads = 0;
 };
 
 enum class GradientMode {

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::python {
@@ -31,8 +32,13 @@ inline py::str Text(const std::string& bytes) {
 }
 
 // ValueError, FileNotFoundError, OSError, MemoryError, KeyboardInterrupt or RuntimeError, by the
-// code. Only at the border to Python, with the GIL held.
+// code; a RuntimeWarning where the system has refused threads. Only at the border to Python, with
+// the GIL held.
 inline void ThrowIfError(const Status& status) {
+  const char* const notice = TakeThreadNotice();
+  if (notice != nullptr && PyErr_WarnEx(PyExc_RuntimeWarning, notice, 1) != 0) {
+    throw py::error_already_set();
+  }
   const auto raise = [&](PyObject* type) {
     PyErr_SetObject(type, Text(status.message()).ptr());
     throw py::error_already_set();

@@ -16,7 +16,8 @@ namespace tilegrad {
 // run, a pinned worker waits for its core, and everything that waits for the worker waits too.
 enum class Pinning { kOff, kOn };
 
-// A fixed number of workers. Copies nothing; two Workers are independent.
+// A fixed number of workers. Copies nothing; two Workers are independent. Where the system refuses
+// threads (limits of a container) there are fewer than asked for, the caller's own at the least.
 //
 // They survive a fork: a child of a process that used oneTBB lacks its threads, so loops there
 // start their own, at some 20 microseconds per thread and loop. Workers that are in the middle of a
@@ -79,6 +80,9 @@ class Workers {
   std::unique_ptr<Impl> impl_;  // null where oneTBB is not used
   mutable std::mutex own_loop_;
 };
+
+// A sentence for people, once after the system has refused a thread; null otherwise.
+const char* TakeThreadNotice();
 
 // The cores this process may run on (its affinity mask), at least 1.
 int AvailableCores();

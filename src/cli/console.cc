@@ -8,6 +8,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include "base/parallel.h"
+
 namespace tilegrad::cli {
 namespace {
 
@@ -34,6 +36,10 @@ void OpenStandardStreams() {
   int fd = 0;
   while (fd >= 0 && fd <= STDERR_FILENO) fd = ::open("/dev/null", O_RDWR);
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
+}
+
+void PrintThreadNotice() {
+  if (const char* notice = TakeThreadNotice()) PrintNote("tilegrad: warning: {}\n", notice);
 }
 
 void WritesFailWithoutSignals() {
@@ -67,6 +73,7 @@ WarningSink ProgressLine::Warnings() {
 
 void ProgressLine::Show(const Progress& progress) {
   const auto now = Clock::now();
+  PrintThreadNotice();
   if (progress.stage != last_.stage) {
     Finish();
     stage_start_ = last_draw_ = now;

@@ -21,6 +21,9 @@ void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
+// Says, once, that the system has refused threads.
+void PrintThreadNotice();
+
 // Opens those of the three standard streams that are closed, on /dev/null: the first files that are
 // opened would get their numbers, and the progress line would be written into a checkpoint.
 void OpenStandardStreams();

@@ -95,7 +95,9 @@ int Run(int argc, char** argv) {
   }
   if (const Status status = CheckValues(app); !status.ok()) return Report(status);
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
-  if (const Status status = action(); !status.ok()) return Report(status);
+  const Status done = action();
+  PrintThreadNotice();
+  if (!done.ok()) return Report(done);
   return Report(FlushOutput());
 }
 

@@ -2,6 +2,7 @@
 """Threads and processes: whoever renders, and however many at a time, the bits are the same."""
 
 import concurrent.futures
+import importlib.util
 import multiprocessing
 import os
 import signal
@@ -11,6 +12,7 @@ import threading
 import time
 import traceback
 import unittest
+from pathlib import Path
 
 import numpy as np
 
@@ -188,6 +190,48 @@ if child:
             return True
 
         self.assertTrue(in_child(delete))
+
+
+class FewThreads(unittest.TestCase):
+    """A system that refuses threads (tests/support/few_threads.c, preloaded): fewer work, and one
+    warning says so."""
+
+    def expect(self, code, output):
+        library = Path(os.environ["TILEGRAD_BUILD"]) / "tests" / "base" / "libfew_threads.so"
+        code = "import warnings; warnings.simplefilter('always')\n" + code
+        for granted in (0, 1, 2, 3, 20):
+            with self.subTest(granted=granted):
+                done = run_python(code, LD_PRELOAD=str(library), OMP_NUM_THREADS="1",
+                                  OPENBLAS_NUM_THREADS="1", TILEGRAD_TEST_THREADS=str(granted))
+                self.assertEqual((done.returncode, done.stdout), (0, output), done.stderr)
+                self.assertEqual(done.stderr.count("RuntimeWarning: the system refuses"),
+                                 granted < 3, done.stderr)
+
+    def test_renderers(self):
+        self.expect("""
+from test_processes import Renderer, step
+one = step(Renderer(threads=1))
+print([step(Renderer(threads=n)) == one for n in (4, 3, 2)])
+""", "[True, True, True]\n")
+
+    def test_self_test(self):
+        self.expect("""
+import contextlib, io, tilegrad, tilegrad.selftest
+tilegrad.Renderer(threads=4).render([], width=8, height=8)
+with contextlib.redirect_stdout(io.StringIO()):
+    failed = tilegrad.selftest.main()
+print(failed)
+""", "0\n")
+
+    @unittest.skipIf(importlib.util.find_spec("torch") is None, "torch is absent")
+    def test_ported_code(self):
+        self.expect("""
+import os, torch, tilegrad.compat.nvdiffrast.torch as dr
+from test_nvdiffrast import triangle
+os.environ["TILEGRAD_NUM_THREADS"] = "4"
+rast, _ = dr.rasterize(dr.RasterizeCudaContext(), *triangle(), (16, 16))
+print((rast[..., 3] > 0).sum().item() > 0)
+""", "True\n")
 
 
 class Environment(unittest.TestCase):
