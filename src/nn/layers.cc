@@ -84,25 +84,30 @@ Var Swapped(const Var& weight) { return Permute(weight, {1, 0, 2, 3}); }
 
 }  // namespace
 
-Spectral::Spectral(const Var& weight, bool transposed, Rng& rng)
-    : transposed_(transposed),
-      u_(weight.context().Empty({weight.shape()[transposed ? 1 : 0]}, weight.dtype())) {
-  FillNormal(u_, rng, 1.0);
+Spectral::Spectral(const Var& weight, bool transposed, Rng& rng) : transposed_(transposed) {
+  const std::int64_t out = weight.shape()[transposed ? 1 : 0];
+  at_.u = weight.context().Empty({out}, weight.dtype());
+  at_.v = weight.context().Empty({weight.shape().elements() / out}, weight.dtype());
+  FillConstant(at_.v, 0.0);  // for a weight of zeros
+  FillNormal(at_.u, rng, 1.0);
   const NoGrad off(weight.context());
-  SpectralStep(transposed_ ? Swapped(weight) : weight, u_);
+  SpectralStep(transposed_ ? Swapped(weight) : weight, at_);
 }
 
 Var Spectral::Normalised(const Var& weight, Mode mode) {
-  if (u_.empty()) return weight;
+  if (at_.u.empty()) return weight;
   const Var by_output = transposed_ ? Swapped(weight) : weight;
-  if (mode == Mode::kTrain) SpectralStep(by_output, u_);
-  // A copy: the graph recorded by this pass must not see later iterations.
-  const Var normalised = SpectralNorm(by_output, weight.context().Copy(u_));
+  if (mode == Mode::kTrain) SpectralStep(by_output, at_);
+  // Copies: the graph recorded by this pass must not see later iterations.
+  Context& context = weight.context();
+  const Var normalised = SpectralNorm(by_output, {context.Copy(at_.u), context.Copy(at_.v)});
   return transposed_ ? Swapped(normalised) : normalised;
 }
 
 void Spectral::Visit(const std::string& prefix, ModuleVisitor& visitor) {
-  if (!u_.empty()) visitor.Buffer(prefix + "spectral_u", u_);
+  if (at_.u.empty()) return;
+  visitor.Buffer(prefix + "spectral_u", at_.u);
+  visitor.Buffer(prefix + "spectral_v", at_.v);
 }
 
 ConvLayer::ConvLayer(Context& context, const ConvShape& shape, bool transposed, Rng& rng)

@@ -59,7 +59,7 @@ struct LinearShape {
 };
 
 // A weight divided by its largest singular value (SpectralNorm of ops/norm.h), which one power
-// iteration per training step tracks. The buffer is "spectral_u".
+// iteration per training step tracks. The buffers are "spectral_u" and "spectral_v".
 class Spectral {
  public:
   Spectral() = default;  // none: leaves weights as they are
@@ -70,7 +70,7 @@ class Spectral {
 
  private:
   bool transposed_ = false;
-  Tensor u_;  // [out]
+  SpectralVectors at_;
 };
 
 class LinearLayer : public Module {

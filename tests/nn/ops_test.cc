@@ -134,7 +134,7 @@ TEST_F(Ops, WhatDoesNotFitIsNamed) {
   refused(GroupNorm(x, 2, Random({3}), Random({3})), "3 channels in 2 groups");
   refused(LayerNorm(x, Random({3}), Random({3})), "layer norm");
   refused(InstanceNorm(Random({1, 4, 1, 1}), c, c), "no two elements");
-  refused(SpectralNorm(w, context_.Zeros({3})), "u [3]");
+  refused(SpectralNorm(w, {context_.Zeros({3}), context_.Zeros({2})}), "u [3], v [2]");
   refused(LogSoftmax(x, 7), "axis 7");
   refused(CrossEntropy(x, indices({0, 1})), "2 labels");
   refused(BinaryCrossEntropy(Random({4, 1}), c), "target [4]");
@@ -266,12 +266,34 @@ TEST_F(Ops, NormalisedSamplesHaveMeanAndVariance) {
 
 // Power iteration finds the largest singular value: of a diagonal matrix, its largest entry.
 TEST_F(Ops, SpectralNormDividesByTheLargestSingularValue) {
-  Tensor u = context_.Full({3}, std::sqrt(1.0 / 3));
+  SpectralVectors at{context_.Full({3}, std::sqrt(1.0 / 3)), context_.Zeros({3})};
   const Var w =
       Constant(context_, context_.From({3, 3}, std::vector<double>{2, 0, 0, 0, -5, 0, 0, 0, 1}));
-  for (int i = 0; i < 60; ++i) SpectralStep(w, u);  // the ratio 4/25 to the power 60 is 0
-  EXPECT_NEAR(Numbers(SpectralNorm(w, u))[4], -1.0, 1e-15);
-  EXPECT_NEAR(Numbers(SpectralNorm(w, u))[0], 0.4, 1e-15);
+  for (int i = 0; i < 60; ++i) SpectralStep(w, at);  // the ratio 4/25 to the power 60 is 0
+  EXPECT_NEAR(Numbers(SpectralNorm(w, at))[4], -1.0, 1e-15);
+  EXPECT_NEAR(Numbers(SpectralNorm(w, at))[0], 0.4, 1e-15);
+}
+
+// One iteration by hand, far from convergence, of W = (3 0; 4 5) and u = (1, 0). W^T u = (3, 0), so
+// v = (1, 0); W v = (3, 4), so u = (3, 4) / 5 and sigma = u^T W v = 5. (|W^T u| would be
+// |(5, 4)| = 6.4.) Then W^T u = (5, 4), v = (5, 4) / sqrt(41), W v = (15, 40) / sqrt(41),
+// u = (3, 8) / sqrt(73) and sigma = |W v| = 5 sqrt(73 / 41).
+TEST_F(Ops, SpectralNormIsUTransposedWV) {
+  const Var w = Constant(context_, context_.From({2, 2}, std::vector<double>{3, 0, 4, 5}));
+  SpectralVectors at{context_.From({2}, std::vector<double>{1, 0}), context_.Zeros({2})};
+  SpectralStep(w, at);
+  EXPECT_NEAR(Numbers(SpectralNorm(w, at))[0], 3 / 5.0, 1e-15);
+  SpectralStep(w, at);
+  const double sigma = 5 * std::sqrt(73 / 41.0);
+  EXPECT_NEAR(Numbers(SpectralNorm(w, at))[3], 5 / sigma, 1e-15);
+  // The vectors stay where they are when the weight moves: twice the last row makes
+  // sigma = u^T (3 0; 8 10) v = (3, 8) . (15, 80) / sqrt(73 41).
+  const Var moved = Constant(context_, context_.From({2, 2}, std::vector<double>{3, 0, 8, 10}));
+  EXPECT_NEAR(Numbers(SpectralNorm(moved, at))[0], 3 / (685 / std::sqrt(73 * 41.0)), 1e-15);
+  // A zero matrix has no direction: u and v stay.
+  SpectralStep(Constant(context_, context_.Zeros({2, 2})), at);
+  EXPECT_NEAR(at.u.data<double>()[0], 3 / std::sqrt(73.0), 1e-15);
+  EXPECT_NEAR(at.v.data<double>()[1], 4 / std::sqrt(41.0), 1e-15);
 }
 
 // The fused gradient and the one composed of operations are the same formula.

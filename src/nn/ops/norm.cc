@@ -92,38 +92,44 @@ Var LayerNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions
 
 namespace {
 
-Status CheckSpectral(const Var& weight, const Tensor& u) {
-  if (weight.shape().rank() >= 2 && !u.empty() && u.dtype() == weight.dtype() &&
-      u.shape() == Shape{weight.shape()[0]}) {
-    return {};
-  }
-  return InvalidArgument("spectral norm: weight {}, u {}", weight.shape().ToString(),
-                         u.shape().ToString());
+Status CheckSpectral(const Var& weight, const SpectralVectors& at) {
+  const std::int64_t out = weight.shape().rank() >= 2 ? weight.shape()[0] : 0;
+  const std::int64_t rest = out > 0 ? weight.shape().elements() / out : 0;
+  const auto fits = [&](const Tensor& t, std::int64_t n) {
+    return !t.empty() && t.dtype() == weight.dtype() && t.shape() == Shape{n};
+  };
+  if (rest > 0 && fits(at.u, out) && fits(at.v, rest)) return {};
+  return InvalidArgument("spectral norm: weight {}, u {}, v {}", weight.shape().ToString(),
+                         at.u.shape().ToString(), at.v.shape().ToString());
 }
 
-// u^T W as [1, rest], with W = weight as [out, rest].
-Var LeftProduct(const Var& weight, const Tensor& u) {
-  const Var row = Constant(weight.context(), u.Reshaped({1, u.shape()[0]}));
-  return Matmul(row, Reshape(weight, {weight.shape()[0], -1}));
+Var AsMatrix(const Var& weight) { return Reshape(weight, {weight.shape()[0], -1}); }
+Var AsRow(const Var& weight, const Tensor& x) {
+  return Constant(weight.context(), x.Reshaped({1, x.shape()[0]}));
+}
+
+// *to <- row / |row|, unless that is no number: a zero matrix turns nothing.
+void SetNormalised(const Var& row, Tensor* to) {
+  const Var length = Sqrt(Sum(Square(row)));
+  if (!(length.item() > 0) || !std::isfinite(length.item())) return;
+  std::memcpy(to->raw(), Div(row, length).value().raw(), to->bytes());
 }
 
 }  // namespace
 
-Var SpectralNorm(const Var& weight, const Tensor& u) {
+Var SpectralNorm(const Var& weight, const SpectralVectors& at) {
   if (!Usable("spectral norm", {&weight})) return Invalid({&weight});
-  if (const Status s = CheckSpectral(weight, u); !s.ok()) return Fail(weight, s);
-  return Div(weight, Sqrt(Sum(Square(LeftProduct(weight, u)))));
+  if (const Status s = CheckSpectral(weight, at); !s.ok()) return Fail(weight, s);
+  const Var left = Matmul(AsRow(weight, at.u), AsMatrix(weight));  // [1, rest]
+  return Div(weight, Sum(Mul(left, AsRow(weight, at.v))));
 }
 
-void SpectralStep(const Var& weight, Tensor& u) {
+void SpectralStep(const Var& weight, SpectralVectors& at) {
   if (!Usable("spectral norm", {&weight})) return;
-  if (const Status s = CheckSpectral(weight, u); !s.ok()) return weight.context().Fail(s);
+  if (const Status s = CheckSpectral(weight, at); !s.ok()) return weight.context().Fail(s);
   const NoGrad off(weight.context());
-  const Var matrix = Reshape(weight, {weight.shape()[0], -1});
-  const Var turned = Matmul(LeftProduct(weight, u), matrix, {false, true});  // [1, out]
-  const Var length = Sqrt(Sum(Square(turned)));
-  if (!(length.item() > 0) || !std::isfinite(length.item())) return;  // a zero matrix turns nothing
-  std::memcpy(u.raw(), Div(turned, length).value().raw(), u.bytes());
+  SetNormalised(Matmul(AsRow(weight, at.u), AsMatrix(weight)), &at.v);
+  SetNormalised(Matmul(AsRow(weight, at.v), AsMatrix(weight), {false, true}), &at.u);
 }
 
 }  // namespace tilegrad::nn

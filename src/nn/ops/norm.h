@@ -24,10 +24,16 @@ Var GroupNorm(const Var& x, int groups, const Var& gamma, const Var& beta,
 // shape], beta as gamma (Ba et al. 2016).
 Var LayerNorm(const Var& x, const Var& gamma, const Var& beta, const NormOptions& options = {});
 
-// weight / sigma, sigma = |W^T u| with W = weight as [out, rest] and u [out] of length 1: the
-// largest singular value where u is its left singular vector (Miyato et al. 2018). u is constant.
-Var SpectralNorm(const Var& weight, const Tensor& u);
-// One power iteration: u = W W^T u, of length 1. Repeated, it turns u into that vector.
-void SpectralStep(const Var& weight, Tensor& u);
+// Of W = a weight as [out, rest]: u [out] and v [rest], each of length 1.
+struct SpectralVectors {
+  Tensor u, v;
+};
+
+// weight / sigma, sigma = u^T W v: the largest singular value where u and v are its singular
+// vectors (Miyato et al. 2018). They are constant, as in torch.nn.utils.spectral_norm.
+Var SpectralNorm(const Var& weight, const SpectralVectors& at);
+// One power iteration (algorithm 1): v = W^T u, then u = W v, each of length 1. Repeated, it turns
+// them into those vectors.
+void SpectralStep(const Var& weight, SpectralVectors& at);
 
 }  // namespace tilegrad::nn

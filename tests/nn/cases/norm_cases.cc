@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include "nn/cases/cases.h"
 
 namespace tilegrad::nn {
@@ -51,9 +53,13 @@ void AddSampleNorms(CaseList& list) {
 void AddSpectralNorm(CaseList& list) {
   list.Add({"spectral norm",
             [](const Inputs& v) {
-              // Any u will do: the derivative is exact for each.
-              const std::vector<double> u = {0.6, 0.0, -0.8};
-              return Square(SpectralNorm(v[0], v[0].context().From({3}, u)));
+              // Any u and v will do: the derivative is exact for each.
+              Context& context = v[0].context();
+              const std::vector<double> u = {0.6, 0.0, 0.8};
+              const std::int64_t rest = v[0].shape().elements() / 3;
+              return Square(SpectralNorm(
+                  v[0], {context.From({3}, u),
+                         context.Full({rest}, 1 / std::sqrt(static_cast<double>(rest)))}));
             },
             {{{3, 2, list.Extent(3), list.Extent(5)}, 0.2, 1}},
             96});
