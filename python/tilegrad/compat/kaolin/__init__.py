@@ -15,12 +15,15 @@ import importlib
 from types import ModuleType
 
 from tilegrad.compat.kaolin import metrics, ops, render
+from tilegrad.compat.kaolin._missing import missing_from
+from tilegrad.compat.kaolin.render.mesh.dibr import use_exact_kaolin
 
-__all__ = ["io", "metrics", "ops", "render"]
+__all__ = ["io", "metrics", "ops", "render", "use_exact_kaolin"]
+
+_LATER = ("io",)  # loaded where they are used first: they bring readers of files along
 
 
 def __getattr__(name: str) -> ModuleType:
-    """`io` is loaded where it is used first: it brings readers of files along."""
-    if name == "io":
-        return importlib.import_module("tilegrad.compat.kaolin.io")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name in _LATER:
+        return importlib.import_module(f"{__name__}.{name}")
+    return missing_from(__name__)(name)

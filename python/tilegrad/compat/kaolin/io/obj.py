@@ -9,6 +9,9 @@ from typing import Any, NamedTuple, Optional, Union
 import torch
 
 from tilegrad.meshes import load_mesh
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
 
 
 class ObjMesh(NamedTuple):

@@ -12,6 +12,9 @@ import torch
 
 from tilegrad.compat.kaolin.render.camera import generate_perspective_projection
 from tilegrad.images import load_image
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
 
 _PICTURES = ("rgb", "normals")  # {idx}_rgb.png; the others are arrays: {idx}_semantic.npy
 

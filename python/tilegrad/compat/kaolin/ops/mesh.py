@@ -6,6 +6,9 @@ from __future__ import annotations
 import torch
 
 from tilegrad.compat._tensors import check_floats, check_tensor
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
 
 _EPS = 1e-10  # Kaolin's, added to lengths
 

@@ -6,6 +6,9 @@ from __future__ import annotations
 import torch
 
 from tilegrad.compat._tensors import check_floats
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
 
 
 def center_points(points: torch.Tensor, normalize: bool = False,

@@ -8,6 +8,10 @@ import math
 
 import torch
 
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
+
 _EPS = 1e-10  # Kaolin's, added to lengths
 
 

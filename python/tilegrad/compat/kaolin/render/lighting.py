@@ -10,6 +10,9 @@ from typing import Sequence, Union
 import torch
 
 from tilegrad.compat._tensors import check_floats
+from tilegrad.compat.kaolin._missing import missing_from
+
+__getattr__ = missing_from(__name__)
 
 # Clamped cosine, as factors of bands 0, 1, 2.
 _COSINE = [math.pi] + 3 * [2 * math.pi / 3] + 5 * [math.pi / 4]

@@ -23,6 +23,14 @@ from tilegrad.compat.kaolin.render.mesh.rasterization import (
 _MAX_ALPHA_ERROR = {torch.float32: 1e-6, torch.float64: 1e-12}
 _KAOLIN_EDGE_EPS = 1e-7  # added to squared lengths in coordinates times multiplier
 _warned = False
+_exact_kaolin = False
+
+
+def use_exact_kaolin(on: bool = True) -> None:
+    """What exact_kaolin=None, the default, means from now on in the whole program: at first False.
+    For code that cannot be given the argument."""
+    global _exact_kaolin
+    _exact_kaolin = bool(on)
 
 
 class _SoftMask(torch.autograd.Function):
@@ -49,7 +57,7 @@ class _SoftMask(torch.autograd.Function):
 
 def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.Tensor,
                    sigmainv: float = 7000, boxlen: float = 0.02, knum: int = 30,
-                   multiplier: float = 1000., *, exact_kaolin: bool = False,
+                   multiplier: float = 1000., *, exact_kaolin: Optional[bool] = None,
                    max_alpha_error: Optional[float] = None) -> torch.Tensor:
     """The soft silhouette: 1 where there is a face, 1 - prod(1 - exp(-sigmainv d^2)) elsewhere, d
     the distance to each face in NDC.
@@ -58,14 +66,12 @@ def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.T
     selected_face_idx: [B,H,W] integers, as `rasterize` returns them; -1 is background.
     sigmainv: > 0; larger is sharper.
     boxlen, knum: ignored, which is said once, unless exact_kaolin is True: then Kaolin's
-        truncation is reproduced, with multiplier in its eps.
+        truncation is reproduced, with multiplier in its eps. None: as use_exact_kaolin says.
     max_alpha_error: how far the mask may be from the formula over all faces, in [0, 1]; None is
         1e-6 for float32 (plus rounding) and 1e-12 for float64. 0 leaves nothing out.
     Returns [B,H,W]. TypeError, ValueError: as of `rasterize`.
     """
-    if not exact_kaolin:
-        _say_once_what_is_ignored()
-    paper = {"boxlen": boxlen, "knum": knum} if exact_kaolin else None
+    paper = _kaolins_numbers(boxlen, knum, exact_kaolin)
     return _soft_mask(face_vertices_image, selected_face_idx, sigmainv, multiplier, paper,
                       max_alpha_error)
 
@@ -75,22 +81,23 @@ def dibr_rasterization(height: int, width: int, face_vertices_z: torch.Tensor,
                        face_normals_z: torch.Tensor, sigmainv: float = 7000,
                        boxlen: float = 0.02, knum: int = 30,
                        multiplier: Optional[float] = None, eps: Optional[float] = None,
-                       rast_backend: str = "cuda", *, exact_kaolin: bool = False,
+                       rast_backend: str = "cuda", *, exact_kaolin: Optional[bool] = None,
                        max_alpha_error: Optional[float] = None
                        ) -> tuple[Union[torch.Tensor, tuple], torch.Tensor, torch.Tensor]:
-    """`rasterize`, for faces with face_normals_z [B,F] >= 0, and `dibr_soft_mask`, over all faces.
+    """`rasterize`, for faces with face_normals_z [B,F] (or [B,F,1]) >= 0, and `dibr_soft_mask`, over all faces.
 
     Arguments as of those two. Returns features [B,H,W,C] (a tuple if face_features is a list),
     soft_mask [B,H,W], face_idx [B,H,W] int64.
     """
-    check_tensor("dibr_rasterization", "face_normals_z", face_normals_z,
-                 tuple(face_vertices_image.shape[:2]))
+    batch_and_faces = tuple(face_vertices_image.shape[:2])
+    if isinstance(face_normals_z, torch.Tensor) and face_normals_z.ndim == 3:
+        check_tensor("dibr_rasterization", "face_normals_z", face_normals_z, (*batch_and_faces, 1))
+        face_normals_z = face_normals_z.squeeze(2)
+    check_tensor("dibr_rasterization", "face_normals_z", face_normals_z, batch_and_faces)
     features, face_idx = rasterize(height, width, face_vertices_z, face_vertices_image,
                                    face_features, face_normals_z >= 0, multiplier, eps,
                                    rast_backend)
-    if not exact_kaolin:
-        _say_once_what_is_ignored()
-    paper = {"boxlen": boxlen, "knum": knum} if exact_kaolin else None
+    paper = _kaolins_numbers(boxlen, knum, exact_kaolin)
     mask = _soft_mask(face_vertices_image, face_idx, sigmainv,
                       DEFAULT_MULTIPLIER if multiplier is None else multiplier, paper,
                       max_alpha_error)
@@ -135,10 +142,18 @@ def _as_int32(face_idx: torch.Tensor) -> torch.Tensor:
     return face_idx.to(torch.int32)
 
 
+def _kaolins_numbers(boxlen: float, knum: int, exact_kaolin: Optional[bool]) -> Optional[dict]:
+    """What Kaolin's rule needs; None for our own rule."""
+    if _exact_kaolin if exact_kaolin is None else exact_kaolin:
+        return {"boxlen": boxlen, "knum": knum}
+    _say_once_what_is_ignored()
+    return None
+
+
 def _say_once_what_is_ignored() -> None:
     global _warned
     if not _warned:
         _warned = True
         warnings.warn("tilegrad.compat.kaolin: boxlen and knum are ignored: the soft mask takes in "
-                      "all faces, within max_alpha_error. exact_kaolin=True gives Kaolin's "
-                      "truncated mask.", UserWarning, stacklevel=3)
+                      "all faces, within max_alpha_error. exact_kaolin=True, or "
+                      "use_exact_kaolin() for the whole program, gives Kaolin's truncated mask.", UserWarning, stacklevel=4)

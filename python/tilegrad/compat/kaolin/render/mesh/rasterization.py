@@ -90,7 +90,8 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
         (_DEFAULT_EPS if eps is None else eps) / scale**2)
     if not several:
         return image, face_idx
-    return torch.split(image, [feature.shape[-1] for feature in features], dim=-1), face_idx
+    parts = torch.split(image, [feature.shape[-1] for feature in features], dim=-1)
+    return tuple(part.clone() for part in parts), face_idx  # callers write into them
 
 
 def check_multiplier(function: str, multiplier: float) -> None:
