@@ -2,6 +2,7 @@
 // The paper's 3D metrics (section 5.1).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -10,6 +11,7 @@
 #include "base/parallel.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
+#include "train/metrics/face_tree.h"
 
 namespace tilegrad::train {
 
@@ -23,6 +25,21 @@ Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
 
 // |a and b| / |a or b| over voxels that are not 0; 1 if both are empty. The sizes must agree.
 double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
+
+// The voxels that a surface passes through, [x][y][z] of 0 or 1. Corners are in voxels: voxel (i,
+// j, k) of [0, resolution)^3 is the cube from (i, j, k) to (i + 1, j + 1, k + 1); up to a
+// thousandth of one, as above. What lies outside is left out. An error for a resolution out of
+// range.
+Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surface, int resolution);
+
+// Points distributed by area: faces, with the weights of their corners (deterministic in `seed`).
+// An error if the areas' sum is not a positive number.
+struct SurfaceSample {
+  std::int32_t face;
+  std::array<double, 3> weights;
+};
+Result<std::vector<SurfaceSample>> SampleFaces(std::span<const double> areas, int count,
+                                               std::uint64_t seed);
 
 // `count` points distributed by area (deterministic in `seed`). An error if the surface has no
 // area.

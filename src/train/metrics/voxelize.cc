@@ -29,7 +29,7 @@ struct Axis {
 
 // The triangle's normal and the nine products of its edges with the box's edges (Akenine-Moller:
 // Fast 3D triangle-box overlap testing). The box's own axes are the loop over the bounding box.
-std::array<Axis, 10> SeparatingAxes(const std::array<dvec3, 3>& corners) {
+std::array<Axis, 10> SeparatingAxes(const Triangle& corners) {
   std::array<Axis, 10> axes;
   std::size_t n = 0;
   const auto add = [&](dvec3 d) {
@@ -53,14 +53,15 @@ class Grid {
   explicit Grid(int n)
       : n_(n), side_(static_cast<std::size_t>(n) + 2), state_(side_ * side_ * side_, kUnknown) {}
 
-  void MarkSurface(const std::array<dvec3, 3>& corners) {
+  void MarkSurface(const Triangle& corners) {
     const auto axes = SeparatingAxes(corners);
     const dvec3 low = glm::min(glm::min(corners[0], corners[1]), corners[2]);
     const dvec3 high = glm::max(glm::max(corners[0], corners[1]), corners[2]);
     int first[3], last[3];
     for (int i = 0; i < 3; ++i) {
-      first[i] = std::clamp(static_cast<int>(std::floor(low[i])), 0, n_ - 1);
-      last[i] = std::clamp(static_cast<int>(std::floor(high[i])), 0, n_ - 1);
+      if (high[i] < 0 || low[i] >= n_) return;
+      first[i] = static_cast<int>(std::clamp(std::floor(low[i]), 0.0, n_ - 1.0));
+      last[i] = static_cast<int>(std::clamp(std::floor(high[i]), 0.0, n_ - 1.0));
     }
     for (int x = first[0]; x <= last[0]; ++x) {
       for (int y = first[1]; y <= last[1]; ++y) {
@@ -95,19 +96,27 @@ class Grid {
     }
   }
 
+  std::vector<std::uint8_t> Surface() const {
+    return Where([](State s) { return s == kSurface; });
+  }
   std::vector<std::uint8_t> Solid() const {
-    std::vector<std::uint8_t> out;
-    out.reserve(state_.size());
-    for (int x = 0; x < n_; ++x) {
-      for (int y = 0; y < n_; ++y) {
-        for (int z = 0; z < n_; ++z) out.push_back(state_[Index(x, y, z)] != kOutside);
-      }
-    }
-    return out;
+    return Where([](State s) { return s != kOutside; });
   }
 
  private:
   enum State : std::uint8_t { kUnknown, kSurface, kOutside };
+
+  template <class Wanted>
+  std::vector<std::uint8_t> Where(const Wanted& wanted) const {
+    std::vector<std::uint8_t> out;
+    out.reserve(state_.size());
+    for (int x = 0; x < n_; ++x) {
+      for (int y = 0; y < n_; ++y) {
+        for (int z = 0; z < n_; ++z) out.push_back(wanted(state_[Index(x, y, z)]));
+      }
+    }
+    return out;
+  }
 
   // -1 and n_ are the empty layer.
   std::size_t Index(int x, int y, int z) const {
@@ -120,29 +129,44 @@ class Grid {
   std::vector<State> state_;
 };
 
+// A surface exactly on a border of voxels must belong to one side only, or boxes would come out a
+// voxel too fat. So all is moved by less than a thousandth of a voxel, in such a way that no
+// integer stays one: x -> x (1 - a) + b with b no multiple of a.
+dvec3 OffBorders(const dvec3& p, double n) { return p * (1 - 9.6e-4 / n) + 4.75e-4; }
+
+Status CheckResolution(int resolution) {
+  if (resolution >= 1 && resolution <= kMaxResolution) return {};
+  return InvalidArgument("the resolution must be in [1, {}], got {}", kMaxResolution, resolution);
+}
+
 }  // namespace
 
-Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
-  if (resolution < 1 || resolution > kMaxResolution) {
-    return InvalidArgument("the resolution must be in [1, {}], got {}", kMaxResolution, resolution);
+Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surface, int resolution) {
+  TILEGRAD_TRY(CheckResolution(resolution));
+  Grid grid(resolution);
+  for (Triangle face : surface) {
+    for (dvec3& p : face) p = OffBorders(p, resolution);
+    grid.MarkSurface(face);
   }
+  return grid.Surface();
+}
+
+Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
+  TILEGRAD_TRY(CheckResolution(resolution));
   TILEGRAD_TRY(Validate(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
   const Bounds bounds = MeshBounds(mesh);
   const dvec3 low(bounds.low), size = dvec3(bounds.high) - low;
   const double longest = std::max({size.x, size.y, size.z});
   if (!(longest > 0)) return InvalidArgument("the mesh has no extent");
-  // A surface exactly on a border of voxels must belong to one side only, or boxes would come out a
-  // voxel too fat. So all is moved by less than a thousandth of a voxel, in such a way that no
-  // integer stays one: x -> x (1 - a) + b with b no multiple of a.
-  const double n = resolution, a = 9.6e-4 / n, b = 4.75e-4;
+  const double n = resolution;
   const dvec3 centre = low + 0.5 * size;
   Grid grid(resolution);
   for (const Face& face : mesh.faces) {
-    std::array<dvec3, 3> corners;
+    Triangle corners;
     for (std::size_t k = 0; k < 3; ++k) {
       const dvec3 p(mesh.positions[static_cast<std::size_t>(face[k])]);
-      corners[k] = ((p - centre) * (n / longest) + 0.5 * n) * (1 - a) + b;
+      corners[k] = OffBorders((p - centre) * (n / longest) + 0.5 * n, n);
     }
     grid.MarkSurface(corners);
   }

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "base/rng.h"
+#include "train/metrics/nearest_point.h"
 
 namespace tilegrad::train {
 namespace {
@@ -92,6 +93,41 @@ TEST(CompareSurfaces, NothingScoresZero) {
   const Points some = Cloud(3, 4);
   EXPECT_EQ(CompareSurfaces({}, some, 0.1).f_score, 0);
   EXPECT_EQ(CompareSurfaces(some, {}, 0.1).f_score, 0);
+}
+
+TEST(NearestPoint, IsTheFirstOfTheNearest) {
+  Points points = Cloud(300, 5);
+  points.insert(points.end(), points.begin(), points.begin() + 50);  // later ones of equal distance
+  const NearestPoint tree{std::span<const glm::vec3>(points)};
+  for (const glm::vec3& query : Cloud(100, 6)) {
+    std::size_t best = 0;
+    const auto distance = [&](std::size_t i) {
+      return glm::distance(glm::dvec3(query), glm::dvec3(points[i]));
+    };
+    for (std::size_t i = 1; i < points.size(); ++i) best = distance(i) < distance(best) ? i : best;
+    const auto found = tree.Find(glm::dvec3(query));
+    EXPECT_EQ(found.index, static_cast<std::int32_t>(best));
+    EXPECT_DOUBLE_EQ(std::sqrt(found.squared), distance(best));
+  }
+  EXPECT_EQ(NearestPoint(std::span<const glm::vec3>()).Find({0, 0, 0}).index, -1);
+}
+
+TEST(SampleFaces, FollowsTheAreas) {
+  const std::vector<double> areas = {1, 0, 3};
+  std::array<int, 3> count{};
+  glm::dvec3 mean(0);
+  const auto samples = SampleFaces(areas, 4000, 7).value();
+  for (const SurfaceSample& s : samples) {
+    ++count[static_cast<std::size_t>(s.face)];
+    mean += glm::dvec3(s.weights[0], s.weights[1], s.weights[2]) / 4000.0;
+    EXPECT_NEAR(s.weights[0] + s.weights[1] + s.weights[2], 1, 1e-15);
+  }
+  EXPECT_EQ(count[1], 0);
+  EXPECT_NEAR(count[0], 1000, 5 * std::sqrt(4000 * 0.25 * 0.75));  // five standard deviations
+  // Each weight has the variance 1/18 in a triangle.
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(mean[k], 1.0 / 3, 5 * std::sqrt(1.0 / 18 / 4000));
+  EXPECT_FALSE(SampleFaces(std::vector<double>{0, 0}, 1, 7).ok());
+  EXPECT_FALSE(SampleFaces(areas, -1, 7).ok());
 }
 
 }  // namespace

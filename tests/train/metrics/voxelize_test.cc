@@ -117,5 +117,30 @@ TEST(SampleSurface, SeedDecidesAndBadMeshesAreErrors) {
   EXPECT_FALSE(SampleSurface(Mesh{}, 5, 1).ok());
 }
 
+TEST(SurfaceVoxels, MarksWhatAFacePassesThrough) {
+  // In the plane z = 1.5 of a grid of 4: the half of the square [0, 2]^2 below its diagonal.
+  const Triangle half = {{{0, 0, 1.5}, {1.9, 0, 1.5}, {0, 1.9, 1.5}}};
+  const auto grid = SurfaceVoxels(std::vector<Triangle>{half}, 4).value();
+  EXPECT_EQ(Count(grid), 3);
+  for (const auto& [x, y] : {std::array{0, 0}, std::array{1, 0}, std::array{0, 1}}) {
+    EXPECT_EQ(grid[static_cast<std::size_t>((x * 4 + y) * 4 + 1)], 1) << x << y;
+  }
+}
+
+TEST(SurfaceVoxels, LeavesOutWhatLiesOutside) {
+  const Triangle far = {{{-3, 1, 1}, {-1, 2, 1}, {-2, 1, 3}}},
+                 beyond = {{{1, 1, 9}, {2, 1, 9}, {1, 2, 1e30}}};
+  EXPECT_EQ(Count(SurfaceVoxels(std::vector<Triangle>{far, beyond}, 4).value()), 0);
+  const Triangle through = {{{-3, 1.5, 1.5}, {9, 1.5, 1.5}, {9, 1.6, 1.5}}};
+  EXPECT_EQ(Count(SurfaceVoxels(std::vector<Triangle>{through}, 4).value()), 4);
+  EXPECT_FALSE(SurfaceVoxels(std::vector<Triangle>{through}, 0).ok());
+  EXPECT_FALSE(SurfaceVoxels(std::vector<Triangle>{through}, 513).ok());
+}
+
+TEST(SurfaceVoxels, ASurfaceOnABorderMarksOneSide) {
+  const Triangle border = {{{0.25, 0.25, 2}, {0.75, 0.25, 2}, {0.25, 0.75, 2}}};
+  EXPECT_EQ(Count(SurfaceVoxels(std::vector<Triangle>{border}, 4).value()), 1);
+}
+
 }  // namespace
 }  // namespace tilegrad::train

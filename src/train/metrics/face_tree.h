@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Triangles in a hierarchy of boxes: the nearest one to a point, and whether they enclose it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace tilegrad::train {
+
+using Triangle = std::array<glm::dvec3, 3>;
+
+class FaceTree {
+ public:
+  struct Nearest {
+    std::int32_t face = -1;           // of equally near ones the first; -1 if there is no face
+    std::array<double, 3> weights{};  // of its corners in the nearest point; 0 where on an edge
+    double squared = std::numeric_limits<double>::infinity();  // distance
+  };
+
+  // Coordinates must be finite, and their differences' squares, too. Faces without area are edges
+  // or points.
+  explicit FaceTree(std::span<const Triangle> faces);
+
+  Nearest Find(const glm::dvec3& query) const;
+
+  // Whether the ray from `query` along +x meets the faces an odd number of times. An edge that two
+  // faces share counts for exactly one of them, so that closed surfaces have no cracks.
+  bool Encloses(const glm::dvec3& query) const;
+
+ private:
+  struct Node {  // the left child follows its parent
+    glm::dvec3 low, high;
+    std::size_t begin, end;  // of order_
+    std::size_t right;       // 0: a leaf
+  };
+  std::size_t Build(std::size_t begin, std::size_t end);
+  void SplitAtMedian(std::size_t begin, std::size_t middle, std::size_t end);
+  void Search(std::size_t at, const glm::dvec3& query, Nearest* best) const;
+
+  std::vector<Triangle> faces_;
+  std::vector<std::size_t> order_;  // faces, as leaves have them
+  std::vector<Node> nodes_;
+};
+
+}  // namespace tilegrad::train
