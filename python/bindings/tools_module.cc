@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad._tools: meshes, images, checkpoints, datasets.
+// tilegrad._tools: meshes, images, checkpoints, datasets, metrics of surfaces.
 #include <pybind11/pybind11.h>
 
 #include "base/simd_target.h"
@@ -14,6 +14,7 @@ void BindCameraFiles(py::module_& m);
 void BindWeights(py::module_& m);
 void BindPredictor(py::module_& m);
 void BindDataset(py::module_& m);
+void BindSurfaces(py::module_& m);
 
 }  // namespace tilegrad::python
 
@@ -30,4 +31,5 @@ PYBIND11_MODULE(_tools, m) {
   BindWeights(m);
   BindPredictor(m);
   BindDataset(m);
+  BindSurfaces(m);
 }

@@ -44,6 +44,13 @@ def to_numpy(tensor: torch.Tensor) -> np.ndarray:
     return tensor.detach().contiguous().numpy()
 
 
+def surface_tools() -> Any:
+    """The module with the engine's metrics of surfaces. ImportError in builds without files and
+    training."""
+    from tilegrad import _tools
+    return _tools
+
+
 def threads() -> int:
     """As many as TILEGRAD_NUM_THREADS says; where it is not set as torch uses, which is one in a
     worker of a DataLoader."""

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points and surfaces, for tilegrad.compat: batches of arrays, float32 or float64.
+#include <optional>
+
+#include "base/array_checks.h"
+#include "bindings/calls.h"
+#include "bindings/shared_workers.h"
+#include "train/metrics/face_tree.h"
+#include "train/metrics/metrics.h"
+#include "train/metrics/nearest_point.h"
+
+namespace tilegrad::python {
+
+void BindSurfaces(py::module_& m);
+
+namespace {
+
+using train::FaceTree;
+using train::Triangle;
+
+constexpr std::size_t kGrain = 64;  // queries of a task
+
+// The numbers of `array`, which must be finite. Errors as of SpanOf.
+template <class T>
+std::span<const T> FiniteSpanOf(const py::object& array, const char* function, const char* argument,
+                                const std::vector<py::ssize_t>& shape) {
+  const auto numbers = SpanOf<T>(array, function, argument, shape);
+  if (AllFinite(numbers)) return numbers;
+  throw py::value_error(fmt::format("{}: {} has a number that is not finite", function, argument));
+}
+
+template <class T>
+std::vector<glm::dvec3> PointsOf(std::span<const T> numbers) {
+  std::vector<glm::dvec3> points;
+  points.reserve(numbers.size() / 3);
+  for (std::size_t i = 0; i < numbers.size(); i += 3) {
+    points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  }
+  return points;
+}
+
+template <class T>
+std::vector<Triangle> TrianglesOf(std::span<const T> numbers) {
+  const auto points = PointsOf(numbers);
+  std::vector<Triangle> faces;
+  faces.reserve(points.size() / 3);
+  for (std::size_t i = 0; i < points.size(); i += 3) {
+    faces.push_back({points[i], points[i + 1], points[i + 2]});
+  }
+  return faces;
+}
+
+// The part of one of `batch` images.
+template <class T>
+std::span<T> Part(std::span<T> all, std::size_t batch, std::size_t at) {
+  return all.subspan(at * (all.size() / batch), all.size() / batch);
+}
+
+struct Queries {
+  const char* function;
+  const Workers& workers;
+  std::size_t batch;
+};
+
+// answer(tree, query, index of the query in the whole batch), for every query in its image's tree.
+template <class Tree, class T, class TreeOf, class Answer>
+void AskTrees(const Queries& how, std::span<const T> queries, const TreeOf& tree_of,
+              const Answer& answer) {
+  Run(how.function, [&]() -> Status {
+    for (std::size_t b = 0; b < how.batch; ++b) {
+      const auto points = PointsOf(Part(queries, how.batch, b));
+      const Tree tree(tree_of(b));
+      how.workers.ForRanges(points.size(), kGrain,
+                            [&](std::size_t begin, std::size_t end, std::size_t) {
+                              for (std::size_t i = begin; i < end; ++i) {
+                                answer(tree, points[i], b * points.size() + i);
+                              }
+                            });
+    }
+    return {};
+  });
+}
+
+template <class T>
+py::array NearestPoints(const py::array& from, const py::array& to, int threads) {
+  constexpr const char* kName = "sided_distance";
+  const auto queries = FiniteSpanOf<T>(from, kName, "p1", {kAny, kAny, 3});
+  const auto targets = FiniteSpanOf<T>(to, kName, "p2", {from.shape(0), kAny, 3});
+  py::array_t<std::int64_t> out(std::vector<py::ssize_t>{from.shape(0), from.shape(1)});
+  std::int64_t* index = out.mutable_data();
+  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(from.shape(0))};
+  AskTrees<train::NearestPoint>(
+      how, queries, [&](std::size_t b) { return PointsOf(Part(targets, how.batch, b)); },
+      [&](const auto& tree, const auto& query, std::size_t i) {
+        index[i] = tree.Find(query).index;
+      });
+  return out;
+}
+
+template <class T>
+py::tuple NearestFaces(const py::array& points, const py::array& corners, int threads) {
+  constexpr const char* kName = "point_to_mesh_distance";
+  const auto queries = FiniteSpanOf<T>(points, kName, "pointclouds", {kAny, kAny, 3});
+  const auto faces =
+      FiniteSpanOf<T>(corners, kName, "face_vertices", {points.shape(0), kAny, 3, 3});
+  py::array_t<std::int64_t> faces_out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
+  auto weights_out = NewArrayLike<T>(points);
+  std::int64_t* index = faces_out.mutable_data();
+  T* weights = weights_out.mutable_data();
+  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
+  AskTrees<FaceTree>(
+      how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
+      [&](const FaceTree& tree, const auto& query, std::size_t i) {
+        const auto found = tree.Find(query);
+        index[i] = found.face;
+        for (std::size_t k = 0; k < 3; ++k) weights[3 * i + k] = static_cast<T>(found.weights[k]);
+      });
+  return py::make_tuple(faces_out, weights_out);
+}
+
+template <class T>
+py::array Enclosed(const py::array& points, const py::array& corners, int threads) {
+  constexpr const char* kName = "check_sign";
+  const auto queries = FiniteSpanOf<T>(points, kName, "points", {kAny, kAny, 3});
+  const auto faces = FiniteSpanOf<T>(corners, kName, "faces", {points.shape(0), kAny, 3, 3});
+  py::array_t<bool> out(std::vector<py::ssize_t>{points.shape(0), points.shape(1)});
+  bool* inside = out.mutable_data();
+  const Queries how{kName, SharedWorkers(threads), static_cast<std::size_t>(points.shape(0))};
+  AskTrees<FaceTree>(
+      how, queries, [&](std::size_t b) { return TrianglesOf(Part(faces, how.batch, b)); },
+      [&](const FaceTree& tree, const auto& query, std::size_t i) {
+        inside[i] = tree.Encloses(query);
+      });
+  return out;
+}
+
+py::tuple SampleFaces(const py::object& areas, int count, std::uint64_t seed) {
+  const auto samples = train::SampleFaces(
+      FiniteSpanOf<double>(areas, "sample_points", "areas", {kAny}), count, seed);
+  ThrowIfError(samples.status().Within("sample_points"));
+  py::array_t<std::int64_t> faces(count);
+  py::array_t<double> weights({count, 3});
+  for (std::size_t i = 0; i < samples->size(); ++i) {
+    faces.mutable_data()[i] = (*samples)[i].face;
+    std::copy((*samples)[i].weights.begin(), (*samples)[i].weights.end(),
+              weights.mutable_data() + 3 * i);
+  }
+  return py::make_tuple(faces, weights);
+}
+
+py::array SurfaceVoxels(const py::object& corners, int resolution) {
+  const auto faces = TrianglesOf(
+      FiniteSpanOf<double>(corners, "trianglemeshes_to_voxelgrids", "corners", {kAny, 3, 3}));
+  const auto voxels = train::SurfaceVoxels(faces, resolution);
+  ThrowIfError(voxels.status().Within("trianglemeshes_to_voxelgrids"));
+  return CopyOf<std::uint8_t>(*voxels, {resolution, resolution, resolution});
+}
+
+double VoxelIou(const py::object& a, const py::array& b) {
+  return train::VoxelIou(SpanOf<std::uint8_t>(a, "iou", "pred", {b.size()}),
+                         SpanOf<std::uint8_t>(b, "iou", "gt", {kAny}));
+}
+
+}  // namespace
+
+void BindSurfaces(py::module_& m) {
+  m.def(
+      "nearest_points",
+      [](const py::array& from, const py::array& to, int threads) {
+        return Dispatch(from, "sided_distance", "p1",
+                        [&](auto t) { return NearestPoints<decltype(t)>(from, to, threads); });
+      },
+      py::arg("from_points"), py::arg("to_points"), py::arg("threads"),
+      "(B, N, 3), (B, M, 3) -> for each of the N the nearest of the M (B, N) int64.");
+  m.def(
+      "nearest_faces",
+      [](const py::array& points, const py::array& corners, int threads) {
+        return Dispatch(points, "point_to_mesh_distance", "pointclouds", [&](auto t) {
+          return NearestFaces<decltype(t)>(points, corners, threads);
+        });
+      },
+      py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
+      "(B, N, 3), (B, F, 3, 3) -> the nearest face (B, N) int64 and the weights of its corners in\n"
+      "the nearest point (B, N, 3): 0 on the opposite edge.");
+  m.def(
+      "enclosed",
+      [](const py::array& points, const py::array& corners, int threads) {
+        return Dispatch(points, "check_sign", "points",
+                        [&](auto t) { return Enclosed<decltype(t)>(points, corners, threads); });
+      },
+      py::arg("points"), py::arg("face_vertices"), py::arg("threads"),
+      "(B, N, 3), (B, F, 3, 3) -> whether the faces enclose the point (B, N) bool.");
+  m.def("sample_faces", &SampleFaces, py::arg("areas"), py::arg("count"), py::arg("seed"),
+        "(F,) float64 -> faces (count,) int64, distributed by area, and weights of their corners\n"
+        "(count, 3) float64.");
+  m.def("surface_voxels", &SurfaceVoxels, py::arg("face_vertices"), py::arg("resolution"),
+        "(F, 3, 3) float64, in voxels -> those that the faces pass through (R, R, R) uint8.");
+  m.def("voxel_iou", &VoxelIou, py::arg("pred"), py::arg("gt"), "(N,) uint8, (N,) uint8.");
+}
+
+}  // namespace tilegrad::python
