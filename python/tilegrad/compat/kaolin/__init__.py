@@ -18,9 +18,9 @@ from tilegrad.compat.kaolin import metrics, ops, render
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.render.mesh.dibr import use_exact_kaolin
 
-__all__ = ["io", "metrics", "ops", "rep", "render", "use_exact_kaolin"]
+__all__ = ["graphics", "io", "metrics", "ops", "rep", "render", "use_exact_kaolin"]
 
-_LATER = ("io", "rep")  # loaded where they are used first: io brings readers of files
+_LATER = ("graphics", "io", "rep")  # loaded where they are used first: io brings readers of files
 
 
 def __getattr__(name: str) -> ModuleType:
