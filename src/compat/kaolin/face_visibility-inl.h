@@ -73,7 +73,7 @@ HWY_INLINE FacePixels PixelsOfBox(const FaceBox<T>& box, const PixelCentresT<T>&
 template <class D>
 struct FaceInLanes {
   using V = hn::Vec<D>;
-  V x[3], y[3], z[3], right, eps;
+  V x[3], y[3], z[3], low, high, right, eps;
   hn::Vec<hn::RebindToSigned<D>> id;
 };
 
@@ -98,8 +98,9 @@ HWY_INLINE void DrawColumns(D d, const FaceInLanes<D>& face, const T* x, hn::Vec
   if (hn::AllFalse(d, covered)) return;
   const auto denominator = hn::Add(area, hn::CopySign(face.eps, area));
   for (auto& weight : w) weight = hn::Div(weight, denominator);
-  const auto z = hn::Add(hn::Add(hn::Mul(w[0], face.z[0]), hn::Mul(w[1], face.z[1])),
-                         hn::Mul(w[2], face.z[2]));
+  const auto sum = hn::Add(hn::Add(hn::Mul(w[0], face.z[0]), hn::Mul(w[1], face.z[1])),
+                           hn::Mul(w[2], face.z[2]));
+  const auto z = hn::Min(hn::Max(sum, face.low), face.high);
   const auto old = hn::LoadU(d, nearest);
   const auto seen = hn::And(covered, hn::Gt(z, old));
   hn::StoreU(hn::IfThenElse(seen, z, old), d, nearest);
@@ -111,11 +112,12 @@ HWY_INLINE FaceInLanes<D> SpreadFace(D d, const ProjectedFacesT<T>& faces, std::
                                      T eps) {
   const hn::RebindToSigned<D> di;
   FaceInLanes<D> out;
+  const OrderedFace<T> face(faces, f);
   for (std::size_t k = 0; k < 3; ++k) {
-    out.x[k] = hn::Set(d, faces.corners(f)[2 * k]);
-    out.y[k] = hn::Set(d, faces.corners(f)[2 * k + 1]);
-    out.z[k] = hn::Set(d, faces.z[3 * f + k]);
+    out.x[k] = hn::Set(d, face.xy[2 * k]), out.y[k] = hn::Set(d, face.xy[2 * k + 1]);
+    out.z[k] = hn::Set(d, face.z[k]);
   }
+  out.low = hn::Set(d, face.low), out.high = hn::Set(d, face.high);
   out.right = hn::Set(d, right), out.eps = hn::Set(d, eps);
   out.id = hn::Set(di, static_cast<hn::TFromD<hn::RebindToSigned<D>>>(f));
   return out;

@@ -4,12 +4,21 @@
 //
 // A face covers the pixel centres p with low <= p < high along both axes of its box where no W_k
 // has another sign than S, and S is finite and not 0. Of the faces that cover a pixel, the one with
-// the largest z = sum w_k z_k is seen; of several, the first.
+// the largest z is seen; of several, the first. z = sum w_k z_k, kept between the z_k and summed
+// over the corners in an order of its own (OrderedFace), has the same bits
+//
+//   * for the same three corners, wherever a face starts and however it is wound;
+//   * for all faces whose corners have one z: it is that z.
+//
+// Other faces of one plane are equal only up to rounding, which then decides.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <type_traits>
 
 #include "base/aligned.h"
@@ -26,6 +35,25 @@ struct PixelCentresT {
   AlignedVector<T> y;  // [H], falling
 
   PixelCentresT(int w, int h);
+};
+
+// The corners of a face by x, then y, then z, and the range of z.
+template <class T>
+struct OrderedFace {
+  T xy[6], z[3], low, high;
+
+  OrderedFace(const ProjectedFacesT<T>& faces, std::size_t face) {
+    std::array<std::array<T, 3>, 3> corners;
+    const T* v = faces.corners(face);
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k] = {v[2 * k], v[2 * k + 1], faces.z[3 * face + k]};
+    }
+    std::sort(corners.begin(), corners.end());
+    for (std::size_t k = 0; k < 3; ++k) {
+      xy[2 * k] = corners[k][0], xy[2 * k + 1] = corners[k][1], z[k] = corners[k][2];
+    }
+    std::tie(low, high) = std::minmax({z[0], z[1], z[2]});
+  }
 };
 
 // Scratch of one worker.

@@ -31,10 +31,11 @@ std::int32_t FaceSeenRef(const ProjectedFacesT<T>& faces, const T& px, const T& 
   T nearest = -std::numeric_limits<T>::infinity();
   std::int32_t best = raster::kNoFace;
   for (std::size_t f = 0; f < faces.count(); ++f) {
-    if (!faces.is_valid(f) || !CoversCentre(faces.corners(f), px, py)) continue;
-    const auto w = ScreenWeights(faces.corners(f), px, py, eps);
-    const T* depth = faces.z.data() + 3 * f;
-    const T z = (w[0] * depth[0] + w[1] * depth[1]) + w[2] * depth[2];
+    const OrderedFace<T> face(faces, f);
+    if (!faces.is_valid(f) || !CoversCentre(face.xy, px, py)) continue;
+    const auto w = ScreenWeights(face.xy, px, py, eps);
+    const T sum = (w[0] * face.z[0] + w[1] * face.z[1]) + w[2] * face.z[2];
+    const T z = std::min(std::max(sum, face.low), face.high);
     if (z > nearest) nearest = z, best = static_cast<std::int32_t>(f);
   }
   return best;

@@ -101,6 +101,68 @@ TYPED_TEST(FaceVisibilityOf, LargestDepthWinsThenTheFirst) {
   EXPECT_EQ(SeenByBands(faces, 2, 1, 1), (std::vector<std::int32_t>{2, 2}));
 }
 
+// Ties that rounding could break: the same corners in any order, slanted; and faces of one z, whose
+// weights sum to 1 only up to rounding and eps.
+TYPED_TEST(FaceVisibilityOf, OfTheSameCornersInAnyOrderTheFirstFaceWins) {
+  using T = TypeParam;
+  Rng rng(11);
+  std::size_t seen = 0;
+  for (std::size_t trial = 0; trial < 30; ++trial) {
+    T v[3][3];
+    for (auto& corner : v) {
+      for (int i = 0; i < 2; ++i) corner[i] = static_cast<T>(rng.Uniform(-1.2, 1.2));
+      corner[2] = static_cast<T>(rng.Uniform(-3, -1));
+    }
+    std::vector<std::vector<int>> orders = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
+                                            {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+    std::swap(orders[0], orders[trial % 6]);
+    Faces<T> faces;
+    for (const auto& order : orders) {
+      std::vector<T> xy, z;
+      for (const int k : order) xy.insert(xy.end(), {v[k][0], v[k][1]}), z.push_back(v[k][2]);
+      AddFace<T>(xy, z, &faces);
+    }
+    for (const std::int32_t id : SeenByBands(faces, 64, 64, 64)) {
+      ASSERT_LE(id, 0) << trial;
+      seen += id == 0;
+    }
+  }
+  EXPECT_GT(seen, 5000u);
+}
+
+TYPED_TEST(FaceVisibilityOf, OfFacesAtOneDepthTheFirstWins) {
+  using T = TypeParam;
+  Rng rng(12);
+  std::size_t overlaps = 0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const T z = static_cast<T>(rng.Uniform(-3, -1));
+    Faces<T> faces;
+    for (int f = 0; f < 6; ++f) {
+      const double size = f % 2 == 0 ? 2 : 0.05;  // eps weighs more in small ones
+      const double x = rng.Uniform(-0.5, 0.5), y = rng.Uniform(-0.5, 0.5);
+      std::vector<T> xy;
+      for (int k = 0; k < 3; ++k) {
+        xy.push_back(static_cast<T>(x + rng.Uniform(-size, size)));
+        xy.push_back(static_cast<T>(y + rng.Uniform(-size, size)));
+      }
+      AddFace<T>(xy, {z, z, z}, &faces);
+    }
+    const auto seen = SeenByBands(faces, 64, 64, 64);
+    const PixelCentresT<T> centres(64, 64);
+    for (std::size_t p = 0; p < seen.size(); ++p) {
+      std::int32_t first = -1;
+      int count = 0;
+      for (std::int32_t f = 5; f >= 0; --f) {
+        const OrderedFace<T> face(faces.View(), static_cast<std::size_t>(f));
+        if (CoversCentre(face.xy, centres.x[p % 64], centres.y[p / 64])) first = f, ++count;
+      }
+      ASSERT_EQ(seen[p], first) << trial << " pixel " << p;
+      overlaps += count > 1;
+    }
+  }
+  EXPECT_GT(overlaps, 5000u);
+}
+
 TYPED_TEST(FaceVisibilityOf, BothWindingsAreDrawnFacesWithoutAreaAreNot) {
   using T = TypeParam;
   Faces<T> faces;

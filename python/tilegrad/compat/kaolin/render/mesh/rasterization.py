@@ -56,8 +56,8 @@ def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
     """Draws faces that come projected, and interpolates their features linearly on the screen.
 
     height, width: pixels, 1..16384.
-    face_vertices_z: [B,F,3] camera z; the largest is nearest, of equal ones the first face's. It
-        has no gradient.
+    face_vertices_z: [B,F,3] camera z; the largest is nearest, of equal ones the first face's
+        (faces with the same corners in any order, or whose corners have one z). It has no gradient.
     face_vertices_image: [B,F,3,2] NDC, y up.
     face_features: [B,F,3,C], or a list of such tensors.
     valid_faces: [B,F] bool; the others are not drawn.
