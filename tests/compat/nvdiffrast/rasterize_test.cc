@@ -176,6 +176,35 @@ TEST(Rasterize, OfCoincidingFacesThatAreCutTheFirstIsSeen) {
   EXPECT_GT(seen, 50000u);
 }
 
+// Overlapping faces of any shape at one depth: a pixel shows the first of those that cover it,
+// which is the one that it shows when drawn with the faces before it only.
+TEST(Rasterize, OfFacesAtOneDepthTheFirstIsSeen) {
+  Scene<float> scene;
+  scene.height = scene.width = 64;
+  Rng rng(7, 1);
+  const auto w = static_cast<float>(rng.Uniform(0.5, 2)), z = 0.3f * w;
+  Numbers<float> first(64 * 64);
+  std::size_t behind = 0;
+  for (std::int32_t f = 0; f < 12; ++f) {
+    for (std::int32_t k = 0; k < 3; ++k) {
+      const double x = rng.Uniform(-1.5, 1.5), y = rng.Uniform(-1.5, 1.5);
+      for (const double v : {x, y}) scene.positions.push_back(static_cast<float>(v) * w);
+      scene.positions.insert(scene.positions.end(), {z, w});
+      scene.faces.push_back(3 * f + k);
+    }
+    Scene<float> alone = scene;
+    alone.faces.assign(scene.faces.end() - 3, scene.faces.end());
+    const auto all = Rasterize(scene).rast, of_face = Rasterize(alone).rast;
+    for (std::size_t p = 0; p < first.size(); ++p) {
+      const bool covers = of_face[4 * p + 3] != 0;
+      behind += covers && first[p] != 0;
+      if (covers && first[p] == 0) first[p] = static_cast<float>(f + 1);
+      ASSERT_EQ(all[4 * p + 3], first[p]) << f << " pixel " << p;
+    }
+  }
+  EXPECT_GT(behind, 1000u);
+}
+
 TEST(Rasterize, RangesChooseFacesAndKeepTheirNumbers) {
   Scene<double> all = WavyGrid(4, 1, 20, 24);
   Scene<double> ranged = all;
