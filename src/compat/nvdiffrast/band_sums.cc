@@ -24,14 +24,15 @@ BandSums::Adder::~Adder() {
   for (const std::size_t row : rows_) slots_[row] = 0;
 }
 
-double* BandSums::Adder::Row(std::size_t row) {
-  std::int32_t& slot = slots_[row];
-  if (slot == 0) {
-    rows_.push_back(row);
-    sums_.resize(sums_.size() + channels_);
-    slot = static_cast<std::int32_t>(rows_.size());
-  }
-  return sums_.data() + static_cast<std::size_t>(slot - 1) * channels_;
+void BandSums::Adder::Clear() {
+  for (const std::size_t row : rows_) slots_[row] = 0;
+  rows_.clear(), sums_.clear();
+}
+
+void BandSums::Adder::MeetRow(std::size_t row) {
+  rows_.push_back(row);
+  sums_.resize(sums_.size() + channels_);
+  slots_[row] = static_cast<std::int32_t>(rows_.size());
 }
 
 namespace {

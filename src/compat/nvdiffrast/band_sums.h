@@ -27,10 +27,21 @@ class BandSums {
     Adder(const Adder&) = delete;
     Adder& operator=(const Adder&) = delete;
 
+    // Forgets what was added.
+    void Clear();
+
     // The sum of a row so far; valid until the next call.
-    double* Row(std::size_t row);
+    double* Row(std::size_t row) {
+      if (slots_[row] == 0) MeetRow(row);
+      return sums_.data() + static_cast<std::size_t>(slots_[row] - 1) * channels_;
+    }
+    // The rows that were met, in the order they were, and their sums, one after the other.
+    std::span<const std::size_t> rows() const { return rows_; }
+    const double* sums() const { return sums_.data(); }
 
    private:
+    void MeetRow(std::size_t row);
+
     std::vector<std::size_t>& rows_;
     std::vector<double>& sums_;
     std::int32_t* slots_;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compat/nvdiffrast/clip_mesh.h"
 
-#include <cmath>
-
 #include "base/error.h"
 
 namespace tilegrad::compat::nvdiffrast {
@@ -16,15 +14,16 @@ Status CheckFaces(FaceList faces, std::size_t vertices) {
   return {};
 }
 
+Status NoSuchFace(std::size_t pixel, double id, std::size_t faces) {
+  return InvalidArgument(
+      "pixel {} of rast names triangle {} (channel 3), but must name 0 (none) to {}", pixel, id,
+      faces);
+}
+
 template <class T>
 Status CheckFaceIds(std::span<const T> rast, std::size_t faces) {
   for (std::size_t i = 3; i < rast.size(); i += 4) {
-    if (rast[i] >= T(0) && rast[i] <= static_cast<T>(faces) && rast[i] == std::floor(rast[i])) {
-      continue;
-    }
-    return InvalidArgument(
-        "pixel {} of rast names triangle {} (channel 3), but must name 0 (none) to {}", i / 4,
-        rast[i], faces);
+    if (!IsFaceId(rast[i], faces)) return NoSuchFace(i / 4, static_cast<double>(rast[i]), faces);
   }
   return {};
 }

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "tilegrad/status.h"
@@ -38,7 +39,16 @@ std::int32_t FaceOf(const T* pixel) {
 
 // Names the first vertex index outside of [0, vertices).
 Status CheckFaces(FaceList faces, std::size_t vertices);
-// Every fourth number of `rast` [pixels,4] is a whole number in [0, faces].
+inline constexpr std::size_t kNoPixel = std::numeric_limits<std::size_t>::max();
+// Whether channel 3 of a pixel is a whole number in [0, faces].
+template <class T>
+bool IsFaceId(T id, std::size_t faces) {
+  return id >= T(0) && id <= static_cast<T>(faces) &&
+         id == static_cast<T>(static_cast<std::int64_t>(id));
+}
+// The error of a pixel of `rast` whose channel 3 is no such number.
+Status NoSuchFace(std::size_t pixel, double id, std::size_t faces);
+// Names the first such pixel of `rast` [pixels,4].
 template <class T>
 Status CheckFaceIds(std::span<const T> rast, std::size_t faces);
 

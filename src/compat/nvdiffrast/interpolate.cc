@@ -1,13 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compat/nvdiffrast/interpolate.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "compat/nvdiffrast/interpolate.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "compat/nvdiffrast/interpolate-inl.h"
+
+#if HWY_ONCE
+
 #include <algorithm>
+#include <vector>
 
 #include "base/error.h"
-#include "compat/nvdiffrast/band_sums.h"
+#include "compat/nvdiffrast/interpolate_ref.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
+
+HWY_EXPORT(InterpolateBand);
+HWY_EXPORT(InterpolateBandBackward);
 
 template <class T>
 Status CheckInput(const InterpolateInput<T>& input) {
@@ -16,122 +29,109 @@ Status CheckInput(const InterpolateInput<T>& input) {
     return InvalidArgument("diff_attrs names attribute {}, but there are {}", channel,
                            input.attributes.channels);
   }
-  TILEGRAD_TRY(CheckFaces(input.faces, input.attributes.vertices));
-  return CheckFaceIds(input.rast, input.faces.size() / 3);
+  return CheckFaces(input.faces, input.attributes.vertices);
 }
 
-// The rows of the corners of the face that a pixel shows; weights, and their derivatives if known.
-template <class T>
-struct PixelFace {
-  std::size_t rows[3];
-  const T* corner[3];
-  double weight[3];
-  double slope[3][2];
+// The attributes of diff_attrs as an array of their own, where they are not the first ones anyway.
+struct SlopedRows {
+  AlignedVector<float> values;
+  VertexRows<float> rows;
+
+  explicit SlopedRows(const InterpolateInput<float>& input) : rows(input.attributes) {
+    const auto& diff = input.diff_attrs;
+    std::size_t first = 0;
+    while (first < diff.size() && diff[first] == static_cast<std::int32_t>(first)) ++first;
+    if (first == diff.size()) return;
+    for (std::size_t row = 0; row < input.attributes.rows(); ++row) {
+      const float* from = &input.attributes.values[row * input.attributes.channels];
+      for (const std::int32_t channel : diff) values.push_back(from[channel]);
+    }
+    rows.values = values, rows.channels = diff.size();
+  }
 };
 
-template <class T>
-PixelFace<T> FaceAt(const InterpolateInput<T>& input, std::size_t image, std::size_t pixel) {
-  const T* rast = &input.rast[4 * pixel];
-  PixelFace<T> out;
-  for (int k = 0; k < 3; ++k) {
-    const std::int32_t v = input.faces[3 * static_cast<std::size_t>(FaceOf(rast)) + k];
-    out.rows[k] = input.attributes.row(image, v), out.corner[k] = input.attributes.at(image, v);
+// Runs `work` on all bands; an error if one returns a pixel.
+template <class Work>
+Status ForBands(const InterpolateInput<float>& input, const Workers& workers, const Work& work) {
+  std::vector<std::size_t> bad(input.grid.bands(), kNoPixel);
+  const SlopedRows sloped(input);
+  workers.For(bad.size(), [&](std::size_t index, std::size_t worker) {
+    bad[index] = work(InterpolateTask{input, sloped.rows, input.grid.band(index)}, worker);
+  });
+  for (const std::size_t pixel : bad) {
+    if (pixel == kNoPixel) continue;
+    return NoSuchFace(pixel, double{input.rast[4 * pixel + 3]}, input.faces.size() / 3);
   }
-  const double u = static_cast<double>(rast[0]), v = static_cast<double>(rast[1]);
-  out.weight[0] = u, out.weight[1] = v, out.weight[2] = 1 - u - v;
-  for (int i = 0; i < 2 && !input.rast_db.empty(); ++i) {
-    const T* db = &input.rast_db[4 * pixel];
-    out.slope[0][i] = static_cast<double>(db[i]), out.slope[1][i] = static_cast<double>(db[2 + i]);
-    out.slope[2][i] = -(out.slope[0][i] + out.slope[1][i]);
-  }
-  return out;
+  return {};
 }
 
-// One attribute at the three corners.
-template <class T>
-double Mix(const PixelFace<T>& face, std::size_t channel, const double (&weight)[3]) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) sum += weight[k] * static_cast<double>(face.corner[k][channel]);
-  return sum;
-}
-
-template <class T>
-void WritePixel(const InterpolateInput<T>& input, const PixelFace<T>& face, T* out, T* out_da) {
-  for (std::size_t c = 0; c < input.attributes.channels; ++c) {
-    out[c] = static_cast<T>(Mix(face, c, face.weight));
-  }
-  for (const std::int32_t channel : input.diff_attrs) {
-    for (int i = 0; i < 2; ++i) {
-      const double slope[3] = {face.slope[0][i], face.slope[1][i], face.slope[2][i]};
-      *out_da++ = static_cast<T>(Mix(face, static_cast<std::size_t>(channel), slope));
+// From the sums of a band's faces to the rows of their corners.
+void SpreadFaces(const InterpolateTask& task, const BandSums::Adder& faces,
+                 BandSums::Adder* vertices) {
+  const InterpolateInput<float>& input = task.input;
+  const std::size_t n = input.attributes.channels, row = (n + 3) / 4 * 4;
+  const std::size_t da = 2 * input.diff_attrs.size(), slopes = (da + 3) / 4 * 4;
+  const double* sums = faces.sums();
+  for (const std::size_t face : faces.rows()) {
+    const double* du = sums + 3 * row;
+    for (std::size_t k = 0; k < 3; ++k) {
+      double* to = vertices->Row(input.attributes.row(task.band.image, input.faces[3 * face + k]));
+      for (std::size_t c = 0; c < n; ++c) to[c] += sums[k * row + c];
+      for (std::size_t i = 0; i < da; ++i) {
+        const double u = du[i], v = du[slopes + i];
+        to[input.diff_attrs[i / 2]] += k == 0 ? u : k == 1 ? v : -(u + v);
+      }
     }
+    sums += InterpolateSums(input);
   }
 }
 
-// What the cotangents of a pixel pull.
-struct PixelPull {
-  double d_weight[3] = {}, d_slope[3][2] = {};
-};
-
-template <class T>
-PixelPull PullWeights(const InterpolateInput<T>& input, const PixelFace<T>& face, const T* d_out,
-                      const T* d_da) {
-  PixelPull pull;
-  for (int k = 0; k < 3; ++k) {
-    for (std::size_t c = 0; c < input.attributes.channels; ++c) {
-      pull.d_weight[k] += static_cast<double>(d_out[c]) * static_cast<double>(face.corner[k][c]);
-    }
-    if (d_da == nullptr) continue;
-    for (std::size_t d = 0; d < input.diff_attrs.size(); ++d) {
-      const auto a =
-          static_cast<double>(face.corner[k][static_cast<std::size_t>(input.diff_attrs[d])]);
-      for (int i = 0; i < 2; ++i) pull.d_slope[k][i] += a * static_cast<double>(d_da[2 * d + i]);
-    }
-  }
-  return pull;
+Status Run(const InterpolateInput<float>& input, const Workers& workers,
+           const InterpolateOutput<float>& out) {
+  return ForBands(input, workers, [&](const InterpolateTask& task, std::size_t) {
+    return HWY_DYNAMIC_DISPATCH(InterpolateBand)(task, out);
+  });
+}
+Status Run(const InterpolateInput<double>& input, const Workers& workers,
+           const InterpolateOutput<double>& out) {
+  TILEGRAD_TRY(CheckFaceIds(input.rast, input.faces.size() / 3));
+  InterpolateRef(input, workers, out);
+  return {};
 }
 
-template <class T>
-void PullAttributes(const InterpolateInput<T>& input, const PixelFace<T>& face, const T* d_out,
-                    const T* d_da, BandSums::Adder* adder) {
-  for (int k = 0; k < 3; ++k) {
-    double* to = adder->Row(face.rows[k]);
-    for (std::size_t c = 0; c < input.attributes.channels; ++c) {
-      to[c] += face.weight[k] * static_cast<double>(d_out[c]);
-    }
-    if (d_da == nullptr) continue;
-    for (std::size_t d = 0; d < input.diff_attrs.size(); ++d) {
-      double& sum = to[static_cast<std::size_t>(input.diff_attrs[d])];
-      for (int i = 0; i < 2; ++i) sum += face.slope[k][i] * static_cast<double>(d_da[2 * d + i]);
-    }
-  }
+Status RunBackward(InterpolateInput<float> input, const InterpolateCotangents<float>& d,
+                   const Workers& workers, const InterpolateGradients<float>& out) {
+  if (d.d_out_da.empty()) input.diff_attrs = {};
+  const bool wanted = !out.d_attributes.empty();
+  const std::size_t bands = wanted ? input.grid.bands() : 0, sums = InterpolateSums(input);
+  // Of the band that a worker is at.
+  BandSums faces(input.faces.size() / 3, sums, static_cast<std::size_t>(workers.count()), workers);
+  BandSums vertices(input.attributes.rows(), input.attributes.channels, bands, workers);
+  std::vector<AlignedVector<float>> scratch(static_cast<std::size_t>(workers.count()));
+  TILEGRAD_TRY(ForBands(input, workers, [&](const InterpolateTask& task, std::size_t worker) {
+    scratch[worker].resize(sums);
+    const auto pull = [&](BandSums::Adder* adder) {
+      return HWY_DYNAMIC_DISPATCH(InterpolateBandBackward)(task, d, scratch[worker].data(), adder,
+                                                           out);
+    };
+    if (!wanted) return pull(nullptr);
+    BandSums::Adder of_faces(&faces, worker, worker);
+    const std::size_t bad = pull(&of_faces);
+    BandSums::Adder of_vertices(&vertices, task.band.index, worker);
+    SpreadFaces(task, of_faces, &of_vertices);
+    of_faces.Clear();
+    return bad;
+  }));
+  if (!wanted) return {};
+  std::fill(out.d_attributes.begin(), out.d_attributes.end(), 0.0f);
+  vertices.AddTo(out.d_attributes, workers);
+  return {};
 }
-
-template <class T>
-void WriteWeights(const PixelPull& pull, std::size_t pixel, const InterpolateGradients<T>& out) {
-  for (std::size_t i = 0; i < 2; ++i) {
-    if (!out.d_rast.empty()) {
-      out.d_rast[4 * pixel + i] = static_cast<T>(pull.d_weight[i] - pull.d_weight[2]);
-    }
-    if (out.d_rast_db.empty()) continue;
-    for (std::size_t j = 0; j < 2; ++j) {
-      out.d_rast_db[4 * pixel + 2 * i + j] =
-          static_cast<T>(pull.d_slope[i][j] - pull.d_slope[2][j]);
-    }
-  }
-}
-
-template <class T>
-void PullPixel(const InterpolateInput<T>& input, const InterpolateCotangents<T>& d,
-               std::size_t image, std::size_t pixel, BandSums::Adder* adder,
-               const InterpolateGradients<T>& out) {
-  const PixelFace<T> face = FaceAt(input, image, pixel);
-  const T* d_out = &d.d_out[pixel * input.attributes.channels];
-  const T* d_da = d.d_out_da.empty() ? nullptr : &d.d_out_da[pixel * 2 * input.diff_attrs.size()];
-  if (!out.d_rast.empty() || !out.d_rast_db.empty()) {
-    WriteWeights(PullWeights(input, face, d_out, d_da), pixel, out);
-  }
-  if (!out.d_attributes.empty()) PullAttributes(input, face, d_out, d_da, adder);
+Status RunBackward(const InterpolateInput<double>& input, const InterpolateCotangents<double>& d,
+                   const Workers& workers, const InterpolateGradients<double>& out) {
+  TILEGRAD_TRY(CheckFaceIds(input.rast, input.faces.size() / 3));
+  InterpolateBackwardRef(input, d, workers, out);
+  return {};
 }
 
 }  // namespace
@@ -140,20 +140,7 @@ template <class T>
 Status Interpolate(const InterpolateInput<T>& input, const Workers& workers,
                    const InterpolateOutput<T>& out) {
   TILEGRAD_TRY(CheckInput(input));
-  const std::size_t channels = input.attributes.channels, da = 2 * input.diff_attrs.size();
-  workers.For(input.grid.bands(), [&](std::size_t index, std::size_t) {
-    const Band band = input.grid.band(index);
-    ForEachPixel(input.grid, band, [&](std::size_t pixel) {
-      T* to = out.out.data() + pixel * channels;
-      T* to_da = out.out_da.data() + pixel * da;
-      if (FaceOf(&input.rast[4 * pixel]) < 0) {
-        std::fill(to, to + channels, T(0)), std::fill(to_da, to_da + da, T(0));
-      } else {
-        WritePixel(input, FaceAt(input, band.image, pixel), to, to_da);
-      }
-    });
-  });
-  return {};
+  return Run(input, workers, out);
 }
 
 template <class T>
@@ -161,20 +148,7 @@ Status InterpolateBackward(const InterpolateInput<T>& input,
                            const InterpolateCotangents<T>& cotangents, const Workers& workers,
                            const InterpolateGradients<T>& out) {
   TILEGRAD_TRY(CheckInput(input));
-  for (const auto& gradient : {out.d_attributes, out.d_rast, out.d_rast_db}) {
-    std::fill(gradient.begin(), gradient.end(), T(0));
-  }
-  BandSums sums(input.attributes.rows(), input.attributes.channels, input.grid.bands(), workers);
-  workers.For(input.grid.bands(), [&](std::size_t index, std::size_t worker) {
-    BandSums::Adder adder(&sums, index, worker);
-    const Band band = input.grid.band(index);
-    ForEachPixel(input.grid, band, [&](std::size_t pixel) {
-      if (FaceOf(&input.rast[4 * pixel]) < 0) return;
-      PullPixel(input, cotangents, band.image, pixel, &adder, out);
-    });
-  });
-  if (!out.d_attributes.empty()) sums.AddTo(out.d_attributes, workers);
-  return {};
+  return RunBackward(input, cotangents, workers, out);
 }
 
 #define TILEGRAD_INSTANTIATE(T)                                                                    \
@@ -187,3 +161,4 @@ TILEGRAD_INSTANTIATE(double)
 #undef TILEGRAD_INSTANTIATE
 
 }  // namespace tilegrad::compat::nvdiffrast
+#endif

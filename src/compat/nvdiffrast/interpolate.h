@@ -4,7 +4,8 @@
 //     out_c = u a_0c + v a_1c + (1 - u - v) a_2c                 a_k: the attributes of corner k
 //     out_da = (dA/dX, dA/dY) of the selected channels A, by the chain rule from rast_db
 //
-// Zeros where rast names no face. Attributes have gradients, and so have u, v and rast_db.
+// Zeros where rast names no face. Attributes have gradients, and so have u, v and rast_db. float is
+// computed in float by vectors, double in scalars (interpolate_ref.h).
 #pragma once
 
 #include <cstddef>
@@ -54,5 +55,19 @@ template <class T>
 Status InterpolateBackward(const InterpolateInput<T>& input,
                            const InterpolateCotangents<T>& cotangents, const Workers& workers,
                            const InterpolateGradients<T>& out);
+
+// What a kernel works on. sloped: rows that begin with the attributes of diff_attrs, in their
+// order.
+struct InterpolateTask {
+  const InterpolateInput<float>& input;
+  const VertexRows<float>& sloped;
+  Band band;
+};
+// What the backward pass sums for each face: for corners 0, 1, 2 the weight times d_out, then for
+// u and v the derivatives times d_out_da, rows of A and of 2 D numbers rounded up to quads.
+inline std::size_t InterpolateSums(const InterpolateInput<float>& input) {
+  return 3 * ((input.attributes.channels + 3) / 4 * 4) +
+         2 * ((2 * input.diff_attrs.size() + 3) / 4 * 4);
+}
 
 }  // namespace tilegrad::compat::nvdiffrast

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "compat/nvdiffrast/test_util.h"
 
 namespace tilegrad::compat::nvdiffrast {
@@ -42,9 +44,9 @@ Images<T> Interpolated(const InterpolateInput<T>& input, const Workers& workers 
   return images;
 }
 
-Scene<double> TwoViews() {
-  Scene<double> scene = WavyGrid(3, 1, 12, 15);
-  const auto other = WavyGrid(3, 2, 12, 15).positions;
+Scene<double> TwoViews(int n = 3, int height = 12, int width = 15) {
+  Scene<double> scene = WavyGrid(n, 1, height, width);
+  const auto other = WavyGrid(n, 2, height, width).positions;
   scene.positions.insert(scene.positions.end(), other.begin(), other.end());
   scene.images = 2;
   return scene;
@@ -144,6 +146,103 @@ TEST(Interpolate, GradientsByDifferences) {
   }
 }
 
+// Everything that follows from attributes and cotangents.
+template <class T>
+struct Results {
+  Numbers<T> out, out_da, d_attributes, d_rast, d_db;
+
+  Results(const InterpolateInput<T>& input, const Numbers<T>& d_out, const Numbers<T>& d_da)
+      : d_attributes(input.attributes.values.size(), T(-7)),
+        d_rast(input.rast.size(), T(-7)),
+        d_db(input.rast.size(), T(-7)) {
+    const auto images = Interpolated(input);
+    out = images.out, out_da = images.out_da;
+    const Status status =
+        InterpolateBackward<T>(input, {d_out, d_da}, Workers(1), {d_attributes, d_rast, d_db});
+    EXPECT_TRUE(status.ok()) << status.message();
+  }
+};
+
+// For each number of attributes: the sum of the absolute weights of the pixels that pull on it.
+// d(out) by attributes is u, v, 1 - u - v, and d(out_da) the derivatives of those.
+Numbers<double> PullsOn(const InterpolateInput<float>& input) {
+  const std::size_t n = input.attributes.channels;
+  Numbers<double> sums(input.attributes.values.size());
+  for (std::size_t p = 0; p < input.grid.pixels(); ++p) {
+    const float *rast = &input.rast[4 * p], *db = &input.rast_db[4 * p];
+    if (rast[3] == 0) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double x = k == 0 ? db[0] : k == 1 ? db[2] : std::abs(db[0]) + std::abs(db[2]);
+      const double y = k == 0 ? db[1] : k == 1 ? db[3] : std::abs(db[1]) + std::abs(db[3]);
+      const auto face = static_cast<std::size_t>(rast[3]) - 1;
+      const std::size_t row =
+          input.attributes.row(p / input.grid.image(), input.faces[3 * face + k]);
+      for (std::size_t c = 0; c < n; ++c) sums[row * n + c] += 1;
+      for (const auto c : input.diff_attrs) {
+        sums[row * n + static_cast<std::size_t>(c)] += std::abs(x) + std::abs(y);
+      }
+    }
+  }
+  return sums;
+}
+
+struct FloatCase {
+  int grid;
+  std::size_t channels;
+  std::vector<std::int32_t> diff;
+  bool shared;
+};
+
+// The double reference gets the same numbers; r is kRounding, attributes and cotangents are within
+// [-1, 1], and so are u, v and w = 1 - u - v, which is off by 2 r.
+//   out     w c and the three rounded products and sums: (2 + 3) r, and terms sum to 1 at most
+//   out_da  differences of attributes, within [-2, 2], and two products and sums: 3 r |du| 2, ...
+//   d_rast  sums of n such differences times cotangents: (n + 2) r 2 n; d_rast_db with 2 D likewise
+//   d_attributes   up to 64 pixels are summed in float, then in double: (64 + 3) r of the sum of
+//           absolute terms; 1 r more when the sum becomes a float
+// each with one r more for what is of second order.
+TEST(Interpolate, FloatIsTheReferenceUpToRounding) {
+  for (const FloatCase& c :
+       {FloatCase{1, 1, {}, true}, FloatCase{3, 1, {0}, false}, FloatCase{3, 2, {0, 1}, true},
+        FloatCase{12, 3, {}, false}, FloatCase{3, 3, {0, 1, 2}, false},
+        FloatCase{3, 3, {2, 0}, true}, FloatCase{1, 4, {0, 1, 2, 3}, false},
+        FloatCase{3, 4, {1, 1, 0}, true}, FloatCase{3, 5, {4, 3}, false},
+        FloatCase{3, 8, {0, 1, 2, 3, 4, 5, 6, 7}, true}, FloatCase{3, 11, {}, false}}) {
+    SCOPED_TRACE(c.channels);
+    const Scene<double> scene = TwoViews(c.grid, 70, 201);
+    const Scene<float> scene32 = AsScene<float>(scene);
+    const Rasterized<float> rast32 = Rasterize(scene32);
+    const Rasterized<double> rast = {As<double>(rast32.rast), As<double>(rast32.rast_db)};
+    const std::size_t rows = scene.vertices() * (c.shared ? 1 : 2);
+    const Attributes<float> values32{RandomNumbers<float>(rows * c.channels, 4), c.channels,
+                                     c.shared, c.diff};
+    const Attributes<double> values{As<double>(values32.values), c.channels, c.shared, c.diff};
+    const std::size_t pixels = scene.grid().pixels(), da = 2 * c.diff.size();
+    const auto d_out = RandomNumbers<float>(pixels * c.channels, 5);
+    const auto d_da = RandomNumbers<float>(pixels * da, 6);
+    const auto input = InputOf(scene32, values32, rast32);
+    const Results<double> want(InputOf(scene, values, rast), As<double>(d_out), As<double>(d_da));
+    const auto pulls = PullsOn(input);
+    const auto n = static_cast<double>(c.channels);
+    const auto at_db = [&](std::size_t i) { return std::abs(double{rast32.rast_db[i]}); };
+    OnEveryTarget([&] {
+      const Results<float> got(input, d_out, d_da);
+      ExpectWithin("out", got.out, want.out, [](std::size_t) { return 6 * kRounding; });
+      ExpectWithin("out_da", got.out_da, want.out_da, [&](std::size_t i) {
+        const std::size_t p = 4 * (i / da), x = i % 2;
+        return 8 * kRounding * (at_db(p + x) + at_db(p + 2 + x));
+      });
+      ExpectWithin("d_rast", got.d_rast, want.d_rast,
+                   [&](std::size_t) { return (n + 3) * kRounding * 2 * n; });
+      ExpectWithin("d_rast_db", got.d_db, want.d_db, [&](std::size_t) {
+        return (static_cast<double>(da) + 3) * kRounding * 2 * static_cast<double>(da);
+      });
+      ExpectWithin("d_attributes", got.d_attributes, want.d_attributes,
+                   [&](std::size_t i) { return 69 * kRounding * pulls[i]; });
+    });
+  }
+}
+
 TEST(Interpolate, SameBitsForAnyNumberOfWorkers) {
   const Scene<float> scene = AsScene<float>(WavyGrid(12, 7, 200, 130));
   const auto rasterized = Rasterize(scene);
@@ -183,6 +282,10 @@ TEST(Interpolate, BadInputIsNamed) {
   EXPECT_NE(message().find("pixel 5 of rast names triangle 9"), std::string::npos);
   rasterized.rast[4 * 5 + 3] = 0.5f;
   EXPECT_NE(message().find("pixel 5 of rast names triangle 0.5"), std::string::npos);
+  for (const float id : {-1.0f, std::nanf(""), 3e38f, -0.5f, 3.0f}) {
+    rasterized.rast[4 * 5 + 3] = id;
+    EXPECT_NE(message().find("pixel 5 of rast names triangle"), std::string::npos) << id;
+  }
 }
 
 }  // namespace

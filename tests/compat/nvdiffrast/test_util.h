@@ -9,9 +9,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/rng.h"
+#include "base/simd_target.h"
 #include "compat/nvdiffrast/rasterize.h"
 
 namespace tilegrad::compat::nvdiffrast {
@@ -40,6 +42,30 @@ double Dot(std::span<const T> a, std::span<const T> b) {
     sum += static_cast<double>(a[i]) * static_cast<double>(b[i]);
   }
   return sum;
+}
+
+// What an operation of float is off by at most, relative to its result.
+inline constexpr double kRounding = 0x1p-24;
+
+// tolerance(i): of number i.
+template <class Tolerance>
+void ExpectWithin(const char* what, const Numbers<float>& got, const Numbers<double>& expected,
+                  const Tolerance& tolerance) {
+  ASSERT_EQ(got.size(), expected.size()) << what;
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    ASSERT_NEAR(double{got[i]}, expected[i], tolerance(i)) << what << " " << i;
+  }
+}
+
+// Calls body() with each instruction set of this machine.
+template <class Body>
+void OnEveryTarget(const Body& body) {
+  for (const std::string& target : RunnableTargets()) {
+    const TargetScope scope(target);
+    ASSERT_TRUE(scope.status().ok());
+    SCOPED_TRACE(target);
+    body();
+  }
 }
 
 // Holds `gradient` to central differences of loss() by each number of *at. The step is the one at

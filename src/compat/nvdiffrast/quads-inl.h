@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Four numbers of a pixel, a vertex or a texel as lanes: images and textures keep the channels of a
+// place side by side, so rows of any number of them go by quads, the last one of which reaches into
+// the next row. What it reads there is ignored, and what it writes there is written again, as rows
+// are written in order; only the end of an array needs care.
+#if defined(TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_
+#undef TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_
+#else
+#define TILEGRAD_COMPAT_NVDIFFRAST_QUADS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstring>
+
+HWY_BEFORE_NAMESPACE();
+namespace tilegrad::compat::nvdiffrast {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using QuadTag = hn::FixedTag<float, 4>;
+using Quad = hn::Vec<QuadTag>;
+using QuadMask = hn::Mask<QuadTag>;
+
+// Pixels in a row whose pulls are summed on their own before they join a longer sum, so that the
+// rounding of many equal ones does not add up.
+inline constexpr int kMostRun = 64;
+
+inline HWY_NOINLINE Quad LoadShortQuad(const float* from, const float* end) {
+  HWY_ALIGN float some[4] = {};
+  std::memcpy(some, from, static_cast<std::size_t>(end - from) * sizeof(float));
+  return hn::Load(QuadTag(), some);
+}
+inline HWY_NOINLINE void StoreShortQuad(Quad v, float* to, const float* end) {
+  HWY_ALIGN float some[4];
+  hn::Store(v, QuadTag(), some);
+  std::memcpy(to, some, static_cast<std::size_t>(end - to) * sizeof(float));
+}
+
+// Up to four numbers, those before `end`. kWhole: all of them are.
+template <bool kWhole = false>
+HWY_INLINE Quad LoadQuad(const float* from, const float* end) {
+  if (kWhole || HWY_LIKELY(end - from >= 4)) return hn::LoadU(QuadTag(), from);
+  return LoadShortQuad(from, end);
+}
+template <bool kWhole = false>
+HWY_INLINE void StoreQuad(Quad v, float* to, const float* end) {
+  if (kWhole || HWY_LIKELY(end - to >= 4)) return hn::StoreU(v, QuadTag(), to);
+  StoreShortQuad(v, to, end);
+}
+
+// Faster than std::fill, which asks the processor for help even with a few kilobytes.
+HWY_INLINE void WriteZeros(float* to, float* end) {
+  const hn::ScalableTag<float> d;
+  for (; to + hn::Lanes(d) <= end; to += hn::Lanes(d)) hn::StoreU(hn::Zero(d), d, to);
+  for (; to < end; ++to) *to = 0;
+}
+
+// The lanes from number `first` on that are below `count`.
+HWY_INLINE QuadMask LanesBelow(std::size_t first, std::size_t count) {
+  return hn::FirstN(QuadTag(), HWY_MIN(count - first, std::size_t{4}));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace tilegrad::compat::nvdiffrast
+HWY_AFTER_NAMESPACE();
+
+#endif
