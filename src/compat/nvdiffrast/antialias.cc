@@ -2,6 +2,8 @@
 #include "compat/nvdiffrast/antialias.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -59,41 +61,68 @@ WayPoint<double> VertexOnWay(const AntialiasInput<T>& input, std::size_t image, 
   return PointOnWay(step, point);
 }
 
-// On which side of the line through a and b a face lies whose third corner is c: the sign. In
-// homogeneous coordinates, so that it holds for corners behind the eye.
-double SideOf(const WayPoint<double>& a, const WayPoint<double>& b, const WayPoint<double>& c) {
-  return (a.q * b.r - b.q * a.r) * c.w + (b.q * a.w - a.q * b.w) * c.r +
-         (a.r * b.w - b.r * a.w) * c.q;
-}
-
-// Whether no face of the edge's ring goes on beyond it, as side `side` of the mesh sees it.
-template <class T>
-bool IsSilhouette(const AntialiasInput<T>& input, std::size_t image, std::int32_t side,
-                  const PixelStep& step, const WayPoint<double> (&corner)[3], int k) {
-  const WayPoint<double>&a = corner[k], &b = corner[(k + 1) % 3];
-  const double own = SideOf(a, b, corner[(k + 2) % 3]);
-  const auto next = [&](std::int32_t s) { return input.rings->next[static_cast<std::size_t>(s)]; };
-  for (std::int32_t other = next(side); other != side; other = next(other)) {
-    const std::int32_t opposite =
-        input.faces[static_cast<std::size_t>(other - other % 3 + (other + 2) % 3)];
-    if (own * SideOf(a, b, VertexOnWay(input, image, opposite, step)) < 0) return false;
+// Which edges of an image's faces are silhouettes, worked out for a face when it is first met.
+// Scratch of one worker.
+class Silhouettes {
+ public:
+  // Bit k: no face of the ring of the edge from corner k on goes on beyond it.
+  template <class T>
+  std::uint8_t Of(const AntialiasInput<T>& input, std::size_t image, std::int32_t face) {
+    if (image_ != image) image_ = image, edges_.assign(input.faces.size() / 3, kUnknown);
+    std::uint8_t& edges = edges_[static_cast<std::size_t>(face)];
+    if (edges == kUnknown) {
+      edges = 0;
+      for (int k = 0; k < 3; ++k) edges |= IsSilhouette(input, image, 3 * face + k) << k;
+    }
+    return edges;
   }
-  return true;
-}
+
+ private:
+  static constexpr std::uint8_t kUnknown = 8;
+  static constexpr std::size_t kNoImage = std::numeric_limits<std::size_t>::max();
+
+  // On which side of the line through the ends of an edge its face lies: the sign. In homogeneous
+  // coordinates, so that it holds for corners behind the eye.
+  template <class T>
+  static double SideOf(const T* a, const T* b, const T* c) {
+    const double ax = a[0], ay = a[1], aw = a[3], bx = b[0], by = b[1], bw = b[3];
+    return (ax * by - bx * ay) * c[3] + (bx * aw - ax * bw) * c[1] + (ay * bw - by * aw) * c[0];
+  }
+  template <class T>
+  static bool IsSilhouette(const AntialiasInput<T>& input, std::size_t image, std::int32_t side) {
+    const auto corner = [&](std::int32_t s, int k) {
+      return input.positions.at(image,
+                                input.faces[static_cast<std::size_t>(s - s % 3 + (s + k) % 3)]);
+    };
+    const auto next = [&](std::int32_t s) {
+      return input.rings->next[static_cast<std::size_t>(s)];
+    };
+    const T *a = corner(side, 0), *b = corner(side, 1);
+    const double own = SideOf(a, b, corner(side, 2));
+    for (std::int32_t other = next(side); other != side; other = next(other)) {
+      if (own * SideOf(a, b, corner(other, 2)) < 0) return false;
+    }
+    return true;
+  }
+
+  std::size_t image_ = kNoImage;
+  std::vector<std::uint8_t> edges_;
+};
 
 // What the edge that the nearer face of a pair ends at does to the two pixels.
 template <class T>
 std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
-                             const PixelPair& pair) {
+                             const PixelPair& pair, Silhouettes* silhouettes) {
   const std::int32_t face = FaceOf(&input.rast[4 * pair.front]);
+  const unsigned edges = silhouettes->Of(input, image, face);
+  if (edges == 0) return std::nullopt;
   const std::int32_t* v = &input.faces[3 * static_cast<std::size_t>(face)];
   WayPoint<double> corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = VertexOnWay(input, image, v[k], pair.step);
   for (int k = 0; k < 3; ++k) {
     double t;
     const int n = (k + 1) % 3;
-    if (!CrossesWay(pair.step, corner[k], corner[n], &t)) continue;
-    if (!IsSilhouette(input, image, 3 * face + k, pair.step, corner, k)) continue;
+    if ((edges >> k & 1) == 0 || !CrossesWay(pair.step, corner[k], corner[n], &t)) continue;
     const bool own = t < 0.5;
     return Blend{own ? pair.front : pair.back,
                  own ? pair.back : pair.front,
@@ -109,21 +138,34 @@ std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
 using BlendLists = std::vector<std::vector<Blend>>;  // of bands
 
 template <class T>
+void FindBlendsOfRow(const AntialiasInput<T>& input, std::size_t image, int y,
+                     Silhouettes* silhouettes, std::vector<Blend>* out) {
+  const PixelGrid& grid = input.grid;
+  std::size_t pixel = grid.first(image, y);
+  const bool last_row = y + 1 == grid.height;
+  const T* id = &input.rast[4 * pixel + 3];
+  const std::size_t above = last_row ? 0 : 4 * grid.row();
+  for (int x = 0; x < grid.width; ++x, ++pixel, id += 4) {
+    const std::size_t beside = x + 1 == grid.width ? 0 : 4;
+    if (id[0] == id[beside] && id[0] == id[above]) continue;  // most of them
+    for (int axis = 0; axis < 2; ++axis) {
+      if (axis == 0 ? beside == 0 : last_row) continue;
+      const auto pair = PairAt(input, pixel, {x, y}, axis);
+      if (!pair.has_value()) continue;
+      if (const auto blend = BlendOf(input, image, *pair, silhouettes)) out->push_back(*blend);
+    }
+  }
+}
+
+template <class T>
 BlendLists FindBlends(const AntialiasInput<T>& input, const Workers& workers) {
   const PixelGrid& grid = input.grid;
   BlendLists out(grid.bands());
-  workers.For(grid.bands(), [&](std::size_t index, std::size_t) {
+  std::vector<Silhouettes> silhouettes(static_cast<std::size_t>(workers.count()));
+  workers.For(grid.bands(), [&](std::size_t index, std::size_t worker) {
     const Band band = grid.band(index);
     for (int y = band.row_begin; y < band.row_end; ++y) {
-      for (int x = 0; x < grid.width; ++x) {
-        const std::size_t pixel = grid.first(band.image, y) + static_cast<std::size_t>(x);
-        for (int axis = 0; axis < 2; ++axis) {
-          if (axis == 0 ? x + 1 == grid.width : y + 1 == grid.height) continue;
-          const auto pair = PairAt(input, pixel, {x, y}, axis);
-          if (!pair.has_value()) continue;
-          if (const auto blend = BlendOf(input, band.image, *pair)) out[index].push_back(*blend);
-        }
-      }
+      FindBlendsOfRow(input, band.image, y, &silhouettes[worker], &out[index]);
     }
   });
   return out;

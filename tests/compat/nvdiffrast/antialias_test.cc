@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <optional>
+#include <utility>
 
 #include "compat/nvdiffrast/test_util.h"
 
@@ -102,6 +103,32 @@ TEST(Antialias, TheSumOfCoverageIsTheArea) {
   for (const double v : out) sum += v;
   for (const double v : color) before += v;
   EXPECT_NEAR(sum, area, 2.0) << "point-sampled: " << before;
+}
+
+// Two triangles meet at x = 4.3 and fill the image. Sharing vertices they are one surface; in a
+// soup the left one ends there and reaches 0.3 into the pixels of column 4.
+TEST(Antialias, InASoupEveryEdgeIsASilhouette) {
+  const auto at = [](double x, double y) { return Numbers<double>{x / 4 - 1, y / 4 - 1, 0, 1}; };
+  const Numbers<double> corners[] = {at(4.3, -9), at(4.3, 17), at(-20, 4), at(30, 4)};
+  for (const bool soup : {false, true}) {
+    Scene<double> scene;
+    scene.faces = {0, 1, 2, 1, 0, 3};
+    std::vector<std::int32_t> vertices = {0, 1, 2, 3};
+    if (soup) vertices = std::exchange(scene.faces, {0, 1, 2, 3, 4, 5});
+    for (const auto v : vertices) {
+      const auto& corner = corners[v];
+      scene.positions.insert(scene.positions.end(), corner.begin(), corner.end());
+    }
+    const auto rast = Rasterize(scene).rast;
+    Numbers<double> color;
+    for (std::size_t i = 3; i < rast.size(); i += 4) color.push_back(rast[i]);
+    const EdgeRings rings = BuildEdgeRings(scene.faces);
+    const auto out = Antialiased(InputOf(scene, rings, rast, color, 1));
+    for (std::size_t p = 0; p < 64; ++p) {
+      const double expected = p % 8 < 4 ? 1 : p % 8 > 4 || !soup ? 2 : 2 - 0.3;
+      EXPECT_NEAR(out[p], expected, 1e-12) << p;
+    }
+  }
 }
 
 TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
