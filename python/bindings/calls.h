@@ -3,12 +3,12 @@
 // float32, or all are float64.
 #pragma once
 
-#include <initializer_list>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "bindings/arrays.h"
+#include "bindings/kept_memory.h"
 
 namespace tilegrad::python {
 
@@ -22,15 +22,20 @@ auto Dispatch(const py::array& array, const char* function, const char* argument
                                    argument, py::str(array.dtype()).cast<std::string>()));
 }
 
+// A result, uninitialised.
 template <class T>
-py::array_t<T> NewArray(std::initializer_list<py::ssize_t> shape) {
-  return py::array_t<T>(std::vector<py::ssize_t>(shape));
+py::array_t<T> NewArray(const std::vector<py::ssize_t>& shape) {
+  std::size_t bytes = sizeof(T);
+  for (const py::ssize_t n : shape) bytes *= static_cast<std::size_t>(n);
+  if (bytes < kLeastKeptBytes) return py::array_t<T>(shape);
+  const KeptBlock block = TakeKeptBlock(bytes);
+  return py::array_t<T>(shape, static_cast<T*>(block.data), block.owner);
 }
 
 // One of the shape of another array.
 template <class T>
 py::array_t<T> NewArrayLike(const py::array& array) {
-  return py::array_t<T>(std::vector<py::ssize_t>(array.shape(), array.shape() + array.ndim()));
+  return NewArray<T>({array.shape(), array.shape() + array.ndim()});
 }
 
 template <class T>

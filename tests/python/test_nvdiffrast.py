@@ -337,6 +337,18 @@ class Determinism(unittest.TestCase):
         finally:
             torch.set_num_threads(before)
 
+    def test_memory_of_results_is_kept_but_never_shared(self):
+        tex, uv = torch.rand(1, 64, 64, 3), torch.rand(1, 128, 128, 2)
+        alive = {}
+        for i in range(40):  # in no order
+            alive[i * 7 % 11] = i, dr.texture(tex + i, uv)
+        first = dr.texture(tex, uv)
+        pointers = {result.data_ptr() for _, result in alive.values()} | {first.data_ptr()}
+        self.assertEqual(len(pointers), len(alive) + 1)
+        for i, result in alive.values():
+            torch.testing.assert_close(result, first + i, rtol=1e-6, atol=1e-5)
+        self.assertEqual(len({dr.texture(tex, uv).data_ptr() for _ in range(10)}), 1)
+
     def test_several_python_threads_and_a_fork(self):
         expected = self.chain()
         with concurrent.futures.ThreadPoolExecutor(2) as pool:

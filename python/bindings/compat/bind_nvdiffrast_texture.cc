@@ -151,7 +151,7 @@ Levels ConstructMip(const py::array& tex, int most, int threads) {
   Levels out;
   for (std::size_t l = 1; l < sizes.size(); ++l) {
     const auto fine = LevelOf<T>(l == 1 ? tex : out.back(), kName);
-    py::array_t<T> coarse(LevelShape(tex, sizes[l]));
+    py::array_t<T> coarse = NewArray<T>(LevelShape(tex, sizes[l]));
     const auto to = NumbersOf(coarse);
     Run(kName, [&] {
       nvdiffrast::HalveTexture<T>(fine, channels, workers, to);

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bindings/kept_memory.h"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "base/aligned.h"
+
+namespace tilegrad::python {
+namespace {
+
+struct Block {
+  std::size_t bytes;
+  void* data;
+};
+
+// Blocks that nobody uses, in the order they came back. Guarded by the GIL; never freed at the end
+// of the process, where arrays may outlive anything.
+std::vector<Block>* const kept = new std::vector<Block>;
+std::size_t kept_bytes = 0;
+
+void Remove(std::vector<Block>::iterator block) {
+  kept_bytes -= block->bytes;
+  kept->erase(block);
+}
+
+void GiveBack(const Block& block) {
+  kept->push_back(block);
+  kept_bytes += block.bytes;
+  while (kept_bytes > kMostKeptBytes) {
+    FreeAligned(kept->front().data, kept->front().bytes);
+    Remove(kept->begin());
+  }
+}
+
+}  // namespace
+
+KeptBlock TakeKeptBlock(std::size_t bytes) {
+  auto block = std::make_unique<Block>(Block{bytes, nullptr});
+  const auto found = std::find_if(kept->rbegin(), kept->rend(),
+                                  [&](const Block& b) { return b.bytes == bytes; });
+  if (found != kept->rend()) {
+    block->data = found->data;
+    Remove(std::prev(found.base()));
+  } else {
+    block->data = AllocateAligned(bytes);
+  }
+  py::capsule owner(block.get(), [](void* p) {
+    const std::unique_ptr<Block> dead(static_cast<Block*>(p));
+    GiveBack(*dead);
+  });
+  return {block.release()->data, std::move(owner)};
+}
+
+}  // namespace tilegrad::python
