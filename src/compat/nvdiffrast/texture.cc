@@ -25,7 +25,7 @@ LevelChoice ChooseLevel(const TextureInput<T>& input, double level) {
   const bool between = input.filter == TextureFilter::kLinearMipmapLinear;
   if (!(level > 0)) return {0, 0, false};
   if (level >= last) return {input.levels.size() - 1, 0, false};
-  const double low = std::floor(between ? level : level + 0.5);
+  const double low = std::floor(level);
   return {static_cast<std::size_t>(low), between ? level - low : 0, between};
 }
 

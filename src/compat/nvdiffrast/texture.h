@@ -9,7 +9,7 @@
 // The level of the pyramid is that at which a texel is as large as the longer axis of the pixel's
 // footprint: with J = d(s W, t H)/d(X, Y), level = log2 of the largest singular value of J, plus
 // the bias, kept within the levels that exist. Where there is no footprint, the bias alone is the
-// level.
+// level. Linear within the nearest level means the level rounded down, as nvdiffrast has it.
 //
 // Coordinates that are not finite, and the zero vector in a cube map, give zeros and pull nothing.
 #pragma once
@@ -27,7 +27,7 @@ namespace tilegrad::compat::nvdiffrast {
 enum class TextureFilter {
   kNearest,
   kLinear,
-  kLinearMipmapNearest,  // linear within the nearest level
+  kLinearMipmapNearest,  // linear within the level, rounded down
   kLinearMipmapLinear,   // and between two levels
 };
 

@@ -7,44 +7,11 @@
 
 #include "compat/nvdiffrast/test_util.h"
 #include "compat/nvdiffrast/texture_cube.h"
+#include "compat/nvdiffrast/texture_lookups.h"
 #include "compat/nvdiffrast/texture_point.h"
 
 namespace tilegrad::compat::nvdiffrast {
 namespace {
-
-// A texture with its pyramid, and where it is looked up.
-template <class T>
-struct Lookups {
-  std::vector<Numbers<T>> levels;
-  std::vector<MipSize> sizes;
-  std::size_t textures = 1, channels = 1;
-  TextureFilter filter = TextureFilter::kLinear;
-  TextureBoundary boundary = TextureBoundary::kWrap;
-  PixelGrid grid{1, 1, 1};
-  Numbers<T> uv, uv_da, bias;
-  std::vector<TextureLevel<T>> views;
-
-  std::size_t faces() const { return boundary == TextureBoundary::kCube ? 6 : 1; }
-  TextureInput<T> input() {
-    views.clear();
-    for (std::size_t l = 0; l < levels.size(); ++l) views.push_back({levels[l], sizes[l]});
-    return {views, textures, channels, filter, boundary, grid, uv, uv_da, bias};
-  }
-  void Random(const MipSize& size, std::uint64_t seed) {
-    sizes = MipSizes(size, -1).value();
-    for (const MipSize& s : sizes) {
-      levels.push_back(RandomNumbers<T>(
-          textures * faces() * static_cast<std::size_t>(s.height * s.width) * channels, ++seed));
-    }
-  }
-};
-
-template <class T>
-Numbers<T> Sampled(Lookups<T>& lookups, const Workers& workers = Workers(1)) {
-  Numbers<T> out(lookups.grid.pixels() * lookups.channels, T(-7));
-  SampleTexture<T>(lookups.input(), workers, out);
-  return out;
-}
 
 // 4 x 2 texels, 10 times the row plus the column.
 Lookups<double> Ramp(TextureFilter filter, TextureBoundary boundary) {
@@ -89,7 +56,8 @@ TEST(Texture, BoundariesByHand) {
   EXPECT_EQ(At(wrap, std::nan(""), 0.5), 0);
 }
 
-TEST(Texture, ALevelIsOneTexelForEachPixelOfTheLongerAxis) {
+// (Not "Longer": tests with Long in their names run with --long only.)
+TEST(Texture, ALevelIsOneTexelForEachPixelOfTheWiderAxis) {
   Lookups<double> lookups;
   lookups.filter = TextureFilter::kLinearMipmapLinear;
   lookups.sizes = MipSizes({16, 16}, -1).value();
@@ -114,13 +82,40 @@ TEST(Texture, ALevelIsOneTexelForEachPixelOfTheLongerAxis) {
   EXPECT_NEAR(Sampled(lookups)[0], 1.5, 1e-12);
   lookups.bias = {0.75};
   EXPECT_NEAR(Sampled(lookups)[0], 2.25, 1e-12);
-  lookups.filter = TextureFilter::kLinearMipmapNearest;
-  EXPECT_NEAR(Sampled(lookups)[0], 2, 1e-12);
   lookups.uv_da.clear();
   lookups.bias = {3.6};
-  EXPECT_NEAR(Sampled(lookups)[0], 4, 1e-12);
-  lookups.filter = TextureFilter::kLinearMipmapLinear;
   EXPECT_NEAR(Sampled(lookups)[0], 3.6, 1e-12);
+}
+
+TEST(Texture, TheNearestLevelIsRoundedDown) {
+  Lookups<double> lookups;
+  lookups.filter = TextureFilter::kLinearMipmapNearest;
+  lookups.sizes = MipSizes({4, 8}, -1).value();
+  for (std::size_t l = 0; l < 4; ++l) {
+    const auto& size = lookups.sizes[l];
+    const auto texels = static_cast<std::size_t>(size.height * size.width);
+    lookups.levels.emplace_back(texels, static_cast<double>(l));  // shows its own number
+  }
+  const double levels[][2] = {{-3, 0},   {0, 0},    {0.49, 0}, {0.5, 0}, {0.99, 0}, {1, 1},
+                              {1.75, 1}, {2.25, 2}, {2.99, 2}, {3, 3},   {9.7, 3}};
+  lookups.grid = {1, 1, static_cast<int>(std::size(levels))};
+  for (const auto& level : levels) {
+    lookups.uv.insert(lookups.uv.end(), {0.3, 0.6}), lookups.bias.push_back(level[0]);
+  }
+  const auto out = Sampled(lookups);
+  // The same by footprints of 2^level texels, and in float.
+  for (const auto& level : levels) {
+    lookups.uv_da.insert(lookups.uv_da.end(), {std::exp2(level[0]) / 8, 0, 0, 0});
+  }
+  lookups.bias.clear();
+  const auto by_footprint = Sampled(lookups);
+  Lookups<float> single = In<float>(lookups);
+  const auto in_float = Sampled(single);
+  for (std::size_t i = 0; i < std::size(levels); ++i) {
+    EXPECT_NEAR(out[i], levels[i][1], 1e-12) << levels[i][0];
+    EXPECT_NEAR(by_footprint[i], levels[i][1], 1e-12) << levels[i][0];
+    EXPECT_NEAR(double{in_float[i]}, levels[i][1], 4 * kRounding * 3) << levels[i][0];
+  }
 }
 
 TEST(Mip, LevelsAreMeansAndSizesAreChecked) {
