@@ -2,6 +2,8 @@
 // Textures for tilegrad.compat.nvdiffrast.
 #include <pybind11/stl.h>
 
+#include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "bindings/calls.h"
@@ -26,6 +28,7 @@ nvdiffrast::MipSize SizeOf(const py::array& level) {
   return {static_cast<int>(level.shape(level.ndim() - 3)),
           static_cast<int>(level.shape(level.ndim() - 2))};
 }
+constexpr py::ssize_t kMostTexels = std::numeric_limits<std::int32_t>::max();
 py::ssize_t ChannelsOf(const py::array& level) { return level.shape(level.ndim() - 1); }
 
 std::vector<py::ssize_t> LevelShape(const py::array& base, const nvdiffrast::MipSize& size) {
@@ -88,11 +91,14 @@ struct TextureArguments {
                 (input.textures == 1 || input.textures == input.grid.images);
     for (std::size_t l = 1; fits && l < from.size(); ++l) {
       const nvdiffrast::MipSize fine = levels[l - 1].size, size = levels[l].size;
-      fits = size.height == std::max(1, fine.height / 2) &&
+      fits = (fine.height > 1 || fine.width > 1) && size.height == std::max(1, fine.height / 2) &&
              size.width == std::max(1, fine.width / 2) && from[l].ndim() == from[0].ndim() &&
              from[l].shape(0) == from[0].shape(0) && ChannelsOf(from[l]) == ChannelsOf(from[0]);
     }
     if (!fits) throw py::value_error("texture: levels of sizes that do not belong together");
+    if (from[0].size() / from[0].shape(0) / ChannelsOf(from[0]) > kMostTexels) {
+      throw py::value_error("texture: tex has more than 2^31 - 1 texels");
+    }
   }
 };
 

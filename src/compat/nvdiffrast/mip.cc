@@ -24,11 +24,26 @@ struct Halving {
   // that it is made of. Both fine numbers are the same where there is no neighbour.
   template <class Visit>
   void ForRow(std::size_t row, std::size_t fine, const Visit& visit) const {
-    const std::size_t rows = fine_rows / step_y;
+    switch (channels) {  // a number that is known is a loop that is not
+      case 1:
+        return ForRowOf<1>(row, fine, visit);
+      case 3:
+        return ForRowOf<3>(row, fine, visit);
+      case 4:
+        return ForRowOf<4>(row, fine, visit);
+      default:
+        return ForRowOf<0>(row, fine, visit);
+    }
+  }
+
+ private:
+  template <std::size_t kChannels, class Visit>
+  void ForRowOf(std::size_t row, std::size_t fine, const Visit& visit) const {
+    const std::size_t n = kChannels > 0 ? kChannels : channels, rows = fine_rows / step_y;
     std::size_t from = (row / rows * fine_rows + row % rows * step_y + fine) * fine_row;
-    const std::size_t beside = (step_x - 1) * channels, end = (row + 1) * coarse_row;
+    const std::size_t beside = (step_x - 1) * n, end = (row + 1) * coarse_row;
     for (std::size_t to = row * coarse_row; to < end; from += beside) {
-      for (std::size_t c = 0; c < channels; ++c, ++to, ++from) visit(to, from, from + beside);
+      for (std::size_t c = 0; c < n; ++c, ++to, ++from) visit(to, from, from + beside);
     }
   }
 };

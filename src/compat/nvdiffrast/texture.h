@@ -12,9 +12,13 @@
 // level. Linear within the nearest level means the level rounded down, as nvdiffrast has it.
 //
 // Coordinates that are not finite, and the zero vector in a cube map, give zeros and pull nothing.
+//
+// float is computed in float by vectors, double in scalars (texture_ref.h). A level of a texture
+// has less than 2^31 texels.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "base/parallel.h"
@@ -69,5 +73,14 @@ struct TextureGradients {
 template <class T>
 void SampleTextureBackward(const TextureInput<T>& input, std::span<const T> d_out,
                            const Workers& workers, const TextureGradients<T>& out);
+
+inline std::size_t TexelsOf(const MipSize& size, std::size_t faces) {
+  return faces * static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
+}
+
+// Of the texels of all levels, those that one of several tasks sums.
+struct TexelPart {
+  std::uint32_t part, parts;
+};
 
 }  // namespace tilegrad::compat::nvdiffrast

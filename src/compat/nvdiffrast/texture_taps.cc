@@ -74,6 +74,8 @@ AxisTaps LinearTaps(double s, int n, TextureBoundary boundary) {
   return Between(std::clamp(s * n - 0.5, -0.5, n - 0.5), n);
 }
 
+}  // namespace
+
 std::ptrdiff_t TexelAt(int x, int y, int face, const MipSize& size, TextureBoundary boundary) {
   if (x == kOutside || y == kOutside) return Taps::kNothing;
   CubeTexel texel{face, x, y};
@@ -84,8 +86,6 @@ std::ptrdiff_t TexelAt(int x, int y, int face, const MipSize& size, TextureBound
   }
   return (static_cast<std::ptrdiff_t>(texel.face) * size.height + texel.y) * size.width + texel.x;
 }
-
-}  // namespace
 
 void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
               TextureBoundary boundary, Taps* out) {

@@ -25,6 +25,10 @@ struct Taps {
   }
 };
 
+// The texel of a face in column x and row y, or what there is beyond it; of a cube map at most one
+// step beyond.
+std::ptrdiff_t TexelAt(int x, int y, int face, const MipSize& size, TextureBoundary boundary);
+
 // Overwrites *out; `point` is valid.
 void FindTaps(const TexturePoint& point, const MipSize& size, bool nearest,
               TextureBoundary boundary, Taps* out);
