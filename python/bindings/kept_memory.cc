@@ -38,8 +38,8 @@ void GiveBack(const Block& block) {
 
 KeptBlock TakeKeptBlock(std::size_t bytes) {
   auto block = std::make_unique<Block>(Block{bytes, nullptr});
-  const auto found = std::find_if(kept->rbegin(), kept->rend(),
-                                  [&](const Block& b) { return b.bytes == bytes; });
+  const auto found =
+      std::find_if(kept->rbegin(), kept->rend(), [&](const Block& b) { return b.bytes == bytes; });
   if (found != kept->rend()) {
     block->data = found->data;
     Remove(std::prev(found.base()));
