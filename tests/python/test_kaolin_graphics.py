@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tilegrad.compat.kaolin.graphics, the interface of Kaolin 0.1: shading by hand, cameras, gradients.
-"""
+"""tilegrad.compat.kaolin.graphics, Kaolin 0.1's interface: shading by hand, cameras, gradients."""
 
 import math
 import unittest

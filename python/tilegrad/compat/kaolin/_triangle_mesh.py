@@ -14,8 +14,8 @@ from tilegrad.compat.kaolin.ops._subdivide import adjacency
 
 class TriangleMesh:
     """vertices [V,3], faces [F,3] int64; uvs [T,2] with face_textures [F,3] int64, or None. With
-    adjacency: edges [E,2], and ff [F,3], the faces beyond each face's edges, -1 where there is none;
-    else both are None. adj: what the caller puts there."""
+    adjacency: edges [E,2], and ff [F,3], the faces beyond each face's edges, -1 where there is
+    none; else both are None. adj: what the caller puts there."""
 
     def __init__(self, vertices: torch.Tensor, faces: torch.Tensor,
                  uvs: Optional[torch.Tensor] = None, face_textures: Optional[torch.Tensor] = None,
@@ -41,8 +41,8 @@ class TriangleMesh:
     @classmethod
     def from_obj(cls, filename: Union[str, "os.PathLike[str]"],
                  enable_adjacency: bool = False) -> TriangleMesh:
-        """Loads a mesh, of any format that tilegrad.meshes reads. OSError, ValueError: name the file
-        and what is wrong with it."""
+        """Loads a mesh, of any format that tilegrad.meshes reads. OSError, ValueError: name the
+        file and what is wrong with it."""
         from tilegrad.compat.kaolin import io
         mesh = io.obj.import_mesh(filename)
         return cls.from_tensors(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs_idx,

@@ -95,8 +95,8 @@ class SurfaceMesh:
         return self.set_batching(self.Batching.FIXED)
 
     def set_batching(self, batching: SurfaceMesh.Batching) -> SurfaceMesh:
-        """Turns one mesh into a batch of one, or back, in place; returns itself. ValueError: a batch
-        of several cannot be one."""
+        """Turns one mesh into a batch of one, or back, in place; returns itself. ValueError: a
+        batch of several cannot be one."""
         if batching == self.batching:
             return self
         if batching == self.Batching.NONE and len(self) != 1:
@@ -112,12 +112,11 @@ class SurfaceMesh:
         if not fixed_topology or not all(torch.equal(m.faces, meshes[0].faces) for m in meshes):
             raise ValueError("SurfaceMesh.cat: only meshes with the same faces form a batch here")
         each = [mesh.copy().to_batched() for mesh in meshes]
-        members = {name: value if name in _UNBATCHED else
-                   torch.cat([getattr(mesh, name) for mesh in each])
-                   if isinstance(value, torch.Tensor) else sum((mesh.materials for mesh in each), [])
-                   for name, value in each[0].__dict__.items()
+        members = {name: [getattr(mesh, name) for mesh in each] for name in each[0].__dict__
                    if all(mesh.has_attribute(name) for mesh in each)}
-        return cls(**members)
+        return cls(**{name: values[0] if name in _UNBATCHED
+                      else sum(values, []) if name == "materials" else torch.cat(values)
+                      for name, values in members.items()})
 
     def copy(self) -> SurfaceMesh:
         """Another mesh with the same tensors."""

@@ -13,7 +13,7 @@ __getattr__ = missing_from(__name__)
 
 def import_mesh(filename: Path, triangulate: bool = True) -> SurfaceMesh:
     """Everything that a file has, of any format that tilegrad.meshes reads; faces are cut into
-    triangles, whatever `triangulate` says. OSError, ValueError: name the file and what is wrong with
-    it."""
+    triangles, whatever `triangulate` says. OSError, ValueError: name the file and what is wrong
+    with it."""
     del triangulate
     return load_surface(filename)

@@ -13,8 +13,8 @@ __getattr__ = missing_from(__name__)
 
 
 def sided_distance(p1: torch.Tensor, p2: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """For each point of p1 [B,N,3] the squared distance to the nearest one of p2 [B,M,3], [B,N], and
-    the index of that one, [B,N] int64; of equally near ones the first."""
+    """For each point of p1 [B,N,3] the squared distance to the nearest one of p2 [B,M,3], [B,N],
+    and the index of that one, [B,N] int64; of equally near ones the first."""
     sizes: dict = {}
     check_floats("sided_distance", "p1", p1, ("B", "N", 3), sizes)
     check_floats("sided_distance", "p2", p2, ("B", "M", 3), sizes, p1)
@@ -37,8 +37,9 @@ def chamfer_distance(p1: torch.Tensor, p2: torch.Tensor, w1: float = 1., w2: flo
 
 def f_score(gt_points: torch.Tensor, pred_points: torch.Tensor, radius: float = 0.01,
             eps: float = 1e-8) -> torch.Tensor:
-    """2 P R / (P + R + eps): P and R are the shares of predicted points within `radius` of the truth
-    and the reverse. gt_points: [B,N,3]. pred_points: [B,M,3]. Returns [B], without gradient."""
+    """2 P R / (P + R + eps): P and R are the shares of predicted points within `radius` of the
+    truth and the reverse. gt_points: [B,N,3]. pred_points: [B,M,3]. Returns [B], without a
+    gradient."""
     recall, precision = (
         (sided_distance(a, b)[0].sqrt() <= radius).to(pred_points.dtype).mean(dim=-1)
         for a, b in ((gt_points, pred_points), (pred_points, gt_points)))

@@ -23,8 +23,8 @@ class _Edges(NamedTuple):
 def subdivide_trianglemesh(vertices: torch.Tensor, faces: torch.Tensor, iterations: int,
                            alpha: Optional[torch.Tensor] = None
                            ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Each face becomes four, `iterations` times; a vertex moves by its alpha towards the mean of its
-    neighbours, those of the border, too, as in Kaolin.
+    """Each face becomes four, `iterations` times; a vertex moves by its alpha towards the mean of
+    its neighbours, those of the border, too, as in Kaolin.
 
     vertices: [B,V,3]. faces: [F,3] int64. alpha: [B,V], 0 keeps a vertex where it is, and new
         vertices get theirs as they get their place; None: Loop's (Charles Loop: Smooth subdivision

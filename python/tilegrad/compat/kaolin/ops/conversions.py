@@ -77,8 +77,9 @@ def _in_grid(name: str, points: torch.Tensor, resolution: int, origin: Optional[
 def voxelgrids_to_cubic_meshes(voxelgrids: torch.Tensor, is_trimesh: bool = True
                                ) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
     """The sides of voxels that are not 0 which border on voxels that are 0; voxel (i, j, k) is the
-    cube from there to (i + 1, j + 1, k + 1). voxelgrids: [B,X,Y,Z]. Returns for each vertices [V,3],
-    each once, and faces [F,3] int64, [F,4] if not is_trimesh; counter-clockwise from outside."""
+    cube from there to (i + 1, j + 1, k + 1). voxelgrids: [B,X,Y,Z]. Returns for each vertices
+    [V,3], each once, and faces [F,3] int64, [F,4] if not is_trimesh; counter-clockwise from
+    outside."""
     check_tensor("voxelgrids_to_cubic_meshes", "voxelgrids", voxelgrids, ("B", "X", "Y", "Z"))
     meshes = [_cubes(grid != 0) for grid in voxelgrids]
     vertices = [v.to(torch.float32) for v, _ in meshes]

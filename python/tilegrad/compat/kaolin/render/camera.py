@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kaolin.render.camera: the functions of its DIB-R examples. Cameras look along -z, x right, y up.
-"""
+"""kaolin.render.camera: pinhole cameras, and the functions of its DIB-R examples. Cameras look
+along -z, x right, y up."""
 
 from __future__ import annotations
 
@@ -9,8 +9,15 @@ import math
 import torch
 
 from tilegrad.compat.kaolin._missing import missing_from
+from tilegrad.compat.kaolin.render._camera import (
+    Camera, generate_centered_pixel_coords, generate_pinhole_rays)
+from tilegrad.compat.kaolin.render._pinhole import CameraExtrinsics, CameraFOV, PinholeIntrinsics
 
 __getattr__ = missing_from(__name__)
+__all__ = ["Camera", "CameraExtrinsics", "CameraFOV", "PinholeIntrinsics",
+           "generate_centered_pixel_coords", "generate_perspective_projection",
+           "generate_pinhole_rays", "generate_rotate_translate_matrices",
+           "generate_transformation_matrix", "perspective_camera", "rotate_translate_points"]
 
 _EPS = 1e-10  # Kaolin's, added to lengths
 

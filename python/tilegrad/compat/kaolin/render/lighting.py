@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kaolin.render.lighting: spherical harmonics of degree up to 2, orthonormal, with the
-Condon-Shortley sign, in the order 1 | y, z, x | xy, yz, 3z^2-1, xz, x^2-y^2."""
+"""kaolin.render.lighting: spherical Gaussians, and spherical harmonics of degree up to 2,
+orthonormal, with the Condon-Shortley sign, in the order 1 | y, z, x | xy, yz, 3z^2-1, xz, x^2-y^2.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +12,18 @@ import torch
 
 from tilegrad.compat._tensors import check_floats
 from tilegrad.compat.kaolin._missing import missing_from
+from tilegrad.compat.kaolin.render._spherical_gaussians import (
+    SgLightingParameters, approximate_sg_integral, cosine_lobe_sg, fresnel, sg_diffuse_fitted,
+    sg_diffuse_inner_product, sg_direction_from_azimuth_elevation, sg_distribution_term,
+    sg_from_sun, sg_irradiance_fitted, sg_irradiance_inner_product, sg_warp_distribution,
+    sg_warp_specular_term)
 
 __getattr__ = missing_from(__name__)
+__all__ = ["project_onto_sh9", "sh9_diffuse", "sh9_irradiance", "SgLightingParameters",
+           "approximate_sg_integral", "cosine_lobe_sg", "fresnel", "sg_diffuse_fitted",
+           "sg_diffuse_inner_product", "sg_direction_from_azimuth_elevation",
+           "sg_distribution_term", "sg_from_sun", "sg_irradiance_fitted",
+           "sg_irradiance_inner_product", "sg_warp_distribution", "sg_warp_specular_term"]
 
 # Clamped cosine, as factors of bands 0, 1, 2.
 _COSINE = [math.pi] + 3 * [2 * math.pi / 3] + 5 * [math.pi / 4]

@@ -2,8 +2,8 @@
 """kaolin.graphics.dib_renderer.renderer: images [B,H,W,3], soft masks [B,H,W,1] and unit normals of
 faces in the camera [B,F,3].
 
-points: [vertices [B,V,3], faces [F,3] int64]. cameras: [rotation [B,3,3], position [B,3], projection
-[3,1]]. uv_bxpx2: [B,T,2], repeated beyond [0, 1], with ft_fx3 [F,3] (None: as faces).
+points: [vertices [B,V,3], faces [F,3] int64]. cameras: [rotation [B,3,3], position [B,3],
+projection [3,1]]. uv_bxpx2: [B,T,2], repeated beyond [0, 1], with ft_fx3 [F,3] (None: as faces).
 texture_bx3xthxtw: row 0 on top.
 """
 

@@ -84,7 +84,8 @@ def dibr_rasterization(height: int, width: int, face_vertices_z: torch.Tensor,
                        rast_backend: str = "cuda", *, exact_kaolin: Optional[bool] = None,
                        max_alpha_error: Optional[float] = None
                        ) -> tuple[Union[torch.Tensor, tuple], torch.Tensor, torch.Tensor]:
-    """`rasterize`, for faces with face_normals_z [B,F] (or [B,F,1]) >= 0, and `dibr_soft_mask`, over all faces.
+    """`rasterize`, for faces with face_normals_z [B,F] (or [B,F,1]) >= 0, and `dibr_soft_mask`,
+    over all faces.
 
     Arguments as of those two. Returns features [B,H,W,C] (a tuple if face_features is a list),
     soft_mask [B,H,W], face_idx [B,H,W] int64.
@@ -156,4 +157,5 @@ def _say_once_what_is_ignored() -> None:
         _warned = True
         warnings.warn("tilegrad.compat.kaolin: boxlen and knum are ignored: the soft mask takes in "
                       "all faces, within max_alpha_error. exact_kaolin=True, or "
-                      "use_exact_kaolin() for the whole program, gives Kaolin's truncated mask.", UserWarning, stacklevel=4)
+                      "use_exact_kaolin() for the whole program, gives Kaolin's truncated mask.",
+                      UserWarning, stacklevel=4)

@@ -22,8 +22,8 @@ def prepare_vertices(vertices: torch.Tensor, faces: torch.Tensor, camera_proj: t
                      ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Vertices into a camera, onto its image plane, and to the corners of faces.
 
-    vertices: [B,V,3], or [V,3] for all cameras. faces: [F,3] int64. camera_proj: [3,1] (or [B,3,1]), see
-        camera.generate_perspective_projection.
+    vertices: [B,V,3], or [V,3] for all cameras. faces: [F,3] int64. camera_proj: [3,1] (or
+        [B,3,1]), see camera.generate_perspective_projection.
     camera_rot [B,3,3] with camera_trans [B,3], or camera_transform [B,4,3]: see camera.
     Returns corners in the camera [B,F,3,3], on the image plane [B,F,3,2], and the faces' unit
     normals in the camera [B,F,3].

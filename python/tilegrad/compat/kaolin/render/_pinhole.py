@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Camera of kaolin.render.camera, of Kaolin 0.11 and later: a batch of C pinhole cameras.
+
+World and camera are right-handed, the camera looks along -z, y up; NDC are OpenGL's, -1 to 1, near
+at -1. Gradients flow to the tensors that a camera was made from.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import Any, Optional, Sequence, Union
+
+import torch
+
+from tilegrad.compat._tensors import check_floats
+
+_Values = Union[torch.Tensor, Sequence[float], Any]  # or an array of NumPy
+_Device = Union[torch.device, str, None]
+_Amount = Union[float, torch.Tensor]
+
+
+class CameraFOV(enum.IntEnum):
+    """Which side of the image a field of view is of."""
+
+    HORIZONTAL = 0
+    VERTICAL = 1
+
+
+class CameraExtrinsics:
+    """Where cameras are, a view matrix [C,4,4]: world to camera. Methods that move a camera change
+    it in place."""
+
+    def __init__(self, view: torch.Tensor) -> None:
+        check_floats("CameraExtrinsics", "view_matrix", view, ("C", 4, 4))
+        self._view = view
+
+    @classmethod
+    def from_view_matrix(cls, view_matrix: _Values, dtype: torch.dtype = torch.float32,
+                         device: _Device = None) -> CameraExtrinsics:
+        """view_matrix: [4,4] or [C,4,4]."""
+        view = torch.as_tensor(view_matrix, dtype=dtype, device=device)
+        return cls(view[None] if view.ndim == 2 else view)
+
+    @classmethod
+    def from_camera_pose(cls, cam_pos: _Values, cam_dir: _Values,
+                         dtype: torch.dtype = torch.float32,
+                         device: _Device = None) -> CameraExtrinsics:
+        """cam_pos: [3], [C,3] or [C,3,1]. cam_dir: [3,3] or [C,3,3], whose columns are the camera's
+        right, up and backward in the world."""
+        axes = torch.as_tensor(cam_dir, dtype=dtype, device=device).reshape(-1, 3, 3)
+        position = torch.as_tensor(cam_pos, dtype=dtype, device=device).reshape(-1, 3)
+        return cls(_view_matrix(axes.transpose(1, 2), position))
+
+    @classmethod
+    def from_lookat(cls, eye: _Values, at: _Values, up: _Values,
+                    dtype: torch.dtype = torch.float32,
+                    device: _Device = None) -> CameraExtrinsics:
+        """eye, at, up: [3] or [C,3]: where the camera is, what it looks at, what is up there."""
+        eye, at, up = torch.broadcast_tensors(*(
+            torch.as_tensor(v, dtype=dtype, device=device).reshape(-1, 3) for v in (eye, at, up)))
+        normalize = torch.nn.functional.normalize
+        backward = normalize(eye - at, dim=-1)
+        right = normalize(torch.cross(up, backward, dim=-1), dim=-1)
+        rotation = torch.stack([right, torch.cross(backward, right, dim=-1), backward], dim=1)
+        return cls(_view_matrix(rotation, eye))
+
+    def view_matrix(self) -> torch.Tensor:
+        """[C,4,4], world to camera."""
+        return self._view
+
+    def inv_view_matrix(self) -> torch.Tensor:
+        """[C,4,4], camera to world."""
+        rotation = self.R.transpose(1, 2)
+        return _rows(rotation, -rotation @ self.t)
+
+    @property
+    def R(self) -> torch.Tensor:  # pylint: disable=invalid-name
+        """[C,3,3], whose rows are the camera's right, up and backward."""
+        return self._view[:, :3, :3]
+
+    @property
+    def t(self) -> torch.Tensor:
+        """[C,3,1], the world's origin in the camera."""
+        return self._view[:, :3, 3:]
+
+    @property
+    def device(self) -> torch.device:
+        return self._view.device
+
+    @property
+    def dtype(self) -> torch.dtype:
+        return self._view.dtype
+
+    def transform(self, vectors: torch.Tensor) -> torch.Tensor:
+        """Points [V,3] or [C,V,3] from the world into cameras [C,V,3]."""
+        check_floats("transform", "vectors", vectors, (*vectors.shape[:-1], 3), like=self._view)
+        return vectors @ self.R.transpose(1, 2) + self.t.transpose(1, 2)
+
+    def inv_transform_rays(self, ray_orig: torch.Tensor,
+                           ray_dir: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Rays [V,3] or [C,V,3] from cameras into the world [C,V,3]."""
+        return (ray_orig - self.t.transpose(1, 2)) @ self.R, ray_dir @ self.R
+
+    def cam_pos(self) -> torch.Tensor:
+        """[C,3,1], in the world; so are the three that follow."""
+        return -self.R.transpose(1, 2) @ self.t
+
+    def cam_right(self) -> torch.Tensor:
+        return self.R[:, 0, :, None]
+
+    def cam_up(self) -> torch.Tensor:
+        return self.R[:, 1, :, None]
+
+    def cam_forward(self) -> torch.Tensor:
+        """The camera's z axis, which points away from what it sees."""
+        return self.R[:, 2, :, None]
+
+    def translate(self, t: torch.Tensor) -> None:
+        """Moves cameras by t [3], [C,3] or [C,3,1], in the world."""
+        self._move(self.R @ t.reshape(-1, 3, 1))
+
+    def move_right(self, amount: _Amount) -> None:
+        """Along its own right; so move_up and move_forward along theirs."""
+        self._move_along(0, amount)
+
+    def move_up(self, amount: _Amount) -> None:
+        self._move_along(1, amount)
+
+    def move_forward(self, amount: _Amount) -> None:
+        """Along cam_forward: backwards, if amount > 0."""
+        self._move_along(2, amount)
+
+    def rotate(self, yaw: Optional[_Amount] = None, pitch: Optional[_Amount] = None,
+               roll: Optional[_Amount] = None) -> None:
+        """Turns cameras about their own y, then x, then z; radians, numbers or [C]."""
+        for angle, (i, j) in ((yaw, (2, 0)), (pitch, (1, 2)), (roll, (0, 1))):
+            if angle is None:
+                continue
+            angle = torch.as_tensor(angle, dtype=self.dtype).reshape(-1)
+            turn = torch.eye(4, dtype=self.dtype).repeat(len(angle), 1, 1)
+            turn[:, i, i] = turn[:, j, j] = torch.cos(angle)
+            turn[:, i, j], turn[:, j, i] = torch.sin(angle), -torch.sin(angle)
+            self._view = turn @ self._view
+
+    def _move(self, in_camera: torch.Tensor) -> None:
+        self._view = _rows(self.R, self.t - in_camera)
+
+    def _move_along(self, axis: int, amount: _Amount) -> None:
+        unit = torch.eye(3, dtype=self.dtype)[axis]
+        self._move((torch.as_tensor(amount, dtype=self.dtype).reshape(-1, 1) * unit)[..., None])
+
+    def __len__(self) -> int:
+        return len(self._view)
+
+
+class PinholeIntrinsics:
+    """What cameras see: width, height, near and far, and params [C,4]: x0, y0, the principal
+    point's offset from the centre of the image, and focal_x, focal_y, in pixels."""
+
+    lens_type = "pinhole"
+
+    def __init__(self, width: int, height: int, params: torch.Tensor, near: float = 1e-2,
+                 far: float = 1e2) -> None:
+        if not (width > 0 and height > 0 and 0 < near < far):
+            raise ValueError(f"PinholeIntrinsics: width {width}, height {height}, near {near}, far "
+                             f"{far}; expected numbers > 0, near before far")
+        self.width, self.height, self.near, self.far = width, height, near, far
+        self.params = params
+
+    @classmethod
+    def from_focal(cls, width: int, height: int, focal_x: _Amount,
+                   focal_y: Optional[_Amount] = None, x0: _Amount = 0., y0: _Amount = 0.,
+                   near: float = 1e-2, far: float = 1e2, num_cameras: int = 1,
+                   device: _Device = None,
+                   dtype: torch.dtype = torch.float32) -> PinholeIntrinsics:
+        """focal_x, focal_y (None: as focal_x), x0, y0: pixels, numbers or [C]."""
+        columns = [torch.as_tensor(v, dtype=dtype, device=device).reshape(-1).expand(num_cameras)
+                   for v in (x0, y0, focal_x, focal_x if focal_y is None else focal_y)]
+        return cls(width, height, torch.stack(columns, dim=1), near, far)
+
+    @classmethod
+    def from_fov(cls, width: int, height: int, fov: _Amount,
+                 fov_direction: CameraFOV = CameraFOV.VERTICAL, **others: Any) -> PinholeIntrinsics:
+        """fov: radians, the whole angle of fov_direction. others: as of from_focal, from x0 on."""
+        side = width if fov_direction == CameraFOV.HORIZONTAL else height
+        tangent = torch.tan(fov / 2) if isinstance(fov, torch.Tensor) else math.tan(fov / 2)
+        return cls.from_focal(width, height, side / 2 / tangent, **others)
+
+    @property
+    def x0(self) -> torch.Tensor:
+        return self.params[:, 0]
+
+    @property
+    def y0(self) -> torch.Tensor:
+        return self.params[:, 1]
+
+    @property
+    def focal_x(self) -> torch.Tensor:
+        return self.params[:, 2]
+
+    @property
+    def focal_y(self) -> torch.Tensor:
+        return self.params[:, 3]
+
+    @property
+    def cx(self) -> torch.Tensor:
+        return self.width / 2 + self.x0
+
+    @property
+    def cy(self) -> torch.Tensor:
+        return self.height / 2 + self.y0
+
+    @property
+    def fov_x(self) -> torch.Tensor:
+        """[C], degrees."""
+        return self.fov(CameraFOV.HORIZONTAL)
+
+    @property
+    def fov_y(self) -> torch.Tensor:
+        """[C], degrees."""
+        return self.fov()
+
+    def tan_half_fov(self, camera_fov_direction: CameraFOV = CameraFOV.VERTICAL) -> torch.Tensor:
+        """[C]."""
+        if camera_fov_direction == CameraFOV.HORIZONTAL:
+            return self.width / 2 / self.focal_x
+        return self.height / 2 / self.focal_y
+
+    def fov(self, camera_fov_direction: CameraFOV = CameraFOV.VERTICAL,
+            in_degrees: bool = True) -> torch.Tensor:
+        """[C], the whole angle."""
+        angle = 2 * torch.atan(self.tan_half_fov(camera_fov_direction))
+        return torch.rad2deg(angle) if in_degrees else angle
+
+    def projection_matrix(self) -> torch.Tensor:
+        """[C,4,4], camera to clip coordinates, of which w is -z."""
+        zero, one = torch.zeros_like(self.x0), torch.ones_like(self.x0)
+        depth = self.far - self.near
+        rows = [[2 / self.width * self.focal_x, zero, -2 / self.width * self.x0, zero],
+                [zero, 2 / self.height * self.focal_y, -2 / self.height * self.y0, zero],
+                [zero, zero, -(self.far + self.near) / depth * one,
+                 -2 * self.far * self.near / depth * one],
+                [zero, zero, -one, zero]]
+        return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=1)
+
+    def project(self, vectors: torch.Tensor) -> torch.Tensor:
+        """Points [V,3] or [C,V,3] in cameras to clip coordinates [C,V,4]."""
+        homogeneous = torch.nn.functional.pad(vectors, (0, 1), value=1.)
+        return homogeneous @ self.projection_matrix().transpose(1, 2)
+
+    def transform(self, vectors: torch.Tensor) -> torch.Tensor:
+        """The same to NDC [C,V,3]."""
+        clip = self.project(vectors)
+        return clip[..., :3] / clip[..., 3:]
+
+    def __len__(self) -> int:
+        return len(self.params)
+
+
+def _view_matrix(rotation: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
+    """[C,4,4] of R and of where the camera is."""
+    return _rows(rotation, -rotation @ position.unsqueeze(-1))
+
+
+def _rows(rotation: torch.Tensor, translation: torch.Tensor) -> torch.Tensor:
+    """[C,4,4] of [C,3,3] and [C,3,1]."""
+    top = torch.cat([rotation.expand(len(translation), 3, 3), translation], dim=2)
+    last = top.new_tensor([0., 0, 0, 1]).expand(len(top), 1, 4)
+    return torch.cat([top, last], dim=1)
