@@ -11,6 +11,7 @@ from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.io._load import Path, load_surface
 
 __getattr__ = missing_from(__name__)
+__all__ = ["import_mesh"]
 
 
 class OffMesh(NamedTuple):
