@@ -5,6 +5,7 @@ import concurrent.futures
 import hashlib
 import importlib.util
 import json
+import math
 import multiprocessing
 import os
 import pathlib
@@ -210,6 +211,21 @@ class Gradients(unittest.TestCase):
         self.check(kaolin.metrics.render.mask_iou, *masks)
         self.check(lambda v: kaolin.ops.mesh.face_normals(v, unit=True),
                    torch.rand(1, 4, 3, 3, dtype=torch.float64, requires_grad=True))
+
+
+    def test_coordinates_that_are_no_numbers(self):
+        """torch reads NaN as -1, and its backward pass of it out of bounds."""
+        for mode in ("nearest", "bilinear", "bicubic"):
+            for shape in ((1, 40, 30, 2), (1, 900, 2)):
+                uv = torch.full(shape, math.nan)
+                uv[0, ..., 1:2] = 0.5
+                uv[0, 0] = torch.tensor([0.3, math.inf])
+                texture = torch.rand(1, 3, 64, 64, requires_grad=True)
+                uv.requires_grad_()
+                image = mesh.texture_mapping(uv, texture, mode)
+                image.sum().backward()
+                for values in (image, texture.grad, uv.grad):
+                    self.assertTrue(bool(torch.isfinite(values).all()))
 
 
 class Vectors(unittest.TestCase):

@@ -66,7 +66,8 @@ def texture_mapping(texture_coordinates: torch.Tensor, texture_maps: torch.Tenso
     check_choice(name, "mode", mode, _MODES)
     inside = texture_coordinates.clamp(0., 1.)
     u, v = (inside.unsqueeze(1) if sparse else inside).unbind(dim=-1)
-    grid = torch.stack([2 * u - 1, 1 - 2 * v], dim=-1)  # torch's v runs down
+    # torch's v runs down. NaN is -1, as torch says; but its own backward pass reads out of bounds.
+    grid = torch.stack([2 * u - 1, 1 - 2 * v], dim=-1).nan_to_num(nan=-1.0)
     texels = torch.nn.functional.grid_sample(texture_maps, grid, mode=mode, align_corners=False,
                                              padding_mode="border").permute(0, 2, 3, 1)
     return texels.squeeze(1) if sparse else texels
