@@ -22,6 +22,7 @@ from torch.autograd.function import once_differentiable
 
 from tilegrad import _arrays, _core
 from tilegrad._camera import Camera
+from tilegrad._dense import check_dense
 from tilegrad._packed import Packed
 from tilegrad._renderer import Frame, Gradients
 from tilegrad._renderer import Renderer as _Engine
@@ -135,9 +136,11 @@ def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     TypeError if they are not real numbers, ValueError if they are not six, or where the first three
     are 0 or the last three parallel to them.
     """
-    if not numbers.is_floating_point():
-        raise TypeError(f"rotation_6d: numbers have dtype {numbers.dtype}, expected torch.float32 "
-                        f"or torch.float64")
+    if not isinstance(numbers, torch.Tensor) or numbers.dtype not in (torch.float32, torch.float64):
+        kind = getattr(numbers, "dtype", type(numbers).__name__)
+        raise TypeError(f"rotation_6d: numbers have dtype {kind}, expected torch.float32 or "
+                        f"torch.float64")
+    _check("rotation_6d", "numbers", numbers)
     if numbers.ndim < 1 or numbers.shape[-1] != 6:
         raise ValueError(f"rotation_6d: numbers have shape {tuple(numbers.shape)}, expected "
                          f"(..., 6)")
@@ -197,9 +200,7 @@ class _Call:
     def _note(self, name: str, index: int, value: Any) -> None:
         if not isinstance(value, torch.Tensor):
             return
-        if value.device.type != "cpu":
-            raise TypeError(f"render: {name} is on {value.device}; tilegrad renders on the CPU: "
-                            f"give {name}.cpu()")
+        _check("render", name, value)
         if value.is_floating_point() and value.dtype not in (torch.float32, torch.float64):
             raise TypeError(f"render: {name} has dtype {value.dtype}, expected torch.float32 or "
                             f"torch.float64 ({name}.float() makes it one)")
@@ -289,6 +290,14 @@ def _engine(threads: int) -> _Engine:
     return _Engine(threads)
 
 
+def _check(function: str, name: str, tensor: torch.Tensor) -> None:
+    """TypeError unless the tensor's numbers lie in memory."""
+    if tensor.device.type != "cpu":
+        raise TypeError(f"{function}: {name} is on {tensor.device}; tilegrad renders on the CPU: "
+                        f"give {name}.cpu()")
+    check_dense(function, name, tensor)
+
+
 def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     """The parts of records behind each other, their leading axes broadcast. In the dtype of their
     tensors; numbers alone are kept in float64, as Camera keeps them, until a scene rounds them."""
@@ -299,7 +308,12 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     flat = []
     lead = torch.Size()
     for name, (value, shape) in parts.items():
-        tensor = torch.as_tensor(value, dtype=dtype)
+        if isinstance(value, torch.Tensor):
+            _check("tilegrad.torch", name, value)
+        try:
+            tensor = torch.as_tensor(value, dtype=dtype)
+        except (TypeError, ValueError, RuntimeError, OverflowError):
+            raise TypeError(f"{name} is {value!r}, expected a tensor or numbers") from None
         split = tensor.ndim - len(shape)
         if split < 0 or tensor.shape[split:] != shape:
             raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected "

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from tilegrad._arrays import Axis, Sizes, check_shape
+from tilegrad._dense import check_dense
 from tilegrad._threads import thread_count
 
 _FLOATS = (torch.float32, torch.float64)
@@ -16,13 +17,14 @@ _FLOATS = (torch.float32, torch.float64)
 
 def check_tensor(function: str, argument: str, value: Any, shape: Sequence[Axis],
                  sizes: Optional[Sizes] = None) -> None:
-    """TypeError unless `value` is a tensor on the CPU, ValueError unless it is of `shape`: see
-    tilegrad._arrays.check_shape."""
+    """TypeError unless `value` is a dense tensor on the CPU, ValueError unless it is of `shape`:
+    see tilegrad._arrays.check_shape."""
     if not isinstance(value, torch.Tensor):
         raise TypeError(f"{function}: {argument} is {type(value).__name__}, expected torch.Tensor")
     if value.device.type != "cpu":
         raise TypeError(f"{function}: {argument} is on {value.device}; tilegrad renders on the "
                         f"CPU, call .cpu() first")
+    check_dense(function, argument, value)
     check_shape(function, argument, tuple(value.shape), shape, sizes)
 
 
@@ -41,7 +43,7 @@ def check_floats(function: str, argument: str, value: Any, shape: Sequence[Axis]
 
 def to_numpy(tensor: torch.Tensor) -> np.ndarray:
     """The tensor's memory as an array; of a copy if it is not contiguous."""
-    return tensor.detach().contiguous().numpy()
+    return tensor.detach().resolve_neg().contiguous().numpy()
 
 
 def surface_tools() -> Any:

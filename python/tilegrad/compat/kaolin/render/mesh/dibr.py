@@ -90,6 +90,8 @@ def dibr_rasterization(height: int, width: int, face_vertices_z: torch.Tensor,
     Arguments as of those two. Returns features [B,H,W,C] (a tuple if face_features is a list),
     soft_mask [B,H,W], face_idx [B,H,W] int64.
     """
+    check_floats("dibr_rasterization", "face_vertices_image", face_vertices_image,
+                 ("B", "F", 3, 2))
     batch_and_faces = tuple(face_vertices_image.shape[:2])
     if isinstance(face_normals_z, torch.Tensor) and face_normals_z.ndim == 3:
         check_tensor("dibr_rasterization", "face_normals_z", face_normals_z, (*batch_and_faces, 1))
