@@ -3,13 +3,11 @@
 
 import concurrent.futures
 import hashlib
-import importlib.util
 import json
 import math
 import multiprocessing
 import os
 import pathlib
-import tempfile
 import unittest
 import warnings
 
@@ -477,51 +475,6 @@ class Extremes(unittest.TestCase):
             self.assertTrue(((mask >= 0) & (mask <= 1)).all(), trial)
             (image.sum() + mask.sum()).backward()
             self.assertTrue(torch.isfinite(corners.grad).all(), trial)
-
-
-@unittest.skipUnless(importlib.util.find_spec("tilegrad._tools"), "a build without files")
-class Files(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.root = pathlib.Path(folder.name)
-
-    def test_import_mesh(self):
-        path = self.root / "quad.obj"
-        path.write_text("v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-                        "f 1/1 2/2 3/3 4/4\n")
-        loaded = kaolin.io.obj.import_mesh(path, with_materials=True)
-        self.assertEqual(tuple(loaded.faces.shape), (2, 3))
-        corners = loaded.vertices[loaded.faces]
-        uvs = kaolin.ops.mesh.index_vertices_by_faces(loaded.uvs[None], loaded.face_uvs_idx)[0]
-        self.assertTrue(torch.equal(uvs * torch.tensor([2., 1]), corners[..., :2]))
-        with self.assertRaisesRegex(OSError, "absent.obj"):
-            kaolin.io.obj.import_mesh(self.root / "absent.obj")
-
-    def test_import_synthetic_view(self):
-        save_image = importlib.import_module("tilegrad.images").save_image
-        transform = np.vstack([np.eye(3), [[0, 0, -4]]])
-        camera = {"tf_mat": np.column_stack([transform, [0, 0, 0, 1]]).tolist(),
-                  "resolution": {"width": 4, "height": 2}, "focal_length": 1.0,
-                  "horizontal_aperture": 2.0, "clipping_range": [0.1, 100]}
-        path = self.root / "7_metadata.json"
-        path.write_text(json.dumps({"camera_properties": camera, "bbox_2d_tight": [1, 2, 3, 4],
-                                    "asset_transforms": [["x", np.eye(4).tolist()]]}))
-        rgb = np.arange(2 * 4 * 4, dtype=np.uint8).reshape(2, 4, 4)
-        save_image(self.root / "7_rgb.png", rgb)
-        save_image(self.root / "7_semantic.npy", np.eye(2, 4, dtype=np.int32))
-        view = kaolin.io.render.import_synthetic_view(self.root, 7, semantic=True, normals=True,
-                                                      bbox_2d_tight=True)
-        self.assertTrue(np.allclose(view["rgb"], rgb[..., :3] / 255))
-        self.assertEqual(view["semantic"].tolist(), np.eye(2, 4).tolist())
-        self.assertIsNone(view["normals"])
-        self.assertEqual(view["bbox_2d_tight"], [1, 2, 3, 4])
-        metadata = view["metadata"]
-        self.assertTrue(np.allclose(metadata["cam_transform"], transform))
-        self.assertTrue(np.allclose(metadata["cam_proj"], [[0.5], [1], [-1]]))
-        path.write_text("{}")
-        with self.assertRaisesRegex(ValueError, "7_metadata.json: not the metadata of a view"):
-            kaolin.io.render.import_synthetic_view(self.root, 7)
 
 
 class Processes(unittest.TestCase):
