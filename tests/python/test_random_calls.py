@@ -85,7 +85,7 @@ class Dice(random.Random):
         if kind == 8:
             return np.resize(array, tuple(self.randrange(6) for _ in range(self.randrange(5))))
         if kind == 9:
-            return np.broadcast_to(array.reshape(-1)[:1], array.shape) if array.size else array
+            return np.broadcast_to(array.flat[0], array.shape) if array.size else array
         if kind == 10:
             return np.ma.masked_array(array, mask=self.one_in(2))
         if kind == 11:
