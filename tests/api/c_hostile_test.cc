@@ -28,29 +28,10 @@
 #include <thread>
 #include <vector>
 
+#include "api/dice.h"
+
 namespace tilegrad {
 namespace {
-
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint32_t Next() {
-    state_ = state_ * 6364136223846793005u + 1442695040888963407u;
-    return static_cast<std::uint32_t>(state_ >> 33);
-  }
-  bool OneIn(std::uint32_t n) { return Next() % n == 0; }
-  template <class T>
-  T Of(std::initializer_list<T> values) {
-    return values.begin()[Next() % values.size()];
-  }
-  float Number() {
-    if (OneIn(4000)) return Of({NAN, INFINITY, -INFINITY, 3e38f, -1e30f, 1e-42f});
-    return static_cast<float>(Next() % 20001) / 10000.0f - 1.0f;
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 // All that one render was given. A float* of `arrays` has no spare room behind it.
 struct World {
@@ -375,6 +356,23 @@ class Caller {
     return d;
   }
 
+  tilegrad_frame_gradients RandomCotangents(World* scratch, const tilegrad_images& images) {
+    tilegrad_frame_gradients d_frame;
+    tilegrad_frame_gradients_init(&d_frame);
+    const auto pixels = static_cast<std::size_t>(images.count) *
+                        static_cast<std::size_t>(images.height * images.width);
+    const auto image = [&](std::size_t width, const float* given) -> const float* {
+      if (given == nullptr && !dice_.OneIn(30)) return nullptr;
+      return dice_.OneIn(3) ? nullptr : scratch->Floats(&dice_, width * pixels);
+    };
+    d_frame.color = image(3, images.color), d_frame.alpha = image(1, images.alpha);
+    d_frame.attributes = image(static_cast<std::size_t>(images.channels), images.attributes);
+    d_frame.depth = image(1, images.depth), d_frame.normals = image(3, images.normals);
+    d_frame.uv = image(2, images.uv);
+    if (dice_.OneIn(50)) d_frame.struct_size = dice_.Of<std::size_t>({0, 3, 8, SIZE_MAX});
+    return d_frame;
+  }
+
   void Backward(tilegrad_renderer* renderer, const Shot& shot) {
     tilegrad_images images;
     tilegrad_images_init(&images);
@@ -402,19 +400,7 @@ class Caller {
       if (dice_.OneIn(2)) d.back().lights = scratch.lights.back().data();
       if (d.back().lights == nullptr) scratch.lights.back().clear();
     }
-    tilegrad_frame_gradients d_frame;
-    tilegrad_frame_gradients_init(&d_frame);
-    const auto pixels = static_cast<std::size_t>(images.count) *
-                        static_cast<std::size_t>(images.height * images.width);
-    const auto image = [&](std::size_t width, const float* given) -> const float* {
-      if (given == nullptr && !dice_.OneIn(30)) return nullptr;
-      return dice_.OneIn(3) ? nullptr : scratch.Floats(&dice_, width * pixels);
-    };
-    d_frame.color = image(3, images.color), d_frame.alpha = image(1, images.alpha);
-    d_frame.attributes = image(static_cast<std::size_t>(images.channels), images.attributes);
-    d_frame.depth = image(1, images.depth), d_frame.normals = image(3, images.normals);
-    d_frame.uv = image(2, images.uv);
-    if (dice_.OneIn(50)) d_frame.struct_size = dice_.Of<std::size_t>({0, 3, 8, SIZE_MAX});
+    const tilegrad_frame_gradients d_frame = RandomCotangents(&scratch, images);
     std::size_t count = d.size();
     if (dice_.OneIn(50)) count = dice_.Of<std::size_t>({0, 2, SIZE_MAX});
     const std::int32_t add = dice_.Of({0, 1, -1});
