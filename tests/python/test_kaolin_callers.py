@@ -55,6 +55,13 @@ class Callers(unittest.TestCase):
         iou(soft, hard).backward()
         self.assertGreater(float(soft.grad.abs().max()), 0)
 
+    def test_textures_without_texels(self):
+        uv = torch.rand(1, 3, 2)
+        for size in ((0, 2), (2, 0), (0, 0)):
+            for mode in ("nearest", "bilinear", "bicubic"):
+                with self.assertRaisesRegex(ValueError, "texture_maps has no texels"):
+                    mesh.texture_mapping(uv, torch.rand(1, 4, *size), mode)
+
     def test_normals_with_an_axis_more(self):
         corners, depth = random_faces(dtype=torch.float32)
         normals = torch.tensor([[1., 1, -1, 0, 1, -1]] * 2)

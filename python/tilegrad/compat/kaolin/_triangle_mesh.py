@@ -52,6 +52,7 @@ class TriangleMesh:
 
     @property
     def device(self) -> torch.device:
+        """Of the vertices."""
         return self.vertices.device
 
     def cuda(self) -> None:

@@ -75,6 +75,7 @@ class SurfaceMesh:
 
     @property
     def batching(self) -> SurfaceMesh.Batching:
+        """NONE if vertices are [V,3]."""
         return self.Batching.NONE if self.vertices.ndim == 2 else self.Batching.FIXED
 
     def has_attribute(self, attr: str) -> bool:

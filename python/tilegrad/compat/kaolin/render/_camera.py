@@ -75,9 +75,11 @@ class Camera:
                                         lens.params.to(*args, **kwargs), lens.near, lens.far))
 
     def float(self) -> Camera:
+        """The camera in float32."""
         return self.to(torch.float32)
 
     def double(self) -> Camera:
+        """The camera in float64."""
         return self.to(torch.float64)
 
     def cpu(self) -> Camera:

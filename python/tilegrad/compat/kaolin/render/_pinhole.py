@@ -86,10 +86,12 @@ class CameraExtrinsics:
 
     @property
     def device(self) -> torch.device:
+        """Of the view matrix."""
         return self._view.device
 
     @property
     def dtype(self) -> torch.dtype:
+        """Of the view matrix."""
         return self._view.dtype
 
     def transform(self, vectors: torch.Tensor) -> torch.Tensor:
@@ -103,17 +105,19 @@ class CameraExtrinsics:
         return (ray_orig - self.t.transpose(1, 2)) @ self.R, ray_dir @ self.R
 
     def cam_pos(self) -> torch.Tensor:
-        """[C,3,1], in the world; so are the three that follow."""
+        """[C,3,1], in the world."""
         return -self.R.transpose(1, 2) @ self.t
 
     def cam_right(self) -> torch.Tensor:
+        """[C,3,1], the camera's x axis in the world."""
         return self.R[:, 0, :, None]
 
     def cam_up(self) -> torch.Tensor:
+        """[C,3,1], the camera's y axis in the world."""
         return self.R[:, 1, :, None]
 
     def cam_forward(self) -> torch.Tensor:
-        """The camera's z axis, which points away from what it sees."""
+        """[C,3,1], the camera's z axis in the world, away from what it sees."""
         return self.R[:, 2, :, None]
 
     def translate(self, t: torch.Tensor) -> None:
@@ -121,10 +125,11 @@ class CameraExtrinsics:
         self._move(self.R @ t.reshape(-1, 3, 1))
 
     def move_right(self, amount: _Amount) -> None:
-        """Along its own right; so move_up and move_forward along theirs."""
+        """Along cam_right, by a number or [C]."""
         self._move_along(0, amount)
 
     def move_up(self, amount: _Amount) -> None:
+        """Along cam_up."""
         self._move_along(1, amount)
 
     def move_forward(self, amount: _Amount) -> None:
@@ -189,26 +194,32 @@ class PinholeIntrinsics:
 
     @property
     def x0(self) -> torch.Tensor:
+        """[C], pixels, the principal point from the centre of the image."""
         return self.params[:, 0]
 
     @property
     def y0(self) -> torch.Tensor:
+        """[C], as x0."""
         return self.params[:, 1]
 
     @property
     def focal_x(self) -> torch.Tensor:
+        """[C], pixels."""
         return self.params[:, 2]
 
     @property
     def focal_y(self) -> torch.Tensor:
+        """[C], pixels."""
         return self.params[:, 3]
 
     @property
     def cx(self) -> torch.Tensor:
+        """[C], pixels, the principal point from the border of the image."""
         return self.width / 2 + self.x0
 
     @property
     def cy(self) -> torch.Tensor:
+        """[C], as cx."""
         return self.height / 2 + self.y0
 
     @property

@@ -79,11 +79,11 @@ class TexRender(_Render):
 
 
 class _SmoothRender(_Render):
-    pfmtx: Optional[torch.Tensor] = None
+    _pfmtx: Optional[torch.Tensor] = None
 
     def set_smooth(self, pfmtx: Any) -> None:
         """pfmtx: [V,F] or [1,V,F], the weights of faces' normals in those of vertices."""
-        self.pfmtx = torch.as_tensor(pfmtx).reshape(-1, *pfmtx.shape[-2:])
+        self._pfmtx = torch.as_tensor(pfmtx).reshape(-1, *pfmtx.shape[-2:])
 
     def _normals(self, points: Sequence[torch.Tensor],
                  cameras: Sequence[torch.Tensor]) -> torch.Tensor:
@@ -92,9 +92,9 @@ class _SmoothRender(_Render):
         corners = ops.mesh.index_vertices_by_faces(
             (vertices - cameras[1].reshape(-1, 1, 3)) @ cameras[0].transpose(1, 2), faces)
         normals = ops.mesh.face_normals(corners)
-        if self.pfmtx is None:
+        if self._pfmtx is None:
             return normals.unsqueeze(2).expand_as(corners)
-        return ops.mesh.index_vertices_by_faces(self.pfmtx.to(normals.dtype) @ normals, faces)
+        return ops.mesh.index_vertices_by_faces(self._pfmtx.to(normals.dtype) @ normals, faces)
 
 
 class SHRender(_SmoothRender):

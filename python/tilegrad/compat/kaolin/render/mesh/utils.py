@@ -64,6 +64,8 @@ def texture_mapping(texture_coordinates: torch.Tensor, texture_maps: torch.Tenso
     check_floats(name, "texture_maps", texture_maps, ("B", "C", "Ht", "Wt"), sizes,
                  texture_coordinates)
     check_choice(name, "mode", mode, _MODES)
+    if 0 in texture_maps.shape[2:]:
+        raise ValueError(f"{name}: texture_maps has no texels")
     inside = texture_coordinates.clamp(0., 1.)
     u, v = (inside.unsqueeze(1) if sparse else inside).unbind(dim=-1)
     # torch's v runs down. NaN is -1, as torch says; but its own backward pass reads out of bounds.
