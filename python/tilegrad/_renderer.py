@@ -183,8 +183,7 @@ class Renderer:
     for each other; renderers do not. After a fork a renderer goes on in both processes.
 
     threads: 1 to 1024; 1: only the caller's; 0: as many as TILEGRAD_NUM_THREADS in the environment
-        says, or one for each core that the process may use. Where the system refuses some, fewer
-        work, and the first call says so in a RuntimeWarning.
+        says, or one for each core. Fewer, with a RuntimeWarning, where the system refuses some.
     """
 
     __slots__ = ("_renderer", "__weakref__")

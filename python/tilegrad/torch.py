@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
-from tilegrad import _arrays, _core
+from tilegrad import _arrays, _core, _rotation
 from tilegrad._camera import Camera
 from tilegrad._dense import check_dense
 from tilegrad._packed import Packed
@@ -129,33 +129,7 @@ def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.
     return numbers if numbers.ndim == 2 else numbers[None]
 
 
-def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
-    """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
-    (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).
-
-    TypeError if they are not real numbers, ValueError if they are not six, or where the first three
-    are 0 or the last three parallel to them.
-    """
-    if not isinstance(numbers, torch.Tensor) or numbers.dtype not in (torch.float32, torch.float64):
-        kind = getattr(numbers, "dtype", type(numbers).__name__)
-        raise TypeError(f"rotation_6d: numbers have dtype {kind}, expected torch.float32 or "
-                        f"torch.float64")
-    _check("rotation_6d", "numbers", numbers)
-    if numbers.ndim < 1 or numbers.shape[-1] != 6:
-        raise ValueError(f"rotation_6d: numbers have shape {tuple(numbers.shape)}, expected "
-                         f"(..., 6)")
-    first, second = numbers[..., :3], numbers[..., 3:]
-    x = torch.nn.functional.normalize(first, dim=-1)
-    across = second - (x * second).sum(-1, keepdim=True) * x
-    y = torch.nn.functional.normalize(across, dim=-1)
-    z = torch.cross(x, y, dim=-1)
-    with torch.no_grad():
-        rounding = 8 * torch.finfo(numbers.dtype).eps * second.norm(dim=-1)
-        if not ((z.norm(dim=-1) > 0.5) & (across.norm(dim=-1) > rounding)).all():
-            raise ValueError("rotation_6d: of six numbers the first three are 0, or the last "
-                             "three parallel to them")
-    return torch.stack([x, y, z], dim=-2)
-
+rotation_6d = _rotation.rotation_6d
 
 _OPTIONS = frozenset(("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule",
                       "paper_box", "paper_faces"))
@@ -200,7 +174,7 @@ class _Call:
     def _note(self, name: str, index: int, value: Any) -> None:
         if not isinstance(value, torch.Tensor):
             return
-        _check("render", name, value)
+        check_dense("render", name, value)
         if value.is_floating_point() and value.dtype not in (torch.float32, torch.float64):
             raise TypeError(f"render: {name} has dtype {value.dtype}, expected torch.float32 or "
                             f"torch.float64 ({name}.float() makes it one)")
@@ -290,14 +264,6 @@ def _engine(threads: int) -> _Engine:
     return _Engine(threads)
 
 
-def _check(function: str, name: str, tensor: torch.Tensor) -> None:
-    """TypeError unless the tensor's numbers lie in memory."""
-    if tensor.device.type != "cpu":
-        raise TypeError(f"{function}: {name} is on {tensor.device}; tilegrad renders on the CPU: "
-                        f"give {name}.cpu()")
-    check_dense(function, name, tensor)
-
-
 def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     """The parts of records behind each other, their leading axes broadcast. In the dtype of their
     tensors; numbers alone are kept in float64, as Camera keeps them, until a scene rounds them."""
@@ -309,7 +275,7 @@ def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:
     lead = torch.Size()
     for name, (value, shape) in parts.items():
         if isinstance(value, torch.Tensor):
-            _check("tilegrad.torch", name, value)
+            check_dense("tilegrad.torch", name, value)
         try:
             tensor = torch.as_tensor(value, dtype=dtype)
         except (TypeError, ValueError, RuntimeError, OverflowError):

@@ -21,9 +21,6 @@ def check_tensor(function: str, argument: str, value: Any, shape: Sequence[Axis]
     see tilegrad._arrays.check_shape."""
     if not isinstance(value, torch.Tensor):
         raise TypeError(f"{function}: {argument} is {type(value).__name__}, expected torch.Tensor")
-    if value.device.type != "cpu":
-        raise TypeError(f"{function}: {argument} is on {value.device}; tilegrad renders on the "
-                        f"CPU, call .cpu() first")
     check_dense(function, argument, value)
     check_shape(function, argument, tuple(value.shape), shape, sizes)
 
