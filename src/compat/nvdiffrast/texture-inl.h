@@ -32,7 +32,7 @@ HWY_INLINE Quad Mixture(const TapQuads& q, const float (&weight)[4], Quad sum) {
   return sum;
 }
 
-// Pixels [first, first + count) of `task`, count at most kRun.
+// Pixels first to first + count - 1, count at most kRun.
 HWY_INLINE void SampleRun(const TextureInput<float>& input, const ImageLevels& levels,
                           std::size_t first, std::size_t count, std::span<float> out,
                           const float* end) {
@@ -43,6 +43,7 @@ HWY_INLINE void SampleRun(const TextureInput<float>& input, const ImageLevels& l
   const bool nearest = input.filter == TextureFilter::kNearest;
   for (std::size_t p = 0; p < count; ++p) {
     float* to = out.data() + (first + p) * n;
+    FetchAhead(levels.at, n, run, p, count);
     for (std::size_t c = 0; c < n; c += 4) {
       const TapQuads fine(levels, run.taps[0], p, c);
       if (nearest) {
@@ -185,6 +186,7 @@ void PullCoordinatesOfBand(const TextureInput<float>& input, const Band& band,
     const RunCoordinates at(input, first, count);
     LookUp(input, at, count, &run);
     for (std::size_t p = 0; p < count; ++p) {
+      FetchAhead(levels.at, levels.channels, run, p, count);
       PullPixel(levels, run, p, d_out.data() + (first + p) * input.channels, d_end, &pull);
     }
     for (std::size_t p = count; p % lanes != 0; ++p) pull.Clear(p);

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/prefetch.h"
 #include "compat/nvdiffrast/quads-inl.h"
 #include "compat/nvdiffrast/texture.h"
 #include "compat/nvdiffrast/texture_taps-inl.h"
@@ -85,6 +86,23 @@ struct TapQuads {
     if (mean >= 0) t[mean] = hn::Mul(sum, hn::Set(d, 1.0f / 3));
   }
 };
+
+// Fetches what the pixel kAhead pixels after p reads: textures are larger than caches, and where
+// their texels are is known by then. levels: as ImageLevels::at; count: pixels of the run.
+inline constexpr std::size_t kAhead = 16;
+template <class Number>
+HWY_INLINE void FetchAhead(Number* const* levels, std::size_t channels, const LookupRun& run,
+                           std::size_t p, std::size_t count) {
+  if (p + kAhead >= count) return;
+  for (int i = 0; i < (run.mixes ? 2 : 1); ++i) {
+    const TapRun& taps = run.taps[i];
+    const std::int32_t level = taps.level[p + kAhead], *texel = taps.texel[p + kAhead];
+    if (level < 0 || HWY_MIN(texel[0], texel[2]) < 0) continue;
+    Number* at = levels[static_cast<std::size_t>(level)];
+    PrefetchLine(at + static_cast<std::size_t>(texel[0]) * channels);
+    PrefetchLine(at + static_cast<std::size_t>(texel[2]) * channels);
+  }
+}
 
 // Calls visit(first pixel, count) for the runs of a band, in order.
 template <class Visit>

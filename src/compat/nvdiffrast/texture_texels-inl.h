@@ -153,6 +153,7 @@ void PullTexelsOfBand(const TextureInput<float>& input, const Band& band,
     LookUp(input, at, count, &run);
     for (std::size_t p = 0; p < count; ++p) {
       const float* g = d_out.data() + (first + p) * n;
+      FetchAhead(d_levels, n, run, p, count);
       if (!HasCotangent(g, n, end)) continue;
       for (int i = 0; i < 2 && run.taps[i].level[p] >= 0; ++i) {
         if (n > 4) {
