@@ -91,17 +91,27 @@ class RunSums {
  private:
   HWY_INLINE void Flush() {
     double* to = faces_->Row(static_cast<std::size_t>(face_) - 1);
-    for (std::size_t i = 0; i < K::kSums && K::kKnown; ++i) Put(kept_[i], i);
-    const std::size_t n = 4 * (K::kKnown ? K::kSums : 3 * values_ + 2 * slopes_);
-    for (std::size_t i = 0; i < n; ++i) to[i] += double{memory_[i]};
+    const std::size_t quads = K::kKnown ? K::kSums : 3 * values_ + 2 * slopes_;
+    for (std::size_t i = 0; i < quads; ++i) AddWide(Sum(i), to + 4 * i);
     Clear();
+  }
+  static HWY_INLINE void AddWide(Quad v, double* to) {
+    const hn::FixedTag<double, 2> d;
+    const hn::Half<QuadTag> half;
+    hn::StoreU(hn::Add(hn::LoadU(d, to), hn::PromoteTo(d, hn::LowerHalf(half, v))), d, to);
+    to += 2;
+    hn::StoreU(hn::Add(hn::LoadU(d, to), hn::PromoteTo(d, hn::UpperHalf(half, v))), d, to);
+  }
+  HWY_INLINE Quad Sum(std::size_t i) const {
+    if constexpr (K::kKnown) return kept_[i];
+    return hn::Load(QuadTag(), memory_ + 4 * i);
   }
   HWY_INLINE void Put(Quad v, std::size_t i) { hn::Store(v, QuadTag(), memory_ + 4 * i); }
   HWY_INLINE void Add(std::size_t i, Quad weight, Quad g) {
     if constexpr (K::kKnown) {
       kept_[i] = hn::MulAdd(weight, g, kept_[i]);
     } else {
-      Put(hn::MulAdd(weight, g, hn::Load(QuadTag(), memory_ + 4 * i)), i);
+      Put(hn::MulAdd(weight, g, Sum(i)), i);
     }
   }
   HWY_INLINE void Clear() {
