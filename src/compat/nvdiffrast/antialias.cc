@@ -23,33 +23,33 @@ struct Blend {
   std::int32_t ends[2];  // vertices of the edge
 };
 
-// Two pixels next to each other, the one that shows the nearer face first.
-struct PixelPair {
-  std::size_t front, back;
-  PixelStep step;
-};
-
 struct PixelAt {
   int x, y;
 };
 
-// The pair of a pixel and the next one along an axis, unless both show the same.
+// Two pixels next to each other along an axis, the one that shows the nearer face first.
+struct PixelPair {
+  std::size_t front, back;
+  PixelAt at;  // of `front`
+  int axis, direction;
+};
+
+// The pair of a pixel and the next one along an axis, which show different faces.
 template <class T>
-std::optional<PixelPair> PairAt(const AntialiasInput<T>& input, std::size_t pixel,
-                                const PixelAt& at, int axis) {
+PixelPair PairAt(const AntialiasInput<T>& input, std::size_t pixel, const PixelAt& at, int axis) {
   const std::size_t next = pixel + (axis == 0 ? 1 : input.grid.row());
   const T* here = &input.rast[4 * pixel];
   const T* there = &input.rast[4 * next];
-  if (here[3] == there[3]) return std::nullopt;
   const std::int32_t face = FaceOf(here), other = FaceOf(there);
-  const bool forwards = other < 0 || (face >= 0 && here[2] <= there[2]);
-  const double scale[2] = {0.5 * input.grid.width, 0.5 * input.grid.height};
-  const int past = forwards ? 0 : 1;
-  const PixelCentre from =
-      CentreOf(input.grid, at.x + (axis == 0 ? past : 0), at.y + (axis == 1 ? past : 0));
-  return PixelPair{forwards ? pixel : next,
-                   forwards ? next : pixel,
-                   {from, axis, forwards ? 1 : -1, {scale[0], scale[1]}}};
+  if (other < 0 || (face >= 0 && here[2] <= there[2])) return {pixel, next, at, axis, 1};
+  return {next, pixel, {at.x + (axis == 0 ? 1 : 0), at.y + axis}, axis, -1};
+}
+
+PixelStep StepOf(const PixelGrid& grid, const PixelPair& pair) {
+  return {CentreOf(grid, pair.at.x, pair.at.y),
+          pair.axis,
+          pair.direction,
+          {0.5 * grid.width, 0.5 * grid.height}};
 }
 
 template <class T>
@@ -90,17 +90,20 @@ class Silhouettes {
   }
   template <class T>
   static bool IsSilhouette(const AntialiasInput<T>& input, std::size_t image, std::int32_t side) {
-    const auto corner = [&](std::int32_t s, int k) {
-      return input.positions.at(image,
-                                input.faces[static_cast<std::size_t>(s - s % 3 + (s + k) % 3)]);
+    const auto vertex = [&](std::int32_t s, int k) {
+      return input.faces[static_cast<std::size_t>(s - s % 3 + (s + k) % 3)];
     };
     const auto next = [&](std::int32_t s) {
       return input.rings->next[static_cast<std::size_t>(s)];
     };
-    const T *a = corner(side, 0), *b = corner(side, 1);
-    const double own = SideOf(a, b, corner(side, 2));
+    const std::int32_t ends[2] = {vertex(side, 0), vertex(side, 1)};
+    const T *a = input.positions.at(image, ends[0]), *b = input.positions.at(image, ends[1]);
+    const double own = SideOf(a, b, input.positions.at(image, vertex(side, 2)));
     for (std::int32_t other = next(side); other != side; other = next(other)) {
-      if (own * SideOf(a, b, corner(other, 2)) < 0) return false;
+      const std::int32_t third = vertex(other, 2);
+      // Of a face without area rounding would choose the side.
+      if (third == ends[0] || third == ends[1]) continue;
+      if (own * SideOf(a, b, input.positions.at(image, third)) < 0) return false;
     }
     return true;
   }
@@ -115,21 +118,22 @@ std::optional<Blend> BlendOf(const AntialiasInput<T>& input, std::size_t image,
                              const PixelPair& pair, Silhouettes* silhouettes) {
   const std::int32_t face = FaceOf(&input.rast[4 * pair.front]);
   const unsigned edges = silhouettes->Of(input, image, face);
-  if (edges == 0) return std::nullopt;
+  if (edges == 0) return std::nullopt;  // most of them
+  const PixelStep step = StepOf(input.grid, pair);
   const std::int32_t* v = &input.faces[3 * static_cast<std::size_t>(face)];
   WayPoint<double> corner[3];
-  for (int k = 0; k < 3; ++k) corner[k] = VertexOnWay(input, image, v[k], pair.step);
+  for (int k = 0; k < 3; ++k) corner[k] = VertexOnWay(input, image, v[k], step);
   for (int k = 0; k < 3; ++k) {
     double t;
     const int n = (k + 1) % 3;
-    if ((edges >> k & 1) == 0 || !CrossesWay(pair.step, corner[k], corner[n], &t)) continue;
+    if ((edges >> k & 1) == 0 || !CrossesWay(step, corner[k], corner[n], &t)) continue;
     const bool own = t < 0.5;
     return Blend{own ? pair.front : pair.back,
                  own ? pair.back : pair.front,
                  own ? 0.5 - t : t - 0.5,
                  t,
                  own ? -1.0 : 1.0,
-                 pair.step,
+                 step,
                  {v[k], v[n]}};
   }
   return std::nullopt;
@@ -142,17 +146,16 @@ void FindBlendsOfRow(const AntialiasInput<T>& input, std::size_t image, int y,
                      Silhouettes* silhouettes, std::vector<Blend>* out) {
   const PixelGrid& grid = input.grid;
   std::size_t pixel = grid.first(image, y);
-  const bool last_row = y + 1 == grid.height;
   const T* id = &input.rast[4 * pixel + 3];
-  const std::size_t above = last_row ? 0 : 4 * grid.row();
+  // To the next pixels' ids; to itself at the border.
+  const std::size_t above = y + 1 == grid.height ? 0 : 4 * grid.row();
   for (int x = 0; x < grid.width; ++x, ++pixel, id += 4) {
-    const std::size_t beside = x + 1 == grid.width ? 0 : 4;
-    if (id[0] == id[beside] && id[0] == id[above]) continue;  // most of them
+    const std::size_t next[2] = {x + 1 == grid.width ? 0 : std::size_t{4}, above};
+    if (id[0] == id[next[0]] && id[0] == id[next[1]]) continue;  // most of them
     for (int axis = 0; axis < 2; ++axis) {
-      if (axis == 0 ? beside == 0 : last_row) continue;
-      const auto pair = PairAt(input, pixel, {x, y}, axis);
-      if (!pair.has_value()) continue;
-      if (const auto blend = BlendOf(input, image, *pair, silhouettes)) out->push_back(*blend);
+      if (id[0] == id[next[axis]]) continue;
+      const PixelPair pair = PairAt(input, pixel, {x, y}, axis);
+      if (const auto blend = BlendOf(input, image, pair, silhouettes)) out->push_back(*blend);
     }
   }
 }

@@ -131,6 +131,25 @@ TEST(Antialias, InASoupEveryEdgeIsASilhouette) {
   }
 }
 
+// Faces that name a vertex twice lie on no side of their edges.
+TEST(Antialias, FacesWithoutAreaHideNoEdge) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Scene<double> scene = WavyGrid(2, seed, 24, 24);
+    const auto rast = Rasterize(scene).rast;
+    const auto color = RandomNumbers<double>(scene.grid().pixels(), 2);
+    const auto blend = [&] {
+      const EdgeRings rings = BuildEdgeRings(scene.faces);
+      return Antialiased(InputOf(scene, rings, rast, color, 1));
+    };
+    const auto expected = blend();
+    for (std::int32_t v = 0; v < 9; ++v) {
+      for (std::int32_t w = 0; w < 9; ++w)
+        scene.faces.insert(scene.faces.end(), {v, w, w, v, v, w});
+    }
+    EXPECT_EQ(blend(), expected) << seed;
+  }
+}
+
 TEST(Antialias, EdgesInsideOfASurfaceAreLeftAlone) {
   const Scene<double> scene = WavyGrid(3, 1, 24, 24);
   const auto rast = Rasterize(scene).rast;
