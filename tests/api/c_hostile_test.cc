@@ -181,6 +181,15 @@ bool AllWritten(std::span<const float> values) {
   return std::all_of(values.begin(), values.end(), IsWritten);
 }
 
+// A scene of an older struct_size as the library reads it: the fields behind its end are those of
+// tilegrad_scene_init, whatever stands there.
+tilegrad_scene AsRead(const tilegrad_scene& given) {
+  tilegrad_scene out;
+  tilegrad_scene_init(&out);
+  std::memcpy(&out, &given, std::min(given.struct_size, sizeof out));
+  return out;
+}
+
 // Every image that was asked for, in the order of options.
 std::vector<std::span<const float>> Planes(const tilegrad_images& i) {
   const auto pixels =
@@ -384,8 +393,7 @@ class Caller {
     std::vector<std::vector<float*>> textures;
     const bool rendered = images.face_ids != nullptr;
     for (const tilegrad_scene& s : world.scenes) {
-      const bool known = rendered && s.struct_size > offsetof(tilegrad_scene, vertices);
-      d.push_back(RandomGradients(&scratch, known ? s : tilegrad_scene()));
+      d.push_back(RandomGradients(&scratch, rendered ? AsRead(s) : tilegrad_scene()));
       if (!rendered || s.struct_size != sizeof s) continue;
       textures.emplace_back();
       for (std::size_t t = 0; t < s.texture_count; ++t) {
