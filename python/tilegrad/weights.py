@@ -54,7 +54,7 @@ def save_weights(path: Path, weights: Mapping[str, Any],
 class Checkpoint:
     """A state of a training run. step: steps done; image_size: pixels; config: TOML; seconds:
     trained so far; weights: every weight, statistic and moment by name; warnings: newer files of
-    the run that could not be read."""
+    the run that are damaged."""
 
     file: str
     step: int

@@ -173,6 +173,16 @@ Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint
   return file;
 }
 
+Result<std::map<std::string, std::string>> SafetensorsMetadata(
+    std::span<const std::uint8_t> bytes) {
+  TILEGRAD_ASSIGN(const Header header, ParseHeader(bytes));
+  std::map<std::string, std::string> metadata;
+  if (header.json.contains(kMetadata)) {
+    TILEGRAD_TRY(ParseMetadata(header.json[kMetadata], metadata));
+  }
+  return metadata;
+}
+
 Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
   auto file = DecodeSafetensors(context, bytes);

@@ -23,6 +23,8 @@ struct TensorFile {
 // against the file before it allocates; an inconsistent or truncated file gives kDataLoss, whose
 // message names the tensor.
 Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint8_t> bytes);
+// The metadata alone: also of files whose tensors this cannot read.
+Result<std::map<std::string, std::string>> SafetensorsMetadata(std::span<const std::uint8_t> bytes);
 Result<TensorFile> ReadSafetensors(Context& context, const Path& path);
 
 // Names must be unique and not "__metadata__"; they and the metadata UTF-8.

@@ -11,7 +11,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr const char* kFormat = "tilegrad-checkpoint-1";
+constexpr std::string_view kFormatName = "tilegrad-checkpoint-", kFormat = "tilegrad-checkpoint-1";
 constexpr std::string_view kPrefix = "step_", kSuffix = ".safetensors";
 constexpr const char* kChecksum = "checksum";
 
@@ -57,7 +57,7 @@ std::optional<std::int64_t> StepOf(const Path& file) {
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors) {
   nn::TensorFile file{std::move(tensors),
-                      {{"format", kFormat},
+                      {{"format", std::string(kFormat)},
                        {"step", std::to_string(info.step)},
                        {"image_size", std::to_string(info.image_size)},
                        {"seconds", fmt::format("{}", info.seconds)},
@@ -67,33 +67,76 @@ Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                               file);
 }
 
-Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& path) {
-  TILEGRAD_ASSIGN(nn::TensorFile file, nn::ReadSafetensors(context, path));
-  const auto& m = file.metadata;
-  // Those of earlier versions have none.
-  if (m.count(kChecksum) > 0 && m.at(kChecksum) != ChecksumOf(file)) {
-    return DataLoss("{}: its contents do not match its checksum: the file was damaged",
-                    path.string());
+namespace {
+
+Status CheckFormat(const std::map<std::string, std::string>& metadata, const Path& path) {
+  const auto format = metadata.find("format");
+  if (format != metadata.end() && format->second == kFormat) return {};
+  if (format != metadata.end() && format->second.starts_with(kFormatName)) {
+    return DataLoss(
+        "{}: of another version of tilegrad, which reads it: its format is \"{}\", not \"{}\"",
+        path.string(), format->second, kFormat);
   }
+  return DataLoss(
+      "{}: a safetensors file, but not a checkpoint of tilegrad: its metadata has no "
+      "format of that name",
+      path.string());
+}
+
+Status CheckChecksum(const nn::TensorFile& file, const Path& path) {
+  const auto checksum = file.metadata.find(kChecksum);
+  // Those of earlier versions have none.
+  if (checksum == file.metadata.end() || checksum->second == ChecksumOf(file)) return {};
+  return DataLoss("{}: its contents do not match its checksum: the file was damaged",
+                  path.string());
+}
+
+// The tensors and metadata, if all is as it was written. What is no safetensors file, or one that
+// is cut short, has lost its checksum with the rest.
+Result<nn::TensorFile> WholeContents(nn::Context& context, std::span<const std::uint8_t> bytes,
+                                     const Path& path) {
+  auto file = nn::DecodeSafetensors(context, bytes);
+  if (!file.ok()) return file.status().Within(path.string());
+  TILEGRAD_TRY(CheckChecksum(*file, path));
+  return file;
+}
+
+// `damaged`: the bytes are not those that were written. Any other error may be one of this program
+// or of the moment (a newer format, no permission, no memory), and the file a good one.
+Result<Checkpoint> Load(nn::Context& context, const Path& path, bool* damaged) {
+  *damaged = false;
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
+  // First, since other versions may store tensors as this one cannot read them.
+  if (const auto metadata = nn::SafetensorsMetadata(bytes); metadata.ok()) {
+    TILEGRAD_TRY(CheckFormat(*metadata, path));
+  }
+  auto file = WholeContents(context, bytes, path);
+  *damaged = !file.ok();
+  if (!file.ok()) return file.status();
+  const auto& m = file->metadata;
   const auto step = Number<std::int64_t>(m, "step"),
              image_size = Number<std::int64_t>(m, "image_size");
   const auto seconds = Number<double>(m, "seconds");
-  if (m.count("format") == 0 || m.at("format") != kFormat || !step || !image_size || !seconds ||
-      m.count("config") == 0) {
+  if (!step || !image_size || !seconds || m.count("config") == 0) {
     return DataLoss(
-        "{}: a safetensors file, but not a checkpoint of tilegrad (its metadata lacks format, "
-        "step, image_size, seconds "
-        "or config)",
+        "{}: not a checkpoint of tilegrad: its metadata lacks step, image_size, seconds or config",
         path.string());
   }
-  return Checkpoint{{*step, *image_size, m.at("config"), *seconds}, std::move(file.tensors)};
+  return Checkpoint{{*step, *image_size, m.at("config"), *seconds}, std::move(file->tensors)};
 }
 
-std::vector<Path> ListCheckpoints(const Path& run) {
+// As ListCheckpoints. An error where the folder is there and cannot be read: that is not a run
+// without checkpoints.
+Result<std::vector<Path>> FindFiles(const Path& run) {
   std::vector<std::pair<std::int64_t, Path>> found;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(Folder(run), error)) {
-    if (const auto step = StepOf(entry.path())) found.emplace_back(*step, entry.path());
+  for (std::filesystem::directory_iterator at(Folder(run), error), end; !error && at != end;
+       at.increment(error)) {
+    if (const auto step = StepOf(at->path())) found.emplace_back(*step, at->path());
+  }
+  if (error && error != std::errc::no_such_file_or_directory) {
+    return IoError("{}: cannot list its files: {}; nothing was changed", Folder(run).string(),
+                   error.message());
   }
   std::sort(found.begin(), found.end());
   std::vector<Path> files;
@@ -101,23 +144,42 @@ std::vector<Path> ListCheckpoints(const Path& run) {
   return files;
 }
 
+}  // namespace
+
+Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& path) {
+  bool damaged = false;
+  return Load(context, path, &damaged);
+}
+
+std::vector<Path> ListCheckpoints(const Path& run) {
+  auto files = FindFiles(run);
+  return files.ok() ? std::move(files).value() : std::vector<Path>();
+}
+
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
-  std::vector<Path> files = ListCheckpoints(run);
+  TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
   if (files.empty()) return NotFound("{}: no checkpoint in it", Folder(run).string());
   FoundCheckpoint found;
-  Status first_failure;
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
-    auto checkpoint = LoadCheckpoint(context, *file);
+    bool damaged = false;
+    auto checkpoint = Load(context, *file, &damaged);
     if (checkpoint.ok()) {
       found.checkpoint = std::move(checkpoint).value();
       found.file = *file;
       return found;
     }
-    found.warnings.push_back(checkpoint.status().message());
+    const Status status = checkpoint.status();
+    if (!damaged) {
+      return Status(status.code(), status.message() +
+                                       "; nothing was changed: once that is mended it goes on from "
+                                       "here, or from the checkpoint before, if this file is moved "
+                                       "away");
+    }
+    found.warnings.push_back(status.message());
     found.broken.push_back(*file);
-    if (first_failure.ok()) first_failure = checkpoint.status();
   }
-  return first_failure;
+  return DataLoss("{}; no checkpoint of this run is whole: begin anew in another folder",
+                  found.warnings[0]);
 }
 
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {

@@ -34,11 +34,13 @@ Result<Checkpoint> LoadCheckpoint(nn::Context& context, const Path& file);
 struct FoundCheckpoint {
   Checkpoint checkpoint;
   Path file;
-  std::vector<std::string> warnings;  // newer files that could not be read
+  std::vector<std::string> warnings;  // newer files that are damaged
   std::vector<Path> broken;           // these files
 };
-// The newest one that is whole. NotFound if there is none, DataLoss naming the first reason if
-// there are only broken ones.
+// The newest one that is whole. Passed over are only files that are damaged: cut short, or of
+// another checksum. One that cannot be read for another reason (another version's format,
+// permissions, memory) is an error, as going on from an older one would throw away what it holds.
+// NotFound if there is none, DataLoss naming the first reason if there are only damaged ones.
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run);
 
 // The newest one of a run's folder, or the one file that `path` is.

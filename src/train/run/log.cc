@@ -64,9 +64,10 @@ Result<std::vector<LogEntry>> ReadLog(const Path& run) {
 
 Result<RunLog> RunLog::Open(const Path& run, std::int64_t step) {
   std::string lines, events = TensorboardVersionRecord(WallTime());
-  if (std::filesystem::exists(MetricsFile(run))) {
-    TILEGRAD_ASSIGN(const auto entries, ReadLog(run));
-    for (const LogEntry& entry : entries) {
+  auto entries = ReadLog(run);
+  if (!entries.ok() && entries.status().code() != StatusCode::kNotFound) return entries.status();
+  if (entries.ok()) {
+    for (const LogEntry& entry : *entries) {
       if (entry.step > step) continue;
       lines += ToLine(entry);
       events += TensorboardScalarsRecord(WallTime(), entry.step, entry.values);

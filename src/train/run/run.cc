@@ -68,8 +68,8 @@ class Session {
 Status Session::Open() {
   TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
   TILEGRAD_TRY(CheckExistingRun(plan_, work_));
-  RemoveHalfWritten(plan_.folder);
   TILEGRAD_TRY(Restore());
+  RemoveHalfWritten(plan_.folder);
   TILEGRAD_TRY(work_.Begin(first_step_));
   PruneCheckpoints(plan_.folder, plan_.schedule.keep_checkpoints);
   TILEGRAD_ASSIGN(log_, RunLog::Open(plan_.folder, first_step_));
@@ -161,7 +161,11 @@ RunOutcome Session::outcome() const {
 
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
   const Path config_file = plan.folder / "config.toml";
-  const bool started = std::filesystem::exists(config_file);
+  std::error_code error;
+  const bool started = std::filesystem::exists(config_file, error);
+  if (error) {
+    return IoError("{}: cannot be looked for: {}", config_file.string(), error.message());
+  }
   // Checkpoints alone are a run, too.
   if ((started || !ListCheckpoints(plan.folder).empty()) && plan.existing == ExistingRun::kRefuse) {
     return InvalidArgument(

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which checkpoint a run goes on from when not all of them can be read: only damaged ones are
+// passed over, and nothing that may be whole is renamed.
+#include "train/run/checkpoint.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <set>
+
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "tiny_run.h"
+#include "train/predictor.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train {
+namespace {
+
+class CheckpointTest : public TempFolderTest {
+ protected:
+  CheckpointTest() : workers_(1), context_(workers_) {
+    for (const std::int64_t step : {10, 20}) {
+      EXPECT_TRUE(SaveCheckpoint(folder_, {step, 64, "", 0}, Tensors()).ok());
+    }
+    newest_ = folder_ / "checkpoints/step_00000020.safetensors";
+  }
+
+  std::vector<nn::NamedTensor> Tensors() { return {{"w", context_.Full({3}, 1)}}; }
+
+  // The newest checkpoint with another `key`; a tensor of a dtype that this version does not know.
+  void Rewrite(const std::string& key, const std::string& value, bool other_dtype = false) {
+    nn::TensorFile file =
+        nn::ReadSafetensors(context_, folder_ / "checkpoints/step_00000010.safetensors").value();
+    file.metadata[key] = value;
+    Bytes bytes = nn::EncodeSafetensors(file).value();
+    std::string text(bytes.begin(), bytes.end());
+    if (other_dtype) text.replace(text.find("\"F32\""), 5, "\"B32\"");
+    Write("checkpoints/step_00000020.safetensors", text);
+  }
+
+  // Neither an older checkpoint nor none, and all files as they are.
+  void ExpectStops(const std::string& reason) {
+    std::vector<Path> before = Files();
+    const Status status = LoadNewestCheckpoint(context_, folder_).status();
+    ExpectMessage(status, "step_00000020", reason, "nothing was changed", "moved away");
+    EXPECT_EQ(Files(), before);
+  }
+  std::vector<Path> Files() const {
+    std::set<Path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "checkpoints"))
+      files.insert(entry.path());
+    return {files.begin(), files.end()};
+  }
+
+  Workers workers_;
+  nn::Context context_;
+  Path newest_;
+};
+
+TEST_F(CheckpointTest, AnotherVersionsIsNotDamaged) {
+  Rewrite("format", "tilegrad-checkpoint-2");
+  ExpectStops("another version");
+  Rewrite("format", "tilegrad-checkpoint-2", /*other_dtype=*/true);
+  ExpectStops("\"tilegrad-checkpoint-2\"");
+  Rewrite("format", "somebody's");
+  ExpectStops("not a checkpoint of tilegrad");
+}
+
+TEST_F(CheckpointTest, OneThatTheSystemDoesNotGiveIsNotDamaged) {
+  std::filesystem::remove(newest_);
+  std::filesystem::create_symlink(newest_, newest_);  // also stops root, unlike permissions
+  ExpectStops("cannot open");
+  std::filesystem::remove(newest_);
+  std::filesystem::create_directory(newest_);
+  ExpectStops("not a regular file");
+}
+
+TEST_F(CheckpointTest, OneAboveTheLimitIsNotDamaged) {
+  std::filesystem::resize_file(newest_, (std::size_t{4} << 30) + 1);  // without taking space
+  ExpectStops("more than the limit");
+}
+
+TEST_F(CheckpointTest, NoFileHandleIsNoDamage) {
+  rlimit before = {};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit none = {3, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const Status status = LoadNewestCheckpoint(context_, folder_).status();
+  const auto alone = LoadCheckpoint(context_, newest_).status();
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  ExpectMessage(status, "cannot list", "nothing was changed");
+  EXPECT_EQ(status.code(), StatusCode::kIo);
+  EXPECT_EQ(alone.code(), StatusCode::kIo);
+  EXPECT_TRUE(LoadNewestCheckpoint(context_, folder_).ok());
+}
+
+TEST_F(CheckpointTest, AFolderThatCannotBeListedIsNoNewRun) {
+  std::filesystem::remove_all(folder_ / "checkpoints");
+  EXPECT_EQ(LoadNewestCheckpoint(context_, folder_).status().code(), StatusCode::kNotFound);
+  std::filesystem::create_symlink(folder_ / "checkpoints", folder_ / "checkpoints");
+  ExpectMessage(LoadNewestCheckpoint(context_, folder_).status(), "checkpoints", "cannot list");
+}
+
+TEST_F(CheckpointTest, WhatIsDamagedIsPassedOver) {
+  const Bytes whole = ReadFile(newest_).value();
+  Bytes other = whole;
+  other.back() ^= 1;
+  const Bytes cut(whole.begin(), whole.begin() + 20);
+  for (const Bytes& bytes : {other, cut, Bytes()}) {
+    Write("checkpoints/step_00000020.safetensors", bytes);
+    const auto found = LoadNewestCheckpoint(context_, folder_);
+    ASSERT_TRUE(found.ok()) << found.status().message();
+    EXPECT_EQ(found->checkpoint.info.step, 10);
+    EXPECT_EQ(found->broken, std::vector<Path>{newest_});
+  }
+}
+
+class ResumeTest : public TempFolderTest {
+ protected:
+  ResumeTest() : workers_(1), context_(workers_) {
+    EXPECT_TRUE(WriteNoiseDataset(folder_ / "data").ok());
+    job_.config = ParseConfig(kTinyConfig, "tiny").value();
+    job_.config.schedule.steps = 4;
+    job_.data = folder_ / "data", job_.run = folder_ / "run";
+    EXPECT_TRUE(Train(job_, workers_, kSilent, stop_).ok());
+    job_.existing = ExistingRun::kContinue;
+    const Path newest = ListCheckpoints(job_.run).back();
+    nn::TensorFile file = nn::ReadSafetensors(context_, newest).value();
+    file.metadata["format"] = "tilegrad-checkpoint-2";
+    EXPECT_TRUE(nn::WriteSafetensors(newest, file).ok());
+  }
+  static inline const ProgressSink kSilent = [](const Progress&) {};
+  Workers workers_;
+  nn::Context context_;
+  TrainJob job_;
+  StopFlag stop_ = false;
+};
+
+// The run, and everything that takes weights from a run's folder.
+TEST_F(ResumeTest, StopsAtAnotherVersionsCheckpoint) {
+  const Bytes log = ReadFile(job_.run / "metrics.jsonl").value();
+  std::vector<std::string> warnings;
+  job_.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+  ExpectMessage(Train(job_, workers_, kSilent, stop_).status(), "step_00000004", "another version");
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_EQ(ReadFile(job_.run / "metrics.jsonl").value(), log);
+  EXPECT_EQ(ListCheckpoints(job_.run).size(), 2u);
+  for (const Path& path : {job_.run, ListCheckpoints(job_.run).back()}) {
+    ExpectMessage(Predictor::Load(path, workers_).status(), "step_00000004", "another version");
+  }
+  // The remedy that the message names.
+  std::filesystem::rename(ListCheckpoints(job_.run).back(), folder_ / "aside");
+  const auto outcome = Train(job_, workers_, kSilent, stop_);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  EXPECT_EQ(outcome->first_step, 3);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
