@@ -61,8 +61,37 @@ std::int64_t CountParameters(Module& module) {
   return count;
 }
 
+namespace {
+
+// What a module takes from a state, and what is to be done afterwards.
+class Loading : public ModuleVisitor {
+ public:
+  explicit Loading(const std::vector<NamedTensor>& state) : state_(state) {}
+  void Parameter(const std::string& name, Var& value) override {
+    wanted.push_back({name, value.value()});
+  }
+  void Buffer(const std::string& name, Tensor& value) override { wanted.push_back({name, value}); }
+  void NewBuffer(const std::string& name, Tensor& value,
+                 const std::function<void()>& derive) override {
+    if (Find(state_, name) != nullptr) return Buffer(name, value);
+    missing.push_back(derive);
+  }
+
+  std::vector<NamedTensor> wanted;
+  std::vector<std::function<void()>> missing;
+
+ private:
+  const std::vector<NamedTensor>& state_;
+};
+
+}  // namespace
+
 Status LoadState(Module& module, const std::vector<NamedTensor>& state) {
-  return CopyByName(state, State(module));
+  Loading loading(state);
+  module.Visit("", loading);
+  TILEGRAD_TRY(CopyByName(state, std::move(loading.wanted)));
+  for (const auto& derive : loading.missing) derive();
+  return {};
 }
 
 LinearLayer::LinearLayer(Context& context, const LinearShape& shape, Rng& rng)
@@ -91,12 +120,14 @@ Spectral::Spectral(const Var& weight, bool transposed, Rng& rng) : transposed_(t
   FillConstant(at_.v, 0.0);  // for a weight of zeros
   FillNormal(at_.u, rng, 1.0);
   const NoGrad off(weight.context());
-  SpectralStep(transposed_ ? Swapped(weight) : weight, at_);
+  SpectralStep(ByOutput(weight), at_);
 }
+
+Var Spectral::ByOutput(const Var& weight) const { return transposed_ ? Swapped(weight) : weight; }
 
 Var Spectral::Normalised(const Var& weight, Mode mode) {
   if (at_.u.empty()) return weight;
-  const Var by_output = transposed_ ? Swapped(weight) : weight;
+  const Var by_output = ByOutput(weight);
   if (mode == Mode::kTrain) SpectralStep(by_output, at_);
   // Copies: the graph recorded by this pass must not see later iterations.
   Context& context = weight.context();
@@ -104,10 +135,13 @@ Var Spectral::Normalised(const Var& weight, Mode mode) {
   return transposed_ ? Swapped(normalised) : normalised;
 }
 
-void Spectral::Visit(const std::string& prefix, ModuleVisitor& visitor) {
+void Spectral::Visit(const std::string& prefix, Var& weight, ModuleVisitor& visitor) {
   if (at_.u.empty()) return;
   visitor.Buffer(prefix + "spectral_u", at_.u);
-  visitor.Buffer(prefix + "spectral_v", at_.v);
+  visitor.NewBuffer(prefix + "spectral_v", at_.v, [this, &weight] {
+    const NoGrad off(weight.context());
+    SpectralRightVector(ByOutput(weight), at_);
+  });
 }
 
 ConvLayer::ConvLayer(Context& context, const ConvShape& shape, bool transposed, Rng& rng)
@@ -122,7 +156,7 @@ ConvLayer::ConvLayer(Context& context, const ConvShape& shape, bool transposed, 
 void ConvLayer::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   visitor.Parameter(prefix + "weight", weight);
   if (bias.valid()) visitor.Parameter(prefix + "bias", bias);
-  spectral_.Visit(prefix, visitor);
+  spectral_.Visit(prefix, weight, visitor);
 }
 
 Var Conv2dLayer::Forward(const Var& x, Mode mode) {

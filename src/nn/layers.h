@@ -7,6 +7,7 @@
 //   Var y = net.Forward(x, Mode::kTrain);
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -35,6 +36,12 @@ class ModuleVisitor {
   virtual ~ModuleVisitor() = default;
   virtual void Parameter(const std::string& name, Var& value) = 0;
   virtual void Buffer(const std::string& name, Tensor& value) = 0;
+  // A buffer that files of earlier versions do not have: `derive` sets it from the rest.
+  virtual void NewBuffer(const std::string& name, Tensor& value,
+                         const std::function<void()>& derive) {
+    (void)derive;
+    Buffer(name, value);
+  }
 };
 
 class Module {
@@ -50,7 +57,8 @@ std::vector<NamedVar> Parameters(Module& module);
 // Parameters and buffers: what a checkpoint holds.
 std::vector<NamedTensor> State(Module& module);
 std::int64_t CountParameters(Module& module);
-// CopyByName into parameters and buffers.
+// CopyByName into parameters and buffers. Of new buffers (ModuleVisitor) that `state` does not have
+// none is an error: they are derived from the rest.
 Status LoadState(Module& module, const std::vector<NamedTensor>& state);
 
 struct LinearShape {
@@ -59,16 +67,20 @@ struct LinearShape {
 };
 
 // A weight divided by its largest singular value (SpectralNorm of ops/norm.h), which one power
-// iteration per training step tracks. The buffers are "spectral_u" and "spectral_v".
+// iteration per training step tracks. The buffers are "spectral_u" and "spectral_v"; files that
+// were written before there was the second get W^T u / |W^T u|, with which sigma = u^T W v is the
+// |W^T u| that was taken then.
 class Spectral {
  public:
   Spectral() = default;  // none: leaves weights as they are
   // `transposed`: the weight is [in, out, ..], as that of a transposed convolution.
   Spectral(const Var& weight, bool transposed, Rng& rng);
   Var Normalised(const Var& weight, Mode mode);
-  void Visit(const std::string& prefix, ModuleVisitor& visitor);
+  // `weight`: what it is the norm of.
+  void Visit(const std::string& prefix, Var& weight, ModuleVisitor& visitor);
 
  private:
+  Var ByOutput(const Var& weight) const;
   bool transposed_ = false;
   SpectralVectors at_;
 };

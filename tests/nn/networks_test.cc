@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "nn/gradient_check.h"
+#include "support/temp_folder.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -214,6 +215,30 @@ TEST_F(Networks, SpectralNormOfATransposedConvolution) {
   EXPECT_NEAR(y.value().data<double>()[0], 0.75, 1e-12);
   EXPECT_NEAR(y.value().data<double>()[5], 1, 1e-12);
   ExpectGradient(layer, [&] { return Mean(Square(layer.Forward(x, Mode::kEval))); });
+}
+
+// Files from before there was spectral_v: sigma is |W^T u|, as it was then. W = [[3, 0], [0, 4]]
+// and u = (0.6, 0.8) give W^T u = (1.8, 3.2).
+TEST_F(Networks, SpectralStateWithoutTheSecondVector) {
+  for (const bool transposed : {false, true}) {
+    const ConvShape shape{.in = 2, .out = 2, .kernel = 1, .bias = false, .spectral = true};
+    std::unique_ptr<Module> layer;
+    if (transposed) layer = std::make_unique<ConvTranspose2dLayer>(context_, shape, rng_);
+    if (!transposed) layer = std::make_unique<Conv2dLayer>(context_, shape, rng_);
+    Tensor weight = context_.Zeros({2, 2, 1, 1}), u = context_.Zeros({2});
+    weight.data<double>()[0] = 3, weight.data<double>()[3] = 4;
+    u.data<double>()[0] = 0.6, u.data<double>()[1] = 0.8;
+    const Status loaded = LoadState(*layer, {{"weight", weight}, {"spectral_u", u}});
+    ASSERT_TRUE(loaded.ok()) << loaded.message();
+    const Var y = layer->Forward(Constant(context_, context_.Full({1, 2, 1, 1}, 1)), Mode::kEval);
+    const double sigma = std::hypot(1.8, 3.2);
+    EXPECT_NEAR(y.value().data<double>()[0], 3 / sigma, 1e-15);
+    EXPECT_NEAR(y.value().data<double>()[1], 4 / sigma, 1e-15);
+    // What was always there is still missed, and a second vector that is there is taken.
+    ExpectMessage(LoadState(*layer, {{"weight", weight}, {"spectral_v", u}}), "spectral_u");
+    ASSERT_TRUE(LoadState(*layer, {{"weight", weight}, {"spectral_u", u}, {"spectral_v", u}}).ok());
+    EXPECT_EQ(std::as_const(State(*layer)[2].value).data<double>()[0], 0.6);
+  }
 }
 
 // A network of torchvision's names with few channels.

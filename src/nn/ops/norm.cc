@@ -124,11 +124,17 @@ Var SpectralNorm(const Var& weight, const SpectralVectors& at) {
   return Div(weight, Sum(Mul(left, AsRow(weight, at.v))));
 }
 
-void SpectralStep(const Var& weight, SpectralVectors& at) {
+void SpectralRightVector(const Var& weight, SpectralVectors& at) {
   if (!Usable("spectral norm", {&weight})) return;
   if (const Status s = CheckSpectral(weight, at); !s.ok()) return weight.context().Fail(s);
   const NoGrad off(weight.context());
   SetNormalised(Matmul(AsRow(weight, at.u), AsMatrix(weight)), &at.v);
+}
+
+void SpectralStep(const Var& weight, SpectralVectors& at) {
+  SpectralRightVector(weight, at);
+  if (!Usable("spectral norm", {&weight}) || !CheckSpectral(weight, at).ok()) return;
+  const NoGrad off(weight.context());
   SetNormalised(Matmul(AsRow(weight, at.v), AsMatrix(weight), {false, true}), &at.u);
 }
 

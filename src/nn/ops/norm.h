@@ -35,5 +35,7 @@ Var SpectralNorm(const Var& weight, const SpectralVectors& at);
 // One power iteration (algorithm 1): v = W^T u, then u = W v, each of length 1. Repeated, it turns
 // them into those vectors.
 void SpectralStep(const Var& weight, SpectralVectors& at);
+// The first half of it: v = W^T u, of length 1; u stays.
+void SpectralRightVector(const Var& weight, SpectralVectors& at);
 
 }  // namespace tilegrad::nn
