@@ -46,6 +46,22 @@ HWY_INLINE bool NoneIsInfiniteOrNan(std::span<const T> values) {
 bool AllFiniteFloat(std::span<const float> values) { return NoneIsInfiniteOrNan(values); }
 bool AllFiniteDouble(std::span<const double> values) { return NoneIsInfiniteOrNan(values); }
 
+// NaN fails every comparison, so what is kept is which values passed.
+template <class T>
+HWY_INLINE bool NoneIsBeyond(std::span<const T> values, T most) {
+  const hn::ScalableTag<T> d;
+  using V = hn::Vec<decltype(d)>;
+  const V limit = hn::Set(d, most), one = hn::Set(d, T(1)), zero = hn::Zero(d);
+  const V beyond = MergeTerms(
+      d, values, [&](V v) HWY_ATTR { return hn::IfThenElse(hn::Le(hn::Abs(v), limit), zero, one); },
+      [](V a, V b) HWY_ATTR { return hn::Max(a, b); });
+  return hn::AllTrue(d, hn::Eq(beyond, zero));
+}
+bool AllBelowFloat(std::span<const float> values, float most) { return NoneIsBeyond(values, most); }
+bool AllBelowDouble(std::span<const double> values, double most) {
+  return NoneIsBeyond(values, most);
+}
+
 bool AllWithinInt(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end) {
   if (least >= end) return values.empty();
   const hn::ScalableTag<std::int32_t> d;
@@ -69,6 +85,8 @@ namespace tilegrad {
 namespace {
 HWY_EXPORT(AllFiniteFloat);
 HWY_EXPORT(AllFiniteDouble);
+HWY_EXPORT(AllBelowFloat);
+HWY_EXPORT(AllBelowDouble);
 HWY_EXPORT(AllWithinInt);
 }  // namespace
 
@@ -77,6 +95,12 @@ bool AllFinite(std::span<const float> values) {
 }
 bool AllFinite(std::span<const double> values) {
   return HWY_DYNAMIC_DISPATCH(AllFiniteDouble)(values);
+}
+bool AllBelow(std::span<const float> values, float most) {
+  return HWY_DYNAMIC_DISPATCH(AllBelowFloat)(values, most);
+}
+bool AllBelow(std::span<const double> values, double most) {
+  return HWY_DYNAMIC_DISPATCH(AllBelowDouble)(values, most);
 }
 bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end) {
   return HWY_DYNAMIC_DISPATCH(AllWithinInt)(values, least, end);

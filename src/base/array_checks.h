@@ -10,6 +10,10 @@ namespace tilegrad {
 bool AllFinite(std::span<const float> values);
 bool AllFinite(std::span<const double> values);
 
+// Whether |value| <= most for every value; none of them is NaN then.
+bool AllBelow(std::span<const float> values, float most);
+bool AllBelow(std::span<const double> values, double most);
+
 // Whether every value is in [least, end).
 bool AllWithin(std::span<const std::int32_t> values, std::int32_t least, std::int32_t end);
 

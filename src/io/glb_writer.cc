@@ -2,6 +2,7 @@
 #include "io/glb_writer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
@@ -240,10 +241,29 @@ Result<Bytes> Assemble(GlbBuilder& glb) {
   return out;
 }
 
+bool IsFinite(const glm::vec4& c) {
+  return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b) && std::isfinite(c.a);
+}
+
+// Large numbers have no linear counterpart; JSON would say null, and readers take white.
+Status CheckLinearColors(const Mesh& mesh) {
+  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    if (IsFinite(SrgbToLinear(mesh.materials[m].base_color))) continue;
+    return InvalidArgument("materials[{}] (\"{}\"): base_color is too large for a GLB file", m,
+                           mesh.materials[m].name);
+  }
+  for (std::size_t v = 0; v < mesh.colors.size(); ++v) {
+    if (IsFinite(SrgbToLinear(mesh.colors[v]))) continue;
+    return InvalidArgument("colors[{}] is too large for a GLB file", v);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Bytes> EncodeGlb(const Mesh& mesh) {
   TILEGRAD_TRY(Validate(mesh));
+  TILEGRAD_TRY(CheckLinearColors(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
   GlbBuilder glb;
   glb.json["scene"] = 0;

@@ -119,7 +119,8 @@ Status Engine::Impl::Render(std::span<const Scene> scenes, const RenderOptions& 
   } else {
     inputs.UsePlain(scenes, forward.colors_only, forward.user_only);
   }
-  return staged ? RenderStaged(options, frame) : RenderPlain(options, frame);
+  TILEGRAD_TRY(staged ? RenderStaged(options, frame) : RenderPlain(options, frame));
+  return parts.may_overflow ? ValidateImages(*frame) : Status();
 }
 
 PlanReport Engine::Impl::Explain() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "render/frame_images.h"
 #include "render/shading/plan.h"
 #include "tilegrad/renderer.h"
 #include "tilegrad/status.h"
@@ -34,6 +35,10 @@ Status ValidateBackward(std::span<const SceneT<T>> scenes, const RenderOptions& 
 template <class T>
 Status ValidateCotangents(const FrameGradientsT<T>& d_frame,
                           std::span<const std::int32_t> face_ids);
+
+// Images that overflow float are an error, not an Inf that spreads. Only where one may
+// (SceneParts::may_overflow).
+Status ValidateImages(const FrameImages& frame);
 
 // Gradients that overflow float are an error, not an Inf that spreads.
 Status ValidateResult(std::span<const SceneGradients> d_scenes);

@@ -110,6 +110,19 @@ Status ValidateCotangents(const FrameGradientsT<T>& d_frame,
   return CheckNumbers("d_frame.attributes", d_frame.attributes);
 }
 
+Status ValidateImages(const FrameImages& frame) {
+  const std::pair<const char*, std::span<const float>> images[] = {
+      {"color", frame.color}, {"attributes", frame.attributes}, {"uv", frame.uv}};
+  for (const auto& [name, image] : images) {
+    if (AllFinite(image)) continue;
+    return CheckFinite(name, image)
+        .Within(
+            "the image overflows: a product of colours, textures, surfaces and lights, or a sum, "
+            "is beyond float; scale them down");
+  }
+  return {};
+}
+
 Status ValidateResult(std::span<const SceneGradients> d_scenes) {
   const SceneGradients nothing;
   for (std::size_t n = 0; n < d_scenes.size(); ++n) {

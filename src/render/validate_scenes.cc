@@ -85,17 +85,27 @@ Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
   return ValidateSceneNumbers(mesh);
 }
 
-// What shading does not use may hold any numbers, but gradients of it have its shape.
+// While no number is beyond this, no colour leaves float's range: it is a product of at most five
+// (base colour, texture, vertex colour, coefficient, intensity), summed over the lights.
+constexpr float kMostSafe = 0x1p20f;
+
+// CheckNumbers; sets *large if some number is not safe.
 template <class T>
-Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known) {
+Status CheckValues(const char* array, std::span<const T> values, bool* large) {
+  if (AllBelow(values, T(kMostSafe))) return {};
+  *large = true;
+  return CheckNumbers(array, values);
+}
+
+// Also of what shading does not use: a number that is none is a mistake wherever it stands.
+template <class T>
+Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   Status status;
   ForEachStream(scene, {}, [&](const SceneStream<T>& s) {
     if (!status.ok() || s.what == Varying::kPosition || s.values.empty()) return;
     status = CheckShape(s.name, s.values.size(), s.rows(scene), static_cast<std::size_t>(s.width));
-    if (s.what == Varying::kNormal && scene.shading.normals != Normals::kGiven) return;
-    if (s.what == Varying::kLightDirection && !UsesLights(scene.shading)) return;
     if (!status.ok() || SameArray(s.values, StreamOf(known, s.what).values)) return;
-    status = CheckNumbers(s.name, s.values);
+    status = CheckValues(s.name, s.values, large);
   });
   TILEGRAD_TRY(status);
   if (scene.shading.normals != Normals::kGiven || !scene.normals.values.empty()) return {};
@@ -104,7 +114,7 @@ Status CheckStreams(const SceneT<T>& scene, const SceneT<T>& known) {
 }
 
 template <class T>
-Status CheckTexture(const TextureT<T>& texture, std::span<const T> known) {
+Status CheckTexture(const TextureT<T>& texture, std::span<const T> known, bool* large) {
   const auto in_range = [](int n) { return n >= 1 && n <= shade::kMaxTextureSize; };
   if (!in_range(texture.width) || !in_range(texture.height)) {
     return InvalidArgument("is {} x {} texels; each side must be in 1..{}", texture.width,
@@ -113,14 +123,15 @@ Status CheckTexture(const TextureT<T>& texture, std::span<const T> known) {
   TILEGRAD_TRY(CheckSize(
       "texels", texture.texels.size(),
       3 * static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height)));
-  return SameArray(texture.texels, known) ? Status() : CheckNumbers("texels", texture.texels);
+  if (SameArray(texture.texels, known)) return {};
+  return CheckValues("texels", texture.texels, large);
 }
 
 template <class T>
-Status CheckTextures(const SceneT<T>& scene, const SceneT<T>& known) {
+Status CheckTextures(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
     const auto texels = i < known.textures.size() ? known.textures[i].texels : std::span<const T>();
-    const Status status = CheckTexture(scene.textures[i], texels);
+    const Status status = CheckTexture(scene.textures[i], texels, large);
     if (!status.ok()) return status.Within(fmt::format("textures[{}]", i));
   }
   if (!scene.textures.empty() && scene.uvs.values.empty()) {
@@ -130,7 +141,7 @@ Status CheckTextures(const SceneT<T>& scene, const SceneT<T>& known) {
 }
 
 template <class T>
-Status CheckSurface(const SurfaceT<T>& surface, std::size_t textures) {
+Status CheckSurface(const SurfaceT<T>& surface, std::size_t textures, bool* large) {
   if (surface.texture < -1 || surface.texture >= static_cast<int>(textures)) {
     return InvalidArgument("texture is {}, but the scene has {}", surface.texture, textures);
   }
@@ -141,16 +152,16 @@ Status CheckSurface(const SurfaceT<T>& surface, std::size_t textures) {
   Status status;
   ForEachSurfacePart(
       [&](const char* name, std::span<const T> part) {
-        if (status.ok()) status = CheckNumbers(name, part);
+        if (status.ok()) status = CheckValues(name, part, large);
       },
       surface);
   return status;
 }
 
 template <class T>
-Status CheckSurfaces(const SceneT<T>& scene) {
+Status CheckSurfaces(const SceneT<T>& scene, bool* large) {
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
-    TILEGRAD_TRY(CheckSurface(scene.surfaces[i], scene.textures.size())
+    TILEGRAD_TRY(CheckSurface(scene.surfaces[i], scene.textures.size(), large)
                      .Within(fmt::format("surfaces[{}]", i)));
   }
   if (scene.face_surfaces.empty()) return {};
@@ -165,19 +176,18 @@ Status CheckSurfaces(const SceneT<T>& scene) {
 }
 
 template <class T>
-Status CheckLights(const SceneT<T>& scene) {
+Status CheckLights(const SceneT<T>& scene, bool* large) {
   const bool harmonics = scene.shading.lighting == Lighting::kSphericalHarmonics;
   if (harmonics || !scene.sh.empty()) TILEGRAD_TRY(CheckSize("sh", scene.sh.size(), 9));
-  if (harmonics) return CheckNumbers("sh", scene.sh);
-  if (!UsesLights(scene.shading)) return {};
-  if (scene.lights.empty() == scene.light_directions.empty()) {
+  TILEGRAD_TRY(CheckValues("sh", scene.sh, large));
+  if (UsesLights(scene.shading) && scene.lights.empty() == scene.light_directions.empty()) {
     return InvalidArgument("lighting needs either lights or light_directions; the scene has {}",
                            scene.lights.empty() ? "neither" : "both");
   }
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
     const LightT<T>& l = scene.lights[i];
     const T numbers[4] = {l.direction[0], l.direction[1], l.direction[2], l.intensity};
-    const Status status = CheckNumbers("direction, intensity", numbers);
+    const Status status = CheckValues<T>("direction, intensity", numbers, large);
     if (!status.ok()) return status.Within(fmt::format("lights[{}]", i));
   }
   return {};
@@ -185,12 +195,12 @@ Status CheckLights(const SceneT<T>& scene) {
 
 // `known`: the scene before, or an empty one.
 template <class T>
-Status CheckScene(const SceneT<T>& scene, const SceneT<T>& known) {
+Status CheckScene(const SceneT<T>& scene, const SceneT<T>& known, bool* large) {
   TILEGRAD_TRY(CheckMesh(scene, known));
-  TILEGRAD_TRY(CheckStreams(scene, known));
-  TILEGRAD_TRY(CheckTextures(scene, known));
-  TILEGRAD_TRY(CheckSurfaces(scene));
-  return CheckLights(scene);
+  TILEGRAD_TRY(CheckStreams(scene, known, large));
+  TILEGRAD_TRY(CheckTextures(scene, known, large));
+  TILEGRAD_TRY(CheckSurfaces(scene, large));
+  return CheckLights(scene, large);
 }
 
 template <class T>
@@ -245,9 +255,10 @@ Status ValidateEnumerators(std::span<const SceneT<T>> scenes, const RenderOption
 template <class T>
 Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
   SceneParts parts;
+  bool large = false;
   const SceneT<T> nothing;
   for (std::size_t n = 0; n < scenes.size(); ++n) {
-    const Status sound = CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing);
+    const Status sound = CheckScene(scenes[n], n > 0 ? scenes[n - 1] : nothing, &large);
     if (!sound.ok()) return sound.Within(SceneName(n));
     const SceneParts own = PartsOf(scenes[n]);
     if (n == 0) parts = own;
@@ -256,6 +267,7 @@ Result<SceneParts> ValidateScenes(std::span<const SceneT<T>> scenes) {
     }
     parts.bilinear |= own.bilinear, parts.trilinear |= own.trilinear;
   }
+  parts.may_overflow = large;
   return parts;
 }
 

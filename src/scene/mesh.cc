@@ -52,6 +52,13 @@ Status CheckMaterials(const Mesh& mesh) {
     }
   }
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    for (int c = 0; c < 4; ++c) {
+      const float value = mesh.materials[m].base_color[c];
+      if (std::isfinite(value)) continue;
+      return InvalidArgument(
+          "materials[{}] (\"{}\"): base_color[{}] is {}; every number must be finite", m,
+          mesh.materials[m].name, c, value);
+    }
     const int t = mesh.materials[m].base_color_texture;
     if (t < -1 || t >= static_cast<int>(mesh.textures.size())) {
       return InvalidArgument("materials[{}] (\"{}\") names texture {}, but there are {}", m,

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -34,6 +35,26 @@ void CheckFinite() {
   }
 }
 
+template <class T>
+void CheckBelow() {
+  using Limits = std::numeric_limits<T>;
+  const T fine[] = {0, T(-0.0), Limits::denorm_min(), T(7.5), T(-7.5)};
+  const T bad[] = {std::nextafter(T(7.5), T(8)), Limits::lowest(),    Limits::infinity(),
+                   -Limits::infinity(),          Limits::quiet_NaN(), -Limits::quiet_NaN()};
+  for (std::size_t n = 0; n < 100; ++n) {
+    std::vector<T> values(n);
+    for (std::size_t i = 0; i < n; ++i) values[i] = fine[i % 5];
+    EXPECT_TRUE(AllBelow(values, T(7.5))) << n;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (const T wrong : bad) {
+        const T right = std::exchange(values[i], wrong);
+        EXPECT_FALSE(AllBelow(values, T(7.5))) << n << " " << i << " " << wrong;
+        values[i] = right;
+      }
+    }
+  }
+}
+
 void CheckWithin(std::int32_t least, std::int32_t end) {
   using Limits = std::numeric_limits<std::int32_t>;
   for (std::size_t n = 0; n < 100; ++n) {
@@ -55,6 +76,7 @@ TEST(ArrayChecks, FindWrongValuesOnEveryTarget) {
     SCOPED_TRACE(target);
     ASSERT_TRUE(ForceTarget(target).ok());
     CheckFinite<float>(), CheckFinite<double>();
+    CheckBelow<float>(), CheckBelow<double>();
     CheckWithin(-1, 5000), CheckWithin(0, 1), CheckWithin(-7, 1 << 30);
     EXPECT_TRUE(AllWithin({}, 0, 0));
     EXPECT_FALSE(

@@ -85,6 +85,10 @@ std::string Text(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
 TEST_F(BrokenInputs, Models) {
   const std::string glb = Text(io::EncodeGlb(Icosphere(1, 1)).value());
   ExpectRejectedModel("truncated.glb", glb.substr(0, glb.size() / 2));
+  std::string factor = glb;  // of the base colour: beyond float
+  const auto at = factor.find("baseColorFactor\":[1.0");
+  ASSERT_NE(at, std::string::npos);
+  ExpectRejectedModel("factor.glb", factor.replace(at + 18, 15, "9e99,1,1,1     "));
   ExpectRejectedModel("json.gltf", "{\"asset\": ");
   ExpectRejectedModel("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
   ExpectRejectedModel("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

@@ -353,6 +353,22 @@ const BadScene kBadScenes[] = {
      "face_surfaces[0] is 1"},
     {"no_lights", [](auto& s) { s.lights.clear(); }, "neither"},
     {"inf_light", [](auto& s) { s.lights[1].direction[2] = INFINITY; }, "lights[1]"},
+    // What the shading does not use is looked at, too.
+    {"unused_sh", [](auto& s) { s.sh.assign(9, NAN); }, "sh[0] is nan"},
+    {"unused_normal", [](auto& s) { s.normals.assign(3 * s.mesh.vertex_count(), NAN); },
+     "normals[0] is nan"},
+    {"unused_light",
+     [](auto& s) {
+       s.shading.lighting = Lighting::kNone;
+       s.lights[1].intensity = NAN;
+     },
+     "lights[1]"},
+    {"unused_light_direction",
+     [](auto& s) {
+       s.shading.lighting = Lighting::kNone;
+       s.light_directions.assign(3 * s.mesh.vertex_count(), INFINITY);
+     },
+     "light_directions[0] is inf"},
     {"face", [](auto& s) { s.mesh.faces[7] = 100000; }, "faces[7] is 100000"},
     {"no_normals", [](auto& s) { s.shading.normals = Normals::kGiven; }, "no normals"},
     {"sh",

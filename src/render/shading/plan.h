@@ -36,6 +36,7 @@ struct SceneParts {
   bool textures = false, surfaces = false;
   bool bilinear = false;  // some texture is filtered: coordinates have a gradient
   bool trilinear = false;
+  bool may_overflow = false;  // some number is so large that images may leave float's range
   int user_channels = 0;
 
   bool operator[](Varying v) const { return has[static_cast<std::size_t>(v)]; }
