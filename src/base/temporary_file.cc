@@ -68,8 +68,17 @@ void RemoveTemporaries(const Path& folder) {
 }
 
 void RemoveTemporaries(const Path& folder, std::span<const std::string> names) {
-  const std::unordered_set<std::string> wanted(names.begin(), names.end());
+  std::unordered_set<std::string> wanted;  // a long name has a hash in its place
+  for (const std::string& name : names) {
+    wanted.insert(TemporaryOf(name).stem().stem().string());
+  }
   RemoveAll(folder, [&](const std::string& name) { return wanted.contains(name); });
+}
+
+void RemoveTemporariesOf(const Path& file) {
+  const Path folder = file.parent_path();
+  const std::string name = file.filename().string();
+  RemoveTemporaries(folder.empty() ? Path(".") : folder, std::span(&name, 1));
 }
 
 }  // namespace tilegrad

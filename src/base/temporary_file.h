@@ -18,5 +18,7 @@ Path TemporaryOf(const Path& path);
 void RemoveTemporaries(const Path& folder);
 // Only those of files with these names: for folders that also hold other programs' files.
 void RemoveTemporaries(const Path& folder, std::span<const std::string> names);
+// Of one file.
+void RemoveTemporariesOf(const Path& file);
 
 }  // namespace tilegrad

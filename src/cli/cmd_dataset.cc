@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad dataset: renders models into a dataset that training reads.
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -72,7 +70,7 @@ Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetOptions& options) {
 }
 
 void PrintTable(const train::BuildSummary& summary) {
-  fmt::print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", "class", "train", "valid.", "test", "rejected");
+  Print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", "class", "train", "valid.", "test", "rejected");
   for (std::size_t c = 0; c < summary.info.classes.size(); ++c) {
     int counts[3] = {}, rejected = 0;
     for (const auto& model : summary.models) {
@@ -81,8 +79,8 @@ void PrintTable(const train::BuildSummary& summary) {
     for (const auto& model : summary.rejected) {
       rejected += model.class_name == summary.info.classes[c];
     }
-    fmt::print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", summary.info.classes[c], counts[0], counts[1],
-               counts[2], rejected);
+    Print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", summary.info.classes[c], counts[0], counts[1], counts[2],
+          rejected);
   }
 }
 
@@ -94,18 +92,18 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
     const auto colon = model.reason.rfind(": ");
     ++reasons[colon == std::string::npos ? model.reason : model.reason.substr(colon + 2)];
   }
-  fmt::print("{} models could not be used ({} lists them):\n", summary.rejected.size(),
-             (folder / "rejected.jsonl").string());
-  for (const auto& [reason, count] : reasons) fmt::print("  {:>5}  {}\n", count, reason);
+  Print("{} models could not be used ({} lists them):\n", summary.rejected.size(),
+        (folder / "rejected.jsonl").string());
+  for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
 }
 
 void PrintWarnings(const train::BuildSummary& summary) {
   constexpr std::size_t kShown = 10;
   if (summary.warnings.empty()) return;
-  fmt::print("{} warnings of reading models:\n", summary.warnings.size());
+  Print("{} warnings of reading models:\n", summary.warnings.size());
   for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
-    fmt::print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
-  if (summary.warnings.size() > kShown) fmt::print("  ...\n");
+    Print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
+  if (summary.warnings.size() > kShown) Print("  ...\n");
 }
 
 Status Make(const DatasetOptions& options) {
@@ -122,13 +120,13 @@ Status Make(const DatasetOptions& options) {
   PrintTable(summary);
   PrintRejected(summary, folder);
   PrintWarnings(summary);
-  fmt::print(
+  Print(
       "{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
       "earlier), {:.1f} s\n",
       summary.models.size(), summary.info.views, summary.info.image_size, summary.info.image_size,
       static_cast<double>(summary.bytes) / 1e6, folder.string(), summary.reused, seconds.count());
-  for (const auto& credit : summary.info.credits) fmt::print("{}\n", credit);
-  fmt::print("look at {}\n", (folder / "contact_sheet.png").string());
+  for (const auto& credit : summary.info.credits) Print("{}\n", credit);
+  Print("look at {}\n", (folder / "contact_sheet.png").string());
   return {};
 }
 

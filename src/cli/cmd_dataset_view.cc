@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "cli/command.h"
+#include "cli/console.h"
 #include "cli/file_ending.h"
 #include "io/image_file.h"
 #include "train/data/dataset.h"
@@ -87,8 +88,8 @@ Status WriteView(const ViewOptions& options) {
       std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
   TILEGRAD_TRY(io::SavePng(options.out, Straighten(image, size)));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
-  fmt::print("{}: {} ({}), view {}\n", options.out, info.name,
-             dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
+  Print("{}: {} ({}), view {}\n", options.out, info.name,
+        dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
   return {};
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside two baselines.
-#include <fmt/core.h>
-
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -30,9 +28,9 @@ Status RunEvaluation(const EvalOptions& options) {
   if (!evaluation.ok()) return evaluation.status();
   // Files first: printing may fail. A look at overfitting leaves them their held-out figures.
   if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
-  fmt::print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
+  Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
   if (options.training_models) return {};
-  fmt::print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
+  Print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
   return {};
 }
 

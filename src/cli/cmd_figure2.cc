@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad figure2: the paper's sanity check of all gradients.
-#include <fmt/core.h>
-
 #include <memory>
 
 #include "base/file.h"
@@ -32,7 +30,7 @@ Status Run(const Options& options) {
   const Path out = options.out;
   const std::string names[] = {out.filename().string()};
   RemoveTemporaries(out.has_parent_path() ? out.parent_path() : ".", names);  // of killed calls
-  fmt::print("{}look at {}\n", train::Figure2Table(results), options.out);
+  Print("{}look at {}\n", train::Figure2Table(results), options.out);
   return {};
 }
 

@@ -132,28 +132,28 @@ void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
       PrintNote("tilegrad: no gradient for {} at the start: {}\n", train::NameOf(f.parameter),
                 f.sentence);
     } else if (all) {
-      fmt::print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
+      Print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
     }
   }
 }
 
 void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) {
   if (scores.empty()) return;
-  fmt::print("{}: PSNR {:.2f} dB, silhouette IoU {:.1f} %\n", name, train::MeanPsnr(scores),
-             100 * train::MeanIou(scores));
+  Print("{}: PSNR {:.2f} dB, silhouette IoU {:.1f} %\n", name, train::MeanPsnr(scores),
+        100 * train::MeanIou(scores));
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  fmt::print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
+  Print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
-  if (o.voxel_iou) fmt::print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
+  if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
   if (o.camera_error_before && o.camera_error_after) {
-    fmt::print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n",
-               *o.camera_error_before, *o.camera_error_after);
+    Print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n", *o.camera_error_before,
+          *o.camera_error_after);
   }
   const Path out = options.out;
-  fmt::print("mesh {}\nlook at {}\n", (out / "mesh.glb").string(), (out / "report.html").string());
+  Print("mesh {}\nlook at {}\n", (out / "mesh.glb").string(), (out / "report.html").string());
 }
 
 Status Run(const Options& options) {

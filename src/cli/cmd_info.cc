@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad info: version, SIMD targets and why one was chosen, cores.
-#include <fmt/core.h>
-
 #include "base/parallel.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
+#include "cli/console.h"
 #include "tilegrad/version.h"
 
 namespace tilegrad::cli {
 namespace {
 
 Status PrintInfo() {
-  fmt::print("tilegrad {}\n", TILEGRAD_VERSION);
-  fmt::print("cores this process may use: {}\n", AvailableCores());
-  fmt::print("SIMD targets this CPU and build offer, best first:");
-  for (const auto& name : RunnableTargets()) fmt::print(" {}", name);
+  Print("tilegrad {}\n", TILEGRAD_VERSION);
+  Print("cores this process may use: {}\n", AvailableCores());
+  Print("SIMD targets this CPU and build offer, best first:");
+  for (const auto& name : RunnableTargets()) Print(" {}", name);
   const bool forced = !ForcedTarget().empty();
-  fmt::print(
+  Print(
       "\nin use: {} ({})\n", ActiveTarget(),
       forced ? "forced by TILEGRAD_TARGET" : "the best; set TILEGRAD_TARGET=NAME to force another");
   return {};

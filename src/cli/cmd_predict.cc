@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and a turntable picture from each image.
-#include <fmt/core.h>
-
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -69,7 +67,7 @@ Status PredictOne(const train::Predictor& predictor, const PredictOptions& optio
              turntable = Path(options.out) / (stem + "_turntable.png");
   TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
-  fmt::print("{} -> {}, {}\n", file, glb.string(), turntable.string());
+  Print("{} -> {}, {}\n", file, glb.string(), turntable.string());
   return {};
 }
 

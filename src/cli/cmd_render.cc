@@ -88,8 +88,8 @@ FaceCulling RenderRun::Culling(const MeshScene& scene) const {
 
 void RenderRun::Explain(const Picture& picture, const std::string& name) const {
   for (std::size_t i = 0; i < picture.plans.size(); ++i) {
-    fmt::print("{}, pass {} of {}:\n", name, i + 1, picture.plans.size());
-    for (const std::string& text : ExplainLines(picture.plans[i])) fmt::print("  {}\n", text);
+    Print("{}, pass {} of {}:\n", name, i + 1, picture.plans.size());
+    for (const std::string& text : ExplainLines(picture.plans[i])) Print("  {}\n", text);
   }
 }
 
@@ -145,7 +145,7 @@ Status RenderRun::Mesh(const std::string& file) {
 Status RenderRun::Finish() {
   line_.Finish();
   if (!files_.empty()) {
-    fmt::print("{} files, the last is {}\n", files_.size(), last_.string());
+    Print("{} files, the last is {}\n", files_.size(), last_.string());
   }
   const Path cameras(settings_.write_cameras);
   if (cameras.empty() || views_.empty()) return {};

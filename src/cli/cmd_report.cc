@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad report: one page about a run.
-#include <fmt/core.h>
-
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -29,10 +27,10 @@ Status RunReport(const ReportOptions& options) {
   if (!summary.ok()) return summary.status();
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: passed over: {}\n", warning);
-  fmt::print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
-             static_cast<double>(summary->bytes) / 1e6);
+  Print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
+        static_cast<double>(summary->bytes) / 1e6);
   if (!summary->evaluated)
-    fmt::print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
+    Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
   return {};
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad selftest: does this program on this machine compute what formulas say?
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cctype>
 #include <chrono>
@@ -10,6 +8,7 @@
 #include "base/error.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
+#include "cli/console.h"
 #include "cli/run_folder.h"
 #include "proof/selftest/checks.h"
 #include "tilegrad/version.h"
@@ -73,27 +72,27 @@ Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& con
 bool RunCheck(const Check& check, const CheckContext& context) {
   const Stopwatch watch;
   const auto finding = RunGuarded(check, context);
-  fmt::print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
-             finding.ok() ? finding->text : finding.status().message(), watch.seconds());
+  Print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
+        finding.ok() ? finding->text : finding.status().message(), watch.seconds());
   std::fflush(stdout);  // a check that crashes is the one after the last line
   return finding.ok();
 }
 
 void PrintHeader(const CheckContext& context) {
-  fmt::print("tilegrad {}", TILEGRAD_VERSION);
+  Print("tilegrad {}", TILEGRAD_VERSION);
   for (const auto& [name, value] : train::DescribeMachine()) {
-    if (name == "compiler" || name == "cpu") fmt::print(", {}", value);
+    if (name == "compiler" || name == "cpu") Print(", {}", value);
   }
   const int threads = context.workers.count();
-  fmt::print(", {} thread{}\nSIMD targets:", threads, threads == 1 ? "" : "s");
-  for (const std::string& target : context.targets) fmt::print(" {}", target);
-  fmt::print("{}\n", ForcedTarget().empty() ? "" : " (forced by TILEGRAD_TARGET)");
+  Print(", {} thread{}\nSIMD targets:", threads, threads == 1 ? "" : "s");
+  for (const std::string& target : context.targets) Print(" {}", target);
+  Print("{}\n", ForcedTarget().empty() ? "" : " (forced by TILEGRAD_TARGET)");
 }
 
 Status RunSelftest(const SelftestOptions& options) {
   TILEGRAD_ASSIGN(const auto checks, ChooseChecks(options.only));
   if (options.list) {
-    fmt::print("{}", Titles(checks));
+    Print("{}", Titles(checks));
     return {};
   }
   const Workers workers(options.workers);
@@ -104,10 +103,10 @@ Status RunSelftest(const SelftestOptions& options) {
   const auto failed = std::count_if(checks.begin(), checks.end(),
                                     [&](const Check& check) { return !RunCheck(check, context); });
   if (failed == 0) {
-    fmt::print("all {} checks hold ({:.1f} s)\n", checks.size(), watch.seconds());
+    Print("all {} checks hold ({:.1f} s)\n", checks.size(), watch.seconds());
     return {};
   }
-  fmt::print("{} of {} checks FAILED ({:.1f} s)\n", failed, checks.size(), watch.seconds());
+  Print("{} of {} checks FAILED ({:.1f} s)\n", failed, checks.size(), watch.seconds());
   return InternalError(
       "do not trust results of this program on this machine; please report the lines above");
 }

@@ -34,11 +34,11 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   }
   const std::string names[] = {"tradeoff.md", "tradeoff.csv", "tradeoff.svg", "training.csv"};
   RemoveTemporaries(folder, names);  // of killed calls
-  fmt::print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables,
-             folder.string(), training.empty() ? "" : ", training.csv");
+  Print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables, folder.string(),
+        training.empty() ? "" : ", training.csv");
   std::error_code error;
   if (training.empty() && std::filesystem::exists(folder / "training.csv", error)) {
-    fmt::print("training.csv there is of an earlier call\n");
+    Print("training.csv there is of an earlier call\n");
   }
   return {};
 }

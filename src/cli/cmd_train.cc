@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad train: a run from a configuration and a dataset.
-#include <fmt/core.h>
-
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -21,14 +19,13 @@ struct TrainOptions {
 
 void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options) {
   if (outcome.first_step == outcome.last_step) {
-    fmt::print("{}: the run is complete at step {}; nothing to do\n", options.out,
-               outcome.last_step);
+    Print("{}: the run is complete at step {}; nothing to do\n", options.out, outcome.last_step);
     return;
   }
-  fmt::print("{}: {} at step {}, {} of training\n", options.out,
-             outcome.finished ? "finished" : "stopped", outcome.last_step,
-             FormatDuration(outcome.seconds));
-  if (!outcome.finished) fmt::print("continue with the same command and --resume\n");
+  Print("{}: {} at step {}, {} of training\n", options.out,
+        outcome.finished ? "finished" : "stopped", outcome.last_step,
+        FormatDuration(outcome.seconds));
+  if (!outcome.finished) Print("continue with the same command and --resume\n");
 }
 
 Status RunTraining(const TrainOptions& options) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad views: images of a mesh from all around, with their cameras.
-#include <fmt/core.h>
-
 #include <memory>
 
 #include "cli/command.h"
@@ -24,8 +22,8 @@ Status Run(const Options& options) {
   TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, line.Sink(),
                                 StopOnSignals()));
   line.Finish();
-  fmt::print("{}: {} images to fit, {} held out, the mesh as truth.glb\n", options.out,
-             options.views.views, options.views.held_out);
+  Print("{}: {} images to fit, {} held out, the mesh as truth.glb\n", options.out,
+        options.views.views, options.views.held_out);
   return {};
 }
 

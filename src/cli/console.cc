@@ -101,7 +101,9 @@ void ProgressLine::Draw(const Progress& p, double seconds) {
     line += fmt::format("  {}", p.done);
   }
   if (!p.note.empty()) line += "  " + p.note;
-  PrintNote("{}{}{}", terminal_ ? "\r" : "", line, terminal_ ? "\x1b[K" : "\n");
+  line = EscapeControls(line);
+  line = terminal_ ? "\r" + line + "\x1b[K" : line + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
   drawn_ = true;
 }
 

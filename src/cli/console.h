@@ -9,15 +9,23 @@
 #include <cstdio>
 #include <string>
 
+#include "base/escape_text.h"
 #include "base/progress.h"
 
 namespace tilegrad::cli {
 
-// As fmt::print to stderr, but what cannot be written there (a full disk, a closed stream) is no
-// reason to end hours of work.
+// As fmt::print to stdout. Names of files and models, and all else that strangers wrote, may hold
+// what a terminal would obey: it is shown instead (EscapeControls).
+template <class... Args>
+void Print(fmt::format_string<Args...> format, Args&&... args) {
+  fmt::print("{}", EscapeControls(fmt::format(format, std::forward<Args>(args)...)));
+}
+
+// The same to stderr, but what cannot be written there (a full disk, a closed stream) is no reason
+// to end hours of work.
 template <class... Args>
 void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
-  const std::string text = fmt::format(format, std::forward<Args>(args)...);
+  const std::string text = EscapeControls(fmt::format(format, std::forward<Args>(args)...));
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 

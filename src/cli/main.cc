@@ -9,6 +9,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <sstream>
 #include <system_error>
 
 #include "base/error.h"
@@ -90,7 +91,10 @@ int Run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
+    std::ostringstream out, note;
+    const int code = app.exit(error, out, note);
+    Print("{}", out.str());
+    PrintNote("{}", note.str());
     return code == 0 ? 0 : 2;
   }
   if (const Status status = CheckValues(app); !status.ok()) return Report(status);

@@ -13,6 +13,7 @@
 #include <mutex>
 
 #include "base/error.h"
+#include "base/hash.h"
 
 namespace tilegrad::io {
 namespace {
@@ -240,6 +241,20 @@ Result<std::vector<std::string>> ListZip(const Path& path) {
       names.emplace_back(name);
   }
   return names;
+}
+
+Result<std::string> ZipFingerprint(const Path& path) {
+  TILEGRAD_ASSIGN(ZipHandle zip, OpenZipHandle(path));
+  Hash hash;
+  for (zip_int64_t i = 0; i < zip_get_num_entries(zip.get(), 0); ++i) {
+    zip_stat_t info;
+    if (zip_stat_index(zip.get(), static_cast<zip_uint64_t>(i), 0, &info) != 0 ||
+        (~info.valid & (ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_CRC)) != 0) {
+      return DataLoss("{}: entry {} has no name, size or checksum", path.string(), i);
+    }
+    hash.Add(info.name), hash.Add(fmt::format("{} {}", info.size, info.crc));
+  }
+  return hash.Text();
 }
 
 Status WriteZip(const Path& path, const std::vector<std::pair<std::string, Bytes>>& entries) {

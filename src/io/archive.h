@@ -33,6 +33,10 @@ Result<std::shared_ptr<FileSource>> OpenZip(const Path& path);
 // The names of all entries of a zip, folders left out.
 Result<std::vector<std::string>> ListZip(const Path& path);
 
+// 16 hexadecimal digits, others if any entry's name or content is another: from the checksums that
+// the zip keeps, without unpacking.
+Result<std::string> ZipFingerprint(const Path& path);
+
 // Writes a zip with these entries, deflated, whole or not at all.
 Status WriteZip(const Path& path, const std::vector<std::pair<std::string, Bytes>>& entries);
 

@@ -41,6 +41,11 @@ struct RawCamera {
   std::array<double, kMaxParams> params = {};
 };
 
+bool IsSize(std::uint64_t width, std::uint64_t height) {
+  constexpr std::uint64_t kMaxSide = 1 << 20;
+  return width >= 1 && height >= 1 && width <= kMaxSide && height <= kMaxSide;
+}
+
 Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
                                   const std::string& place) {
   const auto distortion = std::span(raw.params).first(model.params).subspan(model.focals + 2);
@@ -51,8 +56,7 @@ Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
         "image_undistorter) and take the model that this writes",
         place, raw.id, model.name);
   }
-  constexpr std::uint64_t kMaxSide = 1 << 20;
-  if (raw.width < 1 || raw.height < 1 || raw.width > kMaxSide || raw.height > kMaxSide) {
+  if (!IsSize(raw.width, raw.height)) {
     return DataLoss("{}: camera {} has an image of {} x {} pixels", place, raw.id, raw.width,
                     raw.height);
   }
@@ -241,11 +245,35 @@ Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
   return views;
 }
 
+namespace {
+
+// What the reader refuses, or would read as another name, is not written.
+Status CheckForColmap(const CameraView& view, const ColmapCamera& camera) {
+  const auto [width, height] = view.size;
+  if (width < 1 || height < 1 ||
+      !IsSize(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
+    return InvalidArgument("\"{}\" has an image of {} x {} pixels", view.name, width, height);
+  }
+  const bool one_line = view.name.find_first_of(std::string_view("\n\r\0", 3)) == std::string::npos;
+  if (!one_line || view.name.starts_with(' ') || view.name.starts_with('\t')) {
+    return InvalidArgument(
+        "\"{}\" cannot be a name in COLMAP's text: it begins with a space or has "
+        "a line break",
+        view.name);
+  }
+  TILEGRAD_TRY(Validate(view.camera).Within(view.name));  // a quaternion would hide a mirror
+  return FromColmap(camera).status().Within(view.name);
+}
+
+}  // namespace
+
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views) {
+  if (views.empty()) return InvalidArgument("{}: no views to write", folder.string());
   std::string cameras = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
   std::string images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points\n";
   for (std::size_t i = 0; i < views.size(); ++i) {
     const ColmapCamera c = ToColmap(views[i].camera);
+    TILEGRAD_TRY(CheckForColmap(views[i], c).Within(folder.string()));
     const auto& [q, t, fx, fy, cx, cy] = c;
     cameras += fmt::format("{} PINHOLE {} {} {} {} {} {}\n", i + 1, views[i].size.width,
                            views[i].size.height, fx, fy, cx, cy);

@@ -37,6 +37,19 @@ class MemoryStream : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
+// The library would cut the name there, and of two that then agree lose one.
+Status CheckName(const std::string& name) {
+  constexpr std::size_t kMost = 255;  // Imf::Name::MAX_LENGTH
+  if (name.size() > kMost) {
+    return InvalidArgument("EXR channel name \"{}...\" has {} bytes; a file holds {}",
+                           name.substr(0, 20), name.size(), kMost);
+  }
+  const std::size_t end = name.find('\0');
+  if (end == std::string::npos) return {};
+  return InvalidArgument("EXR channel name \"{}\" goes on after a NUL, which ends names in a file",
+                         name.substr(0, end));
+}
+
 Status Check(const ExrImage& image) {
   if (image.width < 1 || image.height < 1 || image.channels.empty()) {
     return InvalidArgument("an EXR needs a pixel and a channel, got {} x {} x {}", image.width,
@@ -49,6 +62,7 @@ Status Check(const ExrImage& image) {
       return InvalidArgument("EXR channel \"{}\": {} values for {} x {} pixels", c.name,
                              c.values.size(), image.width, image.height);
     }
+    TILEGRAD_TRY(CheckName(c.name));
     bool twice = c.name.empty();
     for (std::size_t j = 0; j < i; ++j) twice |= image.channels[j].name == c.name;
     if (twice) return InvalidArgument("EXR channel name \"{}\" is empty or appears twice", c.name);

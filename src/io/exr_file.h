@@ -21,7 +21,8 @@ struct ExrImage {
   std::vector<ExrChannel> channels;
 };
 
-// Errors: no pixel, no channel, a name that is empty or there twice, a plane of the wrong size.
+// Errors: no pixel, no channel, a name that is empty, there twice, longer than 255 bytes or with a
+// NUL in it, a plane of the wrong size.
 Result<Bytes> EncodeExr(const ExrImage& image);
 // Whole or not at all.
 Status SaveExr(const Path& path, const ExrImage& image);

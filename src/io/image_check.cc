@@ -112,7 +112,7 @@ Status CheckImageContainer(ByteSpan bytes, const std::string& name) {
   return {};
 }
 
-Status CheckImageSize(int width, int height, const std::string& name) {
+Status CheckImageSize(std::int64_t width, std::int64_t height, const std::string& name) {
   if (width >= 1 && height >= 1 && width <= kMaxImageSide && height <= kMaxImageSide) return {};
   return DataLoss("{}: the header says {} x {} pixels; at most {} a side are read", name, width,
                   height, kMaxImageSide);

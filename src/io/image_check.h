@@ -25,7 +25,7 @@ bool IsJpeg(std::span<const std::uint8_t> bytes);
 Status CheckImageContainer(std::span<const std::uint8_t> bytes, const std::string& name);
 
 // Both sides within [1, kMaxImageSide].
-Status CheckImageSize(int width, int height, const std::string& name);
+Status CheckImageSize(std::int64_t width, std::int64_t height, const std::string& name);
 
 // A PNG that passed CheckImageContainer with its palette made 256 colours, those that are added
 // black; nothing if it has none or a full one. stb_image 2.27 takes colours beyond the palette from

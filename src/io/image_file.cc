@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "io/image_check.h"
+#include "io/image_header.h"
 #include "io/pnm_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -45,6 +46,8 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   const auto length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
+    const auto size = ImageHeaderSize(bytes);
+    if (size) TILEGRAD_TRY(CheckImageSize(size->width, size->height, name));
     return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM): {}", name,
                     stbi_failure_reason());
   }

@@ -14,6 +14,8 @@ namespace tilegrad::io {
 inline constexpr int kMaxImageSide = 16384;
 
 // 1 to 4 channels as in the file (16-bit files are reduced to 8). `name` stands in error messages.
+// DecodeImage, of what other files hold, is kCancelled where they are not to be read on
+// (StopGuardedBy).
 Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
 Result<ImageU8> LoadImage(const Path& path);
 

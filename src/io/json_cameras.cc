@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras in JSON: NeRF's transforms.json, and OpenCV's numbers.
+#include "io/json_cameras.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,8 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-Result<json> ReadJson(const Path& file) {
-  TILEGRAD_ASSIGN(const std::string text, ReadText(file));
+Result<json> ParseJson(const std::string& text, const Path& file) {
   json parsed = json::parse(text, nullptr, false);
   if (parsed.is_discarded()) return DataLoss("{}: not valid JSON", file.string());
   if (!parsed.is_object()) return DataLoss("{}: not a JSON object", file.string());
@@ -210,16 +211,6 @@ Result<CameraView> OpenCvView(const Frame& frame, std::size_t index,
   return Named(frame.Name("name", index), FromOpenCv(from), size, frame.place);
 }
 
-template <std::size_t N>
-json Rows(const std::array<double, N>& m, std::size_t columns) {
-  json rows = json::array();
-  for (std::size_t i = 0; i < N; i += columns) {
-    rows.push_back(std::vector<double>(m.begin() + static_cast<std::ptrdiff_t>(i),
-                                       m.begin() + static_cast<std::ptrdiff_t>(i + columns)));
-  }
-  return rows;
-}
-
 bool HasK(const json& top) {
   const auto frames = top.find("frames");
   return top.contains("K") || (frames != top.end() && frames->is_array() && !frames->empty() &&
@@ -240,45 +231,17 @@ Result<std::vector<CameraView>> OpenCvViews(const json& top, const Path& file,
 
 }  // namespace
 
+Result<std::vector<CameraView>> ReadJsonCameras(const std::string& text, const Path& file,
+                                                const CameraFileOptions& options) {
+  TILEGRAD_ASSIGN(const json top, ParseJson(text, file));
+  return HasK(top) ? OpenCvViews(top, file, options) : NerfViews(top, file, options);
+}
+
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return LoadColmapCameras(path);
-  TILEGRAD_ASSIGN(const json top, ReadJson(path));
-  return HasK(top) ? OpenCvViews(top, path, options) : NerfViews(top, path, options);
-}
-
-Status SaveNerfCameras(const Path& file, std::span<const CameraView> views) {
-  json frames = json::array();
-  for (const CameraView& view : views) {
-    const NerfCamera c = ToNerf(view.camera);
-    frames.push_back({{"file_path", view.name},
-                      {"w", view.size.width},
-                      {"h", view.size.height},
-                      {"fl_x", c.fl_x},
-                      {"fl_y", c.fl_y},
-                      {"cx", c.cx},
-                      {"cy", c.cy},
-                      {"transform_matrix", Rows(c.camera_to_world, 4)}});
-  }
-  json top{{"camera_model", "PINHOLE"}, {"frames", frames}};
-  if (!views.empty()) {  // the only keys that readers of the first datasets know
-    top["camera_angle_x"] = 2 * std::atan(0.5 * views[0].size.width / views[0].camera.fx);
-  }
-  return WriteTextAtomic(file, top.dump(1) + "\n");
-}
-
-Status SaveOpenCvCameras(const Path& file, std::span<const CameraView> views) {
-  json frames = json::array();
-  for (const CameraView& view : views) {
-    const OpenCvCamera c = ToOpenCv(view.camera);
-    frames.push_back({{"name", view.name},
-                      {"width", view.size.width},
-                      {"height", view.size.height},
-                      {"K", Rows(c.k, 3)},
-                      {"R", Rows(c.rotation, 3)},
-                      {"t", c.translation}});
-  }
-  return WriteTextAtomic(file, json{{"frames", frames}}.dump(1) + "\n");
+  TILEGRAD_ASSIGN(const std::string text, ReadText(path));
+  return ReadJsonCameras(text, path, options);
 }
 
 }  // namespace tilegrad::io

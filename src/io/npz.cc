@@ -209,9 +209,25 @@ Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
   return DecodeNpy(bytes, zip->Describe(EntryName(name)));
 }
 
+namespace {
+
+// A zip entry's name ends at a NUL, and readers look for "a/b" where a name is "a/./b": such an
+// array would be lost.
+Status CheckArrayName(const std::string& name, const Path& path) {
+  const bool ends = name.find('\0') != std::string::npos;
+  if (!ends && NormalizeName(EntryName(name)) == EntryName(name)) return {};
+  return InvalidArgument(
+      "{}: \"{}\" cannot be the name of an array in an .npz: it has a NUL or a backslash, or leads "
+      "elsewhere as a path",
+      path.string(), name.substr(0, name.find('\0')));
+}
+
+}  // namespace
+
 Status SaveNpz(const Path& path, const NpzArrays& arrays) {
   std::vector<std::pair<std::string, Bytes>> entries;
   for (const auto& [name, array] : arrays) {
+    TILEGRAD_TRY(CheckArrayName(name, path));
     const auto wanted = ByteCount(array.shape, NpyTypeSize(array.type));
     if (wanted != array.data.size()) {
       return InvalidArgument("{}: array \"{}\" has a shape of {} bytes, but data of {}",

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/escape_text.h"
 #include "base/log_plot.h"
 #include "proof/tradeoff_study.h"
 
@@ -17,8 +18,8 @@ std::string Setting(const TradeoffRow& row) {
 }
 
 std::string Heading(const StudyResult& r) {
-  return fmt::format("{}, {} faces, {} x {} pixels, delta = {:.3g}", r.scene, r.tradeoff.faces,
-                     r.size, r.size, r.delta);
+  return fmt::format("{}, {} faces, {} x {} pixels, delta = {:.3g}", EscapeMarkdown(r.scene),
+                     r.tradeoff.faces, r.size, r.size, r.delta);
 }
 
 std::string Table(const StudyResult& r) {
@@ -66,9 +67,9 @@ std::string StudyCsv(const std::vector<StudyResult>& results) {
     for (const TradeoffRow& row : r.tradeoff.rows) {
       out += fmt::format(
           "{},{},{},{:.6g},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}\n",
-          r.scene, r.tradeoff.faces, r.size, r.delta, Setting(row), row.forward_ms, row.backward_ms,
-          row.reported, row.largest, row.mean, row.gradient_angle, row.gradient_error,
-          r.tradeoff.truth_forward_ms, r.tradeoff.truth_backward_ms);
+          EscapeCsv(r.scene), r.tradeoff.faces, r.size, r.delta, Setting(row), row.forward_ms,
+          row.backward_ms, row.reported, row.largest, row.mean, row.gradient_angle,
+          row.gradient_error, r.tradeoff.truth_forward_ms, r.tradeoff.truth_backward_ms);
     }
   }
   return out;
@@ -86,7 +87,7 @@ std::string TrainingCsv(const std::vector<StudyTraining>& training) {
 std::string StudyPicture(const std::vector<StudyResult>& results) {
   LogPlot plot{"CPU time, forward and backward, ms", "largest error of alpha", {}};
   for (const StudyResult& r : results) {
-    LogSeries series{{fmt::format("{}, {} faces", r.scene, r.tradeoff.faces),
+    LogSeries series{{fmt::format("{}, {} faces", EscapeControls(r.scene), r.tradeoff.faces),
                       fmt::format("{} pixels, delta = {:.3g}", r.size, r.delta)},
                      {}};
     for (const TradeoffRow& row : r.tradeoff.rows) {

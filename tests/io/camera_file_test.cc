@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "support/temp_folder.h"
@@ -172,6 +174,58 @@ TEST_F(CameraFiles, BrokenJson) {
   ExpectRefused("a.json", R"({"width": 4, "height": 4, "K": [[1,0],[0,1]]})", "9");
   ExpectRefused("a.json", R"({"width": 4, "height": 4, "K": {}})", "K");
   EXPECT_FALSE(io::LoadCameras(folder_ / "none.json", {}).ok());
+}
+
+using Spoil = std::function<void(std::vector<CameraView>&)>;
+struct Unreadable {
+  const char* name;
+  Spoil spoil;
+};
+
+// What was written and is then refused is lost.
+TEST_F(CameraFiles, WhatCannotBeReadIsNotWritten) {
+  const Unreadable cases[] = {
+      {"no views", [](auto& views) { views.clear(); }},
+      {"width 0", [](auto& views) { views[1].size.width = 0; }},
+      {"height -5", [](auto& views) { views[2].size.height = -5; }},
+      {"a huge side", [](auto& views) { views[0].size.width = (1 << 20) + 1; }},
+      {"a focal length of 0", [](auto& views) { views[1].camera.fx = 0; }},
+      {"an infinite translation", [](auto& views) { views[1].camera.translation[0] = INFINITY; }},
+      {"a mirror", [](auto& views) { views[1].camera.rotation[0] *= -1; }},
+  };
+  for (const Unreadable& c : cases) {
+    SCOPED_TRACE(c.name);
+    std::vector<CameraView> views = Views();
+    c.spoil(views);
+    EXPECT_EQ(io::SaveNerfCameras(folder_ / "nerf.json", views).code(),
+              StatusCode::kInvalidArgument);
+    EXPECT_EQ(io::SaveOpenCvCameras(folder_ / "cv.json", views).code(),
+              StatusCode::kInvalidArgument);
+    EXPECT_EQ(io::SaveColmapCameras(folder_ / "colmap", views).code(),
+              StatusCode::kInvalidArgument);
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(CameraFiles, NamesComeBackOrAreRefused) {
+  for (const std::string& name :
+       {std::string("a b.png"), std::string("a\nb"), std::string(" a"), std::string("a\r"),
+        std::string("a\0b", 3), std::string("\xff"), std::string("\"\\<\x1b"), std::string()}) {
+    SCOPED_TRACE(name);
+    std::vector<CameraView> views = Views();
+    views[1].name = name;
+    const auto check = [&](const Status& saved, const Path& path) {
+      EXPECT_TRUE(saved.ok() || saved.code() == StatusCode::kInvalidArgument) << saved.message();
+      if (!saved.ok()) return;
+      const auto back = io::LoadCameras(path, {});
+      ASSERT_TRUE(back.ok()) << back.status().message();
+      ASSERT_EQ(back->size(), 3u);
+      EXPECT_EQ((*back)[1].name, name);
+    };
+    check(io::SaveNerfCameras(folder_ / "nerf.json", views), folder_ / "nerf.json");
+    check(io::SaveOpenCvCameras(folder_ / "cv.json", views), folder_ / "cv.json");
+    check(io::SaveColmapCameras(folder_ / "colmap", views), folder_ / "colmap");
+  }
 }
 
 }  // namespace

@@ -15,10 +15,10 @@ struct Outcome {
   std::string output;  // both streams
 };
 
-inline Outcome RunProgram(const std::string& arguments) {
+// `before`: what the shell does first.
+inline Outcome RunProgram(const std::string& arguments, const std::string& before = "") {
   Outcome outcome;
-  std::FILE* pipe =
-      ::popen((std::string(TILEGRAD_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+  std::FILE* pipe = ::popen((before + TILEGRAD_PROGRAM + " " + arguments + " 2>&1").c_str(), "r");
   std::array<char, 4096> buffer;
   for (std::size_t n; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
     outcome.output.append(buffer.data(), n);

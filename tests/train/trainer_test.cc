@@ -231,6 +231,35 @@ TEST_F(TrainerTest, RefusesOtherTrainingModels) {
   ExpectFinishes();
 }
 
+TEST_F(TrainerTest, RefusesOtherCamerasAndImages) {
+  StopAfter(2);
+  job_.existing = ExistingRun::kContinue;
+  const auto expect = [&](const std::string& file, const Bytes& other, const char* says) {
+    const Bytes before = ReadFile(folder_ / file).value();
+    Write(file, other);
+    ExpectMessage(Run().status(), "other training models, cameras or model files", says);
+    Write(file, before);
+  };
+  DatasetInfo info = ReadDatasetInfo(job_.data).value();
+  const Path index = DatasetInfoPath(job_.data);
+  const std::string text = ReadText(index).value();
+  for (const char* key :
+       {"\"distance\": ", "\"fov_y\": ", "\"azimuth_step\": ", "\"elevation\": "}) {
+    std::string changed = text;
+    const auto at = changed.find(key) + std::strlen(key);
+    changed.replace(at, changed.find_first_of(",\n", at) - at, "11.5");
+    expect("data/dataset.json", Bytes(changed.begin(), changed.end()), "camera fov_y");
+  }
+  const Bytes sound = ReadFile(ModelFilePath(job_.data, "noise", "m4")).value();
+  expect("data/models/noise/m3.npz", sound, "noise/m3");
+  // Lists of earlier versions, which end before the cameras, are taken, and get them.
+  const std::string list = ReadText(job_.run / "training_models.txt").value();
+  Write("run/training_models.txt", list.substr(0, list.find("camera ")));
+  StopAfter(3);
+  EXPECT_EQ(ReadText(job_.run / "training_models.txt").value(), list);
+  ExpectFinishes();
+}
+
 TEST_F(TrainerTest, OneProcessAtATimeInARun) {
   {
     const auto lock = FolderLock::Take(job_.run);

@@ -2,6 +2,7 @@
 // The index files of a dataset: dataset.json, models.jsonl, rejected.jsonl.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <set>
 
 #include "train/data/dataset_files.h"
@@ -13,6 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "tilegrad-dataset-1";
+constexpr double kMostUnits = 1e6;  // far beyond any dataset, and float still has digits
 constexpr Split kSplits[] = {Split::kTrain, Split::kValidation, Split::kTest};
 
 std::string Dump(const Json& json, int indent) {
@@ -58,7 +60,28 @@ Status ReadCamera(const nlohmann::json& json, const std::string& place, int size
   fields.Read("distance", &rule->distance);
   fields.Read("half_extent", &rule->half_extent);
   rule->lens.width = rule->lens.height = size;
-  return fields.status();
+  TILEGRAD_TRY(fields.status());
+  const CameraRule& r = *rule;
+  if (!(r.lens.fov_y > 0 && r.lens.fov_y < 180)) {
+    return DataLoss("{}: \"fov_y\" is {}; degrees above 0 and below 180 are possible", place,
+                    r.lens.fov_y);
+  }
+  if (!(std::abs(r.elevation) <= 90)) {
+    return DataLoss("{}: \"elevation\" is {}; degrees from -90 to 90 are possible", place,
+                    r.elevation);
+  }
+  // A dataset's objects are half_extent large: of a camera at their centre nothing is seen.
+  for (const auto& [key, value] :
+       {std::pair("distance", r.distance), std::pair("half_extent", r.half_extent)}) {
+    if (!(value > 0 && value <= kMostUnits)) {
+      return DataLoss("{}: \"{}\" is {}; world units above 0 and up to {:g} are possible", place,
+                      key, value, kMostUnits);
+    }
+  }
+  if (!(std::abs(r.azimuth_step) <= kMostUnits)) {
+    return DataLoss("{}: \"azimuth_step\" is {} degrees", place, r.azimuth_step);
+  }
+  return {};
 }
 
 Json ModelJson(const DatasetInfo& info, const ModelInfo& model) {

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "base/error.h"
+#include "io/archive.h"
 #include "train/run/first_difference.h"
 
 namespace tilegrad::train {
@@ -24,20 +25,43 @@ std::string TextOf(const Dataset& dataset) {
   return text;
 }
 
+// What the models look like: the cameras of all, and a fingerprint of each file.
+Result<std::string> ContentsOf(const Dataset& dataset) {
+  const DatasetInfo& info = dataset.info();
+  const CameraRule& c = info.camera;
+  std::string text = fmt::format(
+      "camera fov_y {} azimuth_step {} elevation {} distance {} half_extent {}, {} views of {} "
+      "pixels\n",
+      c.lens.fov_y, c.azimuth_step, c.elevation, c.distance, c.half_extent, info.views,
+      info.image_size);
+  for (const int model : dataset.Select(Split::kTrain)) {
+    TILEGRAD_ASSIGN(const std::string file, io::ZipFingerprint(dataset.ModelPath(model)));
+    const ModelInfo& m = dataset.models()[static_cast<std::size_t>(model)];
+    text += fmt::format("file {} {}/{}\n", file,
+                        info.classes[static_cast<std::size_t>(m.class_index)], m.id);
+  }
+  return text;
+}
+
+// Lists of earlier versions have no contents.
+bool HasContents(const std::string& list) { return list.find("\ncamera ") != std::string::npos; }
+
 }  // namespace
 
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start) {
   const Path file = ListOf(run);
-  const std::string now = TextOf(dataset);
-  std::error_code error;
-  if (start == RunStart::kNew || !std::filesystem::exists(file, error)) {
-    return WriteTextAtomic(file, now);
-  }
-  TILEGRAD_ASSIGN(const std::string then, ReadText(file));
+  const std::string models = TextOf(dataset);
+  TILEGRAD_ASSIGN(const std::string contents, ContentsOf(dataset));
+  const std::string now = models + contents;
+  if (start == RunStart::kNew) return WriteTextAtomic(file, now);
+  const auto read = ReadText(file);
+  if (!read.ok() && read.status().code() != StatusCode::kNotFound) return read.status();
+  const std::string& then = read.ok() ? *read : models;
   if (then == now) return {};
+  if (then == models && !HasContents(then)) return WriteTextAtomic(file, now);
   return InvalidArgument(
-      "{}: this run was started with other training models than those of {}: {}; resume with that "
-      "dataset and its split, or give another --out",
+      "{}: this run was started with other training models, cameras or model files than those of "
+      "{}: {}; resume with that dataset and its split, or give another --out",
       run.string(), dataset.folder().string(), FirstDifference(then, now));
 }
 

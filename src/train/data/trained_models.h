@@ -3,7 +3,8 @@
 // the same name, and then neither goes a run on with it, nor are its test models held out.
 //
 //   <run>/training_models.txt    a line "recipe <hex>", then one "<geometry> <class>/<id>" for each
-//                                model, as the dataset lists them
+//                                model, as the dataset lists them, a line "camera ..." and one
+//                                "file <fingerprint> <class>/<id>" for each model
 #pragma once
 
 #include "base/file.h"
@@ -17,7 +18,8 @@ enum class RunStart {
 };
 
 // Writes the list of a new run; compares with that of a run that goes on: InvalidArgument names the
-// first model that differs. A run of an earlier version has no list and gets one.
+// first model, camera or file that differs. A run of an earlier version has no list, or none of
+// cameras and files, and gets one.
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start);
 
 // InvalidArgument if the run was trained on models of the dataset's test split. Fine for a run

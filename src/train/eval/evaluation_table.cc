@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/escape_text.h"
+#include "base/temporary_file.h"
 #include "train/eval/evaluation.h"
 
 namespace tilegrad::train {
@@ -116,10 +118,13 @@ std::string FormatTable(const Evaluation& evaluation) {
 }
 
 std::string FormatMarkdown(const Evaluation& evaluation) {
-  const auto cells = Cells(evaluation);
+  auto cells = Cells(evaluation);
+  for (auto& line : cells) {
+    for (std::string& cell : line) cell = EscapeMarkdown(cell);
+  }
   const auto widths = Widths(cells);
-  std::string out =
-      fmt::format("# Evaluation\n\n{}\n\n{}.\n\n", evaluation.predictor, Caption(evaluation));
+  std::string out = fmt::format("# Evaluation\n\n{}\n\n{}.\n\n",
+                                EscapeMarkdown(evaluation.predictor), Caption(evaluation));
   for (std::size_t i = 0; i < cells.size(); ++i) {
     out += "| " + Join(cells[i], widths, " | ") + " |\n";
     if (i > 0) continue;
@@ -132,7 +137,10 @@ std::string FormatMarkdown(const Evaluation& evaluation) {
 }
 
 Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
-  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", ToJson(evaluation).dump(1) + "\n"));
+  for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
+  // A class may be no UTF-8: then a replacement character, not an exception.
+  const std::string json = ToJson(evaluation).dump(1, ' ', false, Json::error_handler_t::replace);
+  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", json + "\n"));
   return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/temporary_file.h"
 #include "train/predictor.h"
 #include "train/report/assets.h"
 #include "train/report/html.h"
@@ -42,6 +43,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   const ShowcaseRequest request{job.run, job.data, facts.run.header, predictor, job.models};
   TILEGRAD_ASSIGN(facts.showcase, predictor.task().Show(request, workers, progress, stop));
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
+  RemoveTemporariesOf(job.out);  // of killed calls
   TILEGRAD_TRY(WriteTextAtomic(job.out, page));
   return ReportSummary{page.size(), static_cast<int>(facts.showcase.examples.size()),
                        facts.evaluation.has_value(), predictor.warnings()};

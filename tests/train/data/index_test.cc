@@ -66,6 +66,24 @@ TEST_F(IndexTest, MissingCamera) {
   ExpectOpenError({"dataset.json", "\"camera\""});
 }
 
+TEST_F(IndexTest, CamerasThatCannotBe) {
+  std::string before = ReadText(root_ / "dataset.json").value();
+  const auto expect = [&](const std::string& key, const std::string& value) {
+    const auto at = before.find("\"" + key + "\": ") + key.size() + 4;
+    ASSERT_NE(before.find(key), std::string::npos);
+    std::string text = before;
+    ASSERT_TRUE(WriteTextAtomic(root_ / "dataset.json",
+                                text.replace(at, text.find_first_of(",\n", at) - at, value))
+                    .ok());
+    ExpectOpenError({"dataset.json", "\"camera\"", "\"" + key + "\" is " + value});
+  };
+  for (const char* fov : {"-1", "0", "180", "1e+300"}) expect("fov_y", fov);
+  for (const char* distance : {"0", "-2", "1e+30"}) expect("distance", distance);
+  for (const char* elevation : {"91", "-1e+99"}) expect("elevation", elevation);
+  expect("half_extent", "0");
+  expect("azimuth_step", "1e+300");
+}
+
 TEST_F(IndexTest, ModelLinesNameTheirNumber) {
   Edit("models.jsonl", "\"class\":\"lamp\"", "\"class\":\"ship\"");
   ExpectOpenError({"models.jsonl", "line 3", "ship"});

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names of files and classes that try to be more than names, and what killed commands leave.
+#include <gtest/gtest.h>
+
+#include "support/run_program.h"
+#include "support/source_dir.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n";
+
+class HostileNames : public TempFolderTest {
+ protected:
+  std::string Quoted(const std::string& name) const {
+    return "'" + (folder_ / name).string() + "'";
+  }
+
+  // The control sequence is seen, not obeyed.
+  void ExpectShown(const std::string& arguments, const std::string& shown) {
+    const Outcome outcome = RunProgram(arguments);
+    for (const char* raw : {"\x1b", "\x07", "\xc2\x9b"}) {
+      EXPECT_EQ(outcome.output.find(raw), std::string::npos) << arguments;
+    }
+    EXPECT_NE(outcome.output.find(shown), std::string::npos) << arguments << outcome.output;
+  }
+};
+
+TEST_F(HostileNames, AreShownOnTheTerminalNotObeyed) {
+  Write("in/x\x1b[31mred/a.obj", kTriangle);
+  Write("in/fine/b\x07.obj", kTriangle);
+  Write("bad\xc2\x9b.obj", "v nonsense\n");
+  ExpectShown("render " + Quoted("bad\xc2\x9b.obj"), "bad\\x9b.obj");
+  ExpectShown("render " + Quoted("no\x1b[2J.obj"), "no\\x1b[2J.obj");
+  ExpectShown("dataset --source folder --size 16 --views 1 --input " + Quoted("in") + " --out " +
+                  Quoted("da\x1bta"),
+              "da\\x1bta");
+  ExpectShown("info 'x\x1b[31m'", "x\\x1b[31m");  // the option parser's own words
+  ExpectShown("\x1b[5m", "\\x1b[5m");
+}
+
+TEST_F(HostileNames, AreTextInMarkdownAndOneFieldInCsv) {
+  const std::string name = "<img src=x onerror=alert(1)>, |a| [b](c).obj";
+  Write(name, kTriangle);
+  const Outcome outcome =
+      RunProgram("tradeoff " + Quoted(name) + " --size 16 --repetitions 1 --out " + Quoted("out") +
+                 " --errors 0.1 --deltas 0.01");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string text = ReadText(folder_ / "out/tradeoff.md").value();
+  EXPECT_EQ(text.find("<img"), std::string::npos) << text;
+  EXPECT_NE(text.find("&lt;img src=x onerror=alert(1)&gt;, \\|a\\| \\[b\\](c)"), std::string::npos)
+      << text;
+  const std::string csv = ReadText(folder_ / "out/tradeoff.csv").value();
+  EXPECT_NE(csv.find("\n\"<img"), std::string::npos) << csv;
+}
+
+// Half-written files of processes that are gone; those of others, and other files, stay.
+TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
+  const std::string data = Quoted("data"), run = Quoted("run");
+  ASSERT_EQ(
+      RunProgram("dataset --source procedural --per-class 2 --size 16 --views 3 --out " + data)
+          .exit_code,
+      0);
+  const std::string tiny =
+      " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
+      "network.code=8 "
+      "--set network.hidden1=8 --set network.hidden2=8 --set network.template_level=1";
+  const std::string config = std::string(TILEGRAD_SOURCE_DIR) + "/configs/quick.toml";
+  ASSERT_EQ(
+      RunProgram("train --config " + config + " --data " + data + " --out " + run + tiny).exit_code,
+      0);
+  const std::string gone = ".4194305.tmp", own = "." + std::to_string(::getpid()) + ".tmp";
+  const Path left[] = {Write("run/eval.md" + gone, "half"), Write("run/eval.json" + gone, "half"),
+                       Write("run/report.html" + gone, "half")};
+  const Path kept[] = {Write("run/eval.md" + own, "of a process that runs"),
+                       Write("run/notes" + gone, "another's"),
+                       Write("run/eval.md.tmp", "another's")};
+  EXPECT_EQ(RunProgram("eval --run " + run + " --views-per-model 1").exit_code, 0);
+  EXPECT_EQ(RunProgram("report --run " + run + " --models 1").exit_code, 0);
+  for (const Path& file : left) EXPECT_FALSE(std::filesystem::exists(file)) << file;
+  for (const Path& file : kept) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+}
+
+}  // namespace
+}  // namespace tilegrad
