@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/shortage.h"
 #include "base/temporary_file.h"
 
 namespace tilegrad {
@@ -32,6 +33,7 @@ class FileHandle {
 };
 
 Status SystemError(const Path& path, const char* doing) {
+  NoteShortage(errno);
   return {StatusCode::kIo, fmt::format("{}: {}: {}", path.string(), doing, std::strerror(errno))};
 }
 

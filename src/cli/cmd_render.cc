@@ -161,8 +161,9 @@ Status RunRender(const RenderSettings& settings) {
     const Status status = run.Mesh(file);
     if (status.ok()) continue;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
-    if (first.ok()) first = status;
-    if (status.code() == StatusCode::kCancelled) break;
+    const bool stopped = status.code() == StatusCode::kCancelled;
+    if (first.ok() || stopped) first = status;
+    if (stopped) break;
   }
   TILEGRAD_TRY(run.Finish());
   return first;

@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "base/parallel.h"
+#include "io/guarded_process.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -16,8 +17,10 @@ namespace {
 constexpr double kSilentSeconds = 2, kTerminalInterval = 0.2, kLogInterval = 10;
 
 StopFlag g_stop = false;  // a signal handler can reach nothing but a global
+volatile std::sig_atomic_t g_signal = SIGINT;
 
 extern "C" void HandleStop(int signal) {
+  g_signal = signal;
   g_stop = true;
   std::signal(signal, SIG_DFL);
 }
@@ -54,8 +57,11 @@ std::string FormatDuration(double seconds) {
 
 const StopFlag& StopOnSignals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) StopOn(signal);
+  io::StopGuardedBy(&g_stop);
   return g_stop;
 }
+
+int StopSignal() { return g_signal; }
 
 ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
 ProgressLine::~ProgressLine() { Finish(); }

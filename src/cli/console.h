@@ -70,9 +70,11 @@ class ProgressLine {
 // "1:05:09", "3:07" or "0:04".
 std::string FormatDuration(double seconds);
 
-// A flag that SIGINT, SIGTERM and SIGHUP (the terminal is gone) set; installed at the first call. A
-// second signal kills as usual. Those that whoever started us ignores (nohup, a shell's background)
-// stay ignored.
+// A flag that SIGINT, SIGTERM and SIGHUP (the terminal is gone) set; installed at the first call,
+// and looked at by the readers of files. A second signal kills as usual. Those that whoever started
+// us ignores (nohup, a shell's background) stay ignored.
 const StopFlag& StopOnSignals();
+// The last one that did; SIGINT if none has.
+int StopSignal();
 
 }  // namespace tilegrad::cli

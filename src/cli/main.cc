@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program `tilegrad`. Exit codes: 0 done, 1 the work failed, 2 the command line or
-// configuration is wrong, 3 an input file is missing or broken, 130 stopped by a signal (state
-// saved).
+// configuration is wrong, 3 an input file is missing or broken, 130 stopped by Ctrl-C and 143 by
+// SIGTERM (state saved).
 #include <fmt/core.h>
 
 #include <cerrno>
@@ -31,7 +31,7 @@ int ExitCode(StatusCode code) {
     case StatusCode::kDataLoss:
       return 3;
     case StatusCode::kCancelled:
-      return 130;
+      return 128 + StopSignal();
     default:
       return 1;
   }

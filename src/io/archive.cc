@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/hash.h"
+#include "base/shortage.h"
 
 namespace tilegrad::io {
 namespace {
@@ -40,6 +41,7 @@ std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name
     for (const auto& entry : std::filesystem::directory_iterator(at, error)) {
       if (Lower(entry.path().filename().string()) == wanted) found = entry.path();
     }
+    NoteShortage(error.value());
     if (!found) return std::nullopt;
     at = *found;
   }
@@ -78,7 +80,10 @@ using ZipHandle = std::unique_ptr<zip_t, ZipCloser>;
 Status CheckRegularFile(const Path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0 && errno == ENOENT) return {};
-  if (file < 0) return IoError("{}: cannot open: {}", path.string(), std::strerror(errno));
+  if (file < 0) {
+    NoteShortage(errno);
+    return IoError("{}: cannot open: {}", path.string(), std::strerror(errno));
+  }
   struct stat info = {};
   const bool regular = ::fstat(file, &info) == 0 && S_ISREG(info.st_mode);
   ::close(file);
@@ -90,7 +95,12 @@ Result<ZipHandle> OpenZipHandle(const Path& path) {
   int code = 0;
   ZipHandle zip(zip_open(path.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
   if (zip) return zip;
+  const int system = code == ZIP_ER_MEMORY ? ENOMEM : errno;
   if (code == ZIP_ER_NOENT) return NotFound("{}: no such file", path.string());
+  if (code == ZIP_ER_MEMORY || code == ZIP_ER_OPEN || code == ZIP_ER_READ) {  // not the archive's
+    NoteShortage(system);
+    return IoError("{}: cannot be read: {}", path.string(), std::strerror(system));
+  }
   zip_error_t error;
   zip_error_init_with_code(&error, code);
   const Status status = DataLoss("{}: not a zip archive that can be read: {}", path.string(),
@@ -141,10 +151,17 @@ class Zip : public FileSource {
     return it == by_lower_name_.end() ? std::nullopt : std::optional(it->second);
   }
 
+  Status CannotOpen(const std::string& name) const {
+    const bool memory = zip_error_code_zip(zip_get_error(zip_.get())) == ZIP_ER_MEMORY;
+    if (memory) NoteShortage(ENOMEM);
+    const std::string message = Describe(name) + ": " + zip_strerror(zip_.get());
+    return {memory ? StatusCode::kIo : StatusCode::kDataLoss, message};
+  }
+
   Result<Bytes> ReadEntry(const std::string& name, zip_uint64_t index, zip_uint64_t size) const {
     const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
         zip_fopen_index(zip_.get(), index, 0), &zip_fclose);
-    if (!file) return DataLoss("{}: {}", Describe(name), zip_strerror(zip_.get()));
+    if (!file) return CannotOpen(name);
     // Grows as data arrives: a header with a false size costs no memory.
     Bytes out;
     constexpr std::size_t kChunk = std::size_t{1} << 20;

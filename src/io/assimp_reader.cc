@@ -140,6 +140,10 @@ GuardLimits LimitsFor(std::size_t bytes) {
 }
 
 Status Explain(const Status& failure, const std::string& place, const std::string& name) {
+  // What was refused by the system or stopped says nothing of the file.
+  if (failure.code() == StatusCode::kIo || failure.code() == StatusCode::kCancelled) {
+    return failure.Within(fmt::format("{}: the {} reader", place, MeshEnding(name)));
+  }
   return Status(failure.code(),
                 fmt::format("{}: the {} reader {}; the file is probably damaged, try to save it "
                             "anew or as .glb",

@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/shortage.h"
 
 namespace tilegrad::io {
 namespace {
@@ -49,6 +50,11 @@ UniqueFd AboveStreams(int fd) {
   return UniqueFd(::fcntl(fd, F_DUPFD_CLOEXEC, STDERR_FILENO + 1));
 }
 
+Status Refused(const char* what) {
+  NoteShortage(errno);
+  return IoError("could not get {}: {}", what, std::strerror(errno));
+}
+
 }  // namespace
 
 void UniqueFd::Close() {
@@ -57,7 +63,7 @@ void UniqueFd::Close() {
 
 Result<Mailbox> Mailbox::Open() {
   UniqueFd file = AboveStreams(::memfd_create("tilegrad-guarded", MFD_CLOEXEC));
-  if (!file.valid()) return IoError("could not get a memory file: {}", std::strerror(errno));
+  if (!file.valid()) return Refused("a memory file");
   return Mailbox(std::move(file));
 }
 
@@ -83,10 +89,9 @@ std::optional<Bytes> Mailbox::Get(std::size_t max_bytes) const {
 Result<SocketPair> SocketPair::Open() {
   int ends[2] = {-1, -1};
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
-    return IoError("could not get a socket: {}", std::strerror(errno));
+    return Refused("a socket");
   SocketPair pair{AboveStreams(ends[0]), AboveStreams(ends[1])};
-  if (!pair.parent.valid() || !pair.child.valid())
-    return IoError("could not get a socket: {}", std::strerror(errno));
+  if (!pair.parent.valid() || !pair.child.valid()) return Refused("a socket");
   return pair;
 }
 

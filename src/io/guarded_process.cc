@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -17,6 +18,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/shortage.h"
 #include "io/guarded_channel.h"
 
 #ifndef __has_feature
@@ -29,6 +31,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxQuestions = 4096;
+
+std::atomic<const StopFlag*> g_stop = nullptr;
 
 // What the child may map in all: what this process has mapped, which it inherits, and the limit.
 // 0, no limit, under sanitizers: they map terabytes.
@@ -107,11 +111,13 @@ class Guard {
   // Until the child ends.
   Status Watch() {
     while (!child_.Reap(WNOHANG)) {
+      if (GuardedMustStop()) return Cancelled("was stopped");
       const auto left =
           std::chrono::ceil<std::chrono::milliseconds>(deadline_ - Clock::now()).count();
       if (left <= 0) return DataLoss("took more than {} s", limits_.wall_seconds);
       std::array<pollfd, 2> wait = {{{socket_.get(), POLLIN, 0}, {child_.end_fd(), POLLIN, 0}}};
-      const std::int64_t slice = child_.end_fd() < 0 ? 5 : 60'000;
+      // Another thread may get the signal that sets the flag.
+      const std::int64_t slice = child_.end_fd() < 0 ? 5 : 50;
       if (::poll(wait.data(), wait.size(), static_cast<int>(std::min<std::int64_t>(left, slice))) >
               0 &&
           wait[0].revents != 0) {
@@ -131,8 +137,10 @@ class Guard {
     }
     if (++questions_ > kMaxQuestions) return DataLoss("asked more than {} times", kMaxQuestions);
     const auto content = answer_({question.data(), static_cast<std::size_t>(size)});
-    if (content && !mailbox_.Put(*content))
+    if (content && !mailbox_.Put(*content)) {
+      NoteShortage(errno);
       return IoError("could not be given {} bytes: {}", content->size(), std::strerror(errno));
+    }
     const char known = content.has_value();
     // A child that asks without taking answers fills the socket; that must not block us.
     if (::send(socket_.get(), &known, 1, MSG_NOSIGNAL | MSG_DONTWAIT) != 1) socket_.Close();
@@ -148,7 +156,19 @@ class Guard {
   int questions_ = 0;
 };
 
+// The limit of this process that is lower than what the child was to get; 0 if none is.
+rlim_t OwnLimit(decltype(RLIMIT_AS) resource, std::size_t granted) {
+  rlimit own = {};
+  if (::getrlimit(resource, &own) != 0 || own.rlim_cur >= granted) return 0;
+  return own.rlim_cur;
+}
+
+// Where this process may map less than the child was granted, that was in its way, not the file.
 Status TooMuchMemory(const GuardLimits& limits) {
+  if (const rlim_t own = OwnLimit(RLIMIT_AS, AddressSpace(limits)); own > 0) {
+    NoteShortage(ENOMEM);
+    return IoError("had not enough memory: {} MB may be mapped here (ulimit -v)", own >> 20);
+  }
   return ResourceExhausted("needed more than {} MB of memory", limits.memory_bytes >> 20);
 }
 
@@ -166,6 +186,10 @@ Status StatusOfSignal(int signal, const GuardLimits& limits) {
   if (signal == SIGXCPU)
     return DataLoss("took more than {} s of processor time", limits.cpu_seconds);
   if (signal == SIGXFSZ) return TooLargeAResult(limits);
+  if (signal == SIGKILL) {  // nobody else kills it: it volunteers when memory runs out
+    NoteShortage(ENOMEM);
+    return IoError("was killed by the system, which was short of memory");
+  }
   const char* name = ::sigdescr_np(signal);
   return DataLoss("crashed ({})", name == nullptr ? "unknown signal" : name);
 }
@@ -175,12 +199,22 @@ Status StatusOfExit(int status, const GuardLimits& limits) {
   const int code = WEXITSTATUS(status);
   if (code == kChildDone) return {};
   if (code == kChildOutOfMemory) return TooMuchMemory(limits);
-  if (code == kChildCannotDeliver) return IoError("could not hand over its result");
+  if (code == kChildCannotDeliver) {
+    NoteShortage(ENOMEM);
+    return IoError("could not hand over its result");
+  }
   if (code == kChildThrew) return DataLoss("failed with an exception");
   return DataLoss("ended the process with code {}", code);
 }
 
 }  // namespace
+
+void StopGuardedBy(const StopFlag* stop) { g_stop = stop; }
+
+bool GuardedMustStop() {
+  const StopFlag* const stop = g_stop;
+  return stop != nullptr && *stop;
+}
 
 Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLimits& limits) {
   TILEGRAD_ASSIGN(const Mailbox mailbox, Mailbox::Open());
@@ -192,7 +226,10 @@ Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLi
     pid = ::fork();
     if (pid == 0) RunChildProcess(setup, run);
   }
-  if (pid < 0) return ResourceExhausted("could not be started: {}", std::strerror(errno));
+  if (pid < 0) {
+    NoteShortage(errno);
+    return IoError("could not be started: {}", std::strerror(errno));
+  }
   sockets.child.Close();
   Child child(pid);
   TILEGRAD_TRY(Guard(child, std::move(sockets.parent), mailbox, answer, limits).Watch());

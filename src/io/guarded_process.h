@@ -13,6 +13,7 @@
 
 #include "base/file.h"
 #include "base/function_ref.h"
+#include "base/progress.h"
 
 namespace tilegrad::io {
 
@@ -35,5 +36,11 @@ using AnswerFunction = FunctionRef<std::optional<Bytes>(std::string_view questio
 // fault)", "took more than 20 s of processor time". Whatever happens, the child is gone afterwards
 // and nothing that it did to memory, descriptors, signals or output is seen. Thread-safe.
 Result<Bytes> RunGuarded(ChildFunction run, AnswerFunction answer, const GuardLimits& limits);
+
+// While *stop is set, every RunGuarded of this process ends its child within a tenth of a second
+// and returns kCancelled, and so do the readers of mesh files. For programs that catch signals;
+// null: none, as at the start.
+void StopGuardedBy(const StopFlag* stop);
+bool GuardedMustStop();
 
 }  // namespace tilegrad::io

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_file.h"
 
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <string_view>
 
 #include "base/error.h"
+#include "base/shortage.h"
+#include "io/guarded_process.h"
 #include "io/image_check.h"
 #include "io/image_header.h"
 #include "io/pnm_reader.h"
@@ -61,6 +65,10 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   TILEGRAD_TRY(CheckRawPixels(bytes, width, height, name));
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
+  if (!pixels && std::string_view(stbi_failure_reason()) == "outofmem") {
+    NoteShortage(ENOMEM);
+    return IoError("{}: not enough memory for {} x {} pixels", name, width, height);
+  }
   if (!pixels) {
     return DataLoss("{}: the header says {} x {} pixels, but the data is truncated or corrupt: {}",
                     name, width, height, stbi_failure_reason());
@@ -70,9 +78,7 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   return image;
 }
 
-}  // namespace
-
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
+Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::string& name) {
   if (bytes.size() > std::size_t{1} << 30)
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   if (IsPnm(bytes)) return DecodePnm(bytes, name);
@@ -81,9 +87,16 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
   return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
 }
 
+}  // namespace
+
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
+  if (GuardedMustStop()) return Cancelled("{}: stopped", name);
+  return DecodeBytes(bytes, name);
+}
+
 Result<ImageU8> LoadImage(const Path& path) {
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
-  return DecodeImage(bytes, path.string());
+  return DecodeBytes(bytes, path.string());
 }
 
 Result<Bytes> EncodePng(const ImageU8& image) {

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
+#include "base/shortage.h"
+#include "io/guarded_process.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
@@ -185,7 +187,11 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
     return InvalidArgument("{}: \"{}\" is not the ending of a mesh format that can be read ({})",
                            place, MeshEnding(name), MeshFileEndings());
   }
+  const ShortageWatch watch;
   auto loaded = format->read(source, name);
+  if (GuardedMustStop()) return Cancelled("{}: stopped while it was read", place);
+  TILEGRAD_TRY(watch.Check(place));
+  TILEGRAD_TRY(budget.status().Within(place));  // also where a texture was left out
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())

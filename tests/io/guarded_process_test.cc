@@ -15,8 +15,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
+#include <thread>
 
 #include "base/parallel.h"
+#include "base/shortage.h"
 #include "support/forked.h"
 #include "support/temp_folder.h"
 
@@ -123,6 +125,56 @@ TEST_F(GuardedProcessTest, MemoryHasALimit) {
   ExpectMessage(status, "more than 200 MB of memory");
 }
 #endif
+
+TEST_F(GuardedProcessTest, StopsWhenItIsTold) {
+  StopFlag stop = false;
+  StopGuardedBy(&stop);
+  const auto sleep = [](AskParent) -> Bytes {
+    for (;;) ::pause();
+  };
+  const auto start = std::chrono::steady_clock::now();
+  std::thread teller([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    stop = true;
+  });
+  EXPECT_EQ(Guarded(sleep).status().code(), StatusCode::kCancelled);
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(seconds.count(), 10);  // 0.15 s on a machine that is not busy; 120 s without the flag
+  teller.join();
+  EXPECT_EQ(Guarded(sleep).status().code(), StatusCode::kCancelled);
+  StopGuardedBy(nullptr);
+  EXPECT_TRUE(Guarded([](AskParent) { return Bytes(1, 5); }).ok());
+}
+
+// None of these says anything of what the child read.
+TEST_F(GuardedProcessTest, WhatTheSystemRefusesIsNoFault) {
+  const auto refused = [](auto resource, rlim_t limit, ChildFunction run, const char* says) {
+    return test::TrueInChild([&] {
+      const rlimit now{limit, limit};
+      if (::setrlimit(resource, &now) != 0) return false;
+      const ShortageWatch watch;
+      const Status status = Guarded(run).status();
+      return status.code() == StatusCode::kIo && !watch.Check("x").ok() &&
+             status.message().find(says) != std::string::npos;
+    });
+  };
+  const auto nothing = [](AskParent) { return Bytes(); };
+  EXPECT_TRUE(refused(RLIMIT_NOFILE, 3, nothing, "memory file"));
+  EXPECT_TRUE(refused(RLIMIT_NOFILE, 5, nothing, "socket"));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const auto large = [](AskParent) {
+    return Bytes(Bytes(std::size_t{1} << 30, 1).size() >> 20, 1);
+  };
+  EXPECT_TRUE(refused(RLIMIT_AS, std::size_t{900} << 20, large, "ulimit -v"));
+#endif
+  const ShortageWatch watch;
+  const Status killed = Guarded([](AskParent) -> Bytes {
+                          ::raise(SIGKILL);
+                          return {};
+                        }).status();
+  EXPECT_EQ(killed.code(), StatusCode::kIo);
+  ExpectMessage(watch.Check("a.stl"), "a.stl", "memory");
+}
 
 // Of `ulimit -f 1`: the memory is there.
 TEST_F(GuardedProcessTest, ALimitOfFilesIsNotCalledOneOfMemory) {

@@ -162,6 +162,8 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
   GltfDocument document;
   try {
     TILEGRAD_TRY(Parse(bytes, side, place, &document.model));
+  } catch (const std::bad_alloc&) {
+    throw;                                 // no fault of the file
   } catch (const std::exception& error) {  // the JSON library throws on some type errors
     return DataLoss("{}: not valid glTF: {}", place, error.what());
   }

@@ -119,7 +119,16 @@ class Builder {
   void Reuse(std::size_t i) {
     std::error_code error;
     if (!std::filesystem::exists(FileOf(i), error)) return;
-    if (auto stamp = VerifyModelFile(FileOf(i), info_); stamp.ok()) outcomes_[i].stamp = *stamp;
+    auto stamp = VerifyModelFile(FileOf(i), info_);
+    if (stamp.ok()) outcomes_[i].stamp = *stamp;
+    if (stamp.status().code() == StatusCode::kIo) Fail(stamp.status());
+  }
+
+  // What is refused for one model may be refused for all, and is no fault of the model's.
+  void Fail(const Status& status) {
+    const std::lock_guard lock(mutex_);
+    if (failure_.ok()) failure_ = status;
+    failed_ = true;
   }
 
   Status MakeMissing() {
@@ -130,13 +139,15 @@ class Builder {
     TILEGRAD_TRY(ForEachModel("rendering", [&](std::size_t i, std::size_t worker) {
       if (!outcomes_[i].stamp) Make(i, renderers[worker]);
     }));
-    return write_failure_;
+    return {};
   }
 
   void Make(std::size_t i, LitRenderer& renderer) {
     auto made = Load(i, renderer);
     if (!made.ok()) {
+      const StatusCode code = made.status().code();
       outcomes_[i].failure = made.status();
+      if (code == StatusCode::kIo || code == StatusCode::kCancelled) Fail(made.status());
       return;
     }
     const Status written = SaveModelFile(FileOf(i), info_, made->data, made->stamp);
@@ -144,10 +155,7 @@ class Builder {
       outcomes_[i].stamp = made->stamp;
       return;
     }
-    // A disk that is full for one is full for all.
-    const std::lock_guard lock(mutex_);
-    if (write_failure_.ok()) write_failure_ = written;
-    failed_ = true;
+    Fail(written);
   }
 
   Result<MadeModel> Load(std::size_t i, LitRenderer& renderer) {
@@ -168,7 +176,9 @@ class Builder {
         if (progress_) progress_({stage, ++done, chosen_.size(), entry(i).class_name});
       }
     });
-    if (!stop_ || done == chosen_.size()) return {};
+    const bool cancelled = failure_.code() == StatusCode::kCancelled;
+    if (!failure_.ok() && !cancelled) return failure_;
+    if (!cancelled && (!stop_ || done == chosen_.size())) return {};
     return Cancelled("stopped; what is finished is in {}, the same command goes on from there",
                      folder_.string());
   }
@@ -247,7 +257,7 @@ class Builder {
   std::vector<Outcome> outcomes_;    // of chosen_
   std::vector<std::size_t> usable_;  // entries of summary_.models
   std::mutex mutex_;
-  Status write_failure_;
+  Status failure_;
   std::atomic<bool> failed_ = false;
   BuildSummary summary_;
 };
