@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "bindings/load_within.h"
 #include "bindings/npy_arrays.h"
 #include "bindings/to_python.h"
 #include "io/exr_file.h"
@@ -14,8 +15,8 @@ void BindImages(py::module_& m);
 
 namespace {
 
-py::array LoadImage(const Path& path) {
-  ImageU8 image = ValueOrThrow(WithoutGil([&] { return io::LoadImage(path); }));
+py::array LoadImage(const Path& path, std::size_t max_bytes) {
+  ImageU8 image = LoadWithin(max_bytes, [&] { return io::LoadImage(path); });
   return OwnedArray<std::uint8_t>(std::move(image.pixels),
                                   {image.height, image.width, image.channels});
 }
@@ -31,8 +32,8 @@ void SavePng(const Path& path, const py::object& pixels) {
 }
 
 // Names of channels and [channels,height,width] float32.
-py::tuple LoadExr(const Path& path) {
-  io::LoadedExr image = ValueOrThrow(WithoutGil([&] { return io::LoadExr(path); }));
+py::tuple LoadExr(const Path& path, std::size_t max_bytes) {
+  io::LoadedExr image = LoadWithin(max_bytes, [&] { return io::LoadExr(path); });
   const auto channels = static_cast<py::ssize_t>(image.names.size());
   py::list names;
   for (const std::string& name : image.names) names.append(Text(name));
@@ -51,8 +52,8 @@ void SaveExr(const Path& path, const std::vector<std::string>& names, const py::
   ThrowIfError(WithoutGil([&] { return io::SaveExr(path, image).Within(path.string()); }));
 }
 
-py::array LoadNpy(const Path& path) {
-  return NpyToPython(ValueOrThrow(WithoutGil([&] { return io::LoadNpy(path); })));
+py::array LoadNpy(const Path& path, std::size_t max_bytes) {
+  return NpyToPython(LoadWithin(max_bytes, [&] { return io::LoadNpy(path); }));
 }
 
 void SaveNpy(const Path& path, const py::object& array) {
@@ -63,12 +64,14 @@ void SaveNpy(const Path& path, const py::object& array) {
 }  // namespace
 
 void BindImages(py::module_& m) {
-  m.def("load_image", &LoadImage, py::arg("path"), "(H, W, C) uint8.");
+  m.def("load_image", &LoadImage, py::arg("path"), py::arg("max_bytes") = 0, "(H, W, C) uint8.");
   m.def("save_png", &SavePng, py::arg("path"), py::arg("pixels"), "Writes (H, W, C) uint8.");
-  m.def("load_exr", &LoadExr, py::arg("path"), "Names of channels and (C, H, W) float32.");
+  m.def("load_exr", &LoadExr, py::arg("path"), py::arg("max_bytes") = 0,
+        "Names of channels and (C, H, W) float32.");
   m.def("save_exr", &SaveExr, py::arg("path"), py::arg("names"), py::arg("planes"),
         "Writes (C, H, W) float32 with names of channels.");
-  m.def("load_npy", &LoadNpy, py::arg("path"), "The array of an .npy file.");
+  m.def("load_npy", &LoadNpy, py::arg("path"), py::arg("max_bytes") = 0,
+        "The array of an .npy file.");
   m.def("save_npy", &SaveNpy, py::arg("path"), py::arg("array"), "Writes an .npy file.");
 }
 

@@ -3,6 +3,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "bindings/load_within.h"
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
 #include "io/glb_writer.h"
@@ -23,8 +24,8 @@ py::dict CameraToDict(const io::MeshFileCamera& from) {
       py::arg("znear") = from.camera.znear);
 }
 
-py::dict LoadMesh(const Path& path) {
-  auto loaded = ValueOrThrow(WithoutGil([&] { return io::LoadMesh(path); }));
+py::dict LoadMesh(const Path& path, std::size_t max_bytes) {
+  auto loaded = LoadWithin(max_bytes, [&] { return io::LoadMesh(path); });
   py::dict out = MeshToDict(std::move(loaded.mesh));
   py::list warnings, cameras;
   for (const std::string& warning : loaded.warnings) warnings.append(Text(warning));
@@ -96,7 +97,8 @@ py::dict SceneOfMesh(const py::dict& dict, bool linear, const std::string& norma
 }  // namespace
 
 void BindMeshes(py::module_& m) {
-  m.def("load_mesh", &LoadMesh, py::arg("path"), "The arrays of a mesh file.");
+  m.def("load_mesh", &LoadMesh, py::arg("path"), py::arg("max_bytes") = 0,
+        "The arrays of a mesh file.");
   m.def("save_mesh", &SaveMesh, py::arg("path"), py::arg("mesh"), "Writes a .glb file.");
   m.def("mesh_endings", &io::MeshFileEndings, "Endings of files that load_mesh reads.");
   m.def("scene_of_mesh", &SceneOfMesh, py::arg("mesh"), py::arg("linear"), py::arg("normals"),

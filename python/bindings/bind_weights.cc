@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "bindings/load_within.h"
 #include "bindings/npy_arrays.h"
 #include "bindings/to_python.h"
 #include "nn/serialize.h"
@@ -63,11 +64,11 @@ py::dict TensorDict(const std::vector<nn::NamedTensor>& tensors) {
   return out;
 }
 
-py::tuple LoadSafetensors(const Path& path) {
+py::tuple LoadSafetensors(const Path& path, std::size_t max_bytes) {
   const Workers workers(1);
   nn::Context context(workers);
   const nn::TensorFile file =
-      ValueOrThrow(WithoutGil([&] { return nn::ReadSafetensors(context, path); }));
+      LoadWithin(max_bytes, [&] { return nn::ReadSafetensors(context, path); });
   py::dict metadata;
   for (const auto& [key, value] : file.metadata) metadata[Text(key)] = Text(value);
   return py::make_tuple(TensorDict(file.tensors), metadata);
@@ -86,8 +87,8 @@ void SaveSafetensors(const Path& path, const py::dict& arrays, const Metadata& m
   ThrowIfError(WithoutGil([&] { return nn::WriteSafetensors(path, file).Within(path.string()); }));
 }
 
-py::dict LoadNpz(const Path& path) {
-  io::NpzArrays arrays = ValueOrThrow(WithoutGil([&] { return io::LoadNpz(path); }));
+py::dict LoadNpz(const Path& path, std::size_t max_bytes) {
+  io::NpzArrays arrays = LoadWithin(max_bytes, [&] { return io::LoadNpz(path); });
   py::dict out;
   for (auto& [name, array] : arrays) out[Text(name)] = NpyToPython(std::move(array));
   return out;
@@ -118,10 +119,11 @@ py::dict LoadCheckpoint(const Path& path) {
 }  // namespace
 
 void BindWeights(py::module_& m) {
-  m.def("load_safetensors", &LoadSafetensors, py::arg("path"), "Arrays and metadata by name.");
+  m.def("load_safetensors", &LoadSafetensors, py::arg("path"), py::arg("max_bytes") = 0,
+        "Arrays and metadata by name.");
   m.def("save_safetensors", &SaveSafetensors, py::arg("path"), py::arg("arrays"),
         py::arg("metadata"), "Writes arrays and metadata by name.");
-  m.def("load_npz", &LoadNpz, py::arg("path"), "Arrays by name.");
+  m.def("load_npz", &LoadNpz, py::arg("path"), py::arg("max_bytes") = 0, "Arrays by name.");
   m.def("save_npz", &SaveNpz, py::arg("path"), py::arg("arrays"), "Writes arrays by name.");
   m.def("load_checkpoint", &LoadCheckpoint, py::arg("path"),
         "A checkpoint, or the newest whole one of a run folder.");

@@ -184,6 +184,20 @@ def as_number(function: str, argument: str, value: Any, kind: type) -> Any:
     return number
 
 
+def as_limit(function: str, max_bytes: Any) -> int:
+    """`max_bytes`, None or an int above 0, as C++ takes it: 0 for None."""
+    if max_bytes is None:
+        return 0
+    try:
+        number = operator.index(max_bytes)
+    except TypeError:
+        raise TypeError(f"{function}: max_bytes must be int or None, got {max_bytes!r} "
+                        f"({type(max_bytes).__name__})") from None
+    if not 0 < number < 2**63:
+        raise ValueError(f"{function}: max_bytes is {number}, must be above 0")
+    return number
+
+
 def as_flag(function: str, argument: str, value: Any) -> bool:
     """`value`, which is True or False (or 1 or 0), as a bool; TypeError if it is anything else:
     "no" is true to Python."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -14,19 +14,21 @@ from tilegrad._paths import Path, ending_of
 _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}  # of EXR
 
 
-def load_image(path: Path) -> np.ndarray:
+def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
     """Reads an image.
 
     PNG, JPEG, BMP, TGA, PNM: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
     float32, of its channels R, G, B, A or Y, A or the only one there is. NPY: the array as it is.
+    max_bytes: as of `load_mesh`.
     OSError, ValueError: name the file and what is wrong with it.
     """
     ending = ending_of(path)
+    limit = _arrays.as_limit("load_image", max_bytes)
     if ending == ".npy":
-        return _tools.load_npy(os.fspath(path))
+        return _tools.load_npy(os.fspath(path), limit)
     if ending != ".exr":
-        return _tools.load_image(os.fspath(path))
-    layers = load_layers(path)
+        return _tools.load_image(os.fspath(path), limit)
+    layers = load_layers(path, max_bytes=max_bytes)
     if len(layers) == 1:
         return np.stack(list(layers.values()), axis=-1)
     for names in reversed(_CHANNELS.values()):
@@ -36,9 +38,9 @@ def load_image(path: Path) -> np.ndarray:
                      f"load_layers reads them")
 
 
-def load_layers(path: Path) -> dict[str, np.ndarray]:
-    """Every channel of an EXR image by its name, (H, W) float32."""
-    names, planes = _tools.load_exr(os.fspath(path))
+def load_layers(path: Path, *, max_bytes: Optional[int] = None) -> dict[str, np.ndarray]:
+    """Every channel of an EXR image by its name, (H, W) float32. max_bytes: as of `load_mesh`."""
+    names, planes = _tools.load_exr(os.fspath(path), _arrays.as_limit("load_layers", max_bytes))
     return dict(zip(names, planes))
 
 

@@ -22,12 +22,14 @@ class Weights(dict[str, np.ndarray]):
         self.metadata: dict[str, str] = dict(metadata or {})
 
 
-def load_weights(path: Path) -> Weights:
-    """Reads a .safetensors or .npz file. OSError, ValueError: name the file and what is wrong."""
+def load_weights(path: Path, *, max_bytes: Optional[int] = None) -> Weights:
+    """Reads a .safetensors or .npz file. max_bytes: as of `load_mesh`. OSError, ValueError: name the
+    file and what is wrong."""
     ending = _ending("load_weights", path)
+    limit = _arrays.as_limit("load_weights", max_bytes)
     if ending == ".npz":
-        return Weights(_tools.load_npz(os.fspath(path)))
-    return Weights(*_tools.load_safetensors(os.fspath(path)))
+        return Weights(_tools.load_npz(os.fspath(path), limit))
+    return Weights(*_tools.load_safetensors(os.fspath(path), limit))
 
 
 def save_weights(path: Path, weights: Mapping[str, Any],

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "base/shortage.h"
 #include "base/temporary_file.h"
 
@@ -88,6 +89,7 @@ Result<Container> ReadWhole(const Path& path, std::size_t max_bytes) {
     return ResourceExhausted("{}: {} bytes, more than the limit of {}", path.string(), size,
                              max_bytes);
   }
+  TILEGRAD_TRY(ReadBudget::Take(size, path.string()));
   Container out(size, typename Container::value_type{});
   std::size_t done = 0;
   while (done < size) {

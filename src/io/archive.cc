@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/hash.h"
+#include "base/read_budget.h"
 #include "base/shortage.h"
 
 namespace tilegrad::io {
@@ -131,6 +132,7 @@ class Zip : public FileSource {
       return ResourceExhausted("{}: {} bytes unpacked, more than the limit of {}", Describe(name),
                                info.size, kMaxEntryBytes);
     }
+    TILEGRAD_TRY(ReadBudget::Take(info.size, Describe(name)));
     return ReadEntry(name, *index, info.size);
   }
   bool Exists(const std::string& name) const override {

@@ -7,6 +7,7 @@
 #include <exception>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "io/exr_file.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
@@ -70,7 +71,7 @@ Status CheckHeader(const Imf::Header& header, const GuardLimits& limits) {
   const auto bytes = static_cast<std::size_t>(4 * width * height * channels);
   if (bytes > limits.memory_bytes / 4)  // the library and the transfer need room too
     return ResourceExhausted("{} x {} x {} numbers are too many", width, height, channels);
-  return {};
+  return ReadBudget::Take(bytes, fmt::format("{} x {} x {} numbers", width, height, channels));
 }
 
 void Append(Bytes& out, const void* data, std::size_t size) {
@@ -146,6 +147,7 @@ Result<LoadedExr> FromChild(std::span<const std::uint8_t> bytes) {
       static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height) * out.names.size();
   if ((bytes.size() - at) / sizeof(float) != count || (bytes.size() - at) % sizeof(float) != 0)
     return damaged;
+  TILEGRAD_TRY(ReadBudget::Take(count * sizeof(float), "the image"));
   out.values.resize(count);
   std::memcpy(out.values.data(), bytes.data() + at, count * sizeof(float));
   return out;
@@ -169,6 +171,7 @@ Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::stri
 }
 
 Result<LoadedExr> LoadExr(const Path& path) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
   return DecodeExr(bytes, path.string());
 }

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "base/shortage.h"
 #include "io/guarded_process.h"
 #include "io/image_check.h"
@@ -63,6 +64,7 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
                     height, bytes.size());
   }
   TILEGRAD_TRY(CheckRawPixels(bytes, width, height, name));
+  TILEGRAD_TRY(ReadBudget::Take(unpacked, name));
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
       stbi_load_from_memory(bytes.data(), length, &width, &height, &channels, 0), &stbi_image_free);
   if (!pixels && std::string_view(stbi_failure_reason()) == "outofmem") {
@@ -95,6 +97,7 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
 }
 
 Result<ImageU8> LoadImage(const Path& path) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
   return DecodeBytes(bytes, path.string());
 }

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "base/shortage.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
@@ -89,6 +90,14 @@ void ClampColors(Mesh& mesh) {
   for (Material& material : mesh.materials) clamp(material.base_color);
 }
 
+std::size_t BytesOf(const Mesh& mesh) {
+  const auto bytes = [](const auto&... arrays) {
+    return ((arrays.size() * sizeof(arrays[0])) + ...);
+  };
+  return bytes(mesh.positions, mesh.faces, mesh.normals, mesh.colors, mesh.corner_uvs,
+               mesh.corner_normals);
+}
+
 glm::vec3 UnitOr(glm::vec3 normal, glm::vec3 fallback) {
   const glm::dvec3 n(normal);  // its square must not overflow
   const double length = glm::length(n);
@@ -140,6 +149,7 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
       out.mesh.faces.size() + part.faces.size() > kMaxElements) {
     return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxElements);
   }
+  TILEGRAD_TRY(ReadBudget::Take(BytesOf(part), "vertices and faces"));
   const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
@@ -188,6 +198,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
                            place, MeshEnding(name), MeshFileEndings());
   }
   const ShortageWatch watch;
+  const ReadBudget budget;
   auto loaded = format->read(source, name);
   if (GuardedMustStop()) return Cancelled("{}: stopped while it was read", place);
   TILEGRAD_TRY(watch.Check(place));

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <optional>
 
+#include "base/read_budget.h"
 #include "io/archive.h"
 
 namespace tilegrad::io {
@@ -181,11 +182,13 @@ Bytes EncodeNpy(const NpyArray& array) {
 }
 
 Result<NpyArray> LoadNpy(const Path& path) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
   return DecodeNpy(bytes, path.string());
 }
 
 Result<NpzArrays> LoadNpz(const Path& path) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const auto names, ListZip(path));
   TILEGRAD_ASSIGN(const auto zip, OpenZip(path));
   NpzArrays arrays;
@@ -198,6 +201,7 @@ Result<NpzArrays> LoadNpz(const Path& path) {
 }
 
 Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const auto zip, OpenZip(path));
   if (!zip->Exists(EntryName(name))) {
     std::string there;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "base/read_budget.h"
 #include "io/image_check.h"
 
 namespace tilegrad::io {
@@ -83,6 +84,7 @@ Result<ImageU8> DecodePnm(ByteSpan bytes, const std::string& name) {
     return DataLoss("{}: truncated PNM: {} x {} pixels need {} bytes, {} are there", name, width,
                     height, count * size, samples.size());
   }
+  TILEGRAD_TRY(ReadBudget::Take(count, name));
   ImageU8 image(width, height, channels);
   for (std::size_t i = 0; i < count; ++i) {
     const int sample = size == 2 ? samples[2 * i] << 8 | samples[2 * i + 1] : samples[i];

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <tuple>
 #include <unordered_set>
 #include <utility>
 
@@ -114,6 +115,22 @@ class EntryNames : public nlohmann::json_sax<Json> {
   std::size_t depth_ = 0;
 };
 
+// Of two tensors that share bytes one would be a copy: with many, a small file fills the memory.
+// `ranges`: first byte, end and name of each tensor.
+Status CheckApart(std::vector<std::tuple<std::size_t, std::size_t, std::string>> ranges) {
+  std::sort(ranges.begin(), ranges.end());
+  std::size_t last_end = 0;
+  std::string_view last;  // the tensor that reaches there
+  for (const auto& [begin, end, name] : ranges) {
+    if (begin == end) continue;
+    if (begin < last_end) {
+      return BadEntry(name, fmt::format("its data overlaps that of \"{}\"", last).c_str());
+    }
+    last_end = end, last = name;
+  }
+  return {};
+}
+
 struct Header {
   Json json;
   std::vector<std::string> names;  // as they come
@@ -159,6 +176,8 @@ Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint
   std::memcpy(&length, bytes.data(), kLengthBytes);
   const auto data = bytes.subspan(kLengthBytes + static_cast<std::size_t>(length));
   TensorFile file;
+  std::vector<std::pair<std::string, Entry>> entries;
+  std::vector<std::tuple<std::size_t, std::size_t, std::string>> ranges;
   for (const std::string& name : header.names) {
     const Json& json = header.json[name];
     if (name == kMetadata) {
@@ -166,6 +185,13 @@ Result<TensorFile> DecodeSafetensors(Context& context, std::span<const std::uint
       continue;
     }
     TILEGRAD_ASSIGN(const Entry entry, ParseEntry(name, json, data.size()));
+    const std::size_t size =
+        static_cast<std::size_t>(entry.shape.elements()) * BytesOf(entry.dtype);
+    ranges.emplace_back(entry.begin, entry.begin + size, name);
+    entries.emplace_back(name, entry);
+  }
+  TILEGRAD_TRY(CheckApart(std::move(ranges)));
+  for (const auto& [name, entry] : entries) {
     Tensor tensor = context.Empty(entry.shape, entry.dtype);
     if (tensor.bytes() != 0) std::memcpy(tensor.raw(), data.data() + entry.begin, tensor.bytes());
     file.tensors.push_back({name, std::move(tensor)});

@@ -160,6 +160,34 @@ TEST_F(Safetensors, HeadersThatLie) {
   EXPECT_EQ(Decode(huge).code(), StatusCode::kDataLoss);
 }
 
+// Of bytes that many tensors share every tensor would get a copy.
+TEST_F(Safetensors, SharedBytesAreRefused) {
+  const auto two = [&](const char* a, const char* b, const char* shapes = "[2]") {
+    return Decode(
+        File(fmt::format("{{\"a\":{{\"dtype\":\"F32\",\"shape\":{2},\"data_offsets\":{0}}},"
+                         "\"b\":{{\"dtype\":\"F32\",\"shape\":{2},\"data_offsets\":{1}}}}}",
+                         a, b, shapes),
+             16));
+  };
+  EXPECT_TRUE(two("[0,8]", "[8,16]").ok());
+  EXPECT_TRUE(two("[8,16]", "[0,8]").ok());  // in any order
+  EXPECT_TRUE(two("[4,4]", "[4,4]", "[0]").ok());
+  for (const auto& [a, b] :
+       {std::pair("[0,8]", "[0,8]"), std::pair("[0,8]", "[4,12]"), std::pair("[7,15]", "[0,8]")}) {
+    const Status status = two(a, b);
+    EXPECT_EQ(status.code(), StatusCode::kDataLoss) << a << b;
+    EXPECT_NE(status.message().find("overlaps"), std::string::npos) << status.message();
+  }
+  // One without bytes between two that overlap hides nothing.
+  const Status hidden =
+      Decode(File("{\"a\":{\"dtype\":\"U8\",\"shape\":[10],\"data_offsets\":[0,10]},"
+                  "\"e\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[5,5]},"
+                  "\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[6,8]}}",
+                  16));
+  EXPECT_NE(hidden.message().find("\"b\": its data overlaps that of \"a\""), std::string::npos)
+      << hidden.message();
+}
+
 TEST_F(Safetensors, Files) {
   const Path path = std::filesystem::temp_directory_path() / "tilegrad_safetensors_test" / "a.st";
   const TensorFile file{{{"x", context_.Full({2, 2}, 7.0)}}, {{"k", "v"}}};

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/read_budget.h"
+
+#include <charconv>
+#include <cstdlib>
+#include <string_view>
+#include <system_error>
+
+#include "base/error.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr std::size_t kDefault = std::size_t{4} << 30;
+constexpr const char* kVariable = "TILEGRAD_READ_LIMIT";
+
+thread_local ReadBudget* t_outermost = nullptr;
+
+// "123", "500M", "16G", with any of K, M, G, T as powers of 1024; 0 for other text and for what is
+// too large.
+std::size_t ParseBytes(std::string_view text) {
+  std::size_t value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [at, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || end - at > 1) return 0;
+  if (at == end) return value;
+  const std::size_t power = std::string_view("KMGT").find(*at);
+  if (power == std::string_view::npos) return 0;
+  const std::size_t factor = std::size_t{1} << (10 * (power + 1));
+  std::size_t bytes = 0;
+  return __builtin_mul_overflow(value, factor, &bytes) ? 0 : bytes;
+}
+
+std::string Megabytes(std::size_t bytes) { return fmt::format("{} MB", (bytes >> 20) + 1); }
+
+}  // namespace
+
+Result<std::size_t> ReadLimit() {
+  const char* const text = std::getenv(kVariable);
+  if (text == nullptr || *text == '\0') return kDefault;
+  if (const std::size_t bytes = ParseBytes(text); bytes > 0) return bytes;
+  return InvalidArgument("{} is \"{}\"; it must be bytes, as 4294967296, 500M or 16G", kVariable,
+                         text);
+}
+
+ReadBudget::ReadBudget() : outer_(t_outermost), limit_(ReadLimit()) {
+  if (outer_ == nullptr) t_outermost = this;
+}
+
+ReadBudget::ReadBudget(std::size_t bytes) : outer_(t_outermost), limit_(bytes) {
+  if (outer_ == nullptr) t_outermost = this;
+}
+
+ReadBudget::~ReadBudget() {
+  if (outer_ == nullptr) t_outermost = nullptr;
+}
+
+Status ReadBudget::Take(std::size_t bytes, const std::string& what) {
+  ReadBudget* const budget = t_outermost;
+  if (budget == nullptr) return {};
+  Status status = budget->limit_.status();
+  if (status.ok() && bytes > *budget->limit_ - budget->taken_) {
+    status = ResourceExhausted(
+        "{}: takes {} more, beyond the limit of {} for a file with all that it names; allow more "
+        "with {} in the environment (bytes, or 16G)",
+        what, Megabytes(bytes), Megabytes(*budget->limit_ - 1), kVariable);
+  }
+  if (status.ok()) budget->taken_ += bytes;
+  if (budget->refused_.ok()) budget->refused_ = status;
+  return status;
+}
+
+Status ReadBudget::status() const { return outer_ != nullptr ? outer_->status() : refused_; }
+
+}  // namespace tilegrad

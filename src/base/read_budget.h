@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many bytes one file may become in memory, with all files that it names and all that is packed
+// in it: a megabyte of a GLB can hold pictures of gigabytes. Decoders ask before they allocate.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+// 4 GiB, or what the environment's TILEGRAD_READ_LIMIT says: bytes, or 500M, 16G. An error if that
+// is no such number.
+Result<std::size_t> ReadLimit();
+
+// The budget of whatever this thread reads while the object lives. Inside of another one it is a
+// part of that: a side file belongs to the file.
+class ReadBudget {
+ public:
+  ReadBudget();  // of ReadLimit()
+  explicit ReadBudget(std::size_t bytes);
+  ~ReadBudget();
+  ReadBudget(const ReadBudget&) = delete;
+  ReadBudget& operator=(const ReadBudget&) = delete;
+
+  // `bytes` more, for `what` (a file, an image): an error that names it and says how to allow more.
+  // OK where this thread has no budget.
+  static Status Take(std::size_t bytes, const std::string& what);
+  // The first error of Take: who goes on without what was refused returns it in the end.
+  Status status() const;
+
+ private:
+  ReadBudget* outer_;
+  Result<std::size_t> limit_;
+  std::size_t taken_ = 0;
+  Status refused_;
+};
+
+}  // namespace tilegrad

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is refused before it is lost or fills the memory, and with which exception."""
+
+import os
+import unittest
+from unittest import mock
+
+import numpy as np
+
+import tilegrad
+from file_samples import FolderTest, textured_mesh
+from tilegrad import Light, Renderer, Scene, Surface, files
+
+TRIANGLE = dict(positions=np.array([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], np.float32),
+                faces=np.array([[0, 1, 2]], np.int32),
+                camera=tilegrad.Camera(translation=(0, 0, -3), fx=16, fy=16, cx=8, cy=8))
+
+
+def render(**parts):
+    return Renderer(threads=1).render(Scene(**TRIANGLE, **parts), width=16, height=16)
+
+
+class Numbers(FolderTest):
+    def test_materials_that_are_not_finite(self) -> None:
+        for bad in (np.nan, np.inf, -np.inf, 3e38):
+            mesh = textured_mesh()
+            mesh.materials[1].base_color = (0, bad, 1, 1)
+            with self.assertRaisesRegex(ValueError, "blue.*base_color"):
+                files.save_mesh(self.folder / "a.glb", mesh)
+            self.assertFalse((self.folder / "a.glb").exists())
+        mesh.materials[1].base_color = (0, np.nan, 1, 1)
+        with self.assertRaisesRegex(ValueError, "blue.*base_color"):
+            mesh.scene(TRIANGLE["camera"])
+
+    def test_what_the_lighting_does_not_use(self) -> None:
+        nan = np.nan
+        for parts, name in (({"lights": [Light(intensity=nan)]}, "lights"),
+                            ({"lights": [Light(direction=(nan, 0, 1))]}, "lights"),
+                            ({"sh": np.full(9, nan, np.float32)}, "sh"),
+                            ({"light_directions": np.full((3, 3), nan, np.float32)},
+                             "light_directions")):
+            with self.assertRaisesRegex(ValueError, f"scene 0: {name}.*nan"):
+                render(colors=np.ones((3, 3), np.float32), **parts)
+        with self.assertRaisesRegex(ValueError, "surfaces.*diffuse.*nan"):
+            render(colors=np.ones((3, 3), np.float32), surfaces=[Surface(diffuse=(nan, 0, 0))])
+
+    def test_images_beyond_float(self) -> None:
+        large = np.full((3, 3), 1e30, np.float32)
+        self.assertAlmostEqual(render(colors=large).color.max() / 1e30, 1, 5)
+        for parts in ({"surfaces": [Surface(base_color=(1e30, 1, 1))]},
+                      {"lighting": "spherical_harmonics", "sh": np.full(9, 1e30, np.float32)}):
+            with self.assertRaisesRegex(ValueError, "the image overflows.*color"):
+                render(colors=large, **parts)
+
+
+class Names(FolderTest):
+    def test_files_that_cannot_hold_them(self) -> None:
+        one = np.ones(2, np.float32)
+        for name in ("a\0b", "\0", "../a", "a\\b"):
+            with self.assertRaisesRegex(ValueError, "cannot be the name"):
+                files.save_weights(self.folder / "a.npz", {name: one, "a": one})
+        plane = np.ones((2, 2), np.float32)
+        for names in (("R\0a", "R\0b"), ("n" * 256, "n" * 257)):
+            with self.assertRaisesRegex(ValueError, "EXR channel name"):
+                files.save_layers(self.folder / "a.exr", dict.fromkeys(names, plane))
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_cameras_that_could_not_be_read(self) -> None:
+        camera = TRIANGLE["camera"]
+        for format in ("opencv", "nerf", "colmap"):
+            path = self.folder / format
+            for views in ([], [files.View("a", camera, 0, 5)], [files.View("a", camera, 5, -1)]):
+                with self.assertRaises(ValueError):
+                    files.save_cameras(path, views, format=format)
+            self.assertFalse(path.exists())
+        with self.assertRaisesRegex(ValueError, "line break"):
+            files.save_cameras(path, [files.View("a\nb", camera, 5, 5)], format="colmap")
+
+
+class Memory(FolderTest):
+    def setUp(self) -> None:
+        super().setUp()
+        mesh = textured_mesh()
+        mesh.textures[0].image = np.zeros((1024, 1024, 3), np.uint8)  # 3 MB of a small file
+        files.save_mesh(self.folder / "a.glb", mesh)
+        files.save_image(self.folder / "a.png", mesh.textures[0].image)
+        files.save_weights(self.folder / "a.npz", {"a": np.zeros(1 << 20, np.float32)})
+        files.save_weights(self.folder / "a.safetensors", {"a": np.zeros(1 << 20, np.float32)})
+        files.save_layers(self.folder / "a.exr", {"R": np.zeros((512, 512), np.float32),
+                                                  "G": np.zeros((512, 512), np.float32),
+                                                  "B": np.zeros((512, 512), np.float32)})
+        self.loads = ((files.load_mesh, "a.glb"), (files.load_image, "a.png"),
+                      (files.load_image, "a.exr"), (files.load_weights, "a.npz"),
+                      (files.load_weights, "a.safetensors"), (files.load_layers, "a.exr"))
+
+    def test_a_limit_of_the_call(self) -> None:
+        for load, name in self.loads:
+            load(self.folder / name, max_bytes=20 << 20)
+            load(self.folder / name, max_bytes=None)
+            with self.assertRaisesRegex((OSError, ValueError, MemoryError), f"{name}.*LIMIT"):
+                load(self.folder / name, max_bytes=1 << 20)
+            with self.assertRaisesRegex(ValueError, "max_bytes is 0"):
+                load(self.folder / name, max_bytes=0)
+            with self.assertRaisesRegex(TypeError, "max_bytes must be int or None"):
+                load(self.folder / name, max_bytes="1G")
+
+    def test_a_limit_of_the_environment(self) -> None:
+        for load, name in self.loads:
+            if name.endswith(".safetensors"):
+                continue  # becomes no more than the file is
+            with mock.patch.dict(os.environ, {"TILEGRAD_READ_LIMIT": "1M"}):
+                with self.assertRaisesRegex((OSError, ValueError, MemoryError), f"{name}.*LIMIT"):
+                    load(self.folder / name)
+                load(self.folder / name, max_bytes=20 << 20)
+            with mock.patch.dict(os.environ, {"TILEGRAD_READ_LIMIT": "many"}):
+                with self.assertRaisesRegex(ValueError, "LIMIT is \"many\""):
+                    load(self.folder / name)
+
+
+if __name__ == "__main__":
+    unittest.main()
