@@ -7,6 +7,7 @@
 
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
+#include "fit/refine.h"
 #include "train/data/cutout.h"
 #include "train/predictor.h"
 
@@ -64,6 +65,22 @@ class Model {
     return out;
   }
 
+  // image: [1,4,size,size] as the network sees it; picture: [4,n,n], the same in more pixels.
+  py::dict PredictRefined(const py::object& image, const py::object& picture, int steps) {
+    const int size = predictor_.image_size();
+    const auto seen = SpanOf<std::uint8_t>(image, "predict", "image", {1, 4, size, size});
+    const auto planes = SpanOf<std::uint8_t>(picture, "predict", "picture", {4, kAny, kAny});
+    const auto side = static_cast<int>(py::reinterpret_borrow<py::array>(picture).shape(1));
+    const auto refine = [&]() -> Result<train::RefinedMesh> {
+      const std::scoped_lock lock(mutex_);
+      auto meshes = predictor_.Predict(seen);
+      if (!meshes.ok()) return meshes.status();
+      return train::RefineMesh(meshes->front(), train::TargetOfCutout(planes, side),
+                               {.steps = steps}, *workers_);
+    };
+    return MeshToDict(ValueOrThrow(WithoutGil(refine)).mesh);
+  }
+
  private:
   Model(std::unique_ptr<Workers> workers, train::Predictor predictor)
       : workers_(std::move(workers)), predictor_(std::move(predictor)) {}
@@ -85,7 +102,9 @@ void BindPredictor(py::module_& m) {
       .def_property_readonly("description", &Model::description, "For people.")
       .def("template_mesh", &Model::TemplateMesh, "The sphere.")
       .def("predict", &Model::Predict, py::arg("images"),
-           "Meshes of images (N, 4, size, size) uint8.");
+           "Meshes of images (N, 4, size, size) uint8.")
+      .def("predict_refined", &Model::PredictRefined, py::arg("image"), py::arg("picture"),
+           py::arg("steps"), "The mesh of image (1, 4, size, size), refined on picture (4, n, n).");
 }
 
 }  // namespace tilegrad::python

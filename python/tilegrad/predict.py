@@ -20,6 +20,10 @@ from tilegrad.images import as_bytes
 from tilegrad.meshes import Mesh, mesh_of_dict
 
 
+_REFINE_STEPS = 300  # as of `tilegrad predict`
+_REFINE_SIZE = 128  # pixels a side of the picture that is refined on
+
+
 class Predictor:
     """A trained network. Does what `tilegrad predict` does, to the bit.
 
@@ -71,15 +75,29 @@ class Predictor:
             the object is moved to the middle and scaled as training images show theirs.
         ValueError: no alpha and no mask, nothing or everything opaque, sizes that differ.
         """
-        pixels = as_bytes("prepare", "image", image)
-        cutout = None if mask is None else as_bytes("prepare", "mask", mask)
+        pixels, cutout = self._pixels(image, mask)
         return _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))
 
-    def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False) -> Mesh:
+    def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False,
+                refine: int = _REFINE_STEPS) -> Mesh:
         """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
-        half-extent is 0.45, its middle the origin."""
-        prepared = self.prepare(image, mask, keep_framing=keep_framing)
-        return self.predict_prepared(prepared[None])[0]
+        half-extent is 0.45, its middle the origin.
+
+        refine: steps of gradient descent that move the prediction onto the picture, 0 to 100,000; 0
+            is the network alone, with the faces of the template."""
+        if not 0 <= refine <= 100_000:
+            raise ValueError(f"predict: refine is {refine}, must be in 0..100000")
+        pixels, cutout = self._pixels(image, mask)
+        seen = _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))[None]
+        if refine == 0:
+            return self.predict_prepared(seen)[0]
+        picture = _tools.prepare_cutout(pixels, cutout, _REFINE_SIZE, bool(keep_framing))
+        return mesh_of_dict(self._model().predict_refined(seen, picture, int(refine)))
+
+    @staticmethod
+    def _pixels(image: Any, mask: Any) -> tuple[np.ndarray, np.ndarray | None]:
+        pixels = as_bytes("prepare", "image", image)
+        return pixels, None if mask is None else as_bytes("prepare", "mask", mask)
 
     def predict_prepared(self, images: Any) -> list[Mesh]:
         """The meshes of N pictures (N, 4, size, size) uint8, as `prepare` and datasets have them.

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside two baselines.
+#include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
+#include "fit/refine.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
 
@@ -13,23 +15,41 @@ struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
   bool training_models = false;
+  int refine = 0;
 };
+
+// Refines on the calling thread: pictures are worked on side by side.
+train::PredictionChange RefineWith(int steps, int image_size) {
+  if (steps == 0) return nullptr;
+  return
+      [steps, image_size](const Mesh& mesh, std::span<const std::uint8_t> image) -> Result<Mesh> {
+        TILEGRAD_ASSIGN(train::RefinedMesh refined,
+                        train::RefineMesh(mesh, train::TargetOfCutout(image, image_size),
+                                          {.steps = steps}, Workers(1)));
+        return std::move(refined.mesh);
+      };
+}
 
 Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
-  const train::TaskEvaluation job{run, data, predictor, options.training_models,
-                                  options.views_per_model};
+  const train::TaskEvaluation job{run,
+                                  data,
+                                  predictor,
+                                  options.training_models,
+                                  options.views_per_model,
+                                  RefineWith(options.refine, predictor.image_size())};
+  const bool writes = !options.training_models && options.refine == 0;
   ProgressLine line;
   auto evaluation = predictor.task().Evaluate(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!evaluation.ok()) return evaluation.status();
-  // Files first: printing may fail. A look at overfitting leaves them their held-out figures.
-  if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
+  // Files first: printing may fail. They keep the figures of the network alone on held-out models.
+  if (writes) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
   Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
-  if (options.training_models) return {};
+  if (!writes) return {};
   Print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
   return {};
 }
@@ -48,6 +68,12 @@ void AddEval(CLI::App& app, Action* action) {
       ->check(CLI::Range(1, 1000));
   command->add_flag("--training-models", options->training_models,
                     "score the training models instead and write nothing");
+  command
+      ->add_option("--refine", options->refine,
+                   "steps of refinement of each prediction on its image, as of predict; the scores "
+                   "are printed only")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
   command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 

@@ -5,6 +5,7 @@
 #include "cli/console.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
+#include "fit/refine.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "render/picture/composite.h"
@@ -17,11 +18,13 @@ namespace tilegrad::cli {
 namespace {
 
 constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableSize = 256;
+constexpr int kRefineSize = 128;  // pixels a side of the picture that a mesh is refined on
 
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
   bool keep_framing = false;
+  int refine = 300;
   int workers = 0;
 };
 
@@ -55,6 +58,37 @@ std::vector<std::pair<std::string, std::string>> NameResults(
   return named;
 }
 
+// What the picture shows, the network's mesh and the refined one, from where the picture was taken.
+Status DrawMatch(const train::TargetImages& picture, const Mesh& prediction,
+                 const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
+  const int size = picture.width;
+  std::vector<ImageU8> cells = {
+      Enlarged(OverGrey(PlanarRgba<float>{picture.color, picture.alpha, size, size}, kPaper),
+               kTurntableSize / size)};
+  for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
+                                     std::pair(&refined.mesh, &refined.camera)}) {
+    TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));
+    cells.push_back(std::move(views[0]));
+  }
+  return io::SavePng(file, TileImages(cells, static_cast<int>(cells.size())));
+}
+
+Status Refine(const PredictOptions& options, const ImageU8& cutout, const std::string& stem,
+              Mesh* mesh, const Workers& workers) {
+  const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
+  TILEGRAD_ASSIGN(const auto planar, train::PrepareCutout(cutout, kRefineSize, framing));
+  const train::TargetImages picture = train::TargetOfCutout(planar, kRefineSize);
+  TILEGRAD_ASSIGN(train::RefinedMesh refined,
+                  train::RefineMesh(*mesh, picture, {.steps = options.refine}, workers));
+  const Path file = Path(options.out) / (stem + "_match.png");
+  TILEGRAD_TRY(DrawMatch(picture, *mesh, refined, file, workers));
+  Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
+        100 * refined.before.silhouette_iou, 100 * refined.after.silhouette_iou,
+        refined.before.color_l1, refined.after.color_l1);
+  *mesh = std::move(refined.mesh);
+  return {};
+}
+
 Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
                   const std::pair<std::string, std::string>& image, const Workers& workers) {
   const auto& [file, stem] = image;
@@ -62,7 +96,11 @@ Status PredictOne(const train::Predictor& predictor, const PredictOptions& optio
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   const auto input = train::PrepareCutout(cutout, predictor.image_size(), framing);
   if (!input.ok()) return input.status().Within(file);
-  TILEGRAD_ASSIGN(const auto meshes, predictor.Predict(*input));
+  TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
+  if (options.refine > 0) {
+    const Status refined = Refine(options, cutout, stem, &meshes[0], workers);
+    if (!refined.ok()) return refined.Within(file);
+  }
   const Path glb = Path(options.out) / (stem + ".glb"),
              turntable = Path(options.out) / (stem + "_turntable.png");
   TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
@@ -109,6 +147,12 @@ void AddPredict(CLI::App& app, Action* action) {
       "image of the same size: the object is white or, in one with transparency, opaque");
   command->add_flag("--keep-framing", options->keep_framing,
                     "only resize: the image is framed like a training image already");
+  command
+      ->add_option("--refine", options->refine,
+                   "steps of gradient descent that move the prediction onto the image, and write "
+                   "NAME_match.png: image, prediction, refined; 0: the network alone")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunPrediction(*options); }; });
 }

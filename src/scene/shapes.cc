@@ -5,9 +5,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <map>
 #include <numbers>
-#include <utility>
+
+#include "scene/subdivide.h"
 
 namespace tilegrad {
 namespace {
@@ -21,32 +21,6 @@ const Face kIcosahedronFaces[20] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 
                                     {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
                                     {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
                                     {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-
-// Adds the midpoint of every edge once, on the unit sphere, and splits every face in four.
-class Subdivider {
- public:
-  explicit Subdivider(std::vector<glm::dvec3>& points) : points_(points) {}
-
-  std::vector<Face> Split(const std::vector<Face>& faces) {
-    std::vector<Face> out;
-    out.reserve(faces.size() * 4);
-    for (const auto& [a, b, c] : faces) {
-      const std::int32_t ab = Middle(a, b), bc = Middle(b, c), ca = Middle(c, a);
-      out.insert(out.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
-    }
-    return out;
-  }
-
- private:
-  std::int32_t Middle(std::int32_t a, std::int32_t b) {
-    const auto [it, added] =
-        middle_.try_emplace(std::minmax(a, b), static_cast<std::int32_t>(points_.size()));
-    if (added) points_.push_back(glm::normalize(points_[a] + points_[b]));
-    return it->second;
-  }
-  std::vector<glm::dvec3>& points_;
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middle_;
-};
 
 glm::vec3 OnCircle(float radius, float y, int i, int segments) {
   const double angle = 2 * std::numbers::pi * i / segments;
@@ -125,7 +99,12 @@ Mesh Icosphere(int level, float radius) {
   std::vector<glm::dvec3> points;
   for (const glm::dvec3& p : kIcosahedron) points.push_back(glm::normalize(p));
   std::vector<Face> faces(std::begin(kIcosahedronFaces), std::end(kIcosahedronFaces));
-  for (int i = 0; i < level; ++i) faces = Subdivider(points).Split(faces);
+  const auto middle = [&points](std::int32_t a, std::int32_t b) {
+    points.push_back(
+        glm::normalize(points[static_cast<std::size_t>(a)] + points[static_cast<std::size_t>(b)]));
+    return static_cast<std::int32_t>(points.size() - 1);
+  };
+  for (int i = 0; i < level; ++i) faces = SplitFaces(faces, middle);
   Mesh mesh;
   for (const glm::dvec3& p : points) mesh.positions.emplace_back(p * static_cast<double>(radius));
   mesh.faces = std::move(faces);

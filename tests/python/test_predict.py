@@ -32,24 +32,30 @@ class Predict(FolderTest):
         image = files.load_image(self.image)
         for threads in (1, 2):
             predictor = files.Predictor(run(), threads)
-            self.assertEqual(self._python(predictor.predict(image)), self._program())
-        kept = predictor.predict(image, keep_framing=True)
-        self.assertEqual(self._python(kept), self._program("--keep-framing"))
+            self.assertEqual(self._python(predictor.predict(image, refine=10)),
+                             self._program("--refine", 10))
+        self.assertEqual(self._python(predictor.predict(image)), self._program())
+        kept = predictor.predict(image, keep_framing=True, refine=0)
+        self.assertEqual(self._python(kept), self._program("--keep-framing", "--refine", 0))
         rgb, mask = self.folder / "rgb.png", self.folder / "mask.png"
         files.save_image(rgb, image[..., :3])
         files.save_image(mask, image[..., 3])
-        masked = predictor.predict(image[..., :3], image[..., 3])
+        masked = predictor.predict(image[..., :3], image[..., 3], refine=10)
         self.image.write_bytes(rgb.read_bytes())
-        self.assertEqual(self._python(masked), self._program("--mask", mask))
+        self.assertEqual(self._python(masked), self._program("--mask", mask, "--refine", 10))
 
     def test_a_prediction_is_a_mesh_of_the_template(self) -> None:
         predictor = files.Predictor(run())
         self.assertEqual(predictor.image_size, 32)
         self.assertIn("step 3", predictor.description)
-        mesh, template = predictor.predict(files.load_image(self.image)), predictor.template()
+        image, template = files.load_image(self.image), predictor.template()
+        mesh = predictor.predict(image, refine=0)
         np.testing.assert_array_equal(mesh.faces, template.faces)
         self.assertAlmostEqual(float(np.abs(mesh.positions).max()), 0.45, places=5)
         self.assertTrue(((mesh.colors >= 0) & (mesh.colors <= 1)).all())
+        refined = predictor.predict(image, refine=10)  # 80 faces are divided once
+        self.assertEqual(len(refined.faces), 4 * len(template.faces))
+        self.assertAlmostEqual(float(np.abs(refined.positions).max()), 0.45, places=5)
 
     def test_many_at_once_are_each_alone(self) -> None:
         predictor = files.Predictor(run())
@@ -63,11 +69,12 @@ class Predict(FolderTest):
     def test_threads_pickle_and_fork_give_the_same(self) -> None:
         predictor = files.Predictor(run())
         image = files.load_image(self.image)
-        expected = self._python(predictor.predict(image))
-        self.assertEqual(self._python(pickle.loads(pickle.dumps(predictor)).predict(image)),
-                         expected)
+        expected = self._python(predictor.predict(image, refine=10))
+        again = pickle.loads(pickle.dumps(predictor)).predict(image, refine=10)
+        self.assertEqual(self._python(again), expected)
         got: list[np.ndarray] = []
-        threads = [threading.Thread(target=lambda: got.append(predictor.predict(image).positions))
+        threads = [threading.Thread(target=lambda: got.append(
+            predictor.predict(image, refine=10).positions))
                    for _ in range(4)]
         for thread in threads:
             thread.start()
@@ -75,7 +82,7 @@ class Predict(FolderTest):
             thread.join()
         child = os.fork()
         if child == 0:
-            mesh = predictor.predict(image)
+            mesh = predictor.predict(image, refine=10)
             same = len(got) == 4 and all(np.array_equal(mesh.positions, p) for p in got)
             os._exit(0 if same else 1)
         self.assertEqual(os.waitpid(child, 0)[1], 0)
@@ -102,6 +109,8 @@ class Predict(FolderTest):
                 (image, image[:9, :9, 3], "mask is 9 x 9"), (image[0, 0], None, "image has shape")):
             with self.assertRaisesRegex(ValueError, message):
                 predictor.predict(wrong, mask)
+        with self.assertRaisesRegex(ValueError, "refine is -1"):
+            predictor.predict(image, refine=-1)
         with self.assertRaisesRegex(ValueError, r"predict_prepared: images has shape \(4, 8, 8\)"):
             predictor.predict_prepared(np.zeros((4, 8, 8), np.uint8))
         with self.assertRaisesRegex(FileNotFoundError, "none"):

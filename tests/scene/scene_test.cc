@@ -7,6 +7,7 @@
 
 #include "scene/camera.h"
 #include "scene/shapes.h"
+#include "scene/subdivide.h"
 #include "scene/topology.h"
 
 namespace tilegrad {
@@ -214,6 +215,25 @@ TEST(Camera, LooksFromAnyDistance) {
     const double expected[9] = {0, -1, 0, 0, 0, 1, -1, 0, 0};
     for (int i = 0; i < 9; ++i) EXPECT_NEAR(camera.rotation[i], expected[i], 1e-15) << scale;
   }
+}
+
+// Tetrahedron: 4 vertices and 6 edges give 10 vertices and 16 faces.
+TEST(Subdivide, DividesEachEdgeOnceAndStaysClosed) {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}};
+  mesh.colors = {{0, 0, 0, 1}, {1, 0, 0, 1}, {0, 1, 0, 1}, {0, 0, 1, 1}};
+  mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const Mesh out = Subdivided(mesh);
+  ASSERT_EQ(out.positions.size(), 10u);
+  ASSERT_EQ(out.faces.size(), 16u);
+  EXPECT_EQ(out.faces[0], (Face{0, 4, 6}));  // 4 lies between 0 and 2, 5 between 2 and 1
+  EXPECT_EQ(out.positions[4], glm::vec3(0, 1, 0));
+  EXPECT_EQ(out.positions[5], glm::vec3(1, 1, 0));
+  EXPECT_EQ(out.colors[5], glm::vec4(0.5f, 0.5f, 0, 1));
+  const Topology topology = BuildTopology(out.faces, out.positions.size());
+  EXPECT_EQ(topology.boundary_edges, 0);
+  EXPECT_EQ(topology.nonmanifold_edges, 0);
+  EXPECT_TRUE(Validate(out).ok());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 // normalisation <- network weights.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -74,6 +75,42 @@ TEST(MeshNetwork, SmoothingSpreadsOffsets) {
   EXPECT_NEAR(roughness(4), 0.44, 0.15);
 }
 
+// Every vertex of a sphere has a partner at (-x, y, z); of a symmetric prediction it is at the
+// mirror image of its place, to the rounding of diffusion's sums.
+TEST(MeshNetwork, SymmetricPredictionsAre) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  for (const bool fc_norm : {false, true}) {
+    MeshNetwork network(context,
+                        {.channels = 2,
+                         .code = 6,
+                         .hidden1 = 5,
+                         .hidden2 = 7,
+                         .template_level = 2,
+                         .smoothing = 2,
+                         .symmetric = true,
+                         .fc_norm = fc_norm,
+                         .output_deviation = 1},
+                        16, 1);
+    const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
+    const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
+    const auto& sphere = network.template_mesh().positions;
+    const float* const p = out.positions.value().data<float>();
+    double moved = 0;
+    for (std::size_t v = 0; v < sphere.size(); ++v) {
+      const glm::vec3 image(-sphere[v].x, sphere[v].y, sphere[v].z);
+      const auto partner = std::find(sphere.begin(), sphere.end(), image) - sphere.begin();
+      ASSERT_LT(partner, static_cast<std::ptrdiff_t>(sphere.size()));
+      const float *const a = p + 3 * v, *const b = p + 3 * partner;
+      EXPECT_NEAR(a[0], -b[0], 1e-6);
+      EXPECT_NEAR(a[1], b[1], 1e-6);
+      EXPECT_NEAR(a[2], b[2], 1e-6);
+      moved += std::abs(static_cast<double>(out.movement.value().data<float>()[3 * v]));
+    }
+    EXPECT_GT(moved, 1);  // and not because nothing moves
+  }
+}
+
 // Two objects, two views of 16 x 16, a small network: everything of a real step.
 struct SmallProblem {
   SingleImageConfig config;
@@ -127,8 +164,7 @@ Result<LossValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int6
 // 1e-12 and rounding 1e-16 / h = 1e-10 relative to a loss near 1; gradients of single weights are
 // 1e-4 and more, so 1e-5 relative (plus 1e-8 absolute) is what can be asked. One entry in fifty may
 // sit on a kink.
-TEST(Chain, Float64GradientsAgreeWithDifferences) {
-  const SmallProblem p;
+void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
   const Workers workers(1);
   nn::Context context(workers, nn::DType::kF64);
   TrainStep step(context, p.config, p.store.size);
@@ -160,6 +196,16 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
     }
   }
   EXPECT_LE(off, checked / 50) << "of " << checked;
+}
+
+TEST(Chain, Float64GradientsAgreeWithDifferences) {
+  ExpectGradientsAgreeWithDifferences(SmallProblem());
+}
+
+TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
+  SmallProblem p;
+  p.config.network.symmetric = true, p.config.network.fc_norm = false;
+  ExpectGradientsAgreeWithDifferences(p);
 }
 
 // The path that trains (float32, SIMD, tiled renderer) against float64: a relative error of the

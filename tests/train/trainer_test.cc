@@ -125,6 +125,8 @@ TEST_F(TrainerTest, MirroredSmoothedAndAveragedRunsResumeToo) {
   ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
   ValueOf<double>(job_.config, "optimizer.average") = 0.9;
   ValueOf<std::int64_t>(job_.config, "network.smoothing") = 2;
+  ValueOf<bool>(job_.config, "network.symmetric") = true;
+  ValueOf<bool>(job_.config, "network.fc_norm") = false;
   RunWhole("whole", 2);
   StopAfter(4);
   ExpectFinishes();

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/models/mesh_network.h"
 
+#include <map>
+#include <tuple>
+
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
@@ -32,7 +35,11 @@ struct Builder {
   }
   void FcRelu(nn::Sequential& net, const std::string& name, std::int64_t in, std::int64_t out) {
     Fc(net, name, in, out);
-    net.Add<nn::BatchNorm>("fc_norm" + name, context, out, kRelu);
+    if (config.fc_norm) {
+      net.Add<nn::BatchNorm>("fc_norm" + name, context, out, kRelu);
+    } else {
+      net.Add<nn::Activation>("fc_relu" + name, &nn::Relu);
+    }
   }
 };
 
@@ -68,6 +75,29 @@ nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
   });
 }
 
+// The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
+std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
+  std::map<std::tuple<float, float, float>, std::int64_t> at;
+  for (std::size_t v = 0; v < sphere.positions.size(); ++v) {
+    const glm::vec3& p = sphere.positions[v];
+    at[{p.x, p.y, p.z}] = static_cast<std::int64_t>(v);
+  }
+  std::vector<std::int64_t> mirror;
+  for (const glm::vec3& p : sphere.positions) mirror.push_back(at.at({-p.x, p.y, p.z}));
+  return mirror;
+}
+
+// Offsets [3 V] to the mean of themselves and their mirror image at x = 0, a projection.
+nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
+  const std::vector<std::int64_t> mirror = MirrorVertices(sphere);
+  const auto numbers = 3 * static_cast<std::int64_t>(mirror.size());
+  return nn::MakeAxisMap(like, {numbers, numbers}, [&](std::int64_t i, nn::AxisTerms& terms) {
+    const std::int64_t axis = i % 3, other = 3 * mirror[static_cast<std::size_t>(i / 3)] + axis;
+    terms.push_back({i, 0.5});
+    terms.push_back({other, axis == 0 ? -0.5 : 0.5});
+  });
+}
+
 }  // namespace
 
 void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
@@ -81,7 +111,7 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
     : context_(context),
       template_(Icosphere(static_cast<int>(config.template_level),
                           static_cast<float>(config.template_radius))),
-      smoothing_(config.smoothing) {
+      config_(config) {
   Rng rng(seed, /*stream=*/0x6e6574);
   Builder builder{context, config, rng};
   const auto vertices = static_cast<std::int64_t>(template_.positions.size());
@@ -90,13 +120,17 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
   nn::FillConstant(BuildDecoder(builder, all_.color, vertices).bias.value(), config.color_bias);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ = context.From({vertices, 3}, flat);
-  diffusion_ = DiffusionRound(nn::Constant(context, template_positions_), template_);
+  const nn::Var like = nn::Constant(context, template_positions_);
+  diffusion_ = DiffusionRound(like, template_);
+  if (config.symmetric) symmetry_ = Symmetry(like, template_);
 }
 
 nn::Var MeshNetwork::Movement(const nn::Var& code, nn::Mode mode) {
   const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
-  nn::Var movement = nn::Reshape(all_.shape.Forward(code, mode), {batch, vertices, 3});
-  for (std::int64_t round = 0; round < smoothing_; ++round)
+  nn::Var movement = all_.shape.Forward(code, mode);
+  if (config_.symmetric) movement = nn::MapAxis(movement, 1, symmetry_);
+  movement = nn::Reshape(movement, {batch, vertices, 3});
+  for (std::int64_t round = 0; round < config_.smoothing; ++round)
     movement = nn::MapAxis(movement, 1, diffusion_);
   return movement;
 }

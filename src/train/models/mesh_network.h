@@ -20,6 +20,9 @@ struct NetworkConfig {
   std::int64_t template_level = 3;  // subdivisions of the icosahedron: 3 gives 642 vertices
   double template_radius = 0.175;   // world units
   std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
+  bool symmetric = false;           // offsets are the mean of themselves and their mirror image at
+                                    // x = 0, so every prediction is symmetric there
+  bool fc_norm = true;              // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
@@ -57,9 +60,10 @@ class MeshNetwork {
 
   nn::Context& context_;
   Mesh template_;
-  std::int64_t smoothing_;         // rounds of diffusion
+  NetworkConfig config_;
   nn::Tensor template_positions_;  // [V, 3]
   nn::AxisMap diffusion_;          // one round
+  nn::AxisMap symmetry_;           // of [3 V] offsets
   // The three parts, shown to visitors as one module.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;

@@ -109,6 +109,23 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   return out;
 }
 
+// N images to N meshes, each changed as the job wants it.
+Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
+                                           std::span<const std::uint8_t> images,
+                                           const Workers& workers) {
+  TILEGRAD_ASSIGN(std::vector<Mesh> meshes, job.predictor.Predict(images));
+  if (!job.change) return meshes;
+  const std::size_t bytes = images.size() / meshes.size();
+  std::vector<Status> failures(meshes.size());
+  workers.For(meshes.size(), [&](std::size_t i, std::size_t) {
+    auto changed = job.change(meshes[i], images.subspan(i * bytes, bytes));
+    failures[i] = changed.status();
+    if (changed.ok()) meshes[i] = std::move(*changed);
+  });
+  for (const Status& failure : failures) TILEGRAD_TRY(failure);
+  return meshes;
+}
+
 }  // namespace
 
 std::vector<int> ChooseModels(const Dataset& dataset, int count) {
@@ -167,7 +184,7 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
   EvaluationJob evaluation;
   evaluation.dataset = &dataset;
   evaluation.split = job.training_models ? Split::kTrain : Split::kTest;
-  evaluation.predict = [&](auto images) { return job.predictor.Predict(images); };
+  evaluation.predict = [&](auto images) { return PredictAndChange(job, images, workers); };
   evaluation.template_mesh = job.predictor.template_mesh();
   evaluation.views_per_model = job.views_per_model;
   evaluation.predictor = job.predictor.description();

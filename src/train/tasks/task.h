@@ -4,6 +4,7 @@
 // through this file only. How to add one: docs/adding/task.md.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -56,11 +57,17 @@ class Model {
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
 };
 
+// What is done to a prediction before it is scored, with the image that it was made from. Called
+// from several threads at once.
+using PredictionChange =
+    std::function<Result<Mesh>(const Mesh& prediction, std::span<const std::uint8_t> image)>;
+
 struct TaskEvaluation {
   Path run, data;
   const Predictor& predictor;
   bool training_models = false;  // scores what it was trained on instead of what it never saw
   int views_per_model = 24;
+  PredictionChange change;  // none: predictions are scored as they are
 };
 
 // A picture of a report.

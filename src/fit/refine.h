@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// A predicted mesh brought closer to the picture that it was predicted from: its camera is searched
+// for, then camera, shape and colours follow the gradient of equations 12 and 13 through the
+// renderer. One picture shows one side; the other follows by symmetry at x = 0, which most made
+// things have.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "base/parallel.h"
+#include "fit/image_loss.h"
+#include "scene/camera.h"
+#include "scene/mesh.h"
+#include "train/data/dataset.h"
+
+namespace tilegrad::train {
+
+struct RefineOptions {
+  int steps = 300;  // of gradient descent; 0: only the camera is found
+  CameraRule camera =
+      {};  // of the training images: where the search for the picture's camera begins
+};
+
+// How a mesh looks from the picture's camera.
+struct PictureMatch {
+  double silhouette_iou = 0;  // [0, 1]
+  double color_l1 = 0;  // mean |difference| over channels and the pixels of the picture's object
+};
+
+struct RefinedMesh {
+  Mesh mesh;             // normalised as predictions are; vertex colours in [0, 1]
+  Camera camera;         // sees it as the picture shows it; of pixels of the picture
+  Camera camera_before;  // the best that was found for the prediction
+  PictureMatch before, after;
+};
+
+// A picture as PrepareCutout makes it, planar [4][size][size] bytes with RGB over black, as an
+// image to fit.
+TargetImages TargetOfCutout(std::span<const std::uint8_t> planar, int size);
+
+// `picture`: one square image, a multiple of 4 pixels a side. `prediction`: a mesh with vertex
+// colours, centred, y up. Faces of a coarse mesh are divided once, so that the result may have more
+// vertices than the prediction. A pure function of its arguments; any number of workers gives the
+// same bits. Errors: a picture without an object; those of the renderer.
+Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
+                               const RefineOptions& options, const Workers& workers);
+
+}  // namespace tilegrad::train
