@@ -52,6 +52,10 @@ Status CheckMaterials(const Mesh& mesh) {
     }
   }
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    if (!std::isfinite(mesh.materials[m].alpha_cutoff)) {
+      return InvalidArgument("materials[{}] (\"{}\"): alpha_cutoff is not finite", m,
+                             mesh.materials[m].name);
+    }
     const int t = mesh.materials[m].base_color_texture;
     if (t < -1 || t >= static_cast<int>(mesh.textures.size())) {
       return InvalidArgument("materials[{}] (\"{}\") names texture {}, but there are {}", m,

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <charconv>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -71,20 +72,18 @@ int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
   return AddTexture(source, name, DecodePercent(image.uri), out);
 }
 
+TextureWrap WrapOf(int number) {
+  return number == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
+         : number == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
+                                                           : TextureWrap::kRepeat;
+}
+
 void GltfWalk::SetSampler(int texture, Material* material) {
   if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
   const int index = model.textures[texture].sampler;
   if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
   const tinygltf::Sampler& sampler = model.samplers[index];
-  const int wrap = sampler.wrapS;
-  if (wrap != sampler.wrapT) {
-    out.warnings.push_back(fmt::format(
-        "material \"{}\": its texture wraps differently in u and v; u's way is taken for both",
-        material->name));
-  }
-  material->wrap = wrap == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
-                   : wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
-                                                                   : TextureWrap::kRepeat;
+  material->wrap = {WrapOf(sampler.wrapS), WrapOf(sampler.wrapT)};
   material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
 }
 
@@ -102,6 +101,8 @@ Material GltfWalk::ConvertMaterial(int index) {
                         : from.alphaMode == "BLEND" ? AlphaMode::kBlend
                                                     : AlphaMode::kOpaque;
   if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
+  if (material.alpha_mode == AlphaMode::kMask)
+    material.alpha_cutoff = static_cast<float>(std::clamp(from.alphaCutoff, 0.0, 2.0));
   material.double_sided = from.doubleSided;
   material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
   const tinygltf::TextureInfo& texture = from.pbrMetallicRoughness.baseColorTexture;

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "scene/srgb.h"
+#include "shade/surface_color.h"
 
 namespace tilegrad {
 namespace {
@@ -31,12 +32,6 @@ std::vector<float> DecodeTexels(const ImageU8& image, ColorSpace space) {
     for (std::size_t c = 0; c < 3; ++c) out[3 * p + c] = table[image.pixels[channels * p + c]];
   }
   return out;
-}
-
-Wrap WrapOf(TextureWrap wrap) {
-  return wrap == TextureWrap::kClamp    ? Wrap::kClamp
-         : wrap == TextureWrap::kMirror ? Wrap::kMirror
-                                        : Wrap::kRepeat;
 }
 
 }  // namespace
@@ -96,7 +91,7 @@ int MeshScene::AddTexture(const Material& material) {
   const auto index = static_cast<std::size_t>(material.base_color_texture);
   const ImageU8& image = mesh_.textures[index].image;
   if (texels_[index].empty()) texels_[index] = DecodeTexels(image, options_.color_space);
-  const Texture view = {texels_[index], image.width, image.height, WrapOf(material.wrap),
+  const Texture view = {texels_[index], image.width, image.height, shade::WrapOf(material),
                         material.nearest ? Filter::kNearest : options_.filter};
   const auto same = [&](const Texture& v) {
     return v.texels.data() == view.texels.data() && v.wrap == view.wrap && v.filter == view.filter;
