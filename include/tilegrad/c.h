@@ -58,7 +58,9 @@ typedef struct tilegrad_stream {
 typedef struct tilegrad_texture {
   const float* texels; /* [height,width,3], row 0 on top */
   int32_t width, height;
-  int32_t wrap;   /* 0 repeat, 1 clamp, 2 mirror */
+  int32_t wrap;   /* 0 repeat, 1 clamp, 2 mirror; one way along u, another along v: 3 repeat clamp,
+                     4 clamp mirror, 5 mirror repeat, 6 repeat mirror, 7 clamp repeat,
+                     8 mirror clamp */
   int32_t filter; /* 0 nearest, 1 bilinear, 2 trilinear */
 } tilegrad_texture;
 

@@ -29,6 +29,13 @@ enum class Wrap {
   kRepeat,  // the texture tiles the plane
   kClamp,   // outside [0, 1] the border texels are repeated
   kMirror,  // tiles of the texture and its mirror image alternate
+  // One way along u, another along v.
+  kRepeatClamp,
+  kClampMirror,
+  kMirrorRepeat,
+  kRepeatMirror,
+  kClampRepeat,
+  kMirrorClamp,
 };
 enum class Filter {
   kNearest,    // no gradient to uvs

@@ -41,7 +41,9 @@ void SaveMesh(const Path& path, const py::dict& dict) {
 }
 
 constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};
-constexpr const char* kWraps[] = {"repeat", "clamp", "mirror"};
+constexpr const char* kWraps[] = {"repeat",        "clamp",        "mirror",
+                                  "repeat clamp",  "clamp mirror", "mirror repeat",
+                                  "repeat mirror", "clamp repeat", "mirror clamp"};
 constexpr const char* kFilters[] = {"nearest", "bilinear", "trilinear"};
 
 py::object StreamArray(const StreamT<float>& stream, py::ssize_t channels) {

@@ -174,7 +174,9 @@ void BindNames(py::module_& m) {
   m.attr("INTERPOLATIONS") = py::make_tuple("perspective", "screen_linear");
   m.attr("CULLINGS") = py::make_tuple("none", "back");
   m.attr("ALPHA_RULES") = py::make_tuple("all_faces", "paper");
-  m.attr("WRAPS") = py::make_tuple("repeat", "clamp", "mirror");
+  m.attr("WRAPS") =
+      py::make_tuple("repeat", "clamp", "mirror", "repeat clamp", "clamp mirror", "mirror repeat",
+                     "repeat mirror", "clamp repeat", "mirror clamp");
   m.attr("FILTERS") = py::make_tuple("nearest", "bilinear", "trilinear");
   m.attr("LIGHTINGS") = py::make_tuple("none", "lambert", "phong", "spherical_harmonics");
   m.attr("NORMAL_KINDS") = py::make_tuple("smooth", "flat", "given");

@@ -28,6 +28,21 @@ Enum EnumOf(const char* function, const py::handle& value,
   return static_cast<Enum>(found - names.begin());
 }
 
+// "repeat" along both axes, or "repeat clamp" along u and v.
+std::string NameOf(const std::array<TextureWrap, 2>& wrap) {
+  const auto name = [](TextureWrap w) { return kWraps[static_cast<std::size_t>(w)]; };
+  return wrap[0] == wrap[1] ? name(wrap[0]) : fmt::format("{} {}", name(wrap[0]), name(wrap[1]));
+}
+
+std::array<TextureWrap, 2> WrapOfName(const char* function, const std::string& name) {
+  const std::size_t space = std::min(name.find(' '), name.size());
+  const auto along = [&](const std::string& way) {
+    return EnumOf<TextureWrap>(function, py::str(way), kWraps);
+  };
+  const TextureWrap u = along(name.substr(0, space));
+  return {u, space == name.size() ? u : along(name.substr(space + 1))};
+}
+
 // None where there is nothing.
 template <class T, class Vector>
 py::object ArrayOrNone(Vector values, std::vector<py::ssize_t> shape) {
@@ -37,12 +52,13 @@ py::object ArrayOrNone(Vector values, std::vector<py::ssize_t> shape) {
 
 py::dict MaterialToDict(const Material& m) {
   const auto& c = m.base_color;
-  return py::dict(
-      py::arg("name") = Text(m.name), py::arg("base_color") = py::make_tuple(c.r, c.g, c.b, c.a),
-      py::arg("texture") = m.base_color_texture,
-      py::arg("wrap") = kWraps[static_cast<std::size_t>(m.wrap)], py::arg("nearest") = m.nearest,
-      py::arg("alpha_mode") = kAlphaModes[static_cast<std::size_t>(m.alpha_mode)],
-      py::arg("double_sided") = m.double_sided, py::arg("unlit") = m.unlit);
+  return py::dict(py::arg("name") = Text(m.name),
+                  py::arg("base_color") = py::make_tuple(c.r, c.g, c.b, c.a),
+                  py::arg("texture") = m.base_color_texture, py::arg("wrap") = NameOf(m.wrap),
+                  py::arg("nearest") = m.nearest,
+                  py::arg("alpha_mode") = kAlphaModes[static_cast<std::size_t>(m.alpha_mode)],
+                  py::arg("alpha_cutoff") = m.alpha_cutoff,
+                  py::arg("double_sided") = m.double_sided, py::arg("unlit") = m.unlit);
 }
 
 Material MaterialFromDict(const char* function, const py::dict& dict) {
@@ -51,9 +67,10 @@ Material MaterialFromDict(const char* function, const py::dict& dict) {
   const auto color = py::cast<std::array<float, 4>>(dict["base_color"]);
   m.base_color = {color[0], color[1], color[2], color[3]};
   m.base_color_texture = py::cast<int>(dict["texture"]);
-  m.wrap = EnumOf<TextureWrap>(function, dict["wrap"], kWraps);
+  m.wrap = WrapOfName(function, py::cast<std::string>(dict["wrap"]));
   m.nearest = py::cast<bool>(dict["nearest"]);
   m.alpha_mode = EnumOf<AlphaMode>(function, dict["alpha_mode"], kAlphaModes);
+  m.alpha_cutoff = py::cast<float>(dict["alpha_cutoff"]);
   m.double_sided = py::cast<bool>(dict["double_sided"]);
   m.unlit = py::cast<bool>(dict["unlit"]);
   return m;

@@ -95,7 +95,8 @@ class Texture:
 
     texels: (Ht, Wt, 3), or (N, Ht, Wt, 3) for a texture of each image, 0 to 1; row 0 on top;
         (u, v) = (0, 0) is the lower left corner. Sides 1 to 16384.
-    wrap: "repeat", "clamp" (the border goes on) or "mirror".
+    wrap: "repeat", "clamp" (the border goes on) or "mirror"; "repeat clamp" and the like: one way
+        along u, another along v.
     filter: "nearest", "bilinear" or "trilinear" (between the levels of a pyramid).
     """
 

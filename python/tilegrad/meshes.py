@@ -13,14 +13,13 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _tools
+from tilegrad import _arrays, _core, _tools
 from tilegrad._camera import Camera
 from tilegrad._paths import Path
 from tilegrad._scene import Scene, Surface, Texture, changed
 
 _COLOR_SPACES = ("srgb", "linear")
 _NORMALS = ("auto", "smooth", "flat")
-_WRAPS = ("repeat", "mirror", "clamp")
 _ALPHA_MODES = ("opaque", "mask", "blend")
 
 
@@ -29,8 +28,9 @@ class Material:
     """How faces are drawn. Colours are encoded as in image files (sRGB).
 
     base_color: r, g, b, a, 0 to 1; multiplies the texture. texture: index into Mesh.textures, -1:
-    none. wrap: "repeat", "mirror" or "clamp". nearest: texels as squares. alpha_mode: "opaque",
-    "mask" or "blend". double_sided: False: viewers do not draw back faces. unlit: the colour is
+    none. wrap: "repeat", "mirror" or "clamp"; "repeat clamp" and the like: one way along u, another
+    along v. nearest: texels as squares. alpha_mode: "opaque", "mask" (not there where alpha is less
+    than alpha_cutoff) or "blend"; `scene` draws all three opaque. double_sided: False: viewers do not draw back faces. unlit: the colour is
     shown as it is, whatever the light.
     """
 
@@ -40,18 +40,21 @@ class Material:
     wrap: str = "repeat"
     nearest: bool = False
     alpha_mode: str = "opaque"
+    alpha_cutoff: float = 0.5
     double_sided: bool = True
     unlit: bool = False
 
     def checked(self, function: str) -> dict[str, Any]:
         """Its members for C++. TypeError and ValueError in the name of `function`."""
         place = f"material {self.name!r}: "
-        _arrays.check_choice(function, place + "wrap", self.wrap, _WRAPS)
+        _arrays.check_choice(function, place + "wrap", self.wrap, _core.WRAPS)
         _arrays.check_choice(function, place + "alpha_mode", self.alpha_mode, _ALPHA_MODES)
         color = _arrays.as_array(function, place + "base_color", self.base_color, np.float32, (4,))
         return {"name": str(self.name), "base_color": color.tolist(),
                 "texture": _arrays.as_number(function, place + "texture", self.texture, int),
                 "wrap": self.wrap, "nearest": bool(self.nearest), "alpha_mode": self.alpha_mode,
+                "alpha_cutoff": _arrays.as_number(function, place + "alpha_cutoff",
+                                                  self.alpha_cutoff, float),
                 "double_sided": bool(self.double_sided), "unlit": bool(self.unlit)}
 
 

@@ -47,12 +47,17 @@ MeshSceneOptions SceneOptionsOf(const RenderSettings& settings) {
 }
 
 // What is drawn otherwise than a viewer of the file would.
-std::vector<std::string> MaterialNotes(const Mesh& mesh) {
+std::vector<std::string> MaterialNotes(const Mesh& mesh, bool soft) {
   std::vector<std::string> notes;
   for (const Material& m : mesh.materials) {
-    if (m.alpha_mode == AlphaMode::kOpaque && m.base_color.a >= 1) continue;
-    notes.push_back(fmt::format("material \"{}\": {} is drawn opaque", m.name,
-                                m.alpha_mode == AlphaMode::kMask ? "alpha mask" : "transparency"));
+    const bool opaque = m.alpha_mode == AlphaMode::kOpaque;
+    if (opaque && m.base_color.a <= 0) {
+      notes.push_back(
+          fmt::format("material \"{}\": its alpha of 0 is drawn as if it were 1", m.name));
+    } else if (soft && (!opaque || m.base_color.a < 1)) {
+      notes.push_back(fmt::format(
+          "material \"{}\": --soft-delta draws it opaque, without holes or transparency", m.name));
+    }
   }
   return notes;
 }
@@ -105,7 +110,8 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
                          .height = view.size.height,
                          .supersampling = settings_.supersampling,
                          .soft_delta = settings_.soft_delta,
-                         .culling = Culling(mesh_scene)};
+                         .culling = Culling(mesh_scene),
+                         .cover = mesh_scene.cover()};
   TILEGRAD_TRY(RequestOutputs(settings_.file, &request));
   Picture picture;
   TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
@@ -126,7 +132,8 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
 Status RenderRun::Mesh(const std::string& file) {
   TILEGRAD_ASSIGN(const io::LoadedMesh loaded, io::LoadMesh(Path(file)));
   for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
-  for (const std::string& note : MaterialNotes(loaded.mesh)) PrintNote("{}: {}\n", file, note);
+  for (const std::string& note : MaterialNotes(loaded.mesh, settings_.soft_delta > 0))
+    PrintNote("{}: {}\n", file, note);
   auto views = ChooseViews(settings_.view, loaded);
   if (!views.ok()) return views.status().Within(file);
   const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));

@@ -7,6 +7,8 @@
 
 #include "base/error.h"
 #include "fit/scene.h"
+#include "scene/shapes.h"
+#include "scene/unlit.h"
 
 namespace tilegrad::train {
 namespace {
@@ -59,6 +61,17 @@ ImageU8 ToBytes(const Image& image) {
   return out;
 }
 
+constexpr const char* kFitted = "fitted";
+
+void AddTexture(const FitScene& scene, Mesh* mesh) {
+  for (const std::int32_t u : scene.uv_indices) {
+    const auto at = 2 * static_cast<std::size_t>(u);
+    mesh->corner_uvs.emplace_back(scene.uvs[at], scene.uvs[at + 1]);
+  }
+  mesh->textures.push_back({kFitted, ToBytes(scene.texture)});
+  mesh->materials = {{.name = kFitted, .base_color = glm::vec4(1), .base_color_texture = 0}};
+}
+
 }  // namespace
 
 Result<FitScene> SceneOfMesh(const Mesh& mesh) {
@@ -92,13 +105,10 @@ Mesh MeshOfScene(const FitScene& scene) {
   for (std::size_t i = 0; i < scene.colors.size(); i += 3) {
     mesh.colors.emplace_back(scene.colors[i], scene.colors[i + 1], scene.colors[i + 2], 1.0f);
   }
-  if (scene.texture.empty()) return mesh;
-  for (const std::int32_t u : scene.uv_indices) {
-    const auto at = 2 * static_cast<std::size_t>(u);
-    mesh.corner_uvs.emplace_back(scene.uvs[at], scene.uvs[at + 1]);
-  }
-  mesh.textures.push_back({"fitted", ToBytes(scene.texture)});
-  mesh.materials.push_back({.name = "fitted", .base_color = glm::vec4(1), .base_color_texture = 0});
+  mesh.normals = SmoothNormals(mesh);
+  if (!scene.texture.empty()) AddTexture(scene, &mesh);
+  // Under a fitted light, colours are those of the surface; else they hold the images' light.
+  if (scene.shading.lighting == Lighting::kNone) SetUnlit(mesh, kFitted);
   return mesh;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "fit/texture_fill.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
@@ -229,6 +230,16 @@ Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
   return WriteTextAtomic(job_.out / "report.html", page);
 }
 
+// A texture that began blank has no colour where no view looked. One of the user's keeps his there.
+Status FillTexture(const FitJob& job, const Workers& workers, FitScene* scene) {
+  const bool blank = !job.start.has_value() || job.start->textures.empty();
+  if (!blank || scene->texture.empty()) return {};
+  TILEGRAD_ASSIGN(const std::vector<bool> seen,
+                  SeenTexels(*scene, job.input.training, SizeOf(job.input), workers));
+  FillUnseenTexels(seen, scene);
+  return {};
+}
+
 }  // namespace
 
 double MeanPsnr(std::span<const ViewScore> scores) {
@@ -262,7 +273,9 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   const RunPlan plan = PlanOf(job);
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));
-  TILEGRAD_TRY(FitResult(job, work.scene(), workers).Finish(plan, &outcome));
+  FitScene scene = work.scene();
+  TILEGRAD_TRY(FillTexture(job, workers, &scene));
+  TILEGRAD_TRY(FitResult(job, scene, workers).Finish(plan, &outcome));
   return outcome;
 }
 

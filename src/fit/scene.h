@@ -103,6 +103,7 @@ class FitRenderer {
 // A mesh with its first texture or its vertex colours, and back. Materials' factors are multiplied
 // into colours. An error says what a FitScene cannot hold: several textures, say.
 Result<FitScene> SceneOfMesh(const Mesh& mesh);
+// Its normals are smooth; it is unlit unless the scene has light of its own.
 Mesh MeshOfScene(const FitScene& scene);
 
 }  // namespace tilegrad::train

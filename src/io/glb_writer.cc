@@ -127,7 +127,7 @@ Json AddPrimitive(GlbBuilder& glb, const Primitive& p) {
 // A texture as glTF has them: an image, and how it is looked up.
 struct TextureUse {
   int image = 0;
-  TextureWrap wrap = TextureWrap::kRepeat;
+  std::array<TextureWrap, 2> wrap = {TextureWrap::kRepeat, TextureWrap::kRepeat};  // as Material
   bool nearest = false;
   bool operator==(const TextureUse&) const = default;
 };
@@ -165,6 +165,7 @@ Json MaterialJson(const Material& m, const std::vector<TextureUse>& uses) {
   }
   Json out = {{"name", m.name}, {"pbrMetallicRoughness", pbr}, {"doubleSided", m.double_sided}};
   if (const std::string mode = AlphaModeName(m); mode != "OPAQUE") out["alphaMode"] = mode;
+  if (m.alpha_mode == AlphaMode::kMask) out["alphaCutoff"] = m.alpha_cutoff;
   if (m.unlit) out["extensions"] = {{"KHR_materials_unlit", Json::object()}};
   return out;
 }
@@ -182,10 +183,12 @@ Status AddImages(GlbBuilder& glb, const Mesh& mesh) {
 
 Json SamplerJson(const TextureUse& use) {
   constexpr int kNearest = 9728, kLinear = 9729, kRepeat = 10497, kMirror = 33648, kClamp = 33071;
-  const int wrap = use.wrap == TextureWrap::kRepeat   ? kRepeat
-                   : use.wrap == TextureWrap::kMirror ? kMirror
-                                                      : kClamp;
-  return {{"magFilter", use.nearest ? kNearest : kLinear}, {"wrapS", wrap}, {"wrapT", wrap}};
+  const auto number = [](TextureWrap wrap) {
+    return wrap == TextureWrap::kRepeat ? kRepeat : wrap == TextureWrap::kMirror ? kMirror : kClamp;
+  };
+  return {{"magFilter", use.nearest ? kNearest : kLinear},
+          {"wrapS", number(use.wrap[0])},
+          {"wrapT", number(use.wrap[1])}};
 }
 
 void AddTextures(GlbBuilder& glb, const std::vector<TextureUse>& uses) {

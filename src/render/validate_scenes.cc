@@ -46,7 +46,7 @@ Status CheckEnumerators(const SceneT<T>& scene) {
       CheckEnumerator("shading.lighting", scene.shading.lighting, Lighting::kSphericalHarmonics));
   TILEGRAD_TRY(CheckEnumerator("shading.normals", scene.shading.normals, Normals::kGiven));
   for (const TextureT<T>& texture : scene.textures) {
-    TILEGRAD_TRY(CheckEnumerator("texture.wrap", texture.wrap, Wrap::kMirror));
+    TILEGRAD_TRY(CheckEnumerator("texture.wrap", texture.wrap, Wrap::kMirrorClamp));
     TILEGRAD_TRY(CheckEnumerator("texture.filter", texture.filter, Filter::kTrilinear));
   }
   return {};

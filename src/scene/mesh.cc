@@ -59,6 +59,10 @@ Status CheckMaterials(const Mesh& mesh) {
           "materials[{}] (\"{}\"): base_color[{}] is {}; every number must be finite", m,
           mesh.materials[m].name, c, value);
     }
+    if (!std::isfinite(mesh.materials[m].alpha_cutoff)) {
+      return InvalidArgument("materials[{}] (\"{}\"): alpha_cutoff is not finite", m,
+                             mesh.materials[m].name);
+    }
     const int t = mesh.materials[m].base_color_texture;
     if (t < -1 || t >= static_cast<int>(mesh.textures.size())) {
       return InvalidArgument("materials[{}] (\"{}\") names texture {}, but there are {}", m,

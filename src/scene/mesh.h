@@ -27,9 +27,10 @@ struct Material {
   std::string name;
   glm::vec4 base_color = {0.8f, 0.8f, 0.8f, 1.0f};  // multiplies the texture; alpha < 1 is glass
   int base_color_texture = -1;                      // index into Mesh::textures, -1 for none
-  TextureWrap wrap = TextureWrap::kRepeat;
+  std::array<TextureWrap, 2> wrap = {TextureWrap::kRepeat, TextureWrap::kRepeat};  // along u, v
   bool nearest = false;                       // texels as squares, not filtered
   AlphaMode alpha_mode = AlphaMode::kOpaque;  // as requested by the file
+  float alpha_cutoff = 0.5f;                  // of kMask: what has less alpha is not there
   bool double_sided = true;                   // false: viewers do not draw its back faces
   bool unlit = false;                         // shown without lighting
 

@@ -27,7 +27,17 @@ ImageU8 Halve(const ImageU8& image) {
   return out;
 }
 
+Wrap WayOf(TextureWrap wrap) {
+  return wrap == TextureWrap::kClamp    ? Wrap::kClamp
+         : wrap == TextureWrap::kMirror ? Wrap::kMirror
+                                        : Wrap::kRepeat;
+}
+
 }  // namespace
+
+Wrap WrapOf(const Material& material) {
+  return WrapOf(WayOf(material.wrap[0]), WayOf(material.wrap[1]));
+}
 
 SurfaceColor::SurfaceColor(const Mesh& mesh) : mesh_(mesh) {
   for (const MeshTexture& texture : mesh.textures) textures_.push_back(Prepare(texture.image));
@@ -56,7 +66,7 @@ glm::vec3 SurfaceColor::At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_colo
   const Texels& texels = textures_[static_cast<std::size_t>(material.base_color_texture)];
   if (texels.rgb.empty()) return color;
   std::array<float, 3> texel;
-  SampleLevelRef<float>({texels.rgb, texels.width, texels.height, 3, Wrap::kRepeat}, uv.x, uv.y,
+  SampleLevelRef<float>({texels.rgb, texels.width, texels.height, 3, WrapOf(material)}, uv.x, uv.y,
                         texel);
   return color * glm::vec3(texel[0], texel[1], texel[2]);
 }

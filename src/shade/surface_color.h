@@ -5,17 +5,21 @@
 #include <vector>
 
 #include "scene/mesh.h"
+#include "tilegrad/scene.h"
 
 namespace tilegrad::shade {
 
 inline constexpr int kMaxTextureSide = 512;  // texels; larger textures are halved until they fit
+
+// How the material's texture goes on outside [0, 1].
+Wrap WrapOf(const Material& material);
 
 // Keeps a reference to the mesh.
 class SurfaceColor {
  public:
   explicit SurfaceColor(const Mesh& mesh);
 
-  // Unlit RGB in [0, 1] of a point of a face: factor x texture (bilinear, repeat) x `vertex_color`.
+  // Unlit RGB in [0, 1] of a point of a face: factor x texture (bilinear) x `vertex_color`.
   glm::vec3 At(std::size_t face, glm::vec2 uv, glm::vec3 vertex_color) const;
   // At corner k of a face.
   glm::vec3 AtCorner(std::size_t face, int k) const;

@@ -68,13 +68,13 @@ HWY_INLINE RunInt WrapLaneIndex(RunInt i, RunInt most, Wrap wrap) {
   return hn::IfThenElse(hn::Lt(i, zero), most, hn::IfThenElse(hn::Gt(i, most), zero, i));
 }
 
-// `u`: wrapped; `n`: texels of the axis, at the level of each pixel.
-HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, const TextureInput& input, std::size_t i,
-                        AxisRun* out) {
+// `u`: wrapped by `way`; `n`: texels of the axis, at the level of each pixel.
+HWY_INLINE void SetAxis(const WrappedLanes& u, RunInt n, Wrap way, const TextureInput& input,
+                        std::size_t i, AxisRun* out) {
   const RunTag d;
   const RunIntTag di;
   const bool corners = input.outer_centres;
-  const Wrap wrap = corners ? Wrap::kClamp : input.wrap;  // of indices
+  const Wrap wrap = corners ? Wrap::kClamp : way;  // of indices
   const bool nearest = input.filter == Filter::kNearest;
   const auto most = hn::Sub(n, hn::Set(di, 1));
   const auto scale = hn::ConvertTo(d, corners ? most : n);
@@ -111,14 +111,14 @@ HWY_INLINE RunInt SizeAt(int n, RunInt level) {
 HWY_INLINE void SetFootprints(std::size_t count, const TextureInput& input,
                               const std::int32_t* levels, FootprintRun* out) {
   const RunTag d;
-  const TextureLevel& finest = input.levels[0];
+  const Wrap across = WrapAlongU(input.wrap), down = WrapAlongV(input.wrap);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto level = hn::Load(RunIntTag(), levels + i);
-    const WrappedLanes u = WrapLanes(LoadRun(input.uv[0], i), input.wrap);
-    SetAxis(u, SizeAt(finest.width, level), input, i, &out->column);
-    WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), input.wrap);
+    const WrappedLanes u = WrapLanes(LoadRun(input.uv[0], i), across);
+    SetAxis(u, SizeAt(input.levels[0].width, level), across, input, i, &out->column);
+    WrappedLanes v = WrapLanes(LoadRun(input.uv[1], i), down);
     v = {hn::Sub(hn::Set(d, 1.0f), v.at), hn::Neg(v.slope)};
-    SetAxis(v, SizeAt(finest.height, level), input, i, &out->row);
+    SetAxis(v, SizeAt(input.levels[0].height, level), down, input, i, &out->row);
   }
 }
 

@@ -38,6 +38,18 @@ TextureViewT<T> ViewOf(const TextureT<T>& t) {
   return {t.texels, t.width, t.height, 3, t.wrap, t.filter};
 }
 
+// The ways of a Wrap along u and v: kRepeat, kClamp or kMirror.
+constexpr Wrap WrapAlongU(Wrap wrap) { return static_cast<Wrap>(static_cast<int>(wrap) % 3); }
+constexpr Wrap WrapAlongV(Wrap wrap) {
+  const int way = static_cast<int>(wrap);
+  return static_cast<Wrap>((way + way / 3) % 3);
+}
+// The Wrap of two such ways.
+constexpr Wrap WrapOf(Wrap along_u, Wrap along_v) {
+  const int u = static_cast<int>(along_u), v = static_cast<int>(along_v);
+  return static_cast<Wrap>(u + 3 * ((v - u + 3) % 3));
+}
+
 inline constexpr int kMaxTextureSize = 16384;  // texels, each axis
 
 // Of a pyramid, ready for lookups: texels [height][width][4], the fourth unused.

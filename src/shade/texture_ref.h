@@ -50,11 +50,11 @@ inline int WrapIndex(int i, int n, Wrap wrap) {
   return i < 0 ? n - 1 : i < n ? i : 0;  // wrapped coordinates are at most one texel outside
 }
 
-// Along u; for v, call it with 1 - v.
+// Along u, which is wrapped by `way`; for v, call it with 1 - v.
 template <class T>
-Axis<T> MakeAxis(const Wrapped<T>& u, int n, const TextureViewT<T>& texture) {
+Axis<T> MakeAxis(const Wrapped<T>& u, int n, Wrap way, const TextureViewT<T>& texture) {
   const bool corners = texture.outer_centres, nearest = texture.filter == Filter::kNearest;
-  const Wrap wrap = corners ? Wrap::kClamp : texture.wrap;  // of indices
+  const Wrap wrap = corners ? Wrap::kClamp : way;  // of indices
   const float scale = static_cast<float>(corners ? n - 1 : n);
   const T x = corners || nearest ? u.at * T(scale) : u.at * T(scale) - T(0.5f);
   if (nearest) {
@@ -75,10 +75,11 @@ struct Footprint {
 
 template <class T>
 Footprint<T> MakeFootprint(const TextureViewT<T>& texture, const T& u, const T& v) {
-  Wrapped<T> down = WrapCoordinate(v, texture.wrap);
+  const Wrap along_u = WrapAlongU(texture.wrap), along_v = WrapAlongV(texture.wrap);
+  Wrapped<T> down = WrapCoordinate(v, along_v);
   down = {T(1) - down.at, -down.slope};
-  Footprint<T> out{MakeAxis(WrapCoordinate(u, texture.wrap), texture.width, texture),
-                   MakeAxis(down, texture.height, texture),
+  Footprint<T> out{MakeAxis(WrapCoordinate(u, along_u), texture.width, along_u, texture),
+                   MakeAxis(down, texture.height, along_v, texture),
                    {}};
   const int rows[2] = {out.row.low, out.row.high}, columns[2] = {out.column.low, out.column.high};
   for (int k = 0; k < 4; ++k) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "scene/shapes.h"
+#include "scene/unlit.h"
 #include "train/config.h"
 #include "train/run/checkpoint.h"
 
@@ -68,6 +70,10 @@ Result<std::vector<Mesh>> Predictor::Predict(std::span<const std::uint8_t> image
   for (std::size_t at = 0; at < images.size(); at += Model::kImagesAtOnce * bytes) {
     const std::size_t size = std::min(Model::kImagesAtOnce * bytes, images.size() - at);
     TILEGRAD_TRY(impl_->model->Predict(images.subspan(at, size), &out));
+  }
+  for (Mesh& mesh : out) {
+    if (mesh.normals.empty()) mesh.normals = SmoothNormals(mesh);
+    SetUnlit(mesh, "predicted");
   }
   return out;
 }

@@ -37,7 +37,8 @@ class Predictor {
   const Mesh& template_mesh() const;  // Model::template_mesh
   Task& task() const;                 // with the configuration of the run
 
-  // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes.
+  // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes with
+  // smooth normals; unlit: their colours hold the light of the training images.
   Result<std::vector<Mesh>> Predict(std::span<const std::uint8_t> images) const;
 
  private:

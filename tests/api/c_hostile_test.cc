@@ -74,7 +74,7 @@ std::vector<tilegrad_texture> RandomTextures(Dice* dice, World* world) {
     t.texels = world->Floats(dice, 3 * static_cast<std::size_t>(t.width * t.height));
     if (dice->OneIn(20)) t.width = dice->Of({0, -1, 20000, INT_MAX, INT_MIN});
     if (dice->OneIn(20)) t.height = dice->Of({0, -7, 16385, INT_MAX});
-    if (dice->OneIn(20)) t.wrap = dice->Of({-1, 3, INT_MAX});
+    if (dice->OneIn(20)) t.wrap = dice->Of({-1, 9, INT_MAX});
     if (dice->OneIn(20)) t.filter = dice->Of({-1, 3, INT_MIN});
     if (dice->OneIn(20)) t.texels = nullptr;
   }

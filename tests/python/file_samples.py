@@ -70,7 +70,7 @@ def textured_mesh() -> files.Mesh:
         normals=np.tile(np.array([[0, 0, 1]], np.float32), (4, 1)),
         corner_uvs=np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32),
         face_materials=np.array([0, 1], np.int32),
-        materials=[files.Material("red", (1, 1, 1, 1), texture=0, wrap="clamp", nearest=True),
+        materials=[files.Material("red", (1, 1, 1, 1), texture=0, wrap="clamp repeat", nearest=True),
                    files.Material("blue", (0, 0, 1, 1), double_sided=False, unlit=True)],
         textures=[files.MeshTexture("texels", texels)])
 

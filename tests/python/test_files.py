@@ -78,6 +78,9 @@ class Meshes(FolderTest):
     def test_materials_are_checked(self) -> None:
         for change, error, message in (
                 ({"wrap": "twice"}, ValueError, "material 'red': wrap is 'twice'"),
+                ({"wrap": "repeat twice"}, ValueError, "material 'red': wrap is 'repeat twice'"),
+                ({"alpha_cutoff": "x"}, TypeError, "material 'red': alpha_cutoff must be float"),
+                ({"alpha_cutoff": float("nan")}, ValueError, "alpha_cutoff"),
                 ({"alpha_mode": None}, ValueError, "material 'red': alpha_mode is None"),
                 ({"base_color": (1, 0, 0)}, ValueError, r"base_color has shape \(3,\)"),
                 ({"texture": "wood"}, TypeError, "material 'red': texture"),

@@ -86,14 +86,15 @@ TEST_F(OnEveryTarget, LookupsAreThoseOfTheReference) {
   for (const auto& target : RunnableTargets()) {
     ASSERT_TRUE(ForceTarget(target).ok());
     Rng rng(4, 4);
-    for (int n = 0; n < 400; ++n) {
+    for (int n = 0; n < 432; ++n) {
       const bool outer_centres = n % 4 == 3;
-      const Wrap wrap = outer_centres ? Wrap::kRepeat : static_cast<Wrap>(n % 4);
-      const auto filter = static_cast<Filter>(n / 4 % 3);
+      const Wrap wrap = outer_centres ? Wrap::kRepeat : static_cast<Wrap>(n / 4 % 9);
+      const auto filter = static_cast<Filter>(n / 36 % 3);
       const TextureView view{texels, kWidth, kHeight, 3, wrap, filter, outer_centres};
       TexturePyramid pyramid;
       pyramid.Build(view);
-      const auto u = static_cast<float>(rng.Uniform(-3, 3)), v = static_cast<float>(rng.Uniform());
+      const auto u = static_cast<float>(rng.Uniform(-3, 3));
+      const auto v = static_cast<float>(rng.Uniform(-3, 3));
       const auto level = static_cast<float>(rng.Uniform(-1, 5));
       const auto got = Sample(pyramid, u, v, level);
       const auto expected = SampleRef(PyramidRef<float>(view), u, v, level);

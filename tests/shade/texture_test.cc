@@ -50,6 +50,26 @@ TEST(Texture, CentreOfATexelIsTheTexel) {
   }
 }
 
+constexpr Wrap kWays[] = {Wrap::kRepeat, Wrap::kClamp, Wrap::kMirror};
+
+// Nine ways, each along its own axis: what it makes of u is what it makes of u alone.
+TEST(Texture, EachAxisWrapsInItsOwnWay) {
+  EXPECT_EQ(WrapOf(Wrap::kRepeat, Wrap::kClamp), Wrap::kRepeatClamp);
+  EXPECT_EQ(WrapOf(Wrap::kMirror, Wrap::kRepeat), Wrap::kMirrorRepeat);
+  EXPECT_EQ(WrapOf(Wrap::kClamp, Wrap::kClamp), Wrap::kClamp);
+  const auto texels = RandomTexels();
+  for (const Wrap u : kWays) {
+    for (const Wrap v : kWays) {
+      EXPECT_EQ(WrapAlongU(WrapOf(u, v)), u);
+      EXPECT_EQ(WrapAlongV(WrapOf(u, v)), v);
+      const auto both = View(texels, WrapOf(u, v));
+      // Within half a texel of the middle no wrap matters to the other axis.
+      EXPECT_EQ(Sample(both, -1.2, 0.5), Sample(View(texels, u), -1.2, 0.5));
+      EXPECT_EQ(Sample(both, 0.5, 2.7), Sample(View(texels, v), 0.5, 2.7));
+    }
+  }
+}
+
 TEST(Texture, RepeatTilesThePlaneAndClampHoldsTheBorder) {
   const auto texels = RandomTexels();
   const auto repeat = View(texels, Wrap::kRepeat), clamp = View(texels, Wrap::kClamp);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/gltf/gltf_document.h"
 
-#include <algorithm>
-#include <array>
 #include <cctype>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -10,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/json_nesting.h"
+#include "io/gltf/gltf_extensions.h"
 
 namespace tilegrad::io {
 namespace {
@@ -58,15 +57,6 @@ std::string_view JsonPart(const Bytes& bytes) {
   return text.substr(kGlbHeader, length);
 }
 
-constexpr std::array<std::string_view, 3> kRead = {"KHR_mesh_quantization", "KHR_texture_transform",
-                                                   "KHR_materials_unlit"};
-constexpr std::array<std::string_view, 2> kCompressions = {"KHR_draco_mesh_compression",
-                                                           "EXT_meshopt_compression"};
-
-Status Compressed(const std::string& place, std::string_view extension) {
-  return DataLoss("{}: {} is not supported; save the file without compression", place, extension);
-}
-
 Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
              tinygltf::Model* model) {
   tinygltf::TinyGLTF loader;
@@ -82,10 +72,8 @@ Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
                                           side.folder);
   if (ok) return {};
   // Accessors of compressed geometry have no buffer view, about which tinygltf complains.
-  for (const std::string_view extension : kCompressions) {
-    if (JsonPart(bytes).find(extension) != std::string_view::npos)
-      return Compressed(place, extension);
-  }
+  const std::string_view compression = GltfCompression(JsonPart(bytes));
+  if (!compression.empty()) return RefuseGltfCompression(compression, place);
   while (!error.empty() && std::isspace(static_cast<unsigned char>(error.back()))) error.pop_back();
   return DataLoss("{}: not valid glTF: {}", place, error.empty() ? "no reason given" : error);
 }
@@ -136,17 +124,9 @@ Status CheckImages(std::string_view text, const std::string& place) {
   return {};
 }
 
-// Compressed geometry is an error, other extensions that the file requires are warnings.
-Status CheckVersion(const std::string& place, GltfDocument* document) {
-  const tinygltf::Model& model = document->model;
-  if (!model.asset.version.starts_with("2."))
-    return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
-  for (const std::string& name : model.extensionsRequired) {
-    if (name == kCompressions[0] || name == kCompressions[1]) return Compressed(place, name);
-    if (std::find(kRead.begin(), kRead.end(), name) == kRead.end())
-      document->warnings.push_back(fmt::format("the extension {} is not read", name));
-  }
-  return {};
+Status CheckVersion(const std::string& place, const tinygltf::Model& model) {
+  if (model.asset.version.starts_with("2.")) return {};
+  return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
 }
 
 }  // namespace
@@ -167,7 +147,8 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
   } catch (const std::exception& error) {  // the JSON library throws on some type errors
     return DataLoss("{}: not valid glTF: {}", place, error.what());
   }
-  TILEGRAD_TRY(CheckVersion(place, &document));
+  TILEGRAD_TRY(CheckVersion(place, document.model));
+  TILEGRAD_TRY(CheckGltfExtensions(document.model, place, &document.warnings));
   return document;
 }
 

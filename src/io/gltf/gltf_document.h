@@ -12,7 +12,7 @@ namespace tilegrad::io {
 
 struct GltfDocument {
   tinygltf::Model model;              // images encoded: bytes of data URIs, or a buffer view
-  std::vector<std::string> warnings;  // required extensions that are not read
+  std::vector<std::string> warnings;  // extensions that are not read
 };
 
 // The file `name` with its side files. DataLoss for what is not glTF 2, nested too deep or

@@ -3,9 +3,11 @@
 #include "io/gltf/gltf_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "base/error.h"
+#include "io/gltf/gltf_extensions.h"
 
 namespace tilegrad::io {
 namespace {
@@ -22,6 +24,11 @@ T Read(const unsigned char* at) {
   return value;
 }
 
+constexpr int kNone = -1;
+// An accessor without a buffer view costs no bytes of its file.
+constexpr std::size_t kMostZeros = std::size_t{1} << 24;
+constexpr std::array<unsigned char, 16 * 8> kZeros = {};  // one element
+
 }  // namespace
 
 Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& model, int view,
@@ -32,6 +39,8 @@ Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& mode
   if (!Has(model.buffers, v.buffer))
     return DataLoss("{}: buffer {} does not exist", what, v.buffer);
   const auto& data = model.buffers[v.buffer].data;
+  if (model.buffers[v.buffer].extensions.count("EXT_meshopt_compression") > 0)
+    return RefuseGltfCompression("EXT_meshopt_compression", what);
   if (v.byteOffset > data.size() || v.byteLength > data.size() - v.byteOffset) {
     return DataLoss("{}: buffer view {} ({} bytes from {}) reaches beyond its buffer of {} bytes",
                     what, view, v.byteLength, v.byteOffset, data.size());
@@ -39,35 +48,90 @@ Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& mode
   return std::span(data).subspan(v.byteOffset, v.byteLength);
 }
 
-Result<GltfAccessor> GltfAccessor::Open(const tinygltf::Model& model, int index,
-                                        const std::string& what) {
-  if (!Has(model.accessors, index)) return DataLoss("{}: accessor {} does not exist", what, index);
-  const tinygltf::Accessor& a = model.accessors[index];
-  if (a.sparse.isSparse)
-    return DataLoss("{}: sparse accessors are not supported; save the file without them", what);
-  TILEGRAD_ASSIGN(const auto view, GltfViewBytes(model, a.bufferView, what));
+// An accessor but for what is sparse in it.
+Result<GltfAccessor> GltfAccessor::OpenDense(const tinygltf::Model& model,
+                                             const tinygltf::Accessor& a, const std::string& what) {
   const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType));
   const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(a.type));
-  const int stride = a.ByteStride(model.bufferViews[a.bufferView]);
-  if (size <= 0 || components <= 0 || stride <= 0) {
-    return DataLoss("{}: accessor {} has an invalid type, component type ({}) or stride", what,
-                    index, a.componentType);
-  }
-  const std::size_t element = static_cast<std::size_t>(size) * components;
-  if (a.count > 0 && (a.byteOffset > view.size() || element > view.size() - a.byteOffset ||
-                      a.count - 1 > (view.size() - a.byteOffset - element) / stride)) {
-    return DataLoss("{}: accessor {} ({} elements) reaches beyond its buffer view of {} bytes",
-                    what, index, a.count, view.size());
-  }
+  if (size <= 0 || components <= 0)
+    return DataLoss("{} has an invalid type or component type ({})", what, a.componentType);
   GltfAccessor out;
-  out.bytes_ = view.subspan(std::min(a.byteOffset, view.size()));
   out.count_ = a.count;
-  out.stride_ = static_cast<std::size_t>(stride);
   out.size_ = static_cast<std::size_t>(size);
   out.components_ = components;
   out.type_ = a.componentType;
   out.normalized_ = a.normalized;
+  if (a.bufferView != kNone) {
+    TILEGRAD_TRY(out.OpenView(model, a, what));
+  } else if (a.count > kMostZeros) {
+    return ResourceExhausted("{} has {} elements, but no buffer view", what, a.count);
+  } else {
+    out.bytes_ = kZeros;  // with a stride of 0
+  }
   return out;
+}
+
+Status GltfAccessor::OpenView(const tinygltf::Model& model, const tinygltf::Accessor& a,
+                              const std::string& what) {
+  TILEGRAD_ASSIGN(const auto view, GltfViewBytes(model, a.bufferView, what));
+  const int stride = a.ByteStride(model.bufferViews[a.bufferView]);
+  if (stride <= 0) return DataLoss("{} has an invalid stride", what);
+  stride_ = static_cast<std::size_t>(stride);
+  if (count_ > 0 && (a.byteOffset > view.size() || element() > view.size() - a.byteOffset ||
+                     count_ - 1 > (view.size() - a.byteOffset - element()) / stride_)) {
+    return DataLoss("{} ({} elements) reaches beyond its buffer view of {} bytes", what, count_,
+                    view.size());
+  }
+  bytes_ = view.subspan(std::min(a.byteOffset, view.size()));
+  return {};
+}
+
+Status GltfAccessor::ApplySparse(const tinygltf::Model& model, const tinygltf::Accessor& a,
+                                 const std::string& what) {
+  const auto& sparse = a.sparse;
+  const auto open = [&](int view, int offset, int type, int components) -> Result<GltfAccessor> {
+    if (!Has(model.bufferViews, view))
+      return DataLoss("{}: buffer view {} does not exist", what, view);
+    tinygltf::Accessor part;
+    part.bufferView = view, part.componentType = type, part.type = components;
+    part.byteOffset = static_cast<std::size_t>(offset);  // one below 0 is beyond any view
+    part.count = static_cast<std::size_t>(sparse.count);
+    return OpenDense(model, part, what);
+  };
+  const auto& at = sparse.indices;
+  TILEGRAD_ASSIGN(const GltfAccessor indices,
+                  open(at.bufferView, at.byteOffset, at.componentType, TINYGLTF_TYPE_SCALAR));
+  TILEGRAD_TRY(indices.CheckIndexType(what));
+  TILEGRAD_ASSIGN(const GltfAccessor values,
+                  open(sparse.values.bufferView, sparse.values.byteOffset, type_, a.type));
+  auto own = std::make_shared<std::vector<unsigned char>>(count_ * element());
+  for (std::size_t i = 0; i < count_; ++i)
+    std::memcpy(own->data() + i * element(), bytes_.data() + i * stride_, element());
+  for (std::size_t i = 0; i < indices.count(); ++i) {
+    const std::size_t to = indices.Index(i);
+    if (to >= count_) return DataLoss("{}: index {} is {} of {} elements", what, i, to, count_);
+    std::memcpy(own->data() + to * element(), values.bytes_.data() + i * values.stride_, element());
+  }
+  stride_ = element(), bytes_ = *own, own_ = std::move(own);
+  return {};
+}
+
+Result<GltfAccessor> GltfAccessor::Open(const tinygltf::Model& model, int index,
+                                        const std::string& what) {
+  if (!Has(model.accessors, index)) return DataLoss("{}: accessor {} does not exist", what, index);
+  const tinygltf::Accessor& a = model.accessors[index];
+  const std::string place = fmt::format("{}: accessor {}", what, index);
+  TILEGRAD_ASSIGN(GltfAccessor out, OpenDense(model, a, place));
+  if (a.sparse.isSparse) TILEGRAD_TRY(out.ApplySparse(model, a, place + ", sparse"));
+  return out;
+}
+
+Status GltfAccessor::CheckIndexType(const std::string& what) const {
+  const bool is_unsigned = type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
+                           type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
+                           type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+  if (is_unsigned && components_ == 1) return {};
+  return DataLoss("{}: indices must be unsigned scalars, got component type {}", what, type_);
 }
 
 Result<GltfAccessor> GltfAccessor::OpenAttribute(const tinygltf::Model& model, int index,
@@ -85,11 +149,7 @@ Result<GltfAccessor> GltfAccessor::OpenAttribute(const tinygltf::Model& model, i
 Result<GltfAccessor> GltfAccessor::OpenIndices(const tinygltf::Model& model, int index,
                                                const std::string& what) {
   TILEGRAD_ASSIGN(GltfAccessor out, Open(model, index, what));
-  const bool is_unsigned = out.type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
-                           out.type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
-                           out.type_ == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-  if (!is_unsigned || out.components_ != 1)
-    return DataLoss("{}: indices must be unsigned scalars, got component type {}", what, out.type_);
+  TILEGRAD_TRY(out.CheckIndexType(what));
   return out;
 }
 

@@ -4,8 +4,10 @@
 // bytes of a model. tinygltf itself checks few of the numbers in a file.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "tilegrad/status.h"
 
@@ -24,7 +26,9 @@ namespace tilegrad::io {
 Result<std::span<const unsigned char>> GltfViewBytes(const tinygltf::Model& model, int view,
                                                      const std::string& what);
 
-// The elements of an accessor; Open checks every number, so that reading cannot leave the buffer.
+// The elements of an accessor: those of its buffer view, or zeros where it has none, and what a
+// sparse one puts in their place. Open checks every number, so that reading cannot leave the
+// buffer.
 class GltfAccessor {
  public:
   // Attributes: float, or 8 or 16 bit integers. `components` numbers an element, 0 for any.
@@ -43,7 +47,17 @@ class GltfAccessor {
   static Result<GltfAccessor> Open(const tinygltf::Model& model, int index,
                                    const std::string& what);
 
+  static Result<GltfAccessor> OpenDense(const tinygltf::Model& model, const tinygltf::Accessor& a,
+                                        const std::string& what);
+  Status OpenView(const tinygltf::Model& model, const tinygltf::Accessor& a,
+                  const std::string& what);
+  Status ApplySparse(const tinygltf::Model& model, const tinygltf::Accessor& a,
+                     const std::string& what);
+  Status CheckIndexType(const std::string& what) const;
+  std::size_t element() const { return size_ * static_cast<std::size_t>(components_); }
+
   std::span<const unsigned char> bytes_;
+  std::shared_ptr<const std::vector<unsigned char>> own_;  // bytes_ of a sparse one
   std::size_t count_ = 0, stride_ = 0, size_ = 0;
   int components_ = 0, type_ = 0;
   bool normalized_ = false;

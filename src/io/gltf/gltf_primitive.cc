@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/gltf/gltf_primitive.h"
 
-#include <cmath>
+#include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "io/gltf/gltf_extensions.h"
+#include "io/gltf/gltf_material.h"
 #include "scene/srgb.h"
 
 namespace tilegrad::io {
@@ -78,76 +80,96 @@ Result<std::vector<glm::vec4>> ReadColors(const tinygltf::Model& model,
   if (from.components() < 3 || from.components() > 4)
     return DataLoss("{}: COLOR_0 has {} numbers an element, not 3 or 4", what, from.components());
   for (std::size_t i = 0; i < from.count(); ++i) {
-    out.push_back(LinearToSrgb({from.Float(i, 0), from.Float(i, 1), from.Float(i, 2),
-                                from.components() > 3 ? from.Float(i, 3) : 1.0f}));
+    out.emplace_back(from.Float(i, 0), from.Float(i, 1), from.Float(i, 2),
+                     from.components() > 3 ? from.Float(i, 3) : 1.0f);
   }
   return out;
 }
 
-double NumberOf(const tinygltf::Value& object, const char* key, std::size_t index,
-                double fallback) {
-  if (!object.IsObject() || !object.Has(key)) return fallback;
-  const tinygltf::Value& value = object.Get(key);
-  const tinygltf::Value& number = value.IsArray() ? value.Get(index) : value;
-  return number.IsNumber() ? number.GetNumberAsDouble() : fallback;
-}
-
-// Where the material's texture is looked up: the uv set, and KHR_texture_transform on it, in
-// glTF's own coordinates (v down).
-struct UvUse {
-  int set = 0;
-  glm::dvec2 offset{0}, scale{1};
-  double rotation = 0;  // radians
-
-  std::string Key() const { return fmt::format("TEXCOORD_{}", set); }
-  glm::vec2 operator()(glm::vec2 uv) const {
-    const double c = std::cos(rotation), s = std::sin(rotation);
-    const glm::dvec2 p = scale * glm::dvec2(uv);
-    return offset + glm::dvec2(c * p.x + s * p.y, c * p.y - s * p.x);
-  }
+template <class Vec>
+struct MorphedAttribute {
+  std::string key;
+  std::vector<Vec>* values;
+  const std::string& what;
 };
 
-UvUse UvUseOf(const tinygltf::Model& model, int material) {
-  UvUse use;
-  if (material < 0 || material >= static_cast<int>(model.materials.size())) return use;
-  const auto& texture = model.materials[material].pbrMetallicRoughness.baseColorTexture;
-  use.set = texture.texCoord;
-  const auto found = texture.extensions.find("KHR_texture_transform");
-  if (found == texture.extensions.end()) return use;
-  const tinygltf::Value& t = found->second;
-  const double set = NumberOf(t, "texCoord", 0, use.set);
-  if (set >= 0 && set <= 255) use.set = static_cast<int>(set);
-  use.offset = {NumberOf(t, "offset", 0, 0), NumberOf(t, "offset", 1, 0)};
-  use.scale = {NumberOf(t, "scale", 0, 1), NumberOf(t, "scale", 1, 1)};
-  use.rotation = NumberOf(t, "rotation", 0, 0);
-  return use;
+// Adds what the morph targets move, by their weights, to one attribute: linear colours included.
+template <class Vec>
+Status Morph(const tinygltf::Model& model, const tinygltf::Primitive& p,
+             std::span<const double> weights, const MorphedAttribute<Vec>& to) {
+  if (to.values->empty()) return {};
+  for (std::size_t t = 0; t < p.targets.size() && t < weights.size(); ++t) {
+    const auto found = p.targets[t].find(to.key);
+    if (weights[t] == 0 || found == p.targets[t].end()) continue;
+    const std::string place = fmt::format("{}: target {}: {}", to.what, t, to.key);
+    TILEGRAD_ASSIGN(const GltfAccessor from,
+                    GltfAccessor::OpenAttribute(model, found->second, 0, place));
+    const int length = std::min(from.components(), static_cast<int>(Vec::length()));
+    if (from.count() != to.values->size()) {
+      return DataLoss("{} has {} elements for {} vertices", place, from.count(), to.values->size());
+    }
+    for (std::size_t i = 0; i < from.count(); ++i) {
+      for (int c = 0; c < length; ++c)
+        (*to.values)[i][c] +=
+            static_cast<float>(weights[t] * static_cast<double>(from.Float(i, c)));
+    }
+  }
+  return {};
+}
+
+// Geometry whose uncompressed copy was left out of the file.
+bool IsCompressed(const tinygltf::Model& model, const tinygltf::Primitive& p) {
+  const int at = AttributeIndex(p, "POSITION");
+  return p.extensions.count("KHR_draco_mesh_compression") > 0 && at >= 0 &&
+         at < static_cast<int>(model.accessors.size()) && model.accessors[at].bufferView < 0;
+}
+
+// The attributes of a primitive, morphed.
+struct Attributes {
+  std::vector<glm::vec3> positions, normals;
+  std::vector<glm::vec4> colors;  // linear
+  std::vector<glm::vec2> uvs;     // as in the file
+};
+
+Result<Attributes> ReadAttributes(const tinygltf::Model& model, const tinygltf::Primitive& p,
+                                  const std::string& uv_key, const std::string& what) {
+  Attributes out;
+  if (AttributeIndex(p, "POSITION") < 0) return DataLoss("{}: no POSITION attribute", what);
+  TILEGRAD_ASSIGN(out.positions, ReadAttribute<glm::vec3>(model, p, "POSITION", what));
+  TILEGRAD_ASSIGN(out.normals, ReadAttribute<glm::vec3>(model, p, "NORMAL", what));
+  TILEGRAD_ASSIGN(out.colors, ReadColors(model, p, what));
+  TILEGRAD_ASSIGN(out.uvs, ReadAttribute<glm::vec2>(model, p, uv_key, what));
+  const std::size_t count = out.positions.size();
+  for (const auto& [key, got] :
+       {std::pair("NORMAL", out.normals.size()), std::pair("COLOR_0", out.colors.size()),
+        std::pair(uv_key.c_str(), out.uvs.size())}) {
+    if (AttributeIndex(p, key) >= 0 && got != count)
+      return DataLoss("{}: {} has {} elements for {} vertices", what, key, got, count);
+  }
+  return out;
 }
 
 }  // namespace
 
 Result<Mesh> ConvertGltfPrimitive(const tinygltf::Model& model, const tinygltf::Primitive& p,
-                                  const std::string& what) {
-  Mesh mesh;
-  const UvUse uv_use = UvUseOf(model, p.material);
+                                  std::span<const double> weights, const std::string& what) {
+  if (IsCompressed(model, p)) return RefuseGltfCompression("KHR_draco_mesh_compression", what);
+  const GltfUvUse uv_use = GltfBaseColorOf(model, p.material).uv;
   const std::string uv_key = uv_use.Key();
-  if (AttributeIndex(p, "POSITION") < 0) return DataLoss("{}: no POSITION attribute", what);
-  TILEGRAD_ASSIGN(mesh.positions, ReadAttribute<glm::vec3>(model, p, "POSITION", what));
-  TILEGRAD_ASSIGN(mesh.normals, ReadAttribute<glm::vec3>(model, p, "NORMAL", what));
-  TILEGRAD_ASSIGN(mesh.colors, ReadColors(model, p, what));
-  TILEGRAD_ASSIGN(const auto uvs, ReadAttribute<glm::vec2>(model, p, uv_key, what));
-  const std::size_t count = mesh.positions.size();
-  for (const auto& [key, got] :
-       {std::pair("NORMAL", mesh.normals.size()), std::pair("COLOR_0", mesh.colors.size()),
-        std::pair(uv_key.c_str(), uvs.size())}) {
-    if (AttributeIndex(p, key) >= 0 && got != count)
-      return DataLoss("{}: {} has {} elements for {} vertices", what, key, got, count);
-  }
-  TILEGRAD_ASSIGN(const auto indices, ReadIndices(model, p, count, what));
+  TILEGRAD_ASSIGN(Attributes read, ReadAttributes(model, p, uv_key, what));
+  TILEGRAD_TRY(Morph<glm::vec3>(model, p, weights, {"POSITION", &read.positions, what}));
+  TILEGRAD_TRY(Morph<glm::vec3>(model, p, weights, {"NORMAL", &read.normals, what}));
+  TILEGRAD_TRY(Morph<glm::vec4>(model, p, weights, {"COLOR_0", &read.colors, what}));
+  TILEGRAD_TRY(Morph<glm::vec2>(model, p, weights, {uv_key, &read.uvs, what}));
+  Mesh mesh;
+  TILEGRAD_ASSIGN(const auto indices, ReadIndices(model, p, read.positions.size(), what));
   mesh.faces = Triangles(p.mode, indices);
-  if (uvs.empty()) return mesh;
+  mesh.positions = std::move(read.positions), mesh.normals = std::move(read.normals);
+  for (const glm::vec4& color : read.colors) mesh.colors.push_back(LinearToSrgb(color));
+  if (read.uvs.empty()) return mesh;
   for (const Face& face : mesh.faces) {  // glTF's v points down
     for (const std::int32_t v : face) {
-      const glm::vec2 uv = uv_use(uvs[v]);
+      const glm::vec2 uv = uv_use(read.uvs[v]);
       mesh.corner_uvs.emplace_back(uv.x, 1.0f - uv.y);
     }
   }

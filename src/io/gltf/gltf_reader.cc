@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <charconv>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/gtc/type_ptr.hpp>
 #include <glm/mat4x4.hpp>
 #include <optional>
+#include <set>
+#include <span>
 #include <utility>
 
 #include "base/error.h"
 #include "io/gltf/gltf_document.h"
+#include "io/gltf/gltf_extensions.h"
+#include "io/gltf/gltf_material.h"
+#include "io/gltf/gltf_nodes.h"
 #include "io/gltf/gltf_primitive.h"
+#include "io/gltf/gltf_skin.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
@@ -19,6 +24,13 @@ namespace {
 
 constexpr int kMaxNodeDepth = 256;  // the walk is recursive
 
+// Where a node puts the primitives of its mesh.
+struct PrimitivePlace {
+  glm::dmat4 matrix;
+  std::span<const double> weights;  // of morph targets
+  std::vector<glm::dmat4> joints;   // of its skin: then `matrix` does not count
+};
+
 struct GltfWalk {
   const tinygltf::Model& model;
   const FileSource& source;
@@ -26,15 +38,24 @@ struct GltfWalk {
   LoadedMesh out;
   std::vector<std::optional<int>> textures;  // by glTF image
   std::vector<bool> visited;                 // by node
+  std::vector<glm::dmat4> world;             // by node, if there are skins
+  std::set<std::string> warned = {};
 
-  Status AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m, const std::string& what);
+  Status AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what);
+  Status AddPrimitive(const tinygltf::Primitive& p, const PrimitivePlace& at,
+                      const std::string& what);
+  void Warn(std::string warning);  // once
   Material ConvertMaterial(int index);
-  void AddCamera(const tinygltf::Node& node, const glm::mat4& m);
+  void AddCamera(const tinygltf::Node& node, const glm::dmat4& m);
   void SetSampler(int texture, Material* material);
   int ImageTexture(int texture);
   int AddImage(const tinygltf::Image& image, int index);
-  Status Visit(int node, const glm::mat4& parent, int depth);
+  Status Visit(int node, const glm::dmat4& parent, int depth);
 };
+
+void GltfWalk::Warn(std::string warning) {
+  if (warned.insert(warning).second) out.warnings.push_back(std::move(warning));
+}
 
 // "my%20wood.png" -> "my wood.png"
 std::string DecodePercent(const std::string& uri) {
@@ -56,6 +77,12 @@ std::string DecodePercent(const std::string& uri) {
 int GltfWalk::ImageTexture(int texture) {
   if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return -1;
   const int image = model.textures[texture].source;
+  if (const std::string other = GltfImageExtension(model.textures[texture]); !other.empty()) {
+    Warn(
+        fmt::format("texture {} has its image in {} only, which is not read; the material's colour "
+                    "stands in",
+                    texture, other));
+  }
   if (image < 0 || image >= static_cast<int>(model.images.size())) return -1;
   if (!textures[image]) textures[image] = AddImage(model.images[image], image);
   return *textures[image];
@@ -71,20 +98,18 @@ int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
   return AddTexture(source, name, DecodePercent(image.uri), out);
 }
 
+TextureWrap WrapOf(int number) {
+  return number == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
+         : number == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
+                                                           : TextureWrap::kRepeat;
+}
+
 void GltfWalk::SetSampler(int texture, Material* material) {
   if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return;
   const int index = model.textures[texture].sampler;
   if (index < 0 || index >= static_cast<int>(model.samplers.size())) return;
   const tinygltf::Sampler& sampler = model.samplers[index];
-  const int wrap = sampler.wrapS;
-  if (wrap != sampler.wrapT) {
-    out.warnings.push_back(fmt::format(
-        "material \"{}\": its texture wraps differently in u and v; u's way is taken for both",
-        material->name));
-  }
-  material->wrap = wrap == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
-                   : wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
-                                                                   : TextureWrap::kRepeat;
+  material->wrap = {WrapOf(sampler.wrapS), WrapOf(sampler.wrapT)};
   material->nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
 }
 
@@ -94,23 +119,25 @@ Material GltfWalk::ConvertMaterial(int index) {
   if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
   const tinygltf::Material& from = model.materials[index];
   material.name = from.name;
-  const auto& factor = from.pbrMetallicRoughness.baseColorFactor;
-  for (std::size_t c = 0; c < 4 && c < factor.size(); ++c)
-    material.base_color[static_cast<int>(c)] = static_cast<float>(factor[c]);
-  material.base_color = LinearToSrgb(material.base_color);
+  const GltfBaseColor color = GltfBaseColorOf(model, index);
+  material.base_color = LinearToSrgb(glm::vec4(color.factor));
   material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
                         : from.alphaMode == "BLEND" ? AlphaMode::kBlend
                                                     : AlphaMode::kOpaque;
   if (material.alpha_mode == AlphaMode::kOpaque) material.base_color.a = 1;
+  if (material.alpha_mode == AlphaMode::kMask)
+    material.alpha_cutoff = static_cast<float>(std::clamp(from.alphaCutoff, 0.0, 2.0));
   material.double_sided = from.doubleSided;
   material.unlit = from.extensions.count("KHR_materials_unlit") > 0;
-  const tinygltf::TextureInfo& texture = from.pbrMetallicRoughness.baseColorTexture;
-  material.base_color_texture = ImageTexture(texture.index);
-  SetSampler(texture.index, &material);
+  material.base_color_texture = ImageTexture(color.texture);
+  SetSampler(color.texture, &material);
+  const auto& emission = from.emissiveFactor;
+  if (std::any_of(emission.begin(), emission.end(), [](double c) { return c > 0; }))
+    Warn(fmt::format("material \"{}\": its emission is not drawn", material.name));
   return material;
 }
 
-Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m,
+Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const PrimitivePlace& at,
                               const std::string& what) {
   const bool triangles =
       p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
@@ -118,29 +145,36 @@ Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const glm::mat4& m,
     out.warnings.push_back(fmt::format("{}: points or lines left out", what));
     return {};
   }
-  TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, what));
+  TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
   if (mesh.faces.empty()) return {};
-  if (m != glm::mat4(1))
+  const glm::dmat4& m = at.matrix;
+  if (!at.joints.empty() && IsSkinned(p)) {
+    TILEGRAD_TRY(ApplyGltfSkin(model, p, at.joints, what, &mesh));
+  } else if (m != glm::dmat4(1)) {
     Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
-  const Status added = AppendWithMaterial(std::move(mesh), ConvertMaterial(p.material), out);
+  }
+  const Material material = ConvertMaterial(p.material);
+  if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
+    Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",
+                     material.name, GltfBaseColorOf(model, p.material).uv.Key()));
+  }
+  const Status added = AppendWithMaterial(std::move(mesh), material, out);
   return added.Within(what);
 }
 
-glm::mat4 LocalMatrix(const tinygltf::Node& node) {
-  if (node.matrix.size() == 16) return glm::mat4(glm::make_mat4(node.matrix.data()));
-  glm::dmat4 m(1);
-  const auto& t = node.translation;
-  const auto& r = node.rotation;
-  const auto& s = node.scale;
-  if (r.size() == 4) m = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
-  if (s.size() == 3) {
-    for (int c = 0; c < 3; ++c) m[c] *= s[static_cast<std::size_t>(c)];
+Status GltfWalk::AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what) {
+  const tinygltf::Mesh& mesh = model.meshes[node.mesh];
+  PrimitivePlace at{m, node.weights.empty() ? mesh.weights : node.weights, {}};
+  if (node.skin >= 0) {
+    TILEGRAD_ASSIGN(at.joints, GltfJointMatrices(model, node.skin, world, what));
   }
-  if (t.size() == 3) m[3] = glm::dvec4(t[0], t[1], t[2], 1);
-  return glm::mat4(m);
+  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    TILEGRAD_TRY(AddPrimitive(mesh.primitives[i], at, fmt::format("{} primitive {}", what, i)));
+  }
+  return {};
 }
 
-void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::mat4& m) {
+void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::dmat4& m) {
   if (node.camera < 0 || node.camera >= static_cast<int>(model.cameras.size())) return;
   const tinygltf::Camera& from = model.cameras[node.camera];
   const std::string label = from.name.empty() ? node.name : from.name;
@@ -157,7 +191,7 @@ void GltfWalk::AddCamera(const tinygltf::Node& node, const glm::mat4& m) {
   out.cameras.push_back(std::move(camera));
 }
 
-Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
+Status GltfWalk::Visit(int index, const glm::dmat4& parent, int depth) {
   if (depth > kMaxNodeDepth)
     return DataLoss("{}: nodes are nested more than {} deep", place, kMaxNodeDepth);
   if (index < 0 || index >= static_cast<int>(model.nodes.size()))
@@ -168,39 +202,23 @@ Status GltfWalk::Visit(int index, const glm::mat4& parent, int depth) {
     return DataLoss("{}: node {} is reached twice; nodes must form a tree", place, index);
   visited[index] = true;
   const tinygltf::Node& node = model.nodes[index];
-  const glm::mat4 m = parent * LocalMatrix(node);
+  const glm::dmat4 m = parent * GltfLocalMatrix(node);
   AddCamera(node, m);
   if (node.mesh >= 0) {
     if (node.mesh >= static_cast<int>(model.meshes.size()))
       return DataLoss("{}: node {} names mesh {}, which does not exist", place, index, node.mesh);
-    const auto& primitives = model.meshes[node.mesh].primitives;
-    for (std::size_t i = 0; i < primitives.size(); ++i) {
-      TILEGRAD_TRY(AddPrimitive(primitives[i], m,
-                                fmt::format("{}: mesh {} primitive {}", place, node.mesh, i)));
-    }
+    TILEGRAD_TRY(AddMesh(node, m, fmt::format("{}: mesh {}", place, node.mesh)));
   }
   for (const int child : node.children) TILEGRAD_TRY(Visit(child, m, depth + 1));
   return {};
 }
 
 // The nodes of the default scene, or of the first one, or all root nodes.
-std::vector<int> RootNodes(const tinygltf::Model& model) {
-  if (!model.scenes.empty()) {
-    const bool valid =
-        model.defaultScene >= 0 && model.defaultScene < static_cast<int>(model.scenes.size());
-    return model.scenes[valid ? model.defaultScene : 0].nodes;
-  }
-  std::vector<bool> child(model.nodes.size(), false);
-  for (const auto& node : model.nodes) {
-    for (const int c : node.children) {
-      if (c >= 0 && c < static_cast<int>(child.size())) child[c] = true;
-    }
-  }
-  std::vector<int> roots;
-  for (std::size_t i = 0; i < child.size(); ++i) {
-    if (!child[i]) roots.push_back(static_cast<int>(i));
-  }
-  return roots;
+std::vector<int> SceneNodes(const tinygltf::Model& model) {
+  if (model.scenes.empty()) return GltfRootNodes(model);
+  const bool valid =
+      model.defaultScene >= 0 && model.defaultScene < static_cast<int>(model.scenes.size());
+  return model.scenes[valid ? model.defaultScene : 0].nodes;
 }
 
 }  // namespace
@@ -214,9 +232,10 @@ Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
                 source.Describe(name),
                 {},
                 std::vector<std::optional<int>>(model.images.size()),
-                std::vector<bool>(model.nodes.size())};
+                std::vector<bool>(model.nodes.size()),
+                model.skins.empty() ? std::vector<glm::dmat4>() : GltfWorldMatrices(model)};
   walk.out.warnings = std::move(document.warnings);
-  for (const int root : RootNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::mat4(1), 0));
+  for (const int root : SceneNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::dmat4(1), 0));
   return std::move(walk.out);
 }
 

@@ -27,6 +27,7 @@ MeshSceneOptions LitOptions() {
   options.color_space = ColorSpace::kSrgb;
   options.normals = NormalSource::kAligned;
   options.ambient = {kAmbient, kAmbient, kAmbient};
+  options.blend = false;
   return options;
 }
 
@@ -51,7 +52,8 @@ struct LitRenderer::Impl {
     scene.shading.lighting = Lighting::kLambert, scene.lights = lights;
     for (const Camera& camera : cameras) {
       scene.camera = camera;
-      const PictureRequest request{.width = size, .height = size, .supersampling = kLitSamples};
+      const PictureRequest request{
+          .width = size, .height = size, .supersampling = kLitSamples, .cover = made.cover()};
       TILEGRAD_TRY(renderer.Render(scene, request, &picture));
       visit(picture);
     }

@@ -19,8 +19,8 @@ namespace tilegrad {
 // Pictures of a mesh with its materials under a light that is fixed in the world, so that a point
 // has one colour in all views: Lambert with ambient 0.45, a key light of 0.45 from (0.35, 0.8, 0.5)
 // and a fill light of 0.2 from (-0.6, 0.3, -0.75), in the numbers of the files, cut at 1. Surfaces
-// are two-sided and normals of files are turned to the side of the winding, since real models are
-// soups of shells. 4 x 4 samples a pixel.
+// are two-sided, cut out where they ask for an alpha mask, else opaque, and normals of files are
+// turned to the side of the winding, since real models are soups of shells. 4 x 4 samples a pixel.
 //
 // Owns a renderer and its scratch memory; one call at a time, on the calling thread.
 class LitRenderer {

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "scene/srgb.h"
+#include "shade/surface_color.h"
 
 namespace tilegrad {
 namespace {
@@ -33,10 +34,23 @@ std::vector<float> DecodeTexels(const ImageU8& image, ColorSpace space) {
   return out;
 }
 
-Wrap WrapOf(TextureWrap wrap) {
-  return wrap == TextureWrap::kClamp    ? Wrap::kClamp
-         : wrap == TextureWrap::kMirror ? Wrap::kMirror
-                                        : Wrap::kRepeat;
+// Alpha as a colour.
+std::vector<float> AlphaTexels(const ImageU8& image) {
+  std::vector<float> out;
+  out.reserve(image.pixels.size() / 4 * 3);
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4)
+    out.insert(out.end(), 3, static_cast<float>(image.pixels[i]) / 255.0f);
+  return out;
+}
+
+// Formats without modes have an alpha of materials alone; 0 is more often a mistake than glass that
+// nobody sees.
+SurfaceCover CoverOf(const Material& material, bool blend) {
+  const float alpha = material.base_color.a;
+  if (material.alpha_mode == AlphaMode::kMask)
+    return {SurfaceCover::Kind::kMask, material.alpha_cutoff};
+  const bool glass = material.alpha_mode == AlphaMode::kBlend || (alpha > 0 && alpha < 1);
+  return {blend && glass ? SurfaceCover::Kind::kBlend : SurfaceCover::Kind::kOpaque};
 }
 
 }  // namespace
@@ -56,6 +70,7 @@ MeshScene::MeshScene(const Mesh& mesh, const MeshSceneOptions& options)
     scene_.uvs = {Flat(mesh.corner_uvs), Rate::kCorner};
     scene_.textures = textures_;
   }
+  AddCover();
 }
 
 void MeshScene::AddNormals() {
@@ -96,7 +111,7 @@ int MeshScene::AddTexture(const Material& material) {
   const auto index = static_cast<std::size_t>(material.base_color_texture);
   const ImageU8& image = mesh_.textures[index].image;
   if (texels_[index].empty()) texels_[index] = DecodeTexels(image, options_.color_space);
-  const Texture view = {texels_[index], image.width, image.height, WrapOf(material.wrap),
+  const Texture view = {texels_[index], image.width, image.height, shade::WrapOf(material),
                         material.nearest ? Filter::kNearest : options_.filter};
   const auto same = [&](const Texture& v) {
     return v.texels.data() == view.texels.data() && v.wrap == view.wrap && v.filter == view.filter;
@@ -132,6 +147,45 @@ void MeshScene::AddSurfaces() {
                                                [](const Material& m) { return m.double_sided; });
   scene_.surfaces = surfaces_;
   scene_.face_surfaces = mesh_.face_materials;
+}
+
+void MeshScene::AddAlphaTextures() {
+  alpha_textures_ = textures_;
+  texture_alpha_.resize(texels_.size());
+  for (Texture& view : alpha_textures_) {
+    const auto holds = [&](const auto& texels) { return texels.data() == view.texels.data(); };
+    const auto image = static_cast<std::size_t>(
+        std::find_if(texels_.begin(), texels_.end(), holds) - texels_.begin());
+    if (mesh_.textures[image].image.channels < 4) continue;  // no surface refers to it
+    if (texture_alpha_[image].empty())
+      texture_alpha_[image] = AlphaTexels(mesh_.textures[image].image);
+    view.texels = texture_alpha_[image];
+  }
+}
+
+void MeshScene::AddCover() {
+  std::vector<SurfaceCover> covers;
+  for (const Material& material : mesh_.materials)
+    covers.push_back(CoverOf(material, options_.blend));
+  const auto opaque = [](const SurfaceCover& c) { return c.kind == SurfaceCover::Kind::kOpaque; };
+  if (std::all_of(covers.begin(), covers.end(), opaque)) return;
+  AddAlphaTextures();
+  alpha_surfaces_ = surfaces_;
+  for (std::size_t m = 0; m < mesh_.materials.size(); ++m) {
+    const Material& material = mesh_.materials[m];
+    Surface& surface = alpha_surfaces_[m];
+    surface.base_color.fill(material.base_color.a);
+    const bool textured =
+        surface.texture >= 0 && material.alpha_mode != AlphaMode::kOpaque &&
+        mesh_.textures[static_cast<std::size_t>(material.base_color_texture)].image.channels == 4;
+    if (!textured) surface.texture = -1;
+  }
+  for (const glm::vec4& color : mesh_.colors) vertex_alpha_.insert(vertex_alpha_.end(), 3, color.a);
+  SceneCover& cover = cover_.emplace(SceneCover{scene_, std::move(covers)});
+  cover.alpha.shading = {}, cover.alpha.normals = {};
+  cover.alpha.colors = {vertex_alpha_, Rate::kVertex};
+  cover.alpha.surfaces = alpha_surfaces_;
+  if (!textures_.empty()) cover.alpha.textures = alpha_textures_;
 }
 
 }  // namespace tilegrad

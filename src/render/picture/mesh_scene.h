@@ -3,8 +3,10 @@
 // textures.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "render/picture/layers.h"
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
 
@@ -30,6 +32,7 @@ struct MeshSceneOptions {
   // Of all surfaces; those that are unlit have ambient 1 and nothing else.
   std::array<float, 3> ambient = {0, 0, 0}, diffuse = {1, 1, 1}, specular = {0, 0, 0};
   float shininess = 10;
+  bool blend = true;  // surfaces that ask for it let light through, in cover(); else opaque
 };
 
 // Keeps a reference to the mesh, which is valid.
@@ -43,10 +46,14 @@ class MeshScene {
   const Scene& scene() const { return scene_; }
   // Whether every material asks that back faces are not drawn.
   bool single_sided() const { return single_sided_; }
+  // Of materials with holes or transparency; null: all are opaque. Views as above, no camera.
+  const SceneCover* cover() const { return cover_ ? &*cover_ : nullptr; }
 
  private:
   int AddTexture(const Material& material);
   void AddSurfaces();
+  void AddCover();
+  void AddAlphaTextures();
   void AddNormals();
   void AddAlignedNormals();
 
@@ -59,6 +66,12 @@ class MeshScene {
   std::vector<std::vector<float>> texels_;  // by the mesh's texture; empty: not used
   std::vector<Texture> textures_;           // by use: texture, wrap, filter
   std::vector<Surface> surfaces_;           // by the mesh's material
+  // Of the cover: alpha three times over.
+  std::optional<SceneCover> cover_;
+  std::vector<float> vertex_alpha_;                // [V,3]
+  std::vector<std::vector<float>> texture_alpha_;  // by the mesh's texture
+  std::vector<Texture> alpha_textures_;            // as textures_
+  std::vector<Surface> alpha_surfaces_;
 };
 
 }  // namespace tilegrad

@@ -22,6 +22,9 @@ struct PictureRequest {
   double soft_delta = 0;  // > 0: alpha is equation 6 with this delta (RenderOptions), not the share
                           // that is covered
   FaceCulling culling = FaceCulling::kNone;
+  // What the scene's surfaces let through; null: nothing. A soft alpha knows no holes: with it, all
+  // is opaque. The exact images show the nearest face that is there.
+  const SceneCover* cover = nullptr;
 };
 
 // Planar as a Frame; what was not asked for is empty.
@@ -43,7 +46,8 @@ void AverageSamples(const Images& samples, int scale, Picture* picture);
 
 class PictureRenderer {
  public:
-  explicit PictureRenderer(const Workers& workers) : renderer_(RendererOn(workers)) {}
+  explicit PictureRenderer(const Workers& workers)
+      : renderer_(RendererOn(workers)), layers_(workers) {}
 
   // `scene.camera` is that of the picture's size. Errors: those of Renderer::Render, and a
   // request out of range.
@@ -53,8 +57,16 @@ class PictureRenderer {
   Status RenderColor(Scene scene, const PictureRequest& request, Picture* picture);
   Status RenderExact(const Scene& scene, const PictureRequest& request, Picture* picture);
 
+  Status RenderColorLayers(const Scene& scene, const PictureRequest& request, Picture* picture);
+  Status RenderExactLayers(const Scene& scene, const PictureRequest& request, const Outputs& images,
+                           Picture* picture);
+  void AverageLayers(const PictureRequest& request, Picture* picture) const;
+
   Renderer renderer_;
   Frame frame_;
+  LayerRenderer layers_;
+  std::vector<float> seen_;     // [3,H,W] of all layers
+  std::vector<float> through_;  // [H,W] share of what is behind them that is seen
 };
 
 }  // namespace tilegrad

@@ -43,14 +43,18 @@ void WriteFaceIds(const raster::ScreenMesh& mesh, const raster::PixelRect& rect,
   });
 }
 
-// Where no face is drawn.
-void WriteBackground(const raster::PixelRect& rect, int width, std::int32_t* ids, float* depth) {
+template <class T>
+void FillRows(const raster::PixelRect& rect, int width, T value, T* image) {
   for (int i = rect.y0; i < rect.y1; ++i) {
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i) * width;
-    std::fill(ids + row + rect.x0, ids + row + rect.x1, raster::kNoFace);
-    if (depth == nullptr) continue;
-    std::fill(depth + row + rect.x0, depth + row + rect.x1, std::numeric_limits<float>::infinity());
+    std::fill(image + row + rect.x0, image + row + rect.x1, value);
   }
+}
+
+// Where no face is drawn.
+void WriteBackground(const raster::PixelRect& rect, int width, std::int32_t* ids, float* depth) {
+  FillRows(rect, width, raster::kNoFace, ids);
+  if (depth != nullptr) FillRows(rect, width, std::numeric_limits<float>::infinity(), depth);
 }
 
 void WriteDepth(const raster::PixelRect& rect, int width, const float* inverse, float* depth) {
@@ -87,6 +91,20 @@ bool AnyFace(const std::int32_t* faces, std::size_t pixels) {
   return all != raster::kNoFace;
 }
 
+// Behind what the pixels of `peeled` show; they show this layer then.
+void PeelBin(const BinInput& input, const BinTask& task, WorkerScratch* worker, float* peeled) {
+  worker->behind.assign(raster::kBinSize * raster::kBinSize, 0);
+  ForEachPixel(task.rect, input.options.width, [&](std::size_t in_bin, std::size_t in_image) {
+    worker->behind[in_bin] = peeled[in_image];
+  });
+  const ImageScratch& image = input.image;
+  raster::PeelVisibility(image.mesh, {image.drawn_faces.storage, image.drawn[task.bin]}, task.rect,
+                         worker->behind.data(), &worker->bin);
+  ForEachPixel(task.rect, input.options.width, [&](std::size_t in_bin, std::size_t in_image) {
+    peeled[in_image] = worker->bin.inverse_depth[in_bin];
+  });
+}
+
 // Draws a bin: its face ids and depth go to `worker` and to the frame. False if no face is listed:
 // then only the frame's are written.
 bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFrame& part,
@@ -96,13 +114,19 @@ bool WriteVisibility(const BinInput& input, const BinTask& task, const ImageOfFr
   const int width = input.options.width;
   std::int32_t* const ids = part.plane(frame->face_ids, 1);
   float* const depth = part.plane(frame->depth, 1);
+  float* const peeled = part.plane(frame->peeled, 1);
   ++worker->stats.drawn;
   const std::span<const std::int32_t> listed = image.drawn[task.bin];
   if (listed.empty()) {
     WriteBackground(rect, width, ids, depth);
+    if (peeled != nullptr) FillRows(rect, width, 0.0f, peeled);
     return false;
   }
-  raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, listed}, rect, &worker->bin);
+  if (peeled == nullptr) {
+    raster::ComputeVisibility(image.mesh, {image.drawn_faces.storage, listed}, rect, &worker->bin);
+  } else {
+    PeelBin(input, task, worker, peeled);
+  }
   WriteFaceIds(image.mesh, rect, worker->bin.face, ids);
   if (depth != nullptr) WriteDepth(rect, width, worker->bin.inverse_depth, depth);
   return true;

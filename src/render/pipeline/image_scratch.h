@@ -72,6 +72,7 @@ using BinGradients = AlignedVector<raster::SoftFaceGradient>;
 struct WorkerScratch {
   std::size_t index;  // of the worker
   raster::VisibilityBin bin;
+  AlignedVector<float> behind;  // of a frame that is peeled, [kBinSize][kBinSize]
   raster::InterpolateScratch interpolate;
   raster::BandSums band;
   MergeScratch merge;

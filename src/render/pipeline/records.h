@@ -47,6 +47,10 @@ struct PipelineFrameT {
   // then takes more time.
   AlignedVector<T> transmittance;
   double alpha_error_bound = 0;  // as ImagesT
+  // [N,H,W], or empty. Before Render: a pixel shows the nearest face whose 1/depth is less than
+  // this (raster/visibility.h: PeelVisibility). After it: 1/depth of that face, 0 where there is
+  // none. Only the engine's forward pass knows it.
+  AlignedVector<T> peeled;
 };
 
 // dL/d(image); an empty span is zero. Shapes as in the frame.
