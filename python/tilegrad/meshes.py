@@ -85,6 +85,21 @@ class MeshCamera:
             (width, height)))
 
 
+@dataclasses.dataclass(eq=False)
+class MeshTables:
+    """A file's own lists of texture coordinates and normals, which corners share; None where there
+    are none.
+
+    uvs: (N, 2) float32, without the material's texture transform. normals: (M, 3) float32, of any
+    length. face_uvs, face_normals: (F, 3) int32, indices into them; -1: a corner without.
+    """
+
+    uvs: Optional[np.ndarray] = None
+    face_uvs: Optional[np.ndarray] = None
+    normals: Optional[np.ndarray] = None
+    face_normals: Optional[np.ndarray] = None
+
+
 @dataclasses.dataclass(eq=False, repr=False)
 class Mesh:
     """A triangle mesh: V vertices, F faces; None where there is nothing.
@@ -95,6 +110,8 @@ class Mesh:
         texture. corner_normals: (F, 3, 3) float32.
     face_materials: (F,) int32, indices into materials; all 0 if None.
     warnings: what a file lacked, and what stands in for it. cameras: those of a glTF file.
+    tables: the lists of an OBJ file that corner_uvs and corner_normals were looked up in; nothing
+        follows changes to them.
     """
 
     positions: np.ndarray
@@ -108,6 +125,7 @@ class Mesh:
     textures: list[MeshTexture] = dataclasses.field(default_factory=list)
     warnings: list[str] = dataclasses.field(default_factory=list)
     cameras: list[MeshCamera] = dataclasses.field(default_factory=list)
+    tables: Optional[MeshTables] = None
 
     def scene_arguments(self, *, color_space: str = "srgb",
                         normals: str = "auto") -> dict[str, Any]:
@@ -212,4 +230,6 @@ def mesh_of_dict(arrays: dict[str, Any]) -> Mesh:
     parts["materials"] = [Material(**material) for material in arrays["materials"]]
     parts["textures"] = [MeshTexture(**texture) for texture in arrays["textures"]]
     parts["cameras"] = [MeshCamera(**camera) for camera in arrays.get("cameras", ())]
+    if arrays.get("tables") is not None:
+        parts["tables"] = MeshTables(**arrays["tables"])
     return Mesh(**parts)

@@ -92,8 +92,8 @@ class Assembly {
     material.name = from.name;
     material.base_color = from.color;
     if (!from.image.empty()) material.base_color_texture = Texture(from);
-    // With a texture, OBJ's Kd is often left black or grey by exporters; the image alone is what
-    // people meant.
+    // With a texture, the diffuse colour is often left black or grey by exporters; the image alone
+    // is what people meant.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};
     return material;
   }
@@ -164,13 +164,6 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
-  return ReadByAssimp(source, name, file, LimitsFor(file.size()));
-}
-
-Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
-  TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
-  TILEGRAD_TRY(
-      CheckObj({reinterpret_cast<const char*>(file.data()), file.size()}, source.Describe(name)));
   return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 

@@ -16,10 +16,6 @@
 namespace tilegrad::io {
 namespace {
 
-// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
-// many corners still have 32-bit indices.
-constexpr std::size_t kMaxElements = std::size_t{1} << 26;
-
 struct Format {
   std::string_view ending;
   Result<LoadedMesh> (*read)(const FileSource& source, const std::string& name);
@@ -105,6 +101,33 @@ void MakeNormalsUnit(Mesh& mesh) {
 
 }  // namespace
 
+void StorePositions(std::span<const glm::dvec3> positions, LoadedMesh& out) {
+  out.mesh.positions.insert(out.mesh.positions.end(), positions.begin(), positions.end());
+}
+
+std::string ShortList(const std::set<std::string, std::less<>>& names) {
+  constexpr std::size_t kMost = 8;
+  std::string list;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count++ == kMost) break;
+    list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", name);
+  }
+  if (names.size() > kMost) list += fmt::format(" and {} more", names.size() - kMost);
+  return list;
+}
+
+std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
+                                      std::string_view mentioned) {
+  std::string slashes(mentioned);
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  const std::string base = slashes.substr(slashes.find_last_of('/') + 1);
+  for (const std::string& candidate : {Folder(mesh_name) + slashes, Folder(mesh_name) + base}) {
+    if (source.Exists(candidate)) return candidate;
+  }
+  return std::nullopt;
+}
+
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out) {
   if (!image.ok()) {
     out.warnings.push_back(fmt::format("texture left out: {}", image.status().message()));
@@ -119,14 +142,10 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
   for (std::size_t t = 0; t < out.mesh.textures.size(); ++t) {
     if (out.mesh.textures[t].name == image_name) return static_cast<int>(t);
   }
-  std::string slashes = image_name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const std::string base = slashes.substr(slashes.find_last_of('/') + 1);
-  for (const std::string& candidate : {Folder(mesh_name) + slashes, Folder(mesh_name) + base}) {
-    if (!source.Exists(candidate)) continue;
-    const auto bytes = source.Read(candidate);
+  if (const auto found = FindBeside(source, mesh_name, image_name)) {
+    const auto bytes = source.Read(*found);
     if (!bytes.ok()) return AddTexture(bytes.status(), image_name, out);
-    return AddTexture(DecodeImage(*bytes, source.Describe(candidate)), image_name, out);
+    return AddTexture(DecodeImage(*bytes, source.Describe(*found)), image_name, out);
   }
   out.warnings.push_back(
       fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
@@ -134,9 +153,9 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
 }
 
 Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
-  if (out.mesh.positions.size() + part.positions.size() > kMaxElements ||
-      out.mesh.faces.size() + part.faces.size() > kMaxElements) {
-    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxElements);
+  if (out.mesh.positions.size() + part.positions.size() > kMaxMeshElements ||
+      out.mesh.faces.size() + part.faces.size() > kMaxMeshElements) {
+    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxMeshElements);
   }
   const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};

@@ -2,6 +2,10 @@
 // Internal to io: what mesh_file.cc dispatches to, and what the readers share.
 #pragma once
 
+#include <glm/vec3.hpp>
+#include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +14,10 @@
 #include "io/mesh_file.h"
 
 namespace tilegrad::io {
+
+// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
+// many corners still have 32-bit indices.
+inline constexpr std::size_t kMaxMeshElements = std::size_t{1} << 26;
 
 // All leave validation to mesh_file.cc.
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
@@ -38,13 +46,19 @@ struct Polygon {
   std::vector<glm::vec3> positions_;
 };
 
-// OBJ only, before Assimp, which drops or misreads what is wrong: the numbers of every vertex, and
-// every index of every face, line and point against the counts of v, vt and vn.
-Status CheckObj(std::string_view text, const std::string& name);
+// Adds positions as a file has them to the mesh.
+void StorePositions(std::span<const glm::dvec3> positions, LoadedMesh& out);
 
-// Finds an image that a mesh file mentions: as written beside the mesh, then by its base name
-// there, which helps absolute paths of another computer. Adds it to out.mesh.textures and returns
-// its index, or adds a warning and returns -1.
+// For warnings: up to eight names in quotes, and how many more there are.
+std::string ShortList(const std::set<std::string, std::less<>>& names);
+
+// A file that a mesh file mentions: as written beside the mesh, then by its base name there, which
+// helps absolute paths of another computer. Its name in the source, or nothing.
+std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
+                                      std::string_view mentioned);
+
+// Finds an image that a mesh file mentions. Adds it to out.mesh.textures and returns its index, or
+// adds a warning and returns -1.
 int AddTexture(const FileSource& source, const std::string& mesh_name,
                const std::string& image_name, LoadedMesh& out);
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
@@ -237,6 +239,10 @@ TEST_F(MeshFileTest, ReadsFromAZipIgnoringCase) {
   EXPECT_EQ(loaded->mesh.materials[loaded->mesh.face_materials[0]].base_color.g, 1);
 }
 
+// What these files lack or have too much of, as their authors left them.
+constexpr std::array kHarmless = {"not found", "left out", "white instead",
+                                  "no texture coordinates", "statements that are not read"};
+
 TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
   const Path folder = "/usr/share/sweethome3d/furniture";
   if (!std::filesystem::exists(folder))
@@ -260,8 +266,9 @@ TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
   }
   EXPECT_EQ(models, 820);
   for (const std::string& warning : warnings) {
-    const bool harmless = warning.find("not found") != std::string::npos ||
-                          warning.find("lines left out") != std::string::npos;
+    const bool harmless = std::any_of(kHarmless.begin(), kHarmless.end(), [&](const char* part) {
+      return warning.find(part) != std::string::npos;
+    });
     EXPECT_TRUE(harmless) << warning;
   }
   EXPECT_GT(textured, 350);
