@@ -73,6 +73,8 @@ class PrimitiveBuilder {
       key.append(reinterpret_cast<const char*>(&mesh_.corner_uvs[corner]), sizeof(glm::vec2));
     if (!mesh_.corner_normals.empty())
       key.append(reinterpret_cast<const char*>(&mesh_.corner_normals[corner]), sizeof(glm::vec3));
+    if (!mesh_.corner_colors.empty())
+      key.append(reinterpret_cast<const char*>(&mesh_.corner_colors[corner]), sizeof(glm::vec4));
     const auto [it, added] =
         seen_.try_emplace(std::move(key), static_cast<std::uint32_t>(out_.positions.size()));
     if (added) AddVertex(corner, vertex);
@@ -84,6 +86,8 @@ class PrimitiveBuilder {
   void AddVertex(std::size_t corner, std::int32_t vertex) {
     out_.positions.push_back(mesh_.positions[vertex]);
     if (!mesh_.colors.empty()) out_.colors.push_back(SrgbToLinear(mesh_.colors[vertex]));
+    if (!mesh_.corner_colors.empty())
+      out_.colors.push_back(SrgbToLinear(mesh_.corner_colors[corner]));
     if (!mesh_.corner_normals.empty())
       out_.normals.push_back(mesh_.corner_normals[corner]);
     else if (!mesh_.normals.empty())

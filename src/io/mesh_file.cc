@@ -77,9 +77,20 @@ void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   mesh.materials.pop_back();
 }
 
+// Some files count fractions from 0 to 255. No sound colour is beyond 1; up to 2 may be light.
+void ScaleByteColors(std::vector<glm::vec4>& colors, std::vector<std::string>& warnings) {
+  glm::vec4 most(0);
+  for (const glm::vec4& color : colors) most = glm::max(most, color);
+  if (std::max({most.r, most.g, most.b}) <= 2) return;
+  const glm::vec4 full(glm::vec3(255), most.a > 2 ? 255 : 1);
+  for (glm::vec4& color : colors) color /= full;
+  warnings.push_back("colours reach beyond 2: taken as counted from 0 to 255");
+}
+
 void ClampColors(Mesh& mesh) {
   const auto clamp = [](glm::vec4& color) { color = glm::clamp(color, 0.0f, 1.0f); };
   std::for_each(mesh.colors.begin(), mesh.colors.end(), clamp);
+  std::for_each(mesh.corner_colors.begin(), mesh.corner_colors.end(), clamp);
   for (Material& material : mesh.materials) clamp(material.base_color);
 }
 
@@ -209,6 +220,8 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
+  ScaleByteColors(loaded->mesh.colors, loaded->warnings);
+  ScaleByteColors(loaded->mesh.corner_colors, loaded->warnings);
   ClampColors(loaded->mesh);
   MakeNormalsUnit(loaded->mesh);
   return loaded;

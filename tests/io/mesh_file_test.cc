@@ -78,6 +78,17 @@ TEST_F(MeshFileTest, GlbRoundTripKeepsWhatIsDrawn) {
   EXPECT_EQ(loaded->mesh.textures[0].image.pixels, mesh.textures[0].image.pixels);
 }
 
+TEST_F(MeshFileTest, GlbKeepsColorsOfCorners) {
+  Mesh mesh = Box({0, 0, 0}, {1, 2, 3});
+  for (std::size_t c = 0; c < 3 * mesh.faces.size(); ++c)
+    mesh.corner_colors.emplace_back(c / 3 % 2, 0, 1, 1);  // of faces
+  ASSERT_TRUE(SaveGlb(folder_ / "a.glb", mesh).ok());
+  const auto loaded = LoadMesh(folder_ / "a.glb");
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  for (std::size_t c = 0; c < mesh.corner_colors.size(); ++c)
+    EXPECT_EQ(loaded->mesh.colors[loaded->mesh.faces[c / 3][c % 3]], mesh.corner_colors[c]);
+}
+
 // glTF's factors and vertex colours are linear, ours are sRGB-encoded; and a mesh without a
 // material gets a plain one, which primitives refer to.
 TEST_F(MeshFileTest, GlbStoresLinearColorsAndAlwaysAMaterial) {

@@ -175,6 +175,9 @@ TEST_F(ObjTest, VertexColors) {
     EXPECT_EQ(Load(text).mesh.colors,
               (std::vector<glm::vec4>{{1, 1, 1, 1}, {0, 0, 1, 1}, {1, 1, 1, 1}}));
   }
+  const auto bytes = Load("v 0 0 0 255 0 51\nv 1 0 0 0 255 0\nv 0 1 0\nf 1 2 3\n", 1);
+  ExpectNames(bytes.warnings[0], "0 to 255");
+  EXPECT_EQ(bytes.mesh.colors[0], glm::vec4(1, 0, 0.2f, 1));
   Write("m.mtl", "newmtl m\nKd 0.5 0.25 1\n");
   const auto both = Load("mtllib m.mtl\nusemtl m\n" + kSquare + "v 0 0 1 0 1 0\nf 1 2 5\n").mesh;
   EXPECT_EQ(both.colors[4], glm::vec4(0, 1, 0, 1));

@@ -29,9 +29,8 @@ def load_surface(path: Path, with_materials: bool = True, with_normals: bool = T
         loaded.material_assignments = _assignments(mesh)
     if mesh.colors is not None:
         loaded.vertex_colors = torch.from_numpy(mesh.colors[:, :3])
-    corner_colors = getattr(mesh, "corner_colors", None)
-    if corner_colors is not None:
-        loaded.face_colors = torch.from_numpy(corner_colors[..., :3])
+    if mesh.corner_colors is not None:
+        loaded.face_colors = torch.from_numpy(mesh.corner_colors[..., :3])
     return loaded
 
 
