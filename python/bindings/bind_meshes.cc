@@ -49,13 +49,17 @@ py::dict LoadMesh(const Path& path) {
   for (const io::MeshFileCamera& camera : loaded.cameras) cameras.append(CameraToDict(camera));
   out["warnings"] = warnings;
   out["cameras"] = cameras;
+  out["origin"] =
+      CopyOf<double>(std::array{loaded.origin.x, loaded.origin.y, loaded.origin.z}, {3});
   out["tables"] = TablesToDict(std::move(loaded.tables));
   return out;
 }
 
 void SaveMesh(const Path& path, const py::dict& dict) {
   const Mesh mesh = MeshFromDict("save_mesh", dict);
-  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh).Within(path.string()); }));
+  const auto o = py::cast<std::array<double, 3>>(dict["origin"]);
+  const glm::dvec3 origin(o[0], o[1], o[2]);
+  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh, origin).Within(path.string()); }));
 }
 
 constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};

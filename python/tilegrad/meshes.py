@@ -113,6 +113,8 @@ class Mesh:
     warnings: what a file lacked, and what stands in for it. cameras: those of a glTF file.
     tables: the lists of an OBJ file that corner_uvs and corner_normals were looked up in; nothing
         follows changes to them.
+    origin: (3,) float64: what was subtracted from the file's coordinates, because they are too far
+        from the origin for float32; `positions + origin` is the place in the world. Almost always 0.
     """
 
     positions: np.ndarray
@@ -128,6 +130,7 @@ class Mesh:
     warnings: list[str] = dataclasses.field(default_factory=list)
     cameras: list[MeshCamera] = dataclasses.field(default_factory=list)
     tables: Optional[MeshTables] = None
+    origin: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
 
     def scene_arguments(self, *, color_space: str = "srgb",
                         normals: str = "auto") -> dict[str, Any]:
@@ -184,6 +187,7 @@ class Mesh:
                 "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
                 "corner_colors": self._rgba(function, "corner_colors", sizes, "F", 3),
                 "face_materials": array("face_materials", np.int32, "F"),
+                "origin": array("origin", np.float64, 3).tolist(),
                 "materials": [material.checked(function) for material in self.materials],
                 "textures": [{"name": str(texture.name), "image": self._texels(function, texture)}
                              for texture in self.textures]}

@@ -74,11 +74,14 @@ class Assembly {
     const ImportedPart& part = scene_.parts[instance.part];
     if (part.triangles.empty()) return {};
     Mesh mesh = ConvertPart(part);
-    if (const glm::mat4x3& m = instance.to_scene; m != glm::mat4x3(1))
-      Transform(mesh, {m[0], m[1], m[2]}, m[3]);
+    const glm::dmat4x3& m = instance.to_scene;
+    std::vector<glm::dvec3> exact;
+    for (const glm::vec3& p : mesh.positions) exact.push_back(m * glm::dvec4(p, 1));
+    if (m != glm::dmat4x3(1))
+      Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
     const Material material =
         part.material < materials_.size() ? MaterialOf(part.material) : Material{};
-    return AppendWithMaterial(std::move(mesh), material, out_);
+    return AppendWithMaterial(std::move(mesh), material, out_, exact);
   }
 
   // Converted at first use, so that materials without a face ask for no texture.

@@ -246,13 +246,14 @@ Result<Bytes> Assemble(GlbBuilder& glb) {
 
 }  // namespace
 
-Result<Bytes> EncodeGlb(const Mesh& mesh) {
+Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
   TILEGRAD_TRY(Validate(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
   GlbBuilder glb;
   glb.json["scene"] = 0;
   glb.json["scenes"] = Json::array({{{"nodes", {0}}}});
   glb.json["nodes"] = Json::array({{{"mesh", 0}}});
+  if (origin != glm::dvec3(0)) glb.json["nodes"][0]["translation"] = {origin.x, origin.y, origin.z};
   Json primitives = Json::array();
   const std::vector<Primitive> parts = SplitByMaterial(mesh);
   for (std::size_t m = 0; m < parts.size(); ++m) {
@@ -267,8 +268,8 @@ Result<Bytes> EncodeGlb(const Mesh& mesh) {
   return Assemble(glb);
 }
 
-Status SaveGlb(const Path& path, const Mesh& mesh) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh));
+Status SaveGlb(const Path& path, const Mesh& mesh, const glm::dvec3& origin) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh, origin));
   return WriteFileAtomic(path, bytes);
 }
 

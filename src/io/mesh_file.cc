@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "io/mesh_origin.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
 #include "scene/triangulate.h"
@@ -112,10 +113,6 @@ void MakeNormalsUnit(Mesh& mesh) {
 
 }  // namespace
 
-void StorePositions(std::span<const glm::dvec3> positions, LoadedMesh& out) {
-  out.mesh.positions.insert(out.mesh.positions.end(), positions.begin(), positions.end());
-}
-
 std::string ShortList(const std::set<std::string, std::less<>>& names) {
   constexpr std::size_t kMost = 8;
   std::string list;
@@ -163,11 +160,15 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
   return -1;
 }
 
-Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
+                          std::span<const glm::dvec3> exact) {
   if (out.mesh.positions.size() + part.positions.size() > kMaxMeshElements ||
       out.mesh.faces.size() + part.faces.size() > kMaxMeshElements) {
     return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxMeshElements);
   }
+  out.exact.insert(out.exact.end(), exact.begin(), exact.end());
+  if (exact.empty())
+    out.exact.insert(out.exact.end(), part.positions.begin(), part.positions.end());
   const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
@@ -182,12 +183,13 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
   return {};
 }
 
-void Polygon::AddTo(Mesh& mesh) {
+void Polygon::AddTo(LoadedMesh& out) {
   positions_.clear();
-  for (const std::int32_t v : corners) positions_.push_back(mesh.positions[v]);
+  for (const std::int32_t v : corners)
+    positions_.emplace_back(out.exact[v] - out.exact[corners[0]]);  // small numbers, however far
   TriangulatePolygon(positions_, triangles);
   for (const auto& [a, b, c] : triangles)
-    mesh.faces.push_back({corners[a], corners[b], corners[c]});
+    out.mesh.faces.push_back({corners[a], corners[b], corners[c]});
 }
 
 std::string MeshEnding(const std::string& name) {
@@ -218,6 +220,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   auto loaded = format->read(source, name);
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
+  PlaceNearOrigin(*loaded);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
   ScaleByteColors(loaded->mesh.colors, loaded->warnings);

@@ -4,6 +4,8 @@
 // each file).
 #pragma once
 
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,10 @@ struct LoadedMesh {
   std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
   MeshFileTables tables;
+  // What was subtracted from the file's coordinates, from cameras too: positions + origin is the
+  // place in the world. 0, unless the mesh is farther from the origin than 256 times its size.
+  glm::dvec3 origin{0};
+  std::vector<glm::dvec3> exact;  // of readers: positions before they are rounded; empty afterwards
 };
 
 // Vertices are those of the file, in its order, once each, whether a face uses them or not: OBJ,

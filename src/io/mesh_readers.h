@@ -19,7 +19,7 @@ namespace tilegrad::io {
 // many corners still have 32-bit indices.
 inline constexpr std::size_t kMaxMeshElements = std::size_t{1} << 26;
 
-// All leave validation to mesh_file.cc.
+// All leave positions in LoadedMesh::exact, and validation to mesh_file.cc.
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
@@ -40,14 +40,11 @@ struct Polygon {
   std::vector<Face> triangles;        // set by AddTo: positions in `corners`
 
   // Adds its triangles (scene/triangulate.h) to the faces.
-  void AddTo(Mesh& mesh);
+  void AddTo(LoadedMesh& out);
 
  private:
   std::vector<glm::vec3> positions_;
 };
-
-// Adds positions as a file has them to the mesh.
-void StorePositions(std::span<const glm::dvec3> positions, LoadedMesh& out);
 
 // For warnings: up to eight names in quotes, and how many more there are.
 std::string ShortList(const std::set<std::string, std::less<>>& names);
@@ -66,7 +63,9 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
 
 // Adds a part whose only material is `material`, which refers to textures that are already in
-// out.mesh. An error if the whole becomes too large: a small file can place one part many times.
-Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out);
+// out.mesh. `exact`: its positions in the scene; empty: they are those of `part`. An error if the
+// whole becomes too large: a small file can place one part many times.
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
+                          std::span<const glm::dvec3> exact = {});
 
 }  // namespace tilegrad::io

@@ -117,7 +117,6 @@ class OffReader {
 
  private:
   Status ReadVertices() {
-    std::vector<glm::dvec3> positions;
     OffColors colors;
     for (std::size_t i = 0; i < counts_.vertices; ++i) {
       std::string_view line;
@@ -127,12 +126,11 @@ class OffReader {
         if (!ParseNumber(NextToken(line), p[c]))
           return file_.Error("a vertex needs three finite numbers");
       }
-      positions.push_back(p);
+      out_.exact.push_back(p);
       const bool good = colors.Add(line);
       if (!good && counts_.colors) return file_.Error("a colour needs three or four numbers");
       odd_lines_ += !good;
     }
-    StorePositions(positions, out_);
     out_.mesh.colors = colors.Take();
     return {};
   }
@@ -144,7 +142,7 @@ class OffReader {
       if (!file_.Next(line)) return file_.Error(fmt::format("ends at face {}", f));
       TILEGRAD_TRY(ReadCorners(line, polygon));
       odd_lines_ += !face_colors_.Add(line);
-      polygon.AddTo(out_.mesh);
+      polygon.AddTo(out_);
       polygon_of_.resize(out_.mesh.faces.size(), f);
     }
     return {};

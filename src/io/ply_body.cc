@@ -74,7 +74,6 @@ class PlyBody {
       else
         TILEGRAD_TRY(Skip(element));
     }
-    StorePositions(positions_, out_);
     AddFaces();
     AddWarnings();
     return {};
@@ -117,7 +116,7 @@ class PlyBody {
     row[kAlpha] = 1;
     for (std::size_t i = 0; i < element.count; ++i) {
       TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
-      positions_.emplace_back(row[kX], row[kY], row[kZ]);
+      out_.exact.emplace_back(row[kX], row[kY], row[kZ]);
       if (has[kNx] && has[kNy] && has[kNz]) mesh.normals.emplace_back(row[kNx], row[kNy], row[kNz]);
       if (HasColor(has)) mesh.colors.emplace_back(row[kRed], row[kGreen], row[kBlue], row[kAlpha]);
       if (has[kU] && has[kV]) vertex_uvs_.emplace_back(row[kU], row[kV]);
@@ -217,7 +216,7 @@ class PlyBody {
     Mesh& mesh = out_.mesh;
     const std::span<const std::int32_t> corners(corners_.data() + face.first, face.count);
     polygon_.corners.assign(corners.begin(), corners.end());
-    polygon_.AddTo(mesh);
+    polygon_.AddTo(out_);
     for (const Face& triangle : polygon_.triangles) {
       if (has_images_) images_.push_back(face.image);
       for (const std::int32_t k : triangle) {
@@ -266,7 +265,6 @@ class PlyBody {
   const std::string& place_;
   PlyValues values_;
   LoadedMesh& out_;
-  std::vector<glm::dvec3> positions_;
   std::vector<glm::vec2> vertex_uvs_, uvs_;  // uvs_: of corners_, if any face has them
   std::vector<std::int32_t> corners_;        // of faces_
   std::vector<PlyFace> faces_;

@@ -106,6 +106,20 @@ class Meshes(FolderTest):
                                           [[0, 0, 0], [1, 0, 0], [0, 1, 0]], name)
             self.assertIn(pathlib.Path(name).suffix, files.mesh_endings())
 
+    def test_far_from_the_origin(self) -> None:
+        path = self.folder / "a.off"
+        path.write_text("OFF\n3 1 0\n4600000.25 0 7\n4600001.25 0 7\n4600000.25 1 7\n3 0 1 2\n")
+        mesh = files.load_mesh(path)
+        self.assertEqual(mesh.origin.tolist(), [4600001, 1, 7])
+        world = [[4600000.25, 0, 7], [4600001.25, 0, 7], [4600000.25, 1, 7]]
+        self.assertEqual((mesh.positions + mesh.origin).tolist(), world)
+        self.assertIn("(4600001, 1, 7) was subtracted", mesh.warnings[0])
+        files.save_mesh(self.folder / "b.glb", mesh)
+        back = files.load_mesh(self.folder / "b.glb")
+        self.assertEqual((back.positions + back.origin).tolist(), world)
+        near = files.Mesh(mesh.positions, mesh.faces)
+        self.assertEqual(near.origin.tolist(), [0, 0, 0])
+
     def test_colours_of_faces(self) -> None:
         path = self.folder / "a.off"
         path.write_text("OFF\n4 2 0\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n"

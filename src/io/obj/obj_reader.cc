@@ -125,7 +125,7 @@ class ObjAssembly {
 
   Result<LoadedMesh> Run() {
     out_.warnings = std::move(from_.warnings);
-    StorePositions(from_.positions, out_);
+    out_.exact = std::move(from_.positions);
     out_.mesh.colors = std::move(from_.colors);
     ObjLibraries libraries(source_, name_, out_.warnings);
     for (const std::string& names : from_.libraries) TILEGRAD_TRY(libraries.Read(names));
@@ -187,7 +187,7 @@ class ObjAssembly {
   void AddPolygon(std::span<const ObjCorner> corners, const FaceMaterial& material) {
     polygon_.corners.clear();
     for (const ObjCorner& corner : corners) polygon_.corners.push_back(corner[0]);
-    polygon_.AddTo(out_.mesh);
+    polygon_.AddTo(out_);
     for (const Face& triangle : polygon_.triangles) {
       out_.mesh.face_materials.push_back(material.index);
       for (const std::int32_t k : triangle) {
