@@ -24,6 +24,24 @@ py::dict CameraToDict(const io::MeshFileCamera& from) {
       py::arg("znear") = from.camera.znear);
 }
 
+// The file's own lists; None if it has none.
+py::object TablesToDict(io::MeshFileTables tables) {
+  if (tables.uvs.empty() && tables.normals.empty()) return py::none();
+  const auto add = [](py::dict& out, const char* name, auto values, auto corners) {
+    const auto count = static_cast<py::ssize_t>(values.size()),
+               faces = static_cast<py::ssize_t>(corners.size()) / 3;
+    const auto width = static_cast<py::ssize_t>(decltype(values)::value_type::length());
+    if (count == 0) return;
+    out[name] = OwnedArray<float>(std::move(values), {count, width});
+    out[("face_" + std::string(name)).c_str()] =
+        OwnedArray<std::int32_t>(std::move(corners), {faces, 3});
+  };
+  py::dict out;
+  add(out, "uvs", std::move(tables.uvs), std::move(tables.corner_uvs));
+  add(out, "normals", std::move(tables.normals), std::move(tables.corner_normals));
+  return std::move(out);
+}
+
 py::dict LoadMesh(const Path& path, std::size_t max_bytes) {
   auto loaded = LoadWithin(max_bytes, [&] { return io::LoadMesh(path); });
   py::dict out = MeshToDict(std::move(loaded.mesh));
@@ -32,12 +50,17 @@ py::dict LoadMesh(const Path& path, std::size_t max_bytes) {
   for (const io::MeshFileCamera& camera : loaded.cameras) cameras.append(CameraToDict(camera));
   out["warnings"] = warnings;
   out["cameras"] = cameras;
+  out["origin"] =
+      CopyOf<double>(std::array{loaded.origin.x, loaded.origin.y, loaded.origin.z}, {3});
+  out["tables"] = TablesToDict(std::move(loaded.tables));
   return out;
 }
 
 void SaveMesh(const Path& path, const py::dict& dict) {
   const Mesh mesh = MeshFromDict("save_mesh", dict);
-  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh).Within(path.string()); }));
+  const auto o = py::cast<std::array<double, 3>>(dict["origin"]);
+  const glm::dvec3 origin(o[0], o[1], o[2]);
+  ThrowIfError(WithoutGil([&] { return io::SaveGlb(path, mesh, origin).Within(path.string()); }));
 }
 
 constexpr const char* kNormalKinds[] = {"smooth", "flat", "given"};

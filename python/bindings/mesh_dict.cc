@@ -126,6 +126,7 @@ py::dict MeshToDict(Mesh mesh) {
   out["colors"] = ArrayOrNone<float>(std::move(mesh.colors), {vertices, 4});
   out["corner_uvs"] = ArrayOrNone<float>(std::move(mesh.corner_uvs), {faces, 3, 2});
   out["corner_normals"] = ArrayOrNone<float>(std::move(mesh.corner_normals), {faces, 3, 3});
+  out["corner_colors"] = ArrayOrNone<float>(std::move(mesh.corner_colors), {faces, 3, 4});
   out["face_materials"] = ArrayOrNone<std::int32_t>(std::move(mesh.face_materials), {faces});
   out["materials"] = materials;
   out["textures"] = textures;
@@ -140,6 +141,7 @@ Mesh MeshFromDict(const char* function, const py::dict& dict) {
   Read<float>(function, dict, "colors", {kAny, 4}, &mesh.colors);
   Read<float>(function, dict, "corner_uvs", {kAny, 3, 2}, &mesh.corner_uvs);
   Read<float>(function, dict, "corner_normals", {kAny, 3, 3}, &mesh.corner_normals);
+  Read<float>(function, dict, "corner_colors", {kAny, 3, 4}, &mesh.corner_colors);
   Read<std::int32_t>(function, dict, "face_materials", {kAny}, &mesh.face_materials);
   for (const py::handle m : dict["materials"])
     mesh.materials.push_back(MaterialFromDict(function, py::cast<py::dict>(m)));

@@ -3,7 +3,7 @@
 // None or absent: the mesh has none.
 //
 //   positions [V,3] float32, faces [F,3] int32, normals [V,3], colors [V,4], corner_uvs [F,3,2],
-//   corner_normals [F,3,3], face_materials [F] int32,
+//   corner_normals [F,3,3], corner_colors [F,3,4], face_materials [F] int32,
 //   materials: dicts with the members of Material, enumerations as strings
 //   textures: dicts of "name" and "image" [height,width,3 or 4] uint8
 #pragma once

@@ -88,6 +88,21 @@ class MeshCamera:
             (width, height)))
 
 
+@dataclasses.dataclass(eq=False)
+class MeshTables:
+    """A file's own lists of texture coordinates and normals, which corners share; None where there
+    are none.
+
+    uvs: (N, 2) float32, without the material's texture transform. normals: (M, 3) float32, of any
+    length. face_uvs, face_normals: (F, 3) int32, indices into them; -1: a corner without.
+    """
+
+    uvs: Optional[np.ndarray] = None
+    face_uvs: Optional[np.ndarray] = None
+    normals: Optional[np.ndarray] = None
+    face_normals: Optional[np.ndarray] = None
+
+
 @dataclasses.dataclass(eq=False, repr=False)
 class Mesh:
     """A triangle mesh: V vertices, F faces; None where there is nothing.
@@ -95,9 +110,14 @@ class Mesh:
     positions: (V, 3) float32. faces: (F, 3) int32; counter-clockwise seen from outside.
     normals: (V, 3) float32, unit. colors: (V, 4) or (V, 3) float32, 0 to 1, sRGB.
     corner_uvs: (F, 3, 2) float32, for the corners of faces; (0, 0) is the lower left corner of the
-        texture. corner_normals: (F, 3, 3) float32.
+        texture. corner_normals: (F, 3, 3) float32. corner_colors: (F, 3, 4) or (F, 3, 3) float32,
+        instead of colors.
     face_materials: (F,) int32, indices into materials; all 0 if None.
     warnings: what a file lacked, and what stands in for it. cameras: those of a glTF file.
+    tables: the lists of an OBJ file that corner_uvs and corner_normals were looked up in; nothing
+        follows changes to them.
+    origin: (3,) float64: what was subtracted from the file's coordinates, because they are too far
+        from the origin for float32; `positions + origin` is the place in the world. Almost always 0.
     """
 
     positions: np.ndarray
@@ -106,11 +126,14 @@ class Mesh:
     colors: Optional[np.ndarray] = None
     corner_uvs: Optional[np.ndarray] = None
     corner_normals: Optional[np.ndarray] = None
+    corner_colors: Optional[np.ndarray] = None
     face_materials: Optional[np.ndarray] = None
     materials: list[Material] = dataclasses.field(default_factory=list)
     textures: list[MeshTexture] = dataclasses.field(default_factory=list)
     warnings: list[str] = dataclasses.field(default_factory=list)
     cameras: list[MeshCamera] = dataclasses.field(default_factory=list)
+    tables: Optional[MeshTables] = None
+    origin: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
 
     def scene_arguments(self, *, color_space: str = "srgb",
                         normals: str = "auto") -> dict[str, Any]:
@@ -131,7 +154,7 @@ class Mesh:
                      "textures": [Texture(**texture) for texture in made["textures"]] or None,
                      "surfaces": [Surface(**surface) for surface in made["surfaces"]],
                      "face_surfaces": self.face_materials, "two_sided": True}
-        per_corner = [name for name in ("uvs", "normals")
+        per_corner = [name for name in ("colors", "uvs", "normals")
                       if getattr(arguments[name], "ndim", 2) == 3]
         return {**arguments, "per_corner": tuple(per_corner)}
 
@@ -143,7 +166,8 @@ class Mesh:
         return Scene(self.positions, self.faces, camera, **changed(own, arguments))
 
     def __repr__(self) -> str:
-        parts = [name for name in ("normals", "colors", "corner_uvs", "corner_normals")
+        parts = [name for name in ("normals", "colors", "corner_uvs", "corner_normals",
+                                  "corner_colors")
                  if getattr(self, name) is not None]
         return (f"<tilegrad Mesh: {len(self.positions)} vertices, {len(self.faces)} faces, "
                 f"{len(self.materials)} materials, {len(self.textures)} textures"
@@ -161,10 +185,12 @@ class Mesh:
         return {"positions": array("positions", np.float32, "V", 3),
                 "faces": array("faces", np.int32, "F", 3),
                 "normals": array("normals", np.float32, "V", 3),
-                "colors": self._rgba(function, sizes),
+                "colors": self._rgba(function, "colors", sizes, "V"),
                 "corner_uvs": array("corner_uvs", np.float32, "F", 3, 2),
                 "corner_normals": array("corner_normals", np.float32, "F", 3, 3),
+                "corner_colors": self._rgba(function, "corner_colors", sizes, "F", 3),
                 "face_materials": array("face_materials", np.int32, "F"),
+                "origin": array("origin", np.float64, 3).tolist(),
                 "materials": [material.checked(function) for material in self.materials],
                 "textures": [{"name": str(texture.name), "image": self._texels(function, texture)}
                              for texture in self.textures]}
@@ -175,15 +201,16 @@ class Mesh:
         return _arrays.as_array(function, f"image of texture {texture.name!r}", texture.image,
                                 np.uint8, ("height", "width", channels))
 
-    def _rgba(self, function: str, sizes: dict[str, int]) -> Optional[np.ndarray]:
-        if self.colors is None:
+    def _rgba(self, function: str, name: str, sizes: dict[str, int],
+              *shape: Union[str, int]) -> Optional[np.ndarray]:
+        value = getattr(self, name)
+        if value is None:
             return None
-        channels = 3 if np.shape(self.colors)[-1:] == (3,) else 4
-        colors = _arrays.as_array(function, "colors", self.colors, np.float32, ("V", channels),
-                                  sizes)
+        channels = 3 if np.shape(value)[-1:] == (3,) else 4
+        colors = _arrays.as_array(function, name, value, np.float32, (*shape, channels), sizes)
         if channels == 4:
             return colors
-        return np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
+        return np.concatenate([colors, np.ones((*colors.shape[:-1], 1), np.float32)], axis=-1)
 
 
 def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
@@ -217,4 +244,6 @@ def mesh_of_dict(arrays: dict[str, Any]) -> Mesh:
     parts["materials"] = [Material(**material) for material in arrays["materials"]]
     parts["textures"] = [MeshTexture(**texture) for texture in arrays["textures"]]
     parts["cameras"] = [MeshCamera(**camera) for camera in arrays.get("cameras", ())]
+    if arrays.get("tables") is not None:
+        parts["tables"] = MeshTables(**arrays["tables"])
     return Mesh(**parts)

@@ -80,6 +80,11 @@ Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
 Result<Mesh> Load(const std::string& path) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
+  if (const glm::dvec3& o = loaded.origin; o != glm::dvec3(0)) {
+    return InvalidArgument(
+        "{}: too far from the origin to be fitted; move mesh and cameras by ({}, {}, {})", path,
+        -o.x, -o.y, -o.z);
+  }
   return std::move(loaded.mesh);
 }
 

@@ -82,6 +82,7 @@ class RenderRun {
   const StopFlag& stop_ = StopOnSignals();
   UniqueNames stems_;
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
+  glm::dvec3 origin_{0};               // of the mesh that is rendered, see LoadedMesh
   std::set<Path> files_;               // written
   Path last_;
 };
@@ -125,7 +126,8 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   }
   last_ = files.back();
   if (settings_.explain) Explain(picture, name.stem.string());
-  views_.push_back({name.stem.filename().string() + name.ending, view.camera, view.size});
+  views_.push_back(
+      {name.stem.filename().string() + name.ending, MovedCamera(view.camera, origin_), view.size});
   return {};
 }
 
@@ -134,6 +136,7 @@ Status RenderRun::Mesh(const std::string& file) {
   for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
   for (const std::string& note : MaterialNotes(loaded.mesh, settings_.soft_delta > 0))
     PrintNote("{}: {}\n", file, note);
+  origin_ = loaded.origin;
   auto views = ChooseViews(settings_.view, loaded);
   if (!views.ok()) return views.status().Within(file);
   const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));

@@ -16,13 +16,16 @@ struct ViewSettings {
   std::string camera_file;  // COLMAP folder, transforms.json, OpenCV's numbers
   std::string gltf_camera;  // name, index or "all"
   std::string opencv_centre = "integer";
-  std::vector<float> eye, target = {0, 0, 0}, up = {0, 1, 0};
+  std::vector<double> eye, target = {0, 0, 0}, up = {0, 1, 0};
   double fov = 40, azimuth = 60, elevation = 20, distance = 0, margin = 0.05;
   int turntable = 0;  // views around; 0: none
 };
 
-// Cameras of a mesh in the order of their pictures; names serve for files, empty for a single view.
-// Errors name the option or the file.
+// The camera of a world that is moved.
+Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by);
+
+// Cameras of a mesh, as it is loaded (LoadedMesh::origin), in the order of their pictures; names
+// serve for files, empty for a single view. Errors name the option or the file.
 Result<std::vector<io::CameraView>> ChooseViews(const ViewSettings& settings,
                                                 const io::LoadedMesh& mesh);
 

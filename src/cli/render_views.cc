@@ -92,8 +92,7 @@ Result<std::vector<CameraView>> LookAtView(const ViewSettings& s, ImageSize size
   const Lens lens{s.fov, size.width, size.height};
   if (std::equal(s.eye.begin(), s.eye.end(), s.target.begin()))
     return InvalidArgument("--eye and --target are the same point");
-  const auto camera =
-      CameraCast<double>(LookAtCamera(lens, s.eye.data(), s.target.data(), s.up.data()));
+  const Camera64 camera = LookAtCamera(lens, s.eye.data(), s.target.data(), s.up.data());
   TILEGRAD_TRY(Validate(camera).Within("--eye, --target, --up"));
   return std::vector<CameraView>{{"", camera, size}};
 }
@@ -114,6 +113,14 @@ Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& m
 
 }  // namespace
 
+Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by) {
+  for (int row = 0; row < 3; ++row) {
+    for (int axis = 0; axis < 3; ++axis)
+      camera.translation[row] -= camera.rotation[3 * row + axis] * by[axis];
+  }
+  return camera;
+}
+
 Result<std::vector<CameraView>> ChooseViews(const ViewSettings& settings,
                                             const io::LoadedMesh& mesh) {
   TILEGRAD_ASSIGN(const ImageSize size, ParseSize(settings.size));
@@ -128,7 +135,11 @@ Result<std::vector<CameraView>> ChooseViews(const ViewSettings& settings,
                : !settings.gltf_camera.empty() ? GltfViews(settings, mesh, shown)
                : !settings.eye.empty()         ? LookAtView(settings, shown)
                                                : FramedViews(settings, mesh.mesh, shown);
-  if (views.ok()) NameFiles(&*views);
+  if (!views.ok()) return views;
+  if (!settings.camera_file.empty() || !settings.eye.empty()) {
+    for (CameraView& view : *views) view.camera = MovedCamera(view.camera, -mesh.origin);
+  }
+  NameFiles(&*views);
   return views;
 }
 

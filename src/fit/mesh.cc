@@ -44,11 +44,26 @@ void SetTexture(const Mesh& mesh, FitScene* scene) {
   }
 }
 
+// Of vertices: the mean of its corners' where colours are theirs. Empty if there are none.
+std::vector<glm::vec4> VertexColors(const Mesh& mesh) {
+  if (mesh.corner_colors.empty()) return mesh.colors;
+  std::vector<glm::vec4> colors(mesh.positions.size(), glm::vec4(0));
+  std::vector<float> counts(mesh.positions.size(), 0);
+  for (std::size_t c = 0; c < mesh.corner_colors.size(); ++c) {
+    const std::int32_t v = mesh.faces[c / 3][c % 3];
+    colors[v] += mesh.corner_colors[c], counts[v] += 1;
+  }
+  for (std::size_t v = 0; v < colors.size(); ++v)
+    colors[v] = counts[v] > 0 ? colors[v] / counts[v] : glm::vec4(1);
+  return colors;
+}
+
 void SetColors(const Mesh& mesh, bool textured, FitScene* scene) {
   const glm::vec3 factor = textured ? glm::vec3(1) : FactorOf(mesh);
-  if (mesh.colors.empty() && textured) return;
+  const std::vector<glm::vec4> colors = VertexColors(mesh);
+  if (colors.empty() && textured) return;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    const glm::vec3 own = mesh.colors.empty() ? glm::vec3(1) : glm::vec3(mesh.colors[v]);
+    const glm::vec3 own = colors.empty() ? glm::vec3(1) : glm::vec3(colors[v]);
     for (int c = 0; c < 3; ++c) scene->colors.push_back(own[c] * factor[c]);
   }
 }

@@ -134,6 +134,7 @@ void SetLight(const FitConfig& config, FitScene* scene) {
 void AddMesh(const Mesh& mesh, Hash* hash) {
   hash->AddAll(mesh.positions), hash->AddAll(mesh.faces);
   hash->AddAll(mesh.colors), hash->AddAll(mesh.corner_uvs);
+  if (!mesh.corner_colors.empty()) hash->AddAll(mesh.corner_colors);
   for (const MeshTexture& texture : mesh.textures) hash->AddAll(texture.image.pixels);
 }
 

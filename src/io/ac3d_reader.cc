@@ -162,14 +162,14 @@ class Ac3dReader {
 
   Status ReadVertices(std::string_view rest, Object& object) {
     TILEGRAD_TRY(Numbers(rest, &object.vertices, 1, "numvert"));
-    object.first_vertex = out.mesh.positions.size();
+    object.first_vertex = out.exact.size();
     const glm::dmat4 m = object.inherited.transform * object.local;
     for (std::size_t i = 0; i < object.vertices; ++i) {
       std::string_view line;
       if (!Next(line)) return Error(fmt::format("ends at vertex {} of {}", i, object.vertices));
       glm::dvec4 p(0, 0, 0, 1);
       TILEGRAD_TRY(Numbers(line, &p[0], 3, "a vertex"));
-      out.mesh.positions.emplace_back(m * p);
+      out.exact.emplace_back(m * p);
     }
     return {};
   }
@@ -232,7 +232,7 @@ class Ac3dReader {
   }
 
   void AddPolygon(int palette, const Object& object) {
-    polygon_.AddTo(out.mesh);
+    polygon_.AddTo(out);
     if (polygon_.triangles.empty()) return;
     const std::int32_t material = MaterialOf(palette, object.inherited.texture);
     for (const Face& triangle : polygon_.triangles) {

@@ -9,6 +9,7 @@
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <cstring>
+#include <glm/mat4x4.hpp>
 #include <iterator>
 #include <memory>
 
@@ -119,13 +120,14 @@ ImportedImage ConvertImage(const aiTexture& from) {
   return {from.mFilename.C_Str(), encoded ? Bytes(bytes, bytes + from.mWidth) : Bytes()};
 }
 
-void PlaceParts(const aiNode& node, const aiMatrix4x4& parent, ImportedScene& scene) {
-  const aiMatrix4x4 m = parent * node.mTransformation;
-  const glm::mat4x3 to_scene(m.a1, m.b1, m.c1, m.a2, m.b2, m.c2, m.a3, m.b3, m.c3, m.a4, m.b4,
-                             m.c4);
+// Composed in double: a part near its node's origin may be placed far from the scene's.
+void PlaceParts(const aiNode& node, const glm::dmat4& parent, ImportedScene& scene) {
+  const aiMatrix4x4& m = node.mTransformation;
+  const glm::dmat4 to_scene = parent * glm::dmat4(m.a1, m.b1, m.c1, m.d1, m.a2, m.b2, m.c2, m.d2,
+                                                  m.a3, m.b3, m.c3, m.d3, m.a4, m.b4, m.c4, m.d4);
   for (unsigned i = 0; i < node.mNumMeshes; ++i)
-    scene.instances.push_back({node.mMeshes[i], to_scene});
-  for (unsigned i = 0; i < node.mNumChildren; ++i) PlaceParts(*node.mChildren[i], m, scene);
+    scene.instances.push_back({node.mMeshes[i], glm::dmat4x3(to_scene)});
+  for (unsigned i = 0; i < node.mNumChildren; ++i) PlaceParts(*node.mChildren[i], to_scene, scene);
 }
 
 ImportedScene ConvertScene(const aiScene& from) {
@@ -142,7 +144,7 @@ ImportedScene ConvertScene(const aiScene& from) {
     scene.materials.push_back(ConvertMaterial(*from.mMaterials[i], from));
   for (unsigned i = 0; i < from.mNumTextures; ++i)
     scene.images.push_back(ConvertImage(*from.mTextures[i]));
-  PlaceParts(*from.mRootNode, aiMatrix4x4(), scene);
+  PlaceParts(*from.mRootNode, glm::dmat4(1), scene);
   return scene;
 }
 

@@ -74,11 +74,14 @@ class Assembly {
     const ImportedPart& part = scene_.parts[instance.part];
     if (part.triangles.empty()) return {};
     Mesh mesh = ConvertPart(part);
-    if (const glm::mat4x3& m = instance.to_scene; m != glm::mat4x3(1))
-      Transform(mesh, {m[0], m[1], m[2]}, m[3]);
+    const glm::dmat4x3& m = instance.to_scene;
+    std::vector<glm::dvec3> exact;
+    for (const glm::vec3& p : mesh.positions) exact.push_back(m * glm::dvec4(p, 1));
+    if (m != glm::dmat4x3(1))
+      Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
     const Material material =
         part.material < materials_.size() ? MaterialOf(part.material) : Material{};
-    return AppendWithMaterial(std::move(mesh), material, out_);
+    return AppendWithMaterial(std::move(mesh), material, out_, exact);
   }
 
   // Converted at first use, so that materials without a face ask for no texture.
@@ -92,8 +95,8 @@ class Assembly {
     material.name = from.name;
     material.base_color = from.color;
     if (!from.image.empty()) material.base_color_texture = Texture(from);
-    // With a texture, OBJ's Kd is often left black or grey by exporters; the image alone is what
-    // people meant.
+    // With a texture, the diffuse colour is often left black or grey by exporters; the image alone
+    // is what people meant.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};
     return material;
   }
@@ -168,13 +171,6 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
-  return ReadByAssimp(source, name, file, LimitsFor(file.size()));
-}
-
-Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
-  TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
-  TILEGRAD_TRY(
-      CheckObj({reinterpret_cast<const char*>(file.data()), file.size()}, source.Describe(name)));
   return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 

@@ -74,6 +74,8 @@ class PrimitiveBuilder {
       key.append(reinterpret_cast<const char*>(&mesh_.corner_uvs[corner]), sizeof(glm::vec2));
     if (!mesh_.corner_normals.empty())
       key.append(reinterpret_cast<const char*>(&mesh_.corner_normals[corner]), sizeof(glm::vec3));
+    if (!mesh_.corner_colors.empty())
+      key.append(reinterpret_cast<const char*>(&mesh_.corner_colors[corner]), sizeof(glm::vec4));
     const auto [it, added] =
         seen_.try_emplace(std::move(key), static_cast<std::uint32_t>(out_.positions.size()));
     if (added) AddVertex(corner, vertex);
@@ -85,6 +87,8 @@ class PrimitiveBuilder {
   void AddVertex(std::size_t corner, std::int32_t vertex) {
     out_.positions.push_back(mesh_.positions[vertex]);
     if (!mesh_.colors.empty()) out_.colors.push_back(SrgbToLinear(mesh_.colors[vertex]));
+    if (!mesh_.corner_colors.empty())
+      out_.colors.push_back(SrgbToLinear(mesh_.corner_colors[corner]));
     if (!mesh_.corner_normals.empty())
       out_.normals.push_back(mesh_.corner_normals[corner]);
     else if (!mesh_.normals.empty())
@@ -264,7 +268,7 @@ Status CheckLinearColors(const Mesh& mesh) {
 
 }  // namespace
 
-Result<Bytes> EncodeGlb(const Mesh& mesh) {
+Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
   TILEGRAD_TRY(Validate(mesh));
   TILEGRAD_TRY(CheckLinearColors(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
@@ -272,6 +276,7 @@ Result<Bytes> EncodeGlb(const Mesh& mesh) {
   glb.json["scene"] = 0;
   glb.json["scenes"] = Json::array({{{"nodes", {0}}}});
   glb.json["nodes"] = Json::array({{{"mesh", 0}}});
+  if (origin != glm::dvec3(0)) glb.json["nodes"][0]["translation"] = {origin.x, origin.y, origin.z};
   Json primitives = Json::array();
   const std::vector<Primitive> parts = SplitByMaterial(mesh);
   for (std::size_t m = 0; m < parts.size(); ++m) {
@@ -286,8 +291,8 @@ Result<Bytes> EncodeGlb(const Mesh& mesh) {
   return Assemble(glb);
 }
 
-Status SaveGlb(const Path& path, const Mesh& mesh) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh));
+Status SaveGlb(const Path& path, const Mesh& mesh, const glm::dvec3& origin) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeGlb(mesh, origin));
   return WriteFileAtomic(path, bytes);
 }
 

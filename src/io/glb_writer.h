@@ -11,7 +11,9 @@ namespace tilegrad::io {
 // colours, textures (as PNG inside) and everything else of materials are kept; per-corner
 // attributes split vertices where they must. Colours are stored linear, as glTF asks; LoadMesh
 // turns them back. An error if the mesh is not valid or has no face.
-Result<Bytes> EncodeGlb(const Mesh& mesh);
-Status SaveGlb(const Path& path, const Mesh& mesh);  // whole or not at all
+// `origin` is added by the node, in double: LoadedMesh::origin.
+Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin = glm::dvec3(0));
+Status SaveGlb(const Path& path, const Mesh& mesh,
+               const glm::dvec3& origin = glm::dvec3(0));  // whole or not at all
 
 }  // namespace tilegrad::io

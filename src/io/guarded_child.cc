@@ -79,8 +79,8 @@ std::optional<Bytes> Ask(const ChildSetup& setup, std::string_view question) {
 
 // Page faults are most of what a short-lived process costs: every page of the parent's heap that it
 // reuses is copied, every new one cleared. So what the parent left free is given back, the next
-// block is made of huge pages, and nothing is given back from then on. Assimp's OBJ importer begins
-// with a buffer of 16 MiB, which took 12 ms before, 2 ms since.
+// block is made of huge pages, and nothing is given back from then on. An importer that begins with
+// a buffer of 16 MiB took 12 ms before, 2 ms since.
 void PrepareHeap() {
   constexpr std::size_t kHugePage = std::size_t{2} << 20, kBlock = std::size_t{30} << 20;
   ::malloc_trim(0);

@@ -10,7 +10,7 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x54475331;  // "TGS1"; the digit is the version
+constexpr std::uint32_t kMagic = 0x54475332;  // "TGS2"; the digit is the version
 
 // The fields of each record in their order, for both directions.
 template <class Archive, class T>

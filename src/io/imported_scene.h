@@ -41,7 +41,7 @@ struct ImportedImage {
 // A part at a place of the scene.
 struct ImportedInstance {
   std::uint32_t part = 0;
-  glm::mat4x3 to_scene{1};
+  glm::dmat4x3 to_scene{1};
 };
 
 struct ImportedScene {

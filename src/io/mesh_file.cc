@@ -12,16 +12,13 @@
 #include "base/shortage.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
+#include "io/mesh_origin.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
 #include "scene/triangulate.h"
 
 namespace tilegrad::io {
 namespace {
-
-// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
-// many corners still have 32-bit indices.
-constexpr std::size_t kMaxElements = std::size_t{1} << 26;
 
 struct Format {
   std::string_view ending;
@@ -84,9 +81,20 @@ void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   mesh.materials.pop_back();
 }
 
+// Some files count fractions from 0 to 255. No sound colour is beyond 1; up to 2 may be light.
+void ScaleByteColors(std::vector<glm::vec4>& colors, std::vector<std::string>& warnings) {
+  glm::vec4 most(0);
+  for (const glm::vec4& color : colors) most = glm::max(most, color);
+  if (std::max({most.r, most.g, most.b}) <= 2) return;
+  const glm::vec4 full(glm::vec3(255), most.a > 2 ? 255 : 1);
+  for (glm::vec4& color : colors) color /= full;
+  warnings.push_back("colours reach beyond 2: taken as counted from 0 to 255");
+}
+
 void ClampColors(Mesh& mesh) {
   const auto clamp = [](glm::vec4& color) { color = glm::clamp(color, 0.0f, 1.0f); };
   std::for_each(mesh.colors.begin(), mesh.colors.end(), clamp);
+  std::for_each(mesh.corner_colors.begin(), mesh.corner_colors.end(), clamp);
   for (Material& material : mesh.materials) clamp(material.base_color);
 }
 
@@ -116,6 +124,29 @@ void MakeNormalsUnit(Mesh& mesh) {
 
 }  // namespace
 
+std::string ShortList(const std::set<std::string, std::less<>>& names) {
+  constexpr std::size_t kMost = 8;
+  std::string list;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count++ == kMost) break;
+    list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", name);
+  }
+  if (names.size() > kMost) list += fmt::format(" and {} more", names.size() - kMost);
+  return list;
+}
+
+std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
+                                      std::string_view mentioned) {
+  std::string slashes(mentioned);
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  const std::string base = slashes.substr(slashes.find_last_of('/') + 1);
+  for (const std::string& candidate : {Folder(mesh_name) + slashes, Folder(mesh_name) + base}) {
+    if (source.Exists(candidate)) return candidate;
+  }
+  return std::nullopt;
+}
+
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out) {
   if (!image.ok()) {
     out.warnings.push_back(fmt::format("texture left out: {}", image.status().message()));
@@ -130,26 +161,26 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
   for (std::size_t t = 0; t < out.mesh.textures.size(); ++t) {
     if (out.mesh.textures[t].name == image_name) return static_cast<int>(t);
   }
-  std::string slashes = image_name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const std::string base = slashes.substr(slashes.find_last_of('/') + 1);
-  for (const std::string& candidate : {Folder(mesh_name) + slashes, Folder(mesh_name) + base}) {
-    if (!source.Exists(candidate)) continue;
-    const auto bytes = source.Read(candidate);
+  if (const auto found = FindBeside(source, mesh_name, image_name)) {
+    const auto bytes = source.Read(*found);
     if (!bytes.ok()) return AddTexture(bytes.status(), image_name, out);
-    return AddTexture(DecodeImage(*bytes, source.Describe(candidate)), image_name, out);
+    return AddTexture(DecodeImage(*bytes, source.Describe(*found)), image_name, out);
   }
   out.warnings.push_back(
       fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
   return -1;
 }
 
-Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) {
-  if (out.mesh.positions.size() + part.positions.size() > kMaxElements ||
-      out.mesh.faces.size() + part.faces.size() > kMaxElements) {
-    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxElements);
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
+                          std::span<const glm::dvec3> exact) {
+  if (out.mesh.positions.size() + part.positions.size() > kMaxMeshElements ||
+      out.mesh.faces.size() + part.faces.size() > kMaxMeshElements) {
+    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxMeshElements);
   }
   TILEGRAD_TRY(ReadBudget::Take(BytesOf(part), "vertices and faces"));
+  out.exact.insert(out.exact.end(), exact.begin(), exact.end());
+  if (exact.empty())
+    out.exact.insert(out.exact.end(), part.positions.begin(), part.positions.end());
   const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
@@ -164,12 +195,13 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out) 
   return {};
 }
 
-void Polygon::AddTo(Mesh& mesh) {
+void Polygon::AddTo(LoadedMesh& out) {
   positions_.clear();
-  for (const std::int32_t v : corners) positions_.push_back(mesh.positions[v]);
+  for (const std::int32_t v : corners)
+    positions_.emplace_back(out.exact[v] - out.exact[corners[0]]);  // small numbers, however far
   TriangulatePolygon(positions_, triangles);
   for (const auto& [a, b, c] : triangles)
-    mesh.faces.push_back({corners[a], corners[b], corners[c]});
+    out.mesh.faces.push_back({corners[a], corners[b], corners[c]});
 }
 
 std::string MeshEnding(const std::string& name) {
@@ -205,8 +237,11 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   TILEGRAD_TRY(budget.status().Within(place));  // also where a texture was left out
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
+  PlaceNearOrigin(*loaded);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
+  ScaleByteColors(loaded->mesh.colors, loaded->warnings);
+  ScaleByteColors(loaded->mesh.corner_colors, loaded->warnings);
   ClampColors(loaded->mesh);
   MakeNormalsUnit(loaded->mesh);
   return loaded;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mesh files: glTF and GLB (tinygltf); PLY, OFF and AC3D; OBJ with MTL, STL, 3DS, Collada, FBX,
-// 3MF, DirectX X, X3D, ASE, LWO and MS3D (Assimp, in a process of its own for each file).
+// Mesh files: glTF and GLB (tinygltf); OBJ with MTL, PLY, OFF and AC3D (readers of our own); STL,
+// 3DS, Collada, FBX, 3MF, DirectX X, X3D, ASE, LWO and MS3D (Assimp, in a process of its own for
+// each file).
 #pragma once
 
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
@@ -18,13 +21,29 @@ struct MeshFileCamera {
   GltfCamera camera;
 };
 
+// A file's own lists of texture coordinates and normals, which corners share: OBJ only. As written:
+// of any length, without the material's texture transform.
+struct MeshFileTables {
+  std::vector<glm::vec2> uvs;
+  std::vector<glm::vec3> normals;
+  std::vector<std::int32_t> corner_uvs, corner_normals;  // [3F] indices; -1: a corner without
+};
+
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
               // transforms applied, polygons split, normals unit, colours in [0, 1]
   std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
+  MeshFileTables tables;
+  // What was subtracted from the file's coordinates, from cameras too: positions + origin is the
+  // place in the world. 0, unless the mesh is farther from the origin than 256 times its size.
+  glm::dvec3 origin{0};
+  std::vector<glm::dvec3> exact;  // of readers: positions before they are rounded; empty afterwards
 };
 
+// Vertices are those of the file, in its order, once each, whether a face uses them or not: OBJ,
+// PLY, OFF, AC3D, glTF. Assimp's formats repeat a vertex for each corner; equal ones are merged.
+//
 // The format follows the file name's ending. Errors name the file and, where the format has places,
 // the place in it. A missing texture is a warning; the material's colour stands in. Lines and
 // points are left out with a warning. Side files (MTL, images) are looked for in the mesh's folder

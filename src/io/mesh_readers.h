@@ -2,6 +2,10 @@
 // Internal to io: what mesh_file.cc dispatches to, and what the readers share.
 #pragma once
 
+#include <glm/vec3.hpp>
+#include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,7 +15,11 @@
 
 namespace tilegrad::io {
 
-// All leave validation to mesh_file.cc.
+// Vertices or faces of one mesh: 2^26 faces with all attributes take about 6 GB, and three times as
+// many corners still have 32-bit indices.
+inline constexpr std::size_t kMaxMeshElements = std::size_t{1} << 26;
+
+// All leave positions in LoadedMesh::exact, and validation to mesh_file.cc.
 Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name);
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name);
@@ -32,19 +40,22 @@ struct Polygon {
   std::vector<Face> triangles;        // set by AddTo: positions in `corners`
 
   // Adds its triangles (scene/triangulate.h) to the faces.
-  void AddTo(Mesh& mesh);
+  void AddTo(LoadedMesh& out);
 
  private:
   std::vector<glm::vec3> positions_;
 };
 
-// OBJ only, before Assimp, which drops or misreads what is wrong: the numbers of every vertex, and
-// every index of every face, line and point against the counts of v, vt and vn.
-Status CheckObj(std::string_view text, const std::string& name);
+// For warnings: up to eight names in quotes, and how many more there are.
+std::string ShortList(const std::set<std::string, std::less<>>& names);
 
-// Finds an image that a mesh file mentions: as written beside the mesh, then by its base name
-// there, which helps absolute paths of another computer. Adds it to out.mesh.textures and returns
-// its index, or adds a warning and returns -1.
+// A file that a mesh file mentions: as written beside the mesh, then by its base name there, which
+// helps absolute paths of another computer. Its name in the source, or nothing.
+std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
+                                      std::string_view mentioned);
+
+// Finds an image that a mesh file mentions. Adds it to out.mesh.textures and returns its index, or
+// adds a warning and returns -1.
 int AddTexture(const FileSource& source, const std::string& mesh_name,
                const std::string& image_name, LoadedMesh& out);
 
@@ -52,7 +63,9 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
 
 // Adds a part whose only material is `material`, which refers to textures that are already in
-// out.mesh. An error if the whole becomes too large: a small file can place one part many times.
-Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out);
+// out.mesh. `exact`: its positions in the scene; empty: they are those of `part`. An error if the
+// whole becomes too large: a small file can place one part many times.
+Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
+                          std::span<const glm::dvec3> exact = {});
 
 }  // namespace tilegrad::io

@@ -56,63 +56,145 @@ Result<OffCounts> ReadCounts(OffFile& file) {
   return counts;
 }
 
-Status ReadVertices(OffFile& file, const OffCounts& counts, Mesh& mesh) {
-  for (std::size_t i = 0; i < counts.vertices; ++i) {
-    std::string_view line;
-    if (!file.Next(line)) return file.Error(fmt::format("ends at vertex {}", i));
-    glm::vec3 p;
-    for (int c = 0; c < 3; ++c) {
-      if (!ParseNumber(NextToken(line), p[c]))
-        return file.Error("a vertex needs three finite numbers");
-    }
-    mesh.positions.push_back(p);
-    if (!counts.colors) continue;
+// Colours of vertices or of faces. Integers count from 0 to 255, unless the file has fractions,
+// too, and they are 0 or 1.
+class OffColors {
+ public:
+  // What ends a line. False if that is neither nothing nor three or four numbers.
+  bool Add(std::string_view rest) {
     glm::vec4 color(1);
-    for (int c = 0; c < 4; ++c) {
-      const auto token = NextToken(line);
-      if (c == 3 && token.empty()) break;
-      if (!ParseNumber(token, color[c])) return file.Error("a colour needs three or four numbers");
-      if (token.find('.') == std::string_view::npos) color[c] /= 255;  // integers are 0..255
+    bool fractions = false, good = true;
+    int count = 0;
+    for (auto token = NextToken(rest); !token.empty() && good; token = NextToken(rest)) {
+      good = count < 4 && ParseNumber(token, color[count++]);
+      fractions = fractions || token.find_first_of(".eE") != std::string_view::npos;
     }
-    mesh.colors.push_back(color);
+    good = good && (count == 0 || count >= 3);
+    if (!good || count == 0) return rows_.push_back({glm::vec4(1), 0}), good;
+    rows_.push_back({color, fractions ? 0 : count});
+    any_ = true;
+    fractions_ = fractions_ || fractions;
+    return true;
   }
-  return {};
-}
 
-Status ReadFaces(OffFile& file, const OffCounts& counts, LoadedMesh& out) {
-  Polygon polygon;
-  for (std::size_t f = 0; f < counts.faces; ++f) {
-    std::string_view line;
-    if (!file.Next(line)) return file.Error(fmt::format("ends at face {}", f));
+  // One a line, white where others have one; nothing if no line has.
+  std::vector<glm::vec4> Take() const {
+    std::vector<glm::vec4> colors;
+    for (const Row& row : rows_) {
+      if (!any_) break;
+      colors.push_back(row.color);
+      const glm::vec4& c = row.color;
+      if (fractions_ && std::max({c.r, c.g, c.b, c.a}) <= 1) continue;
+      for (int k = 0; k < row.integers; ++k) colors.back()[k] /= 255;
+    }
+    return colors;
+  }
+
+ private:
+  struct Row {
+    glm::vec4 color;
+    int integers;  // how many of its numbers are integers: all or none
+  };
+  std::vector<Row> rows_;
+  bool any_ = false, fractions_ = false;
+};
+
+class OffReader {
+ public:
+  OffReader(OffFile file, LoadedMesh& out) : file_(file), out_(out) {}
+
+  Status Read() {
+    TILEGRAD_ASSIGN(counts_, ReadCounts(file_));
+    TILEGRAD_TRY(ReadVertices());
+    TILEGRAD_TRY(ReadFaces());
+    AddFaceColors();
+    if (odd_lines_ > 0) {
+      out_.warnings.push_back(fmt::format(
+          "what ends {} lines of vertices or faces is no colour: left out", odd_lines_));
+    }
+    return {};
+  }
+
+ private:
+  Status ReadVertices() {
+    OffColors colors;
+    for (std::size_t i = 0; i < counts_.vertices; ++i) {
+      std::string_view line;
+      if (!file_.Next(line)) return file_.Error(fmt::format("ends at vertex {}", i));
+      glm::dvec3 p;
+      for (int c = 0; c < 3; ++c) {
+        if (!ParseNumber(NextToken(line), p[c]))
+          return file_.Error("a vertex needs three finite numbers");
+      }
+      out_.exact.push_back(p);
+      const bool good = colors.Add(line);
+      if (!good && counts_.colors) return file_.Error("a colour needs three or four numbers");
+      odd_lines_ += !good;
+    }
+    out_.mesh.colors = colors.Take();
+    return {};
+  }
+
+  Status ReadFaces() {
+    Polygon polygon;
+    for (std::size_t f = 0; f < counts_.faces; ++f) {
+      std::string_view line;
+      if (!file_.Next(line)) return file_.Error(fmt::format("ends at face {}", f));
+      TILEGRAD_TRY(ReadCorners(line, polygon));
+      odd_lines_ += !face_colors_.Add(line);
+      polygon.AddTo(out_);
+      polygon_of_.resize(out_.mesh.faces.size(), f);
+    }
+    return {};
+  }
+
+  // Takes the number of corners and the corners off the line.
+  Status ReadCorners(std::string_view& line, Polygon& polygon) const {
     std::size_t corners = 0;
     if (!ParseNumber(NextToken(line), corners) || corners > line.size())
-      return file.Error("expected the number of corners");
+      return file_.Error("expected the number of corners");
     polygon.corners.clear();
     for (std::size_t k = 0; k < corners; ++k) {
       std::int32_t index = 0;
       if (!ParseNumber(NextToken(line), index))
-        return file.Error(fmt::format("corner {} is missing", k));
-      if (index < 0 || static_cast<std::size_t>(index) >= counts.vertices) {
-        return file.Error(
-            fmt::format("vertex {}, but the file has {} (from 0)", index, counts.vertices));
+        return file_.Error(fmt::format("corner {} is missing", k));
+      if (index < 0 || static_cast<std::size_t>(index) >= counts_.vertices) {
+        return file_.Error(
+            fmt::format("vertex {}, but the file has {} (from 0)", index, counts_.vertices));
       }
       polygon.corners.push_back(index);
     }
-    polygon.AddTo(out.mesh);
+    return {};
   }
-  return {};
-}
+
+  void AddFaceColors() {
+    const std::vector<glm::vec4> colors = face_colors_.Take();
+    if (colors.empty()) return;
+    if (!out_.mesh.colors.empty()) {
+      out_.warnings.push_back("colours of faces left out: the vertices have their own");
+      return;
+    }
+    for (const std::size_t polygon : polygon_of_)
+      out_.mesh.corner_colors.insert(out_.mesh.corner_colors.end(), 3, colors[polygon]);
+  }
+
+  OffFile file_;
+  LoadedMesh& out_;
+  OffCounts counts_;
+  OffColors face_colors_;                // of polygons
+  std::vector<std::size_t> polygon_of_;  // of each face
+  std::size_t odd_lines_ = 0;
+};
 
 }  // namespace
 
 Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
   const std::string place = source.Describe(name);
-  OffFile file{Lines({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), place};
   LoadedMesh out;
-  TILEGRAD_ASSIGN(const OffCounts counts, ReadCounts(file));
-  TILEGRAD_TRY(ReadVertices(file, counts, out.mesh));
-  TILEGRAD_TRY(ReadFaces(file, counts, out));
+  OffReader reader({Lines({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), place},
+                   out);
+  TILEGRAD_TRY(reader.Read());
   return out;
 }
 

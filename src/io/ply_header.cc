@@ -72,7 +72,7 @@ bool ParseProperty(std::string_view rest, PlyHeader& header) {
 void ParseComment(std::string_view rest, PlyHeader& header) {
   if (NextToken(rest) != "TextureFile") return;
   const auto begin = rest.find_first_not_of(" \t");
-  if (begin != std::string_view::npos) header.texture = rest.substr(begin);
+  if (begin != std::string_view::npos) header.textures.emplace_back(rest.substr(begin));
 }
 
 bool ParseLine(std::string_view line, PlyHeader& header) {

@@ -29,8 +29,8 @@ struct PlyElement {
 struct PlyHeader {
   enum class Encoding { kText, kLittleEndian, kBigEndian } encoding = Encoding::kText;
   std::vector<PlyElement> elements;
-  std::string texture;    // from "comment TextureFile NAME", or empty
-  std::string_view data;  // what follows the header
+  std::vector<std::string> textures;  // of each "comment TextureFile NAME"
+  std::string_view data;              // what follows the header
 
   // The number of rows of an element, 0 if there is none of that name.
   std::size_t CountOf(std::string_view element) const;

@@ -10,14 +10,18 @@
 
 namespace tilegrad::io {
 
+// The text without UTF-8's byte order mark, if it begins with one.
+inline std::string_view WithoutByteOrderMark(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+  return text;
+}
+
 // Walks over lines; Number() is 1-based. A last line needs no line end; UTF-8's byte order mark at
 // the beginning is left out.
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {
-    constexpr std::string_view kMark = "\xef\xbb\xbf";
-    if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());
-  }
+  explicit Lines(std::string_view text) : rest_(WithoutByteOrderMark(text)) {}
 
   bool Next(std::string_view& line) {
     if (rest_.empty()) return false;

@@ -80,12 +80,16 @@ Status Validate(const Mesh& mesh) {
   TILEGRAD_TRY(CheckCount("colors", mesh.colors.size(), vertices, "vertex"));
   TILEGRAD_TRY(CheckCount("corner_uvs", mesh.corner_uvs.size(), 3 * faces, "corner"));
   TILEGRAD_TRY(CheckCount("corner_normals", mesh.corner_normals.size(), 3 * faces, "corner"));
+  TILEGRAD_TRY(CheckCount("corner_colors", mesh.corner_colors.size(), 3 * faces, "corner"));
+  if (!mesh.colors.empty() && !mesh.corner_colors.empty())
+    return InvalidArgument("colors and corner_colors are both there; a mesh has one of them");
   TILEGRAD_TRY(CheckCount("face_materials", mesh.face_materials.size(), faces, "face"));
   TILEGRAD_TRY(CheckFaces(mesh));
   TILEGRAD_TRY(CheckMaterials(mesh));
   TILEGRAD_TRY(CheckFinite("positions", mesh.positions));
   TILEGRAD_TRY(CheckFinite("normals", mesh.normals));
   TILEGRAD_TRY(CheckFinite("colors", mesh.colors));
+  TILEGRAD_TRY(CheckFinite("corner_colors", mesh.corner_colors));
   TILEGRAD_TRY(CheckFinite("corner_uvs", mesh.corner_uvs));
   return CheckFinite("corner_normals", mesh.corner_normals);
 }

@@ -53,6 +53,7 @@ struct Mesh {
   // doubled vertices.
   std::vector<glm::vec2> corner_uvs;  // u right, v up; (0, 0): the texture's lower left corner
   std::vector<glm::vec3> corner_normals;
+  std::vector<glm::vec4> corner_colors;  // [0, 1]; instead of `colors`, of which there is none then
 
   std::vector<std::int32_t> face_materials;  // empty (all 0) or [F], indices into materials
   std::vector<Material> materials;

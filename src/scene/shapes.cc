@@ -177,6 +177,15 @@ Mesh UvSphere(float radius, int rings, int segments) {
 
 void SetColor(Mesh& mesh, glm::vec4 color) { mesh.colors.assign(mesh.positions.size(), color); }
 
+void ColorsToCorners(Mesh& mesh) {
+  if (!mesh.corner_colors.empty()) return;
+  for (const Face& face : mesh.faces) {
+    for (const std::int32_t v : face)
+      mesh.corner_colors.push_back(mesh.colors.empty() ? glm::vec4(1) : mesh.colors[v]);
+  }
+  mesh.colors.clear();
+}
+
 void Append(Mesh& mesh, const Mesh& other) {
   const std::size_t v0 = mesh.positions.size(), v1 = other.positions.size();
   const std::size_t f0 = mesh.faces.size(), f1 = other.faces.size();
@@ -184,6 +193,15 @@ void Append(Mesh& mesh, const Mesh& other) {
     mesh = other;
     return;
   }
+  if (mesh.corner_colors.empty() != other.corner_colors.empty()) {
+    ColorsToCorners(mesh);
+    if (other.corner_colors.empty()) {
+      Mesh copy = other;
+      ColorsToCorners(copy);
+      return Append(mesh, copy);
+    }
+  }
+  AppendFilled(mesh.corner_colors, 3 * f0, other.corner_colors, 3 * f1, glm::vec4(1));
   AppendFilled(mesh.colors, v0, other.colors, v1, glm::vec4(1));
   AppendFilled(mesh.corner_uvs, 3 * f0, other.corner_uvs, 3 * f1, glm::vec2(0));
   const bool vertex_normals = !mesh.normals.empty() || !other.normals.empty();
@@ -225,6 +243,8 @@ void Transform(Mesh& mesh, const std::array<glm::vec3, 3>& linear, glm::vec3 off
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     std::swap(mesh.faces[f][1], mesh.faces[f][2]);
     if (!mesh.corner_uvs.empty()) std::swap(mesh.corner_uvs[3 * f + 1], mesh.corner_uvs[3 * f + 2]);
+    if (!mesh.corner_colors.empty())
+      std::swap(mesh.corner_colors[3 * f + 1], mesh.corner_colors[3 * f + 2]);
     if (!mesh.corner_normals.empty())
       std::swap(mesh.corner_normals[3 * f + 1], mesh.corner_normals[3 * f + 2]);
   }

@@ -75,6 +75,7 @@ glm::vec3 SurfaceColor::AtCorner(std::size_t face, int k) const {
   const auto vertex = static_cast<std::size_t>(mesh_.faces[face][static_cast<std::size_t>(k)]);
   const std::size_t corner = 3 * face + static_cast<std::size_t>(k);
   const glm::vec2 uv = mesh_.corner_uvs.empty() ? glm::vec2(0) : mesh_.corner_uvs[corner];
+  if (!mesh_.corner_colors.empty()) return At(face, uv, glm::vec3(mesh_.corner_colors[corner]));
   return At(face, uv, mesh_.colors.empty() ? glm::vec3(1) : glm::vec3(mesh_.colors[vertex]));
 }
 

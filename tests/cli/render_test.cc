@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "io/camera_file.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
@@ -40,6 +41,40 @@ class Render : public TempFolderTest {
     return io::LoadNpy(folder_ / name).value().As<float>().value();
   }
 };
+
+// Cameras given and written are those of the world, where the mesh is too far away for float.
+TEST_F(Render, AFarMeshIsSeenByCamerasOfTheWorld) {
+  std::string near, far;
+  const Mesh sphere = Icosphere(2, 1);
+  for (const glm::vec3& p : sphere.positions) {
+    near += fmt::format("v {:.6f} {:.6f} {:.6f}\n", p.x, p.y, p.z);
+    far += fmt::format("v {:.6f} {:.6f} {:.6f}\n", 431000. + p.x, 4600000. + p.y, 300. + p.z);
+  }
+  for (const auto& [a, b, c] : sphere.faces) {
+    near += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+    far += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+  }
+  Write("near.obj", near), Write("far.obj", far);
+  const auto picture = [&](const std::string& arguments, const std::string& name) {
+    const Outcome outcome = RunProgram("render " + arguments + " --out " + In(name));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return io::LoadImage(folder_ / name).value().pixels;
+  };
+  const auto want = picture(In("near.obj") + " --size 48 --eye 1 0.5 3", "near.png");
+  const auto by_eye = picture(In("far.obj") +
+                                  " --size 48 --eye 431001 4600000.5 303 --target 431000 "
+                                  "4600000 300 --write-cameras " +
+                                  In("c.json"),
+                              "eye.png");
+  const auto by_file = picture(In("far.obj") + " --cameras " + In("c.json"), "file.png");
+  ASSERT_EQ(by_eye.size(), want.size());
+  ASSERT_EQ(by_file.size(), want.size());
+  // Digits of 5e-7 move edges by less than 1e-4 pixels.
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    EXPECT_NEAR(by_eye[i], want[i], 1);
+    EXPECT_NEAR(by_file[i], by_eye[i], 1);
+  }
+}
 
 TEST_F(Render, FramesTheWholeMeshByItself) {
   ExpectDone("--out " + In("a.png") + " --size 64x48");

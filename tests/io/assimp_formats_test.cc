@@ -24,7 +24,6 @@ std::array<float, 3> SortedExtents(const Mesh& mesh) {
 }
 
 TEST_F(AssimpFormatsTest, SoundFilesAreRead) {
-  Write("a.mtl", "newmtl paint\nKd 0.8 0.2 0.4\n");
   for (const MeshSample& sample : MakeMeshSamples(folder_)) {
     SCOPED_TRACE(sample.name);
     const auto loaded = LoadMesh(Write(sample.name, sample.bytes));

@@ -22,7 +22,7 @@ ImportedScene Scene() {
   scene.parts = {part};
   scene.materials = {{"m", glm::vec4(0.5f), "image.png", 0}};
   scene.images = {{"image.png", Bytes(20, 3)}};
-  scene.instances = {{0, glm::mat4x3(2)}};
+  scene.instances = {{0, glm::dmat4x3(2)}};
   scene.warnings = {"left out"};
   return scene;
 }
@@ -36,7 +36,7 @@ TEST(ImportedScene, RoundTrip) {
   EXPECT_EQ(back->parts[0].triangles, Scene().parts[0].triangles);
   EXPECT_EQ(back->materials[0].image, "image.png");
   EXPECT_EQ(back->images[0].bytes, Bytes(20, 3));
-  EXPECT_EQ(back->instances[0].to_scene, glm::mat4x3(2));
+  EXPECT_EQ(back->instances[0].to_scene, glm::dmat4x3(2));
   EXPECT_EQ(back->warnings, Scene().warnings);
 }
 

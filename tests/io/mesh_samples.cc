@@ -346,9 +346,7 @@ Bytes ThreeMf(const Path& scratch) {
 }  // namespace
 
 std::vector<MeshSample> MakeMeshSamples(const Path& scratch) {
-  return {{"a.obj", ToBytes("mtllib a.mtl\nusemtl paint\nv 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\n"
-                            "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")},
-          {"text.stl", Export("stl", scratch)},
+  return {{"text.stl", Export("stl", scratch)},
           {"binary.stl", Export("stlb", scratch)},
           {"a.3ds", Export("3ds", scratch)},
           {"a.dae", Export("collada", scratch)},

@@ -154,5 +154,155 @@ TEST_F(PlyOffTest, BrokenOff) {
   ExpectMessage(LoadOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"), "bad.off", "face 0");
 }
 
+// --- colours of faces, several textures, strips ---
+
+std::string Square(const std::string& extra, const std::string& faces, const std::string& body) {
+  return "ply\nformat ascii 1.0\n" + extra +
+         "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n" + faces +
+         "end_header\n9 9 9\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + body;
+}
+
+const glm::vec4 kRed(1, 0, 0, 1), kGreen(0, 1, 0, 1), kBlue(0, 0, 1, 1), kWhite(1);
+
+// Of each face, by its first corner.
+std::vector<glm::vec4> FaceColors(const Mesh& mesh) {
+  std::vector<glm::vec4> colors;
+  for (std::size_t c = 0; c < mesh.corner_colors.size(); ++c) {
+    if (c % 3 == 0) colors.push_back(mesh.corner_colors[c]);
+    EXPECT_EQ(mesh.corner_colors[c], colors.back());
+  }
+  return colors;
+}
+
+TEST_F(PlyOffTest, PlyColorsOfFaces) {
+  const std::string list = "property list uchar int vertex_indices\n";
+  const std::string before = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  for (const auto& [header, body] :
+       {std::pair("element face 2\n" + list + before + "property uchar alpha\n",
+                  std::string("4 1 2 3 4 255 0 0 255\n3 1 3 4 0 0 255 51\n")),
+        std::pair("element face 2\n" + before + list,
+                  std::string("255 0 0 4 1 2 3 4\n0 0 255 3 1 3 4\n"))}) {
+    const auto loaded = LoadMesh(Write("a.ply", Square("", header, body)));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.positions.size(), 5u);  // none doubled, the unused one stays
+    EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{1, 2, 3}, {1, 3, 4}, {1, 3, 4}}));
+    const auto colors = FaceColors(loaded->mesh);
+    const float alpha = header.find("alpha") == std::string::npos ? 1 : 0.2f;
+    EXPECT_EQ(colors, (std::vector<glm::vec4>{kRed, kRed, {0, 0, 1, alpha}}));
+    EXPECT_TRUE(loaded->warnings.empty());
+  }
+  std::string both = Header("ascii") + kTextBody;
+  both.replace(both.find("end_header"), 0,
+               "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+  both.replace(both.rfind("\n"), 0, " 1 2 3");
+  const auto loaded = LoadMesh(Write("b.ply", both));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_TRUE(loaded->mesh.corner_colors.empty());
+  EXPECT_EQ(loaded->mesh.colors[1], kGreen);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("colours of faces left out"), std::string::npos);
+}
+
+TEST_F(PlyOffTest, PlyWithSeveralTextures) {
+  for (const char* name : {"a.png", "b.png"})
+    ASSERT_TRUE(SavePng(folder_ / name, ImageU8(2, 2, 3, 77)).ok());
+  const std::string textures = "comment TextureFile a.png\ncomment TextureFile b.png\n";
+  const std::string faces =
+      "element face 4\nproperty list uchar int vertex_indices\nproperty list uchar float "
+      "texcoord\n";
+  const std::string uv = " 6 0 0 1 0 1 1 ";
+  const auto loaded =
+      LoadMesh(Write("a.ply", Square(textures, faces + "property int texnumber\n",
+                                     "3 1 2 3" + uv + "1\n3 1 3 4" + uv + "0\n3 1 2 4" + uv +
+                                         "1\n3 2 3 4" + uv + "7\n")));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  const Mesh& mesh = loaded->mesh;
+  ASSERT_EQ(mesh.materials.size(), 3u);
+  std::vector<std::string> names;
+  for (const std::int32_t m : mesh.face_materials) names.push_back(mesh.materials[m].name);
+  EXPECT_EQ(names, (std::vector<std::string>{"b.png", "a.png", "b.png", ""}));
+  EXPECT_EQ(mesh.materials[mesh.face_materials[3]].base_color_texture, -1);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("texnumber 7"), std::string::npos);
+  // Without texnumber the first one is everybody's; without uv there is none.
+  const auto first = LoadMesh(Write(
+      "b.ply", Square(textures, faces, "3 1 2 3" + uv + "\n3 1 3 4 0\n3 1 2 4 0\n3 2 3 4 0\n")));
+  ASSERT_TRUE(first.ok()) << first.status().message();
+  EXPECT_EQ(first->mesh.materials.size(), 1u);
+  EXPECT_EQ(first->warnings.size(), 1u);
+  const auto none = LoadMesh(Write(
+      "c.ply",
+      Square(textures, "element face 1\nproperty list uchar int vertex_indices\n", "3 1 2 3\n")));
+  ASSERT_TRUE(none.ok()) << none.status().message();
+  EXPECT_TRUE(none->mesh.materials.empty());
+  EXPECT_EQ(none->warnings.size(), 1u);
+}
+
+TEST_F(PlyOffTest, PlyStrips) {
+  const std::string strips = "element tristrips 1\nproperty list int int vertex_indices\n";
+  const auto loaded =
+      LoadMesh(Write("a.ply", Square("", strips, "12 1 2 4 3 -1 1 2 2 3 4 -1 3\n")));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{1, 2, 4}, {4, 2, 3}, {2, 3, 4}}));
+  EXPECT_EQ(loaded->mesh.positions.size(), 5u);
+  ExpectMessage(LoadPly(Square("", strips, "3 1 2 5\n")), "tristrips 0 uses vertex 5");
+  ExpectMessage(LoadPly(Square("", strips, "3 1 2 -2\n")), "tristrips 0 uses vertex -2");
+}
+
+// Faces before the vertices that they use.
+TEST_F(PlyOffTest, PlyElementsInAnyOrder) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement edge "
+      "1\n"
+      "property int a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\nend_header\n"
+      "4 0 1 2 3\n7\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const auto loaded = LoadMesh(Write("a.ply", text));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("\"edge\""), std::string::npos);
+}
+
+TEST_F(PlyOffTest, PlyFractionsThatCountTo255) {
+  std::string text = Header("ascii") + kTextBody;
+  for (auto at = text.find("uchar red"); at != std::string::npos; at = text.find("uchar red"))
+    text.replace(at, 5, "float");
+  text.replace(text.find("uchar green"), 5, "float").replace(text.find("uchar blue"), 5, "double");
+  const auto loaded = LoadMesh(Write("a.ply", text));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.colors[3], glm::vec4(0.2f, 0.2f, 0.2f, 1));
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("0 to 255"), std::string::npos);
+}
+
+TEST_F(PlyOffTest, OffColors) {
+  const auto load = [&](const std::string& vertices, const std::string& face,
+                        std::size_t warnings) {
+    auto loaded = LoadMesh(Write("a.off", vertices + face));
+    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
+    if (!loaded.ok()) return Mesh{};
+    EXPECT_EQ(loaded->warnings.size(), warnings);
+    return std::move(loaded->mesh);
+  };
+  const std::string colored = "OFF\n3 1 0\n0 0 0 255 0 0\n1 0 0\n0 1 0 0 0 51 102\n";
+  const std::vector<glm::vec4> want = {kRed, kWhite, {0, 0, 0.2f, 0.4f}};
+  EXPECT_EQ(load(colored, "3 0 1 2\n", 0).colors, want);
+  EXPECT_EQ(load("C" + colored, "3 0 1 2\n", 0).colors, want);
+  EXPECT_EQ(load(colored, "3 0 1 2 0 255 0\n", 1).colors, want);  // the face's are left out
+  EXPECT_EQ(
+      load("OFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0.5 0.5 0.5\n0 1 0 0 0 1 0.5\n", "3 0 1 2\n", 0).colors,
+      (std::vector<glm::vec4>{kRed, {0.5f, 0.5f, 0.5f, 1}, {0, 0, 1, 0.5f}}));
+  const std::string plain = "OFF\n4 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const Mesh faces = load(plain, "4 0 1 2 3 255 0 0\n3 0 1 2\n3 0 1 3 0 255 0 255\n", 0);
+  EXPECT_EQ(FaceColors(faces), (std::vector<glm::vec4>{kRed, kRed, kWhite, kGreen}));
+  EXPECT_EQ(faces.positions.size(), 4u);
+  EXPECT_EQ(FaceColors(load(plain, "3 0 1 2 0 0 1.0\n3 0 1 2 1 0 0\n3 0 1 2 0 1 0\n", 0)),
+            (std::vector<glm::vec4>{kBlue, kRed, kGreen}));
+  EXPECT_TRUE(load(plain, "3 0 1 2 17\n3 0 1 2 x\n3 0 1 3\n", 1).corner_colors.empty());
+  EXPECT_TRUE(load("OFF\n3 1 0\n0 0 0 1 2\n1 0 0\n0 1 0\n", "3 0 1 2\n", 1).colors.empty());
+  ExpectMessage(LoadOff("COFF\n3 1 0\n0 0 0 1 2\n"), "line 3", "colour");
+}
+
 }  // namespace
 }  // namespace tilegrad::io

@@ -109,6 +109,50 @@ class Meshes(FolderTest):
                                           [[0, 0, 0], [1, 0, 0], [0, 1, 0]], name)
             self.assertIn(pathlib.Path(name).suffix, files.mesh_endings())
 
+    def test_far_from_the_origin(self) -> None:
+        path = self.folder / "a.off"
+        path.write_text("OFF\n3 1 0\n4600000.25 0 7\n4600001.25 0 7\n4600000.25 1 7\n3 0 1 2\n")
+        mesh = files.load_mesh(path)
+        self.assertEqual(mesh.origin.tolist(), [4600001, 1, 7])
+        world = [[4600000.25, 0, 7], [4600001.25, 0, 7], [4600000.25, 1, 7]]
+        self.assertEqual((mesh.positions + mesh.origin).tolist(), world)
+        self.assertIn("(4600001, 1, 7) was subtracted", mesh.warnings[0])
+        files.save_mesh(self.folder / "b.glb", mesh)
+        back = files.load_mesh(self.folder / "b.glb")
+        self.assertEqual((back.positions + back.origin).tolist(), world)
+        near = files.Mesh(mesh.positions, mesh.faces)
+        self.assertEqual(near.origin.tolist(), [0, 0, 0])
+
+    def test_colours_of_faces(self) -> None:
+        path = self.folder / "a.off"
+        path.write_text("OFF\n4 2 0\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n"
+                        "3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n")
+        mesh = files.load_mesh(path)
+        self.assertEqual((mesh.colors, mesh.corner_colors.shape), (None, (2, 3, 4)))
+        frame = tilegrad.Renderer().render(mesh.scene(CAMERA), width=32, height=32)
+        np.testing.assert_array_equal(frame.color[0, :, 16, 24], [1, 0, 0])
+        np.testing.assert_array_equal(frame.color[0, :, 16, 8], [0, 0, 1])
+        mesh.corner_colors = mesh.corner_colors[..., :3]
+        files.save_mesh(self.folder / "b.glb", mesh)
+        self.assertEqual(len(files.load_mesh(self.folder / "b.glb").colors), 6)
+        mesh.colors = np.ones((4, 3), np.float32)
+        with self.assertRaisesRegex(ValueError, "colors and corner_colors"):
+            mesh.scene(CAMERA)
+
+    def test_the_tables_of_an_obj_file(self) -> None:
+        path = self.folder / "a.obj"
+        path.write_text("v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.25\nvn 0 0 3\n"
+                        "f 2/1/1 3/1/1 4/1/1\nf 2 4 3\n")
+        mesh = files.load_mesh(path)
+        self.assertEqual(mesh.positions[:, 0].tolist(), [9, 0, 1, 0])
+        self.assertEqual(mesh.faces.tolist(), [[1, 2, 3], [1, 3, 2]])
+        self.assertEqual(mesh.tables.uvs.tolist(), [[0.5, 0.25]])
+        self.assertEqual(mesh.tables.face_uvs.tolist(), [[0, 0, 0], [-1, -1, -1]])
+        self.assertEqual(mesh.tables.normals.tolist(), [[0, 0, 3]])
+        self.assertEqual(mesh.tables.face_normals.tolist(), [[0, 0, 0], [-1, -1, -1]])
+        path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.assertIsNone(files.load_mesh(path).tables)
+
     def test_errors_name_the_file(self) -> None:
         with self.assertRaisesRegex(FileNotFoundError, "none.glb"):
             files.load_mesh(self.folder / "none.glb")

@@ -80,6 +80,27 @@ TEST(Shapes, AppendFillsWhatOneSideLacks) {
   EXPECT_EQ(a.faces.back()[0], b.faces.back()[0] + 8 + 12);
 }
 
+TEST(Shapes, ColorsOfCorners) {
+  Mesh flat = Box({0, 0, 0}, {1, 1, 1}), smooth = Icosphere(0, 1), plain = Icosphere(0, 1);
+  flat.corner_colors.assign(36, {0, 0, 1, 1});
+  flat.corner_colors[1] = {1, 0, 0, 1};
+  SetColor(smooth, {0, 1, 0, 1});
+  for (const bool first : {true, false}) {
+    Mesh both = first ? flat : smooth;
+    Append(both, first ? smooth : flat);
+    Append(both, plain);
+    ASSERT_TRUE(Validate(both).ok()) << Validate(both).message();
+    ASSERT_EQ(both.corner_colors.size(), 36 + 2 * 60u);
+    EXPECT_EQ(both.corner_colors[first ? 1 : 61], glm::vec4(1, 0, 0, 1));
+    EXPECT_EQ(both.corner_colors[first ? 36 : 0], glm::vec4(0, 1, 0, 1));
+    EXPECT_EQ(both.corner_colors.back(), glm::vec4(1));
+  }
+  Transform(flat, {glm::vec3(-1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}, {0, 0, 0});
+  EXPECT_EQ(flat.corner_colors[2], glm::vec4(1, 0, 0, 1));  // the mirror exchanges corners
+  SetColor(flat, {1, 1, 1, 1});
+  EXPECT_FALSE(Validate(flat).ok());
+}
+
 TEST(Shapes, MirrorKeepsFacesOutward) {
   Mesh mesh = Icosphere(1, 1);
   mesh.normals = SmoothNormals(mesh);

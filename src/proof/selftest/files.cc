@@ -113,7 +113,7 @@ Result<Finding> Glb(const CheckContext& context) {
   return Finding{"written and read back"};
 }
 
-// By Assimp, in a process of its own. Numbers with nine digits are read as they were.
+// Numbers with nine digits are read as they were.
 std::string ObjText(const Mesh& mesh) {
   std::string text;
   for (const glm::vec3& p : mesh.positions) {

@@ -61,10 +61,11 @@ MeshScene::MeshScene(const Mesh& mesh, const MeshSceneOptions& options)
   scene_.faces = {mesh.faces.data()->data(), 3 * mesh.faces.size()};
   scene_.shading.two_sided = true;
   AddNormals();
-  for (const glm::vec4& color : mesh.colors) {
+  const bool by_corner = !mesh.corner_colors.empty();
+  for (const glm::vec4& color : by_corner ? mesh.corner_colors : mesh.colors) {
     for (int c = 0; c < 3; ++c) colors_.push_back(Decode(color[c], options.color_space));
   }
-  scene_.colors = {colors_, Rate::kVertex};
+  scene_.colors = {colors_, by_corner ? Rate::kCorner : Rate::kVertex};
   AddSurfaces();
   if (!textures_.empty()) {
     scene_.uvs = {Flat(mesh.corner_uvs), Rate::kCorner};

@@ -31,6 +31,7 @@ void RemoveGlass(Mesh* mesh) {
   Keep(&mesh->faces, keep, 1);
   Keep(&mesh->face_materials, keep, 1);
   Keep(&mesh->corner_uvs, keep, 3);
+  Keep(&mesh->corner_colors, keep, 3);
   Keep(&mesh->corner_normals, keep, 3);
 }
 

@@ -13,7 +13,7 @@ namespace tilegrad::train {
 namespace {
 
 // Counts up when the rules change: light, supersampling, glass, clustering, voxels, families.
-constexpr int kRulesVersion = 2;
+constexpr int kRulesVersion = 3;
 
 Result<MadeModel> FromMesh(const SourceEntry& entry, Mesh mesh, const DatasetInfo& info,
                            LitRenderer& renderer) {

@@ -29,9 +29,8 @@ def load_surface(path: Path, with_materials: bool = True, with_normals: bool = T
         loaded.material_assignments = _assignments(mesh)
     if mesh.colors is not None:
         loaded.vertex_colors = torch.from_numpy(mesh.colors[:, :3])
-    corner_colors = getattr(mesh, "corner_colors", None)
-    if corner_colors is not None:
-        loaded.face_colors = torch.from_numpy(corner_colors[..., :3])
+    if mesh.corner_colors is not None:
+        loaded.face_colors = torch.from_numpy(mesh.corner_colors[..., :3])
     return loaded
 
 
@@ -39,10 +38,10 @@ def _table(mesh: Mesh, name: str, corners: Optional[np.ndarray]
            ) -> tuple[Optional[torch.Tensor], Optional[torch.Tensor]]:
     """Values and their indices [F,3]: the file's own where the mesh has its tables, else one for
     each corner."""
-    tables = getattr(mesh, "tables", None)
-    values = getattr(tables, name, None)
+    values = getattr(mesh.tables, name, None)
     if values is not None:
-        return torch.from_numpy(values), torch.from_numpy(getattr(tables, "face_" + name)).long()
+        indices = getattr(mesh.tables, "face_" + name)
+        return torch.from_numpy(values), torch.from_numpy(indices).long()
     if corners is None:
         return None, None
     return (torch.from_numpy(corners.reshape(-1, corners.shape[2])),

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/ply_body.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <span>
+
+#include "base/error.h"
+#include "io/mesh_readers.h"
+#include "io/ply_header.h"
+#include "io/ply_values.h"
+
+namespace tilegrad::io {
+namespace {
+
+// What is read of a vertex or face; names as exporters write them.
+enum Slot { kX, kY, kZ, kNx, kNy, kNz, kRed, kGreen, kBlue, kAlpha, kU, kV, kTexNumber, kSlots };
+constexpr std::array<std::pair<std::string_view, Slot>, 27> kSlotNames = {
+    {{"x", kX},          {"y", kY},          {"z", kZ},
+     {"nx", kNx},        {"ny", kNy},        {"nz", kNz},
+     {"red", kRed},      {"green", kGreen},  {"blue", kBlue},
+     {"r", kRed},        {"g", kGreen},      {"b", kBlue},
+     {"alpha", kAlpha},  {"a", kAlpha},      {"diffuse_red", kRed},
+     {"u", kU},          {"v", kV},          {"diffuse_green", kGreen},
+     {"s", kU},          {"t", kV},          {"diffuse_blue", kBlue},
+     {"texture_u", kU},  {"texture_v", kV},  {"diffuse_alpha", kAlpha},
+     {"texcoord_u", kU}, {"texcoord_v", kV}, {"texnumber", kTexNumber}}};
+
+// Integer colours count from 0 to the type's largest value.
+double ColorScale(const PlyProperty& property) {
+  return property.type == PlyType::kU8 ? 255 : property.type == PlyType::kU16 ? 65535 : 1;
+}
+
+struct Column {
+  Slot slot;  // kSlots: read and forgotten
+  double scale = 1;
+};
+
+std::vector<Column> ColumnsOf(const PlyElement& element, std::array<bool, kSlots>& has) {
+  std::vector<Column> columns;
+  for (const PlyProperty& p : element.properties) {
+    const auto* row = std::find_if(kSlotNames.begin(), kSlotNames.end(),
+                                   [&](const auto& known) { return known.first == p.name; });
+    const bool known = row != kSlotNames.end() && !p.count_type;
+    columns.push_back({known ? row->second : kSlots});
+    if (!known) continue;
+    has[row->second] = true;
+    if (row->second >= kRed && row->second <= kAlpha) columns.back().scale = ColorScale(p);
+  }
+  return columns;
+}
+
+struct PlyFace {
+  std::size_t first = 0, count = 0;  // among the corners of all faces
+  glm::vec4 color;
+  double image = -1;  // the number of its texture
+};
+
+class PlyBody {
+ public:
+  PlyBody(const PlyHeader& header, const std::string& place, LoadedMesh& out)
+      : header_(header), place_(place), values_(header.data, header.encoding), out_(out) {}
+
+  Status Read() {
+    for (const PlyElement& element : header_.elements) {
+      if (element.name == "vertex")
+        TILEGRAD_TRY(Vertices(element));
+      else if (element.name == "face")
+        TILEGRAD_TRY(Faces(element));
+      else if (element.name == "tristrips")
+        TILEGRAD_TRY(Strips(element));
+      else
+        TILEGRAD_TRY(Skip(element));
+    }
+    AddFaces();
+    AddWarnings();
+    return {};
+  }
+
+  // Which of the header's images each triangle names, from 0; empty if no face names one.
+  std::vector<double>& images() { return images_; }
+
+ private:
+  Status Error(const PlyElement& element, std::size_t row, const PlyProperty& property) const {
+    return DataLoss("{}: {} {}: \"{}\" is cut off or not a finite number", place_, element.name,
+                    row, property.name);
+  }
+
+  // The next row: numbers into `row` by column, each list to `take` with its property.
+  template <class Take>
+  Status ReadRow(const PlyElement& element, std::size_t i, const std::vector<Column>& columns,
+                 std::array<double, kSlots + 1>& row, Take take) {
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const PlyProperty& property = element.properties[k];
+      double& to = row[columns[k].slot];
+      if (!property.count_type) {
+        if (!values_.Next(property.type, to)) return Error(element, i, property);
+        to /= columns[k].scale;
+      } else {
+        if (!values_.NextList(property, list_)) return Error(element, i, property);
+        TILEGRAD_TRY(take(property));
+      }
+    }
+    return {};
+  }
+
+  Status Vertices(const PlyElement& element) {
+    Mesh& mesh = out_.mesh;
+    std::array<bool, kSlots> has{};
+    const std::vector<Column> columns = ColumnsOf(element, has);
+    if (!has[kX] || !has[kY] || !has[kZ])
+      return DataLoss("{}: the vertices have no x, y and z", place_);
+    std::array<double, kSlots + 1> row{};
+    row[kAlpha] = 1;
+    for (std::size_t i = 0; i < element.count; ++i) {
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
+      out_.exact.emplace_back(row[kX], row[kY], row[kZ]);
+      if (has[kNx] && has[kNy] && has[kNz]) mesh.normals.emplace_back(row[kNx], row[kNy], row[kNz]);
+      if (HasColor(has)) mesh.colors.emplace_back(row[kRed], row[kGreen], row[kBlue], row[kAlpha]);
+      if (has[kU] && has[kV]) vertex_uvs_.emplace_back(row[kU], row[kV]);
+    }
+    return {};
+  }
+
+  static bool HasColor(const std::array<bool, kSlots>& has) {
+    return has[kRed] && has[kGreen] && has[kBlue];
+  }
+
+  // Kept until all vertices are there: elements may come in any order.
+  Status Faces(const PlyElement& element) {
+    std::array<bool, kSlots> has{};
+    const std::vector<Column> columns = ColumnsOf(element, has);
+    has_images_ = has_images_ || has[kTexNumber];
+    has_face_colors_ = has_face_colors_ || HasColor(has);
+    std::array<double, kSlots + 1> row{};
+    row[kAlpha] = 1;
+    std::vector<double> uvs;
+    for (std::size_t i = 0; i < element.count; ++i) {
+      PlyFace face{corners_.size(), 0, glm::vec4(1), -1};
+      uvs.clear();
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
+        if (property.name == "texcoord") uvs = list_;
+        if (IsIndices(property)) return AddCorners(element, i);
+        return Status();
+      }));
+      face.count = corners_.size() - face.first;
+      if (HasColor(has)) face.color = {row[kRed], row[kGreen], row[kBlue], row[kAlpha]};
+      if (has[kTexNumber]) face.image = row[kTexNumber];
+      AddCornerUvs(uvs, face);
+      faces_.push_back(face);
+    }
+    return {};
+  }
+
+  static bool IsIndices(const PlyProperty& property) {
+    return property.name == "vertex_indices" || property.name == "vertex_index";
+  }
+
+  // The corners in list_.
+  Status AddCorners(const PlyElement& element, std::size_t row) {
+    for (const double index : list_) {
+      TILEGRAD_TRY(CheckIndex(element, row, index));
+      corners_.push_back(static_cast<std::int32_t>(index));
+    }
+    return {};
+  }
+
+  Status CheckIndex(const PlyElement& element, std::size_t row, double index) const {
+    const std::size_t vertices = header_.CountOf("vertex");
+    if (index >= 0 && index < static_cast<double>(vertices) && index == std::floor(index))
+      return {};
+    return DataLoss("{}: {} {} uses vertex {}, but the file has {}", place_, element.name, row,
+                    index, vertices);
+  }
+
+  // "texcoord": u and v of every corner of the polygon, in its order; 0 for a face without them.
+  void AddCornerUvs(const std::vector<double>& uvs, const PlyFace& face) {
+    if (uvs.empty() || uvs.size() != 2 * face.count) return;
+    uvs_.resize(face.first, glm::vec2(0));
+    for (std::size_t k = 0; k < face.count; ++k) uvs_.emplace_back(uvs[2 * k], uvs[2 * k + 1]);
+  }
+
+  // Strips of triangles, one after the other, with -1 between them.
+  Status Strips(const PlyElement& element) {
+    std::array<bool, kSlots> has{};
+    const std::vector<Column> columns = ColumnsOf(element, has);
+    std::array<double, kSlots + 1> row{};
+    for (std::size_t i = 0; i < element.count; ++i) {
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
+        return IsIndices(property) ? AddStrips(element, i) : Status();
+      }));
+    }
+    return {};
+  }
+
+  Status AddStrips(const PlyElement& element, std::size_t row) {
+    std::size_t length = 0;
+    std::array<std::int32_t, 3> last{};
+    for (const double index : list_) {
+      if (index == -1) {
+        length = 0;
+        continue;
+      }
+      TILEGRAD_TRY(CheckIndex(element, row, index));
+      last = {last[1], last[2], static_cast<std::int32_t>(index)};
+      const auto [a, b, c] = last;
+      if (++length < 3 || a == b || b == c || c == a) continue;  // repeated to turn a corner
+      strip_faces_.push_back(length % 2 == 1 ? Face{a, b, c} : Face{b, a, c});
+    }
+    return {};
+  }
+
+  void AddFace(const PlyFace& face) {
+    Mesh& mesh = out_.mesh;
+    const std::span<const std::int32_t> corners(corners_.data() + face.first, face.count);
+    polygon_.corners.assign(corners.begin(), corners.end());
+    polygon_.AddTo(out_);
+    for (const Face& triangle : polygon_.triangles) {
+      if (has_images_) images_.push_back(face.image);
+      for (const std::int32_t k : triangle) {
+        if (!uvs_.empty())
+          mesh.corner_uvs.push_back(uvs_[face.first + static_cast<std::size_t>(k)]);
+        if (has_face_colors_) mesh.corner_colors.push_back(face.color);
+      }
+    }
+  }
+
+  void AddFaces() {
+    Mesh& mesh = out_.mesh;
+    uvs_.resize(uvs_.empty() ? 0 : corners_.size(), glm::vec2(0));
+    for (const PlyFace& face : faces_) AddFace(face);
+    mesh.faces.insert(mesh.faces.end(), strip_faces_.begin(), strip_faces_.end());
+    const std::size_t corners = 3 * mesh.faces.size();
+    if (!mesh.corner_uvs.empty()) mesh.corner_uvs.resize(corners, glm::vec2(0));
+    if (!mesh.corner_colors.empty()) mesh.corner_colors.resize(corners, glm::vec4(1));
+    if (!images_.empty()) images_.resize(mesh.faces.size(), -1);
+    if (mesh.corner_uvs.empty() && !vertex_uvs_.empty()) {
+      for (const Face& face : mesh.faces) {
+        for (const std::int32_t v : face) mesh.corner_uvs.push_back(vertex_uvs_[v]);
+      }
+    }
+  }
+
+  void AddWarnings() {
+    if (!out_.mesh.colors.empty() && !out_.mesh.corner_colors.empty()) {
+      out_.mesh.corner_colors.clear();
+      out_.warnings.push_back("colours of faces left out: the vertices have their own");
+    }
+    if (!not_read_.empty())
+      out_.warnings.push_back(fmt::format("elements left out: {}", ShortList(not_read_)));
+  }
+
+  Status Skip(const PlyElement& element) {
+    if (element.count > 0) not_read_.insert(element.name);
+    const std::vector<Column> columns(element.properties.size(), Column{kSlots});
+    std::array<double, kSlots + 1> row{};
+    for (std::size_t i = 0; i < element.count; ++i)
+      TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
+    return {};
+  }
+
+  const PlyHeader& header_;
+  const std::string& place_;
+  PlyValues values_;
+  LoadedMesh& out_;
+  std::vector<glm::vec2> vertex_uvs_, uvs_;  // uvs_: of corners_, if any face has them
+  std::vector<std::int32_t> corners_;        // of faces_
+  std::vector<PlyFace> faces_;
+  std::vector<Face> strip_faces_;
+  std::vector<double> images_;
+  bool has_images_ = false, has_face_colors_ = false;
+  std::set<std::string, std::less<>> not_read_;
+  std::vector<double> list_;  // scratch: the last list
+  Polygon polygon_;           // scratch: the last polygon
+};
+
+}  // namespace
+
+Result<std::vector<double>> ReadPlyBody(const PlyHeader& header, const std::string& place,
+                                        LoadedMesh& out) {
+  PlyBody body(header, place, out);
+  TILEGRAD_TRY(body.Read());
+  return std::move(body.images());
+}
+
+}  // namespace tilegrad::io
