@@ -177,7 +177,7 @@ class ObjAssembly {
       return material;
     }
     material.base_color_texture = AddTexture(source_, name_, from.image.name, out_);
-    material.wrap = from.image.clamp ? TextureWrap::kClamp : TextureWrap::kRepeat;
+    material.wrap.fill(from.image.clamp ? TextureWrap::kClamp : TextureWrap::kRepeat);
     // With a texture, Kd is often left black or grey by exporters; the image alone is what people
     // meant.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.opacity};
