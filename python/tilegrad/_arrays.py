@@ -237,18 +237,24 @@ def refuse_masked(function: str, argument: str, value: Any) -> None:
                         f"put numbers there first, by filled()")
 
 
-def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
-    """Anything but a plain NumPy array as one, without a copy where the protocol allows it."""
+def plain(function: str, argument: str, value: Any) -> np.ndarray:
+    """Anything as a NumPy array, without a copy where the protocol allows it; TypeError if it is
+    none, as tensors that are sparse, on another device or need a gradient."""
     refuse_masked(function, argument, value)
     try:
         if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
             return _from_dlpack(function, argument, value)
-        array = np.asarray(value)
+        return np.asarray(value)
     except (TypeError, ValueError, OverflowError, RuntimeError, BufferError) as error:
         if str(error).startswith(function + ": "):
             raise
         raise TypeError(f"{function}: {argument} is not an array of numbers but "
                         f"{type(value).__name__}: {error}") from error
+
+
+def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
+    """Anything but a plain NumPy array as one that holds numbers."""
+    array = plain(function, argument, value)
     if array.dtype.kind not in "biufc":
         raise TypeError(f"{function}: {argument} is not an array of numbers but "
                         f"{type(value).__name__}")
@@ -260,6 +266,8 @@ def _from_dlpack(function: str, argument: str, value: Any) -> np.ndarray:
     if device not in _CPU_DEVICES:
         raise TypeError(f"{function}: {argument} is on another device than the CPU; copy it there "
                         f"first (value.cpu(), for example)")
+    if getattr(value, "is_neg", bool)():  # torch would hand over the numbers without their sign
+        value = value.resolve_neg()
     return np.from_dlpack(value)
 
 

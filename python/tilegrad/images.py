@@ -54,8 +54,7 @@ def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
     """
     ending = ending_of(path)
     if ending == ".npy":
-        _arrays.refuse_masked("save_image", "image", image)
-        array = np.asarray(image)
+        array = _arrays.plain("save_image", "image", image)
         return _tools.save_npy(os.fspath(path), np.ascontiguousarray(array).reshape(array.shape))
     if ending not in (".png", ".exr"):
         raise ValueError(f"save_image: {os.fspath(path)!r} must end in .png, .exr or .npy")
@@ -78,8 +77,7 @@ def save_layers(path: Path, layers: dict[str, Any]) -> None:
 
 def _pixels(function: str, argument: str, image: Any, planar: bool = False) -> np.ndarray:
     """(H, W, C) of numbers."""
-    _arrays.refuse_masked(function, argument, image)
-    array = np.asarray(image)
+    array = _arrays.plain(function, argument, image)
     if array.dtype.kind not in "buif":
         raise TypeError(f"{function}: {argument} has dtype {array.dtype}, expected numbers")
     if array.ndim == 2:

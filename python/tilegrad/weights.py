@@ -84,6 +84,5 @@ def _ending(function: str, path: Path) -> str:
 
 
 def _plain(name: str, value: Any) -> np.ndarray:
-    _arrays.refuse_masked("save_weights", name, value)
-    array = np.asarray(value)
+    array = _arrays.plain("save_weights", name, value)
     return np.ascontiguousarray(array).reshape(array.shape)  # keeps arrays without axes

@@ -117,5 +117,46 @@ class Memory(FolderTest):
                     load(self.folder / name)
 
 
+class Tensors(FolderTest):
+    def test_odd_ones_are_type_errors_wherever_they_go(self) -> None:
+        try:
+            import torch
+        except ImportError:
+            self.skipTest("no torch")
+        plain = torch.ones(3, 3)
+        self.write(plain)
+        odd = (plain.clone().requires_grad_(), torch.nn.Parameter(plain),
+               torch.view_as_complex(torch.ones(3, 3, 2)).conj(), plain.to_sparse(),
+               torch.empty(3, 3, device="meta"), plain.to(torch.bfloat16),
+               torch.nested.nested_tensor([plain[0], plain[1]]),
+               torch.quantize_per_tensor(plain, 0.1, 0, torch.qint8))
+        for value in odd:
+            for name in ("a.png", "a.exr", "a.npy", "a.npz", "a.safetensors"):
+                with self.subTest(kind=str(value.dtype), name=name):
+                    with self.assertRaises(TypeError):
+                        self.write(value, name)
+
+    def test_signs_that_torch_keeps_apart(self) -> None:
+        try:
+            import torch
+        except ImportError:
+            self.skipTest("no torch")
+        lazy = torch.view_as_complex(torch.ones(3, 3, 2)).conj().imag
+        self.assertTrue(lazy.is_neg())
+        files.save_weights(self.folder / "a.npz", {"a": lazy})
+        np.testing.assert_array_equal(files.load_weights(self.folder / "a.npz")["a"], -1)
+        scene = Scene(lazy, TRIANGLE["faces"], TRIANGLE["camera"])
+        np.testing.assert_array_equal(scene.positions, -1)
+
+    def write(self, value, name: str = "") -> None:
+        """To the file `name`, or to one of every kind."""
+        for ending in ("png", "exr", "npy", "npz", "safetensors") if not name else (name[2:],):
+            path = self.folder / f"a.{ending}"
+            if ending in ("npz", "safetensors"):
+                files.save_weights(path, {"a": value})
+            else:
+                files.save_image(path, value)
+
+
 if __name__ == "__main__":
     unittest.main()
