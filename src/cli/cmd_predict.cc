@@ -59,12 +59,12 @@ std::vector<std::pair<std::string, std::string>> NameResults(
 }
 
 // What the picture shows, the network's mesh and the refined one, from where the picture was taken.
-Status DrawMatch(const train::TargetImages& picture, const Mesh& prediction,
+Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
                  const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
-  const int size = picture.width;
-  std::vector<ImageU8> cells = {
-      Enlarged(OverGrey(PlanarRgba<float>{picture.color, picture.alpha, size, size}, kPaper),
-               kTurntableSize / size)};
+  constexpr int size = kRefineSize;
+  const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
+                                        picture.subspan(3 * size * size), size, size};
+  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
   for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
                                      std::pair(&refined.mesh, &refined.camera)}) {
     TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));
@@ -77,11 +77,11 @@ Status Refine(const PredictOptions& options, const ImageU8& cutout, const std::s
               Mesh* mesh, const Workers& workers) {
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   TILEGRAD_ASSIGN(const auto planar, train::PrepareCutout(cutout, kRefineSize, framing));
-  const train::TargetImages picture = train::TargetOfCutout(planar, kRefineSize);
   TILEGRAD_ASSIGN(train::RefinedMesh refined,
-                  train::RefineMesh(*mesh, picture, {.steps = options.refine}, workers));
+                  train::RefineMesh(*mesh, train::TargetOfCutout(planar, kRefineSize),
+                                    {.steps = options.refine}, workers));
   const Path file = Path(options.out) / (stem + "_match.png");
-  TILEGRAD_TRY(DrawMatch(picture, *mesh, refined, file, workers));
+  TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, workers));
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
         100 * refined.before.silhouette_iou, 100 * refined.after.silhouette_iou,
         refined.before.color_l1, refined.after.color_l1);

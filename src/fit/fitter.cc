@@ -37,7 +37,8 @@ Fitter::Fitter(FitScene scene, const FitterOptions& options, const Workers& work
       workers_(&workers),
       renderer_(std::make_unique<FitRenderer>(workers)),
       regularizer_(scene_.faces, scene_.positions),
-      diffusion_(regularizer_.topology(), options.smoothing) {
+      diffusion_(regularizer_.topology(), options.smoothing),
+      color_diffusion_(regularizer_.topology(), options.color_smoothing.value_or(0)) {
   for (const Parameter what : kParameters) {
     if (!options.parameters[what]) continue;
     const double rate = options.rates[what];
@@ -103,11 +104,18 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   return values;
 }
 
+// What the steps of a parameter go through; nullptr for those that step number by number.
+Diffusion* Fitter::SmoothingOf(Parameter what) {
+  if (what == Parameter::kPositions) return &diffusion_;
+  const bool colors = what == Parameter::kColors && options_.color_smoothing.has_value();
+  return colors ? &color_diffusion_ : nullptr;
+}
+
 Status Fitter::Move(ParameterBlock* block, double rate_factor) {
   const double rate = rate_factor * block->learning_rate;
   const auto t = static_cast<double>(++block->steps);
-  if (block->what == Parameter::kPositions) {
-    UniformAdamStep({rate, kBeta1, kBeta2, block->steps}, &diffusion_, block->gradient, block->m,
+  if (Diffusion* const smooth = SmoothingOf(block->what); smooth != nullptr) {
+    UniformAdamStep({rate, kBeta1, kBeta2, block->steps}, smooth, block->gradient, block->m,
                     block->v, block->values);
   } else {
     nn::AdamProblem<float> problem{block->values.size(),   block->values.data(),

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,9 @@ struct FitterOptions {
   ImageLoss loss;
   RegularizerTerms regularizers;
   double smoothing = 10;  // lambda of Diffusion
+  // Lambda of the same for vertex colours, which then take one step size: those that are hardly
+  // seen move little, with their neighbours. None: each colour has a step size of its own.
+  std::optional<double> color_smoothing;
 };
 
 // One step: views of the scene, and the images that show them at `render`'s size.
@@ -70,6 +74,7 @@ class Fitter {
   Fitter(FitScene scene, const FitterOptions& options, const Workers& workers);
   Status CheckFinite(const FitValues& values) const;
   Status Move(ParameterBlock* block, double rate_factor);
+  Diffusion* SmoothingOf(Parameter what);
   template <class Visit>
   void ForEachOfViews(std::span<const int> views, const Visit& visit);
 
@@ -80,7 +85,7 @@ class Fitter {
   FitGradients gradients_;
   ImageLossRule rule_;
   Regularizer regularizer_;
-  Diffusion diffusion_;
+  Diffusion diffusion_, color_diffusion_;
   std::vector<ParameterBlock> blocks_;
 };
 

@@ -66,7 +66,8 @@ FitterOptions OptionsOf(const FitScene& scene) {
     out.parameters[p] = true;
   out.rates[Parameter::kPositions] = 0.02 * static_cast<double>(extent);
   out.regularizers = {.laplacian = 1, .flatness = 1e-4};
-  out.smoothing = 20;
+  out.rates[Parameter::kColors] = 0.06;
+  out.smoothing = 20, out.color_smoothing = 0.5;
   return out;
 }
 
