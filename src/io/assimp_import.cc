@@ -96,6 +96,33 @@ ImportedPart ConvertPart(const aiMesh& from) {
   return part;
 }
 
+template <class T>
+T ValueOf(const aiMaterial& from, const char* key, T value) {
+  from.Get(key, aiTextureType_DIFFUSE, 0, value);
+  return value;
+}
+
+// What a material says about its image that is not read: uv are those of the first set, as they
+// are, and repeat.
+std::string NotReadOfImage(const aiMaterial& from) {
+  std::string list;
+  const auto add = [&](bool is, std::string_view what) {
+    if (is) list.append(list.empty() ? "" : ", ").append(what);
+  };
+  add(ValueOf<int>(from, _AI_MATKEY_MAPPING_BASE, aiTextureMapping_UV) != aiTextureMapping_UV,
+      "its projection (a sphere's, a box's, ...)");
+  const int set = ValueOf<int>(from, _AI_MATKEY_UVWSRC_BASE, 0);
+  add(set != 0, fmt::format("uv set {}; set 0 stands in", set));
+  constexpr int kWrap = aiTextureMapMode_Wrap;
+  add(ValueOf(from, _AI_MATKEY_MAPPINGMODE_U_BASE, kWrap) != kWrap ||
+          ValueOf(from, _AI_MATKEY_MAPPINGMODE_V_BASE, kWrap) != kWrap,
+      "its wrapping (clamped, mirrored or once); it repeats");
+  const auto t = ValueOf(from, _AI_MATKEY_UVTRANSFORM_BASE, aiUVTransform());
+  add(t.mTranslation != aiVector2D(0, 0) || t.mScaling != aiVector2D(1, 1) || t.mRotation != 0,
+      "its uv transform");
+  return list;
+}
+
 ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
   ImportedMaterial material;
   aiString text;
@@ -107,6 +134,7 @@ ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
   material.color = {diffuse.r, diffuse.g, diffuse.b, opacity};
   if (from.GetTexture(aiTextureType_DIFFUSE, 0, &text) != AI_SUCCESS) return material;
   material.image = text.C_Str();
+  material.not_read = NotReadOfImage(from);
   const aiTexture* embedded = scene.GetEmbeddedTexture(text.C_Str());
   for (unsigned i = 0; embedded != nullptr && i < scene.mNumTextures; ++i) {
     if (scene.mTextures[i] == embedded) material.embedded = static_cast<std::int32_t>(i);
@@ -135,6 +163,11 @@ ImportedScene ConvertScene(const aiScene& from) {
   for (unsigned i = 0; i < from.mNumMeshes; ++i) {
     const aiMesh& mesh = *from.mMeshes[i];
     scene.parts.push_back(ConvertPart(mesh));
+    if (mesh.mNumBones > 0 || mesh.mNumAnimMeshes > 0) {
+      scene.warnings.push_back(fmt::format(
+          "part \"{}\": bones and morph targets are not read; it is drawn as it was modelled",
+          mesh.mName.C_Str()));
+    }
     if ((mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
       scene.warnings.push_back(
           fmt::format("part \"{}\": points or lines left out", mesh.mName.C_Str()));

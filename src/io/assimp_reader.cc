@@ -95,6 +95,10 @@ class Assembly {
     material.name = from.name;
     material.base_color = from.color;
     if (!from.image.empty()) material.base_color_texture = Texture(from);
+    if (material.base_color_texture >= 0 && !from.not_read.empty()) {
+      out_.warnings.push_back(
+          fmt::format("material \"{}\": of its image is not read: {}", from.name, from.not_read));
+    }
     // With a texture, the diffuse colour is often left black or grey by exporters; the image alone
     // is what people meant.
     if (material.base_color_texture >= 0) material.base_color = {1, 1, 1, from.color.a};

@@ -20,7 +20,7 @@ void Fields(Archive& archive, T& value) {
     archive(value.name, value.material, value.positions, value.normals, value.uvs, value.colors,
             value.triangles);
   } else if constexpr (std::is_same_v<Record, ImportedMaterial>) {
-    archive(value.name, value.color, value.image, value.embedded);
+    archive(value.name, value.color, value.image, value.embedded, value.not_read);
   } else if constexpr (std::is_same_v<Record, ImportedImage>) {
     archive(value.name, value.bytes);
   } else {

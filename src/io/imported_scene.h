@@ -31,6 +31,7 @@ struct ImportedMaterial {
   glm::vec4 color{0.8f, 0.8f, 0.8f, 1};
   std::string image;           // as the file names it; empty: none
   std::int32_t embedded = -1;  // in images, or -1 if the image is a file of its own
+  std::string not_read;        // what the file says about the image and is left out
 };
 
 struct ImportedImage {

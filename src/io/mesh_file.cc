@@ -195,6 +195,25 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
   return {};
 }
 
+Status AppendFacesWithMaterial(const Mesh& part, std::int32_t first, const Material& material,
+                               LoadedMesh& out) {
+  Mesh& mesh = out.mesh;
+  const std::size_t before = mesh.faces.size(), after = before + part.faces.size();
+  if (after > kMaxMeshElements)
+    return ResourceExhausted("the mesh has more than {} vertices or faces", kMaxMeshElements);
+  TILEGRAD_TRY(ReadBudget::Take(BytesOf(part), "vertices and faces"));
+  for (const auto& [a, b, c] : part.faces) mesh.faces.push_back({a + first, b + first, c + first});
+  if (!mesh.corner_uvs.empty() || !part.corner_uvs.empty()) {
+    mesh.corner_uvs.resize(3 * before, glm::vec2(0));
+    mesh.corner_uvs.insert(mesh.corner_uvs.end(), part.corner_uvs.begin(), part.corner_uvs.end());
+    mesh.corner_uvs.resize(3 * after, glm::vec2(0));
+  }
+  mesh.face_materials.resize(after, static_cast<std::int32_t>(mesh.materials.size()));
+  mesh.materials.push_back(material);
+  MergeLastMaterial(mesh, before);
+  return {};
+}
+
 void Polygon::AddTo(LoadedMesh& out) {
   positions_.clear();
   for (const std::int32_t v : corners)

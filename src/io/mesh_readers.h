@@ -68,4 +68,8 @@ int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh&
 Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
                           std::span<const glm::dvec3> exact = {});
 
+// The same of a part whose vertices are in out.mesh already, from number `first` on.
+Status AppendFacesWithMaterial(const Mesh& part, std::int32_t first, const Material& material,
+                               LoadedMesh& out);
+
 }  // namespace tilegrad::io

@@ -2,7 +2,7 @@
 // Coordinates far from the origin: what is subtracted, and what a file has no digits for.
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -130,6 +130,79 @@ TEST_F(MeshOriginTest, PolygonsAreCutRightFarAway) {
     const auto& p = loaded.mesh.positions;
     EXPECT_GT(glm::cross(p[b] - p[a], p[c] - p[a]).z, 0);
   }
+}
+
+using Json = nlohmann::json;
+
+// A glTF file with a triangle strip's four vertices (x, y, 0) in float, and the document's parts.
+std::string Gltf(const std::string& folder, const Json& nodes, const Json& primitives) {
+  const float corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
+  const std::uint16_t indices[6] = {0, 1, 2, 2, 1, 3};
+  std::string bytes(reinterpret_cast<const char*>(corners), sizeof(corners));
+  bytes.append(reinterpret_cast<const char*>(indices), sizeof(indices));
+  std::ofstream(folder + "/b.bin", std::ios::binary) << bytes;
+  const Json view = {{"buffer", 0}, {"byteLength", 48}},
+             index_view = {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 12}};
+  const auto triangle = [](int offset) {
+    return Json{{"bufferView", 1},
+                {"byteOffset", offset},
+                {"componentType", 5123},
+                {"count", 3},
+                {"type", "SCALAR"}};
+  };
+  const Json position = {{"bufferView", 0}, {"componentType", 5126}, {"count", 4},
+                         {"type", "VEC3"},  {"min", {0, 0, 0}},      {"max", {1, 1, 0}}};
+  return Json{{"asset", {{"version", "2.0"}}},
+              {"buffers", {{{"uri", "b.bin"}, {"byteLength", 60}}}},
+              {"bufferViews", {view, index_view}},
+              {"accessors", {position, triangle(0), triangle(6), position}},
+              {"materials", {{{"name", "a"}}, {{"name", "b"}}}},
+              {"meshes", {{{"primitives", primitives}}}},
+              {"scenes", {{{"nodes", {0}}}}},
+              {"nodes", nodes}}
+      .dump();
+}
+
+Json Primitive(int position, int indices, int material) {
+  return {{"attributes", {{"POSITION", position}}}, {"indices", indices}, {"material", material}};
+}
+
+// The vertices are local, two nodes carry the place: their sum is formed in double.
+TEST_F(MeshOriginTest, GltfNodesFarAway) {
+  const Json nodes = {{{"translation", {400000.25, 4600000.125, 300}}, {"children", {1, 2}}},
+                      {{"mesh", 0}, {"translation", {31000.125, 0, 0}}},
+                      {{"camera", 0}, {"translation", {31000.125, 0, 3}}}};
+  auto document = Json::parse(Gltf(folder_.string(), nodes, {Primitive(0, 1, 0)}));
+  document["cameras"] = {
+      {{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}};
+  const auto loaded = Load(Write("a.gltf", document.dump()));
+  EXPECT_EQ(loaded.origin, glm::dvec3(431001, 4600001, 300));
+  ASSERT_EQ(loaded.mesh.positions.size(), 4u);
+  EXPECT_EQ(loaded.mesh.positions[3], glm::vec3(0.375f, 0.125f, 0));
+  EXPECT_EQ(glm::dvec3(loaded.mesh.positions[0]) + loaded.origin,
+            glm::dvec3(431000.375, 4600000.125, 300));
+  ASSERT_EQ(loaded.cameras.size(), 1u);  // it looks at the corner from 3 above, as in the file
+  const auto& m = loaded.cameras[0].camera.node_to_world;
+  EXPECT_EQ(glm::dvec3(m[3], m[7], m[11]), glm::dvec3(-0.625, -0.875, 3));
+  EXPECT_EQ(loaded.warnings.size(), 1u);
+}
+
+// Primitives of one mesh with one accessor of positions share its vertices; others do not.
+TEST_F(MeshOriginTest, GltfSharedAccessors) {
+  const Json nodes = {{{"mesh", 0}}};
+  const auto shared = Load(
+      Write("a.gltf", Gltf(folder_.string(), nodes, {Primitive(0, 1, 0), Primitive(0, 2, 1)})));
+  EXPECT_EQ(shared.mesh.positions,
+            (std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}));
+  EXPECT_EQ(shared.mesh.faces, (std::vector<Face>{{0, 1, 2}, {2, 1, 3}}));
+  EXPECT_EQ(shared.mesh.face_materials, (std::vector<std::int32_t>{0, 1}));
+  EXPECT_EQ(shared.mesh.materials[1].name, "b");
+  const auto apart =
+      Load(Write("b.gltf", Gltf(folder_.string(), nodes,
+                                {Primitive(0, 1, 0), Primitive(3, 2, 1), Primitive(0, 2, 0)})));
+  EXPECT_EQ(apart.mesh.positions.size(), 8u);
+  EXPECT_EQ(apart.mesh.faces, (std::vector<Face>{{0, 1, 2}, {6, 5, 7}, {2, 1, 3}}));
+  EXPECT_EQ(apart.mesh.face_materials, (std::vector<std::int32_t>{0, 1, 0}));
 }
 
 }  // namespace

@@ -296,7 +296,7 @@ TEST_F(ObjTest, OptionsOfImages) {
     const auto loaded = Load("mtllib m.mtl\nusemtl m\n" + kSquare + kUvs + "f 1/1 2/2 3/3 4/4\n");
     EXPECT_EQ(loaded.mesh.textures.size(), 1u);
     EXPECT_EQ(loaded.mesh.corner_uvs[2], c.uv);
-    EXPECT_EQ(loaded.mesh.materials.at(0).wrap, c.wrap);
+    EXPECT_EQ(loaded.mesh.materials.at(0).wrap, (std::array{c.wrap, c.wrap}));
     EXPECT_EQ(loaded.mesh.materials.at(0).base_color, glm::vec4(1));
     EXPECT_EQ(loaded.tables.uvs[2], glm::vec2(1, 1));  // as the file has it
   }

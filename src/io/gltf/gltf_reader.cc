@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <glm/mat4x4.hpp>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -25,10 +26,13 @@ namespace {
 constexpr int kMaxNodeDepth = 256;  // the walk is recursive
 
 // Where a node puts the primitives of its mesh.
+using SharedVertices = std::map<std::string, std::int32_t>;  // first vertex by VertexKey
+
 struct PrimitivePlace {
   glm::dmat4 matrix;
   std::span<const double> weights;  // of morph targets
   std::vector<glm::dmat4> joints;   // of its skin: then `matrix` does not count
+  SharedVertices shared = {};       // of this mesh's primitives so far
 };
 
 struct GltfWalk {
@@ -42,8 +46,9 @@ struct GltfWalk {
   std::set<std::string> warned = {};
 
   Status AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what);
-  Status AddPrimitive(const tinygltf::Primitive& p, const PrimitivePlace& at,
-                      const std::string& what);
+  Status AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at, const std::string& what);
+  Status AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
+                         PrimitivePlace& at, const std::string& what);
   void Warn(std::string warning);  // once
   Material ConvertMaterial(int index);
   void AddCamera(const tinygltf::Node& node, const glm::dmat4& m);
@@ -137,7 +142,38 @@ Material GltfWalk::ConvertMaterial(int index) {
   return material;
 }
 
-Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const PrimitivePlace& at,
+// Primitives with the same key have the same vertices, whatever their uv are.
+std::string VertexKey(const tinygltf::Primitive& p) {
+  std::string key;
+  const auto add = [&](const std::map<std::string, int>& attributes) {
+    for (const auto& [name, accessor] : attributes) {
+      if (!name.starts_with("TEXCOORD_")) key += fmt::format("{} {} ", name, accessor);
+    }
+    key += ';';
+  };
+  add(p.attributes);
+  for (const auto& target : p.targets) add(target);
+  return key;
+}
+
+Status GltfWalk::AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
+                                 PrimitivePlace& at, const std::string& what) {
+  std::vector<glm::dvec3> exact;
+  const glm::dmat4& m = at.matrix;
+  if (!at.joints.empty() && IsSkinned(p)) {
+    TILEGRAD_TRY(ApplyGltfSkin(model, p, at.joints, what, &mesh, &exact));
+  } else {
+    for (const glm::vec3& v : mesh.positions) exact.emplace_back(m * glm::dvec4(v, 1));
+    if (m != glm::dmat4(1))
+      Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
+  }
+  const auto next = static_cast<std::int32_t>(out.mesh.positions.size());
+  const auto [first, added] = at.shared.try_emplace(VertexKey(p), next);
+  if (!added) return AppendFacesWithMaterial(mesh, first->second, material, out);
+  return AppendWithMaterial(std::move(mesh), material, out, exact);
+}
+
+Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at,
                               const std::string& what) {
   const bool triangles =
       p.mode == -1 || (p.mode >= TINYGLTF_MODE_TRIANGLES && p.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
@@ -147,19 +183,12 @@ Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, const PrimitivePlace
   }
   TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
   if (mesh.faces.empty()) return {};
-  const glm::dmat4& m = at.matrix;
-  if (!at.joints.empty() && IsSkinned(p)) {
-    TILEGRAD_TRY(ApplyGltfSkin(model, p, at.joints, what, &mesh));
-  } else if (m != glm::dmat4(1)) {
-    Transform(mesh, {glm::vec3(m[0]), glm::vec3(m[1]), glm::vec3(m[2])}, glm::vec3(m[3]));
-  }
   const Material material = ConvertMaterial(p.material);
   if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
     Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",
                      material.name, GltfBaseColorOf(model, p.material).uv.Key()));
   }
-  const Status added = AppendWithMaterial(std::move(mesh), material, out);
-  return added.Within(what);
+  return AppendPrimitive(std::move(mesh), p, material, at, what).Within(what);
 }
 
 Status GltfWalk::AddMesh(const tinygltf::Node& node, const glm::dmat4& m, const std::string& what) {

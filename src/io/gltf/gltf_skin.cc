@@ -108,11 +108,13 @@ Result<std::vector<glm::dmat4>> GltfJointMatrices(const tinygltf::Model& model, 
 bool IsSkinned(const tinygltf::Primitive& p) { return p.attributes.count("JOINTS_0") > 0; }
 
 Status ApplyGltfSkin(const tinygltf::Model& model, const tinygltf::Primitive& p,
-                     std::span<const glm::dmat4> joints, const std::string& what, Mesh* mesh) {
+                     std::span<const glm::dmat4> joints, const std::string& what, Mesh* mesh,
+                     std::vector<glm::dvec3>* exact) {
   TILEGRAD_ASSIGN(const auto influences, ReadInfluences(model, p, mesh->positions.size(), what));
   for (std::size_t v = 0; v < mesh->positions.size(); ++v) {
     TILEGRAD_ASSIGN(const glm::dmat4 m, MatrixOf(influences, v, joints, what));
-    mesh->positions[v] = glm::vec3(m * glm::dvec4(mesh->positions[v], 1));
+    exact->emplace_back(m * glm::dvec4(mesh->positions[v], 1));
+    mesh->positions[v] = glm::vec3(exact->back());
     if (!mesh->normals.empty()) TurnNormal(glm::dmat3(m), &mesh->normals[v]);
   }
   return {};

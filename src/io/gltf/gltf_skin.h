@@ -22,8 +22,9 @@ Result<std::vector<glm::dmat4>> GltfJointMatrices(const tinygltf::Model& model, 
 bool IsSkinned(const tinygltf::Primitive& p);
 
 // Moves the vertices of the primitive's mesh to where their joints hold them. Weights need not sum
-// to 1; a vertex without any goes with its first joint.
+// to 1; a vertex without any goes with its first joint. `exact` gets them before they are rounded.
 Status ApplyGltfSkin(const tinygltf::Model& model, const tinygltf::Primitive& p,
-                     std::span<const glm::dmat4> joints, const std::string& what, Mesh* mesh);
+                     std::span<const glm::dmat4> joints, const std::string& what, Mesh* mesh,
+                     std::vector<glm::dvec3>* exact);
 
 }  // namespace tilegrad::io
