@@ -98,6 +98,7 @@ def as_bytes(function: str, argument: str, image: Any, planar: bool = False) -> 
     if pixels.dtype.kind == "f":
         if not np.isfinite(pixels).all():
             raise ValueError(f"{function}: {argument} has numbers that are not finite")
+        _arrays.warn_of_bytes(function, argument, pixels)
         pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     if pixels.dtype != np.uint8:
         raise TypeError(f"{function}: {argument} has dtype {pixels.dtype}, expected uint8, bool or "

@@ -178,6 +178,7 @@ class Mesh:
         channels = 3 if np.shape(self.colors)[-1:] == (3,) else 4
         colors = _arrays.as_array(function, "colors", self.colors, np.float32, ("V", channels),
                                   sizes)
+        _arrays.warn_of_bytes(function, "colors", colors)
         if channels == 4:
             return colors
         return np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)

@@ -178,7 +178,7 @@ void AddWhat(CLI::App* command, Options* o) {
   command
       ->add_option("input", o->input,
                    "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
-                   "dataset, with --model")
+                   "COLMAP project; or a dataset, with --model")
       ->required();
   command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "base/error.h"
 #include "base/read_budget.h"
@@ -58,21 +59,6 @@ std::string Folder(const std::string& name) {
   return slash == std::string::npos ? "" : name.substr(0, slash + 1);
 }
 
-// Textures are 3 or 4 channels: grey becomes RGB, grey with alpha RGBA.
-ImageU8 ToColor(ImageU8 image) {
-  if (image.channels >= 3) return image;
-  const bool alpha = image.channels == 2;
-  ImageU8 out(image.width, image.height, alpha ? 4 : 3);
-  const std::size_t count = static_cast<std::size_t>(image.width) * image.height;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint8_t* from = &image.pixels[i * image.channels];
-    std::uint8_t* to = &out.pixels[i * out.channels];
-    std::fill_n(to, 3, from[0]);
-    if (alpha) to[3] = from[1];
-  }
-  return out;
-}
-
 // Files have many parts of few materials: the last one is dropped if it equals one before it.
 void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   const Material& last = mesh.materials.back();
@@ -84,10 +70,35 @@ void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   mesh.materials.pop_back();
 }
 
-void ClampColors(Mesh& mesh) {
+bool IsByte(glm::vec4 color) {
+  return glm::all(glm::equal(glm::vec3(color), glm::round(glm::vec3(color)))) &&
+         glm::all(glm::lessThanEqual(glm::vec3(color), glm::vec3(255)));
+}
+
+// Colours are 0 to 1. Some programs write bytes as floating point, 0 to 255: whole numbers, and
+// not only 0 and 1.
+void ClampColors(LoadedMesh& loaded) {
+  std::vector<glm::vec4>& colors = loaded.mesh.colors;
+  float most = 0;
+  for (const glm::vec4& c : colors) most = std::max({most, c.r, c.g, c.b});
+  const bool bytes = most > 1 && std::all_of(colors.begin(), colors.end(), IsByte);
+  if (bytes) {
+    loaded.warnings.push_back(
+        fmt::format("vertex colours are whole numbers up to {}; taken for bytes, 0 to 255", most));
+    for (glm::vec4& c : colors) c = {glm::vec3(c) / 255.0f, c.a > 1 ? c.a / 255 : c.a};
+  } else if (most > 1 + 1e-3f) {
+    loaded.warnings.push_back(fmt::format("vertex colours reach {}; cut to 1", most));
+  }
   const auto clamp = [](glm::vec4& color) { color = glm::clamp(color, 0.0f, 1.0f); };
-  std::for_each(mesh.colors.begin(), mesh.colors.end(), clamp);
-  for (Material& material : mesh.materials) clamp(material.base_color);
+  std::for_each(colors.begin(), colors.end(), clamp);
+  for (Material& material : loaded.mesh.materials) {
+    const glm::vec4& c = material.base_color;
+    if (std::max({c.r, c.g, c.b}) > 1 + 1e-3f) {
+      loaded.warnings.push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is cut to 1",
+                                            material.name, c.r, c.g, c.b));
+    }
+    clamp(material.base_color);
+  }
 }
 
 std::size_t BytesOf(const Mesh& mesh) {
@@ -207,7 +218,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
-  ClampColors(loaded->mesh);
+  ClampColors(*loaded);
   MakeNormalsUnit(loaded->mesh);
   return loaded;
 }
@@ -221,7 +232,11 @@ Result<LoadedMesh> LoadMesh(const Path& path) {
     folder = std::filesystem::absolute(path, error).lexically_normal().parent_path();
   }
   const Path above = folder.has_parent_path() ? folder.parent_path() : Path(".");
-  return LoadMesh(*OpenFolder(above), (folder.filename() / path.filename()).string());
+  std::vector<Path> files;
+  auto loaded =
+      LoadMesh(*OpenFolder(above, &files), (folder.filename() / path.filename()).string());
+  if (loaded.ok()) loaded->files = std::move(files);
+  return loaded;
 }
 
 }  // namespace tilegrad::io

@@ -23,6 +23,7 @@ struct LoadedMesh {
               // transforms applied, polygons split, normals unit, colours in [0, 1]
   std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
+  std::vector<Path> files;              // that were read: the mesh, its MTL, buffers and images
 };
 
 // The format follows the file name's ending. Errors name the file and, where the format has places,

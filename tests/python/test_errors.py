@@ -2,6 +2,7 @@
 """What scenes and the renderer refuse, and what they say of it."""
 
 import unittest
+import warnings
 
 import numpy as np
 
@@ -192,6 +193,20 @@ class Errors(unittest.TestCase):
         with self.assertRaises(ValueError):
             renderer.render(scene, width=-1)
         self.assertTrue(np.array_equal(renderer.render(scene, **IMAGE).color, expected))
+
+    def test_colors_that_look_like_bytes_warn(self):
+        """0 to 255 in floating point, of which most is above 1; highlights of a picture are not."""
+        scene = patch()
+        bytes_ = np.rint(np.asarray(scene["colors"]) * 254 + 1).astype(np.float32)
+        for change in ({"colors": bytes_}, {"textures": np.full((4, 4, 3), 128.0)}):
+            with self.assertWarnsRegex(RuntimeWarning, "Scene: (colors|textures).*divide by 255"):
+                scene.replace(**change)
+        bright = np.asarray(scene["colors"]).copy()
+        bright[0] = 9
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            scene.replace(colors=bright)
+            scene.replace(textures=np.full((4, 4, 3), 1.0))
 
 
 if __name__ == "__main__":
