@@ -7,8 +7,10 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/mesh_options.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
 #include "train/data/build/build.h"
@@ -23,6 +25,7 @@ struct DatasetOptions {
   int workers = 0;
   bool fixed_size = false;  // --size or --views was given
   bool shares = false;      // of the split were given
+  bool force = false;
   train::BuildOptions build;
 };
 
@@ -35,6 +38,10 @@ Status CheckEffects(const DatasetOptions& options) {
   }
   if (!options.input.empty() && options.source == "procedural") {
     return InvalidArgument("--input: --source procedural reads no models; folder does");
+  }
+  if (options.build.up != UpAxis::kY &&
+      (options.source == "procedural" || options.source == "nmr")) {
+    return InvalidArgument("--up: --source {} reads no mesh files", options.source);
   }
   if (options.shares && (options.source == "nmr" || !options.split_list.empty())) {
     return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
@@ -109,6 +116,7 @@ void PrintWarnings(const train::BuildSummary& summary) {
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.source : Path(options.out);
+  TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
   TILEGRAD_ASSIGN(const auto source, OpenSource(options));
   const Workers workers(options.workers);
   ProgressLine line;
@@ -181,6 +189,8 @@ void AddDataset(CLI::App& app, Action* action) {
                          "After Ctrl-C the same command goes on where it stopped.");
   AddSourceOptions(command, options.get());
   AddBuildOptions(command, &options->build);
+  AddUpOption(command, &options->build.up);
+  AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action, command] {
     options->fixed_size = command->count("--size") + command->count("--views") > 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside two baselines.
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -12,12 +13,15 @@ namespace {
 struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
-  bool training_models = false;
+  bool training_models = false, force = false;
 };
 
 Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
+  const OutputGuard guard(options.force);
+  const Path files[] = {run / "eval.md", run / "eval.json"};
+  if (!options.training_models) TILEGRAD_TRY(guard.CheckAll(files));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   const train::TaskEvaluation job{run, data, predictor, options.training_models,
@@ -30,7 +34,8 @@ Status RunEvaluation(const EvalOptions& options) {
   if (!options.training_models) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
   Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
   if (options.training_models) return {};
-  Print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
+  guard.NoteAll(files);
+  Print("written to {} and {}\n", files[0].string(), files[1].string());
   return {};
 }
 
@@ -48,6 +53,7 @@ void AddEval(CLI::App& app, Action* action) {
       ->check(CLI::Range(1, 1000));
   command->add_flag("--training-models", options->training_models,
                     "score the training models instead and write nothing");
+  AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and a turntable picture from each image.
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -21,7 +22,7 @@ constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableSize = 256;
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
-  bool keep_framing = false;
+  bool keep_framing = false, force = false;
   int workers = 0;
 };
 
@@ -56,18 +57,21 @@ std::vector<std::pair<std::string, std::string>> NameResults(
 }
 
 Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
-                  const std::pair<std::string, std::string>& image, const Workers& workers) {
+                  const std::pair<std::string, std::string>& image, const OutputGuard& guard,
+                  const Workers& workers) {
   const auto& [file, stem] = image;
+  const Path files[] = {Path(options.out) / (stem + "_predicted.glb"),
+                        Path(options.out) / (stem + "_turntable.png")};
+  TILEGRAD_TRY(guard.CheckAll(files));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   const auto input = train::PrepareCutout(cutout, predictor.image_size(), framing);
   if (!input.ok()) return input.status().Within(file);
   TILEGRAD_ASSIGN(const auto meshes, predictor.Predict(*input));
-  const Path glb = Path(options.out) / (stem + ".glb"),
-             turntable = Path(options.out) / (stem + "_turntable.png");
-  TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
-  TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
-  Print("{} -> {}, {}\n", file, glb.string(), turntable.string());
+  TILEGRAD_TRY(io::SaveGlb(files[0], meshes[0]));
+  TILEGRAD_TRY(DrawTurntable(meshes[0], files[1], workers));
+  guard.NoteAll(files);
+  Print("{} -> {}, {}\n", file, files[0].string(), files[1].string());
   return {};
 }
 
@@ -79,8 +83,11 @@ Status RunPrediction(const PredictOptions& options) {
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   // One bad image does not keep the others from being predicted; the first error is the result.
   Status first;
+  OutputGuard guard(options.force);
+  for (const std::string& image : options.images) guard.AddInput(image);
+  guard.AddInput(options.mask);
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(predictor, options, image, workers);
+    const Status status = PredictOne(predictor, options, image, guard, workers);
     if (status.ok()) continue;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
@@ -101,9 +108,10 @@ void AddPredict(CLI::App& app, Action* action) {
   command
       ->add_option(
           "--out", options->out,
-          "folder for NAME.glb and NAME_turntable.png, named after the image; NAME_2 for a "
-          "second image of that name")
+          "folder for NAME_predicted.glb and NAME_turntable.png, named after the image; NAME_2 for "
+          "a second image of that name")
       ->capture_default_str();
+  AddForceOption(command, &options->force);
   command->add_option(
       "--mask", options->mask,
       "image of the same size: the object is white or, in one with transparency, opaque");

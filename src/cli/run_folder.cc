@@ -20,10 +20,20 @@ void AddWorkersOption(CLI::App* command, int* workers) {
       ->check(CLI::Range(0, 1024));
 }
 
+void AddForceOption(CLI::App* command, bool* force) {
+  command->add_flag("--force", *force,
+                    "replace files that are there even if tilegrad did not write them; never what "
+                    "is read here");
+}
+
 void AddRunOptions(CLI::App* command, RunOptions* options) {
   command->add_option("--run", options->run, "run folder [the newest below runs/]");
   command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
   AddWorkersOption(command, &options->workers);
+}
+
+Status CheckRunFolder(const Path& folder, const OutputGuard& guard) {
+  return train::ListCheckpoints(folder).empty() ? guard.CheckFolder(folder) : Status();
 }
 
 Result<Path> ChooseRun(const std::string& given) {

@@ -22,7 +22,7 @@ class Predict(FolderTest):
 
     def _program(self, *arguments: object) -> bytes:
         run_program("predict", self.image, "--run", run(), "--out", self.folder, *arguments)
-        return (self.folder / "view.glb").read_bytes()
+        return (self.folder / "view_predicted.glb").read_bytes()
 
     def _python(self, mesh: files.Mesh) -> bytes:
         files.save_mesh(self.folder / "python.glb", mesh)
