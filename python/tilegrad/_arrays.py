@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import operator
 import threading
-import warnings
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
@@ -67,35 +66,6 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     if not isinstance(value, _NUMBERS):
         _count_copy(copy)
     return copy
-
-
-def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
-    """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
-    be 255 times too bright, and nothing would say so."""
-    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
-    if array.dtype == np.uint8:
-        raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
-                        f"divide by 255")
-
-
-def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
-    """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is meant: most of
-    those that are not black are above 1. Highlights may be; some 4096 numbers are looked at."""
-    sample = np.ravel(array)[::max(1, array.size // 4096)]
-    colored = sample[sample > 0]
-    if colored.size == 0 or not 2 < colored.max() <= 255 or np.mean(colored > 1) <= 0.5:
-        return
-    warnings.warn(f"{function}: {argument} has numbers up to {colored.max():g}, where 0 to 1 is "
-                  f"meant: divide by 255 if they are bytes", RuntimeWarning, stacklevel=5)
-
-
-def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[Axis],
-              sizes: Sizes) -> np.ndarray:
-    """As `as_batched`; bytes are refused, numbers that look like them warn."""
-    refuse_bytes(function, argument, value, dtype)
-    array = as_batched(function, argument, value, dtype, shape, sizes)
-    warn_of_bytes(function, argument, array)
-    return array
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:

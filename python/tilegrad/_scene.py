@@ -7,7 +7,7 @@ from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core
+from tilegrad import _arrays, _core, _numbers
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed, Part, stacked
 
@@ -192,7 +192,7 @@ class Scene:
 
     def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
         colors = name.startswith(("colors", "textures"))
-        take = _arrays.as_colors if colors else _arrays.as_batched
+        take = _numbers.as_colors if colors else _arrays.as_batched
         return take("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _tools
+from tilegrad import _arrays, _numbers, _tools
 from tilegrad._camera import Camera
 from tilegrad._paths import Path
 from tilegrad._scene import Scene, Surface, Texture, changed
@@ -178,7 +178,7 @@ class Mesh:
         channels = 3 if np.shape(self.colors)[-1:] == (3,) else 4
         colors = _arrays.as_array(function, "colors", self.colors, np.float32, ("V", channels),
                                   sizes)
-        _arrays.warn_of_bytes(function, "colors", colors)
+        _numbers.warn_of_bytes(function, "colors", colors)
         if channels == 4:
             return colors
         return np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)

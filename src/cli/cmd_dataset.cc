@@ -99,7 +99,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
     const auto colon = model.reason.rfind(": ");
     ++reasons[colon == std::string::npos ? model.reason : model.reason.substr(colon + 2)];
   }
-  Print("{} models could not be used ({} lists them):\n", summary.rejected.size(),
+  Print("{} could not be used ({} lists them):\n", Count(summary.rejected.size(), "model"),
         (folder / "rejected.jsonl").string());
   for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
 }
@@ -107,7 +107,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
 void PrintWarnings(const train::BuildSummary& summary) {
   constexpr std::size_t kShown = 10;
   if (summary.warnings.empty()) return;
-  Print("{} warnings of reading models:\n", summary.warnings.size());
+  Print("{} of reading models:\n", Count(summary.warnings.size(), "warning"));
   for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
     Print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
   if (summary.warnings.size() > kShown) Print("  ...\n");
@@ -128,11 +128,11 @@ Status Make(const DatasetOptions& options) {
   PrintTable(summary);
   PrintRejected(summary, folder);
   PrintWarnings(summary);
-  Print(
-      "{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
-      "earlier), {:.1f} s\n",
-      summary.models.size(), summary.info.views, summary.info.image_size, summary.info.image_size,
-      static_cast<double>(summary.bytes) / 1e6, folder.string(), summary.reused, seconds.count());
+  Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
+        Count(summary.models.size(), "model"),
+        Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
+        summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
+        Count(static_cast<std::size_t>(summary.reused), "model file"), seconds.count());
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);
   Print("look at {}\n", (folder / "contact_sheet.png").string());
   return {};

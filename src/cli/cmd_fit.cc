@@ -147,7 +147,8 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  Print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
+  Print("{} in {}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
+        FormatDuration(o.seconds));
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
   if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);

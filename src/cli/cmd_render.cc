@@ -66,10 +66,6 @@ std::vector<std::string> MaterialNotes(const Mesh& mesh) {
   return notes;
 }
 
-std::string Count(std::size_t files) {
-  return fmt::format("{} file{}", files, files == 1 ? "" : "s");
-}
-
 class RenderRun {
  public:
   explicit RenderRun(const RenderSettings& settings)
@@ -169,7 +165,7 @@ Status RenderRun::Mesh(const std::string& file) {
   TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
   const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
   for (std::size_t i = 0; i < views->size(); ++i) {
-    if (stop_) return Cancelled("stopped; {} written", Count(written_));
+    if (stop_) return Cancelled("stopped after {}", Count(written_, "file"));
     line_.Sink()({"rendering " + stem, i, views->size(), ""});
     TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
   }
@@ -193,7 +189,7 @@ Result<std::vector<PictureName>> RenderRun::NamePictures(const std::string& stem
 Status RenderRun::Finish() {
   line_.Finish();
   if (written_ == 1) Print("wrote {}\n", last_.string());
-  if (written_ > 1) Print("{}, the last is {}\n", Count(written_), last_.string());
+  if (written_ > 1) Print("{}, the last is {}\n", Count(written_, "file"), last_.string());
   return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
 }
 

@@ -32,7 +32,8 @@ Status RunReport(const ReportOptions& options) {
   guard.Note(job.out);
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: passed over: {}\n", warning);
-  Print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
+  Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),
+        Count(static_cast<std::size_t>(summary->models), "model"),
         static_cast<double>(summary->bytes) / 1e6);
   if (!summary->evaluated)
     Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");

@@ -30,8 +30,8 @@ Status Run(const Options& options) {
   TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, guard,
                                 line.Sink(), StopOnSignals()));
   line.Finish();
-  Print("{}: {} images to fit, {} held out, the mesh as truth.glb\n", options.out,
-        options.views.views, options.views.held_out);
+  Print("{}: {} to fit, {} held out, the mesh as truth.glb\n", options.out,
+        Count(static_cast<std::size_t>(options.views.views), "image"), options.views.held_out);
   return {};
 }
 

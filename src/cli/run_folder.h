@@ -27,7 +27,8 @@ Status CheckRunFolder(const Path& folder, const OutputGuard& guard);
 Result<Path> ChooseRun(const std::string& given);
 // With a note on the terminal of each newer checkpoint that could not be read.
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);
-// `given`, or if that is empty the dataset that the run's run.json names.
+// `given`, or if that is empty the dataset that the run's run.json names, seen from here or from a
+// folder above the run.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);
 
 }  // namespace tilegrad::cli

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "fit/colmap_frames.h"
 #include "io/image_file.h"
 #include "io/orientation.h"
@@ -28,6 +29,7 @@ std::string Describe(ImageSize size) { return fmt::format("{} x {}", size.width,
 // NeRF programs differ: some turn images first, some ignore the tag as COLMAP does. Where the
 // camera's size is that of the stored image and not of the upright one, it counts stored pixels.
 Result<ImageU8> LoadTarget(const TransformsFrame& frame) {
+  const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(frame.image));
   TILEGRAD_ASSIGN(ImageU8 stored,
                   io::DecodeImage(bytes, frame.image.string(), io::PixelOrder::kStored));

@@ -203,6 +203,9 @@ TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
   ASSERT_NE(at, std::string::npos);
   Write("run/run.json", std::string(json).replace(at, Data().string().size(), "elsewhere"));
   ExpectRefused("eval --run " + run.string(), "elsewhere", "--data");
+  // A relative name is also looked for in the folders above the run.
+  Write("run/run.json", std::string(json).replace(at, Data().string().size(), "copy"));
+  ExpectRefused("eval --run " + run.string(), copy.string() + ": no models in its test split");
 }
 
 TEST_F(BrokenInputs, DatasetsOfAnotherImageSize) {

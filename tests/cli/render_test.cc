@@ -101,8 +101,8 @@ TEST_F(Render, MeshesWithAnotherAxisUp) {
   bar("x.glb", {1, 0.1f, 0.2f});
   const auto picture = [&](const std::string& mesh, const std::string& options) {
     const std::string out = In(mesh + "_" + std::to_string(options.size()) + ".png");
-    const Outcome outcome = RunProgram("render --size 32 --force " + options + " " +
-                                       In(mesh + ".glb") + " --out " + out);
+    const Outcome outcome = RunProgram("render " + In(mesh + ".glb") + " --size 32 --force " +
+                                       options + " --out " + out);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     return io::LoadImage(out).value();
   };
@@ -126,7 +126,9 @@ TEST_F(Render, MeshesWithAnotherAxisUp) {
                        "--out " + In("t") + " --write-cameras " + In("t.json"))
                 .exit_code,
             0);
-  for (const auto& view : io::LoadCameras(folder_ / "t.json", {}).value())
+  const auto views = io::LoadCameras(folder_ / "t.json", {});
+  ASSERT_TRUE(views.ok()) << views.status().message();
+  for (const auto& view : *views)
     EXPECT_NEAR(view.camera.rotation[5], 1, 1e-6);  // the picture's up is z
 }
 

@@ -208,6 +208,23 @@ class Errors(unittest.TestCase):
             scene.replace(colors=bright)
             scene.replace(textures=np.full((4, 4, 3), 1.0))
 
+    def test_numbers_have_the_index_of_their_array(self):
+        scene = patch()
+        faces, positions = np.array(scene.faces), np.array(scene.positions)
+        faces[2, 0], positions[4, 1] = 99, np.nan
+        renderer = Renderer(1)
+        for change, text in (({"faces": faces}, r"faces\[2,0\] is 99, outside of \[0, 16\)"),
+                             ({"positions": positions}, r"positions\[4,1\] is nan"),
+                             ({"positions": np.stack([scene.positions, positions])},
+                              r"positions\[4,1\] is nan")):
+            with self.assertRaisesRegex(ValueError, "render: .*" + text):
+                renderer.render(scene.replace(**change), **IMAGE)
+        uvs = np.array(scene["uvs"])
+        index = (3, 2, 1)[:uvs.ndim]
+        uvs[index] = np.inf
+        with self.assertRaisesRegex(ValueError, r"uvs\[" + ",".join(map(str, index)) + r"\] is inf"):
+            renderer.render(scene.replace(uvs=uvs), **IMAGE, outputs=("uv",))
+
 
 if __name__ == "__main__":
     unittest.main()
