@@ -68,15 +68,6 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     return copy
 
 
-def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
-    """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
-    be 255 times too bright, and nothing would say so."""
-    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
-    if array.dtype == np.uint8:
-        raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
-                        f"divide by 255")
-
-
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
     """The dtype that `value` asks to be computed in: float64 if it is an array of that, float32
     for everything else, lists of numbers included."""

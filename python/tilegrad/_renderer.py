@@ -7,7 +7,7 @@ from typing import Any, Callable, Iterator, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core
+from tilegrad import _arrays, _core, _numbers
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed
 from tilegrad._scene import Light, Scene, Surface
@@ -182,7 +182,7 @@ class Renderer:
     same input gives the same bits for any number of threads. Calls from several Python threads wait
     for each other; renderers do not. After a fork a renderer goes on in both processes.
 
-    threads: 1 to 1024; 1: only the caller's; 0: as many as TILEGRAD_NUM_THREADS in the environment
+    threads: 1 to 1024; 1: only the caller's; 0: as many as TILEGRAD_THREADS in the environment
         says, or one for each core. Fewer, with a RuntimeWarning, where the system refuses some.
     """
 
@@ -225,8 +225,9 @@ class Renderer:
         outputs = _arrays.as_names("render", "outputs", outputs, _core.IMAGES)
         if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")
-        records: Any = [scene._record for scene in checked]
-        frame = self._renderer.render(records, options, [name in outputs for name in _core.IMAGES])
+        wanted = [name in outputs for name in _core.IMAGES]
+        with _numbers.axes_of(checked[0]._fields, checked[0]._arguments["per_corner"]):
+            frame = self._renderer.render([s._record for s in checked], options, wanted)
         return Frame(frame, checked, single, outputs)
 
     def backward(self, frame: Frame, *, color: Any = None, alpha: Any = None,

@@ -7,7 +7,7 @@ from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core
+from tilegrad import _arrays, _core, _numbers
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed, Part, stacked
 
@@ -192,9 +192,9 @@ class Scene:
     # What the constructor consists of.
 
     def _take(self, name: str, value: Any, shape: tuple, sizes: dict) -> np.ndarray:
-        if name.startswith(("colors", "textures")):
-            _arrays.refuse_bytes("Scene", name, value, self._dtype)
-        return _arrays.as_batched("Scene", name, value, self._dtype, shape, sizes)
+        colors = name.startswith(("colors", "textures"))
+        take = _numbers.as_colors if colors else _arrays.as_batched
+        return take("Scene", name, value, self._dtype, shape, sizes)
 
     def _camera(self, camera: Camera, sizes: dict) -> np.ndarray:
         if not isinstance(camera, Camera):

@@ -8,19 +8,20 @@ import os
 from tilegrad import _arrays
 
 _MOST = 1024
-_VARIABLE = "TILEGRAD_NUM_THREADS"
+_VARIABLES = ("TILEGRAD_THREADS", "TILEGRAD_NUM_THREADS")  # the second is of earlier versions
 
 
 def thread_count(function: str, threads: int) -> int:
-    """`threads` checked; 0 becomes what TILEGRAD_NUM_THREADS says, or stays 0 (one thread for each
-    core that the process may use) where that is not set."""
+    """`threads` checked; 0 becomes what TILEGRAD_THREADS says, or stays 0 (one thread for each core
+    that the process may use) where that is not set."""
     threads = _arrays.as_number(function, "threads", threads, int)
     if not 0 <= threads <= _MOST:
         raise ValueError(f"{function}: threads is {threads}, must be in 0..{_MOST}")
-    text = os.environ.get(_VARIABLE, "")
-    if threads or not text:
+    variable = next((name for name in _VARIABLES if os.environ.get(name)), None)
+    if threads or variable is None:
         return threads
+    text = os.environ[variable]
     if not text.isdecimal() or not 1 <= int(text) <= _MOST:
-        raise ValueError(f"{function}: {_VARIABLE}={text!r} in the environment, must be a number "
+        raise ValueError(f"{function}: {variable}={text!r} in the environment, must be a number "
                          f"in 1..{_MOST}")
     return int(text)

@@ -13,7 +13,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _tools
+from tilegrad import _arrays, _core, _numbers, _tools
 from tilegrad._camera import Camera
 from tilegrad._paths import Path
 from tilegrad._scene import Scene, Surface, Texture, changed
@@ -208,6 +208,7 @@ class Mesh:
             return None
         channels = 3 if np.shape(value)[-1:] == (3,) else 4
         colors = _arrays.as_array(function, name, value, np.float32, (*shape, channels), sizes)
+        _numbers.warn_of_bytes(function, name, colors)
         if channels == 4:
             return colors
         return np.concatenate([colors, np.ones((*colors.shape[:-1], 1), np.float32)], axis=-1)

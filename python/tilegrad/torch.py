@@ -60,7 +60,7 @@ def render(positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Te
         converted. faces: (F, 3) whole numbers.
     camera: a Camera, or a tensor ([N,] 17) of `camera`.
     width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always there.
-    threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_NUM_THREADS says, or as many as torch uses:
+    threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_THREADS says, or as many as torch uses:
         one in a worker of a DataLoader.
     surface_textures: the texture of each surface, -1: none, where `surfaces` is a tensor.
     arguments: those of `tilegrad.Scene` (colors, uvs, textures, surfaces, lights, lighting, sh,

@@ -7,8 +7,10 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/mesh_options.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
 #include "train/data/build/build.h"
@@ -23,6 +25,7 @@ struct DatasetOptions {
   int workers = 0;
   bool fixed_size = false;  // --size or --views was given
   bool shares = false;      // of the split were given
+  bool force = false;
   train::BuildOptions build;
 };
 
@@ -35,6 +38,10 @@ Status CheckEffects(const DatasetOptions& options) {
   }
   if (!options.input.empty() && options.source == "procedural") {
     return InvalidArgument("--input: --source procedural reads no models; folder does");
+  }
+  if (options.build.up != UpAxis::kY &&
+      (options.source == "procedural" || options.source == "nmr")) {
+    return InvalidArgument("--up: --source {} reads no mesh files", options.source);
   }
   if (options.shares && (options.source == "nmr" || !options.split_list.empty())) {
     return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
@@ -92,7 +99,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
     const auto colon = model.reason.rfind(": ");
     ++reasons[colon == std::string::npos ? model.reason : model.reason.substr(colon + 2)];
   }
-  Print("{} models could not be used ({} lists them):\n", summary.rejected.size(),
+  Print("{} could not be used ({} lists them):\n", Count(summary.rejected.size(), "model"),
         (folder / "rejected.jsonl").string());
   for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
 }
@@ -100,7 +107,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
 void PrintWarnings(const train::BuildSummary& summary) {
   constexpr std::size_t kShown = 10;
   if (summary.warnings.empty()) return;
-  Print("{} warnings of reading models:\n", summary.warnings.size());
+  Print("{} of reading models:\n", Count(summary.warnings.size(), "warning"));
   for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
     Print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
   if (summary.warnings.size() > kShown) Print("  ...\n");
@@ -109,6 +116,7 @@ void PrintWarnings(const train::BuildSummary& summary) {
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.source : Path(options.out);
+  TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
   TILEGRAD_ASSIGN(const auto source, OpenSource(options));
   const Workers workers(options.workers);
   ProgressLine line;
@@ -120,11 +128,11 @@ Status Make(const DatasetOptions& options) {
   PrintTable(summary);
   PrintRejected(summary, folder);
   PrintWarnings(summary);
-  Print(
-      "{} models, {} views of {} x {} pixels, {:.1f} MB in {} ({} model files kept from "
-      "earlier), {:.1f} s\n",
-      summary.models.size(), summary.info.views, summary.info.image_size, summary.info.image_size,
-      static_cast<double>(summary.bytes) / 1e6, folder.string(), summary.reused, seconds.count());
+  Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
+        Count(summary.models.size(), "model"),
+        Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
+        summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
+        Count(static_cast<std::size_t>(summary.reused), "model file"), seconds.count());
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);
   Print("look at {}\n", (folder / "contact_sheet.png").string());
   return {};
@@ -181,6 +189,8 @@ void AddDataset(CLI::App& app, Action* action) {
                          "After Ctrl-C the same command goes on where it stopped.");
   AddSourceOptions(command, options.get());
   AddBuildOptions(command, &options->build);
+  AddUpOption(command, &options->build.up);
+  AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action, command] {
     options->fixed_size = command->count("--size") + command->count("--views") > 0;

@@ -5,9 +5,11 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/file_ending.h"
+#include "cli/run_folder.h"
 #include "io/image_file.h"
 #include "train/data/dataset.h"
 
@@ -17,6 +19,7 @@ namespace {
 struct ViewOptions {
   std::string data, model, class_name, split = "test", out = "view.png";
   int view = 0;
+  bool force = false;
 };
 
 // The models of the split, and of the class if one is named.
@@ -86,7 +89,8 @@ Status WriteView(const ViewOptions& options) {
   const std::size_t bytes = 4 * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   const auto image =
       std::span(images).subspan(static_cast<std::size_t>(options.view) * bytes, bytes);
-  TILEGRAD_TRY(io::SavePng(options.out, Straighten(image, size)));
+  TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
+                            [&] { return io::SavePng(options.out, Straighten(image, size)); }));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
   Print("{}: {} ({}), view {}\n", options.out, info.name,
         dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
@@ -113,6 +117,7 @@ void AddDatasetView(CLI::App& app, Action* action) {
   command->add_option("--out", options->out, "PNG file")
       ->check(FileEnding(".png"))
       ->capture_default_str();
+  AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return WriteView(*options); }; });
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside two baselines.
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -14,7 +15,7 @@ namespace {
 struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
-  bool training_models = false;
+  bool training_models = false, force = false;
   int refine = 0;
 };
 
@@ -33,6 +34,10 @@ train::PredictionChange RefineWith(int steps, int image_size) {
 Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
+  const OutputGuard guard(options.force);
+  const Path files[] = {run / "eval.md", run / "eval.json"};
+  const bool writes = !options.training_models && options.refine == 0;
+  if (writes) TILEGRAD_TRY(guard.CheckAll(files));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   const train::TaskEvaluation job{run,
@@ -41,7 +46,6 @@ Status RunEvaluation(const EvalOptions& options) {
                                   options.training_models,
                                   options.views_per_model,
                                   RefineWith(options.refine, predictor.image_size())};
-  const bool writes = !options.training_models && options.refine == 0;
   ProgressLine line;
   auto evaluation = predictor.task().Evaluate(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
@@ -50,7 +54,8 @@ Status RunEvaluation(const EvalOptions& options) {
   if (writes) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
   Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
   if (!writes) return {};
-  Print("written to {} and {}\n", (run / "eval.md").string(), (run / "eval.json").string());
+  guard.NoteAll(files);
+  Print("written to {} and {}\n", files[0].string(), files[1].string());
   return {};
 }
 
@@ -74,6 +79,7 @@ void AddEval(CLI::App& app, Action* action) {
                    "are printed only")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
+  AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 

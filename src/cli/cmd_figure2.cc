@@ -2,7 +2,7 @@
 // tilegrad figure2: the paper's sanity check of all gradients.
 #include <memory>
 
-#include "base/file.h"
+#include "base/output_guard.h"
 #include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -16,17 +16,20 @@ namespace {
 struct Options {
   std::string out = "figure2.svg";
   int workers = 0;
+  bool force = false;
   train::Figure2Options figure;
 };
 
 Status Run(const Options& options) {
+  const OutputGuard guard(options.force);
+  TILEGRAD_TRY(guard.Check(options.out));  // before the work
   const Workers workers(options.workers);
   ProgressLine line;
   TILEGRAD_ASSIGN(const auto results,
                   train::RunFigure2(options.figure, workers, line.Sink(), StopOnSignals()));
   line.Finish();
   TILEGRAD_ASSIGN(const std::string svg, train::Figure2Svg(results));
-  TILEGRAD_TRY(WriteTextAtomic(options.out, svg));
+  TILEGRAD_TRY(WriteGuarded(guard, options.out, [&] { return WriteTextAtomic(options.out, svg); }));
   const Path out = options.out;
   const std::string names[] = {out.filename().string()};
   RemoveTemporaries(out.has_parent_path() ? out.parent_path() : ".", names);  // of killed calls
@@ -51,6 +54,7 @@ void AddFigure2(CLI::App& app, Action* action) {
   command->add_option("--steps", options->figure.steps, "of each optimisation")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return Run(*options); }; });
 }

@@ -28,7 +28,7 @@ struct Options {
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
-  bool resume = false, doctor = false;
+  bool resume = false, doctor = false, force = false;
   FitConfig config;
 };
 
@@ -77,8 +77,9 @@ Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
   return {};
 }
 
-Result<Mesh> Load(const std::string& path) {
+Result<Mesh> Load(const std::string& path, OutputGuard* guard) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
+  guard->AddInputs(loaded.files);
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   if (const glm::dvec3& o = loaded.origin; o != glm::dvec3(0)) {
     return InvalidArgument(
@@ -116,15 +117,17 @@ Result<train::FitJob> MakeJob(const Options& options) {
   train::FitJob job;
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
+  job.guard = OutputGuard(options.force);
+  if (!options.doctor) TILEGRAD_TRY(CheckRunFolder(options.out, job.guard));
   TILEGRAD_ASSIGN(job.input, options.dataset_model.empty()
                                  ? train::ReadFitFolder(options.input, options.hold_out)
                                  : train::ReadFitDataset(options.input, options.dataset_model,
                                                          options.hold_out));
   if (!options.mesh.empty()) {
-    TILEGRAD_ASSIGN(job.start, Load(options.mesh));
+    TILEGRAD_ASSIGN(job.start, Load(options.mesh, &job.guard));
   }
   if (!options.truth.empty()) {
-    TILEGRAD_ASSIGN(job.truth, Load(options.truth));
+    TILEGRAD_ASSIGN(job.truth, Load(options.truth, &job.guard));
   }
   job.out = options.out;
   job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
@@ -149,7 +152,8 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  Print("{} steps in {}\n", o.last_step, FormatDuration(o.seconds));
+  Print("{} in {}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
+        FormatDuration(o.seconds));
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
   if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
@@ -183,11 +187,12 @@ void AddWhat(CLI::App* command, Options* o) {
   command
       ->add_option("input", o->input,
                    "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
-                   "dataset, with --model")
+                   "COLMAP project; or a dataset, with --model")
       ->required();
   command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
       ->capture_default_str();
+  AddForceOption(command, &o->force);
   command->add_option("--mesh", o->mesh, "start from this file instead of a sphere");
   command->add_option("--optimize", o->optimize,
                       "any of positions, colors, texture, uv, camera, light, sh, material; "

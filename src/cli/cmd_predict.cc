@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and a turntable picture from each image.
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -23,7 +24,7 @@ constexpr int kRefineSize = 128;  // pixels a side of the picture that a mesh is
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
-  bool keep_framing = false;
+  bool keep_framing = false, force = false;
   int refine = 300;
   int workers = 0;
 };
@@ -73,14 +74,13 @@ Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
   return io::SavePng(file, TileImages(cells, static_cast<int>(cells.size())));
 }
 
-Status Refine(const PredictOptions& options, const ImageU8& cutout, const std::string& stem,
-              Mesh* mesh, const Workers& workers) {
+Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& file, Mesh* mesh,
+              const Workers& workers) {
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   TILEGRAD_ASSIGN(const auto planar, train::PrepareCutout(cutout, kRefineSize, framing));
   TILEGRAD_ASSIGN(train::RefinedMesh refined,
                   train::RefineMesh(*mesh, train::TargetOfCutout(planar, kRefineSize),
                                     {.steps = options.refine}, workers));
-  const Path file = Path(options.out) / (stem + "_match.png");
   TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, workers));
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
         100 * refined.before.silhouette_iou, 100 * refined.after.silhouette_iou,
@@ -90,22 +90,27 @@ Status Refine(const PredictOptions& options, const ImageU8& cutout, const std::s
 }
 
 Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
-                  const std::pair<std::string, std::string>& image, const Workers& workers) {
+                  const std::pair<std::string, std::string>& image, const OutputGuard& guard,
+                  const Workers& workers) {
   const auto& [file, stem] = image;
+  const Path files[] = {Path(options.out) / (stem + "_predicted.glb"),
+                        Path(options.out) / (stem + "_turntable.png"),
+                        Path(options.out) / (stem + "_match.png")};
+  const std::span<const Path> written = std::span(files).first(options.refine > 0 ? 3 : 2);
+  TILEGRAD_TRY(guard.CheckAll(written));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
   const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
   const auto input = train::PrepareCutout(cutout, predictor.image_size(), framing);
   if (!input.ok()) return input.status().Within(file);
   TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
   if (options.refine > 0) {
-    const Status refined = Refine(options, cutout, stem, &meshes[0], workers);
+    const Status refined = Refine(options, cutout, files[2], &meshes[0], workers);
     if (!refined.ok()) return refined.Within(file);
   }
-  const Path glb = Path(options.out) / (stem + ".glb"),
-             turntable = Path(options.out) / (stem + "_turntable.png");
-  TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
-  TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
-  Print("{} -> {}, {}\n", file, glb.string(), turntable.string());
+  TILEGRAD_TRY(io::SaveGlb(files[0], meshes[0]));
+  TILEGRAD_TRY(DrawTurntable(meshes[0], files[1], workers));
+  guard.NoteAll(written);
+  Print("{} -> {}, {}\n", file, files[0].string(), files[1].string());
   return {};
 }
 
@@ -117,8 +122,11 @@ Status RunPrediction(const PredictOptions& options) {
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   // One bad image does not keep the others from being predicted; the first error is the result.
   Status first;
+  OutputGuard guard(options.force);
+  for (const std::string& image : options.images) guard.AddInput(image);
+  guard.AddInput(options.mask);
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(predictor, options, image, workers);
+    const Status status = PredictOne(predictor, options, image, guard, workers);
     if (status.ok()) continue;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
@@ -139,9 +147,10 @@ void AddPredict(CLI::App& app, Action* action) {
   command
       ->add_option(
           "--out", options->out,
-          "folder for NAME.glb and NAME_turntable.png, named after the image; NAME_2 for a "
-          "second image of that name")
+          "folder for NAME_predicted.glb and NAME_turntable.png, named after the image; NAME_2 for "
+          "a second image of that name")
       ->capture_default_str();
+  AddForceOption(command, &options->force);
   command->add_option(
       "--mask", options->mask,
       "image of the same size: the object is white or, in one with transparency, opaque");

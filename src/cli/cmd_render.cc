@@ -5,8 +5,10 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/mesh_options.h"
 #include "cli/render_job.h"
 #include "cli/render_options.h"
 #include "cli/run_folder.h"
@@ -39,6 +41,13 @@ std::vector<Light> LightsOf(const RenderSettings& settings, const Camera& camera
   return lights;
 }
 
+std::vector<float> HarmonicsOf(const RenderSettings& settings) {
+  if (!settings.sh.empty()) return settings.sh;
+  const UpAxis up = UpAxisNamed(settings.view.up).value_or(UpAxis::kY);
+  const auto& sky = up == UpAxis::kZ ? kSkyOfZ : up == UpAxis::kX ? kSkyOfX : kSky;
+  return {sky.begin(), sky.end()};
+}
+
 MeshSceneOptions SceneOptionsOf(const RenderSettings& settings) {
   MeshSceneOptions options = settings.scene;
   options.ambient.fill(settings.ambient);
@@ -65,25 +74,37 @@ std::vector<std::string> MaterialNotes(const Mesh& mesh, bool soft) {
 class RenderRun {
  public:
   explicit RenderRun(const RenderSettings& settings)
-      : settings_(settings), workers_(settings.workers), renderer_(workers_) {}
+      : settings_(settings),
+        workers_(settings.workers),
+        renderer_(workers_),
+        guard_(settings.file.force) {
+    if (!settings.view.camera_file.empty()) guard_.AddInput(settings.view.camera_file);
+    for (const std::string& mesh : settings.meshes) guard_.AddInput(mesh);
+  }
 
   Status Mesh(const std::string& file);
   Status Finish();
 
  private:
+  Result<std::vector<PictureName>> NamePictures(const std::string& stem,
+                                                const std::vector<io::CameraView>& views);
+  Status ClaimFiles(const PictureName& name);
   Status View(const MeshScene& scene, const io::CameraView& view, const PictureName& name);
+  Status WriteCameras();
   FaceCulling Culling(const MeshScene& scene) const;
   void Explain(const Picture& picture, const std::string& name) const;
 
   const RenderSettings& settings_;
   Workers workers_;
   PictureRenderer renderer_;
+  OutputGuard guard_;
   ProgressLine line_;
   const StopFlag& stop_ = StopOnSignals();
   UniqueNames stems_;
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
   glm::dvec3 origin_{0};               // of the mesh that is rendered, see LoadedMesh
-  std::set<Path> files_;               // written
+  std::set<Path> files_;               // that are written, or will be
+  std::size_t written_ = 0;
   Path last_;
 };
 
@@ -99,6 +120,19 @@ void RenderRun::Explain(const Picture& picture, const std::string& name) const {
   }
 }
 
+// Before anything is rendered.
+Status RenderRun::ClaimFiles(const PictureName& name) {
+  for (const Path& file : PictureFiles(settings_.file, name)) {
+    if (!files_.insert(file).second) {
+      return InvalidArgument(
+          "{}: two pictures have this name; render these meshes into folders of their own",
+          file.string());
+    }
+    TILEGRAD_TRY(guard_.Check(file));
+  }
+  return {};
+}
+
 Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
                        const PictureName& name) {
   Scene scene = mesh_scene.scene();
@@ -106,7 +140,8 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   scene.shading.lighting = settings_.lighting;
   const auto lights = LightsOf(settings_, scene.camera);
   if (UsesLights(scene.shading)) scene.lights = lights;
-  if (settings_.lighting == Lighting::kSphericalHarmonics) scene.sh = settings_.sh;
+  const std::vector<float> sh = HarmonicsOf(settings_);
+  if (settings_.lighting == Lighting::kSphericalHarmonics) scene.sh = sh;
   PictureRequest request{.width = view.size.width,
                          .height = view.size.height,
                          .supersampling = settings_.supersampling,
@@ -116,15 +151,10 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   TILEGRAD_TRY(RequestOutputs(settings_.file, &request));
   Picture picture;
   TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
-  TILEGRAD_ASSIGN(const auto files,
-                  WritePicture(picture, settings_.scene.color_space, settings_.file, name));
-  for (const Path& file : files) {
-    if (files_.insert(file).second) continue;
-    return InvalidArgument(
-        "{}: two pictures have this name; render these meshes into folders of their own",
-        file.string());
-  }
-  last_ = files.back();
+  TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
+  const std::vector<Path> files = PictureFiles(settings_.file, name);
+  guard_.NoteAll(files);
+  written_ += files.size(), last_ = files.back();
   if (settings_.explain) Explain(picture, name.stem.string());
   views_.push_back(
       {name.stem.filename().string() + name.ending, MovedCamera(view.camera, origin_), view.size});
@@ -132,35 +162,55 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
 }
 
 Status RenderRun::Mesh(const std::string& file) {
-  TILEGRAD_ASSIGN(const io::LoadedMesh loaded, io::LoadMesh(Path(file)));
+  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(Path(file)));
+  TILEGRAD_TRY(TakeTexture(settings_.texture, &loaded).Within(file));
   for (const std::string& warning : loaded.warnings) PrintNote("{}: {}\n", file, warning);
   for (const std::string& note : MaterialNotes(loaded.mesh, settings_.soft_delta > 0))
     PrintNote("{}: {}\n", file, note);
   origin_ = loaded.origin;
   auto views = ChooseViews(settings_.view, loaded);
   if (!views.ok()) return views.status().Within(file);
-  const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
+  guard_.AddInputs(loaded.files);
   const std::string stem = stems_.Take(Path(file).stem().string());
-  const bool single = settings_.meshes.size() == 1 && views->size() == 1;
+  TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
+  const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
   for (std::size_t i = 0; i < views->size(); ++i) {
-    if (stop_) return Cancelled("stopped; {} files are written", files_.size());
+    if (stop_) return Cancelled("stopped after {}", Count(written_, "file"));
     line_.Sink()({"rendering " + stem, i, views->size(), ""});
-    const std::string name = views->size() == 1 ? stem : stem + "_" + (*views)[i].name;
-    TILEGRAD_ASSIGN(const PictureName picture, NamePicture(settings_.file, name, single));
-    TILEGRAD_TRY(View(scene, (*views)[i], picture).Within(file));
+    TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
   }
   return {};
 }
 
+Result<std::vector<PictureName>> RenderRun::NamePictures(const std::string& stem,
+                                                         const std::vector<io::CameraView>& views) {
+  const bool single = settings_.meshes.size() == 1 && views.size() == 1;
+  // This folder may have the mesh's textures in it, chair.png of chair.obj.
+  const std::string base = settings_.file.out.empty() ? stem + "_render" : stem;
+  std::vector<PictureName> names;
+  for (const io::CameraView& view : views) {
+    const std::string name = views.size() == 1 ? base : base + "_" + view.name;
+    TILEGRAD_ASSIGN(names.emplace_back(), NamePicture(settings_.file, name, single));
+    TILEGRAD_TRY(ClaimFiles(names.back()));
+  }
+  return names;
+}
+
 Status RenderRun::Finish() {
   line_.Finish();
-  if (!files_.empty()) {
-    Print("{} files, the last is {}\n", files_.size(), last_.string());
-  }
-  const Path cameras(settings_.write_cameras);
-  if (cameras.empty() || views_.empty()) return {};
-  return cameras.extension() == ".json" ? io::SaveNerfCameras(cameras, views_)
-                                        : io::SaveColmapCameras(cameras, views_);
+  if (written_ == 1) Print("wrote {}\n", last_.string());
+  if (written_ > 1) Print("{}, the last is {}\n", Count(written_, "file"), last_.string());
+  return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
+}
+
+Status RenderRun::WriteCameras() {
+  const Path out(settings_.write_cameras);
+  const bool json = out.extension() == ".json";
+  const auto files = json ? std::vector<Path>{out} : io::ColmapFiles(out);
+  TILEGRAD_TRY(guard_.CheckAll(files));
+  TILEGRAD_TRY(json ? io::SaveNerfCameras(out, views_) : io::SaveColmapCameras(out, views_));
+  guard_.NoteAll(files);
+  return {};
 }
 
 // One bad mesh does not keep the others from being rendered; the first error is the result.

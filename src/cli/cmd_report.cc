@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad report: one page about a run.
+#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -12,6 +13,7 @@ struct ReportOptions {
   RunOptions on;
   std::string out;
   int models = 8;
+  bool force = false;
 };
 
 Status RunReport(const ReportOptions& options) {
@@ -20,14 +22,18 @@ Status RunReport(const ReportOptions& options) {
   TILEGRAD_ASSIGN(job.data, ChooseDataset(options.on.data, job.run));
   job.out = options.out.empty() ? job.run / "report.html" : Path(options.out);
   job.models = options.models;
+  const OutputGuard guard(options.force);
+  TILEGRAD_TRY(guard.Check(job.out));
   const Workers workers(options.on.workers);
   ProgressLine line;
   const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!summary.ok()) return summary.status();
+  guard.Note(job.out);
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: passed over: {}\n", warning);
-  Print("{}: {} models, {:.1f} MB; open it in a browser\n", job.out.string(), summary->models,
+  Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),
+        Count(static_cast<std::size_t>(summary->models), "model"),
         static_cast<double>(summary->bytes) / 1e6);
   if (!summary->evaluated)
     Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
@@ -45,6 +51,7 @@ void AddReport(CLI::App& app, Action* action) {
       ->capture_default_str()
       ->check(CLI::Range(0, 200));
   command->add_option("--out", options->out, "the page [RUN/report.html]");
+  AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return RunReport(*options); }; });
 }
 

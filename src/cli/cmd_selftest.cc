@@ -122,8 +122,7 @@ void AddSelftest(CLI::App& app, Action* action) {
   command->add_option("--only", options->only,
                       "run checks whose title has this in it (upper and lower case are the same)");
   AddWorkersOption(command, &options->workers);
-  command->add_flag("--list", options->list, "print the titles of the checks, run none")
-      ->excludes("--workers");
+  command->add_flag("--list", options->list, "print the titles of the checks, run none");
   command->callback([options, action] { *action = [options] { return RunSelftest(*options); }; });
 }
 

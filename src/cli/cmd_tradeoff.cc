@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "base/output_guard.h"
 #include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -17,13 +18,22 @@ namespace {
 struct TradeoffOptions {
   std::string mesh, out = "tradeoff", data, config = "configs/quick.toml";
   int size = 256, repetitions = 7, steps = 1000, workers = 0;
+  bool force = false;
   std::vector<double> errors = {0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
   std::vector<double> deltas = {1.0 / 7000, 1e-2};
   std::vector<double> training_errors = {1e-6, 1e-3, 3e-2};
 };
 
+// The last one only with trainings.
+std::vector<Path> StudyFiles(const Path& folder, bool trained) {
+  std::vector<Path> files = {folder / "tradeoff.md", folder / "tradeoff.csv",
+                             folder / "tradeoff.svg"};
+  if (trained) files.push_back(folder / "training.csv");
+  return files;
+}
+
 Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
-                  const std::vector<StudyTraining>& training) {
+                  const std::vector<StudyTraining>& training, const OutputGuard& guard) {
   TILEGRAD_TRY(MakeFolder(folder));
   const std::string tables = StudyMarkdown(results, training);
   TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.md", tables));
@@ -32,6 +42,7 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   if (!training.empty()) {
     TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
   }
+  guard.NoteAll(StudyFiles(folder, !training.empty()));
   const std::string names[] = {"tradeoff.md", "tradeoff.csv", "tradeoff.svg", "training.csv"};
   RemoveTemporaries(folder, names);  // of killed calls
   Print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables, folder.string(),
@@ -51,6 +62,9 @@ Result<std::vector<StudyScene>> ChooseScenes(const TradeoffOptions& options) {
 }
 
 Status RunTradeoff(const TradeoffOptions& options) {
+  OutputGuard guard(options.force);
+  guard.AddInput(options.mesh);
+  TILEGRAD_TRY(guard.CheckAll(StudyFiles(options.out, !options.data.empty())));
   TILEGRAD_ASSIGN(const std::vector<StudyScene> scenes, ChooseScenes(options));
   ProgressLine line;
   const TrainingStudyJob study{options.data,  options.config, options.out, options.training_errors,
@@ -78,7 +92,7 @@ Status RunTradeoff(const TradeoffOptions& options) {
     TILEGRAD_ASSIGN(training, RunTrainingStudy(study, workers, line.Sink(), StopOnSignals()));
   }
   line.Finish();
-  return WriteStudy(options.out, results, training);
+  return WriteStudy(options.out, results, training, guard);
 }
 
 }  // namespace
@@ -94,6 +108,7 @@ void AddTradeoff(CLI::App& app, Action* action) {
       ->add_option("--out", options->out,
                    "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs")
       ->capture_default_str();
+  AddForceOption(command, &options->force);
   command->add_option("--size", options->size, "pixels of a mesh file's image, each axis")
       ->needs(mesh)
       ->capture_default_str()

@@ -12,7 +12,7 @@ namespace {
 struct TrainOptions {
   std::string config, data, out;
   std::vector<std::string> overrides;
-  bool resume = false;
+  bool resume = false, force = false;
   double max_minutes = 0;
   int workers = 0;
 };
@@ -32,6 +32,7 @@ Status RunTraining(const TrainOptions& options) {
   train::TrainJob job;
   TILEGRAD_ASSIGN(job.config, train::ReadConfig(options.config));
   TILEGRAD_TRY(train::ApplyOverrides(options.overrides, &job.config));
+  TILEGRAD_TRY(CheckRunFolder(options.out, OutputGuard(options.force)));
   job.data = options.data;
   job.run = options.out;
   job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
@@ -63,6 +64,7 @@ void AddTrain(CLI::App& app, Action* action) {
                       "override a key: --set schedule.steps=100 (repeatable)");
   command->add_flag("--resume", options->resume,
                     "continue the run in --out (start it if there is none)");
+  AddForceOption(command, &options->force);
   command
       ->add_option("--max-minutes", options->max_minutes,
                    "save and stop after this many minutes; 0: no limit")

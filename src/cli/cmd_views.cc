@@ -4,6 +4,8 @@
 
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/mesh_options.h"
+#include "cli/run_folder.h"
 #include "fit/make_views.h"
 #include "io/mesh_file.h"
 
@@ -11,19 +13,25 @@ namespace tilegrad::cli {
 namespace {
 
 struct Options {
-  std::string mesh, out;
+  std::string mesh, out, texture;
+  UpAxis up = UpAxis::kY;
+  bool force = false;
   train::ViewsOptions views;
 };
 
 Status Run(const Options& options) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(options.mesh));
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
+  TILEGRAD_TRY(TakeTexture(options.texture, &loaded));
+  TurnUpright(options.up, &loaded.mesh);
+  OutputGuard guard(options.force);
+  guard.AddInputs(loaded.files);
   ProgressLine line;
-  TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, line.Sink(),
-                                StopOnSignals()));
+  TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, guard,
+                                line.Sink(), StopOnSignals()));
   line.Finish();
-  Print("{}: {} images to fit, {} held out, the mesh as truth.glb\n", options.out,
-        options.views.views, options.views.held_out);
+  Print("{}: {} to fit, {} held out, the mesh as truth.glb\n", options.out,
+        Count(static_cast<std::size_t>(options.views.views), "image"), options.views.held_out);
   return {};
 }
 
@@ -36,6 +44,9 @@ void AddViews(CLI::App& app, Action* action) {
       "Render a mesh from all around into a folder of images and cameras for tilegrad fit");
   command->add_option("mesh", options->mesh, "a file: " + io::MeshFileEndings())->required();
   command->add_option("--out", options->out, "folder to fill")->required();
+  AddForceOption(command, &options->force);
+  AddUpOption(command, &options->up);
+  AddTextureOption(command, &options->texture);
   train::ViewsOptions& v = options->views;
   command->add_option("--views", v.views, "images to fit")->capture_default_str();
   command->add_option("--held-out", v.held_out, "more images, to judge a fit by")

@@ -41,6 +41,10 @@ void OpenStandardStreams() {
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
 }
 
+std::string Count(std::size_t number, const std::string& thing) {
+  return fmt::format("{} {}{}", number, thing, number == 1 ? "" : "s");
+}
+
 void PrintThreadNotice() {
   if (const char* notice = TakeThreadNotice()) PrintNote("tilegrad: warning: {}\n", notice);
 }

@@ -29,6 +29,9 @@ void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
+// "1 file", "2 files".
+std::string Count(std::size_t number, const std::string& thing);
+
 // Says, once, that the system has refused threads.
 void PrintThreadNotice();
 

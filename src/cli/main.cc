@@ -4,6 +4,7 @@
 // SIGTERM (state saved).
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -16,6 +17,7 @@
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/render_options.h"
 #include "tilegrad/version.h"
 
 namespace tilegrad::cli {
@@ -89,7 +91,9 @@ int Run(int argc, char** argv) {
                    fmt::format("unknown command \"{}\"; see tilegrad --help", argv[1])});
   }
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> words = JoinUpVector({argv + std::min(argc, 1), argv + argc});
+    std::reverse(words.begin(), words.end());  // as CLI11 takes them
+    app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     std::ostringstream out, note;
     const int code = app.exit(error, out, note);

@@ -95,28 +95,26 @@ std::vector<float> Interleave(const Planes& planes, std::size_t channels, const 
   return out;
 }
 
+Path FileOf(const PictureName& name, const std::string& output) {
+  const std::string suffix = output == "color" ? "" : "_" + output;
+  return Path(name.stem.string() + suffix + name.ending);
+}
+
 struct Writer {
   const Picture& picture;
   ColorSpace space;
   const FileSettings& settings;
   const PictureName& name;
-  std::vector<Path> written;
 
-  Path File(const std::string& output) const {
-    const std::string suffix = output == "color" ? "" : "_" + output;
-    return Path(name.stem.string() + suffix + name.ending);
-  }
   Status Png(const std::string& output, std::span<const float> values, int channels) {
-    written.push_back(File(output));
-    return io::SavePng(written.back(), ToImage(values, picture, channels));
+    return io::SavePng(FileOf(name, output), ToImage(values, picture, channels));
   }
   template <class T>
   Status Npy(const std::string& output, std::span<const T> values, std::size_t channels) {
     std::vector<std::size_t> shape = {static_cast<std::size_t>(picture.height),
                                       static_cast<std::size_t>(picture.width)};
     if (channels > 1) shape.push_back(channels);
-    written.push_back(File(output));
-    return WriteFileAtomic(written.back(), io::EncodeNpy(io::MakeNpy<T>(shape, values)));
+    return WriteFileAtomic(FileOf(name, output), io::EncodeNpy(io::MakeNpy<T>(shape, values)));
   }
 
   Status Pngs();
@@ -188,8 +186,7 @@ Status Writer::Exr() {
   add("normals", picture.normals, {"normal.X", "normal.Y", "normal.Z"});
   add("uv", picture.uv, {"uv.U", "uv.V"});
   add("faces", faces, {"face.id"});
-  written.push_back(File("color"));
-  return io::SaveExr(written.back(), image);
+  return io::SaveExr(FileOf(name, "color"), image);
 }
 
 }  // namespace
@@ -233,13 +230,20 @@ Result<PictureName> NamePicture(const FileSettings& settings, const std::string&
   return PictureName{out / name, format, "." + format};
 }
 
-Result<std::vector<Path>> WritePicture(const Picture& picture, ColorSpace space,
-                                       const FileSettings& settings, const PictureName& name) {
-  Writer writer{picture, space, settings, name, {}};
-  TILEGRAD_TRY(name.format == "exr"   ? writer.Exr()
-               : name.format == "npy" ? writer.Npys()
-                                      : writer.Pngs());
-  return std::move(writer.written);
+std::vector<Path> PictureFiles(const FileSettings& settings, const PictureName& name) {
+  if (name.format == "exr") return {FileOf(name, "color")};
+  std::vector<Path> files;
+  for (const std::string& output : settings.outputs) {
+    const Path file = FileOf(name, output);
+    if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+  }
+  return files;
+}
+
+Status WritePicture(const Picture& picture, ColorSpace space, const FileSettings& settings,
+                    const PictureName& name) {
+  Writer writer{picture, space, settings, name};
+  return name.format == "exr" ? writer.Exr() : name.format == "npy" ? writer.Npys() : writer.Pngs();
 }
 
 }  // namespace tilegrad::cli

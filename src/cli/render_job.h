@@ -8,6 +8,7 @@
 #include "io/camera_file.h"
 #include "io/mesh_file.h"
 #include "render/picture/picture.h"
+#include "scene/up_axis.h"
 
 namespace tilegrad::cli {
 
@@ -16,7 +17,8 @@ struct ViewSettings {
   std::string camera_file;  // COLMAP folder, transforms.json, OpenCV's numbers
   std::string gltf_camera;  // name, index or "all"
   std::string opencv_centre = "integer";
-  std::vector<double> eye, target = {0, 0, 0}, up = {0, 1, 0};
+  std::vector<double> eye, target = {0, 0, 0};
+  std::string up = "y";  // an axis of the mesh, or with `eye` "X,Y,Z"
   double fov = 40, azimuth = 60, elevation = 20, distance = 0, margin = 0.05;
   int turntable = 0;  // views around; 0: none
 };
@@ -29,11 +31,15 @@ Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by);
 Result<std::vector<io::CameraView>> ChooseViews(const ViewSettings& settings,
                                                 const io::LoadedMesh& mesh);
 
+// The axis that --up names.
+Result<UpAxis> UpAxisOf(const ViewSettings& settings);
+
 struct FileSettings {
-  std::string out;     // a file for one picture, a folder for several; empty: beside where one is
+  std::string out;     // a file for one picture, a folder for several; empty: this folder
   std::string format;  // png, exr, npy; empty: the ending of `out`, else png
   std::vector<std::string> outputs = {"color"};
   std::vector<float> background;  // RGB 0..1 sRGB; empty: transparent
+  bool force = false;             // base/output_guard.h
 };
 
 // Fails for an unknown output or format. Sets what the outputs need.
@@ -47,9 +53,12 @@ struct PictureName {
 };
 Result<PictureName> NamePicture(const FileSettings& settings, const std::string& name, bool single);
 
-// Writes the files of a picture; returns their names. PNG: straight alpha, sRGB. NPY: the same
+// The files that WritePicture will write.
+std::vector<Path> PictureFiles(const FileSettings& settings, const PictureName& name);
+
+// Writes the files of a picture. PNG: straight alpha, sRGB. NPY: the same
 // numbers as floats, [H,W,4]. EXR: linear, colour times alpha, all outputs as layers of one file.
-Result<std::vector<Path>> WritePicture(const Picture& picture, ColorSpace space,
-                                       const FileSettings& settings, const PictureName& name);
+Status WritePicture(const Picture& picture, ColorSpace space, const FileSettings& settings,
+                    const PictureName& name);
 
 }  // namespace tilegrad::cli

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/render_options.h"
 
+#include <algorithm>
 #include <map>
 
 #include "base/error.h"
+#include "cli/mesh_options.h"
 #include "cli/run_folder.h"
 #include "render/scene_fields.h"
 
@@ -43,9 +45,9 @@ void AddViewOptions(CLI::App* command, ViewSettings* view) {
       ->expected(3)
       ->needs(eye)
       ->capture_default_str();
-  command->add_option("--up", view->up, "with --eye: X Y Z points up")
-      ->expected(3)
-      ->needs(eye)
+  command
+      ->add_option("--up", view->up,
+                   "the axis of the mesh that points up: y, z or x; with --eye also X Y Z")
       ->capture_default_str();
   auto* turntable =
       command
@@ -84,7 +86,8 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
   command->add_option("--ambient", s->ambient, "light from everywhere")->capture_default_str();
   command->add_option("--specular", s->specular, "k_s of phong")->capture_default_str();
   command->add_option("--shininess", s->scene.shininess, "alpha of phong")->capture_default_str();
-  command->add_option("--sh", s->sh, "nine coefficients of spherical harmonics")->expected(9);
+  command->add_option("--sh", s->sh, "nine coefficients of spherical harmonics [a bright sky]")
+      ->expected(9);
   AddChoice<NormalSource>(command, "--normals", &s->scene.normals,
                           {{"auto", NormalSource::kAuto},
                            {"smooth", NormalSource::kSmooth},
@@ -106,7 +109,9 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
 
 void AddFileOptions(CLI::App* command, RenderSettings* s) {
   command->add_option("--out", s->file.out,
-                      "a file (.png, .exr, .npy) for one picture, else a folder [this one]");
+                      "a file (.png, .exr, .npy) for one picture, else a folder for NAME.png "
+                      "[NAME_render.png, here]");
+  AddForceOption(command, &s->file.force);
   command->add_option("--format", s->file.format, "in a folder: png (default), exr or npy")
       ->check(CLI::IsMember({"png", "exr", "npy"}));
   command
@@ -134,12 +139,27 @@ void AddFileOptions(CLI::App* command, RenderSettings* s) {
 
 }  // namespace
 
+std::vector<std::string> JoinUpVector(std::vector<std::string> words) {
+  const auto is_number = [](const std::string& word) {
+    double number = 0;
+    return CLI::detail::lexical_cast(word, number);
+  };
+  for (std::size_t i = 0; i + 3 < words.size(); ++i) {
+    const auto first = words.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+    if (words[i] != "--up" || !std::all_of(first, first + 3, is_number)) continue;
+    *first = fmt::format("{},{},{}", first[0], first[1], first[2]);
+    words.erase(first + 1, first + 3);
+  }
+  return words;
+}
+
 void AddRenderOptions(CLI::App* command, RenderSettings* settings) {
   command->add_option("meshes", settings->meshes, "mesh files: " + io::MeshFileEndings())
       ->required();
   AddFileOptions(command, settings);
   AddViewOptions(command, &settings->view);
   AddShadingOptions(command, settings);
+  AddTextureOption(command, &settings->texture);
   AddWorkersOption(command, &settings->workers);
 }
 
@@ -160,6 +180,7 @@ Status CheckRenderOptions(const CLI::App& command, const RenderSettings& s) {
       {"--shininess", phong, "--shading phong"},
       {"--sh", s.lighting == Lighting::kSphericalHarmonics, "--shading sh"},
       {"--opencv-centre", !s.view.camera_file.empty(), "--cameras"},
+      {"--up", !from_file, "cameras that are not of a file"},
       {"--fov", !from_file, "cameras that are not of a file"},
       {"--azimuth", framed, "a camera that is framed by itself"},
       {"--elevation", framed, "a camera that is framed by itself"},

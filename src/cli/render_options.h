@@ -16,6 +16,9 @@ namespace tilegrad::cli {
 
 // A bright sky above, some more from +z.
 constexpr std::array<float, 9> kSky = {2.5f, -0.6f, 0.4f, 0, 0, 0, 0, 0, 0};
+// The same in the axes of a mesh whose z or x is up (scene/up_axis.h).
+constexpr std::array<float, 9> kSkyOfZ = {2.5f, 0.4f, 0.6f, 0, 0, 0, 0, 0, 0};
+constexpr std::array<float, 9> kSkyOfX = {2.5f, 0, 0.4f, -0.6f, 0, 0, 0, 0, 0};
 
 // What was asked for.
 struct RenderSettings {
@@ -26,9 +29,9 @@ struct RenderSettings {
   Lighting lighting = Lighting::kLambert;
   std::vector<std::tuple<float, float, float, float>> lights;  // x y z intensity
   bool camera_light = false;
-  std::vector<float> sh = {kSky.begin(), kSky.end()};
+  std::vector<float> sh;  // empty: the sky above
   float ambient = 0.2f, specular = 0.4f;
-  std::string cull = "auto", write_cameras;
+  std::string cull = "auto", write_cameras, texture;
   int supersampling = 3, workers = 0;
   double soft_delta = 0;
   bool explain = false;
@@ -36,6 +39,10 @@ struct RenderSettings {
 
 // Declares them on `command`, which writes to `settings` when it is parsed.
 void AddRenderOptions(CLI::App* command, RenderSettings* settings);
+
+// --up takes one word or three numbers, which CLI11 cannot tell from the meshes that follow: in the
+// words of a command line, those numbers joined by commas.
+std::vector<std::string> JoinUpVector(std::vector<std::string> words);
 
 // After parsing. An option that would change nothing is a mistake: what it is for is not asked for.
 Status CheckRenderOptions(const CLI::App& command, const RenderSettings& settings);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -88,11 +90,25 @@ Result<std::vector<CameraView>> GltfViews(const ViewSettings& settings, const io
   return views;
 }
 
+// X,Y,Z, or the direction of an axis.
+Result<std::array<double, 3>> UpOf(const ViewSettings& s) {
+  std::array<double, 3> up = {};
+  const std::vector<std::string> words = CLI::detail::split(s.up, ',');
+  if (words.size() == 3 && CLI::detail::lexical_cast(words[0], up[0]) &&
+      CLI::detail::lexical_cast(words[1], up[1]) && CLI::detail::lexical_cast(words[2], up[2])) {
+    return up;
+  }
+  TILEGRAD_ASSIGN(const UpAxis axis, UpAxisOf(s));
+  up[axis == UpAxis::kX ? 0 : axis == UpAxis::kY ? 1 : 2] = 1;
+  return up;
+}
+
 Result<std::vector<CameraView>> LookAtView(const ViewSettings& s, ImageSize size) {
   const Lens lens{s.fov, size.width, size.height};
   if (std::equal(s.eye.begin(), s.eye.end(), s.target.begin()))
     return InvalidArgument("--eye and --target are the same point");
-  const Camera64 camera = LookAtCamera(lens, s.eye.data(), s.target.data(), s.up.data());
+  TILEGRAD_ASSIGN(const auto up, UpOf(s));
+  const Camera64 camera = LookAtCamera(lens, s.eye.data(), s.target.data(), up.data());
   TILEGRAD_TRY(Validate(camera).Within("--eye, --target, --up"));
   return std::vector<CameraView>{{"", camera, size}};
 }
@@ -103,10 +119,15 @@ Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& m
   std::vector<ViewAngle> angles;
   for (int i = 0; i < count; ++i) angles.push_back({s.azimuth - 360.0 * i / count, s.elevation});
   const Framing framing{{s.fov, size.width, size.height}, s.margin, s.distance};
-  TILEGRAD_ASSIGN(const auto cameras, FrameMesh(mesh, framing, angles));
+  TILEGRAD_ASSIGN(const UpAxis axis, UpAxisOf(s));
+  Mesh upright;
+  upright.positions = mesh.positions, upright.faces = mesh.faces;
+  TurnUpright(axis, &upright);
+  TILEGRAD_ASSIGN(const auto cameras, FrameMesh(upright, framing, angles));
   std::vector<CameraView> views;
   for (int i = 0; i < count; ++i) {
-    views.push_back({fmt::format("{:04}", i), CameraCast<double>(cameras[i]), size});
+    const Camera camera = CameraOfFile(axis, cameras[i]);
+    views.push_back({fmt::format("{:04}", i), CameraCast<double>(camera), size});
   }
   return views;
 }
@@ -119,6 +140,11 @@ Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by) {
       camera.translation[row] -= camera.rotation[3 * row + axis] * by[axis];
   }
   return camera;
+}
+
+Result<UpAxis> UpAxisOf(const ViewSettings& settings) {
+  if (const auto axis = UpAxisNamed(settings.up)) return *axis;
+  return InvalidArgument("--up {}: y, z or x; with --eye also X Y Z", settings.up);
 }
 
 Result<std::vector<CameraView>> ChooseViews(const ViewSettings& settings,

@@ -14,16 +14,27 @@ namespace tilegrad::cli {
 
 void AddWorkersOption(CLI::App* command, int* workers) {
   command
-      ->add_option("--workers", *workers,
-                   "threads; 0: one per core. The result does not depend on it")
+      ->add_option("--threads,--workers", *workers,
+                   "0: one per core. The result does not depend on it. --workers is the old name")
+      ->envname("TILEGRAD_THREADS")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
+}
+
+void AddForceOption(CLI::App* command, bool* force) {
+  command->add_flag("--force", *force,
+                    "replace files that are there even if tilegrad did not write them; never what "
+                    "is read here");
 }
 
 void AddRunOptions(CLI::App* command, RunOptions* options) {
   command->add_option("--run", options->run, "run folder [the newest below runs/]");
   command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
   AddWorkersOption(command, &options->workers);
+}
+
+Status CheckRunFolder(const Path& folder, const OutputGuard& guard) {
+  return train::ListCheckpoints(folder).empty() ? guard.CheckFolder(folder) : Status();
 }
 
 Result<Path> ChooseRun(const std::string& given) {
@@ -55,6 +66,23 @@ Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) 
   return predictor;
 }
 
+namespace {
+
+// A relative name counts from where the run was started: here, or some folder above the run.
+std::optional<Path> FindDataset(const Path& dataset, const Path& run) {
+  std::error_code error;
+  if (std::filesystem::exists(dataset, error)) return dataset;
+  if (dataset.is_absolute()) return std::nullopt;
+  Path above = std::filesystem::canonical(run, error);
+  while (!error && above.has_relative_path()) {
+    above = above.parent_path();
+    if (std::filesystem::exists(above / dataset, error)) return above / dataset;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
   const Path file = run / "run.json";
@@ -69,11 +97,11 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }
   const Path dataset = json["dataset"].get<std::string>();
-  if (!std::filesystem::exists(dataset, error)) {
-    return NotFound("{}: its dataset {} is not there, seen from this folder; name it with --data",
-                    file.string(), dataset.string());
-  }
-  return dataset;
+  if (const auto found = FindDataset(dataset, run)) return *found;
+  return NotFound(
+      "{}: its dataset {} is not there, seen from this folder or those above the run; name it with "
+      "--data",
+      file.string(), dataset.string());
 }
 
 }  // namespace tilegrad::cli

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "base/file.h"
+#include "base/output_guard.h"
 #include "train/predictor.h"
 
 namespace tilegrad::cli {
@@ -17,13 +17,18 @@ struct RunOptions {
 };
 void AddRunOptions(CLI::App* command, RunOptions* options);
 void AddWorkersOption(CLI::App* command, int* workers);
+// --force, for base/output_guard.h.
+void AddForceOption(CLI::App* command, bool* force);
 
+// Whether a run may begin or go on in the folder: it holds a run, or nothing that is not ours.
+Status CheckRunFolder(const Path& folder, const OutputGuard& guard);
 // `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
 // note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);
 // With a note on the terminal of each newer checkpoint that could not be read.
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);
-// `given`, or if that is empty the dataset that the run's run.json names.
+// `given`, or if that is empty the dataset that the run's run.json names, seen from here or from a
+// folder above the run.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);
 
 }  // namespace tilegrad::cli

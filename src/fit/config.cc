@@ -2,6 +2,7 @@
 #include "fit/config.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -14,6 +15,15 @@ namespace {
 constexpr double kDeltaShare = 0.7;                    // of the run, until delta is what it ends at
 constexpr double kFinalPixels = 0.7;                   // of the default delta
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
+
+// By value, as the options of tilegrad fit call them.
+constexpr std::array kLightings = {"none", "lambert", "phong", "sh"};
+constexpr std::array kFilters = {"nearest", "bilinear", "trilinear"};
+
+template <class Names, class Value>
+std::string NameIn(const Names& names, Value value) {
+  return names[static_cast<std::size_t>(value)];
+}
 
 double FinalDelta(const FitConfig& config, ImageSize size) {
   if (config.delta > 0) return config.delta;
@@ -68,9 +78,9 @@ std::string DescribeConfig(const FitConfig& config) {
     out += fmt::format("{} = {}\n", key, value);
   };
   line("parameters", names);
-  line("lighting", static_cast<int>(c.lighting));
+  line("lighting", NameIn(kLightings, c.lighting));
   line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
-  line("filter", static_cast<int>(c.filter));
+  line("filter", NameIn(kFilters, c.filter));
   line("vertex_colors", c.vertex_colors);
   line("max_alpha_error", c.max_alpha_error);
   line("rates", fmt::format("{}", fmt::join(c.rates.of, ",")));

@@ -9,8 +9,10 @@
 #include <numbers>
 
 #include "base/error.h"
-#include "fit/transforms.h"
+#include "base/read_budget.h"
+#include "fit/colmap_frames.h"
 #include "io/image_file.h"
+#include "io/orientation.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/data/dataset_files.h"
@@ -23,6 +25,23 @@ constexpr std::size_t kMostPixels = std::size_t{1} << 30;  // of all views toget
 ImageSize SizeOf(const ImageU8& image) { return {image.width, image.height}; }
 
 std::string Describe(ImageSize size) { return fmt::format("{} x {}", size.width, size.height); }
+
+// NeRF programs differ: some turn images first, some ignore the tag as COLMAP does. Where the
+// camera's size is that of the stored image and not of the upright one, it counts stored pixels.
+Result<ImageU8> LoadTarget(const TransformsFrame& frame) {
+  const ReadBudget budget;
+  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(frame.image));
+  TILEGRAD_ASSIGN(ImageU8 stored,
+                  io::DecodeImage(bytes, frame.image.string(), io::PixelOrder::kStored));
+  if (frame.stored_order) return stored;
+  const auto fits = [&](const ImageU8& image) {
+    return std::int64_t{image.width} * frame.size.height ==
+           std::int64_t{image.height} * frame.size.width;
+  };
+  const bool fits_stored = frame.size.width > 0 && fits(stored);
+  ImageU8 upright = io::Upright(stored, io::OrientationOf(bytes));
+  return fits_stored && !fits(upright) ? std::move(stored) : std::move(upright);
+}
 
 Status TakeMask(const Path& path, ImageSize size, float* alpha) {
   TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(path));
@@ -51,7 +70,7 @@ void TakeImage(const ImageU8& image, float* color, float* alpha) {
 
 // Grows the input by one view.
 Status AddView(const TransformsFrame& frame, FitInput* input) {
-  TILEGRAD_ASSIGN(const ImageU8 image, io::LoadImage(frame.image));
+  TILEGRAD_ASSIGN(const ImageU8 image, LoadTarget(frame));
   TargetImages& all = input->images;
   const ImageSize size = SizeOf(image);
   if (input->names.empty()) all.width = size.width, all.height = size.height;
@@ -92,22 +111,25 @@ Status Finish(FitInput* input) {
   return {};
 }
 
-Result<Path> FindTransforms(const Path& folder) {
+// Of transforms.json, or of a COLMAP model where there is none.
+Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder) {
   std::error_code error;
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
-    if (std::filesystem::exists(folder / name, error)) return folder / name;
+    if (std::filesystem::exists(folder / name, error)) return ReadTransforms(folder / name);
   }
+  if (const auto model = FindColmapModel(folder)) return ReadColmapFrames(*model);
   if (std::filesystem::exists(DatasetInfoPath(folder), error)) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
                            folder.string());
   }
   if (std::filesystem::is_regular_file(folder, error)) {
-    return InvalidArgument("{}: a file; a fit takes the folder of transforms.json and its images",
-                           folder.string());
+    return InvalidArgument(
+        "{}: a file; a fit takes the folder of transforms.json and its images, or of COLMAP",
+        folder.string());
   }
   return NotFound(
-      "{}: neither transforms.json nor transforms_train.json in it (docs/fit.md says "
-      "what a fit reads)",
+      "{}: neither transforms.json nor transforms_train.json nor a COLMAP model in it (docs/fit.md "
+      "says what a fit reads)",
       folder.string());
 }
 
@@ -141,8 +163,7 @@ void TakeDataset(const std::vector<std::uint8_t>& bytes, std::size_t views, Targ
 }  // namespace
 
 Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
-  TILEGRAD_ASSIGN(const Path file, FindTransforms(folder));
-  TILEGRAD_ASSIGN(const auto frames, ReadTransforms(file));
+  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder));
   FitInput input;
   for (const TransformsFrame& frame : frames) TILEGRAD_TRY(AddView(frame, &input));
   std::error_code error;

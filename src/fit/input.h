@@ -24,10 +24,10 @@ struct FitInput {
   std::vector<std::uint8_t> occupancy;
 };
 
-// A folder with transforms.json, or transforms_train.json. Views of transforms_test.json beside
-// it, if it is there, are held out; otherwise every `hold_out`-th (0: none). An image's mask is its
-// alpha, or the mask_path of its frame (grey or alpha). All images must have one size. Errors name
-// the file.
+// A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
+// transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
+// none). An image's mask is its alpha, or the mask_path of its frame (grey or alpha). All images
+// must have one size. Errors name the file.
 Result<FitInput> ReadFitFolder(const Path& folder, int hold_out);
 
 // One model of a dataset (train/data/dataset.h), named "CLASS/ID".

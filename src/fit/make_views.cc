@@ -61,7 +61,7 @@ bool IsHeldOut(const ViewsOptions& o, int index) {
 std::string ImageName(int index) { return fmt::format("images/{:03}.png", index); }
 
 // Those images beyond `count` that the files of cameras of an earlier call name as ours are named.
-std::vector<Path> EarlierImages(const Path& folder, int count) {
+std::vector<Path> EarlierImages(const Path& folder, int count, const OutputGuard& guard) {
   std::vector<Path> out;
   for (const char* name : {kTrainName, kTestName}) {
     const auto frames = ReadTransforms(folder / name);
@@ -71,26 +71,29 @@ std::vector<Path> EarlierImages(const Path& folder, int count) {
       int index = -1;
       const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), index);
       if (error != std::errc() || end != stem.data() + stem.size() || index < count) continue;
-      if (frame.image == folder / ImageName(index)) out.push_back(frame.image);
+      if (frame.image == folder / ImageName(index) && guard.IsOurs(frame.image)) {
+        out.push_back(frame.image);
+      }
     }
   }
   return out;
 }
 
 // Takes away the cameras that an earlier call left: views of another mesh that stay would be fitted
-// or judged by. Then its images that none of the `count` new ones will replace. What is somebody
-// else's is left alone; transforms.json is what a fit reads first.
-Status ClearEarlierViews(const Path& folder, int count) {
+// or judged by. Then its images that none of the `count` new ones will replace.
+Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard) {
   std::error_code error;
-  const bool ours = std::filesystem::exists(folder / kTruthName, error);
-  const std::vector<Path> images = ours ? EarlierImages(folder, count) : std::vector<Path>();
-  for (const char* name : {"transforms.json", kTrainName, kTestName}) {
+  const Path other = folder / "transforms.json";  // what a fit reads first
+  if (std::filesystem::exists(other, error)) {
+    return InvalidArgument("{}: already exists, and belongs to other images; choose another folder",
+                           other.string());
+  }
+  if (!guard.IsOurs(folder / kTruthName)) TILEGRAD_TRY(guard.CheckFolder(folder));
+  const std::vector<Path> images = EarlierImages(folder, count, guard);
+  for (const char* name : {kTrainName, kTestName}) {
     const Path file = folder / name;
     if (!std::filesystem::exists(file, error)) continue;
-    if (!ours || name == std::string_view("transforms.json")) {
-      return InvalidArgument(
-          "{}: already exists, and belongs to other images; choose another folder", file.string());
-    }
+    TILEGRAD_TRY(guard.Check(file));
     if (!std::filesystem::remove(file, error)) {
       return IoError("{}: cannot be replaced: {}", file.string(), error.message());
     }
@@ -111,12 +114,13 @@ void RemoveHalfWritten(const Path& folder, int count) {
 }  // namespace
 
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
-                 const ProgressSink& progress, const StopFlag& stop) {
+                 const OutputGuard& guard, const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_TRY(Check(options));
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
-  TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out));
-  TILEGRAD_TRY(io::SaveGlb(folder / kTruthName, mesh));
+  TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out, guard));
+  const Path truth = folder / kTruthName;
+  TILEGRAD_TRY(WriteGuarded(guard, truth, [&] { return io::SaveGlb(truth, mesh); }));
   LitRenderer renderer;
   std::vector<TransformsView> train, test;
   const int all = options.views + options.held_out;
@@ -125,7 +129,8 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
     const Camera camera = SpiralCamera(options, i);
     TILEGRAD_ASSIGN(const ImageU8 image, renderer.RenderStraight(mesh, camera, options.size));
     const std::string name = ImageName(i);
-    TILEGRAD_TRY(io::SavePng(folder / name, image));
+    TILEGRAD_TRY(
+        WriteGuarded(guard, folder / name, [&] { return io::SavePng(folder / name, image); }));
     (IsHeldOut(options, i) ? test : train).push_back({name, camera});
     if (progress) {
       progress(
@@ -133,10 +138,13 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
     }
   }
   const ImageSize size{options.size, options.size};
-  if (!test.empty()) {
-    TILEGRAD_TRY(WriteTextAtomic(folder / kTestName, WriteTransforms(test, size)));
-  }
-  TILEGRAD_TRY(WriteTextAtomic(folder / kTrainName, WriteTransforms(train, size)));
+  const auto write = [&](const char* name, const std::vector<TransformsView>& views) {
+    return WriteGuarded(guard, folder / name, [&] {
+      return WriteTextAtomic(folder / name, WriteTransforms(views, size));
+    });
+  };
+  if (!test.empty()) TILEGRAD_TRY(write(kTestName, test));
+  TILEGRAD_TRY(write(kTrainName, train));
   RemoveHalfWritten(folder, all);
   return {};
 }

@@ -3,7 +3,7 @@
 // with, where the truth is known.
 #pragma once
 
-#include "base/file.h"
+#include "base/output_guard.h"
 #include "base/progress.h"
 #include "scene/mesh.h"
 
@@ -25,9 +25,9 @@ struct ViewsOptions {
 // What an earlier call wrote there is replaced: files of cameras first, so that those of a call
 // that was stopped belong to nothing else. Images that they name, and that are not written again,
 // are removed, as is what killed calls left half-written. Cameras lie on a spiral that spreads
-// evenly over the sphere between the two elevations. Errors: options out of range; cameras that no
-// such call wrote.
+// evenly over the sphere between the two elevations. Errors: options out of range; files that no
+// such call wrote, unless `guard` forces it; a transforms.json, which a fit would read instead.
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
-                 const ProgressSink& progress, const StopFlag& stop);
+                 const OutputGuard& guard, const ProgressSink& progress, const StopFlag& stop);
 
 }  // namespace tilegrad::train

@@ -139,6 +139,7 @@ class FitResult {
   Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
 
  private:
+  Status Write(const RunPlan& plan, FitOutcome* outcome) const;
   Result<ImageU8> Sheet(const RunPlan& plan) const;
   Status Score(FitOutcome* outcome) const;
   Status ScoreCameras(FitOutcome* outcome) const;
@@ -219,7 +220,20 @@ Status FitResult::Score(FitOutcome* outcome) const {
   return {};
 }
 
+std::vector<Path> ResultFiles(const Path& out) {
+  return {out / "mesh.glb", out / "transforms_fitted.json", out / "timelapse.png",
+          out / "report.html"};
+}
+
 Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
+  const std::vector<Path> files = ResultFiles(job_.out);
+  TILEGRAD_TRY(job_.guard.CheckAll(files));
+  TILEGRAD_TRY(Write(plan, outcome));
+  job_.guard.NoteAll(files);
+  return {};
+}
+
+Status FitResult::Write(const RunPlan& plan, FitOutcome* outcome) const {
   TILEGRAD_TRY(io::SaveGlb(job_.out / "mesh.glb", MeshOfScene(scene_)));
   TILEGRAD_TRY(WriteCameras());
   TILEGRAD_TRY(ScoreCameras(outcome));
@@ -265,6 +279,7 @@ Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& worke
 Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop) {
   FitOutcome outcome;
+  TILEGRAD_TRY(job.guard.CheckAll(ResultFiles(job.out)));  // before the work
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseFit(job, workers));
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));

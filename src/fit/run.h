@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "base/file.h"
+#include "base/output_guard.h"
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "fit/config.h"
@@ -29,6 +29,7 @@ struct FitJob {
   std::optional<Mesh> start;  // none: a sphere about as large as the object
   std::optional<Mesh> truth;  // to compare with
   Path out;
+  OutputGuard guard;  // of the files beside the run's own
   ExistingRun existing = ExistingRun::kRefuse;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };

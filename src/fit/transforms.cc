@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "io/transforms_lens.h"
 #include "train/json_fields.h"
 
 namespace tilegrad::train {
@@ -30,14 +31,7 @@ Status ReadIntrinsics(const Json& file, const Json& frame, TransformsFrame* out)
                                                      {"w", &width},
                                                      {"h", &height}};
   for (const auto& [key, number] : numbers) TILEGRAD_TRY(ReadNumber(file, frame, key, number));
-  for (const char* key : {"k1", "k2", "k3", "p1", "p2"}) {
-    double distortion = 0;
-    TILEGRAD_TRY(ReadNumber(file, frame, key, &distortion));
-    if (distortion != 0) {
-      return DataLoss("\"{}\" is {}: undistort the images first, the camera here is a pinhole", key,
-                      distortion);
-    }
-  }
+  TILEGRAD_TRY(io::CheckPinhole(file, frame));
   if (out->pose.fl_x == 0 && out->angle_x == 0) {
     return DataLoss("needs \"camera_angle_x\" or \"fl_x\", here or for all frames");
   }
@@ -63,11 +57,14 @@ Status ReadPose(const Json& frame, NerfCamera* out) {
   return {};
 }
 
-Path WithEnding(const Path& path) {
+// As it is written, with slashes, or with the ending that it leaves out: what is there of these.
+Path FindFile(const Path& folder, const std::string& name) {
+  const Path path = folder / name, portable = folder / io::PortablePath(name);
   std::error_code error;
-  if (std::filesystem::exists(path, error)) return path;
-  const Path png = path.string() + ".png";
-  return std::filesystem::exists(png, error) ? png : path;
+  for (const Path& candidate : {path, portable, Path(portable.string() + ".png")}) {
+    if (std::filesystem::exists(candidate, error)) return candidate;
+  }
+  return portable;
 }
 
 Status ReadFrame(const Json& file, const Json& frame, const Path& folder, TransformsFrame* out) {
@@ -75,10 +72,10 @@ Status ReadFrame(const Json& file, const Json& frame, const Path& folder, Transf
   if (!frame.is_object() || !frame.contains("file_path") || !frame["file_path"].is_string()) {
     return DataLoss("needs \"file_path\", a string");
   }
-  out->image = WithEnding(folder / frame["file_path"].get<std::string>());
+  out->image = FindFile(folder, frame["file_path"].get<std::string>());
   if (frame.contains("mask_path")) {
     if (!frame["mask_path"].is_string()) return DataLoss("\"mask_path\" must be a string");
-    out->mask = WithEnding(folder / frame["mask_path"].get<std::string>());
+    out->mask = FindFile(folder, frame["mask_path"].get<std::string>());
   }
   TILEGRAD_TRY(ReadIntrinsics(file, frame, out));
   return ReadPose(frame, &out->pose);

@@ -18,8 +18,9 @@
 namespace tilegrad::train {
 
 struct TransformsFrame {
-  Path image, mask;  // whole paths; mask is empty where there is none
-  NerfCamera pose;   // its intrinsics are 0 where they are not given
+  Path image, mask;           // whole paths; mask is empty where there is none
+  bool stored_order = false;  // pixels are counted as the image stores them (io/orientation.h)
+  NerfCamera pose;            // its intrinsics are 0 where they are not given
   double angle_x = 0, angle_y = 0;
   ImageSize size;  // that intrinsics are meant for; 0: of the image
 };

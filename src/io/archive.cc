@@ -51,10 +51,11 @@ std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name
 
 class Folder : public FileSource {
  public:
-  explicit Folder(Path path) : path_(std::move(path)) {}
+  Folder(Path path, std::vector<Path>* read) : path_(std::move(path)), read_(read) {}
   Result<Bytes> Read(const std::string& name) const override {
     const auto found = Find(name);
     if (!found) return NotFound("{}: no such file", Describe(name));
+    if (read_ != nullptr) read_->push_back(*found);
     return ReadFile(*found);
   }
   bool Exists(const std::string& name) const override {
@@ -70,6 +71,7 @@ class Folder : public FileSource {
     return normal ? FindIgnoringCase(path_, *normal) : std::nullopt;
   }
   Path path_;
+  std::vector<Path>* read_;
 };
 
 struct ZipCloser {
@@ -242,8 +244,8 @@ std::optional<std::string> NormalizeName(const std::string& name) {
   return normal.string();
 }
 
-std::shared_ptr<FileSource> OpenFolder(const Path& folder) {
-  return std::make_shared<Folder>(folder);
+std::shared_ptr<FileSource> OpenFolder(const Path& folder, std::vector<Path>* read) {
+  return std::make_shared<Folder>(folder, read);
 }
 
 Result<std::shared_ptr<FileSource>> OpenZip(const Path& path) {

@@ -25,7 +25,8 @@ class FileSource {
       const std::string& name) const = 0;  // for messages: "chairs.zip: a/b.obj"
 };
 
-std::shared_ptr<FileSource> OpenFolder(const Path& folder);
+// Adds the name of each file that is read to `read`, if that is given.
+std::shared_ptr<FileSource> OpenFolder(const Path& folder, std::vector<Path>* read = nullptr);
 
 // Reading is thread-safe (a lock); one entry may be at most 1 GiB unpacked.
 Result<std::shared_ptr<FileSource>> OpenZip(const Path& path);

@@ -42,6 +42,7 @@ Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder);
 
 // Writers for what LoadCameras reads; numbers come back as they were.
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text
+std::vector<Path> ColmapFiles(const Path& folder);  // that SaveColmapCameras writes
 Status SaveNerfCameras(const Path& file, std::span<const CameraView> views);
 Status SaveOpenCvCameras(const Path& file, std::span<const CameraView> views);
 

@@ -124,23 +124,47 @@ Result<Cameras> ReadCamerasText(const Path& file) {
   return cameras;
 }
 
+Status ReadImageLine(std::string_view line, const std::string& place, const Cameras& cameras,
+                     std::vector<CameraView>* views) {
+  std::uint32_t id = 0, camera_id = 0;
+  ColmapCamera c;
+  auto& [w, x, y, z] = c.quaternion;
+  auto& t = c.translation;
+  const bool good = ParseTokens(line, id, w, x, y, z, t[0], t[1], t[2], camera_id);
+  line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+  if (!good || line.empty()) {
+    return DataLoss("{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", place);
+  }
+  return AddView(place, cameras, camera_id, c, std::string(line), views);
+}
+
+// The points that an image sees, X Y POINT3D_ID each. An image has ten words, of which the last is
+// a name: it is no such line even if the name is a number.
+bool IsPoints(std::string_view line) {
+  std::size_t count = 0;
+  double number = 0;
+  for (std::string_view word = NextToken(line); !word.empty(); word = NextToken(line), ++count) {
+    if (!ParseNumber(word, number)) return false;
+  }
+  return count % 3 == 0;
+}
+
+// COLMAP writes two lines an image, the second with its points, which may be empty. Other programs
+// leave that one out, and filters of empty lines drop it.
 Result<std::vector<CameraView>> ReadImagesText(const Path& file, const Cameras& cameras) {
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::vector<CameraView> views;
   Lines lines(text);
+  bool after_image = false;
   for (std::string_view line; lines.Next(line);) {
-    if (IsComment(line) || line.find_first_not_of(" \t") == line.npos) continue;
+    if (IsComment(line)) continue;
+    const bool empty = line.find_first_not_of(" \t") == line.npos;
+    const bool points = after_image && IsPoints(line);
+    after_image = false;
+    if (empty || points) continue;
     const std::string place = fmt::format("{}: line {}", file.string(), lines.Number());
-    std::uint32_t id = 0, camera_id = 0;
-    ColmapCamera c;
-    auto& [w, x, y, z] = c.quaternion;
-    auto& t = c.translation;
-    if (!ParseTokens(line, id, w, x, y, z, t[0], t[1], t[2], camera_id)) {
-      return DataLoss("{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME", place);
-    }
-    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
-    TILEGRAD_TRY(AddView(place, cameras, camera_id, c, std::string(line), &views));
-    lines.Next(line);  // the points that the image sees; may be empty
+    TILEGRAD_TRY(ReadImageLine(line, place, cameras, &views));
+    after_image = true;
   }
   return views;
 }
@@ -267,6 +291,10 @@ Status CheckForColmap(const CameraView& view, const ColmapCamera& camera) {
 
 }  // namespace
 
+std::vector<Path> ColmapFiles(const Path& folder) {
+  return {folder / "cameras.txt", folder / "points3D.txt", folder / "images.txt"};
+}
+
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views) {
   if (views.empty()) return InvalidArgument("{}: no views to write", folder.string());
   std::string cameras = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
@@ -280,9 +308,10 @@ Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views) 
     images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n\n", i + 1, q[0], q[1], q[2], q[3], t[0],
                           t[1], t[2], i + 1, views[i].name);
   }
-  TILEGRAD_TRY(WriteTextAtomic(folder / "cameras.txt", cameras));
-  TILEGRAD_TRY(WriteTextAtomic(folder / "points3D.txt", "# none\n"));
-  return WriteTextAtomic(folder / "images.txt", images);
+  const std::vector<Path> files = ColmapFiles(folder);
+  TILEGRAD_TRY(WriteTextAtomic(files[0], cameras));
+  TILEGRAD_TRY(WriteTextAtomic(files[1], "# none\n"));
+  return WriteTextAtomic(files[2], images);
 }
 
 }  // namespace tilegrad::io

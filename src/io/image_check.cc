@@ -42,7 +42,8 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
   return DataLoss("{}: truncated PNG: it ends without an end chunk", name);
 }
 
-constexpr int kHuffmanTables = 0xc4, kStartOfScan = 0xda, kStartOfImage = 0xd8, kEndOfImage = 0xd9;
+constexpr int kApp14 = 0xee, kHuffmanTables = 0xc4, kStartOfScan = 0xda, kStartOfImage = 0xd8,
+              kEndOfImage = 0xd9;
 
 // Files have about ten. Each goes over the whole picture, even if it takes a few bytes: stb_image
 // took 5 s for 100 scans of 16,000 x 16,000 pixels in 25 kB.
@@ -62,6 +63,33 @@ bool HuffmanTablesFit(ByteSpan segment) {
   return true;
 }
 
+// SOF0 to SOF2, the frames that stb_image reads.
+bool IsFrame(int marker) { return marker >= 0xc0 && marker <= 0xc2; }
+
+// What says how a JPEG's components are to be read as colours.
+struct JpegColors {
+  int components = 0;
+  int transform = -1;  // of the segment that Adobe's programs write
+
+  void Take(int marker, ByteSpan segment) {
+    constexpr std::string_view kAdobe = "Adobe";
+    if (IsFrame(marker) && segment.size() > 5) components = segment[5];
+    if (marker == kApp14 && segment.size() >= 12 &&
+        std::equal(kAdobe.begin(), kAdobe.end(), segment.begin())) {
+      transform = segment[11];
+    }
+  }
+  // Four components are CMYK (0) or YCCK (2), both inverted, if that segment is there. Without it
+  // they may be inverted or not; stb_image takes them for YCbCr.
+  Status Check(const std::string& name) const {
+    if (components != 4 || transform == 0 || transform == 2) return {};
+    return DataLoss(
+        "{}: a JPEG of four components that does not say whether they are CMYK or inverted CMYK; "
+        "save it as RGB",
+        name);
+  }
+};
+
 // Markers without a segment: TEM, RST0 to RST7, SOI.
 bool HasNoSegment(int marker) { return marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8); }
 
@@ -75,16 +103,18 @@ std::size_t NextMarker(ByteSpan bytes, std::size_t at) {
 
 Status CheckJpeg(ByteSpan bytes, const std::string& name) {
   int scans = 0;
+  JpegColors colors;
   std::size_t at = NextMarker(bytes, 0);
   for (; at < bytes.size(); at = NextMarker(bytes, at)) {
     const int marker = bytes[at++];
-    if (marker == kEndOfImage) return {};
+    if (marker == kEndOfImage) return colors.Check(name);
     if (HasNoSegment(marker)) continue;
     const std::size_t length = bytes.size() - at < 2 ? 0 : bytes[at] << 8 | bytes[at + 1];
     if (length < 2 || length > bytes.size() - at) {
       return DataLoss(
           "{}: truncated or corrupt JPEG: the segment at byte {} reaches beyond the end", name, at);
     }
+    colors.Take(marker, bytes.subspan(at + 2, length - 2));
     if (marker == kHuffmanTables && !HuffmanTablesFit(bytes.subspan(at + 2, length - 2)))
       return DataLoss("{}: corrupt JPEG: the Huffman tables at byte {} are too long", name, at);
     if (marker == kStartOfScan && ++scans > kMostScans)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "io/guarded_process.h"
 #include "io/image_check.h"
 #include "io/image_header.h"
+#include "io/orientation.h"
 #include "io/pnm_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -80,26 +82,45 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   return image;
 }
 
-Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::string& name) {
+Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::string& name,
+                            PixelOrder order) {
   if (bytes.size() > std::size_t{1} << 30)
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   if (IsPnm(bytes)) return DecodePnm(bytes, name);
   TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
   const auto padded = WithFullPalette(bytes);
-  return Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name);
+  TILEGRAD_ASSIGN(ImageU8 image,
+                  Decode(padded ? std::span<const std::uint8_t>(*padded) : bytes, name));
+  return order == PixelOrder::kStored ? std::move(image)
+                                      : Upright(std::move(image), OrientationOf(bytes));
 }
 
 }  // namespace
 
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name,
+                            PixelOrder order) {
   if (GuardedMustStop()) return Cancelled("{}: stopped", name);
-  return DecodeBytes(bytes, name);
+  return DecodeBytes(bytes, name, order);
 }
 
-Result<ImageU8> LoadImage(const Path& path) {
+Result<ImageU8> LoadImage(const Path& path, PixelOrder order) {
   const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
-  return DecodeBytes(bytes, path.string());
+  return DecodeBytes(bytes, path.string(), order);
+}
+
+ImageU8 ToColor(ImageU8 image) {
+  if (image.channels >= 3) return image;
+  const bool alpha = image.channels == 2;
+  ImageU8 out(image.width, image.height, alpha ? 4 : 3);
+  const std::size_t count = static_cast<std::size_t>(image.width) * image.height;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint8_t* from = &image.pixels[i * image.channels];
+    std::uint8_t* to = &out.pixels[i * out.channels];
+    std::fill_n(to, 3, from[0]);
+    if (alpha) to[3] = from[1];
+  }
+  return out;
 }
 
 Result<Bytes> EncodePng(const ImageU8& image) {

@@ -13,11 +13,18 @@ namespace tilegrad::io {
 // Pixels; a larger header is refused before any memory is taken.
 inline constexpr int kMaxImageSide = 16384;
 
-// 1 to 4 channels as in the file (16-bit files are reduced to 8). `name` stands in error messages.
-// DecodeImage, of what other files hold, is kCancelled where they are not to be read on
-// (StopGuardedBy).
-Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
-Result<ImageU8> LoadImage(const Path& path);
+// Programs that ignore the tag of orientation (orientation.h) count pixels as they are stored.
+enum class PixelOrder { kUpright, kStored };
+
+// 1 to 4 channels as in the file (16-bit files are reduced to 8; CMYK becomes RGB). `name` stands
+// in error messages. DecodeImage, of what other files hold, is kCancelled where they are not to be
+// read on (StopGuardedBy).
+Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name,
+                            PixelOrder order = PixelOrder::kUpright);
+Result<ImageU8> LoadImage(const Path& path, PixelOrder order = PixelOrder::kUpright);
+
+// 3 or 4 channels: grey becomes RGB, grey with alpha RGBA.
+ImageU8 ToColor(ImageU8 image);
 
 // 1 to 4 channels, 8 bits. SavePng appears whole or not at all.
 Result<Bytes> EncodePng(const ImageU8& image);

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "io/camera_file.h"
+#include "io/transforms_lens.h"
 
 namespace tilegrad::io {
 namespace {
@@ -157,8 +158,7 @@ Result<double> NerfFocal(const Frame& frame, const char* focal, const char* angl
 
 Result<CameraView> NerfView(const Frame& frame, std::size_t index,
                             const CameraFileOptions& options) {
-  constexpr std::array<const char*, 6> kDistortion = {"k1", "k2", "k3", "k4", "p1", "p2"};
-  TILEGRAD_TRY(frame.NoDistortion(kDistortion));
+  TILEGRAD_TRY(CheckPinhole(frame.top, frame.frame).Within(frame.place));
   TILEGRAD_ASSIGN(const ImageSize size, frame.Size("w", "h", options.size));
   NerfCamera from;
   TILEGRAD_ASSIGN(from.camera_to_world, ArrayOf<16>(frame, "transform_matrix"));
@@ -174,7 +174,7 @@ Result<CameraView> NerfView(const Frame& frame, std::size_t index,
   if (frame.Find("cy") != nullptr) {
     TILEGRAD_ASSIGN(from.cy, frame.Number("cy"));
   }
-  return Named(frame.Name("file_path", index), FromNerf(from), size, frame.place);
+  return Named(PortablePath(frame.Name("file_path", index)), FromNerf(from), size, frame.place);
 }
 
 Status OpenCvPose(const Frame& frame, OpenCvCamera* out) {

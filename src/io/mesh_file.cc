@@ -6,6 +6,7 @@
 #include <cctype>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "base/error.h"
 #include "base/read_budget.h"
@@ -55,21 +56,6 @@ std::string Folder(const std::string& name) {
   return slash == std::string::npos ? "" : name.substr(0, slash + 1);
 }
 
-// Textures are 3 or 4 channels: grey becomes RGB, grey with alpha RGBA.
-ImageU8 ToColor(ImageU8 image) {
-  if (image.channels >= 3) return image;
-  const bool alpha = image.channels == 2;
-  ImageU8 out(image.width, image.height, alpha ? 4 : 3);
-  const std::size_t count = static_cast<std::size_t>(image.width) * image.height;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint8_t* from = &image.pixels[i * image.channels];
-    std::uint8_t* to = &out.pixels[i * out.channels];
-    std::fill_n(to, 3, from[0]);
-    if (alpha) to[3] = from[1];
-  }
-  return out;
-}
-
 // Files have many parts of few materials: the last one is dropped if it equals one before it.
 void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   const Material& last = mesh.materials.back();
@@ -81,21 +67,40 @@ void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   mesh.materials.pop_back();
 }
 
-// Some files count fractions from 0 to 255. No sound colour is beyond 1; up to 2 may be light.
-void ScaleByteColors(std::vector<glm::vec4>& colors, std::vector<std::string>& warnings) {
-  glm::vec4 most(0);
-  for (const glm::vec4& color : colors) most = glm::max(most, color);
-  if (std::max({most.r, most.g, most.b}) <= 2) return;
-  const glm::vec4 full(glm::vec3(255), most.a > 2 ? 255 : 1);
-  for (glm::vec4& color : colors) color /= full;
-  warnings.push_back("colours reach beyond 2: taken as counted from 0 to 255");
+bool IsByte(glm::vec4 color) {
+  return glm::all(glm::equal(glm::vec3(color), glm::round(glm::vec3(color)))) &&
+         glm::all(glm::lessThanEqual(glm::vec3(color), glm::vec3(255)));
 }
 
-void ClampColors(Mesh& mesh) {
-  const auto clamp = [](glm::vec4& color) { color = glm::clamp(color, 0.0f, 1.0f); };
-  std::for_each(mesh.colors.begin(), mesh.colors.end(), clamp);
-  std::for_each(mesh.corner_colors.begin(), mesh.corner_colors.end(), clamp);
-  for (Material& material : mesh.materials) clamp(material.base_color);
+// Colours are 0 to 1. Some programs write bytes as floating point, 0 to 255: whole numbers, and
+// not only 0 and 1, or numbers that no light explains.
+void ClampColors(std::vector<glm::vec4>* colors, std::vector<std::string>* warnings) {
+  constexpr float kBrightest = 16;
+  float most = 0;
+  for (const glm::vec4& c : *colors) most = std::max({most, c.r, c.g, c.b});
+  const bool bytes =
+      most > kBrightest || (most > 1 && std::all_of(colors->begin(), colors->end(), IsByte));
+  if (bytes) {
+    warnings->push_back(
+        fmt::format("vertex colours are numbers up to {}; taken for bytes, 0 to 255", most));
+    for (glm::vec4& c : *colors) c = {glm::vec3(c) / 255.0f, c.a > 1 ? c.a / 255 : c.a};
+  } else if (most > 1 + 1e-3f) {
+    warnings->push_back(fmt::format("vertex colours reach {}; cut to 1", most));
+  }
+  for (glm::vec4& c : *colors) c = glm::clamp(c, 0.0f, 1.0f);
+}
+
+void ClampColors(LoadedMesh& loaded) {
+  ClampColors(&loaded.mesh.colors, &loaded.warnings);
+  ClampColors(&loaded.mesh.corner_colors, &loaded.warnings);
+  for (Material& material : loaded.mesh.materials) {
+    const glm::vec4& c = material.base_color;
+    if (std::max({c.r, c.g, c.b}) > 1 + 1e-3f) {
+      loaded.warnings.push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is cut to 1",
+                                            material.name, c.r, c.g, c.b));
+    }
+    material.base_color = glm::clamp(material.base_color, 0.0f, 1.0f);
+  }
 }
 
 std::size_t BytesOf(const Mesh& mesh) {
@@ -259,9 +264,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   PlaceNearOrigin(*loaded);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
-  ScaleByteColors(loaded->mesh.colors, loaded->warnings);
-  ScaleByteColors(loaded->mesh.corner_colors, loaded->warnings);
-  ClampColors(loaded->mesh);
+  ClampColors(*loaded);
   MakeNormalsUnit(loaded->mesh);
   return loaded;
 }
@@ -275,7 +278,11 @@ Result<LoadedMesh> LoadMesh(const Path& path) {
     folder = std::filesystem::absolute(path, error).lexically_normal().parent_path();
   }
   const Path above = folder.has_parent_path() ? folder.parent_path() : Path(".");
-  return LoadMesh(*OpenFolder(above), (folder.filename() / path.filename()).string());
+  std::vector<Path> files;
+  auto loaded =
+      LoadMesh(*OpenFolder(above, &files), (folder.filename() / path.filename()).string());
+  if (loaded.ok()) loaded->files = std::move(files);
+  return loaded;
 }
 
 }  // namespace tilegrad::io

@@ -39,6 +39,7 @@ struct LoadedMesh {
   // place in the world. 0, unless the mesh is farther from the origin than 256 times its size.
   glm::dvec3 origin{0};
   std::vector<glm::dvec3> exact;  // of readers: positions before they are rounded; empty afterwards
+  std::vector<Path> files;        // that were read: the mesh, its MTL, buffers and images
 };
 
 // Vertices are those of the file, in its order, once each, whether a face uses them or not: OBJ,

@@ -173,7 +173,8 @@ TEST_F(BrokenInputs, SeveralImagesOneOfThemBad) {
                  (folder_ / "b/x.png").string() + " " + (folder_ / "opaque.png").string());
   EXPECT_EQ(outcome.exit_code, 3) << outcome.output;  // the first one's: missing
   // Two images of one name are two meshes.
-  for (const char* name : {"x.glb", "x_turntable.png", "x_2.glb", "x_2_turntable.png"})
+  for (const char* name :
+       {"x_predicted.glb", "x_turntable.png", "x_2_predicted.glb", "x_2_turntable.png"})
     EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
 }
 
@@ -202,6 +203,9 @@ TEST_F(BrokenInputs, DatasetsOfOtherFoldersOrSplits) {
   ASSERT_NE(at, std::string::npos);
   Write("run/run.json", std::string(json).replace(at, Data().string().size(), "elsewhere"));
   ExpectRefused("eval --run " + run.string(), "elsewhere", "--data");
+  // A relative name is also looked for in the folders above the run.
+  Write("run/run.json", std::string(json).replace(at, Data().string().size(), "copy"));
+  ExpectRefused("eval --run " + run.string(), copy.string() + ": no models in its test split");
 }
 
 TEST_F(BrokenInputs, DatasetsOfAnotherImageSize) {

@@ -124,6 +124,89 @@ TEST_F(Render, ExrIsOneFile) {
   EXPECT_FALSE(Exists("a_depth.exr"));
 }
 
+// A flat bar along the axis that is up, red; the picture shows it upright, as high as it can be.
+TEST_F(Render, MeshesWithAnotherAxisUp) {
+  const auto bar = [&](const std::string& name, glm::vec3 half) {
+    Mesh mesh = Box(-half, half);
+    SetColor(mesh, {1, 0, 0, 1});
+    ASSERT_TRUE(io::SaveGlb(folder_ / name, mesh).ok());
+  };
+  bar("y.glb", {0.1f, 1, 0.2f});
+  bar("z.glb", {0.1f, 0.2f, 1});
+  bar("x.glb", {1, 0.1f, 0.2f});
+  const auto picture = [&](const std::string& mesh, const std::string& options) {
+    const std::string out = In(mesh + "_" + std::to_string(options.size()) + ".png");
+    const Outcome outcome = RunProgram("render " + In(mesh + ".glb") + " --size 32 --force " +
+                                       options + " --out " + out);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return io::LoadImage(out).value();
+  };
+  const ImageU8 upright = picture("y", "");
+  EXPECT_EQ(picture("z", "--up z").pixels, upright.pixels);
+  EXPECT_EQ(picture("x", "--up X").pixels, upright.pixels);
+  EXPECT_NE(picture("z", "--up y").pixels, upright.pixels);
+  // The sky turns with it.
+  const std::string sky = " --shading sh";
+  EXPECT_EQ(picture("z", "--up z" + sky).pixels, picture("y", sky).pixels);
+  EXPECT_EQ(picture("x", "--up x" + sky).pixels, picture("y", sky).pixels);
+  // By hand: a word or three numbers.
+  const std::string eye = "--eye 0 -4 0 ";
+  EXPECT_EQ(picture("z", eye + "--up z").pixels, picture("z", eye + "--up 0 0 2").pixels);
+  EXPECT_EQ(picture("z", eye + "--up z").pixels, picture("y", "--eye 0 0 4").pixels);
+  // Cameras are those of the file: its turntable goes around z.
+  ExpectRefused("--up 0 0 1", 2, "--up 0,0,1");
+  ExpectRefused("--up w", 2, "--up w");
+  ExpectRefused("--gltf-camera 0 --up z", 2, "--up would do nothing");
+  ASSERT_EQ(RunProgram("render " + In("z.glb") + " --up z --size 8 --turntable 4 --elevation 0 " +
+                       "--out " + In("t") + " --write-cameras " + In("t.json"))
+                .exit_code,
+            0);
+  const auto views = io::LoadCameras(folder_ / "t.json", {});
+  ASSERT_TRUE(views.ok()) << views.status().message();
+  for (const auto& view : *views)
+    EXPECT_NEAR(view.camera.rotation[5], 1, 1e-6);  // the picture's up is z
+}
+
+TEST_F(Render, TexturesByHand) {
+  ImageU8 blue(1, 1, 3);
+  blue.pixels = {0, 0, 255};
+  ASSERT_TRUE(io::SavePng(folder_ / "blue.png", blue).ok());
+  const std::string faces = "vt 0 0\nf 1/1 2/1 3/1\n", corners = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\n";
+  Write("plain.obj", corners + faces);
+  Write("kd.mtl", std::string("newmtl m\nKd 0.5 0.5 0.5\n"));
+  Write("kd.obj", "mtllib kd.mtl\nusemtl m\n" + corners + faces);
+  Write("bare.obj", corners + "f 1 2 3\n");
+  Write("map.mtl", std::string("newmtl m\nmap_Kd blue.png\n"));
+  Write("map.obj", "mtllib map.mtl\nusemtl m\n" + corners + faces);
+  Write("uv.ply", std::string("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                              "property float y\nproperty float z\nproperty float s\n"
+                              "property float t\nelement face 1\nproperty list uchar int "
+                              "vertex_indices\nend_header\n-1 -1 0 0 0\n1 -1 0 0 0\n0 1 0 0 0\n"
+                              "3 0 1 2\n"));
+  const auto run = [&](const std::string& mesh, const std::string& texture) {
+    return RunProgram("render --size 16 --eye 0 0 4 --shading none --force " + In(mesh) +
+                      " --texture " + In(texture) + " --out " + In("a.png"));
+  };
+  for (const char* mesh : {"plain.obj", "kd.obj", "uv.ply"}) {
+    const Outcome outcome = run(mesh, "blue.png");
+    ASSERT_EQ(outcome.exit_code, 0) << mesh << outcome.output;
+    const ImageU8 image = io::LoadImage(folder_ / "a.png").value();
+    EXPECT_EQ(std::vector<int>(image.at(8, 8), image.at(8, 8) + 4),
+              (std::vector<int>{0, 0, 255, 255}))
+        << mesh;
+  }
+  const auto refused = [&](const std::string& mesh, const std::string& texture, int code,
+                           const std::string& part) {
+    const Outcome outcome = run(mesh, texture);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+  };
+  refused("bare.obj", "blue.png", 2, "no texture coordinates");
+  refused("map.obj", "blue.png", 2, "has a texture already");
+  refused("plain.obj", "none.png", 3, "none.png");
+  refused("plain.obj", "kd.mtl", 3, "kd.mtl");
+}
+
 TEST_F(Render, EveryShadingModel) {
   for (const char* model : {"none", "lambert", "phong", "sh"}) {
     const std::string file = std::string(model) + ".png";
@@ -178,7 +261,10 @@ TEST_F(Render, ViewsOfOneNameDoNotOverwriteEachOther) {
     frames += (frames.empty() ? "" : ",") + ("{\"file_path\":\"" + name + "\"," + camera);
   Write("views.json", "{\"camera_angle_x\":0.7,\"frames\":[" + frames + "]}");
   ExpectDone("--cameras " + In("views.json") + " --size 16 --out " + In("out"));
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "out"), {}), 3);
+  int pictures = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out"))
+    pictures += entry.path().extension() == ".png";
+  EXPECT_EQ(pictures, 3);
 }
 
 // The depth of "ball" and the colours of "ball_depth".

@@ -26,7 +26,7 @@ class Fit : public TempFolderTest {
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.8f, 0.4f, 0.2f, 1});
     const Status made =
-        MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", {}, stop_);
+        MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", {}, {}, stop_);
     ASSERT_TRUE(made.ok()) << made.message();
   }
   FitJob Job(const std::string& out) {
@@ -165,7 +165,7 @@ TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
 TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
   const auto make = [&](int held_out, const Path& folder) {
     return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder, {},
-                     stop_);
+                     {}, stop_);
   };
   ASSERT_TRUE(make(0, folder_ / "views").ok());
   const auto input = ReadFitFolder(folder_ / "views", 3);
@@ -189,7 +189,7 @@ TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
 TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
   const auto make = [&](int views) {
     return MakeViews(Icosphere(1, 1), {.views = views, .held_out = 1, .size = 16}, folder_ / "few",
-                     {}, stop_);
+                     {}, {}, stop_);
   };
   ASSERT_TRUE(make(6).ok());
   const Path images = folder_ / "few" / "images";
@@ -205,13 +205,9 @@ TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
     names.push_back(entry.path().filename().string());
   }
   std::sort(names.begin(), names.end());
-  const std::vector<std::string> expected = {"000.png",
-                                             "001.png",
-                                             "002.png",
-                                             "007.png",
-                                             "copy.99999999.tmp",
-                                             "photo.png",
-                                             "photo.png.99999999.tmp"};
+  const std::vector<std::string> expected = {
+      ".tilegrad-made", "000.png",           "001.png",   "002.png",
+      "007.png",        "copy.99999999.tmp", "photo.png", "photo.png.99999999.tmp"};
   EXPECT_EQ(names, expected);
 }
 

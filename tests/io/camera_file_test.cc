@@ -133,6 +133,65 @@ TEST_F(CameraFiles, BrokenColmapText) {
   EXPECT_FALSE(io::LoadColmapCameras(folder_ / "none").ok());
 }
 
+// With a line of points after each image, without, and with it for some.
+TEST_F(CameraFiles, ColmapImagesWithoutPoints) {
+  Write("cameras.txt", std::string("1 PINHOLE 640 480 500 500 320 240\n"));
+  const std::string a = "1 1 0 0 0 0 0 0 1 a.png\n", b = "2 1 0 0 0 1 0 0 1 b c.png\n",
+                    c = "3 1 0 0 0 2 0 0 1 0003\n", points = "1.5 2.5 -1 3 4 17\n";
+  for (const std::string& text :
+       {a + "\n" + b + "\n" + c + "\n", a + b + c, a + points + b + points + c + points,
+        a + b + points + c, a + points + b + c, "# head\n" + a + "# aside\n" + b + "\n" + c,
+        "\n\n" + a + "\n\n" + b + points + "\n" + c, a + "\r\n" + b + "  \n" + c}) {
+    Write("images.txt", text);
+    const auto got = io::LoadColmapCameras(folder_);
+    ASSERT_TRUE(got.ok()) << text << got.status().message();
+    ASSERT_EQ(got->size(), 3u) << text;
+    EXPECT_EQ((*got)[1].name, "b c.png");
+    EXPECT_EQ((*got)[2].name, "0003");
+    EXPECT_EQ((*got)[2].camera.translation[0], 2);
+  }
+  Write("images.txt", a + "1.5 2.5\n" + b);
+  ExpectMessage(io::LoadColmapCameras(folder_).status(), "images.txt: line 2", "CAMERA_ID NAME");
+  Write("images.txt", a + "\n2 1 0 0 0 1 0 0 1\n");
+  ExpectMessage(io::LoadColmapCameras(folder_).status(), "images.txt: line 3", "NAME");
+}
+
+constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
+
+TEST_F(CameraFiles, LensesThatBendRays) {
+  const std::string head = R"({"w":4,"h":4,"fl_x":3,)", frame = std::string("{") + kPose + "}";
+  for (const std::string lens :
+       {R"("camera_model":"OPENCV_FISHEYE","k1":0)", R"("camera_model":"opencv_fisheye")",
+        R"("camera_model":"EQUIRECTANGULAR")", R"("camera_model":"VR180_L")",
+        R"("camera_model":"FISHEYE624")", R"("camera_model":5)", R"("is_fisheye":true)",
+        R"("equirectangular":1)", R"("k1":0.1)", R"("k4":-1e-9)", R"("p2":"a")", R"("k6":1)"}) {
+    ExpectRefused("a.json", head + lens + R"(,"frames":[)" + frame + "]}", "undistort");
+    // In one frame only.
+    const std::string bent = std::string("{") + lens + "," + kPose + "}";
+    ExpectRefused("a.json", head + R"("frames":[)" + frame + "," + bent + "]}", "frame 1");
+  }
+  for (const std::string lens :
+       {R"("camera_model":"PINHOLE")", R"("camera_model":"OPENCV","k1":0,"k2":0.0,"p1":0)",
+        R"("camera_model":"SIMPLE_PINHOLE")", R"("camera_model":null)", R"("is_fisheye":false)",
+        R"("camera_model":"perspective")"}) {
+    const auto got =
+        io::LoadCameras(Write("a.json", head + lens + R"(,"frames":[)" + frame + "]}"), {});
+    EXPECT_TRUE(got.ok()) << lens << got.status().message();
+  }
+  // A frame's own word counts.
+  EXPECT_TRUE(io::LoadCameras(Write("a.json", head + R"("is_fisheye":true,"frames":[{)" +
+                                                  R"("is_fisheye":false,)" + kPose + "}]}"),
+                              {})
+                  .ok());
+}
+
+TEST_F(CameraFiles, BackslashesOfWindows) {
+  const std::string text = R"({"w":4,"h":4,"fl_x":3,"frames":[{"file_path":".\\images\\0 1.png",)";
+  const auto got = io::LoadCameras(Write("a.json", text + kPose + "}]}"), {});
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  EXPECT_EQ(got->front().name, "./images/0 1.png");
+}
+
 TEST_F(CameraFiles, SyntheticNerfSaysOnlyTheAngle) {
   const std::string text = R"({"camera_angle_x": 0.6911112, "frames": [{"file_path": "./r_0",
     "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]})";

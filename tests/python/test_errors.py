@@ -2,6 +2,7 @@
 """What scenes and the renderer refuse, and what they say of it."""
 
 import unittest
+import warnings
 
 import numpy as np
 
@@ -192,6 +193,37 @@ class Errors(unittest.TestCase):
         with self.assertRaises(ValueError):
             renderer.render(scene, width=-1)
         self.assertTrue(np.array_equal(renderer.render(scene, **IMAGE).color, expected))
+
+    def test_colors_that_look_like_bytes_warn(self):
+        """0 to 255 in floating point, of which most is above 1; highlights of a picture are not."""
+        scene = patch()
+        bytes_ = np.rint(np.asarray(scene["colors"]) * 254 + 1).astype(np.float32)
+        for change in ({"colors": bytes_}, {"textures": np.full((4, 4, 3), 128.0)}):
+            with self.assertWarnsRegex(RuntimeWarning, "Scene: (colors|textures).*divide by 255"):
+                scene.replace(**change)
+        bright = np.asarray(scene["colors"]).copy()
+        bright[0] = 9
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            scene.replace(colors=bright)
+            scene.replace(textures=np.full((4, 4, 3), 1.0))
+
+    def test_numbers_have_the_index_of_their_array(self):
+        scene = patch()
+        faces, positions = np.array(scene.faces), np.array(scene.positions)
+        faces[2, 0], positions[4, 1] = 99, np.nan
+        renderer = Renderer(1)
+        for change, text in (({"faces": faces}, r"faces\[2,0\] is 99, outside of \[0, 16\)"),
+                             ({"positions": positions}, r"positions\[4,1\] is nan"),
+                             ({"positions": np.stack([scene.positions, positions])},
+                              r"positions\[4,1\] is nan")):
+            with self.assertRaisesRegex(ValueError, "render: .*" + text):
+                renderer.render(scene.replace(**change), **IMAGE)
+        uvs = np.array(scene["uvs"])
+        index = (3, 2, 1)[:uvs.ndim]
+        uvs[index] = np.inf
+        with self.assertRaisesRegex(ValueError, r"uvs\[" + ",".join(map(str, index)) + r"\] is inf"):
+            renderer.render(scene.replace(uvs=uvs), **IMAGE, outputs=("uv",))
 
 
 if __name__ == "__main__":

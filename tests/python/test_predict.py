@@ -22,7 +22,7 @@ class Predict(FolderTest):
 
     def _program(self, *arguments: object) -> bytes:
         run_program("predict", self.image, "--run", run(), "--out", self.folder, *arguments)
-        return (self.folder / "view.glb").read_bytes()
+        return (self.folder / "view_predicted.glb").read_bytes()
 
     def _python(self, mesh: files.Mesh) -> bytes:
         files.save_mesh(self.folder / "python.glb", mesh)
@@ -97,6 +97,21 @@ class Predict(FolderTest):
             np.testing.assert_array_equal(array, again[name])
         one = files.load_checkpoint(checkpoint.file)
         self.assertEqual(one.step, 3)
+
+    def test_grey_images_with_alpha_are_cut_outs(self) -> None:
+        image = files.load_image(self.image)
+        image[..., 1] = image[..., 2] = image[..., 0]
+        predictor = files.Predictor(run())
+        expected = predictor.prepare(image)
+        np.testing.assert_array_equal(predictor.prepare(image[..., [0, 3]]), expected)
+        files.save_image(self.image, image)
+        colored = self._program()
+        files.save_image(self.image, image[..., [0, 3]])
+        self.assertEqual(self._program(), colored)
+        with self.assertRaisesRegex(ValueError, "no alpha channel"):
+            predictor.prepare(image[..., :1])
+        with self.assertWarnsRegex(RuntimeWarning, "prepare: image.*divide by 255"):
+            predictor.prepare(image.astype(np.float32))
 
     def test_errors(self) -> None:
         predictor = files.Predictor(run())

@@ -245,10 +245,10 @@ before = len(os.listdir("/proc/self/task"))
 renderer.render([scene] * 64)
 print(renderer.threads, len(os.listdir("/proc/self/task")) - before)
 """
-        self.assertEqual(run_python(code, TILEGRAD_NUM_THREADS="1").stdout, "1 0\n")
+        self.assertEqual(run_python(code, TILEGRAD_THREADS="1", TILEGRAD_NUM_THREADS="3").stdout, "1 0\n")
         self.assertIn(run_python(code, TILEGRAD_NUM_THREADS="3").stdout, ("3 1\n", "3 2\n"))
-        wrong = run_python(code, TILEGRAD_NUM_THREADS="many")
-        self.assertIn("ValueError: Renderer: TILEGRAD_NUM_THREADS='many' in the environment, must "
+        wrong = run_python(code, TILEGRAD_THREADS="many")
+        self.assertIn("ValueError: Renderer: TILEGRAD_THREADS='many' in the environment, must "
                       "be a number in 1..1024", wrong.stderr)
 
     def test_instruction_set(self):
@@ -257,6 +257,11 @@ print(renderer.threads, len(os.listdir("/proc/self/task")) - before)
         wrong = run_python(code, TILEGRAD_TARGET="MMX")
         self.assertIn("MMX", wrong.stderr)
         self.assertNotEqual(wrong.returncode, 0)
+
+    def test_modules_need_no_import_of_their_own(self):
+        code = "import tilegrad; print(tilegrad.files.mesh_endings()[0], tilegrad.fragments.__name__)"
+        self.assertEqual(run_python(code).stdout, ".glb tilegrad.fragments\n")
+        self.assertIn("no attribute 'file'", run_python("import tilegrad; tilegrad.file").stderr)
 
 
 if __name__ == "__main__":

@@ -51,6 +51,6 @@ def surface_tools() -> Any:
 
 
 def threads() -> int:
-    """As many as TILEGRAD_NUM_THREADS says; where it is not set as torch uses, which is one in a
+    """As many as TILEGRAD_THREADS says; where it is not set as torch uses, which is one in a
     worker of a DataLoader."""
     return thread_count("tilegrad.compat", 0) or torch.get_num_threads()

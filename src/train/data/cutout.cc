@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "io/image_file.h"
 
 namespace tilegrad::train {
 namespace {
@@ -64,7 +65,8 @@ Sum AverageArea(const ImageU8& rgba, double x0, double y0, double side) {
 
 }  // namespace
 
-Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, Framing framing) {
+Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& image, int size, Framing framing) {
+  const ImageU8 rgba = io::ToColor(image);
   if (rgba.channels != 4)
     return InvalidArgument(
         "the image has no alpha channel; give a cut-out with transparency, or a mask");

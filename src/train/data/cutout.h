@@ -15,11 +15,11 @@ enum class Framing {
   kKeep,  // the picture is only resized: it is framed like a training image already
 };
 
-// rgba: 4 channels, straight alpha. Returns planar [4][size][size] bytes, RGB composited over
-// black, by area averaging. With Framing::kFit the longer side of the mask's bounding box (alpha >=
-// 1/2) gets kTrainingFill of the image. An error where no pixel is opaque, or where all are (then
-// there is no cut-out).
-Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& rgba, int size, Framing framing);
+// image: with straight alpha, RGBA or grey. Returns planar [4][size][size] bytes, RGB composited
+// over black, by area averaging. With Framing::kFit the longer side of the mask's bounding box
+// (alpha >= 1/2) gets kTrainingFill of the image. An error where no pixel is opaque, or where all
+// are (then there is no cut-out).
+Result<std::vector<std::uint8_t>> PrepareCutout(const ImageU8& image, int size, Framing framing);
 
 // The share of the image that the longest side of a normalised object spans when it faces the
 // camera of CameraRule's defaults: half_extent / (distance tan(fov_y / 2)) = 0.45 / (1.45 *

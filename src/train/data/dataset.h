@@ -16,6 +16,7 @@
 #include "base/file.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
+#include "scene/up_axis.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::train {
@@ -39,6 +40,7 @@ struct DatasetInfo {
   std::vector<std::string> classes;  // sorted; ModelInfo::class_index points here
   std::vector<std::string> credits;  // one sentence a source
   std::string recipe;                // 16 hex digits over all that shapes the model files
+  UpAxis up = UpAxis::kY;            // of the source's meshes; only while the files are made
 };
 
 enum class Split { kTrain, kValidation, kTest };

@@ -32,6 +32,7 @@ DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
   if (const auto fixed = source.FixedInfo()) info = *fixed;
   info.source = source.name();
   info.credits = source.credits();
+  info.up = options.up;
   info.camera.lens.width = info.camera.lens.height = info.image_size;
   info.recipe = RecipeOf(info);
   return info;

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "scene/up_axis.h"
 #include "train/data/dataset_files.h"
 #include "train/data/sources/model_source.h"
 #include "train/data/split.h"
@@ -21,6 +22,7 @@ struct BuildOptions {
   SplitRule split;
   int per_class = 0;  // at most that many models of a class, chosen by a hash of the seed; 0: all
   int limit = 0;      // at most that many in all; 0: all
+  UpAxis up = UpAxis::kY;  // of the source's meshes
 };
 
 // What was left out of a model that is used all the same.

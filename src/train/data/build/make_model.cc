@@ -21,6 +21,7 @@ Result<MadeModel> FromMesh(const SourceEntry& entry, Mesh mesh, const DatasetInf
   MadeModel made;
   made.stamp.source_faces = static_cast<int>(mesh.faces.size());
   RemoveGlass(&mesh);
+  TurnUpright(info.up, &mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(info.camera.half_extent)));
   made.stamp.geometry = GeometryFingerprint(mesh);
   std::vector<Camera> cameras;
@@ -65,10 +66,12 @@ std::string RecipeOf(const DatasetInfo& info) {
   const CameraRule& camera = info.camera;
   const std::string text = fmt::format(
       "rules {} source {} credits {} size {} views {} fov {} azimuth {} elevation {} distance {} "
-      "half {}",
+      "half {}{}",
       kRulesVersion, info.source, fmt::join(info.credits, ";"), info.image_size, info.views,
-      camera.lens.fov_y, camera.azimuth_step, camera.elevation, camera.distance,
-      camera.half_extent);
+      camera.lens.fov_y, camera.azimuth_step, camera.elevation, camera.distance, camera.half_extent,
+      info.up == UpAxis::kZ   ? " up z"
+      : info.up == UpAxis::kX ? " up x"
+                              : "");
   return fmt::format("{:016x}", HashText(text, 0));
 }
 

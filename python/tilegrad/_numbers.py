@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of numbers in arrays: colours that are bytes, and where a wrong number stands."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import warnings
+from typing import Any, Iterator, Sequence
+
+import numpy as np
+
+from tilegrad import _arrays
+
+_OF_NUMBERS = ("positions", "faces", "colors", "uvs", "normals", "attributes")  # not of records
+
+
+def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
+    """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
+    be 255 times too bright, and nothing would say so."""
+    array = value if type(value) is np.ndarray else _arrays._foreign(function, argument, value)
+    if array.dtype == np.uint8:
+        raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
+                        f"divide by 255")
+
+
+def warn_of_bytes(function: str, argument: str, array: np.ndarray) -> None:
+    """Warns if floating-point colours look like bytes, 0 to 255, where 0 to 1 is meant: most of
+    those that are not black are above 1. Highlights may be; some 4096 numbers are looked at."""
+    sample = np.ravel(array)[::max(1, array.size // 4096)]
+    colored = sample[sample > 0]
+    if colored.size == 0 or not 2 < colored.max() <= 255 or np.mean(colored > 1) <= 0.5:
+        return
+    warnings.warn(f"{function}: {argument} has numbers up to {colored.max():g}, where 0 to 1 is "
+                  f"meant: divide by 255 if they are bytes", RuntimeWarning, stacklevel=5)
+
+
+def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Sequence[_arrays.Axis],
+              sizes: _arrays.Sizes) -> np.ndarray:
+    """As `as_batched`; bytes are refused, numbers that look like them warn."""
+    refuse_bytes(function, argument, value, dtype)
+    array = _arrays.as_batched(function, argument, value, dtype, shape, sizes)
+    warn_of_bytes(function, argument, array)
+    return array
+
+
+@contextlib.contextmanager
+def axes_of(fields: dict[str, np.ndarray], corners: Sequence[str]) -> Iterator[None]:
+    """ValueErrors of the core, which counts numbers of an array one by one, get the index that the
+    array has in Python: "faces[6] is 9" becomes "faces[2,0] is 9".
+
+    fields: arrays by name, maybe with an axis of scenes before their own. corners: those of three
+        axes of their own, faces, corners and numbers.
+    """
+    def spell(match: re.Match) -> str:
+        name, number = match[1], int(match[2])
+        shape = np.shape(fields.get(name, ()))[-3 if name in corners else -2:]
+        if name not in _OF_NUMBERS or len(shape) < 2 or number >= np.prod(shape):
+            return match[0]
+        return f"{name}[{','.join(map(str, np.unravel_index(number, shape)))}]"
+
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(re.sub(r"\b(\w+)\[(\d+)\]", spell, str(error))) from None

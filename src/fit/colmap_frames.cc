@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/colmap_frames.h"
+
+#include "base/error.h"
+#include "io/camera_file.h"
+#include "io/transforms_lens.h"
+
+namespace tilegrad::train {
+namespace {
+
+bool IsThere(const Path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
+// The folder that the names of images count from.
+Result<Path> FindImages(const Path& model, const std::string& first) {
+  std::error_code error;
+  Path folder = std::filesystem::absolute(model, error).lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();  // "model/"
+  for (int up = 0; up < 4; ++up, folder = folder.parent_path()) {
+    for (const Path& candidate : {folder / "images", folder}) {
+      if (IsThere(candidate / first)) return candidate;
+    }
+  }
+  return NotFound(
+      "{}: its image {} is neither in a folder \"images\" beside the model or above it, nor there "
+      "itself",
+      model.string(), first);
+}
+
+// Nothing where the image has none.
+Path FindMask(const Path& images, const Path& name) {
+  for (const Path& folder : {images.parent_path() / "masks", images.parent_path() / "mask"}) {
+    for (const Path& candidate : {folder / (name.string() + ".png"),
+                                  (folder / name).replace_extension(".png"), folder / name}) {
+      if (IsThere(candidate)) return candidate;
+    }
+  }
+  return {};
+}
+
+Status CheckMasks(const std::vector<TransformsFrame>& frames) {
+  const TransformsFrame* masked = nullptr;
+  const TransformsFrame* bare = nullptr;
+  for (const TransformsFrame& frame : frames) (frame.mask.empty() ? bare : masked) = &frame;
+  if (masked == nullptr || bare == nullptr) return {};
+  return DataLoss("{}: has no mask, though {} has {}", bare->image.string(), masked->image.string(),
+                  masked->mask.string());
+}
+
+}  // namespace
+
+std::optional<Path> FindColmapModel(const Path& folder) {
+  for (const Path& root : {folder, folder / "colmap"}) {
+    for (const Path& model : {root, root / "sparse/0", root / "sparse"}) {
+      if (IsThere(model / "cameras.txt") || IsThere(model / "cameras.bin")) return model;
+    }
+  }
+  return std::nullopt;
+}
+
+Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
+  TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model));
+  TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
+  std::vector<TransformsFrame> frames;
+  for (const io::CameraView& view : views) {
+    const std::string name = io::PortablePath(view.name);
+    TransformsFrame frame;
+    frame.image = images / name;
+    frame.mask = FindMask(images, name);
+    frame.stored_order = true;  // COLMAP ignores the tag of orientation
+    frame.pose = ToNerf(view.camera);
+    frame.size = view.size;
+    frames.push_back(std::move(frame));
+  }
+  TILEGRAD_TRY(CheckMasks(frames));
+  return frames;
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A COLMAP project as frames: its cameras, the images that they belong to, and masks beside these.
+//
+//   <project>/sparse/0/cameras.txt, images.txt   or .bin; also <project>/sparse, <project>, and
+//                                                colmap/ before them, as nerfstudio has it
+//   <project>/images/a/1.jpg
+//   <project>/masks/a/1.jpg.png                  as COLMAP names masks, or masks/a/1.png
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fit/transforms.h"
+
+namespace tilegrad::train {
+
+// `folder` is the project or the folder of the model itself. The model that is in it, or nothing.
+std::optional<Path> FindColmapModel(const Path& folder);
+
+// Images are looked for in folders `images`, and by their names alone, beside the model and up to
+// two folders above it. Either all images have a mask or none. Errors name the file.
+Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model);
+
+}  // namespace tilegrad::train

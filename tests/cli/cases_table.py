@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prints one table of the small files in shared/cases, which came from reports of users of other
+programs: what is right for each, and what this program did.
+
+    cases_table.py PROGRAM [FOLDER]
+
+FOLDER: default $TILEGRAD_SHARED/cases, else shared/cases beside or above the source. Skips, and says
+so, where it is absent. Exit code 1 if a file is neither right nor listed as not done.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+SIZE, HALF = 128, 4 * np.tan(np.radians(20))  # pixels; what they show at z = 0, seen from 4 away
+
+# Not right yet, and what they need; the table says which of these have become right.
+NOT_DONE = {
+    **dict.fromkeys(("02_sparse_base.glb", "02_sparse_nobase.glb", "02_zero_accessor.glb"),
+                    "sparse and empty accessors"),
+    **dict.fromkeys(("11_EXT_texture_webp_required.glb", "11_EXT_texture_webp_used.glb",
+                     "11_KHR_texture_basisu_required.glb", "11_KHR_texture_basisu_used.glb"),
+                    "glTF extensions that are not read"),
+    "12_specgloss_factor.glb": "specular-glossiness", "13_skin.glb": "skins",
+    **dict.fromkeys(("20_o.obj", "20_s.obj"), "options of map_Kd"),
+    **dict.fromkeys(("22_partial.obj", "22_vcolor.obj"), "OBJ vertex colours"),
+    "25_facecolor.ply": "colours per face", "26_twotex.ply": "several textures",
+    "27_off_vcolor.off": "colours in a plain OFF",
+    **dict.fromkeys(("30_utm_sphere.obj", "30_utm_sphere.ply"), "large coordinates"),
+    **dict.fromkeys(("34_c_objbom.obj", "34_missing.obj", "34_twolibs.obj", "34_unknown.obj"),
+                    "OBJ libraries, byte-order marks"),
+}
+
+
+class Shot:
+    """What the program did with one file."""
+
+    def __init__(self, program, folder, arguments):
+        with tempfile.TemporaryDirectory() as out:
+            file = pathlib.Path(out) / "a.npy"
+            command = [program, "render", *map(str, arguments), "--size", str(SIZE), "--out", file]
+            done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+            self.image = np.load(file) if file.exists() else None
+        self.code, self.text = done.returncode, done.stderr.strip()
+        self.refused = self.code in (2, 3)
+
+    def at(self, x, y):
+        """RGB bytes at a point of the plane z = 0."""
+        column, row = (x / HALF + 1) / 2 * SIZE, (1 - y / HALF) / 2 * SIZE
+        return np.rint(255 * self.image[int(row), int(column), :3])
+
+    def mask(self):
+        return self.image[..., 3] > 0.5
+
+
+def straight(*more):
+    return ("--shading", "none", "--eye", 0, 0, 4, "--supersample", 1, *more)
+
+
+def drawn(shot):
+    return shot.code == 0 and shot.mask().any()
+
+
+def colored(points, tolerance=12):
+    """points: {(x, y): (r, g, b)}"""
+    def check(shot):
+        return drawn(shot) and all(np.abs(shot.at(*point) - color).max() <= tolerance
+                                   for point, color in points.items())
+    return check
+
+
+def said(*words):
+    """Drawn, with a warning that has these words."""
+    return lambda shot: drawn(shot) and all(word in shot.text for word in words)
+
+
+def refused(*words):
+    return lambda shot: shot.refused and all(word in shot.text for word in words)
+
+
+def either(*checks):
+    return lambda shot: any(check(shot) for check in checks)
+
+
+def round_or_said(shot):
+    mask = shot.mask() if shot.code == 0 else np.zeros((1, 1), bool)
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    if len(rows) == 0:
+        return shot.refused and shot.text != ""
+    box = (rows[-1] - rows[0] + 1) * (columns[-1] - columns[0] + 1)
+    return abs(mask.sum() / box - np.pi / 4) < 0.03 or "extent" in shot.text
+
+
+def within(low, high):
+    """The box of what is drawn, seen by `wide`."""
+    def check(shot):
+        if not drawn(shot):
+            return False
+        scale = 2 * 12 * np.tan(np.radians(20)) / SIZE
+        rows, columns = np.flatnonzero(shot.mask().any(1)), np.flatnonzero(shot.mask().any(0))
+        box = [2.25 + scale * (columns[0] - SIZE / 2), 2.25 + scale * (columns[-1] + 1 - SIZE / 2),
+               2 - scale * (rows[-1] + 1 - SIZE / 2), 2 - scale * (rows[0] - SIZE / 2)]
+        return np.abs(np.subtract(box, [low[0], high[0], low[1], high[1]])).max() < 2 * scale
+    return check
+
+
+CORNER = 0.93  # of a square from -1 to 1
+LL, LR, UR, UL = (-CORNER, -CORNER), (CORNER, -CORNER), (CORNER, CORNER), (-CORNER, CORNER)
+RED, GREEN, BLUE = (255, 0, 0), (0, 255, 0), (0, 0, 255)
+WHITE = (255, 255, 255)
+
+# File: (what is right, check). Arguments, where they are not those of `straight`, in VIEWS.
+RIGHT = {
+    "22_partial.obj": ("its colour each, others white",
+                       colored({LL: WHITE, LR: BLUE, UL: (255, 128, 64)}, 75)),
+    "12_specgloss_tex.glb": ("drawn with its texture", drawn),
+    "11_EXT_texture_webp_used.glb": ("warned", said("EXT_texture_webp")),
+    "11_KHR_texture_basisu_used.glb": ("warned", said("KHR_texture_basisu")),
+    "33_webp_plain.glb": ("warned or refused", either(said("webp"), refused("webp"))),
+    "13_skin.glb": ("x -0.5 to 5, y 1.5 to 2.5", within((-0.5, 1.5), (5, 2.5))),
+    "34_twolibs.obj": ("(0, 0, 255)", colored({(0, 0): BLUE})),
+    "34_missing.obj": ("warned", said("nothere.mtl")),
+    "34_unknown.obj": ("warned", said("zzz")),
+    "34_c_mtlbom.obj": ("(255, 0, 0)", colored({(0, 0): RED})),
+    "34_c_objbom.obj": ("(255, 0, 0)", colored({(0, 0): RED})),
+    "34_c_objbom_comment.obj": ("(255, 0, 0)", colored({(0, 0): RED})),
+    "25_facecolor.ply": ("coloured", lambda s: drawn(s) and np.ptp(s.at(0.5, -0.5)) > 100),
+    "27_off_vcolor.off": ("red, green, blue corners", colored({LL: RED, LR: GREEN, UR: BLUE}, 75)),
+    "26_twotex.ply": ("lower right red, upper left blue",
+                      colored({(0.5, -0.5): RED, (-0.5, 0.5): BLUE})),
+    "22_vcolor255.obj": ("warned", said("colours")),
+    "25_float255.ply": ("warned or drawn", drawn),
+    "24_ascii_upper.stl": ("drawn or refused", either(drawn, refused("STL"))),
+    "27_noff.off": ("drawn or refused", either(drawn, refused("line 1"))),
+    "36_cmyk_noadobe.obj": ("warned: its image is not there", said("15_cmyk_noadobe.jpg")),
+}
+for name in ("EXT_meshopt_compression", "EXT_texture_webp", "KHR_draco_mesh_compression",
+             "KHR_texture_basisu"):
+    RIGHT[f"11_{name}_required.glb"] = ("refused", refused(name))
+for name in ("30_utm_sphere.obj", "30_utm_sphere.ply", "30_local_sphere.obj"):
+    RIGHT[name] = ("round, or warned with extent", round_or_said)
+for name in ("30_huge.obj", "30_huge18.obj", "30_tiny.obj", "30_tiny20.obj", "30_utm.obj"):
+    RIGHT[name] = ("drawn, warned or refused", either(drawn, lambda shot: shot.text != ""))
+CAMERAS = {"tf_fisheye.json": refused("OPENCV_FISHEYE"), "tf_isfisheye.json": refused("is_fisheye"),
+           "tf_ortho.json": refused("EQUIRECTANGULAR"), "tf_k1.json": refused("k1"),
+           "tf_blenderscale.json": refused("rotation"), "tf_mirror.json": refused("rotation"),
+           "colmapf": refused("cameras.txt: line 2")}
+COUNTS = {"tf_anglexy.json": 1, "tf_perframe.json": 2, "colmap1": 3, "colmap2": 2}
+
+
+def equal(program, folder, one, other):
+    a, b = (Shot(program, folder, (file, *straight())) for file in (one, other))
+    same = drawn(a) and drawn(b) and np.abs(a.image - b.image).max() < 2 / 255
+    return a, same
+
+
+def scaled_texture(program, folder, file, u, v):
+    """Whether `file` looks like its square with texture coordinates u(0), u(1) and v(0), v(1)."""
+    with tempfile.TemporaryDirectory() as place:
+        mesh = pathlib.Path(place) / "square.obj"
+        uvs = [(u[0], v[0]), (u[1], v[0]), (u[1], v[1]), (u[0], v[1])]
+        mesh.write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n" +
+                        "".join(f"vt {s} {t}\n" for s, t in uvs) + "f 1/1 2/2 3/3 4/4\n")
+        shot = Shot(program, folder, (file, *straight()))
+        plain = Shot(program, folder, (mesh, *straight("--texture", "q.png")))
+    return shot, drawn(shot) and drawn(plain) and np.abs(shot.image - plain.image).max() < 8 / 255
+
+
+def diffuse_of(file):
+    data = file.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    material = json.loads(data[20:20 + length])["materials"][0]
+    linear = np.array(material["extensions"]["KHR_materials_pbrSpecularGlossiness"]
+                      ["diffuseFactor"][:3])
+    return np.rint(255 * np.where(linear < 0.0031308, 12.92 * linear,
+                                  1.055 * linear ** (1 / 2.4) - 0.055))
+
+
+def count_views(program, folder, cameras):
+    with tempfile.TemporaryDirectory() as out:
+        done = subprocess.run([program, "render", "22_plain.ply", "--cameras", cameras, "--out", out],
+                              capture_output=True, text=True, cwd=folder, check=False)
+        return done, len(list(pathlib.Path(out).glob("*.png")))
+
+
+def rows(program, folder):
+    """(file, what is right, whether it is, the shot)."""
+    special = {"22_vcolor.obj": "22_plain.ply"}
+    for file in sorted(folder.glob("*.*")):
+        name = file.name
+        if name in ("22_vcolor.obj",):
+            shot, good = equal(program, folder, name, special[name])
+            yield name, f"as {special[name]}", good, shot
+        elif name in ("20_s.obj", "20_o.obj"):
+            u, v = ((0, 2), (0, 4)) if name == "20_s.obj" else ((0.25, 1.25), (0.5, 1.5))
+            shot, good = scaled_texture(program, folder, name, u, v)
+            yield name, "its texture coordinates", good, shot
+        elif name == "12_specgloss_factor.glb":
+            shot = Shot(program, folder, (name, *straight()))
+            color = tuple(diffuse_of(file))
+            yield name, f"colour {color}", colored({(0, 0): color})(shot), shot
+        elif file.suffix in (".jpg", ".png", ".tga"):
+            shot = Shot(program, folder, ("34_missing.obj", *straight("--texture", name)))
+            yield name, "drawn or refused", drawn(shot) or refused(name)(shot), shot
+        elif file.suffix in (".glb", ".gltf", ".obj", ".ply", ".off", ".stl"):
+            right, check = RIGHT.get(name, ("drawn", drawn))
+            view = straight()
+            if name.startswith("30_"):
+                view = ("--shading", "none", "--supersample", 1)
+            elif name == "13_skin.glb":
+                view = ("--shading", "none", "--eye", 2.25, 2, 12, "--target", 2.25, 2, 0)
+            elif right == "drawn" and not name.startswith("2"):
+                view = ("--shading", "none")
+            shot = Shot(program, folder, (name, *view))
+            yield name, right, check(shot), shot
+    for name, check in CAMERAS.items():
+        shot = Shot(program, folder, ("22_plain.ply", "--cameras", name))
+        yield name, "refused", check(shot), shot
+    for name, count in COUNTS.items():
+        done, views = count_views(program, folder, name)
+        yield name, f"{count} cameras", done.returncode == 0 and views == count, done
+
+
+def find_folder():
+    root = pathlib.Path(__file__).resolve().parents[2]
+    places = [root / "../shared", root / "../../shared"]
+    if "TILEGRAD_SHARED" in os.environ:
+        places.insert(0, pathlib.Path(os.environ["TILEGRAD_SHARED"]))
+    return next((p.resolve() / "cases" for p in places if (p / "cases").is_dir()), None)
+
+
+def main():
+    program = pathlib.Path(sys.argv[1]).resolve()
+    folder = pathlib.Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else find_folder()
+    if folder is None:
+        print("SKIPPED: there is no folder shared/cases")
+        return 0
+    wrong = 0
+    print("| file | right is | got | said |\n|---|---|---|---|")
+    for name, right, good, shot in rows(program, folder):
+        text = getattr(shot, "text", "").splitlines()
+        got = "refused" if getattr(shot, "refused", False) else "warned" if text else "drawn"
+        if not good:
+            got = "NOT DONE: " + NOT_DONE[name] if name in NOT_DONE else "WRONG"
+        elif name in NOT_DONE:
+            got = "right, though listed as not done"
+        wrong += got == "WRONG"
+        print(f"| {name} | {right} | {got} | {text[0][:110] if text else ''} |")
+    print(f"{wrong} wrong, {len(NOT_DONE)} not done" if wrong or NOT_DONE else "all right")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nothing of the user's is overwritten, whatever the command: what stands there stays byte for byte
+// until --force, and what is read stays with it, too.
+#include <gtest/gtest.h>
+
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "scene/shapes.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+class Outputs : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    // fuze.obj, its material and its texture, all of one stem.
+    ASSERT_TRUE(io::SavePng(folder_ / "fuze.png", ImageU8(2, 2, 3)).ok());
+    Write("fuze.mtl", std::string("newmtl m\nmap_Kd fuze.png\n"));
+    Write("fuze.obj", std::string("mtllib fuze.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                                  "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  // In the folder, as RunProgram starts the program where the test is.
+  Outcome Run(const std::string& arguments) const {
+    const Path before = std::filesystem::current_path();
+    std::filesystem::current_path(folder_);
+    const Outcome outcome = RunProgram(arguments);
+    std::filesystem::current_path(before);
+    return outcome;
+  }
+  void ExpectDone(const std::string& arguments) const {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+  }
+  // ... and `file` is what it was.
+  void ExpectKept(const std::string& file, const std::string& arguments,
+                  const std::string& part) const {
+    const std::string before = ReadText(folder_ / file).value();
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+    EXPECT_EQ(ReadText(folder_ / file).value(), before) << arguments;
+  }
+  bool Exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
+};
+
+TEST_F(Outputs, DefaultNamesCannotBeThoseOfTextures) {
+  const std::string texture = ReadText(folder_ / "fuze.png").value();
+  ExpectDone("render fuze.obj --size 8");
+  EXPECT_TRUE(Exists("fuze_render.png"));
+  EXPECT_EQ(ReadText(folder_ / "fuze.png").value(), texture);
+  ExpectDone("render fuze.obj --size 8 --turntable 2 --outputs color,depth");
+  EXPECT_TRUE(Exists("fuze_render_0001.png"));
+  EXPECT_TRUE(Exists("fuze_render_0001_depth.png"));
+}
+
+TEST_F(Outputs, PicturesOfOursAreReplacedOthersAreNot) {
+  for (const std::string name : {"a.png", "a.exr", "a.npy"}) {
+    ExpectDone("render fuze.obj --size 8 --out " + name);
+    ExpectDone("render fuze.obj --size 9 --out " + name);
+    Write(name, std::string("mine"));
+    ExpectKept(name, "render fuze.obj --size 8 --out " + name, "--force");
+    ExpectDone("render fuze.obj --size 8 --force --out " + name);
+    EXPECT_NE(ReadText(folder_ / name).value(), "mine");
+    ExpectDone("render fuze.obj --size 9 --out " + name);
+  }
+  Write("turn/fuze_0001.png", std::string("mine"));
+  ExpectKept("turn/fuze_0001.png", "render fuze.obj --size 8 --turntable 2 --out turn", "--force");
+  EXPECT_FALSE(Exists("turn/fuze_0000.png"));  // before the first is rendered
+  Write("b_depth.png", std::string("mine"));
+  ExpectKept("b_depth.png", "render fuze.obj --size 8 --outputs color,depth --out b.png",
+             "--force");
+}
+
+TEST_F(Outputs, InputsAreNotReplacedEvenByForce) {
+  std::filesystem::create_symlink("fuze.png", folder_ / "soft.png");
+  std::filesystem::create_hard_link(folder_ / "fuze.png", folder_ / "hard.png");
+  for (const std::string name : {"fuze.png", "soft.png", "hard.png", "x/../fuze.png"}) {
+    std::filesystem::create_directories(folder_ / "x");
+    ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out " + name, "is read here");
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "soft.png"));
+  ExpectKept("fuze.png", "render fuze.obj --size 8 --force --out .", "is read here");
+}
+
+TEST_F(Outputs, CamerasAreNotReplaced) {
+  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras transforms.json");
+  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras transforms.json");
+  ExpectKept("transforms.json",
+             "render fuze.obj --size 8 --force --out a.png --cameras transforms.json "
+             "--write-cameras transforms.json",
+             "is read here");
+  Write("sparse/images.txt", std::string("# mine\n"));
+  ExpectKept("sparse/images.txt", "render fuze.obj --size 8 --out a.png --write-cameras sparse",
+             "--force");
+  EXPECT_FALSE(Exists("sparse/cameras.txt"));
+  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras sparse --force");
+  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras sparse");
+}
+
+TEST_F(Outputs, ViewsAndFits) {
+  const std::string views = "views fuze.obj --views 2 --held-out 0 --size 8 --out ";
+  Write("photos/me.jpg", std::string("mine"));
+  ExpectKept("photos/me.jpg", views + "photos", "--force");
+  EXPECT_FALSE(Exists("photos/truth.glb"));
+  ExpectDone(views + "photos --force");
+  EXPECT_TRUE(Exists("photos/me.jpg"));
+  ExpectDone(views + "photos");
+  Write("photos/images/001.png", std::string("retouched"));
+  ExpectKept("photos/images/001.png", views + "photos", "--force");
+  ExpectDone(views + "v");
+  ExpectDone(views + "v");
+
+  const std::string fit = "fit v --steps 1 --template-level 1 --texture-size 8 --out ";
+  ExpectKept("photos/me.jpg", fit + "photos", "--force");
+  Write("f/report.html", std::string("mine"));
+  ExpectKept("f/report.html", fit + "f", "--force");
+  ExpectDone(fit + "f --force");
+  EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "mine");
+  Write("f/report.html", std::string("annotated"));
+  ExpectKept("f/report.html", fit + "f --resume", "--force");
+  ExpectKept("f/mesh.glb", fit + "f --force --resume --mesh f/mesh.glb", "is read here");
+}
+
+TEST_F(Outputs, DatasetsAndRuns) {
+  const std::string dataset = "dataset --source procedural --per-class 1 --size 8 --views 1 --out ";
+  Write("d/thesis.txt", std::string("mine"));
+  ExpectKept("d/thesis.txt", dataset + "d", "--force");
+  ExpectDone(dataset + "d --force");
+  ExpectDone(dataset + "d");  // it goes on in its own
+  Write("view.png", std::string("mine"));
+  const std::string view = "dataset-view --split train --data d";
+  ExpectKept("view.png", view, "--force");
+  ExpectDone(view + " --force");
+  ExpectDone(view);
+  Write("r/notes.txt", std::string("mine"));
+  ExpectKept("r/notes.txt", "train --config " TILEGRAD_CONFIGS "/quick.toml --data d --out r",
+             "--force");
+}
+
+TEST_F(Outputs, PagesAndStudies) {
+  Write("figure2.svg", std::string("mine"));
+  ExpectKept("figure2.svg", "figure2 --size 8 --steps 1", "--force");
+  Write("tradeoff/tradeoff.csv", std::string("mine"));
+  ExpectKept("tradeoff/tradeoff.csv", "tradeoff fuze.obj --size 8 --repetitions 1", "--force");
+  EXPECT_FALSE(Exists("tradeoff/tradeoff.md"));
+}
+
+}  // namespace
+}  // namespace tilegrad

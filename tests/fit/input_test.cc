@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a fit reads of other programs' projects.
+#include "fit/input.h"
+
+#include <gtest/gtest.h>
+
+#include "fit/colmap_frames.h"
+#include "io/image_file.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::train {
+namespace {
+
+class Input : public TempFolderTest {
+ protected:
+  // 8 x 6 pixels of one grey.
+  void Image(const std::string& name, int grey) {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    ASSERT_TRUE(
+        io::SavePng(folder_ / name, ImageU8(8, 6, 3, static_cast<std::uint8_t>(grey))).ok());
+  }
+  // The left half is the object.
+  void Mask(const std::string& name) {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    ImageU8 mask(8, 6, 1);
+    for (int y = 0; y < 6; ++y) {
+      for (int x = 0; x < 4; ++x) mask.at(x, y)[0] = 255;
+    }
+    ASSERT_TRUE(io::SavePng(folder_ / name, mask).ok());
+  }
+  // Cameras of images twice as large; the second image has no line of points.
+  void Model(const std::string& folder) {
+    Write(folder + "/cameras.txt", std::string("1 PINHOLE 16 12 20 22 9 5\n"));
+    Write(folder + "/images.txt",
+          std::string("1 0 1 0 0 0 0 4 1 a.png\n3.5 4.5 -1\n2 0 1 0 0 1 0 4 1 deep/b.png\n"));
+  }
+  void Images(const std::string& folder) {
+    Image(folder + "/a.png", 51);
+    Image(folder + "/deep/b.png", 102);
+  }
+  void ExpectTwoViews(const std::string& folder, bool masked) {
+    const auto input = ReadFitFolder(folder_ / folder, 0);
+    ASSERT_TRUE(input.ok()) << input.status().message();
+    ASSERT_EQ(input->cameras.size(), 2u);
+    const Camera& camera = input->cameras[1];
+    EXPECT_EQ(camera.fx, 10);
+    EXPECT_EQ(camera.fy, 11);
+    EXPECT_EQ(camera.cx, 4.5f);
+    EXPECT_EQ(camera.cy, 2.5f);
+    EXPECT_EQ(camera.translation[0], 1);
+    EXPECT_EQ(camera.translation[2], -4);
+    EXPECT_NEAR(input->images.color[0], 0.2, 1e-6);
+    EXPECT_NEAR(input->images.color[3 * 48], 0.4, 1e-6);
+    EXPECT_EQ(input->masked, masked);
+    EXPECT_EQ(input->images.alpha[48 + 3], 1);
+    EXPECT_EQ(input->images.alpha[48 + 4], masked ? 0 : 1);
+  }
+};
+
+TEST_F(Input, ColmapProjects) {
+  Model("p/sparse/0");
+  Images("p/images");
+  ExpectTwoViews("p", false);
+  ExpectTwoViews("p/sparse/0", false);
+  Mask("p/masks/a.png.png");  // COLMAP's names
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "b.png: has no mask", "a.png.png");
+  Mask("p/masks/deep/b.png.png");
+  ExpectTwoViews("p", true);
+  EXPECT_EQ(ReadFitFolder(folder_ / "p", 2).value().held_out, std::vector<int>{1});
+}
+
+TEST_F(Input, ColmapModelsOfOtherLayouts) {
+  Model("flat");
+  Images("flat");
+  Mask("mask/a.png");
+  Mask("mask/deep/b.png");
+  ExpectTwoViews("flat", true);
+  Model("nerfstudio/colmap/sparse/0");
+  Images("nerfstudio/images");
+  ExpectTwoViews("nerfstudio", false);
+  Model("undistorted/sparse");
+  Images("undistorted/images");
+  ExpectTwoViews("undistorted", false);
+}
+
+TEST_F(Input, ColmapImagesThatAreNotThere) {
+  Model("p/sparse/0");
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "a.png", "images");
+  Image("p/images/a.png", 51);
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "deep/b.png");
+  Write("p/sparse/0/cameras.txt", std::string("1 OPENCV_FISHEYE 16 12 20 22 9 5 0 0 0 0\n"));
+  ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "cameras.txt: line 1", "undistort");
+}
+
+constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
+
+TEST_F(Input, TransformsOfWindows) {
+  Image("w/images/0.png", 51);
+  Mask("w/masks/0.png");
+  for (const std::string path : {R"(images\\0.png)", R"(.\\images\\0.png)", R"(images\\0)"}) {
+    Write("w/transforms.json", R"({"fl_x":10,"frames":[{"file_path":")" + path +
+                                   R"(","mask_path":"masks\\0.png",)" + kPose + "}]}");
+    const auto input = ReadFitFolder(folder_ / "w", 0);
+    ASSERT_TRUE(input.ok()) << input.status().message();
+    EXPECT_TRUE(input->masked);
+  }
+  Image("w/odd\\name.png", 51);  // a name that has one is found as it is
+  Write("w/transforms.json",
+        std::string(R"({"fl_x":10,"frames":[{"file_path":"odd\\name.png",)") + kPose + "}]}");
+  EXPECT_TRUE(ReadFitFolder(folder_ / "w", 0).ok());
+}
+
+TEST_F(Input, TransformsOfOtherLenses) {
+  Image("f/0.png", 51);
+  const std::string image = R"("file_path":"0.png",)" + std::string(kPose);
+  for (const std::string lens :
+       {R"("camera_model":"OPENCV_FISHEYE")", R"("camera_model":"EQUIRECTANGULAR")",
+        R"("is_fisheye":true)", R"("k4":0.1)"}) {
+    Write("f/transforms.json", R"({"fl_x":10,)" + lens + R"(,"frames":[{)" + image + "}]}");
+    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 0", "pinhole");
+    Write("f/transforms.json",
+          R"({"fl_x":10,"frames":[{)" + image + "},{" + lens + "," + image + "}]}");
+    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 1", "pinhole");
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::train
