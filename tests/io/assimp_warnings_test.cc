@@ -46,8 +46,7 @@ std::string Collada(const std::string& sampler, const std::string& extra, int se
          sampler +
          "</sampler2D></newparam><technique sid=\"t\"><lambert><diffuse>"
          "<texture texture=\"s\" texcoord=\"UVSET" +
-         std::to_string(set) + "\">" +
-         extra +
+         std::to_string(set) + "\">" + extra +
          "</texture></diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
          "<library_materials><material id=\"m\" name=\"paint\"><instance_effect "
          "url=\"#e\"/></material>"
@@ -63,7 +62,8 @@ std::string Collada(const std::string& sampler, const std::string& extra, int se
          "</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"S\">"
          "<node id=\"n\"><instance_geometry url=\"#g\"><bind_material><technique_common>"
          "<instance_material symbol=\"M\" target=\"#m\"><bind_vertex_input semantic=\"UVSET" +
-         std::to_string(set) + "\" "
+         std::to_string(set) +
+         "\" "
          "input_semantic=\"TEXCOORD\" input_set=\"" +
          std::to_string(set) +
          "\"/></instance_material></technique_common></bind_material></instance_geometry></node>"
