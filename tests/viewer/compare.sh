@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Scenes by `tilegrad render` and by three.js in headless Chromium, side by side in pictures to be looked at: those of Debian's
-# assimp-testmodels (viewer.png), and small ones of our own about alpha, textures and skins (cases.png). Wants the packages
+# assimp-testmodels (viewer.png), and small ones of our own about alpha, textures, skins and the axis that is up (cases.png). Wants the packages
 # assimp-testmodels, libjs-three and chromium.
 #   tests/viewer/compare.sh [PROGRAM [FOLDER]]
 set -euo pipefail
@@ -21,9 +21,10 @@ shoot() {  # shoot PAGE PICTURE WIDTH HEIGHT
 }
 
 pair() {  # pair SCENE SIZE: NAME.png and NAME.three.png
-  local name page
+  local name page up=y
   name=$(basename "$1"); name=${name%.*}
-  "$PROGRAM" render "$1" --out "$WORK/$name.png" --size "$2" --background 0.54 0.66 0.66 --write-cameras "$WORK/$name.json" >/dev/null
+  [ "$name" != z_up ] || up=z
+  "$PROGRAM" render "$1" --up $up --out "$WORK/$name.png" --size "$2" --background 0.54 0.66 0.66 --write-cameras "$WORK/$name.json" >/dev/null
   page=$WORK/$name.html
   sed -e "s|SCENE|file://$1|" -e "s|THREE/|file:///usr/share/javascript/three/|" "$HERE/three.html" |
     sed -e "/CAMERA.frames/{s|CAMERA|($(tr -d '\n' <"$WORK/$name.json"))|}" >"$page"
@@ -49,5 +50,5 @@ sheet() {  # sheet PICTURE SIZE SCENE...: two columns of pairs
 
 mkdir -p "$OUT"
 python3 "$HERE/make_cases.py" "$WORK"
-sheet "$OUT/cases.png" 180 "$WORK"/{alpha_mask,alpha_blend,texture_transform,skin}.glb
+sheet "$OUT/cases.png" 140 "$WORK"/{alpha_mask,alpha_blend,texture_transform,skin,z_up}.glb
 sheet "$OUT/viewer.png" 300 "${SCENES[@]/#/$MODELS/}"

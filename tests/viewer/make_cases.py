@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Four small GLB files of what viewers do with alpha, textures and skins, for compare.sh: make_cases.py FOLDER"""
+"""Small GLB files of what viewers do with alpha, textures, skins and an axis that is up, for compare.sh: make_cases.py FOLDER"""
 
 import json
 import math
@@ -64,11 +64,12 @@ class Glb:
         self.json["nodes"].append({"mesh": len(self.json["meshes"]) - 1, **(node or {})})
         self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]) - 1)
 
-    def quad(self, material, corners, uvs=((0, 1), (1, 1), (1, 0), (0, 0))):
-        self.mesh(material, corners, [(0, 1, 2), (0, 2, 3)], TEXCOORD_0=self.accessor(list(uvs), "VEC2"))
+    def quad(self, material, corners, node=None):
+        uvs = self.accessor([(0, 1), (1, 1), (1, 0), (0, 0)], "VEC2")
+        self.mesh(material, corners, [(0, 1, 2), (0, 2, 3)], node, TEXCOORD_0=uvs)
 
     def box(self, material, centre, half):
-        corners = [tuple(c + half * s for c, s in zip(centre, signs))
+        corners = [tuple(c + h * s for c, h, s in zip(centre, half, signs))
                    for signs in ((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1), (-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1))]
         for face in ((0, 1, 2, 3), (5, 4, 7, 6), (1, 5, 6, 2), (4, 0, 3, 7), (3, 2, 6, 7), (4, 5, 1, 0)):
             self.quad(material, [corners[i] for i in face])
@@ -99,16 +100,16 @@ def alpha_mask():
     cut = glb.material(texture={"index": image}, alphaMode="MASK")
     glb.quad(cut, wall(0, 0, 1))
     glb.quad(cut, [(0, -1, 1), (0, -1, -1), (0, 1, -1), (0, 1, 1)])
-    glb.box(glb.material((0.8, 0.5, 0.1, 1)), (-0.5, 0, -0.5), 0.3)
+    glb.box(glb.material((0.8, 0.5, 0.1, 1)), (-0.5, 0, -0.5), (0.3, 0.3, 0.3))
     return glb
 
 
 def alpha_blend():
-    """Three panes, the nearest first in the file, before a box."""
+    """Three panes, the nearest first in the file, before a box. Each is a node, which three.js sorts them by."""
     glb = Glb()
     for z, color in ((0.8, (0.9, 0.05, 0.05, 0.4)), (0.3, (0.05, 0.6, 0.1, 0.5)), (-0.2, (0.05, 0.1, 0.9, 0.6))):
-        glb.quad(glb.material(color, alphaMode="BLEND"), wall(z - 0.3, z, 0.6))
-    glb.box(glb.material((0.8, 0.5, 0.1, 1)), (0, 0, -0.9), 0.4)
+        glb.quad(glb.material(color, alphaMode="BLEND"), wall(0, 0, 0.6), {"translation": [z - 0.3, 0, z]})
+    glb.box(glb.material((0.8, 0.5, 0.1, 1)), (0, 0, -0.9), (0.4, 0.4, 0.4))
     return glb
 
 
@@ -163,6 +164,18 @@ def skin():
     return glb
 
 
+def z_up():
+    """A chair that stands on the plane z = 0 and looks towards -y."""
+    glb = Glb()
+    wood, cloth = glb.material((0.5, 0.25, 0.08, 1)), glb.material((0.1, 0.25, 0.6, 1))
+    for x in (-0.35, 0.35):
+        for y in (-0.35, 0.35):
+            glb.box(wood, (x, y, 0.4), (0.05, 0.05, 0.4))
+    glb.box(cloth, (0, 0, 0.85), (0.42, 0.42, 0.06))
+    glb.box(wood, (0, 0.38, 1.35), (0.42, 0.04, 0.45))
+    return glb
+
+
 if __name__ == "__main__":
-    for make in (alpha_mask, alpha_blend, texture_transform, skin):
+    for make in (alpha_mask, alpha_blend, texture_transform, skin, z_up):
         make().save(pathlib.Path(sys.argv[1]) / (make.__name__ + ".glb"))
