@@ -109,6 +109,23 @@ TEST_F(Fit, ABrokenCheckpointIsToldOfEvenIfTheFitIsStopped) {
   EXPECT_NE(warnings[0].find(newest.filename().string()), std::string::npos) << warnings[0];
 }
 
+// Going on from an older checkpoint would throw away what a newer version did.
+TEST_F(Fit, AnotherVersionsCheckpointStopsIt) {
+  FitJob job = Job("run");
+  job.config.steps = 12, job.config.checkpoint_every = 5;
+  ASSERT_TRUE(Run(job).ok());
+  const Workers workers(1);
+  nn::Context context(workers);
+  const auto files = ListCheckpoints(job.out);
+  nn::TensorFile newest = nn::ReadSafetensors(context, files.back()).value();
+  newest.metadata["format"] = "tilegrad-checkpoint-2";
+  ASSERT_TRUE(nn::WriteSafetensors(files.back(), newest).ok());
+  job.existing = ExistingRun::kContinue;
+  ExpectMessage(Run(job).status(), files.back().filename().string(), "another version",
+                "nothing was changed");
+  EXPECT_EQ(ListCheckpoints(job.out), files);
+}
+
 // Of one that was killed before its first checkpoint pictures are all that is there.
 TEST_F(Fit, PicturesOfAnEarlierFitAreNotShown) {
   FitJob job = Job("whole");

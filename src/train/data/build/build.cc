@@ -102,24 +102,20 @@ class Builder {
     RemoveTemporaries(folder_);
     for (const std::string& name : info_.classes)
       RemoveTemporaries(ModelFilePath(folder_, name, "").parent_path());
-    std::error_code error;
-    if (std::filesystem::exists(DatasetInfoPath(folder_), error)) {
-      TILEGRAD_ASSIGN(const DatasetInfo there, ReadDatasetInfo(folder_));
-      if (there.recipe != info_.recipe) {
-        return InvalidArgument(
-            "{} holds a dataset made with other settings (source {}, {} pixels, {} views); choose "
-            "another folder or delete it",
-            folder_.string(), there.source, there.image_size, there.views);
-      }
-      // The index that may be there belongs to the classes of then, and stays until the new one.
-      return {};
+    const auto there = ReadDatasetInfo(folder_);
+    if (there.status().code() == StatusCode::kNotFound) return WriteDatasetInfo(folder_, info_);
+    if (!there.ok()) return there.status();
+    if (there->recipe != info_.recipe) {
+      return InvalidArgument(
+          "{} holds a dataset made with other settings (source {}, {} pixels, {} views); choose "
+          "another folder or delete it",
+          folder_.string(), there->source, there->image_size, there->views);
     }
-    return WriteDatasetInfo(folder_, info_);
+    // The index that may be there belongs to the classes of then, and stays until the new one.
+    return {};
   }
 
   void Reuse(std::size_t i) {
-    std::error_code error;
-    if (!std::filesystem::exists(FileOf(i), error)) return;
     auto stamp = VerifyModelFile(FileOf(i), info_);
     if (stamp.ok()) outcomes_[i].stamp = *stamp;
     if (stamp.status().code() == StatusCode::kIo) Fail(stamp.status());

@@ -162,6 +162,23 @@ TEST_F(BuildTest, BrokenModelFilesAreMadeAgain) {
   EXPECT_EQ(Contents(root_ / "set"), whole);
 }
 
+// What cannot be opened may be whole: it is neither made again nor taken for missing.
+TEST_F(BuildTest, FilesThatTheSystemDoesNotGiveStopIt) {
+  const auto source = ProceduralSource(1, 3);
+  for (const char* name : {"models/lamp/lamp-00000.npz", "dataset.json"}) {
+    SCOPED_TRACE(name);
+    ASSERT_TRUE(Build(*source, root_ / "set").ok());
+    const Path file = root_ / "set" / name;
+    std::filesystem::remove(file);
+    std::filesystem::create_symlink(file, file);  // also stops root, unlike permissions
+    const Status status = Build(*source, root_ / "set").status();
+    EXPECT_EQ(status.code(), StatusCode::kIo) << status.message();
+    EXPECT_NE(status.message().find(file.string()), std::string::npos) << status.message();
+    EXPECT_TRUE(std::filesystem::is_symlink(file));
+    std::filesystem::remove(file);
+  }
+}
+
 TEST_F(BuildTest, OtherSettingsDoNotOverwrite) {
   const auto source = ProceduralSource(1, 3);
   ASSERT_TRUE(Build(*source, root_ / "set").ok());
