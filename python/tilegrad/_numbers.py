@@ -45,15 +45,18 @@ def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Seque
 
 
 @contextlib.contextmanager
-def axes_of(fields: dict[str, np.ndarray], corners: Sequence[str]) -> Iterator[None]:
+def axes_of(scenes: Sequence[Any]) -> Iterator[None]:
     """ValueErrors of the core, which counts numbers of an array one by one, get the index that the
     array has in Python: "faces[6] is 9" becomes "faces[2,0] is 9".
 
-    fields: arrays by name, maybe with an axis of scenes before their own. corners: those of three
-        axes of their own, faces, corners and numbers.
+    scenes: alike, as a call of the renderer has them.
     """
+    fields = scenes[0]._fields if scenes else {}
+    corners = scenes[0]._arguments["per_corner"] if scenes else ()
+
     def spell(match: re.Match) -> str:
         name, number = match[1], int(match[2])
+        # Before an array's own axes there may be one of images.
         shape = np.shape(fields.get(name, ()))[-3 if name in corners else -2:]
         if name not in _OF_NUMBERS or len(shape) < 2 or number >= np.prod(shape):
             return match[0]

@@ -226,7 +226,7 @@ class Renderer:
         if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")
         wanted = [name in outputs for name in _core.IMAGES]
-        with _numbers.axes_of(checked[0]._fields, checked[0]._arguments["per_corner"]):
+        with _numbers.axes_of(checked):
             frame = self._renderer.render([s._record for s in checked], options, wanted)
         return Frame(frame, checked, single, outputs)
 

@@ -127,8 +127,8 @@ class Errors(unittest.TestCase):
         ]
         for error, text, call in cases:
             self.expect(error, text, call)
-        for text, change in ((r"^render: scene 0: faces\[2\] is 99", {"faces": [[0, 1, 99]]}),
-                             (r"^render: scene 0: positions\[13\]", {"positions": bad})):
+        for text, change in ((r"^render: scene 0: faces\[0,2\] is 99", {"faces": [[0, 1, 99]]}),
+                             (r"^render: scene 0: positions\[4,1\]", {"positions": bad})):
             moved = {"uvs": None, "textures": None, "surfaces": None, "face_surfaces": None,
                      "per_corner": ()}
             with self.assertRaisesRegex(ValueError, text):

@@ -398,7 +398,7 @@ class Errors(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "delta has no gradient"):
             rendered(given, delta=torch.tensor(1e-3, requires_grad=True))
         given["positions"][3, 1] = float("nan")
-        with self.assertRaisesRegex(ValueError, r"positions\[10\] is nan"):
+        with self.assertRaisesRegex(ValueError, r"positions\[3,1\] is nan"):
             rendered(given)
 
     def test_six_numbers_without_a_rotation(self):
