@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """tilegrad: a differentiable rasterizer for CPUs, with NumPy arrays in and out."""
 
-from importlib import import_module
+from importlib import import_module as _import_module
 from types import ModuleType
 
 from tilegrad._arrays import reset_stats, stats
@@ -18,7 +18,7 @@ _MODULES = ("cameras", "compat", "dataset", "files", "fragments", "images", "mes
 def __getattr__(name: str) -> ModuleType:
     if name not in _MODULES:
         raise AttributeError(f"module 'tilegrad' has no attribute {name!r}")
-    return import_module(f"tilegrad.{name}")
+    return _import_module(f"tilegrad.{name}")
 
 
 def __dir__() -> list[str]:

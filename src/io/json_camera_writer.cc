@@ -45,6 +45,10 @@ Status SaveJson(const Path& file, const json& top) {
 Status SaveNerfCameras(const Path& file, std::span<const CameraView> views) {
   json frames = json::array();
   for (const CameraView& view : views) {
+    if (view.name.find('\\') != std::string::npos) {
+      return InvalidArgument("{}: \"{}\" has a backslash, which transforms.json takes for a slash",
+                             file.string(), view.name);
+    }
     const NerfCamera c = ToNerf(view.camera);
     frames.push_back({{"file_path", view.name},
                       {"w", view.size.width},

@@ -24,9 +24,13 @@ Mesh Painted(glm::vec4 color) {
 
 class HostileMaterials : public TempFolderTest {
  protected:
-  // An error that names the file and the material, or a warning that does, and sound colours.
+  // An error that names the file and the material (or, of MTL, the line), or a warning that does,
+  // and sound colours.
   void ExpectNamed(const Path& file) {
     const auto loaded = LoadMesh(file);
+    if (!loaded.ok() && file.extension() == ".obj") {
+      return ExpectMessage(loaded.status(), "a.mtl: line 2", "finite");
+    }
     if (!loaded.ok()) return ExpectMessage(loaded.status(), file.filename().string(), "paint");
     bool named = false;
     for (const std::string& warning : loaded->warnings) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coordinates far from the origin: what is subtracted, and what a file has no digits for.
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -74,7 +75,7 @@ TEST_F(MeshOriginTest, TextWithDigitsIsRound) {
     SCOPED_TRACE(path.string());
     const auto loaded = Load(path);
     ExpectRound(loaded, 2e-6);  // digits to 5e-7 in each of three, and 2^-24
-    EXPECT_EQ(loaded.warnings.size(), 1u);
+    EXPECT_EQ(loaded.warnings.size(), 1u) << fmt::format("{}", fmt::join(loaded.warnings, "|"));
   }
 }
 
@@ -153,12 +154,12 @@ std::string Gltf(const std::string& folder, const Json& nodes, const Json& primi
   const Json position = {{"bufferView", 0}, {"componentType", 5126}, {"count", 4},
                          {"type", "VEC3"},  {"min", {0, 0, 0}},      {"max", {1, 1, 0}}};
   return Json{{"asset", {{"version", "2.0"}}},
-              {"buffers", {{{"uri", "b.bin"}, {"byteLength", 60}}}},
+              {"buffers", Json::array({{{"uri", "b.bin"}, {"byteLength", 60}}})},
               {"bufferViews", {view, index_view}},
               {"accessors", {position, triangle(0), triangle(6), position}},
               {"materials", {{{"name", "a"}}, {{"name", "b"}}}},
-              {"meshes", {{{"primitives", primitives}}}},
-              {"scenes", {{{"nodes", {0}}}}},
+              {"meshes", Json::array({{{"primitives", primitives}}})},
+              {"scenes", Json::array({{{"nodes", Json::array({0})}}})},
               {"nodes", nodes}}
       .dump();
 }
@@ -172,9 +173,9 @@ TEST_F(MeshOriginTest, GltfNodesFarAway) {
   const Json nodes = {{{"translation", {400000.25, 4600000.125, 300}}, {"children", {1, 2}}},
                       {{"mesh", 0}, {"translation", {31000.125, 0, 0}}},
                       {{"camera", 0}, {"translation", {31000.125, 0, 3}}}};
-  auto document = Json::parse(Gltf(folder_.string(), nodes, {Primitive(0, 1, 0)}));
-  document["cameras"] = {
-      {{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}};
+  auto document = Json::parse(Gltf(folder_.string(), nodes, Json::array({Primitive(0, 1, 0)})));
+  document["cameras"] =
+      Json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}});
   const auto loaded = Load(Write("a.gltf", document.dump()));
   EXPECT_EQ(loaded.origin, glm::dvec3(431001, 4600001, 300));
   ASSERT_EQ(loaded.mesh.positions.size(), 4u);
@@ -184,12 +185,12 @@ TEST_F(MeshOriginTest, GltfNodesFarAway) {
   ASSERT_EQ(loaded.cameras.size(), 1u);  // it looks at the corner from 3 above, as in the file
   const auto& m = loaded.cameras[0].camera.node_to_world;
   EXPECT_EQ(glm::dvec3(m[3], m[7], m[11]), glm::dvec3(-0.625, -0.875, 3));
-  EXPECT_EQ(loaded.warnings.size(), 1u);
+  EXPECT_EQ(loaded.warnings.size(), 1u) << fmt::format("{}", fmt::join(loaded.warnings, "|"));
 }
 
 // Primitives of one mesh with one accessor of positions share its vertices; others do not.
 TEST_F(MeshOriginTest, GltfSharedAccessors) {
-  const Json nodes = {{{"mesh", 0}}};
+  const Json nodes = Json::array({{{"mesh", 0}}});
   const auto shared = Load(
       Write("a.gltf", Gltf(folder_.string(), nodes, {Primitive(0, 1, 0), Primitive(0, 2, 1)})));
   EXPECT_EQ(shared.mesh.positions,

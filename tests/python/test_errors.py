@@ -73,7 +73,8 @@ class Errors(unittest.TestCase):
         ]
         self.expect_refused(cases)
         self.expect(ValueError, "Texture: wrap is 'tile', expected one of 'repeat', 'clamp', "
-                    "'mirror'", lambda: Texture(np.zeros((2, 2, 3)), "tile"))
+                    "'mirror', 'repeat clamp', 'clamp mirror', 'mirror repeat', 'repeat mirror', "
+                    "'clamp repeat', 'mirror clamp'", lambda: Texture(np.zeros((2, 2, 3)), "tile"))
 
     def test_scenes_of_wrong_types(self):
         self.expect_refused([

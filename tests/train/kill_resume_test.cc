@@ -169,7 +169,7 @@ TEST_F(KillResume, TerminationSavesAndSaysHowToGoOn) {
     ::kill(child, signal);
     const int status = Wait(child);
     ASSERT_TRUE(WIFEXITED(status)) << Output(run);
-    EXPECT_EQ(WEXITSTATUS(status), 130) << Output(run);
+    EXPECT_EQ(WEXITSTATUS(status), 128 + signal) << Output(run);
     EXPECT_NE(Output(run).find("--resume"), std::string::npos) << Output(run);
     const auto found = LoadNewestCheckpoint(context_, folder_ / run);
     ASSERT_TRUE(found.ok()) << found.status().message();

@@ -106,7 +106,7 @@ class MtlParser {
     std::array<float, 3> n;
     const std::string_view whole = rest;
     const int count = TakeNumbers(rest, n.data(), 3);
-    if (count == 0 || count == 2) return Error("Kd", whole);
+    if (count != 3 && (count != 1 || !NextToken(rest).empty())) return Error("Kd", whole);
     if (count == 1) n[1] = n[2] = n[0];
     material().diffuse = {n[0], n[1], n[2]};
     return {};
