@@ -54,7 +54,7 @@ double CoarseStep(const LoadedMesh& loaded, const ExactBounds& bounds, int axis)
     floats = floats && static_cast<double>(static_cast<float>(p[axis])) == p[axis];
     if (floats && values.size() < 2 * kTooCoarse) values.insert(p[axis]);
   });
-  if (!floats) return 0;
+  if (!floats || values.size() < 3) return 0;  // two values, as of a box, say nothing about steps
   double least = std::numeric_limits<double>::infinity();
   for (auto at = values.begin(); at != values.end() && std::next(at) != values.end(); ++at)
     least = std::min(least, *std::next(at) - *at);
