@@ -2,7 +2,7 @@
 """tilegrad: a differentiable rasterizer for CPUs, with NumPy arrays in and out."""
 
 from importlib import import_module as _import_module
-from types import ModuleType
+from types import ModuleType as _ModuleType
 
 from tilegrad._arrays import reset_stats, stats
 from tilegrad._camera import Camera
@@ -15,7 +15,7 @@ _MODULES = ("cameras", "compat", "dataset", "files", "fragments", "images", "mes
             "selftest", "torch", "weights")  # imported at first use: `tilegrad.files.load_mesh(...)`
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> _ModuleType:
     if name not in _MODULES:
         raise AttributeError(f"module 'tilegrad' has no attribute {name!r}")
     return _import_module(f"tilegrad.{name}")
