@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad dataset: which axis of the models is up.
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "io/npz.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+// A wedge without symmetry, with integer coordinates, so that turning it rounds nothing.
+constexpr int kWedge[6][3] = {{0, 0, 0}, {3, 0, 0}, {0, 5, 0}, {0, 0, 2}, {3, 0, 2}, {0, 5, 2}};
+constexpr const char* kFaces =
+    "f 1 3 2\nf 4 5 6\nf 1 2 5\nf 1 5 4\nf 2 3 6\nf 2 6 5\nf 3 1 4\nf 3 4 6\n";
+
+class DatasetTest : public TempFolderTest {
+ protected:
+  // A folder CLASS/MODEL of the wedge, its axes where `place` puts them; and the dataset's
+  // pictures of it.
+  template <class Place>
+  std::vector<std::uint8_t> PicturesOf(const std::string& name, const Place& place,
+                                       const std::string& options) {
+    std::filesystem::create_directories(folder_ / name / "wedge");
+    std::string obj;
+    for (const auto& [x, y, z] : kWedge) {
+      const auto [a, b, c] = place(x, y, z);
+      obj += "v " + std::to_string(a) + " " + std::to_string(b) + " " + std::to_string(c) + "\n";
+    }
+    Write(name + "/wedge/a.obj", obj + kFaces);
+    Write(name + "/wedge/b.obj", obj + kFaces);  // one to train on, one to test with
+    const std::string out = (folder_ / (name + "_data")).string();
+    const Outcome made = RunProgram("dataset --source folder --input " + (folder_ / name).string() +
+                                    " --size 16 --views 3 --out " + out + " " + options);
+    EXPECT_EQ(made.exit_code, 0) << made.output;
+    const auto images = io::LoadNpzArray(Path(out) / "models" / "wedge" / "a.npz", "images");
+    EXPECT_TRUE(images.ok()) << images.status().message();
+    return images.ok() ? images->As<std::uint8_t>().value() : std::vector<std::uint8_t>();
+  }
+};
+
+using Point = std::array<int, 3>;
+
+TEST_F(DatasetTest, TheAxisThatIsUpTurnsTheModel) {
+  const auto y = PicturesOf(
+      "y",
+      [](int x, int y, int z) {
+        return Point{x, y, z};
+      },
+      "");
+  const auto z = PicturesOf(
+      "z",
+      [](int x, int y, int z) {
+        return Point{x, -z, y};
+      },
+      "--up z");
+  const auto lying = PicturesOf(
+      "lying",
+      [](int x, int y, int z) {
+        return Point{x, -z, y};
+      },
+      "");
+  ASSERT_EQ(y.size(), 3u * 4 * 16 * 16);
+  EXPECT_TRUE(z == y);
+  EXPECT_FALSE(lying == y);
+}
+
+TEST_F(DatasetTest, AnotherAxisIsAnotherDataset) {
+  const auto same = [](int x, int y, int z) { return Point{x, y, z}; };
+  PicturesOf("m", same, "");
+  const Outcome again =
+      RunProgram("dataset --source folder --input " + (folder_ / "m").string() +
+                 " --size 16 --views 3 --up z --out " + (folder_ / "m_data").string());
+  EXPECT_EQ(again.exit_code, 2) << again.output;
+  const Outcome wrong = RunProgram("dataset --source folder --up w --input " + folder_.string());
+  EXPECT_EQ(wrong.exit_code, 2) << wrong.output;
+  EXPECT_NE(wrong.output.find("--up"), std::string::npos) << wrong.output;
+}
+
+}  // namespace
+}  // namespace tilegrad
