@@ -7,6 +7,7 @@
 
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
+#include "fit/input.h"
 #include "fit/refine.h"
 #include "train/data/cutout.h"
 #include "train/predictor.h"
@@ -75,7 +76,7 @@ class Model {
       const std::scoped_lock lock(mutex_);
       auto meshes = predictor_.Predict(seen);
       if (!meshes.ok()) return meshes.status();
-      return train::RefineMesh(meshes->front(), train::TargetOfCutout(planes, side),
+      return train::RefineMesh(meshes->front(), train::TargetsOfPlanar(planes, side),
                                {.steps = steps}, *workers_);
     };
     return MeshToDict(ValueOrThrow(WithoutGil(refine)).mesh);
@@ -95,6 +96,8 @@ class Model {
 void BindPredictor(py::module_& m) {
   m.def("prepare_cutout", &PrepareCutout, py::arg("image"), py::arg("mask"), py::arg("size"),
         py::arg("keep_framing"), "(4, size, size) uint8 of a picture (H, W, C) uint8.");
+  m.attr("REFINE_STEPS") = train::kRefineSteps;
+  m.attr("REFINE_SIZE") = train::kRefineSize;
   py::class_<Model>(m, "Model", "A trained network.")
       .def(py::init(&Model::Load), py::arg("path"), py::arg("threads"),
            "path: of a run folder or a checkpoint.")

@@ -56,6 +56,8 @@ def surface_voxels(face_vertices: np.ndarray, resolution: int) -> np.ndarray: ..
 def voxel_iou(pred: np.ndarray, gt: np.ndarray) -> float: ...
 
 # Trained networks.
+REFINE_STEPS: int
+REFINE_SIZE: int
 def prepare_cutout(image: np.ndarray, mask: Optional[np.ndarray], size: int,
                    keep_framing: bool) -> np.ndarray: ...
 

@@ -20,10 +20,6 @@ from tilegrad.images import as_bytes
 from tilegrad.meshes import Mesh, mesh_of_dict
 
 
-_REFINE_STEPS = 300  # as of `tilegrad predict`
-_REFINE_SIZE = 128  # pixels a side of the picture that is refined on
-
-
 class Predictor:
     """A trained network. Does what `tilegrad predict` does, to the bit.
 
@@ -79,7 +75,7 @@ class Predictor:
         return _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))
 
     def predict(self, image: Any, mask: Any = None, *, keep_framing: bool = False,
-                refine: int = _REFINE_STEPS) -> Mesh:
+                refine: int = _tools.REFINE_STEPS) -> Mesh:
         """The mesh of a picture, with vertex colours; arguments as of `prepare`. Its largest
         half-extent is 0.45, its middle the origin.
 
@@ -91,7 +87,7 @@ class Predictor:
         seen = _tools.prepare_cutout(pixels, cutout, self.image_size, bool(keep_framing))[None]
         if refine == 0:
             return self.predict_prepared(seen)[0]
-        picture = _tools.prepare_cutout(pixels, cutout, _REFINE_SIZE, bool(keep_framing))
+        picture = _tools.prepare_cutout(pixels, cutout, _tools.REFINE_SIZE, bool(keep_framing))
         return mesh_of_dict(self._model().predict_refined(seen, picture, int(refine)))
 
     @staticmethod

@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
+#include "fit/input.h"
 #include "fit/refine.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
@@ -25,7 +26,7 @@ train::PredictionChange RefineWith(int steps, int image_size) {
   return
       [steps, image_size](const Mesh& mesh, std::span<const std::uint8_t> image) -> Result<Mesh> {
         TILEGRAD_ASSIGN(train::RefinedMesh refined,
-                        train::RefineMesh(mesh, train::TargetOfCutout(image, image_size),
+                        train::RefineMesh(mesh, train::TargetsOfPlanar(image, image_size),
                                           {.steps = steps}, Workers(1)));
         return std::move(refined.mesh);
       };

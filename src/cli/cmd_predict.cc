@@ -6,6 +6,7 @@
 #include "cli/console.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
+#include "fit/input.h"
 #include "fit/refine.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
@@ -19,15 +20,18 @@ namespace tilegrad::cli {
 namespace {
 
 constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableSize = 256;
-constexpr int kRefineSize = 128;  // pixels a side of the picture that a mesh is refined on
 
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
   bool keep_framing = false, force = false;
-  int refine = 300;
+  int refine = train::kRefineSteps;
   int workers = 0;
 };
+
+train::Framing FramingOf(const PredictOptions& options) {
+  return options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
+}
 
 Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& file) {
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(file));
@@ -62,7 +66,7 @@ std::vector<std::pair<std::string, std::string>> NameResults(
 // What the picture shows, the network's mesh and the refined one, from where the picture was taken.
 Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
                  const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
-  constexpr int size = kRefineSize;
+  constexpr int size = train::kRefineSize;
   const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
                                         picture.subspan(3 * size * size), size, size};
   std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
@@ -76,10 +80,10 @@ Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
 
 Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& file, Mesh* mesh,
               const Workers& workers) {
-  const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
-  TILEGRAD_ASSIGN(const auto planar, train::PrepareCutout(cutout, kRefineSize, framing));
+  TILEGRAD_ASSIGN(const auto planar,
+                  train::PrepareCutout(cutout, train::kRefineSize, FramingOf(options)));
   TILEGRAD_ASSIGN(train::RefinedMesh refined,
-                  train::RefineMesh(*mesh, train::TargetOfCutout(planar, kRefineSize),
+                  train::RefineMesh(*mesh, train::TargetsOfPlanar(planar, train::kRefineSize),
                                     {.steps = options.refine}, workers));
   TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, workers));
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
@@ -93,24 +97,24 @@ Status PredictOne(const train::Predictor& predictor, const PredictOptions& optio
                   const std::pair<std::string, std::string>& image, const OutputGuard& guard,
                   const Workers& workers) {
   const auto& [file, stem] = image;
-  const Path files[] = {Path(options.out) / (stem + "_predicted.glb"),
-                        Path(options.out) / (stem + "_turntable.png"),
-                        Path(options.out) / (stem + "_match.png")};
-  const std::span<const Path> written = std::span(files).first(options.refine > 0 ? 3 : 2);
+  const Path out(options.out);
+  const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
+             match = out / (stem + "_match.png");
+  std::vector<Path> written = {glb, turntable};
+  if (options.refine > 0) written.push_back(match);
   TILEGRAD_TRY(guard.CheckAll(written));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
-  const auto framing = options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
-  const auto input = train::PrepareCutout(cutout, predictor.image_size(), framing);
+  const auto input = train::PrepareCutout(cutout, predictor.image_size(), FramingOf(options));
   if (!input.ok()) return input.status().Within(file);
   TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
   if (options.refine > 0) {
-    const Status refined = Refine(options, cutout, files[2], &meshes[0], workers);
+    const Status refined = Refine(options, cutout, match, &meshes[0], workers);
     if (!refined.ok()) return refined.Within(file);
   }
-  TILEGRAD_TRY(io::SaveGlb(files[0], meshes[0]));
-  TILEGRAD_TRY(DrawTurntable(meshes[0], files[1], workers));
+  TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
+  TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
   guard.NoteAll(written);
-  Print("{} -> {}, {}\n", file, files[0].string(), files[1].string());
+  Print("{} -> {}, {}\n", file, glb.string(), turntable.string());
   return {};
 }
 

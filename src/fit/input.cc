@@ -143,24 +143,26 @@ Result<int> FindModel(const Dataset& dataset, const std::string& name) {
                   dataset.folder().string(), name);
 }
 
-// Bytes of [views][4][size][size], colours multiplied by alpha.
-void TakeDataset(const std::vector<std::uint8_t>& bytes, std::size_t views, TargetImages* out) {
-  const std::size_t plane = out->pixels();
-  out->color.resize(3 * plane * views), out->alpha.resize(plane * views);
+}  // namespace
+
+TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
+  TargetImages out;
+  out.width = out.height = size;
+  const std::size_t plane = out.pixels(), views = bytes.size() / (4 * plane);
+  out.color.resize(3 * plane * views), out.alpha.resize(plane * views);
   for (std::size_t n = 0; n < views; ++n) {
     const std::uint8_t* from = &bytes[4 * plane * n];
     for (std::size_t p = 0; p < plane; ++p) {
       const float alpha = static_cast<float>(from[3 * plane + p]) / 255;
-      out->alpha[n * plane + p] = alpha;
+      out.alpha[n * plane + p] = alpha;
       for (std::size_t c = 0; c < 3; ++c) {
         const float value = static_cast<float>(from[c * plane + p]) / 255;
-        out->color[(3 * n + c) * plane + p] = alpha > 0 ? std::min(value / alpha, 1.0f) : 0.0f;
+        out.color[(3 * n + c) * plane + p] = alpha > 0 ? std::min(value / alpha, 1.0f) : 0.0f;
       }
     }
   }
+  return out;
 }
-
-}  // namespace
 
 Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder));
@@ -191,9 +193,8 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
   TILEGRAD_ASSIGN(const int index, FindModel(dataset, model));
   TILEGRAD_ASSIGN(ModelData data, dataset.Load(index));
   FitInput input;
-  input.images.width = input.images.height = dataset.info().image_size;
+  input.images = TargetsOfPlanar(data.images, dataset.info().image_size);
   const auto views = static_cast<std::size_t>(dataset.info().views);
-  TakeDataset(data.images, views, &input.images);
   for (std::size_t i = 0; i < views; ++i) {
     input.cameras.push_back(dataset.info().camera.View(static_cast<int>(i)));
     input.names.push_back(fmt::format("view {}", i));

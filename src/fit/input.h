@@ -2,7 +2,9 @@
 // What a fit is given: images with masks, and their cameras.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,10 @@ Result<FitInput> ReadFitFolder(const Path& folder, int hold_out);
 
 // One model of a dataset (train/data/dataset.h), named "CLASS/ID".
 Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, int hold_out);
+
+// Images as datasets and PrepareCutout have them, bytes of [views][4][size][size] with RGB over
+// black.
+TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size);
 
 // Means over squares of `factor` pixels; colours weighted by alpha. The sides must be multiples of
 // `factor`.

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -13,7 +13,6 @@
 #include "fit/fitter.h"
 #include "fit/input.h"
 #include "fit/score.h"
-#include "render/picture/composite.h"
 #include "scene/camera_conventions.h"
 #include "scene/subdivide.h"
 #include "train/data/batches.h"
@@ -22,15 +21,25 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kCoarse = 2000;     // vertices below which faces are divided
+// Where no other reason is given, values were chosen by eye and by silhouette and colour on a few
+// furniture pictures and photographs: docs/lab/single-image.md, "Refinement on the picture".
+constexpr std::size_t kCoarse = 2000;     // vertices below which faces are divided: the template of
+                                          // level 3 becomes that of level 4
 constexpr int kSearchSide = 64;           // pixels a side of pictures that cameras are searched in
 constexpr std::size_t kCandidates = 3;    // cameras that are tried by descent
-constexpr double kApart = 30;             // degrees between them
+constexpr double kApart = 30;             // degrees between them: two steps of the search
 constexpr double kPilotShare = 0.2;       // of the steps, for each candidate
 constexpr double kSymmetricShare = 0.75;  // of the steps that see the mirror image, too
-constexpr double kDeltaStart = 2e-3, kFinalPixels = 0.15;  // softness of outlines
-constexpr double kFinalRate = 0.1;
-constexpr int kSamples = 3;  // a side of a pixel, to measure
+// Softness of outlines (equation 5), squared NDC, then pixels. Soft alpha lies outside of faces, so
+// a mesh that fits it is too small by about its width: it ends narrow, and before the last steps.
+constexpr double kDeltaStart = 2e-3, kFinalPixels = 0.15, kDeltaShare = 0.9;
+constexpr double kMaxAlphaError = 1e-4;  // as of fits
+constexpr double kFinalRate = 0.1;       // of the first, by a half cosine
+// World units and colours a step. Positions and colours go through diffusion, so that what the
+// picture does not show follows its neighbours; the movement's Laplacian holds it in shape.
+constexpr double kPositionRate = 0.02 * static_cast<double>(kPredictionHalfExtent);
+constexpr double kColorRate = 0.06, kSmoothing = 20, kColorSmoothing = 0.5;
+constexpr RegularizerTerms kRegularizers = {.laplacian = 1, .flatness = 1e-4};
 
 const int kOwnView[] = {0};
 const int kBothViews[] = {0, 1};
@@ -58,16 +67,13 @@ std::pair<TargetImages, int> AtMost(const TargetImages& picture, int side) {
   return {factor == 1 ? picture : Reduce(picture, factor), factor};
 }
 
-FitterOptions OptionsOf(const FitScene& scene) {
-  float extent = 0;
-  for (const float x : scene.positions) extent = std::max(extent, std::abs(x));
+FitterOptions Options() {
   FitterOptions out;
   for (const Parameter p : {Parameter::kPositions, Parameter::kColors, Parameter::kCamera})
     out.parameters[p] = true;
-  out.rates[Parameter::kPositions] = 0.02 * static_cast<double>(extent);
-  out.regularizers = {.laplacian = 1, .flatness = 1e-4};
-  out.rates[Parameter::kColors] = 0.06;
-  out.smoothing = 20, out.color_smoothing = 0.5;
+  out.rates[Parameter::kPositions] = kPositionRate, out.rates[Parameter::kColors] = kColorRate;
+  out.regularizers = kRegularizers;
+  out.smoothing = kSmoothing, out.color_smoothing = kColorSmoothing;
   return out;
 }
 
@@ -77,27 +83,14 @@ class Descent {
   static Result<Descent> Make(FitScene scene, const Camera& camera, const TargetImages& picture,
                               const Workers& workers) {
     scene.cameras = {camera, MirroredCamera(camera, picture.width)};
-    const FitterOptions options = OptionsOf(scene);
-    TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(scene), options, workers));
+    TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(scene), Options(), workers));
     return Descent(std::move(fitter), picture);
   }
 
   // Takes steps [first, last) of `steps`.
   Status Run(int first, int last, int steps) {
     for (int i = first; i < last; ++i) {
-      const double t = static_cast<double>(i) / steps;
-      const bool coarse = t < kSymmetricShare / 2 && small_.has_value();
-      FitStep step;
-      step.views = t < kSymmetricShare ? std::span<const int>(kBothViews) : kOwnView;
-      step.targets = coarse ? &*small_ : &targets_;
-      step.job.scale = coarse ? 1.0f / static_cast<float>(factor_) : 1;
-      step.job.options.width = step.job.options.height = step.targets->width;
-      const double pixel = kFinalPixels * 2 / targets_.width;
-      step.job.options.delta =
-          kDeltaStart * std::pow(pixel * pixel / kDeltaStart, std::min(1.0, t / 0.9));
-      step.job.options.max_alpha_error = 1e-4;
-      step.rate_factor = kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
-      TILEGRAD_ASSIGN(const FitValues values, fitter_.Step(step));
+      TILEGRAD_ASSIGN(const FitValues values, fitter_.Step(StepAt(static_cast<double>(i) / steps)));
       loss_ = values.total;
     }
     return {};
@@ -114,6 +107,21 @@ class Descent {
     if (factor > 1) small_ = WithMirrorImage(small);
   }
 
+  // t: the share of the steps that is done. Coarse first, then with the mirror image, then alone.
+  FitStep StepAt(double t) const {
+    const bool coarse = t < kSymmetricShare / 2 && small_.has_value();
+    FitStep step;
+    step.views = t < kSymmetricShare ? std::span<const int>(kBothViews) : kOwnView;
+    step.targets = coarse ? &*small_ : &targets_;
+    step.job.scale = coarse ? 1.0f / static_cast<float>(factor_) : 1;
+    step.job.options.width = step.job.options.height = step.targets->width;
+    const double end = kFinalPixels * 2 / targets_.width, share = std::min(1.0, t / kDeltaShare);
+    step.job.options.delta = kDeltaStart * std::pow(end * end / kDeltaStart, share);
+    step.job.options.max_alpha_error = kMaxAlphaError;
+    step.rate_factor = kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+    return step;
+  }
+
   Fitter fitter_;
   TargetImages targets_;
   std::optional<TargetImages> small_;
@@ -124,12 +132,8 @@ class Descent {
 Result<PictureMatch> Match(const FitScene& scene, const TargetImages& picture,
                            const Workers& workers) {
   FitRenderer renderer(workers);
-  FitRenderer::Job job;
-  job.views = kOwnView, job.scale = kSamples, job.alpha = false;
-  job.options.width = job.options.height = kSamples * picture.width;
-  TILEGRAD_TRY(renderer.Render(scene, job));
-  Picture rendered;
-  AverageSamples(renderer.images(), kSamples, &rendered);
+  TILEGRAD_ASSIGN(const Picture rendered,
+                  DrawView(renderer, scene, kOwnView[0], {picture.width, picture.height}));
   const std::size_t pixels = picture.pixels();
   double both = 0, either = 0, gap = 0, object = 0;
   for (std::size_t p = 0; p < pixels; ++p) {
@@ -177,42 +181,17 @@ Result<Descent> BestStart(const FitScene& scene, const std::vector<Camera>& came
 
 // Centred and of the size of predictions, and the camera that still sees it as before.
 Status Normalize(Mesh* mesh, Camera* camera) {
-  const Mesh before = *mesh;
+  const Bounds box = MeshBounds(*mesh);
   TILEGRAD_TRY(NormalizeToBox(*mesh, kPredictionHalfExtent));
-  std::size_t far = 0;  // a vertex that is not the first, to read the scale from
-  for (std::size_t v = 1; v < before.positions.size(); ++v) {
-    if (glm::distance(before.positions[v], before.positions[0]) >
-        glm::distance(before.positions[far], before.positions[0]))
-      far = v;
-  }
+  const glm::dvec3 low(box.low), high(box.high), half = 0.5 * (high - low);
   Alignment moved;
-  moved.scale = static_cast<double>(glm::distance(mesh->positions[far], mesh->positions[0]) /
-                                    glm::distance(before.positions[far], before.positions[0]));
-  for (int i = 0; i < 3; ++i) {
-    moved.offset[i] = static_cast<double>(mesh->positions[0][i]) -
-                      moved.scale * static_cast<double>(before.positions[0][i]);
-  }
+  moved.scale = static_cast<double>(kPredictionHalfExtent) / std::max({half.x, half.y, half.z});
+  for (int i = 0; i < 3; ++i) moved.offset[i] = -moved.scale * 0.5 * (low[i] + high[i]);
   *camera = Moved(*camera, moved);
   return {};
 }
 
 }  // namespace
-
-TargetImages TargetOfCutout(std::span<const std::uint8_t> planar, int size) {
-  TargetImages out;
-  out.width = out.height = size;
-  const std::size_t pixels = out.pixels();
-  out.color.resize(3 * pixels), out.alpha.resize(pixels);
-  for (std::size_t p = 0; p < pixels; ++p) {
-    const float alpha = static_cast<float>(planar[3 * pixels + p]) / 255;
-    out.alpha[p] = alpha;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float over_black = static_cast<float>(planar[c * pixels + p]) / 255;
-      out.color[c * pixels + p] = alpha > 0 ? std::min(1.0f, over_black / alpha) : 0;
-    }
-  }
-  return out;
-}
 
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers) {

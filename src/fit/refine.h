@@ -5,9 +5,6 @@
 // things have.
 #pragma once
 
-#include <cstdint>
-#include <span>
-
 #include "base/parallel.h"
 #include "fit/image_loss.h"
 #include "scene/camera.h"
@@ -16,15 +13,18 @@
 
 namespace tilegrad::train {
 
+inline constexpr int kRefineSteps = 300;  // a few seconds on two cores
+inline constexpr int kRefineSize = 128;   // pixels a side of the picture that predict refines on:
+                                          // an edge of the divided template is about three
+
 struct RefineOptions {
-  int steps = 300;  // of gradient descent; 0: only the camera is found
-  CameraRule camera =
-      {};  // of the training images: where the search for the picture's camera begins
+  int steps = kRefineSteps;  // of gradient descent; 0: only the camera is found
+  CameraRule camera = {};    // of the training images: where the search for the camera begins
 };
 
 // How a mesh looks from the picture's camera.
 struct PictureMatch {
-  double silhouette_iou = 0;  // [0, 1]
+  double silhouette_iou = 0;  // sum of minima by sum of maxima of both alphas: 1 where they agree
   double color_l1 = 0;  // mean |difference| over channels and the pixels of the picture's object
 };
 
@@ -35,12 +35,8 @@ struct RefinedMesh {
   PictureMatch before, after;
 };
 
-// A picture as PrepareCutout makes it, planar [4][size][size] bytes with RGB over black, as an
-// image to fit.
-TargetImages TargetOfCutout(std::span<const std::uint8_t> planar, int size);
-
-// `picture`: one square image, a multiple of 4 pixels a side. `prediction`: a mesh with vertex
-// colours, centred, y up. Faces of a coarse mesh are divided once, so that the result may have more
+// `picture`: one square image. `prediction`: a mesh with vertex colours, normalised as predictions
+// are, y up. Faces of a coarse mesh are divided once, so that the result may have more
 // vertices than the prediction. A pure function of its arguments; any number of workers gives the
 // same bits. Errors: a picture without an object; those of the renderer.
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,

@@ -88,6 +88,17 @@ glm::dmat3 MatrixOf(const Alignment& a) {
 
 }  // namespace
 
+Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view, ImageSize size) {
+  FitRenderer::Job job;
+  job.views = {&view, 1};
+  job.scale = kSamples, job.alpha = false;
+  job.options.width = kSamples * size.width, job.options.height = kSamples * size.height;
+  TILEGRAD_TRY(renderer.Render(scene, job));
+  Picture out;
+  AverageSamples(renderer.images(), kSamples, &out);
+  return out;
+}
+
 Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
                                           std::span<const int> views,
                                           std::span<const Camera> cameras, const Workers& workers) {
@@ -97,15 +108,9 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
   const ImageSize size{input.images.width, input.images.height};
   std::vector<ViewScore> scores;
   for (int i = 0; i < static_cast<int>(views.size()); ++i) {
-    FitRenderer::Job job;
-    job.views = {&i, 1};
-    job.scale = kSamples, job.alpha = false;
-    job.options.width = kSamples * size.width, job.options.height = kSamples * size.height;
-    TILEGRAD_TRY(renderer.Render(seen, job));
+    TILEGRAD_ASSIGN(const Picture rendered, DrawView(renderer, seen, i, size));
     ViewScore score;
     score.view = views[static_cast<std::size_t>(i)];
-    Picture rendered;
-    AverageSamples(renderer.images(), kSamples, &rendered);
     const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
     score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
     score.iou = Iou(rendered.alpha, truth.alpha);

@@ -7,6 +7,7 @@
 
 #include "fit/input.h"
 #include "fit/scene.h"
+#include "render/picture/picture.h"
 
 namespace tilegrad::train {
 
@@ -16,6 +17,9 @@ struct ViewScore {
   double iou = 0;   // of the silhouettes
   ImageU8 truth, rendered;
 };
+
+// A view of the scene as a picture of `size`, 3 x 3 samples a pixel.
+Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view, ImageSize size);
 
 // Views of the input rendered from `cameras` (one for each of `views`).
 Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "fit/find_camera.h"
+#include "fit/input.h"
 #include "render/picture/mesh_pictures.h"
 #include "scene/shapes.h"
 
@@ -39,7 +40,7 @@ Camera CameraAt(double azimuth) {
 TargetImages PictureOf(const Mesh& mesh, const Camera& camera) {
   const auto planar = LitRenderer().Render(mesh, {&camera, 1}, kSize);
   EXPECT_TRUE(planar.ok()) << planar.status().message();
-  return TargetOfCutout(*planar, kSize);
+  return TargetsOfPlanar(*planar, kSize);
 }
 
 TEST(FindCameras, FindsWhereAPictureWasTaken) {

@@ -39,20 +39,24 @@ TEST(MeshNetwork, PredictionsFillTheirBox) {
     EXPECT_TRUE(std::isfinite(v));
 }
 
+// A few weights, offsets large enough to look at.
+NetworkConfig TinyNetwork() {
+  return {.channels = 2,
+          .code = 6,
+          .hidden1 = 5,
+          .hidden2 = 7,
+          .template_level = 2,
+          .output_deviation = 1};
+}
+
 // The gradient of smoothing is covered by the chain below.
 TEST(MeshNetwork, SmoothingSpreadsOffsets) {
   const Workers workers(1);
   nn::Context context(workers);
   const auto roughness = [&](std::int64_t rounds) {
-    MeshNetwork network(context,
-                        {.channels = 2,
-                         .code = 6,
-                         .hidden1 = 5,
-                         .hidden2 = 7,
-                         .template_level = 2,
-                         .smoothing = rounds,
-                         .output_deviation = 1},
-                        16, 1);
+    NetworkConfig config = TinyNetwork();
+    config.smoothing = rounds;
+    MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
     const auto& mesh = network.template_mesh();
@@ -81,17 +85,9 @@ TEST(MeshNetwork, SymmetricPredictionsAre) {
   const Workers workers(1);
   nn::Context context(workers);
   for (const bool fc_norm : {false, true}) {
-    MeshNetwork network(context,
-                        {.channels = 2,
-                         .code = 6,
-                         .hidden1 = 5,
-                         .hidden2 = 7,
-                         .template_level = 2,
-                         .smoothing = 2,
-                         .symmetric = true,
-                         .fc_norm = fc_norm,
-                         .output_deviation = 1},
-                        16, 1);
+    NetworkConfig config = TinyNetwork();
+    config.smoothing = 2, config.symmetric = true, config.fc_norm = fc_norm;
+    MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
     const auto& sphere = network.template_mesh().positions;
