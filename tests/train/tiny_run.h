@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/rng.h"
+#include "scene/shapes.h"
 #include "train/config.h"
 #include "train/data/dataset_files.h"
 
@@ -42,10 +43,12 @@ T& ValueOf(TrainConfig& config, const std::string& key) {
   std::abort();
 }
 
-inline Status WriteNoiseDataset(const Path& folder) {
+enum class Meshes { kNone, kBoxes };
+
+inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone) {
   constexpr int kModels = 12, kSize = 32, kViews = 4;
   DatasetInfo info;
-  info.source = "nmr";
+  info.source = meshes == Meshes::kNone ? "nmr" : "folder";
   info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
   info.views = kViews;
   info.classes = {"noise"};
@@ -54,6 +57,11 @@ inline Status WriteNoiseDataset(const Path& folder) {
   data.images.resize(std::size_t{kViews} * 4 * kSize * kSize);
   data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
                         kOccupancyResolution);
+  if (meshes == Meshes::kBoxes) {
+    data.mesh = Box(glm::vec3(0), {0.9f, 0.4f, 0.6f});
+    data.mesh.colors.assign(data.mesh.positions.size(), {0.8f, 0.3f, 0.2f, 1.0f});
+    data.points.resize(kTruthPoints);
+  }
   std::vector<ModelInfo> models;
   Rng rng(3);
   for (int m = 0; m < kModels; ++m) {

@@ -133,6 +133,25 @@ TEST_F(TrainerTest, MirroredSmoothedAndAveragedRunsResumeToo) {
   ExpectSameBits("whole", "run");
 }
 
+TEST_F(TrainerTest, StreamedRunsResumeAndDoNotDependOnWorkers) {
+  ASSERT_TRUE(WriteNoiseDataset(folder_ / "boxes", Meshes::kBoxes).ok());
+  job_.data = folder_ / "boxes";
+  ValueOf<double>(job_.config, "stream.share") = 0.5;
+  ValueOf<double>(job_.config, "schedule.mirrored") = 0.5;
+  RunWhole("whole", 1);
+  RunWhole("two", 2);
+  StopAfter(4);
+  ExpectFinishes();
+  ExpectSameBits("whole", "run");
+  ExpectSameBits("whole", "two");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / "stream.png"));
+}
+
+TEST_F(TrainerTest, WithoutMeshesNothingCanBeStreamed) {
+  ValueOf<double>(job_.config, "stream.share") = 0.5;
+  ExpectMessage(Run().status(), "stream.share");
+}
+
 TEST_F(TrainerTest, TheAverageOfTheWeightsPredicts) {
   ValueOf<double>(job_.config, "optimizer.average") = 0.9;
   RunWhole("run", 1);

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "render/picture/composite.h"
+#include "render/picture/dataset_light.h"
 #include "render/picture/mesh_scene.h"
 #include "render/picture/picture.h"
 #include "scene/camera_conventions.h"
@@ -15,18 +16,12 @@ namespace {
 
 constexpr int kMaxSize = 4096;
 constexpr int kLitSamples = 4, kUnlitSamples = 3;  // a side of a pixel
-constexpr float kAmbient = 0.45f, kKey = 0.45f, kFill = 0.2f;
-
-Light LightFrom(glm::vec3 towards, float intensity) {
-  const glm::vec3 d = glm::normalize(towards);
-  return {{d.x, d.y, d.z}, intensity};
-}
 
 MeshSceneOptions LitOptions() {
   MeshSceneOptions options;
   options.color_space = ColorSpace::kSrgb;
   options.normals = NormalSource::kAligned;
-  options.ambient = {kAmbient, kAmbient, kAmbient};
+  options.ambient.fill(kDatasetAmbient);
   options.blend = false;
   return options;
 }
@@ -45,8 +40,7 @@ struct LitRenderer::Impl {
     }
     TILEGRAD_TRY(Validate(mesh));
     if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
-    static const Light lights[] = {LightFrom({0.35f, 0.8f, 0.5f}, kKey),
-                                   LightFrom({-0.6f, 0.3f, -0.75f}, kFill)};
+    const std::array<Light, 2> lights = DatasetLights();
     const MeshScene made(mesh, LitOptions());
     Scene scene = made.scene();
     scene.shading.lighting = Lighting::kLambert, scene.lights = lights;

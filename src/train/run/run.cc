@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/folder_lock.h"
+#include "base/processor_time.h"
 #include "io/image_file.h"
 #include "train/run/checkpoint.h"
 #include "train/run/first_difference.h"
@@ -45,6 +46,7 @@ class Session {
   Status OneStep();
   Status Draw();
   Status Log();
+  void LogStream(LogEntry* entry);
   Status Save();
   double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
   bool OutOfTime() const {
@@ -61,7 +63,9 @@ class Session {
   std::int64_t saved_ = -1;
   double seconds_before_ = 0;
   Clock::time_point loop_start_, last_log_;
-  std::int64_t images_ = 0;  // since the last log
+  // Since the last log.
+  std::int64_t images_ = 0;
+  double stream_seconds_ = 0, process_seconds_ = 0;  // the latter: of the process at that log
   std::string note_;
 };
 
@@ -115,7 +119,18 @@ Status Session::Log() {
   LogEntry entry{done_, values_.ForLog()};
   entry.values.emplace_back("images_per_second", rate);
   entry.values.emplace_back("seconds", Seconds());
+  LogStream(&entry);
   return log_->Append(entry);
+}
+
+// The share of the processor time that went into streamed pictures.
+void Session::LogStream(LogEntry* entry) {
+  const double before = std::exchange(process_seconds_, ProcessSeconds());
+  const double streamed = std::exchange(stream_seconds_, 0);
+  if (streamed <= 0 || process_seconds_ <= before) return;
+  const double share = streamed / (process_seconds_ - before);
+  note_ += fmt::format("  streaming {:.0f} %", 100 * share);
+  entry->values.emplace_back("stream_share", share);
 }
 
 Status Session::Draw() {
@@ -130,6 +145,7 @@ Status Session::OneStep() {
   TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
   ++done_;
   images_ += values_.images;
+  stream_seconds_ += values_.stream_seconds;
   const bool last = done_ == s.steps;
   if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
   TILEGRAD_TRY(Draw());
@@ -139,6 +155,7 @@ Status Session::OneStep() {
 
 Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
   loop_start_ = last_log_ = Clock::now();
+  process_seconds_ = ProcessSeconds();
   const std::int64_t steps = plan_.schedule.steps;
   if (done_ == 0) TILEGRAD_TRY(Draw());
   while (done_ < steps && !stop && !OutOfTime()) {

@@ -11,9 +11,10 @@
 namespace tilegrad::train {
 
 struct LossTerm {
-  const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second", "seconds"
-  double weight;     // in the loss; 0: only watched
-  double value;      // before the weight
+  const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second",
+                     // "seconds", "stream_share"
+  double weight;  // in the loss; 0: only watched
+  double value;   // before the weight
 };
 
 // Cleared and filled anew by each step: a steady state keeps the memory.
@@ -22,6 +23,7 @@ struct StepValues {
   std::vector<LossTerm> terms;
   std::vector<std::pair<const char*, double>> also;  // for the log: learning rate, epoch, ...
   std::int64_t images = 0;                           // that the step worked on
+  double stream_seconds = 0;  // of processor time, for pictures that it rendered to learn from
 
   // The loss and each term's share of it: "loss 0.6320  iou 0.521  color 0.111".
   std::string ForConsole() const;

@@ -4,7 +4,7 @@
 namespace tilegrad::train {
 
 ConfigFields FieldsOf(SingleImageConfig* c) {
-  return {
+  ConfigFields fields = {
       {"network.channels", &c->network.channels, 1, 4096,
        "of the first convolution; then 2x and 4x"},
       {"network.code", &c->network.code, 1, 65536, "width of the encoder's fully connected layers"},
@@ -47,6 +47,8 @@ ConfigFields FieldsOf(SingleImageConfig* c) {
       {"schedule.mirrored", &c->mirrored, 0, 1,
        "share of the objects shown mirrored, left to right"},
   };
+  for (ConfigField& field : FieldsOf(&c->stream)) fields.push_back(std::move(field));
+  return fields;
 }
 
 }  // namespace tilegrad::train

@@ -2,6 +2,7 @@
 // The keys of `task.kind = "single_image"`. What each does: config.cc, one line a key.
 #pragma once
 
+#include "train/data/stream/stream_config.h"
 #include "train/models/mesh_network.h"
 #include "train/run/schedule.h"
 
@@ -36,6 +37,7 @@ struct SingleImageConfig {
   NetworkConfig network;
   LossConfig loss;
   RenderConfig render;
+  StreamConfig stream;
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)

@@ -9,6 +9,7 @@
 #include "nn/optim.h"
 #include "scene/topology.h"
 #include "train/data/batches.h"
+#include "train/data/stream/scene_stream.h"
 #include "train/ops/render_op.h"
 #include "train/run/step_values.h"
 #include "train/tasks/single_image/config.h"
@@ -28,6 +29,10 @@ struct BatchTensors {
 };
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch);
+// The first objects of the batch, which is that of `step`, are rendered instead; null: none are.
+Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
+                                 const std::vector<Sample>& batch, SceneStream* stream,
+                                 std::int64_t step);
 
 // The learning rate and 1/delta of a step: both follow schedules of the configuration.
 double LearningRateAt(const SingleImageConfig& config, std::int64_t step);

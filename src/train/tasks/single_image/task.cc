@@ -2,6 +2,7 @@
 #include "train/tasks/single_image/task.h"
 
 #include "base/error.h"
+#include "io/image_file.h"
 #include "nn/nn.h"
 #include "train/data/trained_models.h"
 #include "train/tasks/held_out.h"
@@ -27,10 +28,7 @@ class SingleImageTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return train_.size; }
   RunHeader Header() override;
-  Status Begin(const Path& run, std::int64_t first_step) override {
-    return RememberTrainedModels(run, *dataset_,
-                                 first_step == 0 ? RunStart::kNew : RunStart::kContinued);
-  }
+  Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
@@ -58,6 +56,7 @@ class SingleImageTask : public Task {
  private:
   Status CheckDataset() const;
   Status LoadImages(const TaskStart& start);
+  Status LoadMeshes(const TaskStart& start);
 
   SingleImageConfig config_;
   nn::Context* context_ = nullptr;
@@ -66,6 +65,7 @@ class SingleImageTask : public Task {
   std::vector<Sample> samples_;  // of held_out_, for pictures
   std::optional<TrainStep> step_;
   std::optional<BatchOrder> order_;
+  std::optional<SceneStream> stream_;
 };
 
 Status SingleImageTask::Start(const TaskStart& start) {
@@ -74,10 +74,19 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
+  TILEGRAD_TRY(LoadMeshes(start));
   step_.emplace(*context_, config_, train_.size);
   order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed),
                  config_.mirrored);
   return {};
+}
+
+Status SingleImageTask::Begin(const Path& run, std::int64_t first_step) {
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
+                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  if (!stream_ || first_step > 0) return {};
+  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
+  return io::SavePng(run / "stream.png", sheet);
 }
 
 Status SingleImageTask::CheckDataset() const {
@@ -112,6 +121,17 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
   return {};
 }
 
+Status SingleImageTask::LoadMeshes(const TaskStart& start) {
+  if (config_.stream.share <= 0) return {};
+  TILEGRAD_ASSIGN(
+      StreamMeshes meshes,
+      LoadStreamMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.max_faces,
+                       start.context.workers(), start.progress, start.stop));
+  stream_.emplace(config_.stream, std::move(meshes), dataset_->info(),
+                  static_cast<std::uint64_t>(start.schedule.seed), start.context.workers());
+  return {};
+}
+
 RunHeader SingleImageTask::Header() {
   RunHeader header;
   header.dataset_source = dataset_->info().source;
@@ -125,14 +145,16 @@ Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex
   const auto batch =
       order_->Batch(at.step, static_cast<int>(config_.batch), static_cast<int>(config_.views));
   LossValues values;
-  TILEGRAD_ASSIGN(auto gradients,
-                  step_->Backward(GatherBatch(*context_, train_, batch), at.step, &values));
+  TILEGRAD_ASSIGN(const BatchTensors tensors,
+                  GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, at.step));
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at.step, &values));
   out->loss = values.total;
   step_->AddTerms(values, &out->terms);
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_.models);
   out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));
   out->images = config_.batch;
+  out->stream_seconds = stream_ ? stream_->TakeSeconds() : 0;
   return gradients;
 }
 

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys of table [stream]: what the pictures that training renders itself may look like.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "train/run/config_fields.h"
+
+namespace tilegrad::train {
+
+struct StreamConfig {
+  double share = 0;  // of the objects of a batch; the others are the dataset's pictures
+  std::int64_t max_faces = 2000;  // of a mesh; larger ones are clustered
+  std::int64_t samples = 2;       // along each side of a pixel
+
+  // The shape. Each axis is cut into pieces, and each piece grows or shrinks by a factor of its own
+  // within exp(+-stretch); across x = 0 the pieces are mirror images. Upper and lower end then
+  // differ in width by a factor within exp(+-taper).
+  double stretch = 0.4;
+  double taper = 0.15;
+
+  // The camera: any azimuth, and of the others any value of the range.
+  double elevation_low = 5, elevation_high = 45;  // degrees
+  double fov_low = 30,
+         fov_high = 55;  // degrees; the distance follows, so that objects keep their size
+  double roll = 4;       // degrees, to either side
+  double jitter = 0.04;  // of the image's side: shift, and change of size
+
+  // Colours and light.
+  double recolor = 0.5;     // share of the objects whose hues are turned and tinted
+  double brightness = 0.2;  // factor within exp(+-brightness)
+  double light = 0.25;      // how far lights leave those of datasets: 1 is anywhere above
+};
+
+ConfigFields FieldsOf(StreamConfig* config);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// Streamed pictures: what is drawn by lot stays in its range, nothing drawn is the dataset's
+// picture, and the same position gives the same bits for any worker.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render/picture/dataset_light.h"
+#include "render/picture/mesh_pictures.h"
+#include "scene/shapes.h"
+#include "train/data/stream/scene_stream.h"
+#include "train/data/stream/view_draw.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Nothing is left to chance but the azimuth.
+StreamConfig Still() {
+  StreamConfig c;
+  c.share = 1, c.stretch = c.taper = c.roll = c.jitter = 0;
+  c.recolor = c.brightness = c.light = 0;
+  c.elevation_low = c.elevation_high = 27;
+  c.fov_low = c.fov_high = Lens{}.fov_y;
+  return c;
+}
+
+ColoredMesh Ball() {
+  const Mesh ball = Icosphere(2, 0.45f);
+  ColoredMesh out{ball.positions, {}, ball.faces};
+  for (const glm::vec3& p : ball.positions) out.colors.push_back(glm::vec3(0.5f) + p);
+  return out;
+}
+
+StreamMeshes Balls(std::size_t count) { return {std::vector<ColoredMesh>(count, Ball()), 0}; }
+
+DatasetInfo Info(int size) {
+  DatasetInfo info;
+  info.image_size = info.camera.lens.width = info.camera.lens.height = size;
+  return info;
+}
+
+TEST(AxisWarp, WithoutStretchNothingMoves) {
+  Rng rng(1);
+  const AxisWarp warp(rng, 0.45, 0, false);
+  for (const float x : {-0.45f, -0.2f, 0.0f, 0.1f, 0.45f}) EXPECT_FLOAT_EQ(warp(x), x);
+}
+
+TEST(AxisWarp, GrowsByItsFactorsAndKeepsSymmetry) {
+  constexpr double kStretch = 0.5;
+  bool lopsided = false;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Rng rng(seed);
+    const AxisWarp even(rng, 0.45, kStretch, true), odd(rng, 0.45, kStretch, false);
+    float before = even(-0.45f);
+    for (float x = -0.44f; x < 0.45f; x += 0.01f) {
+      const float now = even(x), slope = (now - before) / 0.01f;
+      EXPECT_GT(slope, 0.999f * std::exp(-0.5f));
+      EXPECT_LT(slope, 1.001f * std::exp(0.5f));
+      EXPECT_NEAR(even(-x), -now, 1e-6f);
+      before = now;
+    }
+    lopsided |= std::abs(odd(0.45f) + odd(-0.45f)) > 0.05f;
+  }
+  EXPECT_TRUE(lopsided);
+}
+
+TEST(ObjectDraw, FillsTheBoxAndStaysInRange) {
+  StreamConfig config;
+  config.stretch = 1, config.recolor = 1, config.brightness = 1, config.taper = 1;
+  ObjectDraw object;
+  bool deformed = false;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Rng rng(seed);
+    DrawObject(config, Ball(), 0.45f, rng, &object);
+    glm::vec3 low(1), high(-1);
+    for (const glm::vec3& p : object.positions) low = glm::min(low, p), high = glm::max(high, p);
+    const glm::vec3 half = 0.5f * (high - low), centre = 0.5f * (high + low);
+    EXPECT_NEAR(std::max({half.x, half.y, half.z}), 0.45f, 1e-6f);
+    EXPECT_LT(glm::length(centre), 1e-6f);
+    deformed |= std::min({half.x, half.y, half.z}) < 0.3f;
+    for (const glm::vec3& c : object.colors) {
+      for (int i = 0; i < 3; ++i) EXPECT_TRUE(c[i] >= 0 && c[i] <= 1) << c[i];
+    }
+  }
+  EXPECT_TRUE(deformed);
+}
+
+// A hue that is turned keeps its luminance in YIQ, 0.299 r + 0.587 g + 0.114 b, and so does a tint,
+// as long as nothing is cut at 0 or 1.
+TEST(ObjectDraw, OtherHuesHaveTheSameLuminance) {
+  StreamConfig config = Still();
+  config.recolor = 1;
+  ColoredMesh mesh = Ball();
+  std::fill(mesh.colors.begin(), mesh.colors.end(), glm::vec3(0.45f, 0.4f, 0.35f));
+  const float luminance = 0.299f * 0.45f + 0.587f * 0.4f + 0.114f * 0.35f;
+  ObjectDraw object;
+  int kept = 0;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Rng rng(seed);
+    DrawObject(config, mesh, 0.45f, rng, &object);
+    const glm::vec3 c = object.colors[0];
+    if (std::max({c.r, c.g, c.b}) == 1) continue;
+    EXPECT_NEAR(0.299f * c.r + 0.587f * c.g + 0.114f * c.b, luminance, 2e-3f);
+    EXPECT_GT(glm::length(c - mesh.colors[0]), 1e-4f);
+    ++kept;
+  }
+  EXPECT_GT(kept, 25);
+}
+
+TEST(ViewDraw, WithoutChanceItIsAnOrbit) {
+  const DatasetInfo info = Info(64);
+  Rng rng(5);
+  const Camera camera = DrawCamera(Still(), info.camera, rng);
+  // The eye is at the rule's distance and elevation, and looks at the origin.
+  glm::vec3 eye(0);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k)
+      eye[i] -= camera.rotation[3 * k + i] * camera.translation[static_cast<std::size_t>(k)];
+  }
+  EXPECT_NEAR(glm::length(eye), 1.45f, 1e-5f);
+  EXPECT_NEAR(eye.y, 1.45f * std::sin(27 * 3.14159265f / 180), 1e-5f);
+  EXPECT_NEAR(camera.translation[0], 0, 1e-6f);
+  EXPECT_NEAR(camera.translation[1], 0, 1e-6f);
+  EXPECT_FLOAT_EQ(camera.cx, 32);
+  EXPECT_FLOAT_EQ(camera.fx, Camera(info.camera.View(0)).fx);
+}
+
+// A square that faces the camera at the origin has the same size through any lens.
+TEST(ViewDraw, TheDistanceFollowsTheLens) {
+  StreamConfig config = Still();
+  config.fov_low = 20, config.fov_high = 80, config.roll = 20;
+  const DatasetInfo info = Info(64);
+  const float want = info.camera.View(0).fx / 1.45f;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Rng rng(seed);
+    const Camera camera = DrawCamera(config, info.camera, rng);
+    EXPECT_NEAR(camera.fx / -camera.translation[2], want, 1e-4f * want);
+  }
+}
+
+TEST(ViewDraw, LightsComeFromAbove) {
+  StreamConfig config = Still();
+  const auto still = [&] {
+    Rng rng(1);
+    return DrawLights(config, rng);
+  }();
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(still[i].direction[k], DatasetLights()[i].direction[k], 1e-6f);
+  }
+  config.light = 1;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Rng rng(seed);
+    for (const Light& light : DrawLights(config, rng)) {
+      EXPECT_GE(light.direction[1], std::sin(4.99f * 3.14159265f / 180));
+      EXPECT_NEAR(std::hypot(light.direction[0], light.direction[1], light.direction[2]), 1, 1e-5f);
+    }
+  }
+}
+
+// At most half a step of 8 bits from the picture of the dataset's renderer, which is rounded to
+// them; and flat normals there are ours.
+TEST(SceneStream, WithoutChanceItIsTheDatasetsPicture) {
+  constexpr int kSize = 32;
+  StreamConfig config = Still();
+  config.samples = 4;
+  const Workers workers(1);
+  SceneStream stream(config, Balls(1), Info(kSize), 7, workers);
+  std::vector<Camera> cameras(3);
+  const auto rgba = stream.Render(0, 0, 0, cameras);
+  ASSERT_TRUE(rgba.ok()) << rgba.status().message();
+  Mesh mesh;
+  const ColoredMesh ball = Ball();
+  mesh.positions = ball.positions, mesh.faces = ball.faces;
+  for (const glm::vec3& c : ball.colors) mesh.colors.emplace_back(c, 1.0f);
+  LitRenderer lit;
+  const auto want = lit.Render(mesh, cameras, kSize);
+  ASSERT_TRUE(want.ok()) << want.status().message();
+  ASSERT_EQ(rgba->size(), want->size());
+  for (std::size_t i = 0; i < want->size(); ++i)
+    EXPECT_NEAR(255 * (*rgba)[i], (*want)[i], 0.51f) << i;
+}
+
+TEST(SceneStream, DependsOnSeedAndPositionOnly) {
+  constexpr int kSize = 16;
+  StreamConfig config;
+  config.share = 0.5;
+  const Workers two(2);
+  SceneStream a(config, Balls(2), Info(kSize), 7, two), b(config, Balls(2), Info(kSize), 7, two),
+      other(config, Balls(2), Info(kSize), 8, two);
+  EXPECT_EQ(a.Count(8), 4u);
+  std::vector<Camera> cameras(2), again(2);
+  const auto draw = [&](SceneStream& s, std::uint64_t position, std::size_t worker,
+                        std::vector<Camera>& to) {
+    const auto rgba = *s.Render(1, position, worker, to);
+    return std::vector<float>(rgba.begin(), rgba.end());
+  };
+  const auto first = draw(a, 3, 0, cameras);
+  draw(b, 9, 1, again);  // a worker that has drawn something else before
+  EXPECT_EQ(first, draw(b, 3, 1, again));
+  EXPECT_EQ(std::memcmp(cameras.data(), again.data(), sizeof(Camera) * 2), 0);
+  EXPECT_NE(first, draw(a, 4, 0, again));
+  EXPECT_NE(first, draw(other, 3, 0, again));
+}
+
+TEST(SceneStream, ASheetShowsAllOfIt) {
+  const Workers workers(1);
+  SceneStream stream(StreamConfig{}, Balls(3), Info(16), 7, workers);
+  const auto sheet = stream.Sheet(2, 3);
+  ASSERT_TRUE(sheet.ok());
+  EXPECT_EQ(sheet->width, 3 * 16 + 2 * 4);
+  EXPECT_EQ(sheet->height, 2 * 16 + 4);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
