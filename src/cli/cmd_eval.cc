@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad eval: how good a run is on models that it never saw, beside two baselines.
+// tilegrad eval: how good a run is on models that it never saw, beside three baselines.
 #include "base/error.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
@@ -65,7 +65,7 @@ Status RunEvaluation(const EvalOptions& options) {
 void AddEval(CLI::App& app, Action* action) {
   auto options = std::make_shared<EvalOptions>();
   auto* command = app.add_subcommand(
-      "eval", "3D IoU and F-score of a run on held-out models, beside two baselines");
+      "eval", "3D IoU and F-score of a run on held-out models, beside three baselines");
   AddRunOptions(command, &options->on);
   command
       ->add_option("--views-per-model", options->views_per_model,

@@ -3,52 +3,18 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
+#include "train/eval/retrieval.h"
+#include "train/eval/scores.h"
 #include "train/eval/single_shape.h"
-#include "train/metrics/metrics.h"
 
 namespace tilegrad::train {
 namespace {
 
-// What is compared with the truth: both normalised to fill the same cube.
-struct Shape {
-  std::vector<std::uint8_t> occupancy;
-  std::vector<glm::vec3> points;
-};
-
-Result<Shape> ShapeOf(Mesh mesh, std::uint64_t seed) {
-  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule{}.half_extent)));
-  Shape shape;
-  TILEGRAD_ASSIGN(shape.occupancy, Voxelize(mesh, kOccupancyResolution));
-  TILEGRAD_ASSIGN(shape.points, SampleSurface(mesh, kTruthPoints, seed));
-  return shape;
-}
-
-Score Compare(const Shape& shape, const ModelData& truth) {
-  Score score{.iou = VoxelIou(shape.occupancy, truth.occupancy), .f_score = {}};
-  if (!truth.points.empty()) {
-    score.f_score = CompareSurfaces(shape.points, truth.points, kFScoreThreshold).f_score;
-  }
-  return score;
-}
-
-Score Worst(const ModelData& truth) {
-  return {.iou = 0, .f_score = truth.points.empty() ? std::nullopt : std::optional(0.0)};
-}
-
-// The mean of scores; an F-score only if all have one.
-Score Mean(std::span<const Score> scores) {
-  Score mean{.iou = 0, .f_score = 0.0};
-  const double n = static_cast<double>(scores.size());
-  for (const Score& score : scores) {
-    mean.iou += score.iou / n;
-    mean.f_score = mean.f_score && score.f_score ? std::optional(*mean.f_score + *score.f_score / n)
-                                                 : std::nullopt;
-  }
-  return mean;
-}
+constexpr int kColorViews = 4;  // that colours are compared in
 
 // `count` of `views`, evenly spread: 0, step, 2 step, ...
 std::vector<int> SpreadViews(int views, int count) {
@@ -56,6 +22,13 @@ std::vector<int> SpreadViews(int views, int count) {
   for (int i = 0; i < count; ++i) out.push_back(i * views / count);
   return out;
 }
+
+// The training models, for the baselines that know nothing else.
+struct TrainingShapes {
+  std::vector<Shape> shapes;
+  std::vector<std::vector<std::uint8_t>> color_images;  // [kColorViews][4][size][size] each
+  ImageIndex index;
+};
 
 class Evaluator {
  public:
@@ -69,16 +42,22 @@ class Evaluator {
       return InvalidArgument("{}: no models in its {} split; `tilegrad dataset` makes the splits",
                              data_.folder().string(), SplitName(job_.split));
     }
-    views_ =
-        SpreadViews(data_.info().views, std::clamp(job_.views_per_model, 1, data_.info().views));
+    const int views = data_.info().views;
+    views_ = SpreadViews(views, std::clamp(job_.views_per_model, 1, views));
+    color_views_ = SpreadViews(views, std::min(kColorViews, views));
+    for (int w = 0; w < workers_.count(); ++w)
+      pictures_.push_back(std::make_unique<PredictionPictures>(data_.info(), color_views_));
     TILEGRAD_ASSIGN(const Shape undeformed, ShapeOf(job_.template_mesh, /*seed=*/1));
+    TILEGRAD_TRY(LoadTrainingShapes());
     TILEGRAD_ASSIGN(const Shape single, MakeSingleShape());
     for (std::size_t i = 0; i < held_out.size(); ++i) {
       TILEGRAD_TRY(Tick("evaluating", i, held_out.size()));
-      TILEGRAD_ASSIGN(const ModelData truth, data_.Load(held_out[i]));
+      TILEGRAD_ASSIGN(const ModelData data, data_.Load(held_out[i]));
+      TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
       template_scores_.push_back(Compare(undeformed, truth));
       single_scores_.push_back(Compare(single, truth));
-      TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], truth));
+      retrieval_scores_.push_back(ScoreRetrieval(data, truth));
+      TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], data, truth));
       predicted_scores_.push_back(score);
       const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
       out_.models.push_back({ClassOf(info), info.id, score});
@@ -94,15 +73,36 @@ class Evaluator {
     return {};
   }
 
-  Result<Shape> MakeSingleShape() {
+  std::span<const std::uint8_t> Image(const ModelData& data, int view) const {
+    const std::size_t bytes = data.images.size() / static_cast<std::size_t>(data_.info().views);
+    return std::span(data.images).subspan(bytes * static_cast<std::size_t>(view), bytes);
+  }
+  std::vector<std::uint8_t> Images(const ModelData& data, std::span<const int> views) const {
+    std::vector<std::uint8_t> out;
+    for (const int view : views) {
+      const auto image = Image(data, view);
+      out.insert(out.end(), image.begin(), image.end());
+    }
+    return out;
+  }
+
+  Status LoadTrainingShapes() {
     const auto train = data_.Select(Split::kTrain);
     if (train.empty()) return InvalidArgument("the dataset has no training models");
-    std::vector<std::vector<std::uint8_t>> grids;
     for (std::size_t i = 0; i < train.size(); ++i) {
-      TILEGRAD_TRY(Tick("mean training shape", i, train.size()));
-      TILEGRAD_ASSIGN(auto model, data_.Load(train[i]));
-      grids.push_back(std::move(model.occupancy));
+      TILEGRAD_TRY(Tick("training shapes", i, train.size()));
+      TILEGRAD_ASSIGN(const ModelData data, data_.Load(train[i]));
+      TILEGRAD_ASSIGN(Shape shape, TruthShape(data));
+      train_.shapes.push_back(std::move(shape));
+      train_.color_images.push_back(Images(data, color_views_));
+      train_.index.Add(data.images, data_.info().views, data_.info().image_size);
     }
+    return {};
+  }
+
+  Result<Shape> MakeSingleShape() {
+    std::vector<std::vector<std::uint8_t>> grids;
+    for (const Shape& shape : train_.shapes) grids.push_back(shape.occupancy);
     SingleShape best = BestSingleShape(grids);
     out_.shape_threshold = best.threshold;
     // The grid itself is scored, not a voxelization of its surface, which might differ by rounding.
@@ -111,27 +111,50 @@ class Evaluator {
     return shape;
   }
 
-  Result<Score> ScorePredictions(int model, const ModelData& truth) {
-    const std::size_t bytes = truth.images.size() / static_cast<std::size_t>(data_.info().views);
-    std::vector<std::uint8_t> images;
-    for (const int view : views_) {
-      const auto at = truth.images.begin() + static_cast<std::ptrdiff_t>(bytes) * view;
-      images.insert(images.end(), at, at + static_cast<std::ptrdiff_t>(bytes));
-    }
-    TILEGRAD_ASSIGN(auto meshes, job_.predict(images));
+  double ColorL1(std::span<const std::uint8_t> images, const ModelData& truth) const {
+    ColorDifference difference;
+    const std::size_t bytes = images.size() / color_views_.size();
+    for (std::size_t v = 0; v < color_views_.size(); ++v)
+      difference.Add(images.subspan(v * bytes, bytes), Image(truth, color_views_[v]));
+    return difference.Mean();
+  }
+
+  // Of the training model whose picture is nearest to each view.
+  Score ScoreRetrieval(const ModelData& data, const Shape& truth) const {
+    std::vector<Score> scores(views_.size());
+    workers_.For(views_.size(), [&](std::size_t i, std::size_t) {
+      const auto match = train_.index.Nearest(Image(data, views_[i]), data_.info().image_size);
+      const auto model = static_cast<std::size_t>(match.model);
+      scores[i] = Compare(train_.shapes[model], truth);
+      scores[i].color_l1 = ColorL1(train_.color_images[model], data);
+    });
+    return MeanScore(scores);
+  }
+
+  Score ScorePrediction(Mesh mesh, std::uint64_t seed, std::size_t worker, const ModelData& data,
+                        const Shape& truth, std::uint8_t* unusable) const {
+    const auto images = pictures_[worker]->Draw(mesh);
+    const auto shape = ShapeOf(std::move(mesh), seed);
+    *unusable = !shape.ok() || !images.ok();
+    if (*unusable) return WorstScore(truth);
+    Score score = Compare(*shape, truth);
+    score.color_l1 = ColorL1(*images, data);
+    return score;
+  }
+
+  Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth) {
+    TILEGRAD_ASSIGN(auto meshes, job_.predict(Images(data, views_)));
     if (meshes.size() != views_.size()) {
       return InternalError("{} predictions for {} images", meshes.size(), views_.size());
     }
     std::vector<Score> scores(meshes.size());
     std::vector<std::uint8_t> unusable(meshes.size(), 0);
-    workers_.For(meshes.size(), [&](std::size_t i, std::size_t) {
+    workers_.For(meshes.size(), [&](std::size_t i, std::size_t worker) {
       const auto seed = static_cast<std::uint64_t>(model) * 4096 + i;
-      const auto shape = ShapeOf(std::move(meshes[i]), seed);
-      unusable[i] = !shape.ok();
-      scores[i] = shape.ok() ? Compare(*shape, truth) : Worst(truth);
+      scores[i] = ScorePrediction(std::move(meshes[i]), seed, worker, data, truth, &unusable[i]);
     });
     for (const auto flag : unusable) out_.unusable_predictions += flag;
-    return Mean(scores);
+    return MeanScore(scores);
   }
 
   EvaluationRow Row(const std::string& method, std::span<const Score> scores,
@@ -140,9 +163,9 @@ class Evaluator {
     for (const auto& [class_index, indices] : members) {
       std::vector<Score> of_class;
       for (const std::size_t i : indices) of_class.push_back(scores[i]);
-      row.classes.push_back(Mean(of_class));
+      row.classes.push_back(MeanScore(of_class));
     }
-    row.mean = Mean(row.classes);
+    row.mean = MeanScore(row.classes);
     return row;
   }
 
@@ -161,6 +184,7 @@ class Evaluator {
     }
     out_.rows = {Row("undeformed template", template_scores_, members),
                  Row("best single shape", single_scores_, members),
+                 Row("nearest training picture", retrieval_scores_, members),
                  Row("tilegrad", predicted_scores_, members)};
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
@@ -173,8 +197,10 @@ class Evaluator {
   const Workers& workers_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
-  std::vector<int> views_;
-  std::vector<Score> template_scores_, single_scores_, predicted_scores_;
+  std::vector<int> views_, color_views_;
+  std::vector<std::unique_ptr<PredictionPictures>> pictures_;  // by worker
+  TrainingShapes train_;
+  std::vector<Score> template_scores_, single_scores_, retrieval_scores_, predicted_scores_;
   Evaluation out_;
 };
 

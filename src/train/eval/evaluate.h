@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How good a predictor is on models that it never saw: the paper's Table 1 with two baselines
+// How good a predictor is on models that it never saw: the paper's Table 1 with three baselines
 // (section 5.1).
 #pragma once
 

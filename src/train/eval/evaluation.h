@@ -14,8 +14,14 @@ namespace tilegrad::train {
 inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
 
 struct Score {
-  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]
+  double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; voxels of Voxelize
   std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
+  // As iou, with voxels of VoxelizeCarved: the paper's rule; none: the truth has no mesh.
+  std::optional<double> carved_iou = std::nullopt;
+  // Mean |difference| of colour, [0, 1], over the channels and the pixels that the object or its
+  // prediction covers, black beyond them, in views of the dataset; none: of a shape without
+  // colours.
+  std::optional<double> color_l1 = std::nullopt;
 };
 
 struct EvaluationRow {

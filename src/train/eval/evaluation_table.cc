@@ -17,15 +17,28 @@ std::string Cell(const Score& score) {
                        : fmt::format("{:.1f} / -", 100 * score.iou);
 }
 
+bool HasAny(const Evaluation& evaluation, std::optional<double> Score::*measure) {
+  return std::any_of(evaluation.rows.begin(), evaluation.rows.end(),
+                     [&](const EvaluationRow& row) { return (row.mean.*measure).has_value(); });
+}
+
 // Heading, then a line a method: the cells of the table as text.
 std::vector<std::vector<std::string>> Cells(const Evaluation& evaluation) {
   std::vector<std::vector<std::string>> cells = {{"method"}};
   for (const auto& name : evaluation.classes) cells[0].push_back(name);
   cells[0].push_back("mean");
+  const bool carved = HasAny(evaluation, &Score::carved_iou);
+  const bool color = HasAny(evaluation, &Score::color_l1);
+  if (carved) cells[0].push_back("carved IoU");
+  if (color) cells[0].push_back("colour L1");
   for (const auto& row : evaluation.rows) {
     auto& line = cells.emplace_back(1, row.method);
     for (const auto& score : row.classes) line.push_back(Cell(score));
     line.push_back(Cell(row.mean));
+    const Score& mean = row.mean;
+    if (carved)
+      line.push_back(mean.carved_iou ? fmt::format("{:.1f}", 100 * *mean.carved_iou) : "-");
+    if (color) line.push_back(mean.color_l1 ? fmt::format("{:.3f}", *mean.color_l1) : "-");
   }
   return cells;
 }
@@ -60,9 +73,20 @@ std::string Caption(const Evaluation& evaluation) {
 std::string Notes(const Evaluation& evaluation) {
   std::string notes = fmt::format(
       "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
-      "that "
-      "scores best on the training models.",
+      "that scores best on the training models. Nearest training picture: the shape and the "
+      "colours of the training model that has the picture most like the input.",
       100 * evaluation.shape_threshold);
+  if (HasAny(evaluation, &Score::carved_iou)) {
+    notes +=
+        " Carved IoU: mean over classes of the IoU with voxels by the paper's rule (binvox -cb -dc "
+        "-aw).";
+  }
+  if (HasAny(evaluation, &Score::color_l1)) {
+    notes +=
+        " Colour L1: mean difference of colour in views all around, over the pixels that the "
+        "object "
+        "or its prediction covers, of 1.";
+  }
   if (evaluation.unusable_predictions > 0) {
     notes += fmt::format(" {} predictions without extent or area score 0.",
                          evaluation.unusable_predictions);
@@ -73,6 +97,8 @@ std::string Notes(const Evaluation& evaluation) {
 Json ToJson(const Score& score) {
   Json json = {{"iou", score.iou}, {"f_score", nullptr}};
   if (score.f_score) json["f_score"] = *score.f_score;
+  if (score.carved_iou) json["carved_iou"] = *score.carved_iou;
+  if (score.color_l1) json["color_l1"] = *score.color_l1;
   return json;
 }
 

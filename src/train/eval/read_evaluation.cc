@@ -19,8 +19,13 @@ Result<Score> ReadScore(const Json& json, const std::string& place) {
   Score score;
   JsonFields fields(json, place);
   fields.Read("iou", &score.iou);
-  if (json.is_object() && json.contains("f_score") && !json["f_score"].is_null())
-    fields.Read("f_score", &score.f_score.emplace());
+  const auto read = [&](const char* key, std::optional<double>* out) {
+    if (json.is_object() && json.contains(key) && !json[key].is_null())
+      fields.Read(key, &out->emplace());
+  };
+  read("f_score", &score.f_score);
+  read("carved_iou", &score.carved_iou);
+  read("color_l1", &score.color_l1);
   if (!fields.status().ok()) return fields.status();
   return score;
 }

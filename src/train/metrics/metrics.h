@@ -23,6 +23,12 @@ namespace tilegrad::train {
 // [x][y][z] of 0 or 1. An error for an invalid mesh or one without extent.
 Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution);
 
+// The paper's rule (binvox -cb -dc -aw), on the same cube: a voxel is empty if a ray along an axis,
+// from outside, comes through it and one voxel further without meeting the surface. One voxel
+// before the surface stays solid where no other ray takes it, and a hollow that no ray along an
+// axis looks into is filled.
+Result<std::vector<std::uint8_t>> VoxelizeCarved(const Mesh& mesh, int resolution);
+
 // |a and b| / |a or b| over voxels that are not 0; 1 if both are empty. The sizes must agree.
 double VoxelIou(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b);
 

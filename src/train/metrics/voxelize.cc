@@ -96,6 +96,20 @@ class Grid {
     }
   }
 
+  // Everything that rays along the axes see from outside, but for the voxel before the surface.
+  void CarveAlongAxes() {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (int u = 0; u < n_; ++u) {
+        for (int v = 0; v < n_; ++v) {
+          std::array<int, 3> at{};
+          at[(axis + 1) % 3] = u, at[(axis + 2) % 3] = v;
+          CarveRay(at, axis, false);
+          CarveRay(at, axis, true);
+        }
+      }
+    }
+  }
+
   std::vector<std::uint8_t> Surface() const {
     return Where([](State s) { return s == kSurface; });
   }
@@ -105,6 +119,18 @@ class Grid {
 
  private:
   enum State : std::uint8_t { kUnknown, kSurface, kOutside };
+
+  // Along `axis` from its low or its high end; `at` says where across it.
+  void CarveRay(std::array<int, 3> at, std::size_t axis, bool from_high) {
+    const auto state = [&](int i) -> State& {
+      at[axis] = from_high ? n_ - 1 - i : i;
+      return state_[Index(at[0], at[1], at[2])];
+    };
+    int met = 0;
+    while (met < n_ && state(met) != kSurface) ++met;
+    const int end = met == n_ ? n_ : met - 1;
+    for (int i = 0; i < end; ++i) state(i) = kOutside;
+  }
 
   template <class Wanted>
   std::vector<std::uint8_t> Where(const Wanted& wanted) const {
@@ -151,7 +177,10 @@ Result<std::vector<std::uint8_t>> SurfaceVoxels(std::span<const Triangle> surfac
   return grid.Surface();
 }
 
-Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
+namespace {
+
+// The surface of a mesh that fills the grid's cube.
+Result<Grid> GridOf(const Mesh& mesh, int resolution) {
   TILEGRAD_TRY(CheckResolution(resolution));
   TILEGRAD_TRY(Validate(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
@@ -170,7 +199,20 @@ Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
     }
     grid.MarkSurface(corners);
   }
+  return grid;
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> Voxelize(const Mesh& mesh, int resolution) {
+  TILEGRAD_ASSIGN(Grid grid, GridOf(mesh, resolution));
   grid.CarveOutside();
+  return grid.Solid();
+}
+
+Result<std::vector<std::uint8_t>> VoxelizeCarved(const Mesh& mesh, int resolution) {
+  TILEGRAD_ASSIGN(Grid grid, GridOf(mesh, resolution));
+  grid.CarveAlongAxes();
   return grid.Solid();
 }
 

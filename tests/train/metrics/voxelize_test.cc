@@ -71,6 +71,43 @@ TEST(Voxelize, APlateIsOneVoxelThick) {
   EXPECT_EQ(Count(Voxelize(plate, 32).value()), 32 * 32);
 }
 
+// Worked out by hand. A plate across the cube: above and below it one voxel is left standing where
+// rays along its normal stop early, unless a ray along the plate takes it; those rays meet nothing
+// there. So it is one voxel thick.
+TEST(VoxelizeCarved, APlateIsOneVoxelThick) {
+  Mesh plate;
+  plate.positions = {{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}};
+  plate.faces = {{0, 1, 2}, {0, 2, 3}};
+  EXPECT_EQ(Count(VoxelizeCarved(plate, 32).value()), 32 * 32);
+}
+
+// A box without its top: rays from above see its inside, down to one voxel above the floor, which
+// no ray from the side can take. Voxelize leaves the floor alone.
+TEST(VoxelizeCarved, LeavesOneVoxelBeforeWhatItSees) {
+  Mesh box = Box({0, 0, 0}, {1, 1, 1});
+  std::erase_if(box.faces, [&](const Face& f) {
+    return std::all_of(f.begin(), f.end(), [&](std::int32_t v) {
+      return box.positions[static_cast<std::size_t>(v)].y > 0;
+    });
+  });
+  ASSERT_EQ(box.faces.size(), 10u);
+  const auto reached = Voxelize(box, 32).value(), carved = VoxelizeCarved(box, 32).value();
+  EXPECT_FALSE(At(reached, 16, 1, 16));
+  EXPECT_TRUE(At(carved, 16, 0, 16));
+  EXPECT_TRUE(At(carved, 16, 1, 16));
+  EXPECT_FALSE(At(carved, 16, 2, 16));
+  // Walls are one voxel thick: rays from above pass beside them, whose one voxel of distance is
+  // along the ray.
+  EXPECT_TRUE(At(carved, 0, 16, 16));
+  EXPECT_FALSE(At(carved, 1, 16, 16));
+}
+
+TEST(VoxelizeCarved, AClosedBoxIsFull) {
+  const Mesh mesh = Box({0, 0, 0}, {1, 1, 1});
+  EXPECT_EQ(VoxelizeCarved(mesh, 32).value(), Voxelize(mesh, 32).value());
+  EXPECT_EQ(Count(VoxelizeCarved(mesh, 32).value()), 32 * 32 * 32);
+}
+
 TEST(Voxelize, BadMeshesAreErrors) {
   EXPECT_FALSE(Voxelize(Mesh{}, 32).ok());
   Mesh point = Icosphere(0, 1.0f);
@@ -78,8 +115,10 @@ TEST(Voxelize, BadMeshesAreErrors) {
   EXPECT_FALSE(Voxelize(point, 1 << 20).ok());
   for (auto& p : point.positions) p = glm::vec3(1);
   EXPECT_FALSE(Voxelize(point, 32).ok());
+  EXPECT_FALSE(VoxelizeCarved(point, 32).ok());
   point.positions[0].x = std::nanf("");
   EXPECT_FALSE(Voxelize(point, 32).ok());
+  EXPECT_FALSE(VoxelizeCarved(point, 32).ok());
 }
 
 TEST(SampleSurface, PointsLieOnTheSurfaceByArea) {
