@@ -4,6 +4,7 @@
 
 #include "train/models/mesh_network.h"
 #include "train/run/schedule.h"
+#include "train/tasks/single_image/rivals.h"
 
 namespace tilegrad::train {
 
@@ -16,6 +17,9 @@ struct LossConfig {
 };
 
 struct RenderConfig {
+  // "dibr", "softras" or "n3mr". The rivals draw alpha alone: there is no colour loss then, and the
+  // next three numbers mean nothing. Pictures and scores are always drawn by "dibr".
+  std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
   double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
                                   // run: a wide band first
@@ -36,6 +40,7 @@ struct SingleImageConfig {
   NetworkConfig network;
   LossConfig loss;
   RenderConfig render;
+  RivalConfig rivals;
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)
