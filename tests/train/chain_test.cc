@@ -204,6 +204,14 @@ TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   ExpectGradientsAgreeWithDifferences(p);
 }
 
+// SoftRas has a derivative once its product has no floor; N3MR's sweep is none.
+TEST(Chain, SoDoThoseThroughSoftRas) {
+  SmallProblem p;
+  p.config.render.rule = "softras";
+  p.config.rivals.softras.sigma = 3e-3, p.config.rivals.softras.exact_product = true;
+  ExpectGradientsAgreeWithDifferences(p);
+}
+
 // The path that trains (float32, SIMD, tiled renderer) against float64: a relative error of the
 // whole gradient of each tensor. Float rounding 6e-8 grows by the sums' condition and batch norm's
 // division; 1e-3 of the tensor's norm is asked.
@@ -238,7 +246,7 @@ TEST(Chain, TheTrainingPathAgreesWithFloat64) {
   }
 }
 
-TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
+void ExpectSameBitsAndLearning(const std::string& rule) {
   const SmallProblem p;
   std::vector<std::vector<float>> finals;
   double first = 0, last = 0;
@@ -246,7 +254,7 @@ TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
     const Workers workers(count);
     nn::Context context(workers);
     SingleImageConfig config = p.config;
-    config.optimizer.learning_rate = 3e-3;
+    config.optimizer.learning_rate = 3e-3, config.render.rule = rule;
     TrainStep step(context, config, p.store.size);
     for (std::int64_t s = 0; s < 60; ++s) {
       const auto values = RunStep(step, GatherBatch(context, p.store, p.samples), s);
@@ -263,6 +271,45 @@ TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) {
   EXPECT_EQ(finals[0], finals[1]);
   EXPECT_EQ(finals[0], finals[2]);
   EXPECT_LT(last, 0.7 * first);  // three pictures can be learned by heart
+}
+
+TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) { ExpectSameBitsAndLearning("dibr"); }
+TEST(Chain, SoDoesSoftRas) { ExpectSameBitsAndLearning("softras"); }
+TEST(Chain, SoDoesN3mr) { ExpectSameBitsAndLearning("n3mr"); }
+
+// Alpha alone: no colour in the loss, and none of its decoder's weights moves.
+TEST(Chain, RivalsHaveNoColorLoss) {
+  SmallProblem p;
+  const Workers workers(1);
+  for (const char* rule : {"softras", "n3mr"}) {
+    nn::Context context(workers);
+    p.config.render.rule = rule;
+    TrainStep step(context, p.config, p.store.size);
+    LossValues values;
+    const nn::Var loss = step.Loss(GatherBatch(context, p.store, p.samples), 0, &values);
+    const LossConfig& w = p.config.loss;
+    EXPECT_NEAR(
+        values.total,
+        w.iou * values.iou + w.smoothness * values.smoothness + w.laplacian * values.laplacian,
+        1e-6);
+    std::vector<LossTerm> terms;
+    step.AddTerms(values, &terms);
+    EXPECT_EQ(terms.size(), 3u);
+    const auto parameters = nn::Parameters(step.network().module());
+    const auto gradients = nn::Grad(loss, step.adam().parameters());
+    double moving = 0;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      double largest = 0;
+      for (const float g : gradients[i].value().span<float>())
+        largest = std::max(largest, std::abs(static_cast<double>(g)));
+      if (parameters[i].name.starts_with("color")) {
+        EXPECT_EQ(largest, 0) << parameters[i].name;
+      } else {
+        moving += largest > 0 ? 1 : 0;
+      }
+    }
+    EXPECT_GT(moving, 10);
+  }
 }
 
 // One weight of infinity, whatever layer it is in.
@@ -297,10 +344,33 @@ TEST(Schedules, LearningRateAndSharpness) {
   EXPECT_NEAR(LearningRateAt(c, 0), 0.1, 1e-9);
   EXPECT_NEAR(LearningRateAt(c, 50), 0.55, 1e-12);
   EXPECT_NEAR(LearningRateAt(c, 100), 0.1, 1e-12);
+  c.rivals.softras.sigma = 1e-4, c.rivals.softras_late_sigma = 0.3;
+  EXPECT_EQ(SoftRasSigmaAt(c.rivals, 0.59), 1e-4);
+  EXPECT_NEAR(SoftRasSigmaAt(c.rivals, 0.6), 3e-5, 1e-18);
   c.render.sharpness_start = 100, c.render.sharpness = 10000;
   EXPECT_NEAR(SharpnessAt(c, 0), 100, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 25), 1000, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 80), 10000, 1e-8);
+}
+
+TEST(RivalConfig, UnknownWordsNameTheKnownOnes) {
+  const auto message = [](const std::string& rule, const RivalConfig& config) {
+    return RivalOptions(rule, config).status().message();
+  };
+  EXPECT_EQ(message("nmr", {}),
+            "render.rule is \"nmr\", but must be one of \"dibr\", \"softras\", \"n3mr\"");
+  EXPECT_EQ(message("dibr", {.softras_distance = "l2"}),
+            "softras.distance is \"l2\", but must be one of \"euclidean\", \"barycentric\", "
+            "\"hard\"");
+  EXPECT_EQ(message("dibr", {.softras_alpha = "max"}),
+            "softras.alpha is \"max\", but must be one of \"product\", \"sum\", \"hard\"");
+  EXPECT_EQ(message("n3mr", {.n3mr_reduction = "box"}),
+            "n3mr.reduction is \"box\", but must be one of \"mean\", \"bilinear\", \"none\"");
+  EXPECT_EQ(message("n3mr", {.n3mr = {.near_plane = 7, .far_plane = 7}}),
+            "N3MR: near 7 and far 7 must be 0 < near < far");
+  EXPECT_FALSE(RivalOptions("dibr", {}).value().has_value());
+  EXPECT_EQ(RivalOptions("n3mr", {.n3mr_reduction = "bilinear"}).value()->n3mr.reduction,
+            rivals::N3mrReduction::kBilinear);
 }
 
 }  // namespace

@@ -39,15 +39,15 @@ class KillResume : public TempFolderTest {
   // `prepare` is called in the new process before the program is.
   pid_t Start(
       const std::string& run, int workers, void (*prepare)() = [] {}) const {
-    const std::vector<std::string> words = {
-        TILEGRAD_PROGRAM, "train",
-        "--config",       (folder_ / "tiny.toml").string(),
-        "--data",         (folder_ / "data").string(),
-        "--out",          (folder_ / run).string(),
-        "--workers",      std::to_string(workers),
-        "--set",          "schedule.steps=" + std::to_string(steps_),
-        "--max-minutes",  minutes_,
-        "--resume"};
+    std::vector<std::string> words = {TILEGRAD_PROGRAM, "train",
+                                      "--config",       (folder_ / "tiny.toml").string(),
+                                      "--data",         (folder_ / "data").string(),
+                                      "--out",          (folder_ / run).string(),
+                                      "--workers",      std::to_string(workers),
+                                      "--set",          "schedule.steps=" + std::to_string(steps_),
+                                      "--max-minutes",  minutes_,
+                                      "--resume"};
+    words.insert(words.end(), settings_.begin(), settings_.end());
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
@@ -153,9 +153,18 @@ class KillResume : public TempFolderTest {
   nn::Context context_;
   int steps_ = 200;
   std::string minutes_ = "0";
+  std::vector<std::string> settings_;  // of the command line
 };
 
 TEST_F(KillResume, ThreeKills) { CheckKills(3); }
+
+TEST_F(KillResume, TwoKillsWithTheRulesOfOthers) {
+  for (const std::string rule : {"softras", "n3mr"}) {
+    for (const char* run : {"whole", "killed"}) std::filesystem::remove_all(folder_ / run);
+    settings_ = {"--set", "render.rule=" + rule};
+    CheckKills(2);
+  }
+}
 
 TEST_F(KillResume, LongTenKills) {
   steps_ = 1000;
@@ -208,7 +217,7 @@ TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
 
 TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
   const pid_t child = Start("run", 1, [] {
-    const rlimit limit = {4096, 4096};
+    const rlimit limit = {8192, 8192};  // more than a configuration, less than a checkpoint
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   });
   const int status = Wait(child);

@@ -3,8 +3,10 @@
 
 namespace tilegrad::train {
 
-ConfigFields FieldsOf(SingleImageConfig* c) {
-  ConfigFields fields = {
+namespace {
+
+ConfigFields OwnFields(SingleImageConfig* c) {
+  return {
       {"network.channels", &c->network.channels, 1, 4096,
        "of the first convolution; then 2x and 4x"},
       {"network.code", &c->network.code, 1, 65536, "width of the encoder's fully connected layers"},
@@ -29,6 +31,8 @@ ConfigFields FieldsOf(SingleImageConfig* c) {
        "weight of the normal difference of neighbouring faces"},
       {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
        "weight of the Laplacian of the movement"},
+      {"render.rule", &c->render.rule, 0, 0,
+       "whose renderer trains: \"dibr\", or, by alpha alone, \"softras\" or \"n3mr\""},
       {"render.sharpness", &c->render.sharpness, 1e-3, 1e9,
        "1/delta of equation 5, per squared NDC unit"},
       {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,
@@ -47,7 +51,14 @@ ConfigFields FieldsOf(SingleImageConfig* c) {
       {"schedule.mirrored", &c->mirrored, 0, 1,
        "share of the objects shown mirrored, left to right"},
   };
-  for (ConfigField& field : FieldsOf(&c->stream)) fields.push_back(std::move(field));
+}
+
+}  // namespace
+
+ConfigFields FieldsOf(SingleImageConfig* c) {
+  ConfigFields fields = OwnFields(c);
+  for (const ConfigFields& more : {FieldsOf(&c->rivals), FieldsOf(&c->stream)})
+    fields.insert(fields.end(), more.begin(), more.end());
   return fields;
 }
 

@@ -5,6 +5,7 @@
 #include "train/data/stream/stream_config.h"
 #include "train/models/mesh_network.h"
 #include "train/run/schedule.h"
+#include "train/tasks/single_image/rivals.h"
 
 namespace tilegrad::train {
 
@@ -17,6 +18,9 @@ struct LossConfig {
 };
 
 struct RenderConfig {
+  // "dibr", "softras" or "n3mr". The rivals draw alpha alone: there is no colour loss then, and the
+  // next three numbers mean nothing. Pictures and scores are always drawn by "dibr".
+  std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
   double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
                                   // run: a wide band first
@@ -38,6 +42,7 @@ struct SingleImageConfig {
   LossConfig loss;
   RenderConfig render;
   StreamConfig stream;
+  RivalConfig rivals;
   OptimizerConfig optimizer;
   std::int64_t batch = 64;  // objects a step
   std::int64_t views = 2;   // per object: the input's own, the others random (section 5.1: 2)

@@ -143,7 +143,9 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
                config.optimizer.average),
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
-      renderer_(context.workers()) {}
+      renderer_(context.workers()),
+      rival_(RivalOptions(config.render.rule, config.rivals).value()),
+      rival_renderer_(context.workers()) {}
 
 RenderOptions TrainStep::OptionsAt(std::int64_t step) const {
   RenderOptions options;
@@ -158,32 +160,46 @@ std::span<const std::int32_t> TrainStep::faces() const {
   return {faces[0].data(), 3 * faces.size()};
 }
 
+RenderedImages TrainStep::Draw(const PredictedMeshes& meshes, const BatchTensors& batch,
+                               std::int64_t step) {
+  if (!rival_) {
+    const int views =
+        static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
+    return RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
+                        {faces(), batch.cameras, views, OptionsAt(step)});
+  }
+  RivalJob job{faces(), batch.cameras, image_size_, *rival_};
+  job.options.softras.sigma = SoftRasSigmaAt(
+      config_.rivals, static_cast<double>(step) / static_cast<double>(config_.schedule.steps));
+  return {{}, RenderRival(rival_renderer_, meshes.positions, std::move(job))};
+}
+
 nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues* values) {
   const PredictedMeshes meshes =
       network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
-  const int views =
-      static_cast<int>(batch.cameras.size() / static_cast<std::size_t>(batch.input.shape()[0]));
-  const RenderedImages images =
-      RenderScenes(renderer_, {.positions = meshes.positions, .colors = meshes.colors},
-                   {faces(), batch.cameras, views, OptionsAt(step)});
+  const RenderedImages images = Draw(meshes, batch, step);
   const nn::Var iou = IouLoss(images.alpha, batch.truth_alpha);
-  const nn::Var color = ColorL1Loss(images.colors, batch.truth_colors);
   const nn::Var smoothness =
       SmoothnessLoss(meshes.positions, network_.template_mesh().faces, topology_);
   const nn::Var laplacian = LaplacianLoss(meshes.movement, topology_);
   const LossConfig& w = config_.loss;
-  const nn::Var total = w.iou * iou + w.color * color + w.smoothness * smoothness +
-                        w.laplacian * laplacian;  // equation 14
-  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item()};
+  nn::Var total = w.iou * iou, color;  // equation 14
+  if (!rival_) {
+    color = ColorL1Loss(images.colors, batch.truth_colors);
+    total = total + w.color * color;
+  }
+  total = total + w.smoothness * smoothness + w.laplacian * laplacian;
+  *values = {total.item(),      iou.item(),       color.valid() ? color.item() : 0,
+             smoothness.item(), laplacian.item(), !rival_};
   return total;
 }
 
 void TrainStep::AddTerms(const LossValues& v, std::vector<LossTerm>* terms) const {
   const LossConfig& w = config_.loss;
-  terms->insert(terms->end(), {{"iou", w.iou, v.iou},
-                               {"color", w.color, v.color},
-                               {"smoothness", w.smoothness, v.smoothness},
-                               {"laplacian", w.laplacian, v.laplacian}});
+  terms->push_back({"iou", w.iou, v.iou});
+  if (v.has_color) terms->push_back({"color", w.color, v.color});
+  terms->push_back({"smoothness", w.smoothness, v.smoothness});
+  terms->push_back({"laplacian", w.laplacian, v.laplacian});
 }
 
 Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& batch,

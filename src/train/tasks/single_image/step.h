@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "nn/moving_average.h"
 #include "nn/optim.h"
@@ -11,6 +12,7 @@
 #include "train/data/batches.h"
 #include "train/data/stream/scene_stream.h"
 #include "train/ops/render_op.h"
+#include "train/ops/rival_op.h"
 #include "train/run/step_values.h"
 #include "train/tasks/single_image/config.h"
 
@@ -18,6 +20,7 @@ namespace tilegrad::train {
 
 struct LossValues {
   double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
+  bool has_color = true;  // false where the rule draws alpha alone
 };
 
 // The tensors of one batch: what the network sees, and what the renders are held to.
@@ -41,6 +44,7 @@ double SharpnessAt(const SingleImageConfig& config, std::int64_t step);
 // Network, optimiser and renderer of a run.
 class TrainStep {
  public:
+  // The words of config.render and config.rivals are known (RivalOptions).
   TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size);
 
   // Equation 14 of a batch, on the tape; `values` gets the parts.
@@ -61,6 +65,9 @@ class TrainStep {
   std::span<const std::int32_t> faces() const;
 
  private:
+  // The images that losses look at; of a rival, alpha alone.
+  RenderedImages Draw(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step);
+
   nn::Context& context_;
   SingleImageConfig config_;
   int image_size_;
@@ -69,6 +76,8 @@ class TrainStep {
   nn::MovingAverage average_;
   Topology topology_;
   SceneRenderer renderer_;
+  std::optional<rivals::Options> rival_;  // instead of ours
+  RivalRenderer rival_renderer_;
 };
 
 }  // namespace tilegrad::train

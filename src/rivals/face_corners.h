@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faces as the rivals of the paper's section 5.1, N3MR and SoftRas, see them: corners on the image
+// plane, each face on its own. Image coordinates are [-1, 1], x right, y up; z is the depth before
+// the camera. Pixel centres of an image of n x n lie at x_j = (2 j + 1 - n) / n and
+// y_i = (n - 1 - 2 i) / n, row 0 on top.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "base/scalar.h"
+
+namespace tilegrad::rivals {
+
+inline constexpr std::size_t kCornerNumbers = 9;  // of a face: x, y, z of three corners
+
+template <class T>
+struct FaceCorners {
+  T x[3], y[3], z[3];
+};
+
+// `corners`: [F,3,3].
+template <class T>
+FaceCorners<T> CornersOf(const T* corners, std::size_t face) {
+  const T* c = corners + kCornerNumbers * face;
+  return {{c[0], c[3], c[6]}, {c[1], c[4], c[7]}, {c[2], c[5], c[8]}};
+}
+
+// Twice the signed area, positive where the corners turn counter-clockwise.
+template <class T>
+T DoubledArea(const FaceCorners<T>& f) {
+  return (f.x[1] - f.x[0]) * (f.y[2] - f.y[0]) - (f.y[1] - f.y[0]) * (f.x[2] - f.x[0]);
+}
+
+// Barycentric weights of a point of the image plane.
+template <class T>
+void BarycentricWeights(const FaceCorners<T>& f, const T& area2, const T& px, const T& py, T b[3]) {
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    b[k] = ((f.x[i] - px) * (f.y[j] - py) - (f.y[i] - py) * (f.x[j] - px)) / area2;
+  }
+}
+
+// Weights clipped to [0, 1] and scaled to the sum 1: what depth and colours are interpolated by.
+template <class T>
+void ClippedWeights(const T b[3], T w[3]) {
+  T sum = T(0);
+  for (int k = 0; k < 3; ++k) {
+    w[k] = RealPart(b[k]) < 0 ? T(0) : RealPart(b[k]) > 1 ? T(1) : b[k];
+    sum += w[k];
+  }
+  for (int k = 0; k < 3; ++k) w[k] /= sum;
+}
+
+// Perspective-correct depth.
+template <class T>
+T DepthAt(const FaceCorners<T>& f, const T w[3]) {
+  return T(1) / (w[0] / f.z[0] + w[1] / f.z[1] + w[2] / f.z[2]);
+}
+
+// Adds to d_corners [3,3] of a face what follows from adjoints of its barycentric weights: moving
+// corner m by v changes b_k by -b_m grad b_k . v.
+template <class T>
+void AddBarycentricAdjoint(const FaceCorners<T>& f, const T& area2, const T b[3], const T d_b[3],
+                           T* d_corners) {
+  T gx = T(0), gy = T(0);
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    gx += d_b[k] * (f.y[i] - f.y[j]) / area2;
+    gy += d_b[k] * (f.x[j] - f.x[i]) / area2;
+  }
+  for (int m = 0; m < 3; ++m) {
+    d_corners[3 * m] -= b[m] * gx;
+    d_corners[3 * m + 1] -= b[m] * gy;
+  }
+}
+
+// Faces with a number that is not finite, or so far off the image that squares overflow in float,
+// are left out.
+template <class T>
+bool IsUsable(const FaceCorners<T>& f) {
+  constexpr double kFarthest = 1e9;
+  for (int k = 0; k < 3; ++k) {
+    const bool usable = std::abs(RealPart(f.x[k])) <= kFarthest &&
+                        std::abs(RealPart(f.y[k])) <= kFarthest && std::isfinite(RealPart(f.z[k]));
+    if (!usable) return false;
+  }
+  return true;
+}
+
+template <class T>
+T CentreX(int column, int size) {
+  return T(2 * column + 1 - size) / T(size);
+}
+template <class T>
+T CentreY(int row, int size) {
+  return T(size - 1 - 2 * row) / T(size);
+}
+
+}  // namespace tilegrad::rivals

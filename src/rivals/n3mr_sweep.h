@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// The geometry of N3MR's hand-made gradient. A face's edge is moved along one axis; where it meets
+// a line of pixel centres, the line's pixels outward and inward of the crossing could change owner.
+// The change of their value over the distance that a corner has to move for it is taken for a
+// slope. Scalar, for reference and fast code alike; T: float or double.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "rivals/n3mr_options.h"
+
+namespace tilegrad::rivals {
+
+// Pixel units: l along which lines are counted, m the coordinate that moves.
+template <class T>
+struct SweepPoint {
+  T l, m;
+};
+
+// An edge of a counter-clockwise face from a to b, and the third corner.
+template <class T>
+struct SweepEdge {
+  SweepPoint<T> a, b, c;
+  int outward;  // +1 or -1: along m, away from the face
+};
+
+enum class SweepAxis { kY, kX };  // that moves
+
+template <class T>
+SweepEdge<T> SweepEdgeOf(const FaceCorners<T>& f, int edge, SweepAxis axis, int inner) {
+  const auto point = [&](int k) {
+    const T x = ToInnerPixels(f.x[k], inner), y = ToInnerPixels(f.y[k], inner);
+    return axis == SweepAxis::kY ? SweepPoint<T>{x, y} : SweepPoint<T>{y, x};
+  };
+  SweepEdge<T> out{point(edge), point((edge + 1) % 3), point((edge + 2) % 3), 1};
+  // The face lies to the left of a -> b.
+  if ((out.a.l < out.b.l) == (axis == SweepAxis::kY)) out.outward = -1;
+  return out;
+}
+
+// Where an edge meets line `line`.
+template <class T>
+struct SweepLine {
+  int line;
+  int in, out;                 // pixels before and behind the crossing, outward = out
+  int inner_begin, inner_end;  // pixels of the face on the line, both included; may be none
+  T crossing;                  // along m
+  T per_a, per_b;              // how far a (b) moves for a crossing moved by 1; 0: it cannot
+};
+
+// The last line that the published loop or its repair takes.
+template <class T>
+int LastSweepLine(T last, int inner, bool floor_lines) {
+  const T bounded = std::clamp(last, T(-2), T(inner - 1));
+  return static_cast<int>(floor_lines ? std::floor(bounded) : bounded);  // int(): toward zero
+}
+
+template <class T>
+void SetInnerRange(const SweepEdge<T>& e, int inner, SweepLine<T>* line) {
+  const T at = static_cast<T>(line->line);
+  const bool beside_a = (at - e.a.l) * (at - e.c.l) < 0;
+  const SweepPoint<T>&p = beside_a ? e.a : e.c, &q = beside_a ? e.c : e.b;
+  const T limit = p.m + (q.m - p.m) / (q.l - p.l) * (at - p.l);
+  line->inner_begin = 0, line->inner_end = -1;
+  if (!std::isfinite(limit)) return;
+  const T bounded = std::clamp(limit, T(-2), T(inner + 1));
+  const int end = static_cast<int>(e.outward > 0 ? std::ceil(bounded) : std::floor(bounded));
+  line->inner_begin = std::max(0, std::min(line->in, end));
+  line->inner_end = std::min(inner - 1, std::max(line->in, end));
+}
+
+// Calls visit(line) for the lines of a drawing of inner x inner that the edge meets. Lines whose
+// pixel `in` or `out` is off the drawing are dropped, as published.
+template <class T, class Visit>
+void ForSweepLines(const SweepEdge<T>& e, int inner, bool floor_lines, const Visit& visit) {
+  if (e.a.l == e.b.l) return;
+  const T first = std::max(std::ceil(std::min(e.a.l, e.b.l)), T(0));
+  const int end = LastSweepLine(std::max(e.a.l, e.b.l), inner, floor_lines);
+  if (!(first <= static_cast<T>(end))) return;
+  const T slope = (e.b.m - e.a.m) / (e.b.l - e.a.l);
+  for (int at = static_cast<int>(first); at <= end; ++at) {
+    const T l = static_cast<T>(at), crossing = e.a.m + slope * (l - e.a.l);
+    if (!(crossing > -1 && crossing < static_cast<T>(inner))) continue;
+    SweepLine<T> line;
+    line.line = at, line.crossing = crossing;
+    line.in = static_cast<int>(e.outward > 0 ? std::floor(crossing) : std::ceil(crossing));
+    line.out = line.in + e.outward;
+    if (std::min(line.in, line.out) < 0 || std::max(line.in, line.out) >= inner) continue;
+    line.per_a = e.b.l == l ? T(0) : (e.b.l - e.a.l) / (e.b.l - l);
+    line.per_b = l == e.a.l ? T(0) : (e.b.l - e.a.l) / (l - e.a.l);
+    SetInnerRange(e, inner, &line);
+    visit(line);
+  }
+}
+
+// dL/dm of the two ends of an edge.
+template <class T>
+struct SweepEnds {
+  T a = T(0), b = T(0);
+};
+
+// A pixel at `at` on the line, whose change would lower the loss by `gain` > 0.
+template <class T>
+void AddSweep(const SweepLine<T>& line, int at, T gain, T per_pixel, T eps, SweepEnds<T>* ends) {
+  const T move = (static_cast<T>(at) - line.crossing) * per_pixel;
+  const auto slope = [&](T per_end) {
+    const T distance = per_end * move;
+    return gain / (distance > 0 ? distance + eps : distance - eps);
+  };
+  if (line.per_a != 0) ends->a -= slope(line.per_a);
+  if (line.per_b != 0) ends->b -= slope(line.per_b);
+}
+
+// Adds to d_corners [3,3] of the source of `face`. `scale`: N3mrOptions::Scale.
+template <class T>
+void AddSweepEnds(const N3mrFaceT<T>& face, int edge, SweepAxis axis, double scale,
+                  const SweepEnds<T>& ends, T* d_corners) {
+  const int c = axis == SweepAxis::kX ? 0 : 1;
+  d_corners[3 * face.SourceCorner(edge) + c] += ends.a * static_cast<T>(scale);
+  d_corners[3 * face.SourceCorner((edge + 1) % 3) + c] += ends.b * static_cast<T>(scale);
+}
+
+}  // namespace tilegrad::rivals
