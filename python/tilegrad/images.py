@@ -17,7 +17,7 @@ _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"
 def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
     """Reads an image.
 
-    PNG, JPEG, BMP, TGA, PNM: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
+    PNG, JPEG, BMP, TGA, PNM, SGI: (H, W, 1 to 4) uint8; 16 bits are reduced to 8. EXR: (H, W, 1 to 4)
     float32, of its channels R, G, B, A or Y, A or the only one there is. NPY: the array as it is.
     max_bytes: as of `load_mesh`.
     OSError, ValueError: name the file and what is wrong with it.

@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// AC3D text (.ac), as FlightGear's models use it. Not read by Assimp, whose reader exhausts memory,
-// overflows the stack or leaves array bounds on wrong counts. Surfaces keep the order of their
-// corners; crease angles and subdivision are ignored.
+// AC3D text (.ac), as FlightGear's models use it, and its dialect of TORCS (.acc), which has strips
+// of triangles, normals behind vertices, several layers of texture, of which the base is read, and
+// a uv for each layer behind a corner, of which the first is read. Not read by Assimp, whose reader
+// exhausts memory, overflows the stack or leaves array bounds on wrong counts. Surfaces keep the
+// order of their corners; crease angles and subdivision are ignored.
 #include <glm/mat4x4.hpp>
 #include <map>
 
 #include "base/error.h"
+#include "io/ac3d_text.h"
 #include "io/mesh_readers.h"
-#include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
 
-constexpr int kMaxDepth = 256;  // objects are read recursively
-
-// The next token, or a quoted string, which may contain spaces.
-std::string_view NextString(std::string_view& rest) {
-  const auto begin = rest.find_first_not_of(" \t");
-  if (begin == std::string_view::npos || rest[begin] != '"') return NextToken(rest);
-  const auto end = std::min(rest.find('"', begin + 1), rest.size());
-  const auto text = rest.substr(begin + 1, end - begin - 1);
-  rest.remove_prefix(std::min(end + 1, rest.size()));
-  return text;
-}
+constexpr int kMaxDepth = 256;                // objects are read recursively
+constexpr unsigned kPolygon = 0, kStrip = 4;  // the low four bits of a surface's flags
 
 // What an object hands to its children.
 struct Inherited {
@@ -31,6 +24,7 @@ struct Inherited {
 };
 
 struct Object {
+  std::string name;
   Inherited inherited;
   glm::dmat4 local = glm::dmat4(1);
   glm::vec2 uv_repeat = glm::vec2(1), uv_offset = glm::vec2(0);
@@ -40,22 +34,23 @@ struct Object {
 class Ac3dReader {
  public:
   Ac3dReader(const FileSource& source, const std::string& name, std::string_view text)
-      : source_(source), name_(name), place_(source.Describe(name)), lines_(text) {}
+      : source_(source), name_(name), text_(source.Describe(name), text) {}
 
   Status Read() {
     std::string_view line;
-    if (!lines_.Next(line) || !line.starts_with("AC3D"))
-      return DataLoss("{}: does not begin with \"AC3D\"", place_);
-    while (Next(line)) {
+    if (!text_.NextRaw(line) || !line.starts_with("AC3D"))
+      return DataLoss("{}: does not begin with \"AC3D\"", text_.place());
+    while (text_.Next(line)) {
       const auto keyword = NextToken(line);
-      if (keyword == "MATERIAL")
-        TILEGRAD_TRY(ReadMaterial(line));
-      else if (keyword == "MAT")
-        TILEGRAD_TRY(ReadMaterialBlock(line));
-      else if (keyword == "OBJECT")
+      if (keyword == "OBJECT") {
         TILEGRAD_TRY(ReadObject({}, 0));
-      else
-        return Error("expected MATERIAL or OBJECT");
+        continue;
+      }
+      if (keyword != "MATERIAL" && keyword != "MAT")
+        return text_.Error("expected MATERIAL or OBJECT");
+      TILEGRAD_ASSIGN(Material material,
+                      keyword == "MAT" ? text_.ReadMaterialBlock(line) : text_.ReadMaterial(line));
+      palette_.push_back(std::move(material));
     }
     return {};
   }
@@ -63,88 +58,43 @@ class Ac3dReader {
   LoadedMesh out;
 
  private:
-  // The next line that is not empty.
-  bool Next(std::string_view& line) {
-    while (lines_.Next(line)) {
-      if (line.find_first_not_of(" \t\r") != std::string_view::npos) return true;
-    }
-    return false;
-  }
-
-  Status Error(const std::string& what) const {
-    return DataLoss("{}: line {}: {}", place_, lines_.Number(), what);
-  }
-
-  template <class T>
-  Status Numbers(std::string_view& rest, T* values, int count, const char* what) {
-    for (int i = 0; i < count; ++i) {
-      if (!ParseNumber(NextToken(rest), values[i]))
-        return Error(fmt::format("{} needs {} finite number{}", what, count, count > 1 ? "s" : ""));
-    }
-    return {};
-  }
-
-  // "rgb 1 1 1  amb ...  trans 0", or a part of it.
-  Status MaterialValues(std::string_view rest, Material& material) {
-    for (auto key = NextToken(rest); !key.empty(); key = NextToken(rest)) {
-      if (key == "rgb") TILEGRAD_TRY(Numbers(rest, &material.base_color[0], 3, "rgb"));
-      if (key != "trans") continue;
-      float transparency = 0;
-      TILEGRAD_TRY(Numbers(rest, &transparency, 1, "trans"));
-      material.base_color.a = 1 - transparency;
-    }
-    return {};
-  }
-
-  Status ReadMaterial(std::string_view rest) {
-    Material material{.name = std::string(NextString(rest)), .base_color = glm::vec4(1)};
-    TILEGRAD_TRY(MaterialValues(rest, material));
-    palette_.push_back(std::move(material));
-    return {};
-  }
-
-  // Version 12 of the format: one line a property, up to ENDMAT.
-  Status ReadMaterialBlock(std::string_view rest) {
-    Material material{.name = std::string(NextString(rest)), .base_color = glm::vec4(1)};
-    for (std::string_view line; Next(line);) {
-      if (line.starts_with("ENDMAT")) {
-        palette_.push_back(std::move(material));
-        return {};
-      }
-      TILEGRAD_TRY(MaterialValues(line, material));
-    }
-    return Error("ends before ENDMAT");
-  }
-
   // The lines after OBJECT up to its children, which end it.
   Status ReadObject(const Inherited& parent, int depth) {
-    if (depth > kMaxDepth) return Error(fmt::format("objects nested more than {} deep", kMaxDepth));
+    if (depth > kMaxDepth)
+      return text_.Error(fmt::format("objects nested more than {} deep", kMaxDepth));
     Object object;
     object.inherited = parent;
-    for (std::string_view line; Next(line);) {
+    for (std::string_view line; text_.Next(line);) {
       const auto keyword = NextToken(line);
       if (keyword == "kids") return ReadKids(line, object, depth);
       TILEGRAD_TRY(ReadProperty(keyword, line, object));
     }
-    return Error("ends within an object, before its \"kids\"");
+    return text_.Error("ends within an object, before its \"kids\"");
   }
 
   Status ReadProperty(std::string_view keyword, std::string_view rest, Object& object) {
-    if (keyword == "texture") object.inherited.texture = NextString(rest);
-    if (keyword == "texrep") return Numbers(rest, &object.uv_repeat[0], 2, "texrep");
-    if (keyword == "texoff") return Numbers(rest, &object.uv_offset[0], 2, "texoff");
-    if (keyword == "loc") return Numbers(rest, &object.local[3][0], 3, "loc");
+    if (keyword == "name") object.name = NextAc3dString(rest);
+    if (keyword == "texture") ReadTexture(rest, object);
+    if (keyword == "texrep") return text_.Numbers(rest, &object.uv_repeat[0], 2, "texrep");
+    if (keyword == "texoff") return text_.Numbers(rest, &object.uv_offset[0], 2, "texoff");
+    if (keyword == "loc") return text_.Numbers(rest, &object.local[3][0], 3, "loc");
     if (keyword == "rot") return ReadRotation(rest, object);
     if (keyword == "data") return SkipData(rest);
     if (keyword == "numvert") return ReadVertices(rest, object);
     if (keyword == "numsurf") return ReadSurfaces(rest, object);
-    return {};  // name, crease, subdiv, url, hidden, locked, folded, ...
+    return {};  // crease, subdiv, url, hidden, locked, folded, ...
+  }
+
+  // The name, and in .acc the layer: base, tiled, skids, shad.
+  static void ReadTexture(std::string_view rest, Object& object) {
+    const auto file = NextAc3dString(rest), layer = NextToken(rest);
+    if (layer.empty() || layer == "base") object.inherited.texture = file;
   }
 
   // Row-major.
   Status ReadRotation(std::string_view rest, Object& object) {
     double r[9];
-    TILEGRAD_TRY(Numbers(rest, r, 9, "rot"));
+    TILEGRAD_TRY(text_.Numbers(rest, r, 9, "rot"));
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) object.local[column][row] = r[3 * row + column];
     }
@@ -154,21 +104,22 @@ class Ac3dReader {
   // "data N" is followed by N characters of any kind.
   Status SkipData(std::string_view rest) {
     std::size_t size = 0;
-    TILEGRAD_TRY(Numbers(rest, &size, 1, "data"));
+    TILEGRAD_TRY(text_.Numbers(rest, &size, 1, "data"));
     std::size_t done = 0;
-    for (std::string_view line; done < size && lines_.Next(line);) done += line.size() + 1;
+    for (std::string_view line; done < size && text_.NextRaw(line);) done += line.size() + 1;
     return {};
   }
 
   Status ReadVertices(std::string_view rest, Object& object) {
-    TILEGRAD_TRY(Numbers(rest, &object.vertices, 1, "numvert"));
+    TILEGRAD_TRY(text_.Numbers(rest, &object.vertices, 1, "numvert"));
     object.first_vertex = out.exact.size();
     const glm::dmat4 m = object.inherited.transform * object.local;
     for (std::size_t i = 0; i < object.vertices; ++i) {
       std::string_view line;
-      if (!Next(line)) return Error(fmt::format("ends at vertex {} of {}", i, object.vertices));
+      if (!text_.Next(line))
+        return text_.Error(fmt::format("ends at vertex {} of {}", i, object.vertices));
       glm::dvec4 p(0, 0, 0, 1);
-      TILEGRAD_TRY(Numbers(line, &p[0], 3, "a vertex"));
+      TILEGRAD_TRY(text_.Numbers(line, &p[0], 3, "a vertex"));
       out.exact.emplace_back(m * p);
     }
     return {};
@@ -176,15 +127,16 @@ class Ac3dReader {
 
   Status ReadSurfaces(std::string_view rest, Object& object) {
     std::size_t count = 0;
-    TILEGRAD_TRY(Numbers(rest, &count, 1, "numsurf"));
+    TILEGRAD_TRY(text_.Numbers(rest, &count, 1, "numsurf"));
+    out.parts.push_back({object.name, out.mesh.faces.size()});
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
-      if (!Next(line) || NextToken(line) != "SURF") return Error("expected SURF");
+      if (!text_.Next(line) || NextToken(line) != "SURF") return text_.Error("expected SURF");
       auto flags = NextToken(line);
       if (flags.starts_with("0x") || flags.starts_with("0X")) flags.remove_prefix(2);
       unsigned bits = 0;
       if (std::from_chars(flags.data(), flags.data() + flags.size(), bits, 16).ec != std::errc())
-        return Error("SURF needs a hexadecimal number");
+        return text_.Error("SURF needs a hexadecimal number");
       TILEGRAD_TRY(ReadSurface(object, bits));
     }
     return {};
@@ -194,21 +146,29 @@ class Ac3dReader {
     std::size_t palette = 0, refs = 0;
     std::string_view line;
     for (bool last = false; !last;) {
-      if (!Next(line)) return Error("ends within a surface");
+      if (!text_.Next(line)) return text_.Error("ends within a surface");
       const auto keyword = NextToken(line);
       last = keyword == "refs";
-      if (keyword == "mat") TILEGRAD_TRY(Numbers(line, &palette, 1, "mat"));
-      if (last) TILEGRAD_TRY(Numbers(line, &refs, 1, "refs"));
-      if (keyword != "mat" && !last) return Error("expected mat or refs");
+      if (keyword == "mat") TILEGRAD_TRY(text_.Numbers(line, &palette, 1, "mat"));
+      if (last) TILEGRAD_TRY(text_.Numbers(line, &refs, 1, "refs"));
+      if (keyword != "mat" && !last) return text_.Error("expected mat or refs");
     }
     if (palette > 0 && palette >= palette_.size())
-      return Error(fmt::format("material {}, but the file has {}", palette, palette_.size()));
+      return text_.Error(fmt::format("material {}, but the file has {}", palette, palette_.size()));
     TILEGRAD_TRY(ReadCorners(object, refs));
-    constexpr unsigned kTypeMask = 0xf;
-    if ((flags & kTypeMask) == 0)
-      AddPolygon(static_cast<int>(palette), object);
-    else if (!std::exchange(lines_warned_, true))
-      out.warnings.push_back("surfaces that are lines left out");
+    switch (flags & 0xf) {
+      case kPolygon:
+        polygon_.AddTo(out);
+        break;
+      case kStrip:
+        AddStrip();
+        break;
+      default:
+        polygon_.triangles.clear();
+        if (!std::exchange(lines_warned_, true))
+          out.warnings.push_back("surfaces that are lines left out");
+    }
+    FinishTriangles(static_cast<int>(palette), object);
     return {};
   }
 
@@ -218,21 +178,35 @@ class Ac3dReader {
     uvs_.clear();
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
-      if (!Next(line)) return Error(fmt::format("ends at corner {} of {}", i, count));
+      if (!text_.Next(line)) return text_.Error(fmt::format("ends at corner {} of {}", i, count));
       std::size_t index = 0;
-      TILEGRAD_TRY(Numbers(line, &index, 1, "a corner's vertex"));
+      TILEGRAD_TRY(text_.Numbers(line, &index, 1, "a corner's vertex"));
       if (index >= object.vertices)
-        return Error(fmt::format("vertex {}, but the object has {}", index, object.vertices));
+        return text_.Error(fmt::format("vertex {}, but the object has {}", index, object.vertices));
       glm::vec2 uv(0);
-      TILEGRAD_TRY(Numbers(line, &uv[0], 2, "a corner's uv"));
+      TILEGRAD_TRY(text_.Numbers(line, &uv[0], 2, "a corner's uv"));
       polygon_.corners.push_back(static_cast<std::int32_t>(object.first_vertex + index));
       uvs_.push_back(object.uv_offset + uv * object.uv_repeat);
     }
     return {};
   }
 
-  void AddPolygon(int palette, const Object& object) {
-    polygon_.AddTo(out);
+  // Every other triangle is turned, so that all keep the first one's side. What repeats a corner
+  // only joins strips.
+  void AddStrip() {
+    const std::vector<std::int32_t>& v = polygon_.corners;
+    polygon_.triangles.clear();
+    for (std::int32_t i = 0; i + 2 < static_cast<std::int32_t>(v.size()); ++i) {
+      const Face corner = {i, i + 1 + i % 2, i + 2 - i % 2};
+      const Face face = {v[corner[0]], v[corner[1]], v[corner[2]]};
+      if (face[0] == face[1] || face[1] == face[2] || face[0] == face[2]) continue;
+      polygon_.triangles.push_back(corner);
+      out.mesh.faces.push_back(face);
+    }
+  }
+
+  // Material and uv of the triangles that a surface has added.
+  void FinishTriangles(int palette, const Object& object) {
     if (polygon_.triangles.empty()) return;
     const std::int32_t material = MaterialOf(palette, object.inherited.texture);
     for (const Face& triangle : polygon_.triangles) {
@@ -256,12 +230,12 @@ class Ac3dReader {
 
   Status ReadKids(std::string_view rest, Object& object, int depth) {
     std::size_t count = 0;
-    TILEGRAD_TRY(Numbers(rest, &count, 1, "kids"));
+    TILEGRAD_TRY(text_.Numbers(rest, &count, 1, "kids"));
     object.inherited.transform *= object.local;
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
-      if (!Next(line) || NextToken(line) != "OBJECT")
-        return Error(fmt::format("expected OBJECT, child {} of {}", i, count));
+      if (!text_.Next(line) || NextToken(line) != "OBJECT")
+        return text_.Error(fmt::format("expected OBJECT, child {} of {}", i, count));
       TILEGRAD_TRY(ReadObject(object.inherited, depth + 1));
     }
     return {};
@@ -269,8 +243,7 @@ class Ac3dReader {
 
   const FileSource& source_;
   const std::string& name_;
-  const std::string place_;
-  Lines lines_;
+  Ac3dText text_;
   std::vector<Material> palette_;
   std::map<std::pair<int, std::string>, std::int32_t> materials_;
   Polygon polygon_;             // scratch: the last surface

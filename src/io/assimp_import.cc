@@ -133,6 +133,7 @@ ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
   from.Get(AI_MATKEY_OPACITY, opacity);
   material.color = {diffuse.r, diffuse.g, diffuse.b, opacity};
   if (from.GetTexture(aiTextureType_DIFFUSE, 0, &text) != AI_SUCCESS) return material;
+  if (text == aiString("$texture_dummy.bmp")) return material;  // of an MD2 without a skin
   material.image = text.C_Str();
   material.not_read = NotReadOfImage(from);
   const aiTexture* embedded = scene.GetEmbeddedTexture(text.C_Str());

@@ -106,11 +106,22 @@ class Assembly {
   }
 
   int Texture(const ImportedMaterial& from) {
-    if (from.embedded < 0) return AddTexture(source_, name_, from.image, out_);
+    if (from.embedded < 0) return AddTexture(source_, name_, ImageName(from.image), out_);
     std::optional<int>& image = images_[static_cast<std::size_t>(from.embedded)];
     if (!image)
       image = Embedded(scene_.images[static_cast<std::size_t>(from.embedded)], from.image);
     return *image;
+  }
+
+  // Skins of MD2 are often named without an ending, behind a point where they lie beside the mesh,
+  // or with that of a format which was replaced since.
+  std::string ImageName(const std::string& written) const {
+    if (MeshEnding(name_) != ".md2" || FindBeside(source_, name_, written)) return written;
+    const std::string stem = Path(written.substr(written.starts_with('.') ? 1 : 0)).stem().string();
+    for (const char* ending : {".png", ".jpg", ".jpeg", ".tga", ".bmp"}) {
+      if (FindBeside(source_, name_, stem + ending)) return stem + ending;
+    }
+    return written;
   }
 
   int Embedded(const ImportedImage& image, const std::string& label) {
@@ -174,7 +185,9 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
 }
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name) {
-  TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
+  TILEGRAD_ASSIGN(Bytes file, source.Read(name));
+  // Assimp 5.2 takes frames that end with the file for frames beyond it.
+  if (MeshEnding(name) == ".md2") file.push_back(0);
   return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 

@@ -16,6 +16,7 @@
 #include "io/image_header.h"
 #include "io/orientation.h"
 #include "io/pnm_reader.h"
+#include "io/sgi_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -55,7 +56,7 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
     const auto size = ImageHeaderSize(bytes);
     if (size) TILEGRAD_TRY(CheckImageSize(size->width, size->height, name));
-    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM): {}", name,
+    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM, SGI): {}", name,
                     stbi_failure_reason());
   }
   if (height < 0 && height >= -kMaxImageSide) height = -height;  // a BMP with its first row on top
@@ -87,6 +88,7 @@ Result<ImageU8> DecodeBytes(std::span<const std::uint8_t> bytes, const std::stri
   if (bytes.size() > std::size_t{1} << 30)
     return ResourceExhausted("{}: an image file above 1 GiB", name);
   if (IsPnm(bytes)) return DecodePnm(bytes, name);
+  if (IsSgi(bytes)) return DecodeSgi(bytes, name);
   TILEGRAD_TRY(CheckImageContainer(bytes, name));  // before stb_image sees anything
   const auto padded = WithFullPalette(bytes);
   TILEGRAD_ASSIGN(ImageU8 image,

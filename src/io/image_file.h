@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files: PNG, JPEG, BMP, TGA by stb_image, binary PGM and PPM in; PNG out.
+// Image files: PNG, JPEG, BMP, TGA by stb_image, binary PGM and PPM and SGI in; PNG out.
 #pragma once
 
 #include <span>

@@ -27,12 +27,13 @@ struct Format {
 };
 // Assimp's importers run in a process of their own; the list holds those that read a sound file
 // right (tests/io/assimp_formats_test.cc).
-constexpr std::array<Format, 16> kFormats = {{{".glb", ReadGltf},
+constexpr std::array<Format, 18> kFormats = {{{".glb", ReadGltf},
                                               {".gltf", ReadGltf},
                                               {".obj", ReadObj},
                                               {".ply", ReadPly},
                                               {".off", ReadOff},
                                               {".ac", ReadAc3d},
+                                              {".acc", ReadAc3d},
                                               {".stl", ReadByAssimp},
                                               {".3ds", ReadByAssimp},
                                               {".dae", ReadByAssimp},
@@ -42,7 +43,8 @@ constexpr std::array<Format, 16> kFormats = {{{".glb", ReadGltf},
                                               {".x3d", ReadByAssimp},
                                               {".ase", ReadByAssimp},
                                               {".lwo", ReadByAssimp},
-                                              {".ms3d", ReadByAssimp}}};
+                                              {".ms3d", ReadByAssimp},
+                                              {".md2", ReadByAssimp}}};
 
 const Format* FindFormat(const std::string& name) {
   const std::string ending = MeshEnding(name);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mesh files: glTF and GLB (tinygltf); OBJ with MTL, PLY, OFF and AC3D (readers of our own); STL,
-// 3DS, Collada, FBX, 3MF, DirectX X, X3D, ASE, LWO and MS3D (Assimp, in a process of its own for
-// each file).
+// 3DS, Collada, FBX, 3MF, DirectX X, X3D, ASE, LWO, MS3D and MD2 (Assimp, in a process of its own
+// for each file).
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -29,12 +29,19 @@ struct MeshFileTables {
   std::vector<std::int32_t> corner_uvs, corner_normals;  // [3F] indices; -1: a corner without
 };
 
+// Faces from `first_face` up to the next part's are of the object of that name.
+struct MeshFilePart {
+  std::string name;
+  std::size_t first_face = 0;
+};
+
 struct LoadedMesh {
   Mesh mesh;  // valid (scene/mesh.h: Validate), with at least one face; all parts merged, node
               // transforms applied, polygons split, normals unit, colours in [0, 1]
   std::vector<std::string> warnings;    // what was missing or dropped, and its substitute
   std::vector<MeshFileCamera> cameras;  // in the order of the scene's nodes
   MeshFileTables tables;
+  std::vector<MeshFilePart> parts;  // ascending; AC3D only
   // What was subtracted from the file's coordinates, from cameras too: positions + origin is the
   // place in the world. 0, unless the mesh is farther from the origin than 256 times its size.
   glm::dvec3 origin{0};

@@ -70,6 +70,39 @@ TEST_F(Ac3dTest, ConcavePolygonsAndLines) {
   EXPECT_NE(loaded->warnings[0].find("lines"), std::string::npos);
 }
 
+// As TORCS writes it: normals behind vertices, strips, layers of texture, a uv for each of them.
+TEST_F(Ac3dTest, StripsAndLayersOfTorcs) {
+  ASSERT_TRUE(SavePng(folder_ / "paint.png", ImageU8(2, 2, 3, 50)).ok());
+  const auto loaded = LoadMesh(
+      Write("car.acc", World("name \"body\"\ntexture \"paint.png\" base\n"
+                             "texture \"none.rgb\" tiled\ntexture \"none.rgb\" skids\n"
+                             "texture \"none.rgb\" shad\nnumvert 5\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 "
+                             "0 0 0 1\n1 1 0 0 0 1\n0 2 0 0 0 1\nnumsurf 2\nSURF 0x34\nmat "
+                             "1\nrefs 6\n0 0 0 9 9\n1 1 0 9 9\n2 0 1 9 9\n3 1 1 9 9\n3 1 1 9 "
+                             "9\n4 0 2 9 9\nSURF 0x14\nmat 1\nrefs 2\n0 0 0\n1 0 0\n")));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_TRUE(loaded->warnings.empty()) << loaded->warnings[0];
+  // All counter-clockwise seen from +z; the repeated corner, which joins two strips, gives none.
+  EXPECT_EQ(loaded->mesh.faces, (std::vector<Face>{{0, 1, 2}, {1, 3, 2}}));
+  EXPECT_EQ(loaded->mesh.corner_uvs,
+            (std::vector<glm::vec2>{{0, 0}, {1, 0}, {0, 1}, {1, 0}, {1, 1}, {0, 1}}));
+  ASSERT_EQ(loaded->mesh.textures.size(), 1u);
+  EXPECT_EQ(loaded->mesh.textures[0].name, "paint.png");
+  ASSERT_EQ(loaded->parts.size(), 1u);
+  EXPECT_EQ(loaded->parts[0].name, "body");
+}
+
+TEST_F(Ac3dTest, PartsSayWhichFacesAnObjectHas) {
+  const auto loaded = LoadMesh(
+      Write("a.ac", kHead + "OBJECT world\nkids 2\nOBJECT poly\nname \"hull\"\n" + kTriangle +
+                        "kids 0\nOBJECT poly\nname \"bow wake\"\n" + kTriangle + "kids 0\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_EQ(loaded->parts.size(), 2u);
+  EXPECT_EQ(loaded->parts[0].first_face, 0u);
+  EXPECT_EQ(loaded->parts[1].name, "bow wake");
+  EXPECT_EQ(loaded->parts[1].first_face, 1u);
+}
+
 TEST_F(Ac3dTest, ByteOrderMarkIsSkipped) {
   EXPECT_TRUE(LoadMesh(Write("bom.ac", "\xef\xbb\xbf" + World(kTriangle))).ok());
 }

@@ -345,6 +345,25 @@ Bytes ThreeMf(const Path& scratch) {
 
 }  // namespace
 
+Bytes Md2Sample(const std::string& skin) {
+  constexpr std::int32_t kHeader = 68, kSkin = 64, kFrame = 40 + 4 * 4;
+  const std::int32_t skins = skin.empty() ? 0 : 1, uvs = kHeader + skins * kSkin,
+                     triangles = uvs + 4 * 4, frames = triangles + 4 * 12;
+  Packer file(std::endian::little);
+  file.Text("IDP2", 4)(std::int32_t{8}, std::int32_t{4}, std::int32_t{2}, kFrame, skins);
+  for (const std::int32_t count : {4, 4, 4, 0, 1}) file(count);
+  file(kHeader, uvs, triangles, frames, frames, frames + kFrame);
+  if (skins == 1) file.Text(skin, kSkin);
+  for (std::int16_t i = 0; i < 4; ++i) file(i, static_cast<std::int16_t>(i / 2));
+  for (const auto& [a, b, c] : kFaces) file(a, b, c, a, b, c);
+  file(1.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f).Text("rest", 16);
+  for (const auto& corner : kCorners) {
+    for (const float x : corner) file(static_cast<std::uint8_t>(x));
+    file(std::uint8_t{0});
+  }
+  return file.out;
+}
+
 std::vector<MeshSample> MakeMeshSamples(const Path& scratch) {
   return {{"text.stl", Export("stl", scratch)},
           {"binary.stl", Export("stlb", scratch)},
@@ -357,7 +376,8 @@ std::vector<MeshSample> MakeMeshSamples(const Path& scratch) {
           {"a.x3d", Export("x3d", scratch)},
           {"a.ase", Ase()},
           {"a.lwo", Lwo()},
-          {"a.ms3d", Ms3d()}};
+          {"a.ms3d", Ms3d()},
+          {"a.md2", Md2Sample("")}};
 }
 
 }  // namespace tilegrad::io

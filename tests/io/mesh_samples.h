@@ -19,4 +19,8 @@ struct MeshSample {
 // some by hand. Writes into the folder `scratch`.
 std::vector<MeshSample> MakeMeshSamples(const Path& scratch);
 
+// The MD2 among them, with a skin of 4 x 2 pixels by that name unless it is empty. Corner i lies at
+// pixel (i, i / 2), from the upper left. Nothing follows its one frame, as in files of our time.
+Bytes Md2Sample(const std::string& skin);
+
 }  // namespace tilegrad::io
