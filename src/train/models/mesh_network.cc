@@ -4,6 +4,8 @@
 #include <map>
 #include <tuple>
 
+#include "base/error.h"
+#include "nn/networks/blocks.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
@@ -26,6 +28,14 @@ struct Builder {
         nn::ConvShape{.in = in, .out = out, .kernel = kKernel, .options = kHalve}, rng);
     net.Add<nn::BatchNorm>("conv_norm" + name, context, out, kRelu);
   }
+  void Blocks(nn::Sequential& net, const std::string& name, std::int64_t channels) {
+    for (std::int64_t i = 0; i < config.blocks; ++i) {
+      const std::string block = fmt::format("block{}_{}", name, i + 1);
+      nn::AddResidualBlock(net, block, context,
+                           {.in = channels, .out = channels, .norm = nn::Norm::kBatch}, rng);
+      net.Add<nn::Activation>(block + "_relu", &nn::Relu);
+    }
+  }
   nn::LinearLayer& Fc(nn::Sequential& net, const std::string& name, std::int64_t in,
                       std::int64_t out) {
     auto& layer =
@@ -47,7 +57,9 @@ void BuildEncoder(Builder& b, nn::Sequential& net, int image_size) {
   const std::int64_t c = b.config.channels, code = b.config.code, side = image_size / 8;
   b.Conv(net, "1", 4, c);
   b.Conv(net, "2", c, 2 * c);
+  b.Blocks(net, "2", 2 * c);
   b.Conv(net, "3", 2 * c, 4 * c);
+  b.Blocks(net, "3", 4 * c);
   net.Add<nn::Flatten>("flatten");
   b.FcRelu(net, "1", 4 * c * side * side, code);
   b.FcRelu(net, "2", code, code);
@@ -75,18 +87,6 @@ nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
   });
 }
 
-// The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
-std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
-  std::map<std::tuple<float, float, float>, std::int64_t> at;
-  for (std::size_t v = 0; v < sphere.positions.size(); ++v) {
-    const glm::vec3& p = sphere.positions[v];
-    at[{p.x, p.y, p.z}] = static_cast<std::int64_t>(v);
-  }
-  std::vector<std::int64_t> mirror;
-  for (const glm::vec3& p : sphere.positions) mirror.push_back(at.at({-p.x, p.y, p.z}));
-  return mirror;
-}
-
 // Offsets [3 V] to the mean of themselves and their mirror image at x = 0, a projection.
 nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
   const std::vector<std::int64_t> mirror = MirrorVertices(sphere);
@@ -99,6 +99,17 @@ nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
 }
 
 }  // namespace
+
+std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
+  std::map<std::tuple<float, float, float>, std::int64_t> at;
+  for (std::size_t v = 0; v < sphere.positions.size(); ++v) {
+    const glm::vec3& p = sphere.positions[v];
+    at[{p.x, p.y, p.z}] = static_cast<std::int64_t>(v);
+  }
+  std::vector<std::int64_t> mirror;
+  for (const glm::vec3& p : sphere.positions) mirror.push_back(at.at({-p.x, p.y, p.z}));
+  return mirror;
+}
 
 void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
   encoder.Visit(prefix + "encoder.", visitor);

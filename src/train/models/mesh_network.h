@@ -14,6 +14,7 @@ namespace tilegrad::train {
 // x 64 with the 642-vertex template.
 struct NetworkConfig {
   std::int64_t channels = 64;   // of the first convolution; the next two have 2x and 4x
+  std::int64_t blocks = 0;      // residual blocks after the second and after the third convolution
   std::int64_t code = 1024;     // width of the encoder's three fully connected layers
   std::int64_t hidden1 = 1024;  // widths of each decoder
   std::int64_t hidden2 = 2048;
@@ -22,7 +23,9 @@ struct NetworkConfig {
   std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
   bool symmetric = false;           // offsets are the mean of themselves and their mirror image at
                                     // x = 0, so every prediction is symmetric there
-  bool fc_norm = true;              // batch norm after hidden fully connected layers
+  bool mirror_mean = false;  // what predicts is the mean of the predictions from a picture and
+                             // from its mirror image; training does not know of it
+  bool fc_norm = true;       // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
@@ -42,6 +45,9 @@ struct PredictedMeshes {
   nn::Var positions;
   nn::Var colors;  // [B, V, 3] linear, not clamped
 };
+
+// The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
+std::vector<std::int64_t> MirrorVertices(const Mesh& sphere);
 
 class MeshNetwork {
  public:

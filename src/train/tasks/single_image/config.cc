@@ -9,6 +9,8 @@ ConfigFields OwnFields(SingleImageConfig* c) {
   return {
       {"network.channels", &c->network.channels, 1, 4096,
        "of the first convolution; then 2x and 4x"},
+      {"network.blocks", &c->network.blocks, 0, 16,
+       "residual blocks after the second and after the third convolution"},
       {"network.code", &c->network.code, 1, 65536, "width of the encoder's fully connected layers"},
       {"network.hidden1", &c->network.hidden1, 1, 65536, "width of each decoder's first layer"},
       {"network.hidden2", &c->network.hidden2, 1, 65536, "width of each decoder's second layer"},
@@ -18,6 +20,8 @@ ConfigFields OwnFields(SingleImageConfig* c) {
       {"network.smoothing", &c->network.smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
       {"network.symmetric", &c->network.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
+      {"network.mirror_mean", &c->network.mirror_mean, 0, 1,
+       "what predicts is the mean over a picture and its mirror image"},
       {"network.fc_norm", &c->network.fc_norm, 0, 1,
        "batch norm after hidden fully connected layers"},
       {"network.fc_deviation", &c->network.fc_deviation, 0, 10,
