@@ -13,8 +13,8 @@ namespace tilegrad::train {
 struct LossTerm {
   const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second",
                      // "seconds", "stream_share"
-  double weight;  // in the loss; 0: only watched
-  double value;   // before the weight
+  double weight;     // in the loss; 0: only watched
+  double value;      // before the weight
 };
 
 // Cleared and filled anew by each step: a steady state keeps the memory.

@@ -2,33 +2,35 @@
 #include "train/tasks/single_image/config.h"
 
 namespace tilegrad::train {
-
 namespace {
 
-ConfigFields OwnFields(SingleImageConfig* c) {
+ConfigFields FieldsOf(NetworkConfig* c) {
   return {
-      {"network.channels", &c->network.channels, 1, 4096,
-       "of the first convolution; then 2x and 4x"},
-      {"network.blocks", &c->network.blocks, 0, 16,
+      {"network.channels", &c->channels, 1, 4096, "of the first convolution; then 2x and 4x"},
+      {"network.blocks", &c->blocks, 0, 16,
        "residual blocks after the second and after the third convolution"},
-      {"network.code", &c->network.code, 1, 65536, "width of the encoder's fully connected layers"},
-      {"network.hidden1", &c->network.hidden1, 1, 65536, "width of each decoder's first layer"},
-      {"network.hidden2", &c->network.hidden2, 1, 65536, "width of each decoder's second layer"},
-      {"network.template_level", &c->network.template_level, 0, 6,
+      {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
+      {"network.hidden1", &c->hidden1, 1, 65536, "width of each decoder's first layer"},
+      {"network.hidden2", &c->hidden2, 1, 65536, "width of each decoder's second layer"},
+      {"network.template_level", &c->template_level, 0, 6,
        "subdivisions of the icosahedron; 3: 642 vertices"},
-      {"network.template_radius", &c->network.template_radius, 1e-3, 10, "world units"},
-      {"network.smoothing", &c->network.smoothing, 0, 64,
+      {"network.template_radius", &c->template_radius, 1e-3, 10, "world units"},
+      {"network.smoothing", &c->smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
-      {"network.symmetric", &c->network.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
-      {"network.mirror_mean", &c->network.mirror_mean, 0, 1,
+      {"network.symmetric", &c->symmetric, 0, 1, "every prediction is symmetric at x = 0"},
+      {"network.mirror_mean", &c->mirror_mean, 0, 1,
        "what predicts is the mean over a picture and its mirror image"},
-      {"network.fc_norm", &c->network.fc_norm, 0, 1,
-       "batch norm after hidden fully connected layers"},
-      {"network.fc_deviation", &c->network.fc_deviation, 0, 10,
+      {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
+      {"network.fc_deviation", &c->fc_deviation, 0, 10,
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
-      {"network.output_deviation", &c->network.output_deviation, 0, 10,
+      {"network.output_deviation", &c->output_deviation, 0, 10,
        "the decoders' last weights start as N(0, this^2)"},
-      {"network.color_bias", &c->network.color_bias, -1, 2, "what vertex colours start at"},
+      {"network.color_bias", &c->color_bias, -1, 2, "what vertex colours start at"},
+  };
+}
+
+ConfigFields LossAndRenderFields(SingleImageConfig* c) {
+  return {
       {"loss.iou", &c->loss.iou, 0, kNoLimit, "weight of equation 12"},
       {"loss.color", &c->loss.color, 0, kNoLimit, "weight of equation 13"},
       {"loss.smoothness", &c->loss.smoothness, 0, kNoLimit,
@@ -42,14 +44,24 @@ ConfigFields OwnFields(SingleImageConfig* c) {
       {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,
        "at step 0; reaches sharpness geometrically at half of the run"},
       {"render.max_alpha_error", &c->render.max_alpha_error, 0, 1, "bound on the error of alpha"},
-      {"optimizer.learning_rate", &c->optimizer.learning_rate, 0, 1, "of Adam"},
-      {"optimizer.final_factor", &c->optimizer.final_factor, 0, 1,
+  };
+}
+
+ConfigFields FieldsOf(OptimizerConfig* c) {
+  return {
+      {"optimizer.learning_rate", &c->learning_rate, 0, 1, "of Adam"},
+      {"optimizer.final_factor", &c->final_factor, 0, 1,
        "share of the rate at the end (half cosine); 1: constant"},
-      {"optimizer.warmup", &c->optimizer.warmup, 0, kNoLimit, "steps of linear rise"},
-      {"optimizer.beta1", &c->optimizer.beta1, 0, 0.999999, "of Adam"},
-      {"optimizer.beta2", &c->optimizer.beta2, 0, 0.99999999, "of Adam"},
-      {"optimizer.average", &c->optimizer.average, 0, 0.999999,
+      {"optimizer.warmup", &c->warmup, 0, kNoLimit, "steps of linear rise"},
+      {"optimizer.beta1", &c->beta1, 0, 0.999999, "of Adam"},
+      {"optimizer.beta2", &c->beta2, 0, 0.99999999, "of Adam"},
+      {"optimizer.average", &c->average, 0, 0.999999,
        "decay of a moving average of the weights, which predicts; 0: none"},
+  };
+}
+
+ConfigFields ScheduleFields(SingleImageConfig* c) {
+  return {
       {"schedule.batch", &c->batch, 2, 65536, "objects a step; batch norm needs two"},
       {"schedule.views", &c->views, 1, 64, "rendered per object: its own view and random others"},
       {"schedule.mirrored", &c->mirrored, 0, 1,
@@ -60,8 +72,10 @@ ConfigFields OwnFields(SingleImageConfig* c) {
 }  // namespace
 
 ConfigFields FieldsOf(SingleImageConfig* c) {
-  ConfigFields fields = OwnFields(c);
-  for (const ConfigFields& more : {FieldsOf(&c->rivals), FieldsOf(&c->stream)})
+  ConfigFields fields;
+  for (const ConfigFields& more :
+       {FieldsOf(&c->network), LossAndRenderFields(c), FieldsOf(&c->optimizer), ScheduleFields(c),
+        FieldsOf(&c->rivals), FieldsOf(&c->stream)})
     fields.insert(fields.end(), more.begin(), more.end());
   return fields;
 }
