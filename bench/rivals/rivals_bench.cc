@@ -36,7 +36,7 @@ struct RivalBench {
     alpha.resize(batch.d_alpha.size()), d_positions.resize(positions.size());
   }
   rivals::BatchT<float> View() const {
-    return {positions, batch.faces, cameras, cameras.size(), kScenes[0].size};
+    return {positions, {}, batch.faces, cameras, cameras.size(), kScenes[0].size};
   }
   // Corners of the first image's faces.
   std::vector<float> FirstCorners() const {
@@ -60,9 +60,13 @@ void Rival(benchmark::State& state, const rivals::Options& options, Way way, int
   RivalBench bench;
   const Workers workers(count);
   rivals::Renderer renderer(workers);
-  const auto forward = [&] { Check(renderer.Render(bench.View(), options, bench.alpha), state); };
+  const auto forward = [&] {
+    Check(renderer.Render(bench.View(), options, {bench.alpha, {}}), state);
+  };
   const auto backward = [&] {
-    Check(renderer.Backward(bench.View(), options, bench.batch.d_alpha, bench.d_positions), state);
+    Check(renderer.Backward(bench.View(), options, {bench.batch.d_alpha, {}},
+                            {bench.d_positions, {}}),
+          state);
   };
   forward(), backward();  // which find their memory
   for (auto _ : state) way == Way::kForward ? forward() : backward();

@@ -4,28 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rivals/n3mr_box.h"
 #include "rivals/n3mr_reduce.h"
 #include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {
 namespace {
-
-// Pixels of the drawing whose centre may lie within the extent of three coordinates. In pixel units
-// these round by up to 2^15 2^-24 = 2e-3 in float, at the far end of the largest drawing.
-struct InnerRange {
-  int begin, end;
-
-  template <class T>
-  InnerRange(const T c[3], int inner) {
-    const auto pixel = [&](T v) {
-      return std::clamp(ToInnerPixels(v, inner), T(-2), static_cast<T>(inner) + 1);
-    };
-    const T slack = T(4e-3), low = pixel(std::min({c[0], c[1], c[2]})) - slack;
-    const T high = pixel(std::max({c[0], c[1], c[2]})) + slack;
-    begin = std::max(0, static_cast<int>(std::ceil(low)));
-    end = std::min(inner, static_cast<int>(std::floor(high)) + 1);
-  }
-};
 
 // Barycentric weights and 1/depth, which are affine on the image.
 template <class T>
@@ -154,20 +138,6 @@ class CoverageSweep {
   std::int32_t f_;
   T per_pixel_, eps_;
 };
-
-// Faces that own no pixel have no gradient.
-template <class T>
-bool OwnsAPixel(const N3mrImageT<T>& image, std::int32_t f) {
-  const N3mrFaceT<T>& face = image.faces[static_cast<std::size_t>(f)];
-  const InnerRange columns(face.at.x, image.inner), rows(face.at.y, image.inner);
-  for (int i = rows.begin; i < rows.end; ++i) {
-    const auto row = image.owner.begin() + i * image.inner;
-    if (std::find(row + columns.begin, row + std::max(columns.begin, columns.end), f) !=
-        row + std::max(columns.begin, columns.end))
-      return true;
-  }
-  return false;
-}
 
 }  // namespace
 

@@ -210,6 +210,9 @@ TEST(Chain, SoDoThoseThroughSoftRas) {
   p.config.render.rule = "softras";
   p.config.rivals.softras.sigma = 3e-3, p.config.rivals.softras.exact_product = true;
   ExpectGradientsAgreeWithDifferences(p);
+  p.config.rivals.softras_color = p.config.rivals.softras_colors.position_gradient = true;
+  p.config.rivals.softras_colors.gamma = 1e-2;
+  ExpectGradientsAgreeWithDifferences(p);
 }
 
 // The path that trains (float32, SIMD, tiled renderer) against float64: a relative error of the
@@ -246,8 +249,9 @@ TEST(Chain, TheTrainingPathAgreesWithFloat64) {
   }
 }
 
-void ExpectSameBitsAndLearning(const std::string& rule) {
-  const SmallProblem p;
+void ExpectSameBitsAndLearning(const std::string& rule, bool color = false) {
+  SmallProblem p;
+  p.config.rivals.softras_color = p.config.rivals.n3mr_color = color;
   std::vector<std::vector<float>> finals;
   double first = 0, last = 0;
   for (const int count : {1, 2, 7}) {
@@ -275,7 +279,9 @@ void ExpectSameBitsAndLearning(const std::string& rule) {
 
 TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) { ExpectSameBitsAndLearning("dibr"); }
 TEST(Chain, SoDoesSoftRas) { ExpectSameBitsAndLearning("softras"); }
+TEST(Chain, SoDoesSoftRasWithColors) { ExpectSameBitsAndLearning("softras", true); }
 TEST(Chain, SoDoesN3mr) { ExpectSameBitsAndLearning("n3mr"); }
+TEST(Chain, SoDoesN3mrWithColors) { ExpectSameBitsAndLearning("n3mr", true); }
 
 // Alpha alone: no colour in the loss, and none of its decoder's weights moves.
 TEST(Chain, RivalsHaveNoColorLoss) {

@@ -32,7 +32,7 @@ ConfigFields FieldsButRivals(SingleImageConfig* c) {
       {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
        "weight of the Laplacian of the movement"},
       {"render.rule", &c->render.rule, 0, 0,
-       "whose renderer trains: \"dibr\", or, by alpha alone, \"softras\" or \"n3mr\""},
+       "whose renderer trains: \"dibr\", \"softras\" or \"n3mr\""},
       {"render.sharpness", &c->render.sharpness, 1e-3, 1e9,
        "1/delta of equation 5, per squared NDC unit"},
       {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,

@@ -17,8 +17,9 @@ struct LossConfig {
 };
 
 struct RenderConfig {
-  // "dibr", "softras" or "n3mr". The rivals draw alpha alone: there is no colour loss then, and the
-  // next three numbers mean nothing. Pictures and scores are always drawn by "dibr".
+  // "dibr", "softras" or "n3mr". The rivals draw alpha alone, and there is no colour loss, unless
+  // RivalConfig says otherwise; the next three numbers mean nothing to them. Pictures and scores
+  // are always drawn by "dibr".
   std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
   double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
