@@ -204,6 +204,12 @@ TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   ExpectGradientsAgreeWithDifferences(p);
 }
 
+TEST(Chain, SoDoThoseOfN3mrsVertices) {
+  SmallProblem p;
+  p.config.network.n3mr_vertices = true, p.config.network.smoothing = 0;
+  ExpectGradientsAgreeWithDifferences(p);
+}
+
 // SoftRas has a derivative once its product has no floor; N3MR's sweep is none.
 TEST(Chain, SoDoThoseThroughSoftRas) {
   SmallProblem p;
@@ -357,6 +363,15 @@ TEST(Schedules, LearningRateAndSharpness) {
   EXPECT_NEAR(SharpnessAt(c, 0), 100, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 25), 1000, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 80), 10000, 1e-8);
+}
+
+TEST(SingleImageConfig, N3mrVerticesHaveNoOffsets) {
+  SingleImageConfig config;
+  config.network.n3mr_vertices = true;
+  EXPECT_TRUE(CheckConfig(config).ok());
+  config.network.symmetric = true;
+  EXPECT_NE(CheckConfig(config).message().find("network.n3mr_vertices has no offsets"),
+            std::string::npos);
 }
 
 TEST(RivalConfig, UnknownWordsNameTheKnownOnes) {

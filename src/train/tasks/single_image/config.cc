@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/single_image/config.h"
 
+#include "base/error.h"
+
 namespace tilegrad::train {
 
 namespace {
@@ -25,6 +27,8 @@ ConfigFields FieldsButRivals(SingleImageConfig* c) {
       {"network.output_deviation", &c->network.output_deviation, 0, 10,
        "the decoders' last weights start as N(0, this^2)"},
       {"network.color_bias", &c->network.color_bias, -1, 2, "what vertex colours start at"},
+      {"network.n3mr_vertices", &c->network.n3mr_vertices, 0, 1,
+       "N3MR's sigmoids and centroid instead of offsets"},
       {"loss.iou", &c->loss.iou, 0, kNoLimit, "weight of equation 12"},
       {"loss.color", &c->loss.color, 0, kNoLimit, "weight of equation 13"},
       {"loss.smoothness", &c->loss.smoothness, 0, kNoLimit,
@@ -54,6 +58,16 @@ ConfigFields FieldsButRivals(SingleImageConfig* c) {
 }
 
 }  // namespace
+
+Status CheckConfig(const SingleImageConfig& config) {
+  const NetworkConfig& n = config.network;
+  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
+    return InvalidArgument(
+        "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
+        "about: leave these at 0 and false");
+  }
+  return RivalOptions(config.render.rule, config.rivals).status();
+}
 
 ConfigFields FieldsOf(SingleImageConfig* c) {
   ConfigFields fields = FieldsButRivals(c);

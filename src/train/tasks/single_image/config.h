@@ -50,5 +50,7 @@ struct SingleImageConfig {
 };
 
 ConfigFields FieldsOf(SingleImageConfig* config);
+// InvalidArgument names keys that do not go together, and words that are not known.
+Status CheckConfig(const SingleImageConfig& config);
 
 }  // namespace tilegrad::train
