@@ -3,6 +3,8 @@
 // 64 x 64, 1,280 faces each. Beside them the scalar references of the rivals on one image in the
 // same process: a ratio times 64 is what the fast code gains.
 //
+// With `color`, colours and alpha together: softmax over vertex colours, and N3MR's joint sweep.
+//
 // Names: rule/direction/who, who being a number of workers, or `reference` (one image).
 #include <benchmark/benchmark.h>
 
@@ -25,18 +27,24 @@ void Check(const Status& status, benchmark::State& state) {
 // One view each of as many meshes as there are images.
 struct RivalBench {
   BenchBatch batch{kScenes[0]};
-  std::vector<float> positions, alpha, d_positions;
+  std::vector<float> positions, colors, alpha, color, d_color, d_positions, d_colors;
   std::vector<Camera> cameras;
 
-  RivalBench() {
+  explicit RivalBench(bool with_color = false) {
     for (const PipelineScene& scene : batch.scenes) {
       positions.insert(positions.end(), scene.positions.begin(), scene.positions.end());
       cameras.push_back(scene.camera);
     }
     alpha.resize(batch.d_alpha.size()), d_positions.resize(positions.size());
+    if (!with_color) return;
+    while (colors.size() < positions.size())
+      colors.insert(colors.end(), batch.colors.begin(), batch.colors.end());
+    color.resize(3 * alpha.size()), d_colors.resize(colors.size());
+    for (int c = 0; c < 3; ++c)
+      d_color.insert(d_color.end(), batch.d_alpha.begin(), batch.d_alpha.end());
   }
   rivals::BatchT<float> View() const {
-    return {positions, batch.faces, cameras, cameras.size(), kScenes[0].size};
+    return {positions, colors, batch.faces, cameras, cameras.size(), kScenes[0].size};
   }
   // Corners of the first image's faces.
   std::vector<float> FirstCorners() const {
@@ -56,13 +64,23 @@ struct RivalBench {
 
 enum class Way { kForward, kBackward };
 
-void Rival(benchmark::State& state, const rivals::Options& options, Way way, int count) {
-  RivalBench bench;
+struct RivalRun {
+  std::string name;
+  rivals::Options options;
+  bool color = false;
+};
+
+void Rival(benchmark::State& state, const RivalRun& run, Way way, int count) {
+  RivalBench bench(run.color);
   const Workers workers(count);
   rivals::Renderer renderer(workers);
-  const auto forward = [&] { Check(renderer.Render(bench.View(), options, bench.alpha), state); };
+  const auto forward = [&] {
+    Check(renderer.Render(bench.View(), run.options, {bench.alpha, bench.color}), state);
+  };
   const auto backward = [&] {
-    Check(renderer.Backward(bench.View(), options, bench.batch.d_alpha, bench.d_positions), state);
+    Check(renderer.Backward(bench.View(), run.options, {bench.batch.d_alpha, bench.d_color},
+                            {bench.d_positions, bench.d_colors}),
+          state);
   };
   forward(), backward();  // which find their memory
   for (auto _ : state) way == Way::kForward ? forward() : backward();
@@ -120,18 +138,19 @@ void Register(const std::string& name, const Run& run) {
 }
 
 void RegisterAll() {
+  const rivals::Options soft, n3mr{.rule = rivals::Rule::kN3mr};
+  const RivalRun runs[] = {
+      {"softras", soft}, {"n3mr", n3mr}, {"softras_color", soft, true}, {"n3mr_color", n3mr, true}};
   for (const Way way : {Way::kForward, Way::kBackward}) {
     const std::string direction = way == Way::kForward ? "/forward/" : "/backward/";
     for (const int count : {1, 2}) {
       const std::string who = direction + std::to_string(count);
       Register("dibr" + who, [=](benchmark::State& state) { Dibr(state, way, count); });
-      for (const auto rule : {rivals::Rule::kSoftRas, rivals::Rule::kN3mr}) {
-        const std::string name = rule == rivals::Rule::kSoftRas ? "softras" : "n3mr";
-        const rivals::Options options{.rule = rule};
-        Register(name + who, [=](benchmark::State& state) { Rival(state, options, way, count); });
-        if (count != 1) continue;
-        Register(name + direction + "reference",
-                 [=](benchmark::State& state) { Reference(state, options, way); });
+      for (const RivalRun& run : runs) {
+        Register(run.name + who, [=](benchmark::State& state) { Rival(state, run, way, count); });
+        if (count != 1 || run.color) continue;
+        Register(run.name + direction + "reference",
+                 [=](benchmark::State& state) { Reference(state, run.options, way); });
       }
     }
   }

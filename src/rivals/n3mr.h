@@ -4,6 +4,7 @@
 // pixels (n3mr_sweep.h). What is published and what is repaired here: docs/rivals.md.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -14,14 +15,18 @@
 
 namespace tilegrad::rivals {
 
-// Positions on the lines of a drawing, ascending: line i has at[begin[i]] .. at[begin[i + 1] - 1].
-struct LinePixels {
-  AlignedVector<std::int32_t> begin, at;
+// Pixels on the lines of a drawing, ascending: line i has those of begin[i] .. begin[i + 1] - 1.
+template <class T>
+struct LinePixelsT {
+  AlignedVector<std::int32_t> begin;  // [inner + 1]
+  AlignedVector<T> at, gain;          // position on the line, and how much the loss falls
 
-  std::span<const std::int32_t> operator[](int line) const {
+  // Of [first, end): where `line` has its first pixel at or beyond `at_least`.
+  std::size_t Find(int line, int at_least) const {
     const auto i = static_cast<std::size_t>(line);
-    const auto first = static_cast<std::size_t>(begin[i]);
-    return std::span(at).subspan(first, static_cast<std::size_t>(begin[i + 1]) - first);
+    const auto from = at.begin() + begin[i], to = at.begin() + begin[i + 1];
+    return static_cast<std::size_t>(std::lower_bound(from, to, static_cast<T>(at_least)) -
+                                    at.begin());
   }
 };
 
@@ -36,7 +41,7 @@ struct N3mrImageT {
   AlignedVector<T> coverage, d_coverage;  // [inner,inner]
   // Uncovered pixels that the loss wants covered, by row and by column of the drawing: the only
   // ones that pull an edge outward.
-  LinePixels pull_rows, pull_columns;
+  LinePixelsT<T> pull_rows, pull_columns;
 };
 
 // Sets up an image of size x size with faces [F,3,3]. T: float or double, as everything below.

@@ -7,6 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
 #include "rivals/n3mr_options.h"
 
@@ -119,6 +122,58 @@ void AddSweepEnds(const N3mrFaceT<T>& face, int edge, SweepAxis axis, double sca
   const int c = axis == SweepAxis::kX ? 0 : 1;
   d_corners[3 * face.SourceCorner(edge) + c] += ends.a * static_cast<T>(scale);
   d_corners[3 * face.SourceCorner((edge + 1) % 3) + c] += ends.b * static_cast<T>(scale);
+}
+
+// What the sweep looks at: planes of the drawing that were asked for, background filled in, and
+// their adjoints, [channels][inner,inner].
+template <class T>
+struct SweepImages {
+  int inner, channels;
+  std::span<const T> values, d_values;
+  std::span<const std::int32_t> owner;
+
+  std::size_t Pixel(SweepAxis axis, int line, int at) const {
+    const int row = axis == SweepAxis::kY ? at : line, column = axis == SweepAxis::kY ? line : at;
+    return static_cast<std::size_t>(row * inner + column);
+  }
+  // How much the loss falls if pixel `to` takes the value that `from` has. One sum over all
+  // channels: colours and alpha together are not the sum of both alone.
+  T Gain(std::size_t to, std::size_t from) const {
+    T gain = T(0);
+    for (int c = 0; c < channels; ++c) {
+      const std::size_t plane = static_cast<std::size_t>(c) * owner.size();
+      gain += (values[plane + to] - values[plane + from]) * d_values[plane + to];
+    }
+    return gain;
+  }
+};
+
+// Adds the gradient of faces[f] to d_corners [3,3] of its source.
+template <class T>
+void SweepFace(const N3mrFaceT<T>& face, std::int32_t f, const SweepImages<T>& images,
+               const N3mrOptions& options, double scale, T* d_corners) {
+  const T per_pixel = T(2) / T(images.inner), eps = static_cast<T>(options.eps);
+  for (int edge = 0; edge < 3; ++edge) {
+    for (const SweepAxis axis : {SweepAxis::kY, SweepAxis::kX}) {
+      const SweepEdge<T> e = SweepEdgeOf(face.at, edge, axis, images.inner);
+      SweepEnds<T> ends;
+      ForSweepLines(e, images.inner, options.floor_lines, [&](const SweepLine<T>& line) {
+        const std::size_t in = images.Pixel(axis, line.line, line.in);
+        const std::size_t out = images.Pixel(axis, line.line, line.out);
+        const auto add = [&](int at, std::size_t from) {
+          const T gain = images.Gain(images.Pixel(axis, line.line, at), from);
+          if (gain > 0) AddSweep(line, at, gain, per_pixel, eps, &ends);
+        };
+        if (images.owner[in] == f) {
+          for (int d = line.out; d >= 0 && d < images.inner; d += e.outward) add(d, in);
+        }
+        for (int d = line.inner_begin; d <= line.inner_end; ++d) {
+          if (images.owner[images.Pixel(axis, line.line, d)] == f) add(d, out);
+        }
+      });
+      AddSweepEnds(face, edge, axis, scale, ends, d_corners);
+    }
+  }
 }
 
 }  // namespace tilegrad::rivals

@@ -217,11 +217,20 @@ TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   ExpectGradientsAgreeWithDifferences(p);
 }
 
+TEST(Chain, SoDoThoseOfN3mrsVertices) {
+  SmallProblem p;
+  p.config.network.n3mr_vertices = true, p.config.network.smoothing = 0;
+  ExpectGradientsAgreeWithDifferences(p);
+}
+
 // SoftRas has a derivative once its product has no floor; N3MR's sweep is none.
 TEST(Chain, SoDoThoseThroughSoftRas) {
   SmallProblem p;
   p.config.render.rule = "softras";
   p.config.rivals.softras.sigma = 3e-3, p.config.rivals.softras.exact_product = true;
+  ExpectGradientsAgreeWithDifferences(p);
+  p.config.rivals.softras_color = p.config.rivals.softras_colors.position_gradient = true;
+  p.config.rivals.softras_colors.gamma = 1e-2;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -259,8 +268,9 @@ TEST(Chain, TheTrainingPathAgreesWithFloat64) {
   }
 }
 
-void ExpectSameBitsAndLearning(const std::string& rule) {
-  const SmallProblem p;
+void ExpectSameBitsAndLearning(const std::string& rule, bool color = false) {
+  SmallProblem p;
+  p.config.rivals.softras_color = p.config.rivals.n3mr_color = color;
   std::vector<std::vector<float>> finals;
   double first = 0, last = 0;
   for (const int count : {1, 2, 7}) {
@@ -288,7 +298,9 @@ void ExpectSameBitsAndLearning(const std::string& rule) {
 
 TEST(Chain, SameBitsForAnyWorkerCountAndTrainingLearns) { ExpectSameBitsAndLearning("dibr"); }
 TEST(Chain, SoDoesSoftRas) { ExpectSameBitsAndLearning("softras"); }
+TEST(Chain, SoDoesSoftRasWithColors) { ExpectSameBitsAndLearning("softras", true); }
 TEST(Chain, SoDoesN3mr) { ExpectSameBitsAndLearning("n3mr"); }
+TEST(Chain, SoDoesN3mrWithColors) { ExpectSameBitsAndLearning("n3mr", true); }
 
 // Alpha alone: no colour in the loss, and none of its decoder's weights moves.
 TEST(Chain, RivalsHaveNoColorLoss) {
@@ -364,6 +376,15 @@ TEST(Schedules, LearningRateAndSharpness) {
   EXPECT_NEAR(SharpnessAt(c, 0), 100, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 25), 1000, 1e-9);
   EXPECT_NEAR(SharpnessAt(c, 80), 10000, 1e-8);
+}
+
+TEST(SingleImageConfig, N3mrVerticesHaveNoOffsets) {
+  SingleImageConfig config;
+  config.network.n3mr_vertices = true;
+  EXPECT_TRUE(CheckConfig(config).ok());
+  config.network.symmetric = true;
+  EXPECT_NE(CheckConfig(config).message().find("network.n3mr_vertices has no offsets"),
+            std::string::npos);
 }
 
 TEST(RivalConfig, UnknownWordsNameTheKnownOnes) {

@@ -9,6 +9,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "scene/topology.h"
+#include "train/models/sphere_vertices.h"
 
 namespace tilegrad::train {
 namespace {
@@ -66,13 +67,16 @@ void BuildEncoder(Builder& b, nn::Sequential& net, int image_size) {
   b.Fc(net, "3", code, code);
 }
 
-nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t vertices) {
+nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t numbers) {
   b.FcRelu(net, "1", b.config.code, b.config.hidden1);
   b.FcRelu(net, "2", b.config.hidden1, b.config.hidden2);
-  auto& output = b.Fc(net, "3", b.config.hidden2, 3 * vertices);
+  auto& output = b.Fc(net, "3", b.config.hidden2, numbers);
   nn::FillNormal(output.weight.value(), b.rng, b.config.output_deviation);
   return output;
 }
+
+// A quarter of the unit sphere is what N3MR's vertices start from.
+constexpr double kN3mrRadius = 0.25;
 
 // One round of diffusion over a mesh: each vertex goes halfway to the mean of its neighbours. Noise
 // from vertex to vertex dies out with the rounds, and what is smooth stays.
@@ -120,17 +124,22 @@ void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& vis
 MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int image_size,
                          std::uint64_t seed)
     : context_(context),
-      template_(Icosphere(static_cast<int>(config.template_level),
-                          static_cast<float>(config.template_radius))),
+      template_(Icosphere(
+          static_cast<int>(config.template_level),
+          static_cast<float>(config.n3mr_vertices ? kN3mrRadius : config.template_radius))),
       config_(config) {
   Rng rng(seed, /*stream=*/0x6e6574);
   Builder builder{context, config, rng};
   const auto vertices = static_cast<std::int64_t>(template_.positions.size());
   BuildEncoder(builder, all_.encoder, image_size);
-  BuildDecoder(builder, all_.shape, vertices);
-  nn::FillConstant(BuildDecoder(builder, all_.color, vertices).bias.value(), config.color_bias);
+  BuildDecoder(builder, all_.shape, 3 * vertices + (config.n3mr_vertices ? 3 : 0));
+  nn::FillConstant(BuildDecoder(builder, all_.color, 3 * vertices).bias.value(), config.color_bias);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ = context.From({vertices, 3}, flat);
+  std::vector<float> unit(flat.begin(), flat.end());
+  for (float& x : unit) x /= static_cast<float>(kN3mrRadius);
+  if (config.n3mr_vertices)
+    unit_sphere_ = context.From({vertices, 3}, std::span<const float>(unit));
   const nn::Var like = nn::Constant(context, template_positions_);
   diffusion_ = DiffusionRound(like, template_);
   if (config.symmetric) symmetry_ = Symmetry(like, template_);
@@ -139,11 +148,23 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
 nn::Var MeshNetwork::Movement(const nn::Var& code, nn::Mode mode) {
   const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
   nn::Var movement = all_.shape.Forward(code, mode);
+  if (config_.n3mr_vertices) return N3mrMovement(movement);
   if (config_.symmetric) movement = nn::MapAxis(movement, 1, symmetry_);
   movement = nn::Reshape(movement, {batch, vertices, 3});
   for (std::int64_t round = 0; round < config_.smoothing; ++round)
     movement = nn::MapAxis(movement, 1, diffusion_);
   return movement;
+}
+
+// The last three outputs are the centroid. Published, its layer learns at a tenth of the rate.
+// Adam's steps do not depend on a factor behind the layer, so a factor of a tenth does the same.
+nn::Var MeshNetwork::N3mrMovement(const nn::Var& raw) const {
+  const std::int64_t batch = raw.shape()[0], vertices = template_positions_.shape()[0];
+  const nn::Var bias = nn::Reshape(nn::Slice(raw, 1, 0, 3 * vertices), {batch, vertices, 3});
+  const nn::Var centroid =
+      nn::Reshape(nn::Slice(raw, 1, 3 * vertices, 3 * vertices + 3), {batch, 1, 3});
+  const nn::Var start = nn::Constant(context_, template_positions_);
+  return SphereVertices(bias, 0.1 * centroid, unit_sphere_) - start;
 }
 
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {

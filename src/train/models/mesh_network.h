@@ -31,6 +31,7 @@ struct NetworkConfig {
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
                                     // fan-in, as convolutions
   double color_bias = 0.0;          // what vertex colours start at
+  bool n3mr_vertices = false;       // sphere_vertices.h instead of offsets from the template
 };
 
 // At 64 x 64 with NetworkConfig's defaults.
@@ -63,11 +64,13 @@ class MeshNetwork {
 
  private:
   nn::Var Movement(const nn::Var& code, nn::Mode mode);
+  nn::Var N3mrMovement(const nn::Var& raw) const;
 
   nn::Context& context_;
   Mesh template_;
   NetworkConfig config_;
   nn::Tensor template_positions_;  // [V, 3]
+  nn::Tensor unit_sphere_;         // [V, 3] the template at radius 1; n3mr_vertices
   nn::AxisMap diffusion_;          // one round
   nn::AxisMap symmetry_;           // of [3 V] offsets
   // The three parts, shown to visitors as one module.

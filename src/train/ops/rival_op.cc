@@ -16,55 +16,90 @@ template <class T>
 struct RivalBatch {
   rivals::RendererT<T>& renderer;
   RivalJob job;
-  nn::Tensor positions;
+  nn::Tensor positions, colors;  // colors: empty without
   std::vector<CameraT<T>> cameras;
 
-  RivalBatch(RivalRenderer& r, RivalJob rival_job, nn::Tensor at)
-      : renderer(RendererOf(r, T{})), job(std::move(rival_job)), positions(std::move(at)) {
+  RivalBatch(RivalRenderer& r, RivalJob rival_job, const nn::Var& at, const nn::Var& of)
+      : renderer(RendererOf(r, T{})), job(std::move(rival_job)), positions(at.value()) {
+    if (of.valid()) colors = of.value();
     for (const Camera& camera : job.cameras) cameras.push_back(CameraCast<T>(camera));
   }
   rivals::BatchT<T> View() {
-    return {positions.span<T>(), job.faces, cameras, static_cast<std::size_t>(positions.shape()[0]),
+    return {positions.span<T>(),
+            colors.empty() ? std::span<T>() : colors.span<T>(),
+            job.faces,
+            cameras,
+            static_cast<std::size_t>(positions.shape()[0]),
             job.size};
   }
+  std::vector<nn::Tensor> Images(nn::Context& context) const {
+    const auto n = static_cast<std::int64_t>(cameras.size());
+    std::vector<nn::Tensor> out = {context.Empty({n, job.size, job.size}, nn::kDTypeOf<T>)};
+    if (!colors.empty()) out.push_back(context.Empty({n, 3, job.size, job.size}, nn::kDTypeOf<T>));
+    return out;
+  }
+  std::vector<nn::Tensor> Gradients(nn::Context& context, std::span<const nn::Tensor> d_outputs);
 };
 
+// The numbers of the i-th tensor, if it is there.
 template <class T>
-nn::Var Render(RivalRenderer& renderer, const nn::Var& positions, RivalJob job) {
+std::span<T> SpanOf(std::span<const nn::Tensor> tensors, std::size_t i) {
+  if (i >= tensors.size() || tensors[i].empty()) return {};
+  nn::Tensor tensor = tensors[i];  // shares its memory
+  return tensor.span<T>();
+}
+
+template <class T>
+std::vector<nn::Tensor> RivalBatch<T>::Gradients(nn::Context& context,
+                                                 std::span<const nn::Tensor> d_outputs) {
+  std::vector<nn::Tensor> out = {context.Empty(positions.shape(), nn::kDTypeOf<T>)};
+  if (!colors.empty()) out.push_back(context.Empty(colors.shape(), nn::kDTypeOf<T>));
+  Status done =
+      renderer.Backward(View(), job.options, {SpanOf<T>(d_outputs, 0), SpanOf<T>(d_outputs, 1)},
+                        {SpanOf<T>(out, 0), SpanOf<T>(out, 1)});
+  if (!done.ok()) context.Fail(std::move(done));
+  return out;
+}
+
+template <class T>
+RenderedImages Render(RivalRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
+                      RivalJob job) {
   nn::Context& context = positions.context();
-  auto batch = std::make_shared<RivalBatch<T>>(renderer, std::move(job), positions.value());
-  nn::Tensor alpha = context.Empty(
-      {static_cast<std::int64_t>(batch->cameras.size()), batch->job.size, batch->job.size},
-      nn::kDTypeOf<T>);
-  Status status = batch->renderer.Render(batch->View(), batch->job.options, alpha.span<T>());
-  if (!status.ok()) return nn::Fail(positions, std::move(status));
-  auto backward = [batch, &context](std::span<const nn::Tensor> d_outputs) {
-    if (d_outputs[0].empty()) return std::vector<nn::Tensor>(1);
-    nn::Tensor d_positions = context.Empty(batch->positions.shape(), nn::kDTypeOf<T>);
-    nn::Tensor d_alpha = d_outputs[0];
-    Status done = batch->renderer.Backward(batch->View(), batch->job.options, d_alpha.span<T>(),
-                                           d_positions.span<T>());
-    if (!done.ok()) context.Fail(std::move(done));
-    return std::vector<nn::Tensor>{d_positions};
-  };
-  return nn::External(context, {.name = "render_rival",
-                                .inputs = {positions},
-                                .outputs = {alpha},
-                                .backward = std::move(backward)})[0];
+  auto batch = std::make_shared<RivalBatch<T>>(renderer, std::move(job), positions, colors);
+  const std::vector<nn::Tensor> images = batch->Images(context);
+  Status status = batch->renderer.Render(batch->View(), batch->job.options,
+                                         {SpanOf<T>(images, 0), SpanOf<T>(images, 1)});
+  if (!status.ok()) {
+    const nn::Var failed = nn::Fail(positions, std::move(status));
+    return {failed, failed};
+  }
+  std::vector<nn::Var> inputs = {positions};
+  if (colors.valid()) inputs.push_back(colors);
+  const std::vector<nn::Var> out =
+      nn::External(context, {.name = "render_rival",
+                             .inputs = inputs,
+                             .outputs = images,
+                             .backward = [batch, &context](std::span<const nn::Tensor> d_outputs) {
+                               return batch->Gradients(context, d_outputs);
+                             }});
+  return {out.size() > 1 ? out[1] : nn::Var(), out[0]};
 }
 
 }  // namespace
 
-nn::Var RenderRival(RivalRenderer& renderer, const nn::Var& positions, RivalJob job) {
-  if (!positions.valid()) return positions;
+RenderedImages RenderRival(RivalRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
+                           RivalJob job) {
+  if (!positions.valid()) return {positions, positions};
   const nn::Shape& shape = positions.shape();
   if (shape.rank() != 3 || shape[2] != 3 || job.size < 1) {
-    return nn::Fail(positions, InvalidArgument("positions have the shape {} for images of {} "
-                                               "pixels a side, expected [meshes, vertices, 3]",
-                                               shape.ToString(), job.size));
+    const nn::Var failed = nn::Fail(
+        positions, InvalidArgument("positions have the shape {} for images of {} pixels a side, "
+                                   "expected [meshes, vertices, 3]",
+                                   shape.ToString(), job.size));
+    return {failed, failed};
   }
   return nn::WithFloatType(positions.dtype(), [&]<class T>(T) {
-    return Render<T>(renderer, positions, std::move(job));
+    return Render<T>(renderer, positions, colors, std::move(job));
   });
 }
 

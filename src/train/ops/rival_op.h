@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rivals' renderers (src/rivals) as an operation on the tape: meshes in, alpha out, the rule's
+// The rivals' renderers (src/rivals) as an operation on the tape: meshes in, images out, the rule's
 // own gradient back.
 #pragma once
 
@@ -9,6 +9,7 @@
 #include "nn/tape.h"
 #include "rivals/renderer.h"
 #include "scene/camera.h"
+#include "train/ops/render_op.h"
 
 namespace tilegrad::train {
 
@@ -29,8 +30,10 @@ struct RivalRenderer {
   rivals::RendererT<double> renderer64;
 };
 
-// positions: [B,V,3]; alpha: [N,size,size]. f64 draws SoftRas with the scalar reference (for
-// proofs). Errors of shapes and options reach the context's status.
-nn::Var RenderRival(RivalRenderer& renderer, const nn::Var& positions, RivalJob job);
+// positions, and colors of vertices: [B,V,3]. An invalid `colors` draws alpha alone: the images'
+// colors are then invalid, too. f64 draws SoftRas with the scalar reference (for proofs). Errors of
+// shapes and options reach the context's status.
+RenderedImages RenderRival(RivalRenderer& renderer, const nn::Var& positions, const nn::Var& colors,
+                           RivalJob job);
 
 }  // namespace tilegrad::train

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/single_image/config.h"
 
+#include "base/error.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -26,6 +28,8 @@ ConfigFields FieldsOf(NetworkConfig* c) {
       {"network.output_deviation", &c->output_deviation, 0, 10,
        "the decoders' last weights start as N(0, this^2)"},
       {"network.color_bias", &c->color_bias, -1, 2, "what vertex colours start at"},
+      {"network.n3mr_vertices", &c->n3mr_vertices, 0, 1,
+       "N3MR's sigmoids and centroid instead of offsets"},
   };
 }
 
@@ -38,7 +42,7 @@ ConfigFields LossAndRenderFields(SingleImageConfig* c) {
       {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
        "weight of the Laplacian of the movement"},
       {"render.rule", &c->render.rule, 0, 0,
-       "whose renderer trains: \"dibr\", or, by alpha alone, \"softras\" or \"n3mr\""},
+       "whose renderer trains: \"dibr\", \"softras\" or \"n3mr\""},
       {"render.sharpness", &c->render.sharpness, 1e-3, 1e9,
        "1/delta of equation 5, per squared NDC unit"},
       {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,
@@ -70,6 +74,16 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
 }
 
 }  // namespace
+
+Status CheckConfig(const SingleImageConfig& config) {
+  const NetworkConfig& n = config.network;
+  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
+    return InvalidArgument(
+        "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
+        "about: leave these at 0 and false");
+  }
+  return RivalOptions(config.render.rule, config.rivals).status();
+}
 
 ConfigFields FieldsOf(SingleImageConfig* c) {
   ConfigFields fields;

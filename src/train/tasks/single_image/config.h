@@ -18,8 +18,9 @@ struct LossConfig {
 };
 
 struct RenderConfig {
-  // "dibr", "softras" or "n3mr". The rivals draw alpha alone: there is no colour loss then, and the
-  // next three numbers mean nothing. Pictures and scores are always drawn by "dibr".
+  // "dibr", "softras" or "n3mr". The rivals draw alpha alone, and there is no colour loss, unless
+  // RivalConfig says otherwise; the next three numbers mean nothing to them. Pictures and scores
+  // are always drawn by "dibr".
   std::string rule = "dibr";
   double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
   double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
@@ -51,5 +52,7 @@ struct SingleImageConfig {
 };
 
 ConfigFields FieldsOf(SingleImageConfig* config);
+// InvalidArgument names keys that do not go together, and words that are not known.
+Status CheckConfig(const SingleImageConfig& config);
 
 }  // namespace tilegrad::train

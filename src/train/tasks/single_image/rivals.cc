@@ -41,6 +41,11 @@ ConfigFields FieldsOf(RivalConfig* c) {
        "repair: no floor in the derivative of the product"},
       {"softras.gradient_beyond_planes", &c->softras.gradient_beyond_planes, 0, 1,
        "repair: faces beyond near and far have a gradient, too"},
+      {"softras.color", &c->softras_color, 0, 1, "colours are drawn and have their loss, too"},
+      {"softras.gamma", &c->softras_colors.gamma, 1e-9, 1e3,
+       "how nearness weighs in colours; of (far - near)"},
+      {"softras.position_gradient", &c->softras_colors.position_gradient, 0, 1,
+       "repair: of colours to x and y, whole"},
       {"n3mr.reduction", &c->n3mr_reduction, 0, 0,
        "of rule \"n3mr\", from a drawing of twice the size: \"mean\", \"bilinear\", \"none\""},
       {"n3mr.eps", &c->n3mr.eps, 1e-9, 1, "NDC units, added to each distance of the sweep"},
@@ -49,13 +54,15 @@ ConfigFields FieldsOf(RivalConfig* c) {
       {"n3mr.far", &c->n3mr.far_plane, 1e-9, 1e9, "depth that is drawn up to"},
       {"n3mr.floor_lines", &c->n3mr.floor_lines, 0, 1,
        "repair: no line counts that an edge just misses at the left and lower border"},
+      {"n3mr.color", &c->n3mr_color, 0, 1, "colours of faces are drawn and have their loss, too"},
   };
 }
 
 Result<std::optional<rivals::Options>> RivalOptions(const std::string& rule,
                                                     const RivalConfig& config) {
   using rivals::N3mrReduction, rivals::SoftAlpha, rivals::SoftDistance;
-  rivals::Options out{.softras = config.softras, .n3mr = config.n3mr};
+  rivals::Options out{
+      .softras = config.softras, .softras_colors = config.softras_colors, .n3mr = config.n3mr};
   TILEGRAD_ASSIGN(const int kind, ValueOfWord<int>("render.rule", rule,
                                                    {{"dibr", 0}, {"softras", 1}, {"n3mr", 2}}));
   TILEGRAD_ASSIGN(out.softras.distance,

@@ -18,8 +18,11 @@ struct RivalConfig {
   rivals::SoftRasOptions softras = {.near_plane = 0.1};
   std::string softras_distance = "euclidean", softras_alpha = "product";
   double softras_late_sigma = 1;  // share of sigma after 60 % of the run
+  bool softras_color = false;     // colours of vertices, mixed by softras_colors
+  rivals::SoftRasColors softras_colors = {};
   rivals::N3mrOptions n3mr = {};
   std::string n3mr_reduction = "mean";
+  bool n3mr_color = false;  // each face in the mean colour of its corners
 };
 
 ConfigFields FieldsOf(RivalConfig* config);

@@ -160,6 +160,11 @@ std::span<const std::int32_t> TrainStep::faces() const {
   return {faces[0].data(), 3 * faces.size()};
 }
 
+bool TrainStep::HasColor() const {
+  return !rival_ || (rival_->rule == rivals::Rule::kSoftRas ? config_.rivals.softras_color
+                                                            : config_.rivals.n3mr_color);
+}
+
 RenderedImages TrainStep::Draw(const PredictedMeshes& meshes, const BatchTensors& batch,
                                std::int64_t step) {
   if (!rival_) {
@@ -171,7 +176,8 @@ RenderedImages TrainStep::Draw(const PredictedMeshes& meshes, const BatchTensors
   RivalJob job{faces(), batch.cameras, image_size_, *rival_};
   job.options.softras.sigma = SoftRasSigmaAt(
       config_.rivals, static_cast<double>(step) / static_cast<double>(config_.schedule.steps));
-  return {{}, RenderRival(rival_renderer_, meshes.positions, std::move(job))};
+  return RenderRival(rival_renderer_, meshes.positions, HasColor() ? meshes.colors : nn::Var(),
+                     std::move(job));
 }
 
 nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues* values) {
@@ -184,13 +190,13 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
   const nn::Var laplacian = LaplacianLoss(meshes.movement, topology_);
   const LossConfig& w = config_.loss;
   nn::Var total = w.iou * iou, color;  // equation 14
-  if (!rival_) {
+  if (HasColor()) {
     color = ColorL1Loss(images.colors, batch.truth_colors);
     total = total + w.color * color;
   }
   total = total + w.smoothness * smoothness + w.laplacian * laplacian;
   *values = {total.item(),      iou.item(),       color.valid() ? color.item() : 0,
-             smoothness.item(), laplacian.item(), !rival_};
+             smoothness.item(), laplacian.item(), HasColor()};
   return total;
 }
 

@@ -65,7 +65,9 @@ class TrainStep {
   std::span<const std::int32_t> faces() const;
 
  private:
-  // The images that losses look at; of a rival, alpha alone.
+  // Whether the rule draws colours, which the colour loss needs.
+  bool HasColor() const;
+  // The images that losses look at.
   RenderedImages Draw(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step);
 
   nn::Context& context_;

@@ -71,7 +71,7 @@ class SingleImageTask : public Task {
 Status SingleImageTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
-  TILEGRAD_TRY(RivalOptions(config_.render.rule, config_.rivals).status());
+  TILEGRAD_TRY(CheckConfig(config_));
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));

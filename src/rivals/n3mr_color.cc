@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rivals/n3mr_color.h"
+
+#include <algorithm>
+
+#include "rivals/n3mr_box.h"
+#include "rivals/n3mr_reduce.h"
+#include "rivals/n3mr_sweep.h"
+
+namespace tilegrad::rivals {
+namespace {
+
+constexpr std::size_t kCoverage = 3;  // plane, after r, g, b
+
+// An owner at a pixel of the drawing.
+template <class T>
+struct OwnPixel {
+  T w[3], z;
+
+  OwnPixel(const N3mrFaceT<T>& face, int column, int row, int inner) {
+    T b[3];
+    BarycentricWeights(face.at, face.area2, CentreX<T>(column, inner), -CentreY<T>(row, inner), b);
+    ClippedWeights(b, w);
+    z = DepthAt(face.at, w);
+  }
+};
+
+template <class T>
+N3mrTexels<T> TexelsOf(const N3mrColorJob<T>& job, const N3mrFaceT<T>& face,
+                       const OwnPixel<T>& at) {
+  return N3mrTexelsAt(face, at.w, at.z, job.colors.resolution, job.options.eps);
+}
+
+template <class T>
+void ShadePixel(const N3mrColorJob<T>& job, int column, int row, N3mrPlanesT<T>* planes) {
+  const std::size_t pixels = job.image.owner.size();
+  const auto p = static_cast<std::size_t>(row * job.image.inner + column);
+  const std::int32_t owner = job.image.owner[p];
+  T color[3];
+  for (int c = 0; c < 3; ++c) color[c] = static_cast<T>(job.colors.background[c]);
+  planes->values[kCoverage * pixels + p] = owner < 0 ? T(0) : T(1);
+  planes->depth[p] = static_cast<T>(job.options.far_plane);
+  if (owner >= 0) {
+    const N3mrFaceT<T>& face = job.image.faces[static_cast<std::size_t>(owner)];
+    const OwnPixel<T> at(face, column, row, job.image.inner);
+    planes->depth[p] = at.z;
+    const std::size_t cube = 3 * job.colors.texels() * static_cast<std::size_t>(face.source);
+    MixTexels(TexelsOf(job, face, at), &job.textures[cube], color);
+  }
+  for (std::size_t c = 0; c < 3; ++c) planes->values[c * pixels + p] = color[c];
+}
+
+// Plane c of [channels][pixels].
+template <class Array>
+auto PlaneOf(Array& planes, std::size_t c, std::size_t pixels) {
+  return std::span(planes).subspan(c * pixels, pixels);
+}
+
+// The planes that the sweep sums over.
+template <class T>
+SweepImages<T> SweptPlanes(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
+                           const N3mrPlanesT<T>& planes) {
+  const std::size_t pixels = job.image.owner.size();
+  const std::size_t begin = d_images.color.empty() ? kCoverage : 0;
+  const std::size_t end = d_images.alpha.empty() ? kCoverage : kCoverage + 1;
+  const std::span<const T> values = planes.values, d_values = planes.d_values;
+  const std::size_t first = begin * pixels, count = (end - begin) * pixels;
+  return {job.image.inner, static_cast<int>(end - begin), values.subspan(first, count),
+          d_values.subspan(first, count), job.image.owner};
+}
+
+// The exact parts of a face's adjoint: texels and depth.
+template <class T>
+void AddExactParts(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
+                   const N3mrPlanesT<T>& planes, std::int32_t f, T* d_corners, T* d_cube) {
+  const N3mrFaceT<T>& face = job.image.faces[static_cast<std::size_t>(f)];
+  const std::size_t pixels = job.image.owner.size();
+  ForOwnPixels(job.image, f, [&](std::size_t p, int column, int row) {
+    const OwnPixel<T> at(face, column, row, job.image.inner);
+    if (!d_images.color.empty()) {
+      const T g[3] = {planes.d_values[p], planes.d_values[pixels + p],
+                      planes.d_values[2 * pixels + p]};
+      MixTexelsAdjoint(TexelsOf(job, face, at), g, d_cube);
+    }
+    if (d_images.depth.empty()) return;
+    AddDepthAdjoint(face, at.w, at.z, planes.d_depth[p], job.options.Scale(job.image.size),
+                    d_corners);
+  });
+}
+
+}  // namespace
+
+template <class T>
+void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes) {
+  const std::size_t pixels = image.owner.size();
+  planes->values.resize(4 * pixels), planes->d_values.resize(4 * pixels);
+  planes->depth.resize(pixels), planes->d_depth.resize(pixels);
+}
+
+template <class T>
+void N3mrShade(const N3mrColorJob<T>& job, RowRange rows, N3mrPlanesT<T>* planes) {
+  for (int i = rows.begin; i < rows.end; ++i) {
+    for (int j = 0; j < job.image.inner; ++j) ShadePixel(job, j, i, planes);
+  }
+}
+
+template <class T>
+void N3mrReducePlanes(const N3mrColorJob<T>& job, const N3mrPlanesT<T>& planes,
+                      const N3mrImages<T>& out) {
+  const std::size_t pixels = job.image.owner.size(), plane = out.color.size() / 3;
+  const auto reduce = [&](std::span<const T> from, std::span<T> to) {
+    if (!to.empty()) ReduceN3mr<T>(job.options, job.image.size, from, to);
+  };
+  for (std::size_t c = 0; c < 3; ++c)
+    reduce(PlaneOf(planes.values, c, pixels), PlaneOf(out.color, c, plane));
+  reduce(PlaneOf(planes.values, kCoverage, pixels), out.alpha);
+  reduce(planes.depth, out.depth);
+}
+
+template <class T>
+void N3mrPrepareColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
+                              N3mrPlanesT<T>* planes) {
+  const std::size_t pixels = job.image.owner.size(), plane = d_images.color.size() / 3;
+  const auto spread = [&](std::span<const T> from, std::span<T> to) {
+    if (!from.empty()) ReduceN3mrAdjoint<T>(job.options, job.image.size, from, to);
+  };
+  for (std::size_t c = 0; c < 3; ++c)
+    spread(PlaneOf(d_images.color, c, plane), PlaneOf(planes->d_values, c, pixels));
+  spread(d_images.alpha, PlaneOf(planes->d_values, kCoverage, pixels));
+  spread(d_images.depth, planes->d_depth);
+}
+
+template <class T>
+void N3mrColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
+                       const N3mrPlanesT<T>& planes, std::size_t begin, std::size_t end,
+                       const N3mrColorAdjoints<T>& out) {
+  const SweepImages<T> swept = SweptPlanes(job, d_images, planes);
+  const std::size_t texels = 3 * job.colors.texels();
+  for (std::size_t f = begin; f < end; ++f) {
+    T* const d_corners = &out.d_corners[kCornerNumbers * f];
+    std::fill_n(d_corners, kCornerNumbers, T(0));
+    std::fill_n(&out.d_textures[texels * f], texels, T(0));
+    const std::int32_t drawn = job.image.drawn_of[f];
+    if (drawn < 0 || !OwnsAPixel(job.image, drawn)) continue;
+    AddExactParts(job, d_images, planes, drawn, d_corners, &out.d_textures[texels * f]);
+    if (swept.channels == 0) continue;
+    SweepFace(job.image.faces[static_cast<std::size_t>(drawn)], drawn, swept, job.options,
+              job.options.Scale(job.image.size), d_corners);
+  }
+}
+
+#define TILEGRAD_INSTANTIATE(T)                                                              \
+  template void ReserveN3mrPlanes(const N3mrImageT<T>&, N3mrPlanesT<T>*);                    \
+  template void N3mrShade(const N3mrColorJob<T>&, RowRange, N3mrPlanesT<T>*);                \
+  template void N3mrReducePlanes(const N3mrColorJob<T>&, const N3mrPlanesT<T>&,              \
+                                 const N3mrImages<T>&);                                      \
+  template void N3mrPrepareColorBackward(const N3mrColorJob<T>&, const N3mrImages<const T>&, \
+                                         N3mrPlanesT<T>*);                                   \
+  template void N3mrColorBackward(const N3mrColorJob<T>&, const N3mrImages<const T>&,        \
+                                  const N3mrPlanesT<T>&, std::size_t, std::size_t,           \
+                                  const N3mrColorAdjoints<T>&);
+TILEGRAD_INSTANTIATE(float)
+TILEGRAD_INSTANTIATE(double)
+#undef TILEGRAD_INSTANTIATE
+
+}  // namespace tilegrad::rivals
