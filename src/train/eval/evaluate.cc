@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
@@ -98,8 +99,11 @@ class Evaluator {
     const auto train = data_.Select(Split::kTrain);
     if (train.empty()) return InvalidArgument("the dataset has no training models");
     std::vector<std::vector<std::uint8_t>> grids;
+    std::set<std::pair<int, std::string>> seen;
     for (std::size_t i = 0; i < train.size(); ++i) {
       TILEGRAD_TRY(Tick("mean training shape", i, train.size()));
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
+      if (!seen.emplace(info.class_index, ShapeOf(info)).second) continue;
       TILEGRAD_ASSIGN(auto model, data_.Load(train[i]));
       grids.push_back(std::move(model.occupancy));
     }
@@ -134,12 +138,19 @@ class Evaluator {
     return Mean(scores);
   }
 
+  // class -> shape -> positions in held_out
+  using Members = std::map<int, std::map<std::string, std::vector<std::size_t>>>;
+
   EvaluationRow Row(const std::string& method, std::span<const Score> scores,
-                    const std::map<int, std::vector<std::size_t>>& members) const {
+                    const Members& members) const {
     EvaluationRow row{.method = method, .classes = {}, .mean = {}};
-    for (const auto& [class_index, indices] : members) {
+    for (const auto& [class_index, shapes] : members) {
       std::vector<Score> of_class;
-      for (const std::size_t i : indices) of_class.push_back(scores[i]);
+      for (const auto& [shape, indices] : shapes) {
+        std::vector<Score> of_shape;
+        for (const std::size_t i : indices) of_shape.push_back(scores[i]);
+        of_class.push_back(Mean(of_shape));
+      }
       row.classes.push_back(Mean(of_class));
     }
     row.mean = Mean(row.classes);
@@ -151,13 +162,16 @@ class Evaluator {
   }
 
   void Fill(std::span<const int> held_out) {
-    std::map<int, std::vector<std::size_t>> members;  // class -> positions in held_out
+    Members members;
+    std::map<int, int> models;
     for (std::size_t i = 0; i < held_out.size(); ++i) {
-      members[data_.models()[static_cast<std::size_t>(held_out[i])].class_index].push_back(i);
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
+      members[info.class_index][ShapeOf(info)].push_back(i);
+      ++models[info.class_index];
     }
-    for (const auto& [class_index, indices] : members) {
+    for (const auto& [class_index, count] : models) {
       out_.classes.push_back(data_.info().classes[static_cast<std::size_t>(class_index)]);
-      out_.class_models.push_back(static_cast<int>(indices.size()));
+      out_.class_models.push_back(count);
     }
     out_.rows = {Row("undeformed template", template_scores_, members),
                  Row("best single shape", single_scores_, members),
