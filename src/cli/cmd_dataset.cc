@@ -10,84 +10,83 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/dataset_source.h"
 #include "cli/mesh_options.h"
 #include "cli/run_folder.h"
-#include "io/mesh_file.h"
 #include "train/data/build/build.h"
 
 namespace tilegrad::cli {
 namespace {
 
-using train::ModelSource;
-
 struct DatasetOptions {
-  std::string source = "sweethome3d", input, out, split_list;
+  std::vector<std::string> sources = {"sweethome3d"};
+  std::string input, out, split_list;
   int workers = 0;
   bool fixed_size = false;  // --size or --views was given
   bool shares = false;      // of the split were given
+  bool liveries = false;    // --liveries was given
   bool force = false;
   train::BuildOptions build;
+
+  std::string Name() const { return fmt::format("{}", fmt::join(sources, "+")); }
 };
 
-constexpr int kProceduralModels = 100;  // of each class, where --per-class does not say
+DatasetSourceRequest RequestOf(const DatasetOptions& options) {
+  return {.sources = options.sources,
+          .input = options.input,
+          .split_list = options.split_list,
+          .procedural_per_class = options.build.per_class,
+          .seed = options.build.split.seed};
+}
+
+bool Has(const DatasetOptions& options, std::string_view source) {
+  return std::find(options.sources.begin(), options.sources.end(), source) != options.sources.end();
+}
 
 // An option that would do nothing is a mistake: somebody expects a split that there will not be.
 Status CheckEffects(const DatasetOptions& options) {
-  if (!options.split_list.empty() && options.source != "shapenet") {
-    return InvalidArgument("--split-list is for --source shapenet, not {}", options.source);
-  }
-  if (!options.input.empty() && options.source == "procedural") {
+  const std::string name = options.Name();
+  if (!options.split_list.empty() && name != "shapenet")
+    return InvalidArgument("--split-list is for --source shapenet, not {}", name);
+  if (!options.input.empty() && name == "procedural")
     return InvalidArgument("--input: --source procedural reads no models; folder does");
-  }
-  if (options.build.up != UpAxis::kY &&
-      (options.source == "procedural" || options.source == "nmr")) {
-    return InvalidArgument("--up: --source {} reads no mesh files", options.source);
-  }
-  if (options.shares && (options.source == "nmr" || !options.split_list.empty())) {
+  if (options.build.up != UpAxis::kY && (name == "procedural" || name == "nmr"))
+    return InvalidArgument("--up: --source {} reads no mesh files", name);
+  if (options.build.up != UpAxis::kY && name != "folder" && name != "shapenet" &&
+      name != "sweethome3d")
+    return InvalidArgument("--up: --source {} knows how its models stand", name);
+  if (options.shares && (name == "nmr" || !options.split_list.empty())) {
     return InvalidArgument("--test-share, --validation-share: {} has a split of its own",
-                           options.source == "nmr" ? "--source nmr" : "--split-list");
+                           name == "nmr" ? "--source nmr" : "--split-list");
   }
-  return {};
-}
-
-Result<std::unique_ptr<ModelSource>> OpenSource(const DatasetOptions& options) {
-  TILEGRAD_TRY(CheckEffects(options));
-  const train::BuildOptions& build = options.build;
-  if (options.source == "procedural") {
-    return train::ProceduralSource(build.per_class > 0 ? build.per_class : kProceduralModels,
-                                   build.split.seed);
-  }
-  if (options.source == "sweethome3d") {
-    return train::SweetHome3dSource(options.input.empty() ? train::kSweetHome3dFolder
-                                                          : options.input);
-  }
-  if (options.input.empty()) {
-    return InvalidArgument("--source {} needs --input FOLDER", options.source);
-  }
-  if (options.source == "folder") return train::FolderSource(options.input);
-  if (options.source == "shapenet") {
-    return train::ShapeNetSource(options.input, options.split_list);
-  }
-  if (options.fixed_size) {
+  if (options.liveries && !Has(options, "thirteen") && !Has(options, "planes") &&
+      !Has(options, "cars"))
+    return InvalidArgument("--liveries: models of --source {} have one set of textures each", name);
+  if (options.fixed_size && name == "nmr") {
     return InvalidArgument(
         "--source nmr holds images of 64 pixels in 24 views: leave out --size "
         "and --views");
   }
-  return train::NmrSource(options.input);
+  return {};
 }
 
 void PrintTable(const train::BuildSummary& summary) {
-  Print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", "class", "train", "valid.", "test", "rejected");
+  const bool shapes = train::CountShapes(summary.models) < summary.models.size();
+  Print("{:<14}{:>8}{:>8}{:>8}{:>10}{}\n", "class", "train", "valid.", "test", "rejected",
+        shapes ? "  shapes" : "");
   for (std::size_t c = 0; c < summary.info.classes.size(); ++c) {
     int counts[3] = {}, rejected = 0;
+    std::vector<train::ModelInfo> of_class;
     for (const auto& model : summary.models) {
-      if (model.class_index == static_cast<int>(c)) ++counts[static_cast<int>(model.split)];
+      if (model.class_index != static_cast<int>(c)) continue;
+      ++counts[static_cast<int>(model.split)];
+      of_class.push_back(model);
     }
     for (const auto& model : summary.rejected) {
       rejected += model.class_name == summary.info.classes[c];
     }
-    Print("{:<14}{:>8}{:>8}{:>8}{:>10}\n", summary.info.classes[c], counts[0], counts[1], counts[2],
-          rejected);
+    Print("{:<14}{:>8}{:>8}{:>8}{:>10}{}\n", summary.info.classes[c], counts[0], counts[1],
+          counts[2], rejected, shapes ? fmt::format("{:>8}", train::CountShapes(of_class)) : "");
   }
 }
 
@@ -113,11 +112,23 @@ void PrintWarnings(const train::BuildSummary& summary) {
   if (summary.warnings.size() > kShown) Print("  ...\n");
 }
 
+void PrintIgnored(const train::BuildSummary& summary) {
+  constexpr std::size_t kShown = 10;
+  if (summary.ignored.empty()) return;
+  const std::size_t count = summary.ignored.size();
+  Print("{} ignored:\n",
+        count == 1 ? "1 file or folder" : fmt::format("{} files or folders", count));
+  for (std::size_t i = 0; i < std::min(kShown, count); ++i)
+    Print("  {}: {}\n", summary.ignored[i].file, summary.ignored[i].reason);
+  if (count > kShown) Print("  ...\n");
+}
+
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const Path folder = options.out.empty() ? Path("datasets") / options.source : Path(options.out);
+  const Path folder = options.out.empty() ? Path("datasets") / options.Name() : Path(options.out);
   TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
-  TILEGRAD_ASSIGN(const auto source, OpenSource(options));
+  TILEGRAD_TRY(CheckEffects(options));
+  TILEGRAD_ASSIGN(const auto source, OpenDatasetSource(RequestOf(options)));
   const Workers workers(options.workers);
   ProgressLine line;
   TILEGRAD_ASSIGN(
@@ -128,6 +139,7 @@ Status Make(const DatasetOptions& options) {
   PrintTable(summary);
   PrintRejected(summary, folder);
   PrintWarnings(summary);
+  PrintIgnored(summary);
   Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
         Count(summary.models.size(), "model"),
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
@@ -139,17 +151,13 @@ Status Make(const DatasetOptions& options) {
 }
 
 void AddSourceOptions(CLI::App* command, DatasetOptions* options) {
-  command
-      ->add_option("--source", options->source,
-                   "where models come from: sweethome3d (Debian package sweethome3d-furniture), "
-                   "shapenet (SYNSET/MODEL/models/model_normalized.obj), folder (CLASS/MODEL with "
-                   "one of " +
-                       io::MeshFileEndings() +
-                       "), procedural (built in), nmr (.npz renders of N3MR and SoftRas)")
-      ->check(CLI::IsMember({"sweethome3d", "shapenet", "folder", "procedural", "nmr"}))
+  command->add_option("--source", options->sources, DatasetSourceHelp())
+      ->delimiter(',')
+      ->check(CLI::IsMember(DatasetSourceNames()))
       ->capture_default_str();
-  command->add_option("--input", options->input,
-                      "folder of the models; sweethome3d has a default, procedural needs none");
+  command->add_option(
+      "--input", options->input,
+      "folder of the models; those of packages have a default, procedural needs none");
   command->add_option("--out", options->out, "folder to fill [datasets/SOURCE]");
   command->add_option("--split-list", options->split_list,
                       "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
@@ -160,8 +168,10 @@ void AddBuildOptions(CLI::App* command, train::BuildOptions* build) {
   command->add_option("--views", build->views, "views of a model")->capture_default_str();
   command
       ->add_option("--per-class", build->per_class,
-                   "at most this many models of a class; 0: all, or 100 if procedural")
+                   "at most this many shapes of a class; 0: all, or 100 if procedural")
       ->capture_default_str();
+  command->add_option("--liveries", build->liveries,
+                      "at most this many textures of one shape; 0: all [1 of thirteen, else 0]");
   command->add_option("--limit", build->limit, "at most this many models in all; 0: all")
       ->capture_default_str();
   command
@@ -171,11 +181,11 @@ void AddBuildOptions(CLI::App* command, train::BuildOptions* build) {
       ->capture_default_str();
   command
       ->add_option("--test-share", build->split.test_share,
-                   "share of each class's models to test with")
+                   "share of each class's shapes to test with")
       ->capture_default_str();
   command
       ->add_option("--validation-share", build->split.validation_share,
-                   "share of each class's models to validate with")
+                   "share of each class's shapes to validate with")
       ->capture_default_str();
 }
 
@@ -194,7 +204,9 @@ void AddDataset(CLI::App& app, Action* action) {
   AddWorkersOption(command, &options->workers);
   command->callback([options, action, command] {
     options->fixed_size = command->count("--size") + command->count("--views") > 0;
+    options->liveries = command->count("--liveries") > 0;
     options->shares = command->count("--test-share") + command->count("--validation-share") > 0;
+    if (!options->liveries && options->Name() == "thirteen") options->build.liveries = 1;
     *action = [options] { return Make(*options); };
   });
 }

@@ -234,9 +234,20 @@ class Ac3dReader {
     object.inherited.transform *= object.local;
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
-      if (!text_.Next(line) || NextToken(line) != "OBJECT")
+      const bool more = text_.Next(line);
+      if (!more && i > 0) return NoteMissing(i, count);
+      if (!more || NextToken(line) != "OBJECT")
         return text_.Error(fmt::format("expected OBJECT, child {} of {}", i, count));
       TILEGRAD_TRY(ReadObject(object.inherited, depth + 1));
+    }
+    return {};
+  }
+
+  // People delete objects by hand, and leave the number of their group as it was.
+  Status NoteMissing(std::size_t child, std::size_t count) {
+    if (!std::exchange(missing_warned_, true)) {
+      out.warnings.push_back(
+          fmt::format("the file ends before child {} of {} of a group", child, count));
     }
     return {};
   }
@@ -248,7 +259,7 @@ class Ac3dReader {
   std::map<std::pair<int, std::string>, std::int32_t> materials_;
   Polygon polygon_;             // scratch: the last surface
   std::vector<glm::vec2> uvs_;  // scratch: of its corners
-  bool lines_warned_ = false;
+  bool lines_warned_ = false, missing_warned_ = false;
 };
 
 }  // namespace

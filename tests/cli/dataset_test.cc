@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad dataset: which axis of the models is up.
+// tilegrad dataset: which axis of the models is up, and which sources go together.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -77,6 +77,48 @@ TEST_F(DatasetTest, AnotherAxisIsAnotherDataset) {
   const Outcome wrong = RunProgram("dataset --source folder --up w --input " + folder_.string());
   EXPECT_EQ(wrong.exit_code, 2) << wrong.output;
   EXPECT_NE(wrong.output.find("--up"), std::string::npos) << wrong.output;
+}
+
+void ExpectRefused(const std::string& options, const std::string& says) {
+  const Outcome made = RunProgram("dataset " + options);
+  EXPECT_NE(made.exit_code, 0) << options;
+  EXPECT_NE(made.output.find(says), std::string::npos) << made.output;
+}
+
+TEST_F(DatasetTest, SourcesThatDoNotGoTogether) {
+  const std::string folder = folder_.string(), out = " --out " + folder + "/out";
+  ExpectRefused("--source planes,folder --input " + folder + out, "reads several folders");
+  ExpectRefused("--source cars,folder" + out, "each is sweethome3d, planes, ships or cars");
+  ExpectRefused("--source cars,cars" + out, "and there once");
+  ExpectRefused("--source thirteen,cars" + out, "each is sweethome3d");
+  ExpectRefused("--source thirteen --input " + folder + out, "--input");
+  ExpectRefused("--source boats" + out, "boats");
+}
+
+TEST_F(DatasetTest, MissingPackagesAndOptionsWithoutEffect) {
+  const std::string folder = folder_.string(), out = " --out " + folder + "/out";
+  ExpectRefused("--source planes --input " + folder + out, "recommends flightgear-data-ai");
+  ExpectRefused("--source ships --input " + folder + out, "recommends flightgear-data-models");
+  ExpectRefused("--source cars --input " + folder + out, "recommends torcs-data");
+  ExpectRefused("--source folder --liveries 2 --input " + folder + out, "--liveries");
+  ExpectRefused("--source planes --up z" + out, "--up");
+}
+
+TEST_F(DatasetTest, WhatAFolderHoldsBesidesIsNamed) {
+  Write("set/notes.txt", "none");
+  Write("set/wedge/a.max", "none");
+  PicturesOf(
+      "set",
+      [](int x, int y, int z) {
+        return Point{x, y, z};
+      },
+      "");
+  const Outcome again = RunProgram("dataset --source folder --input " + (folder_ / "set").string() +
+                                   " --size 16 --views 3 --out " + (folder_ / "set_data").string());
+  EXPECT_EQ(again.exit_code, 0) << again.output;
+  for (const char* text : {"2 files or folders ignored", "notes.txt: is no model",
+                           "a.max: is of no kind that is read"})
+    EXPECT_NE(again.output.find(text), std::string::npos) << again.output;
 }
 
 }  // namespace

@@ -123,11 +123,22 @@ TEST_F(Ac3dTest, CountsAndIndicesThatLie) {
   ExpectMessage(Load(with("numvert 3", "numvert -3")), "bad.ac", "line 7", "numvert");
   ExpectMessage(Load(with("numsurf 1", "numsurf 4000000000")), "bad.ac", "expected SURF");
   ExpectMessage(Load(with("refs 3", "refs 4000000000")), "bad.ac", "line 18");
-  ExpectMessage(Load(with("kids 1", "kids 4000000000")), "bad.ac", "child 1 of 4000000000");
+  ExpectMessage(Load(with("kids 1", "kids 4000000000") + "x"), "bad.ac", "child 1 of 4000000000");
   ExpectMessage(Load(with("2 0 1", "3 0 1")), "bad.ac", "line 17", "vertex 3");
   ExpectMessage(Load(with("mat 0", "mat 2")), "bad.ac", "material 2, but the file has 2");
   ExpectMessage(Load(with("1 0 0\n", "inf 0 0\n")), "bad.ac", "line 9");
   ExpectMessage(Load(with("AC3Db", "AC4Db")), "bad.ac", "AC3D");
+}
+
+// As files are that somebody has deleted objects from: what is there is read.
+TEST_F(Ac3dTest, FewerChildrenThanPromised) {
+  const auto loaded =
+      LoadMesh(Write("a.ac", kHead + "OBJECT world\nkids 3\nOBJECT group\nkids 2\nOBJECT poly\n" +
+                                 kTriangle + "kids 0\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces.size(), 1u);
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_NE(loaded->warnings[0].find("child 1 of 2"), std::string::npos);
 }
 
 TEST_F(Ac3dTest, NestedTooDeep) {

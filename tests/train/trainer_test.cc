@@ -290,6 +290,24 @@ TEST_F(TrainerTest, RefusesOtherTrainingModels) {
   ExpectFinishes();
 }
 
+// A mesh that was trained on in one livery is not held out in another.
+TEST_F(TrainerTest, OtherColoursOfATrainedMeshAreNotHeldOut) {
+  const Dataset dataset = Dataset::Open(job_.data).value();
+  auto models = dataset.models();
+  const int test = dataset.Select(Split::kTest)[0], train = dataset.Select(Split::kTrain)[0];
+  const auto remember = [&](std::uint64_t geometry) {
+    models[static_cast<std::size_t>(train)].geometry = 77;
+    models[static_cast<std::size_t>(test)].geometry = geometry;
+    EXPECT_TRUE(WriteModels(job_.data, dataset.info(), models).ok());
+    const Dataset changed = Dataset::Open(job_.data).value();
+    EXPECT_TRUE(MakeFolder(job_.run).ok());
+    EXPECT_TRUE(RememberTrainedModels(job_.run, changed, RunStart::kNew).ok());
+    return CheckHeldOut(job_.run, changed);
+  };
+  EXPECT_TRUE(remember(78).ok());
+  ExpectMessage(remember(77), "1 of the ", models[static_cast<std::size_t>(test)].id);
+}
+
 TEST_F(TrainerTest, RefusesOtherCamerasAndImages) {
   StopAfter(2);
   job_.existing = ExistingRun::kContinue;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/dataset.h"
 
+#include <set>
+
 #include "base/error.h"
 #include "train/data/dataset_files.h"
 
@@ -8,6 +10,12 @@ namespace tilegrad::train {
 
 Camera CameraRule::View(int index) const {
   return OrbitCamera(lens, azimuth_step * index, elevation, distance);
+}
+
+std::size_t CountShapes(const std::vector<ModelInfo>& models) {
+  std::set<std::pair<int, std::string>> shapes;
+  for (const ModelInfo& model : models) shapes.emplace(model.class_index, ShapeOf(model));
+  return shapes.size();
 }
 
 Result<Dataset> Dataset::Open(const Path& folder) {

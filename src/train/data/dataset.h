@@ -33,7 +33,7 @@ struct CameraRule {
 };
 
 struct DatasetInfo {
-  std::string source;   // "sweethome3d", "shapenet", "folder", "procedural", "nmr"
+  std::string source;   // "sweethome3d", "shapenet", "planes", "folder", ...
   int image_size = 64;  // pixels, square
   int views = 24;       // per model
   CameraRule camera;
@@ -53,7 +53,15 @@ struct ModelInfo {
   std::string license, creator;  // empty where unknown
   int source_faces = 0;          // triangles before anything was done to it
   std::uint64_t geometry = 0;    // equal for copies of one mesh in other colours; 0: no mesh
+  std::string shape = {};        // the same for one shape with other textures; empty: its own
 };
+
+// What a model is counted by: its shape where it shares one, else itself. Unique in its class.
+inline const std::string& ShapeOf(const ModelInfo& model) {
+  return model.shape.empty() ? model.id : model.shape;
+}
+// Of these models: each shape of a class once.
+std::size_t CountShapes(const std::vector<ModelInfo>& models);
 
 inline constexpr int kOccupancyResolution = 32;  // voxels a side
 inline constexpr int kTruthPoints = 2500;        // as the official code takes for the F-score

@@ -85,14 +85,16 @@ Status ReadCamera(const nlohmann::json& json, const std::string& place, int size
 }
 
 Json ModelJson(const DatasetInfo& info, const ModelInfo& model) {
-  return {{"id", model.id},
-          {"class", info.classes[static_cast<std::size_t>(model.class_index)]},
-          {"split", SplitName(model.split)},
-          {"name", model.name},
-          {"license", model.license},
-          {"creator", model.creator},
-          {"source_faces", model.source_faces},
-          {"geometry", Hex(model.geometry)}};
+  Json json = {{"id", model.id},
+               {"class", info.classes[static_cast<std::size_t>(model.class_index)]},
+               {"split", SplitName(model.split)},
+               {"name", model.name},
+               {"license", model.license},
+               {"creator", model.creator},
+               {"source_faces", model.source_faces},
+               {"geometry", Hex(model.geometry)}};
+  if (!model.shape.empty()) json["shape"] = model.shape;
+  return json;
 }
 
 void ReadSplit(JsonFields& fields, Split* out) {
@@ -127,6 +129,7 @@ Result<ModelInfo> ReadModel(const nlohmann::json& json, const std::string& place
   fields.Read("creator", &model.creator);
   fields.Read("source_faces", 0, INT32_MAX, &model.source_faces);
   ReadHex(fields, "geometry", &model.geometry);
+  if (json.contains("shape")) fields.Read("shape", &model.shape);
   ReadSplit(fields, &model.split);
   ReadClass(fields, info, &model.class_index);
   if (!fields.status().ok()) return fields.status();

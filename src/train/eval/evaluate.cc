@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
@@ -101,8 +102,14 @@ class Evaluator {
   }
 
   Result<Shape> MakeSingleShape() {
+    const auto train = data_.Select(Split::kTrain);
     std::vector<std::vector<std::uint8_t>> grids;
-    for (const Shape& shape : train_.shapes) grids.push_back(shape.occupancy);
+    std::set<std::pair<int, std::string>> seen;
+    for (std::size_t i = 0; i < train.size(); ++i) {
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
+      if (seen.emplace(info.class_index, ShapeOf(info)).second)
+        grids.push_back(train_.shapes[i].occupancy);
+    }
     SingleShape best = BestSingleShape(grids);
     out_.shape_threshold = best.threshold;
     // The grid itself is scored, not a voxelization of its surface, which might differ by rounding.
@@ -157,12 +164,19 @@ class Evaluator {
     return MeanScore(scores);
   }
 
+  // class -> shape -> positions in held_out
+  using Members = std::map<int, std::map<std::string, std::vector<std::size_t>>>;
+
   EvaluationRow Row(const std::string& method, std::span<const Score> scores,
-                    const std::map<int, std::vector<std::size_t>>& members) const {
+                    const Members& members) const {
     EvaluationRow row{.method = method, .classes = {}, .mean = {}};
-    for (const auto& [class_index, indices] : members) {
+    for (const auto& [class_index, shapes] : members) {
       std::vector<Score> of_class;
-      for (const std::size_t i : indices) of_class.push_back(scores[i]);
+      for (const auto& [shape, indices] : shapes) {
+        std::vector<Score> of_shape;
+        for (const std::size_t i : indices) of_shape.push_back(scores[i]);
+        of_class.push_back(MeanScore(of_shape));
+      }
       row.classes.push_back(MeanScore(of_class));
     }
     row.mean = MeanScore(row.classes);
@@ -174,13 +188,16 @@ class Evaluator {
   }
 
   void Fill(std::span<const int> held_out) {
-    std::map<int, std::vector<std::size_t>> members;  // class -> positions in held_out
+    Members members;
+    std::map<int, int> models;
     for (std::size_t i = 0; i < held_out.size(); ++i) {
-      members[data_.models()[static_cast<std::size_t>(held_out[i])].class_index].push_back(i);
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
+      members[info.class_index][ShapeOf(info)].push_back(i);
+      ++models[info.class_index];
     }
-    for (const auto& [class_index, indices] : members) {
+    for (const auto& [class_index, count] : models) {
       out_.classes.push_back(data_.info().classes[static_cast<std::size_t>(class_index)]);
-      out_.class_models.push_back(static_cast<int>(indices.size()));
+      out_.class_models.push_back(count);
     }
     out_.rows = {Row("undeformed template", template_scores_, members),
                  Row("best single shape", single_scores_, members),

@@ -27,9 +27,10 @@ struct EvaluationJob {
   std::string predictor;     // Predictor::description, for the heading
 };
 
-// One score for each model and view, mean over the views, then over the models of a class, then
-// over classes. Same bits for any worker count. Errors: no model in the split or none to train on,
-// a model file that cannot be read, a failed prediction; kCancelled when `stop` is set.
+// One score for each model and view, mean over the views, then over the models of a shape
+// (ShapeOf), over the shapes of a class, and over classes. Same bits for any worker count. Errors:
+// no model in the split or none to train on, a model file that cannot be read, a failed prediction;
+// kCancelled when `stop` is set.
 Result<Evaluation> Evaluate(const EvaluationJob& job, const Workers& workers,
                             const ProgressSink& progress, const StopFlag& stop);
 

@@ -20,6 +20,10 @@ std::string SourceName(const std::string& source) {
       {"sweethome3d", "of the Sweet Home 3D furniture library"},
       {"shapenet", "of ShapeNet"},
       {"nmr", "of ShapeNet, as rendered for N3MR"},
+      {"planes", "of FlightGear's aircraft"},
+      {"ships", "of FlightGear's ships"},
+      {"cars", "of the games TORCS, Trigger Rally and UFO: Alien Invasion"},
+      {"thirteen", "of Sweet Home 3D, FlightGear and three games"},
       {"folder", "of a folder of one's own"},
       {"procedural", "made by the built-in generator"}};
   const auto at = names.find(source);
@@ -96,7 +100,12 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   const DatasetInfo& info = dataset.info();
   Showcase out;
   const std::size_t classes = info.classes.size();
-  out.data = fmt::format("It learned from {} models in {} class{} {}.", header.training_models,
+  std::vector<ModelInfo> models;
+  for (const int m : dataset.Select(Split::kTrain))
+    models.push_back(dataset.models()[static_cast<std::size_t>(m)]);
+  const std::size_t shapes = CountShapes(models);
+  out.data = fmt::format("It learned from {} models{} in {} class{} {}.", header.training_models,
+                         shapes < models.size() ? fmt::format(" of {} shapes", shapes) : "",
                          classes, classes == 1 ? "" : "es", SourceName(header.dataset_source));
   out.note =
       "The network saw none of these in training. From the first picture alone it predicted one "

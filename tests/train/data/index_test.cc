@@ -39,6 +39,20 @@ class IndexTest : public FolderTest {
 
 TEST_F(IndexTest, IsReadableToBeginWith) { EXPECT_TRUE(Dataset::Open(root_).ok()); }
 
+// Datasets of before have none; a shape of its own is written nowhere.
+TEST_F(IndexTest, ShapesAreOptional) {
+  auto models = ReadModels(root_, ReadDatasetInfo(root_).value()).value();
+  EXPECT_EQ(ReadText(ModelsPath(root_)).value().find("shape"), std::string::npos);
+  EXPECT_EQ(CountShapes(models), models.size());
+  models[1].shape = "one";
+  ASSERT_TRUE(WriteModels(root_, ReadDatasetInfo(root_).value(), models).ok());
+  const auto again = Dataset::Open(root_).value();
+  EXPECT_EQ(again.models()[1].shape, "one");
+  EXPECT_EQ(again.models()[0].shape, "");
+  Edit("models.jsonl", "\"shape\":\"one\"", "\"shape\":1");
+  ExpectOpenError({"models.jsonl", "line 2", "shape"});
+}
+
 TEST_F(IndexTest, MissingFolder) {
   const auto dataset = Dataset::Open(root_ / "no");
   EXPECT_EQ(dataset.status().code(), StatusCode::kNotFound);

@@ -83,6 +83,39 @@ TEST(Split, CopiesOfOneMeshStayTogether) {
   }
 }
 
+// Ten shapes, the first of 91 liveries: it counts as one, and no shape is divided.
+TEST(Split, ShapesStayTogetherAndCountOnce) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    auto models = Models(100);
+    for (std::size_t i = 0; i < models.size(); ++i)
+      models[i].shape = "s" + std::to_string(i < 91 ? 0 : i - 90);
+    SplitModels({"x"}, {.test_share = 0.2, .validation_share = 0.1, .seed = seed}, &models);
+    std::map<std::string, std::set<Split>> sides;
+    for (const auto& m : models) sides[m.shape].insert(m.split);
+    std::array<int, 3> counts = {};
+    for (const auto& [shape, splits] : sides) {
+      EXPECT_EQ(splits.size(), 1u);
+      ++counts[static_cast<std::size_t>(*splits.begin())];
+    }
+    EXPECT_EQ(counts, (std::array<int, 3>{7, 1, 2}));
+  }
+}
+
+// a and b have a mesh in common, b and c a shape.
+TEST(Split, WhatSharesAMeshOrAShapeIsOneGroup) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    auto models = Models(12);
+    for (std::size_t i = 0; i + 2 < models.size(); i += 3) {
+      models[i + 1].geometry = models[i].geometry;
+      models[i + 1].shape = models[i + 2].shape = "s" + std::to_string(i);
+    }
+    SplitModels({"x"}, {.test_share = 0.5, .validation_share = 0, .seed = seed}, &models);
+    for (std::size_t i = 0; i < models.size(); ++i)
+      EXPECT_EQ(models[i].split, models[i - i % 3].split);
+    EXPECT_EQ(Count(models), (std::array<int, 3>{6, 0, 6}));
+  }
+}
+
 TEST(Split, WithoutGeometryEachModelIsItsOwn) {
   auto models = Models(10);
   for (auto& m : models) m.geometry = 0;

@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
 
 #include "base/error.h"
 #include "base/folder_lock.h"
-#include "base/rng.h"
 #include "base/temporary_file.h"
+#include "train/data/build/choose.h"
 #include "train/data/build/contact_sheet.h"
 #include "train/data/build/make_model.h"
 
@@ -45,26 +44,6 @@ std::vector<std::string> ClassesOf(const ModelSource& source,
   return {classes.begin(), classes.end()};
 }
 
-// The first by hash, so that a part of a set is as varied as the whole; ascending.
-std::vector<std::size_t> Choose(const ModelSource& source, const BuildOptions& options) {
-  const auto& entries = source.entries();
-  std::vector<std::pair<std::uint64_t, std::size_t>> order;
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const std::string key = entries[i].class_name + "/" + entries[i].id;
-    order.emplace_back(HashText(key, Mix64(options.split.seed)), i);
-  }
-  std::sort(order.begin(), order.end());
-  std::map<std::string, int> taken;
-  std::vector<std::size_t> chosen;
-  for (const auto& [hash, i] : order) {
-    if (options.per_class > 0 && taken[entries[i].class_name]++ >= options.per_class) continue;
-    if (options.limit > 0 && chosen.size() >= static_cast<std::size_t>(options.limit)) break;
-    chosen.push_back(i);
-  }
-  std::sort(chosen.begin(), chosen.end());
-  return chosen;
-}
-
 class Builder {
  public:
   Builder(const ModelSource& source, const BuildOptions& options, const Path& folder,
@@ -76,7 +55,7 @@ class Builder {
         progress_(progress),
         stop_(stop),
         info_(MakeInfo(source, options)),
-        chosen_(Choose(source, options)),
+        chosen_(ChooseEntries(source.entries(), options)),
         outcomes_(chosen_.size()) {}
 
   Result<BuildSummary> Run() {
@@ -207,6 +186,7 @@ class Builder {
     model.creator = e.creator;
     model.source_faces = stamp.source_faces;
     model.geometry = stamp.geometry;
+    model.shape = e.shape;
     return model;
   }
 
@@ -236,6 +216,7 @@ class Builder {
     TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder_));
     TILEGRAD_TRY(WriteContactSheet(dataset));
     summary_.info = info_;
+    summary_.ignored = source_.ignored();
     for (std::size_t i = 0; i < summary_.models.size(); ++i) {
       summary_.bytes += std::filesystem::file_size(dataset.ModelPath(static_cast<int>(i)), error);
     }
@@ -268,6 +249,7 @@ Status CheckOptions(const BuildOptions& options) {
   TILEGRAD_TRY(CheckRange("the image size", options.image_size, 8, 1024));
   TILEGRAD_TRY(CheckRange("the number of views", options.views, 1, 1024));
   TILEGRAD_TRY(CheckRange("the number per class", options.per_class, 0, INT32_MAX));
+  TILEGRAD_TRY(CheckRange("the number of liveries", options.liveries, 0, INT32_MAX));
   TILEGRAD_TRY(CheckRange("the limit", options.limit, 0, INT32_MAX));
   TILEGRAD_TRY(CheckRange("the test share", options.split.test_share, 0, 0.9));
   TILEGRAD_TRY(CheckRange("the validation share", options.split.validation_share, 0, 0.9));

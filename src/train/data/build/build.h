@@ -20,7 +20,8 @@ struct BuildOptions {
   int views = 24;
   CameraRule camera;  // its lens's width and height follow image_size
   SplitRule split;
-  int per_class = 0;  // at most that many models of a class, chosen by a hash of the seed; 0: all
+  int per_class = 0;  // at most that many shapes of a class, chosen by a hash of the seed; 0: all
+  int liveries = 0;   // at most that many models of a shape, chosen in the same way; 0: all
   int limit = 0;      // at most that many in all; 0: all
   UpAxis up = UpAxis::kY;  // of the source's meshes
 };
@@ -35,6 +36,7 @@ struct BuildSummary {
   DatasetInfo info;
   std::vector<RejectedModel> rejected;
   std::vector<ModelWarning> warnings;  // of models that this run read; kept ones are not read again
+  std::vector<IgnoredFile> ignored;    // by the source
   int reused = 0;                      // model files that an earlier run had finished
   std::uint64_t bytes = 0;             // of the dataset's files
 };

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models that lie in folders, one file each: any tree class/file, and ShapeNetCore.
+#include <algorithm>
+#include <cctype>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "base/error.h"
@@ -12,10 +15,15 @@ namespace {
 
 class FileModels : public ModelSource {
  public:
-  FileModels(std::string name, std::string credit, std::vector<SourceEntry> entries)
-      : name_(std::move(name)), credit_(std::move(credit)), entries_(std::move(entries)) {
+  FileModels(std::string name, std::string credit, std::vector<SourceEntry> entries,
+             std::vector<IgnoredFile> ignored)
+      : name_(std::move(name)),
+        credit_(std::move(credit)),
+        entries_(std::move(entries)),
+        ignored_(std::move(ignored)) {
     SortEntries(&entries_);
   }
+  std::vector<IgnoredFile> ignored() const override { return ignored_; }
   std::string name() const override { return name_; }
   std::vector<std::string> credits() const override { return {credit_}; }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
@@ -27,6 +35,7 @@ class FileModels : public ModelSource {
  private:
   std::string name_, credit_;
   std::vector<SourceEntry> entries_;
+  std::vector<IgnoredFile> ignored_;
 };
 
 // "synset/model" -> split.
@@ -59,32 +68,93 @@ bool IsFolder(const Path& path) {
   return std::filesystem::is_directory(path, error);
 }
 
+// Images, materials and buffers, which models name; and what file managers hide.
+bool BelongsToModels(const Path& file) {
+  static const std::set<std::string> endings = {".png", ".jpg", ".jpeg", ".bmp", ".tga",
+                                                ".ppm", ".pgm", ".rgb",  ".bw",  ".rgba",
+                                                ".sgi", ".mtl", ".bin"};
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return file.filename().string().starts_with('.') || endings.count(ending) > 0;
+}
+
+// Models of a folder CLASS/MODEL, and what was passed over.
+class FolderList {
+ public:
+  Status Read(const Path& folder) {
+    TILEGRAD_ASSIGN(const auto classes, ListFolder(folder));
+    for (const Path& path : classes) {
+      if (IsFolder(path))
+        ReadClass(path);
+      else if (IsModel(path))
+        Ignore(path, "lies in no class's folder: expected CLASS/MODEL");
+      else if (!BelongsToModels(path))
+        Ignore(path, "is no model");
+    }
+    return {};
+  }
+
+  std::vector<SourceEntry> entries;
+  std::vector<IgnoredFile> ignored;
+
+ private:
+  static bool IsModel(const Path& path) { return io::IsMeshFileName(path.filename().string()); }
+  void Ignore(const Path& path, const std::string& reason) {
+    ignored.push_back({path.string(), reason});
+  }
+
+  void ReadClass(const Path& folder) {
+    const auto files = ListFolder(folder);
+    if (!files.ok()) return Ignore(folder, "cannot be listed");
+    const std::size_t before = entries.size();
+    for (const Path& file : *files) {
+      if (IsFolder(file))
+        ReadFolder(file);
+      else if (IsModel(file))
+        Add(folder, file);
+      else if (!BelongsToModels(file))
+        Ignore(file, "is of no kind that is read");
+    }
+    if (entries.size() == before) Ignore(folder, "holds no model: no class");
+  }
+
+  // Textures have folders of their own; models there would belong to no class.
+  void ReadFolder(const Path& folder) {
+    const auto files = ListFolder(folder);
+    if (!files.ok() || std::any_of(files->begin(), files->end(), IsModel))
+      Ignore(folder, "holds models one folder too deep: expected CLASS/MODEL");
+  }
+
+  void Add(const Path& class_folder, const Path& file) {
+    const std::string stem = file.stem().string();
+    entries.push_back({SafeFileName(class_folder.filename().string()),
+                       SafeFileName(stem),
+                       stem,
+                       "",
+                       "",
+                       file.string(),
+                       {},
+                       {}});
+  }
+};
+
 }  // namespace
 
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder) {
-  std::vector<SourceEntry> entries;
-  TILEGRAD_ASSIGN(const auto classes, ListFolder(folder));
-  for (const Path& class_folder : classes) {
-    if (!IsFolder(class_folder)) continue;
-    TILEGRAD_ASSIGN(const auto files, ListFolder(class_folder));
-    for (const Path& file : files) {
-      if (!io::IsMeshFileName(file.filename().string())) continue;
-      const std::string stem = file.stem().string();
-      entries.push_back({SafeFileName(class_folder.filename().string()),
-                         SafeFileName(stem),
-                         stem,
-                         "",
-                         "",
-                         file.string(),
-                         {}});
-    }
+  FolderList list;
+  TILEGRAD_TRY(list.Read(folder));
+  if (list.entries.empty()) {
+    const std::size_t ignored = list.ignored.size();
+    return NotFound("{}: no models; expected <class>/<model> with one of {}{}", folder.string(),
+                    io::MeshFileEndings(),
+                    ignored == 0
+                        ? ""
+                        : fmt::format("; of what is there, {} {}{}", list.ignored[0].file,
+                                      list.ignored[0].reason, ignored == 1 ? "" : ", and so on"));
   }
-  if (entries.empty()) {
-    return NotFound("{}: no models; expected <class>/<model> with one of {}", folder.string(),
-                    io::MeshFileEndings());
-  }
-  return std::unique_ptr<ModelSource>(
-      std::make_unique<FileModels>("folder", "Models of the user.", std::move(entries)));
+  return std::unique_ptr<ModelSource>(std::make_unique<FileModels>(
+      "folder", "Models of the user.", std::move(list.entries), std::move(list.ignored)));
 }
 
 Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Path& split_list) {
@@ -105,16 +175,23 @@ Result<std::unique_ptr<ModelSource>> ShapeNetSource(const Path& folder, const Pa
       std::optional<Split> split;
       if (listed != list.end()) split = listed->second;
       const Path file = model / "models" / "model_normalized.obj";
-      entries.push_back({class_name, SafeFileName(name), name, "ShapeNet terms of use", "",
-                         file.string(), split});
+      entries.push_back({class_name,
+                         SafeFileName(name),
+                         name,
+                         "ShapeNet terms of use",
+                         "",
+                         file.string(),
+                         split,
+                         {}});
     }
   }
   if (entries.empty()) {
     return NotFound("{}: no models{}; expected <synset>/<model>/models/model_normalized.obj",
                     folder.string(), list.empty() ? "" : " that " + split_list.string() + " names");
   }
-  return std::unique_ptr<ModelSource>(std::make_unique<FileModels>(
-      "shapenet", "3D models: ShapeNetCore (Chang et al. 2015).", std::move(entries)));
+  return std::unique_ptr<ModelSource>(
+      std::make_unique<FileModels>("shapenet", "3D models: ShapeNetCore (Chang et al. 2015).",
+                                   std::move(entries), std::vector<IgnoredFile>()));
 }
 
 }  // namespace tilegrad::train

@@ -21,6 +21,13 @@ struct SourceEntry {
   std::string name, license, creator;
   std::string file;            // for reports
   std::optional<Split> split;  // where the source fixes it
+  // The same for all entries of a class that are one shape with other textures; empty: its own.
+  std::string shape = {};
+};
+
+// A file or folder that a source passed over, and why: it may have been meant.
+struct IgnoredFile {
+  std::string file, reason;
 };
 
 struct SourceModel {
@@ -40,6 +47,7 @@ class ModelSource {
   virtual Result<SourceModel> Load(std::size_t entry) const = 0;
   // The camera and sizes that the source dictates, where it holds images.
   virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
+  virtual std::vector<IgnoredFile> ignored() const { return {}; }
 };
 
 // Parametric furniture, lamps, cars and planes (procedural.h), `per_class` of each.
@@ -50,7 +58,22 @@ std::unique_ptr<ModelSource> ProceduralSource(int per_class, std::uint64_t seed)
 inline constexpr const char* kSweetHome3dFolder = "/usr/share/sweethome3d/furniture";
 Result<std::unique_ptr<ModelSource>> SweetHome3dSource(const Path& folder);
 
-// folder/<class>/<file>, every file whose ending io::LoadMesh knows.
+// Models of Debian's packages of games, by lists in data/, all below `games`. Each set of textures
+// (a livery, a skin) is an entry, and those of one model have its shape. Errors: a package is not
+// there (says which), or its archive cannot be opened.
+inline constexpr const char* kGamesFolder = "/usr/share/games";
+Result<std::unique_ptr<ModelSource>> PlanesSource(const Path& games);  // flightgear-data-ai
+Result<std::unique_ptr<ModelSource>> ShipsSource(const Path& games);   // flightgear-data-models
+// torcs-data, trigger-rally-data, ufoai-data
+Result<std::unique_ptr<ModelSource>> CarsSource(const Path& games);
+
+// The models of several sources, which hold meshes, as one; a class of the same name is one class.
+std::unique_ptr<ModelSource> CombineSources(std::string name,
+                                            std::vector<std::unique_ptr<ModelSource>> sources);
+
+// folder/<class>/<file>, every file whose ending io::LoadMesh knows. Other files, images and what
+// belongs to a model left out, are `ignored`, as are models that lie in no class's folder or in a
+// folder within one.
 Result<std::unique_ptr<ModelSource>> FolderSource(const Path& folder);
 
 // folder/<synset>/<model>/models/model_normalized.obj, the paper's 13 synsets; other folders

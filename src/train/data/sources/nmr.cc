@@ -64,8 +64,14 @@ class Nmr : public ModelSource {
     TILEGRAD_ASSIGN(const io::NpyArray voxels, LoadVoxels(part));
     for (std::size_t i = 0; i < voxels.shape[0]; ++i) {
       const std::string id = fmt::format("{}-{:05}", SplitName(part.split), i);
-      entries_.push_back({part.class_name, id, id, "ShapeNet terms of use", "",
-                          fmt::format("{}: [{}]", part.images.string(), i), part.split});
+      entries_.push_back({part.class_name,
+                          id,
+                          id,
+                          "ShapeNet terms of use",
+                          "",
+                          fmt::format("{}: [{}]", part.images.string(), i),
+                          part.split,
+                          {}});
       places_[{part.class_name, id}] = {parts_.size(), i};
     }
     parts_.push_back(std::move(part));

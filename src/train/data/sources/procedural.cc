@@ -245,7 +245,7 @@ class Procedural : public ModelSource {
     for (const std::string& name : ProceduralClasses()) {
       for (int i = 0; i < per_class; ++i) {
         const std::string id = fmt::format("{}-{:05}", name, i);
-        entries_.push_back({name, id, id, "Apache-2.0", "tilegrad", "built in", {}});
+        entries_.push_back({name, id, id, "Apache-2.0", "tilegrad", "built in", {}, {}});
       }
     }
   }

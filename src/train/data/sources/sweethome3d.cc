@@ -101,6 +101,7 @@ class SweetHome3d : public ModelSource {
                         row.license,
                         row.creator,
                         file,
+                        {},
                         {}});
     return {};
   }

@@ -79,6 +79,40 @@ TEST_F(SourcesTest, FolderFindsModelsAndReportsBrokenOnes) {
   EXPECT_EQ(summary->models.size(), 1u);
   ASSERT_EQ(summary->rejected.size(), 1u);
   EXPECT_NE(summary->rejected[0].reason.find("c.obj"), std::string::npos);
+  ASSERT_EQ(summary->ignored.size(), 2u);
+  EXPECT_NE(summary->ignored[0].file.find("readme.md"), std::string::npos);
+  EXPECT_NE(summary->ignored[1].file.find("notes.txt"), std::string::npos);
+}
+
+TEST_F(SourcesTest, FolderSaysWhatItPassedOver) {
+  Write("set/loose.obj", kTetrahedron);
+  Write("set/deep/inner/a.obj", kTetrahedron);
+  Write("set/empty/.hidden", "");
+  Write("set/solid/a.OBJ", kTetrahedron);
+  Write("set/solid/a.mtl", "");
+  Write("set/solid/skin.JPG", "");
+  Write("set/solid/textures/skin.png", "");
+  Write("set/solid/b.max", "");
+  const auto source = FolderSource(root_ / "set");
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  ASSERT_EQ((*source)->entries().size(), 1u);
+  const std::vector<IgnoredFile> ignored = (*source)->ignored();
+  const std::vector<std::pair<std::string, std::string>> expected = {
+      {"deep/inner", "too deep"},
+      {"deep", "no model"},
+      {"empty", "no model"},
+      {"loose.obj", "no class's folder"},
+      {"solid/b.max", "no kind that is read"}};
+  ASSERT_EQ(ignored.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(ignored[i].file, (root_ / "set" / expected[i].first).string());
+    EXPECT_NE(ignored[i].reason.find(expected[i].second), std::string::npos) << ignored[i].reason;
+  }
+  // Where nothing is left, the error has the first of them.
+  std::filesystem::remove(root_ / "set/solid/a.OBJ");
+  const auto none = FolderSource(root_ / "set");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.status().message().find("deep/inner"), std::string::npos);
 }
 
 TEST_F(SourcesTest, FoldersWithoutModelsAreErrors) {

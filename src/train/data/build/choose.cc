@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/build/choose.h"
+
+#include <algorithm>
+#include <map>
+
+#include "base/rng.h"
+
+namespace tilegrad::train {
+
+std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
+                                       const BuildOptions& options) {
+  struct Candidate {
+    std::uint64_t shape_hash, hash;
+    std::size_t entry;
+    auto operator<=>(const Candidate&) const = default;
+  };
+  const auto shape_of = [&](std::size_t i) {
+    return entries[i].class_name + "/" +
+           (entries[i].shape.empty() ? entries[i].id : entries[i].shape);
+  };
+  std::vector<Candidate> order;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const std::uint64_t seed = Mix64(options.split.seed);
+    order.push_back({HashText(shape_of(i), seed),
+                     HashText(entries[i].class_name + "/" + entries[i].id, seed), i});
+  }
+  std::sort(order.begin(), order.end());
+  std::map<std::string, int> shapes, models;  // taken of a class, of a shape
+  std::vector<std::size_t> chosen;
+  for (const Candidate& c : order) {
+    int &of_class = shapes[entries[c.entry].class_name], &of_shape = models[shape_of(c.entry)];
+    if (of_shape == 0 && options.per_class > 0 && of_class >= options.per_class) continue;
+    if (options.liveries > 0 && of_shape >= options.liveries) continue;
+    if (options.limit > 0 && chosen.size() >= static_cast<std::size_t>(options.limit)) break;
+    of_class += of_shape++ == 0;
+    chosen.push_back(c.entry);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+}  // namespace tilegrad::train

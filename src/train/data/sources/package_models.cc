@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/sources/package_models.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <glm/geometric.hpp>
+#include <map>
+
+#include "base/error.h"
+#include "io/sh3f.h"
+#include "scene/keep_faces.h"
+#include "scene/shapes.h"
+#include "train/data/sources/package_textures.h"
+#include "train/data/sources/wheels.h"
+
+namespace tilegrad::train {
+namespace {
+
+struct Package {
+  std::string_view name;
+  const char* archive;  // a folder or zip below /usr/share/games
+  const char* credit;
+};
+
+constexpr Package kPackages[] = {
+    {"flightgear-data-ai", "flightgear/AI/Aircraft",
+     "3D models of aircraft: the FlightGear team (GPL-2+)."},
+    {"flightgear-data-models", "flightgear/Models",
+     "3D models of ships: the FlightGear team (GPL-2+)."},
+    {"torcs-data", "torcs",
+     "3D models of cars: TORCS (Free Art License: Jean-Christophe Durieu, ViPeR; GPL-2+: Eric "
+     "Espié, Christophe Guionneau, Bernhard Wymann, Andrea Alfieri)."},
+    {"trigger-rally-data", "trigger-rally/data.zip",
+     "3D models of cars: Trigger Rally (GPL-2+: Jasmine Langridge, Richard Langridge and others)."},
+    {"ufoai-data", "ufoai/base/0models.pk3",
+     "3D models of cars: UFO: Alien Invasion (GPL-2, GPL-2+: its contributors)."}};
+
+using Words = std::vector<std::string_view>;
+
+// A line of a list.
+struct Row {
+  std::string class_name, shape, name, package, license, model;
+  std::string_view front, up;     // axes of the file: "-x", "z", ...
+  std::vector<std::string> with;  // other files of the same model
+  Words without;                  // as PackageList::without
+  std::string_view textures;      // package_textures.h
+  std::vector<Wheel> wheels;
+};
+
+std::vector<std::string_view> SplitText(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t end; (end = text.find(separator)) != std::string_view::npos;) {
+    parts.push_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  parts.push_back(text);
+  return parts;
+}
+
+Result<std::vector<Row>> ReadRows(const PackageList& list) {
+  std::vector<Row> rows;
+  int number = 0;
+  for (const std::string_view line : SplitText(list.text, '\n')) {
+    ++number;
+    const auto part = SplitText(line, '\t');
+    if (line.empty() || part[0] == "class") continue;
+    if (part.size() != 12)
+      return InternalError("list {}: line {}: {} columns", list.name, number, part.size());
+    Row row{.class_name = std::string(part[0]),
+            .shape = std::string(part[1]),
+            .name = std::string(part[2]),
+            .package = std::string(part[3]),
+            .license = std::string(part[4]),
+            .model = std::string(part[5]),
+            .front = part[6],
+            .up = part[7],
+            .with = {},
+            .without = {},
+            .textures = part[10],
+            .wheels = {}};
+    TILEGRAD_ASSIGN(row.wheels, ReadWheels(part[11]));
+    if (!part[8].empty()) {
+      for (const auto file : SplitText(part[8], '|')) row.with.emplace_back(file);
+    }
+    if (!part[9].empty()) row.without = SplitText(part[9], '|');
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+glm::vec3 Axis(std::string_view text) {
+  glm::vec3 axis(0);
+  axis[text.back() - 'x'] = text.front() == '-' ? -1.0f : 1.0f;
+  return axis;
+}
+
+// The rotation that takes `front` to +z and `up` to +y, row-major.
+std::array<float, 9> Turn(const Row& row) {
+  const glm::vec3 z = Axis(row.front), y = Axis(row.up), x = glm::cross(y, z);
+  return {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
+}
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+bool HasOneOf(const std::string& name, const Words& words) {
+  const std::string lower = Lower(name);
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return lower.find(word) != std::string::npos; });
+}
+
+// Takes the faces out whose object or texture has one of the words in its name.
+void LeaveOut(const Words& words, io::LoadedMesh* loaded) {
+  Mesh& mesh = loaded->mesh;
+  std::vector<char> keep(mesh.faces.size(), 1);
+  for (std::size_t p = 0; p < loaded->parts.size(); ++p) {
+    if (!HasOneOf(loaded->parts[p].name, words)) continue;
+    const std::size_t begin = loaded->parts[p].first_face;
+    const std::size_t end =
+        p + 1 < loaded->parts.size() ? loaded->parts[p + 1].first_face : keep.size();
+    std::fill_n(keep.begin() + static_cast<std::ptrdiff_t>(begin), end - begin, 0);
+  }
+  std::vector<char> out;  // of materials
+  for (const Material& material : mesh.materials) {
+    const int texture = material.base_color_texture;
+    out.push_back(texture >= 0 &&
+                  HasOneOf(mesh.textures[static_cast<std::size_t>(texture)].name, words));
+  }
+  for (std::size_t f = 0; f < mesh.face_materials.size(); ++f)
+    keep[f] = keep[f] && !out[static_cast<std::size_t>(mesh.face_materials[f])];
+  KeepFaces(keep, &mesh);
+}
+
+class Models : public ModelSource {
+ public:
+  explicit Models(const PackageList& list) : name_(list.name), without_(list.without) {}
+
+  Status Open(const std::vector<Row>& rows, const Path& games) {
+    for (const Package& package : kPackages) {
+      if (std::any_of(rows.begin(), rows.end(),
+                      [&](const Row& row) { return row.package == package.name; }))
+        TILEGRAD_TRY(OpenPackage(package, rows, games));
+    }
+    SortEntries(&entries_);
+    return {};
+  }
+
+  std::string name() const override { return name_; }
+  std::vector<std::string> credits() const override { return credits_; }
+  const std::vector<SourceEntry>& entries() const override { return entries_; }
+
+  Result<SourceModel> Load(std::size_t entry) const override {
+    const Item& item = items_.at(entries_[entry].file);
+    const io::FileSource& files = *archives_.at(item.row.package);
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, LoadWithTextures(files, item.row.model, item.textures));
+    LeaveOut(without_, &loaded);
+    LeaveOut(item.row.without, &loaded);
+    for (const std::string& file : item.row.with) {
+      TILEGRAD_ASSIGN(const io::LoadedMesh part, io::LoadMesh(files, file));
+      Append(loaded.mesh, part.mesh);
+      loaded.warnings.insert(loaded.warnings.end(), part.warnings.begin(), part.warnings.end());
+    }
+    const glm::vec3 axle = glm::cross(Axis(item.row.up), Axis(item.row.front));
+    for (const Wheel& wheel : item.row.wheels) AddWheel(wheel, axle, &loaded.mesh);
+    io::ApplyRotation(loaded.mesh, Turn(item.row));
+    return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
+  }
+
+ private:
+  struct Item {
+    Row row;
+    TextureSet textures;
+  };
+
+  Status OpenPackage(const Package& package, const std::vector<Row>& rows, const Path& games) {
+    const Path archive = games / package.archive;
+    std::error_code error;
+    const bool folder = std::filesystem::is_directory(archive, error);
+    std::shared_ptr<io::FileSource>& files = archives_[std::string(package.name)];
+    if (folder) {
+      files = io::OpenFolder(archive);
+    } else if (std::filesystem::exists(archive, error)) {
+      TILEGRAD_ASSIGN(files, io::OpenZip(archive));
+    }
+    bool found = false;
+    for (const Row& row : rows) {
+      if (row.package != package.name || files == nullptr) continue;
+      found = found || files->Exists(row.model);
+      Add(row, folder ? archive : Path());
+    }
+    if (!found) {
+      return NotFound(
+          "{}: the models are not there; install them with `sudo apt-get install "
+          "--no-install-recommends {}`",
+          archive.string(), package.name);
+    }
+    credits_.emplace_back(package.credit);
+    return {};
+  }
+
+  void Add(const Row& row, const Path& archive) {
+    const std::string model = archives_.at(row.package)->Describe(row.model);
+    for (TextureSet& textures : FindTextureSets(row.textures, archive)) {
+      const std::string& set = textures.name;
+      const std::string file = set.empty() ? model : model + " (" + set + ")";
+      SourceEntry entry{row.class_name,
+                        SafeFileName(set.empty() ? row.shape : row.shape + "-" + set),
+                        set.empty() ? row.name : row.name + ", " + set,
+                        row.license,
+                        "",
+                        file,
+                        {},
+                        row.shape};
+      entries_.push_back(std::move(entry));
+      items_[file] = {row, std::move(textures)};
+    }
+  }
+
+  const std::string name_;
+  const Words without_;
+  std::map<std::string, std::shared_ptr<io::FileSource>> archives_;  // by package
+  std::map<std::string, Item> items_;                                // by SourceEntry::file
+  std::vector<SourceEntry> entries_;
+  std::vector<std::string> credits_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ModelSource>> PackageModels(const PackageList& list, const Path& games) {
+  TILEGRAD_ASSIGN(const std::vector<Row> rows, ReadRows(list));
+  auto source = std::make_unique<Models>(list);
+  TILEGRAD_TRY(source->Open(rows, games));
+  return std::unique_ptr<ModelSource>(std::move(source));
+}
+
+Result<std::unique_ptr<ModelSource>> PlanesSource(const Path& games) {
+  // What a propeller looks like when it turns, flames, and the glow of lamps.
+  return PackageModels(
+      {"planes",
+       PlanesList(),
+       {"blur", "propdis", "propellerdisk", "prop_disk", "fast", "slow", "propturn", "prop_spin",
+        "spinning", "propeller-disc", "halo", "glow", "flame", "conden"}},
+      games);
+}
+
+Result<std::unique_ptr<ModelSource>> ShipsSource(const Path& games) {
+  return PackageModels({"ships", ShipsList(), {"wake", "water"}}, games);
+}
+
+Result<std::unique_ptr<ModelSource>> CarsSource(const Path& games) {
+  return PackageModels({"cars", CarsList(), {}}, games);
+}
+
+}  // namespace tilegrad::train
