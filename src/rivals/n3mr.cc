@@ -56,38 +56,39 @@ void DrawFace(const N3mrOptions& options, RowRange rows, std::size_t f, N3mrImag
 // `line_step`, `step`: distances of lines, and of pixels on a line, in the drawing.
 template <class T>
 void ListPull(const N3mrImageT<T>& image, int line_step, int step, LinePixelsT<T>* out) {
-  out->begin.resize(static_cast<std::size_t>(image.inner) + 1);
   for (auto* list : {&out->at, &out->gain}) {
     list->clear();
     list->reserve(image.owner.size());  // the most there can be: nothing grows later
   }
+  out->first.resize(image.owner.size() + static_cast<std::size_t>(image.inner));
+  auto first = out->first.begin();
   for (int line = 0; line < image.inner; ++line) {
-    out->begin[static_cast<std::size_t>(line)] = static_cast<std::int32_t>(out->at.size());
     for (int at = 0; at < image.inner; ++at) {
+      *first++ = static_cast<std::int32_t>(out->at.size());
       const auto p = static_cast<std::size_t>(line * line_step + at * step);
       if (image.owner[p] >= 0 || !(image.d_coverage[p] < 0)) continue;
       out->at.push_back(static_cast<T>(at)), out->gain.push_back(-image.d_coverage[p]);
     }
+    *first++ = static_cast<std::int32_t>(out->at.size());
   }
-  out->begin.back() = static_cast<std::int32_t>(out->at.size());
 }
 
-// The sum over pixels [begin, end) of a list of AddSweep's slope for one end of an edge, in eight
-// sums side by side: the compiler makes vectors of them.
+// The sum over pixels [begin, end) of a list, all on one side of the crossing, of AddSweep's slope
+// for one end of an edge; `eps` has the sign of their distances. In eight sums side by side: the
+// compiler makes vectors of them.
 template <class T>
 T SumSlopes(const LinePixelsT<T>& list, std::size_t begin, std::size_t end, T crossing, T per_pixel,
             T eps) {
   constexpr std::size_t kLanes = 8;
+  const T* const at = list.at.data();
+  const T* const gain = list.gain.data();
   T sums[kLanes] = {};
-  const auto slope = [&](std::size_t i) {
-    const T distance = (list.at[i] - crossing) * per_pixel;
-    return list.gain[i] / (distance + (distance > 0 ? eps : -eps));
-  };
   std::size_t i = begin;
   for (; i + kLanes <= end; i += kLanes) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) sums[lane] += slope(i + lane);
+    for (std::size_t k = 0; k < kLanes; ++k)
+      sums[k] += gain[i + k] / ((at[i + k] - crossing) * per_pixel + eps);
   }
-  for (; i < end; ++i) sums[0] += slope(i);
+  for (; i < end; ++i) sums[0] += gain[i] / ((at[i] - crossing) * per_pixel + eps);
   return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
 }
 
@@ -127,7 +128,9 @@ class CoverageSweep {
       if (image_.owner[Pixel(axis, line.line, line.in)] == f_) {
         Outward(e.outward, line, pull, &ends);
       }
-      if (image_.owner[Pixel(axis, line.line, line.out)] < 0) Inward(axis, line, &ends);
+      if (image_.owner[Pixel(axis, line.line, line.out)] < 0) {
+        Inward(axis, line, InnerPixelsOf(e, line, image_.inner), &ends);
+      }
     });
     return ends;
   }
@@ -135,17 +138,20 @@ class CoverageSweep {
   void Outward(int outward, const SweepLine<T>& line, const LinePixelsT<T>& pull,
                SweepEnds<T>* ends) const {
     const int whole = outward > 0 ? image_.inner : 0, split = outward > 0 ? line.out : line.out + 1;
-    const std::size_t begin = pull.Find(line.line, std::min(split, whole));
-    const std::size_t end = pull.Find(line.line, std::max(split, whole));
+    const std::size_t begin = pull.Find(line.line, std::min(split, whole), image_.inner);
+    const std::size_t end = pull.Find(line.line, std::max(split, whole), image_.inner);
+    if (begin == end) return;
     const auto sum = [&](T per_end) {
-      return SumSlopes(pull, begin, end, line.crossing, per_end * per_pixel_, eps_);
+      const T eps = (per_end > 0) == (outward > 0) ? eps_ : -eps_;
+      return SumSlopes(pull, begin, end, line.crossing, per_end * per_pixel_, eps);
     };
     if (line.per_a != 0) ends->a -= sum(line.per_a);
     if (line.per_b != 0) ends->b -= sum(line.per_b);
   }
 
-  void Inward(SweepAxis axis, const SweepLine<T>& line, SweepEnds<T>* ends) const {
-    for (int d = line.inner_begin; d <= line.inner_end; ++d) {
+  void Inward(SweepAxis axis, const SweepLine<T>& line, InnerPixels inside,
+              SweepEnds<T>* ends) const {
+    for (int d = inside.first; d <= inside.last; ++d) {
       const std::size_t p = Pixel(axis, line.line, d);
       const T gain = image_.d_coverage[p];
       if (image_.owner[p] == f_ && gain > 0) AddSweep(line, d, gain, per_pixel_, eps_, ends);

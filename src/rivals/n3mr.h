@@ -4,7 +4,6 @@
 // pixels (n3mr_sweep.h). What is published and what is repaired here: docs/rivals.md.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -15,18 +14,15 @@
 
 namespace tilegrad::rivals {
 
-// Pixels on the lines of a drawing, ascending: line i has those of begin[i] .. begin[i + 1] - 1.
+// Pixels on the lines of a drawing, ascending.
 template <class T>
 struct LinePixelsT {
-  AlignedVector<std::int32_t> begin;  // [inner + 1]
+  AlignedVector<std::int32_t> first;  // [inner][inner + 1], see Find
   AlignedVector<T> at, gain;          // position on the line, and how much the loss falls
 
-  // Of [first, end): where `line` has its first pixel at or beyond `at_least`.
-  std::size_t Find(int line, int at_least) const {
-    const auto i = static_cast<std::size_t>(line);
-    const auto from = at.begin() + begin[i], to = at.begin() + begin[i + 1];
-    return static_cast<std::size_t>(std::lower_bound(from, to, static_cast<T>(at_least)) -
-                                    at.begin());
+  // Index of the first pixel of `line` at or beyond `at_least`, of 0 .. inner.
+  std::size_t Find(int line, int at_least, int inner) const {
+    return static_cast<std::size_t>(first[static_cast<std::size_t>(line * (inner + 1) + at_least)]);
   }
 };
 

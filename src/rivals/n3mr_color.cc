@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "rivals/n3mr_box.h"
+#include "rivals/n3mr_color_sweep.h"
 #include "rivals/n3mr_reduce.h"
-#include "rivals/n3mr_sweep.h"
 
 namespace tilegrad::rivals {
 namespace {
@@ -69,6 +69,27 @@ SweepImages<T> SweptPlanes(const N3mrColorJob<T>& job, const N3mrImages<const T>
           d_values.subspan(first, count), job.image.owner};
 }
 
+// Sums and columns for ColorSweep.
+template <class T>
+void PrepareLines(const SweepImages<T>& swept, N3mrPlanesT<T>* planes) {
+  const std::size_t pixels = swept.owner.size();
+  std::fill(planes->row_sums.begin(), planes->row_sums.end(), T(0));
+  for (std::size_t c = 0; c < static_cast<std::size_t>(swept.channels); ++c) {
+    for (std::size_t p = 0; p < pixels; ++p) {
+      planes->row_sums[p] += swept.values[c * pixels + p] * swept.d_values[c * pixels + p];
+    }
+  }
+  const auto transpose = [&](std::span<const T> from, std::span<T> to) {
+    const auto n = static_cast<std::size_t>(swept.inner);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < n; ++j) to[j * n + i] = from[i * n + j];
+    }
+  };
+  transpose(planes->row_sums, planes->column_sums);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(swept.channels); ++c)
+    transpose(PlaneOf(swept.d_values, c, pixels), PlaneOf(planes->d_columns, c, pixels));
+}
+
 // The exact parts of a face's adjoint: texels and depth.
 template <class T>
 void AddExactParts(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_images,
@@ -95,6 +116,8 @@ void ReserveN3mrPlanes(const N3mrImageT<T>& image, N3mrPlanesT<T>* planes) {
   const std::size_t pixels = image.owner.size();
   planes->values.resize(4 * pixels), planes->d_values.resize(4 * pixels);
   planes->depth.resize(pixels), planes->d_depth.resize(pixels);
+  planes->row_sums.resize(pixels), planes->column_sums.resize(pixels);
+  planes->d_columns.resize(4 * pixels);
 }
 
 template <class T>
@@ -128,6 +151,7 @@ void N3mrPrepareColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const
     spread(PlaneOf(d_images.color, c, plane), PlaneOf(planes->d_values, c, pixels));
   spread(d_images.alpha, PlaneOf(planes->d_values, kCoverage, pixels));
   spread(d_images.depth, planes->d_depth);
+  PrepareLines(SweptPlanes(job, d_images, *planes), planes);
 }
 
 template <class T>
@@ -144,8 +168,7 @@ void N3mrColorBackward(const N3mrColorJob<T>& job, const N3mrImages<const T>& d_
     if (drawn < 0 || !OwnsAPixel(job.image, drawn)) continue;
     AddExactParts(job, d_images, planes, drawn, d_corners, &out.d_textures[texels * f]);
     if (swept.channels == 0) continue;
-    SweepFace(job.image.faces[static_cast<std::size_t>(drawn)], drawn, swept, job.options,
-              job.options.Scale(job.image.size), d_corners);
+    ColorSweep<T>(job, swept, planes, drawn).AddTo(d_corners);
   }
 }
 

@@ -110,6 +110,9 @@ template <class T>
 struct N3mrPlanesT {
   AlignedVector<T> values, d_values;  // [4]
   AlignedVector<T> depth, d_depth;
+  // Of what the sweep sums over: the sum of values times adjoints by row; that by column, and the
+  // adjoints by column.
+  AlignedVector<T> row_sums, column_sums, d_columns;  // d_columns: [4]
 };
 
 // How an image is coloured; after SetUpN3mr and DrawN3mr of all rows. T: float or double.

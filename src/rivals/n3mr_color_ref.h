@@ -118,9 +118,9 @@ void N3mrSceneBackwardRef(const N3mrSceneRef<T>& scene, const N3mrImages<const T
                               drawing.owner};
   for (std::size_t f = 0; f < drawing.faces.size() && channels > 0; ++f) {
     const N3mrFaceT<T>& face = drawing.faces[f];
-    SweepFace(face, static_cast<std::int32_t>(f), images, scene.options,
-              scene.options.Scale(scene.size),
-              &out.d_corners[kCornerNumbers * static_cast<std::size_t>(face.source)]);
+    SweepFaceRef(face, static_cast<std::int32_t>(f), images, scene.options,
+                 scene.options.Scale(scene.size),
+                 &out.d_corners[kCornerNumbers * static_cast<std::size_t>(face.source)]);
   }
 }
 

@@ -51,6 +51,35 @@ struct N3mrDrawingRef {
   }
 };
 
+// Adds the gradient of faces[f] to d_corners [3,3] of its source.
+template <class T>
+void SweepFaceRef(const N3mrFaceT<T>& face, std::int32_t f, const SweepImages<T>& images,
+                  const N3mrOptions& options, double scale, T* d_corners) {
+  const T per_pixel = T(2) / T(images.inner), eps = static_cast<T>(options.eps);
+  for (int edge = 0; edge < 3; ++edge) {
+    for (const SweepAxis axis : {SweepAxis::kY, SweepAxis::kX}) {
+      const SweepEdge<T> e = SweepEdgeOf(face.at, edge, axis, images.inner);
+      SweepEnds<T> ends;
+      ForSweepLines(e, images.inner, options.floor_lines, [&](const SweepLine<T>& line) {
+        const std::size_t in = images.Pixel(axis, line.line, line.in);
+        const std::size_t out = images.Pixel(axis, line.line, line.out);
+        const auto add = [&](int at, std::size_t from) {
+          const T gain = images.Gain(images.Pixel(axis, line.line, at), from);
+          if (gain > 0) AddSweep(line, at, gain, per_pixel, eps, &ends);
+        };
+        if (images.owner[in] == f) {
+          for (int d = line.out; d >= 0 && d < images.inner; d += e.outward) add(d, in);
+        }
+        const InnerPixels inside = InnerPixelsOf(e, line, images.inner);
+        for (int d = inside.first; d <= inside.last; ++d) {
+          if (images.owner[images.Pixel(axis, line.line, d)] == f) add(d, out);
+        }
+      });
+      AddSweepEnds(face, edge, axis, scale, ends, d_corners);
+    }
+  }
+}
+
 // Coverage, 0 or 1, of a drawing.
 template <class T>
 std::vector<T> CoverageOf(const N3mrDrawingRef<T>& drawing) {
@@ -78,8 +107,8 @@ void N3mrBackwardRef(std::span<const T> corners, int size, const N3mrOptions& op
   const SweepImages<T> images{drawing.inner, 1, coverage, d_coverage, drawing.owner};
   for (std::size_t f = 0; f < drawing.faces.size(); ++f) {
     const N3mrFaceT<T>& face = drawing.faces[f];
-    SweepFace(face, static_cast<std::int32_t>(f), images, options, options.Scale(size),
-              &d_corners[kCornerNumbers * static_cast<std::size_t>(face.source)]);
+    SweepFaceRef(face, static_cast<std::int32_t>(f), images, options, options.Scale(size),
+                 &d_corners[kCornerNumbers * static_cast<std::size_t>(face.source)]);
   }
 }
 
