@@ -33,7 +33,7 @@ DatasetInfo MakeInfo(const ModelSource& source, const BuildOptions& options) {
   info.credits = source.credits();
   info.up = options.up;
   info.camera.lens.width = info.camera.lens.height = info.image_size;
-  info.recipe = RecipeOf(info);
+  info.recipe = RecipeOf(info, source.version());
   return info;
 }
 

@@ -62,16 +62,17 @@ Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const D
   return made;
 }
 
-std::string RecipeOf(const DatasetInfo& info) {
+std::string RecipeOf(const DatasetInfo& info, std::uint64_t version) {
   const CameraRule& camera = info.camera;
   const std::string text = fmt::format(
       "rules {} source {} credits {} size {} views {} fov {} azimuth {} elevation {} distance {} "
-      "half {}{}",
+      "half {}{}{}",
       kRulesVersion, info.source, fmt::join(info.credits, ";"), info.image_size, info.views,
       camera.lens.fov_y, camera.azimuth_step, camera.elevation, camera.distance, camera.half_extent,
       info.up == UpAxis::kZ   ? " up z"
       : info.up == UpAxis::kX ? " up x"
-                              : "");
+                              : "",
+      version == 0 ? "" : fmt::format(" list {:016x}", version));
   return fmt::format("{:016x}", HashText(text, 0));
 }
 

@@ -22,7 +22,7 @@ Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const D
                             LitRenderer& renderer);
 
 // 16 hex digits that change whenever model files would: `info`'s sizes and camera, the source's
-// name, and a version of the rules.
-std::string RecipeOf(const DatasetInfo& info);
+// name and version (ModelSource::version), and a version of the rules.
+std::string RecipeOf(const DatasetInfo& info, std::uint64_t version);
 
 }  // namespace tilegrad::train

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "base/rng.h"
 #include "train/data/sources/model_source.h"
 
 namespace tilegrad::train {
@@ -38,6 +39,11 @@ class Combined : public ModelSource {
   Result<SourceModel> Load(std::size_t entry) const override {
     const Place& place = places_.at(entries_[entry].file);
     return sources_[place.source]->Load(place.entry);
+  }
+  std::uint64_t version() const override {
+    std::uint64_t version = 0;
+    for (const auto& source : sources_) version = Mix64(version ^ source->version());
+    return version;
   }
   std::vector<IgnoredFile> ignored() const override {
     std::vector<IgnoredFile> all;

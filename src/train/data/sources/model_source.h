@@ -48,6 +48,9 @@ class ModelSource {
   // The camera and sizes that the source dictates, where it holds images.
   virtual std::optional<DatasetInfo> FixedInfo() const { return std::nullopt; }
   virtual std::vector<IgnoredFile> ignored() const { return {}; }
+  // Another where the same entries give other models, as after a change of a list that says how
+  // they are read; 0 where nothing does.
+  virtual std::uint64_t version() const { return 0; }
 };
 
 // Parametric furniture, lamps, cars and planes (procedural.h), `per_class` of each.

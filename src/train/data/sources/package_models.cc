@@ -13,6 +13,7 @@
 #include "scene/shapes.h"
 #include "train/data/sources/package_textures.h"
 #include "train/data/sources/wheels.h"
+#include "train/data/split.h"
 
 namespace tilegrad::train {
 namespace {
@@ -137,7 +138,10 @@ void LeaveOut(const Words& words, io::LoadedMesh* loaded) {
 
 class Models : public ModelSource {
  public:
-  explicit Models(const PackageList& list) : name_(list.name), without_(list.without) {}
+  explicit Models(const PackageList& list) : name_(list.name), without_(list.without) {
+    version_ = HashText(list.text, 0);
+    for (const std::string_view word : without_) version_ = HashText(word, version_);
+  }
 
   Status Open(const std::vector<Row>& rows, const Path& games) {
     for (const Package& package : kPackages) {
@@ -152,6 +156,7 @@ class Models : public ModelSource {
   std::string name() const override { return name_; }
   std::vector<std::string> credits() const override { return credits_; }
   const std::vector<SourceEntry>& entries() const override { return entries_; }
+  std::uint64_t version() const override { return version_; }
 
   Result<SourceModel> Load(std::size_t entry) const override {
     const Item& item = items_.at(entries_[entry].file);
@@ -222,6 +227,7 @@ class Models : public ModelSource {
 
   const std::string name_;
   const Words without_;
+  std::uint64_t version_;                                            // a hash of the list
   std::map<std::string, std::shared_ptr<io::FileSource>> archives_;  // by package
   std::map<std::string, Item> items_;                                // by SourceEntry::file
   std::vector<SourceEntry> entries_;

@@ -226,6 +226,26 @@ TEST_F(PackageModelsTest, DatasetsAreSplitByShape) {
   EXPECT_EQ(CountShapes(one->models), 1u);
 }
 
+// Files that another list made are not kept: it may turn a model, or leave a part of it out.
+TEST_F(PackageModelsTest, AnotherListIsAnotherRecipe) {
+  const auto source = Open(Row("one"));
+  ASSERT_NE(source, nullptr);
+  BuildOptions options;
+  options.image_size = 8, options.views = 1;
+  const StopFlag stop = false;
+  ASSERT_TRUE(BuildDataset(*source, options, root_ / "out", Workers(1), {}, stop).ok());
+  std::string row = Row("one");
+  const std::string text = kHead + row.replace(row.find("\t-x\t") + 1, 2, "-z");
+  auto turned = PackageModels({"planes", text, {"blur"}}, root_);
+  ASSERT_TRUE(turned.ok()) << turned.status().message();
+  const auto again = BuildDataset(**turned, options, root_ / "out", Workers(1), {}, stop);
+  ASSERT_FALSE(again.ok());
+  EXPECT_NE(again.status().message().find("other settings"), std::string::npos);
+  std::vector<std::unique_ptr<ModelSource>> one;
+  one.push_back(std::move(*turned));
+  EXPECT_NE(CombineSources("planes", std::move(one))->version(), source->version());
+}
+
 TEST_F(PackageModelsTest, CombinedSourcesKeepTheirModels) {
   std::vector<std::unique_ptr<ModelSource>> sources;
   const std::string first = kHead + Row("one"), second = kHead + Row("two");
