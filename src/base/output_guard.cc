@@ -86,6 +86,10 @@ OutputGuard::Notes& OutputGuard::NotesOf(const Path& folder) const {
   return at->second;
 }
 
+LeftTemporaries& OutputGuard::LeftIn(const Path& folder) const {
+  return left_.try_emplace(folder, folder.empty() ? Path(".") : folder).first->second;
+}
+
 bool OutputGuard::IsOurs(const Path& file) const {
   const Path target = Target(file);
   const std::string checksum = Checksum(target);
@@ -140,6 +144,7 @@ void OutputGuard::Note(const Path& file) const {
   const auto info = Stat(file);
   if (!info || !S_ISREG(info->st_mode)) return;
   const Path target = Target(file);
+  LeftIn(target.parent_path()).RemoveOf(target.filename().string());
   const std::string checksum = Checksum(target);
   if (checksum.empty() || !NotesOf(target.parent_path()).insert(checksum).second) return;
   Append(target.parent_path() / kNotes, checksum);

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "base/temporary_file.h"
 
 namespace tilegrad {
 
@@ -42,7 +43,7 @@ class OutputGuard {
   bool IsOurs(const Path& file) const;
 
   // Notes that this program has just written `file`. Where no note can be made (somebody else's
-  // folder), the file counts as foreign.
+  // folder), the file counts as foreign. What killed calls left of this file is removed.
   void Note(const Path& file) const;
   void NoteAll(std::span<const Path> files) const;
 
@@ -50,11 +51,13 @@ class OutputGuard {
   using Id = std::pair<std::uint64_t, std::uint64_t>;  // device and number of a file
   using Notes = std::set<std::string>;
   Notes& NotesOf(const Path& folder) const;
+  LeftTemporaries& LeftIn(const Path& folder) const;
   std::optional<Path> ForeignFile(const Path& folder) const;
 
   bool force_;
   std::set<Id> inputs_;
   mutable std::map<Path, Notes> notes_;  // of folders that were looked at
+  mutable std::map<Path, LeftTemporaries> left_;
 };
 
 // Checks `file`, writes it by `write()`, which returns a Status, and notes it.

@@ -8,7 +8,6 @@
 #include <climits>
 #include <csignal>
 #include <optional>
-#include <unordered_set>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -47,38 +46,34 @@ Path TemporaryOf(const Path& path) {
   return path.parent_path() / (name + ending);
 }
 
-namespace {
-
-template <class IsWanted>  // (name of the file that was to be)
-void RemoveAll(const Path& folder, const IsWanted& is_wanted) {
+LeftTemporaries::LeftTemporaries(const Path& folder) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::optional<pid_t> writer = WriterOf(entry.path());
     if (!writer || IsRunningElsewhere(*writer) || !entry.is_regular_file(error)) continue;
-    if (is_wanted(entry.path().stem().stem().string())) {
-      std::filesystem::remove(entry.path(), error);
-    }
+    files_.emplace(entry.path().stem().stem().string(), entry.path());
   }
 }
 
-}  // namespace
-
-void RemoveTemporaries(const Path& folder) {
-  RemoveAll(folder, [](const std::string&) { return true; });
+void LeftTemporaries::RemoveAll() {
+  std::error_code error;
+  for (const auto& [_, file] : files_) std::filesystem::remove(file, error);
+  files_.clear();
 }
 
-void RemoveTemporaries(const Path& folder, std::span<const std::string> names) {
-  std::unordered_set<std::string> wanted;  // a long name has a hash in its place
-  for (const std::string& name : names) {
-    wanted.insert(TemporaryOf(name).stem().stem().string());
-  }
-  RemoveAll(folder, [&](const std::string& name) { return wanted.contains(name); });
+void LeftTemporaries::RemoveOf(const std::string& name) {
+  std::error_code error;
+  const std::string short_name = TemporaryOf(name).stem().stem().string();
+  const auto [first, end] = files_.equal_range(short_name);
+  for (auto at = first; at != end; ++at) std::filesystem::remove(at->second, error);
+  files_.erase(first, end);
 }
+
+void RemoveTemporaries(const Path& folder) { LeftTemporaries(folder).RemoveAll(); }
 
 void RemoveTemporariesOf(const Path& file) {
   const Path folder = file.parent_path();
-  const std::string name = file.filename().string();
-  RemoveTemporaries(folder.empty() ? Path(".") : folder, std::span(&name, 1));
+  LeftTemporaries(folder.empty() ? Path(".") : folder).RemoveOf(file.filename().string());
 }
 
 }  // namespace tilegrad

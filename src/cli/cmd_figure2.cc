@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "base/output_guard.h"
-#include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/file_ending.h"
@@ -30,9 +29,6 @@ Status Run(const Options& options) {
   line.Finish();
   TILEGRAD_ASSIGN(const std::string svg, train::Figure2Svg(results));
   TILEGRAD_TRY(WriteGuarded(guard, options.out, [&] { return WriteTextAtomic(options.out, svg); }));
-  const Path out = options.out;
-  const std::string names[] = {out.filename().string()};
-  RemoveTemporaries(out.has_parent_path() ? out.parent_path() : ".", names);  // of killed calls
   Print("{}look at {}\n", train::Figure2Table(results), options.out);
   return {};
 }

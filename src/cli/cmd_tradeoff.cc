@@ -6,7 +6,6 @@
 #include <system_error>
 
 #include "base/output_guard.h"
-#include "base/temporary_file.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -43,8 +42,6 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
     TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
   }
   guard.NoteAll(StudyFiles(folder, !training.empty()));
-  const std::string names[] = {"tradeoff.md", "tradeoff.csv", "tradeoff.svg", "training.csv"};
-  RemoveTemporaries(folder, names);  // of killed calls
   Print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables, folder.string(),
         training.empty() ? "" : ", training.csv");
   std::error_code error;

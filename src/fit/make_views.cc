@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/temporary_file.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
@@ -102,15 +101,6 @@ Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard
   return {};
 }
 
-// What killed calls left of files that are whole now.
-void RemoveHalfWritten(const Path& folder, int count) {
-  const std::string names[] = {kTrainName, kTestName, kTruthName};
-  RemoveTemporaries(folder, names);
-  std::vector<std::string> images;
-  for (int i = 0; i < count; ++i) images.push_back(Path(ImageName(i)).filename().string());
-  RemoveTemporaries(folder / "images", images);
-}
-
 }  // namespace
 
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
@@ -145,7 +135,6 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   };
   if (!test.empty()) TILEGRAD_TRY(write(kTestName, test));
   TILEGRAD_TRY(write(kTrainName, train));
-  RemoveHalfWritten(folder, all);
   return {};
 }
 

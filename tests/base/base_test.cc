@@ -375,8 +375,7 @@ TEST_F(FileTest, HalfWrittenFilesOfOtherNamesStay) {
   for (const std::string name : {"a.png", "b.png", "a.png.old", "a"}) {
     ASSERT_TRUE(AppendText(folder_ / (name + ".4194305.tmp"), "half", false).ok());
   }
-  const std::string names[] = {"a.png", "c.png"};
-  RemoveTemporaries(folder_, names);
+  for (const char* name : {"a.png", "c.png"}) RemoveTemporariesOf(folder_ / name);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.png.4194305.tmp"));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 3);
 }

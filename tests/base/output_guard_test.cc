@@ -41,6 +41,24 @@ TEST_F(Guard, WhatWeWroteIsReplacedAsLongAsNobodyEditedIt) {
   ExpectMessage(OutputGuard().Check(folder_ / "b.npy"), "--force");
 }
 
+// Of this file, from processes that are gone; a folder is listed once.
+TEST_F(Guard, WhatKilledCallsLeftOfAFileGoes) {
+  const std::string gone = ".4194305.tmp", long_name = std::string(250, 'n') + ".png";
+  for (const std::string name : {"a.png", "b.png", "c.png"})
+    Write(name + gone, std::string("half"));
+  const Path hashed = TemporaryOf(folder_ / long_name);
+  Write(hashed.stem().stem().string() + gone, std::string("half"));
+  OutputGuard guard;
+  guard.NoteAll(std::vector{Write("a.png", std::string("whole")), folder_ / "none.png",
+                            Write(long_name, std::string("whole"))});
+  guard.Note(Write("b.png", std::string("whole")));
+  std::vector<Path> left;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    if (entry.path().extension() == ".tmp") left.push_back(entry.path().filename());
+  }
+  EXPECT_EQ(left, std::vector<Path>{"c.png" + gone});
+}
+
 // What is written twice is noted once.
 TEST_F(Guard, NotesDoNotGrowWithRepetition) {
   Made("a.png", "ours");

@@ -71,13 +71,28 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
       RunProgram("train --config " + config + " --data " + data + " --out " + run + tiny).exit_code,
       0);
   const std::string gone = ".4194305.tmp", own = "." + std::to_string(::getpid()) + ".tmp";
-  const Path left[] = {Write("run/eval.md" + gone, "half"), Write("run/eval.json" + gone, "half"),
-                       Write("run/report.html" + gone, "half")};
+  std::vector<Path> left;
+  for (const std::string name :
+       {"run/eval.md", "run/eval.json", "run/report.html", "out/view_predicted.glb",
+        "out/view_turntable.png", "out/view_match.png", "out/view.png", "out/drawn.png",
+        "out/drawn_depth.png", "out/cameras.json", "out/colmap/images.txt"}) {
+    left.push_back(Write(name + gone, "half"));
+  }
   const Path kept[] = {Write("run/eval.md" + own, "of a process that runs"),
                        Write("run/notes" + gone, "another's"),
                        Write("run/eval.md.tmp", "another's")};
   EXPECT_EQ(RunProgram("eval --run " + run + " --views-per-model 1").exit_code, 0);
   EXPECT_EQ(RunProgram("report --run " + run + " --models 1").exit_code, 0);
+  const std::string view = Quoted("out/view.png"), out = Quoted("out");
+  EXPECT_EQ(RunProgram("dataset-view --data " + data + " --split train --out " + view).exit_code,
+            0);
+  EXPECT_EQ(RunProgram("predict --run " + run + " --refine 1 --out " + out + " " + view).exit_code,
+            0);
+  const std::string render = "render " + Quoted("out/view_predicted.glb") +
+                             " --size 8 --outputs color,depth --out " + Quoted("out/drawn.png") +
+                             " --write-cameras ";
+  EXPECT_EQ(RunProgram(render + Quoted("out/cameras.json")).exit_code, 0);
+  EXPECT_EQ(RunProgram(render + Quoted("out/colmap")).exit_code, 0);
   for (const Path& file : left) EXPECT_FALSE(std::filesystem::exists(file)) << file;
   for (const Path& file : kept) EXPECT_TRUE(std::filesystem::exists(file)) << file;
 }
