@@ -4,6 +4,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include "base/error.h"
 #include "cli/render_job.h"
@@ -134,10 +137,20 @@ Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& m
 
 }  // namespace
 
+// Far away, a rotation of float digits would put a camera that is written at -R^T t some tenths
+// off: it is made one of double digits, about the place where the camera stands.
 Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by) {
+  if (by == glm::dvec3(0)) return camera;
+  double* const r = camera.rotation;
+  const glm::dvec3 rows[] = {{r[0], r[1], r[2]}, {r[3], r[4], r[5]}, {r[6], r[7], r[8]}};
+  const glm::dvec3 t(camera.translation[0], camera.translation[1], camera.translation[2]);
+  const glm::dvec3 eye = -glm::inverse(glm::transpose(glm::dmat3(rows[0], rows[1], rows[2]))) * t;
+  const glm::dvec3 x = glm::normalize(rows[0]);
+  const glm::dvec3 y = glm::normalize(rows[1] - glm::dot(rows[1], x) * x);
+  const glm::dvec3 units[] = {x, y, glm::cross(x, y)};
   for (int row = 0; row < 3; ++row) {
-    for (int axis = 0; axis < 3; ++axis)
-      camera.translation[row] -= camera.rotation[3 * row + axis] * by[axis];
+    for (int axis = 0; axis < 3; ++axis) r[3 * row + axis] = units[row][axis];
+    camera.translation[row] = -glm::dot(units[row], eye + by);
   }
   return camera;
 }

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/assimp_import.h"
+#include "io/fbx_wrapping.h"
 #include "io/image_file.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
@@ -181,6 +182,10 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
   if (!scene.ok()) return scene.status().Within(place);
   auto loaded = Assembly(std::move(*scene), source, name).Run();
   if (!loaded.ok()) return loaded.status().Within(place);
+  if (!loaded->mesh.textures.empty() && MeshEnding(name) == ".fbx" && HasClampedFbxTexture(file)) {
+    loaded->warnings.emplace_back(
+        "the wrapping of a texture (clamped) is not read; all textures repeat");
+  }
   return loaded;
 }
 

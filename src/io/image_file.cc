@@ -56,6 +56,10 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
   if (!stbi_info_from_memory(bytes.data(), length, &width, &height, &channels)) {
     const auto size = ImageHeaderSize(bytes);
     if (size) TILEGRAD_TRY(CheckImageSize(size->width, size->height, name));
+    if (const std::string_view format = UnreadImageFormat(bytes); !format.empty()) {
+      return DataLoss("{}: an image in {}, which is not read; save it as PNG or JPEG", name,
+                      format);
+    }
     return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM, SGI): {}", name,
                     stbi_failure_reason());
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_header.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdlib>
 
@@ -75,6 +76,37 @@ std::optional<HeaderSize> ImageHeaderSize(ByteSpan bytes) {
   if (IsJpeg(bytes)) return JpegSize(bytes);
   if (bytes.size() > 2 && bytes[0] == 'B' && bytes[1] == 'M') return BmpSize(bytes);
   return TgaSize(bytes);
+}
+
+std::string_view UnreadImageFormat(std::span<const std::uint8_t> bytes) {
+  struct Format {
+    std::string_view name, begins;
+    std::size_t at = 0;
+  };
+  using namespace std::string_view_literals;
+  constexpr std::array<Format, 17> kFormats = {{{"WebP (.webp)", "WEBP", 8},
+                                                {"AVIF", "ftypavif", 4},
+                                                {"HEIC", "ftyphei", 4},
+                                                {"HEIC", "ftypmif", 4},
+                                                {"GIF", "GIF8"},
+                                                {"TIFF", "II*\0"sv},
+                                                {"TIFF", "MM\0*"sv},
+                                                {"DDS", "DDS "},
+                                                {"KTX", "\xABKTX "},
+                                                {"Radiance HDR", "#?R"},
+                                                {"Photoshop", "8BPS"},
+                                                {"JPEG 2000", "jP  ", 4},
+                                                {"JPEG XL", "JXL ", 4},
+                                                {"text or bitmap PNM", "P1"},
+                                                {"text or bitmap PNM", "P2"},
+                                                {"text or bitmap PNM", "P3"},
+                                                {"text or bitmap PNM", "P4"}}};
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (const Format& format : kFormats) {
+    if (text.size() > format.at && text.substr(format.at).starts_with(format.begins))
+      return format.name;
+  }
+  return text.starts_with("<svg") || text.starts_with("<?xml") ? "SVG" : "";
 }
 
 }  // namespace tilegrad::io

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 
 namespace tilegrad::io {
 
@@ -15,5 +16,9 @@ struct HeaderSize {
 // Of PNG, JPEG, BMP and TGA; nothing for other bytes, or where the header is cut short. stb_image
 // calls what is larger than its limit no image at all.
 std::optional<HeaderSize> ImageHeaderSize(std::span<const std::uint8_t> bytes);
+
+// "GIF" and the like, by its first bytes: a format that is not read, whatever the file is called.
+// Empty for others.
+std::string_view UnreadImageFormat(std::span<const std::uint8_t> bytes);
 
 }  // namespace tilegrad::io

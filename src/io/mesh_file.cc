@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vector_relational.hpp>
 
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
+#include "io/mesh_colors.h"
 #include "io/mesh_origin.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
@@ -67,42 +66,6 @@ void MergeLastMaterial(Mesh& mesh, std::size_t first_face) {
   std::fill(mesh.face_materials.begin() + static_cast<std::ptrdiff_t>(first_face),
             mesh.face_materials.end(), index);
   mesh.materials.pop_back();
-}
-
-bool IsByte(glm::vec4 color) {
-  return glm::all(glm::equal(glm::vec3(color), glm::round(glm::vec3(color)))) &&
-         glm::all(glm::lessThanEqual(glm::vec3(color), glm::vec3(255)));
-}
-
-// Colours are 0 to 1. Some programs write bytes as floating point, 0 to 255: whole numbers, and
-// not only 0 and 1, or numbers that no light explains.
-void ClampColors(std::vector<glm::vec4>* colors, std::vector<std::string>* warnings) {
-  constexpr float kBrightest = 16;
-  float most = 0;
-  for (const glm::vec4& c : *colors) most = std::max({most, c.r, c.g, c.b});
-  const bool bytes =
-      most > kBrightest || (most > 1 && std::all_of(colors->begin(), colors->end(), IsByte));
-  if (bytes) {
-    warnings->push_back(
-        fmt::format("vertex colours are numbers up to {}; taken for bytes, 0 to 255", most));
-    for (glm::vec4& c : *colors) c = {glm::vec3(c) / 255.0f, c.a > 1 ? c.a / 255 : c.a};
-  } else if (most > 1 + 1e-3f) {
-    warnings->push_back(fmt::format("vertex colours reach {}; cut to 1", most));
-  }
-  for (glm::vec4& c : *colors) c = glm::clamp(c, 0.0f, 1.0f);
-}
-
-void ClampColors(LoadedMesh& loaded) {
-  ClampColors(&loaded.mesh.colors, &loaded.warnings);
-  ClampColors(&loaded.mesh.corner_colors, &loaded.warnings);
-  for (Material& material : loaded.mesh.materials) {
-    const glm::vec4& c = material.base_color;
-    if (std::max({c.r, c.g, c.b}) > 1 + 1e-3f) {
-      loaded.warnings.push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is cut to 1",
-                                            material.name, c.r, c.g, c.b));
-    }
-    material.base_color = glm::clamp(material.base_color, 0.0f, 1.0f);
-  }
 }
 
 std::size_t BytesOf(const Mesh& mesh) {
@@ -186,8 +149,10 @@ Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
   }
   TILEGRAD_TRY(ReadBudget::Take(BytesOf(part), "vertices and faces"));
   out.exact.insert(out.exact.end(), exact.begin(), exact.end());
-  if (exact.empty())
-    out.exact.insert(out.exact.end(), part.positions.begin(), part.positions.end());
+  // Until PlaceNearOrigin, positions only serve for normals of parts without any: small numbers,
+  // however far away.
+  const glm::dvec3 near = part.faces.empty() ? glm::dvec3(0) : exact[part.faces[0][0]];
+  for (std::size_t v = 0; v < exact.size(); ++v) part.positions[v] = glm::vec3(exact[v] - near);
   const std::size_t faces_before = out.mesh.faces.size();
   part.materials = {Material{}};
   part.face_materials.assign(part.faces.size(), 0);
@@ -251,6 +216,7 @@ bool IsMeshFileName(const std::string& name) { return FindFormat(name) != nullpt
 Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   const std::string place = source.Describe(name);
   const Format* format = FindFormat(name);
+  if (format == nullptr && !source.Exists(name)) return NotFound("{}: no such file", place);
   if (format == nullptr) {
     return InvalidArgument("{}: \"{}\" is not the ending of a mesh format that can be read ({})",
                            place, MeshEnding(name), MeshFileEndings());
@@ -267,11 +233,15 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
   ClampColors(*loaded);
+  if (format->read != ReadGltf) WarnOfTransparentColors(*loaded);  // glTF says when alpha counts
   MakeNormalsUnit(loaded->mesh);
   return loaded;
 }
 
 Result<LoadedMesh> LoadMesh(const Path& path) {
+  std::error_code no_file;
+  if (std::filesystem::is_directory(path, no_file))
+    return InvalidArgument("{}: is a folder; name a mesh file in it", path.string());
   // The source begins one folder above the mesh's: textures often lie in "../images".
   Path folder = path.parent_path();
   const Path last = folder.filename();

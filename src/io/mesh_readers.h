@@ -63,10 +63,10 @@ int AddTexture(const FileSource& source, const std::string& mesh_name,
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);
 
 // Adds a part whose only material is `material`, which refers to textures that are already in
-// out.mesh. `exact`: its positions in the scene; empty: they are those of `part`. An error if the
-// whole becomes too large: a small file can place one part many times.
+// out.mesh. `exact`: its positions in the scene, one for each vertex. An error if the whole becomes
+// too large: a small file can place one part many times.
 Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
-                          std::span<const glm::dvec3> exact = {});
+                          std::span<const glm::dvec3> exact);
 
 // The same of a part whose vertices are in out.mesh already, from number `first` on.
 Status AppendFacesWithMaterial(const Mesh& part, std::int32_t first, const Material& material,

@@ -56,8 +56,8 @@ Result<OffCounts> ReadCounts(OffFile& file) {
   return counts;
 }
 
-// Colours of vertices or of faces. Integers count from 0 to 255, unless the file has fractions,
-// too, and they are 0 or 1.
+// Colours of vertices or of faces. Integers count from 0 to 255, unless they are 0 or 1, in files
+// that have fractions, too, or nothing beyond 1.
 class OffColors {
  public:
   // What ends a line. False if that is neither nothing nor three or four numbers.
@@ -74,6 +74,7 @@ class OffColors {
     rows_.push_back({color, fractions ? 0 : count});
     any_ = true;
     fractions_ = fractions_ || fractions;
+    most_ = std::max({most_, color.r, color.g, color.b, count == 4 ? color.a : 0});
     return true;
   }
 
@@ -84,7 +85,7 @@ class OffColors {
       if (!any_) break;
       colors.push_back(row.color);
       const glm::vec4& c = row.color;
-      if (fractions_ && std::max({c.r, c.g, c.b, c.a}) <= 1) continue;
+      if ((fractions_ || most_ <= 1) && std::max({c.r, c.g, c.b, c.a}) <= 1) continue;
       for (int k = 0; k < row.integers; ++k) colors.back()[k] /= 255;
     }
     return colors;
@@ -96,6 +97,7 @@ class OffColors {
     int integers;  // how many of its numbers are integers: all or none
   };
   std::vector<Row> rows_;
+  float most_ = 0;
   bool any_ = false, fractions_ = false;
 };
 

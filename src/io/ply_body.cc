@@ -33,18 +33,26 @@ double ColorScale(const PlyProperty& property) {
   return property.type == PlyType::kU8 ? 255 : property.type == PlyType::kU16 ? 65535 : 1;
 }
 
+bool IsIndices(const PlyProperty& property) {
+  return property.name == "vertex_indices" || property.name == "vertex_index";
+}
+
 struct Column {
   Slot slot;  // kSlots: read and forgotten
   double scale = 1;
 };
 
-std::vector<Column> ColumnsOf(const PlyElement& element, std::array<bool, kSlots>& has) {
+// What is forgotten of rows that are there goes to `not_read`.
+std::vector<Column> ColumnsOf(const PlyElement& element, std::array<bool, kSlots>& has,
+                              std::set<std::string, std::less<>>* not_read) {
   std::vector<Column> columns;
   for (const PlyProperty& p : element.properties) {
     const auto* row = std::find_if(kSlotNames.begin(), kSlotNames.end(),
                                    [&](const auto& known) { return known.first == p.name; });
     const bool known = row != kSlotNames.end() && !p.count_type;
     columns.push_back({known ? row->second : kSlots});
+    if (!known && element.count > 0 && !IsIndices(p) && p.name != "texcoord")
+      not_read->insert(p.name);
     if (!known) continue;
     has[row->second] = true;
     if (row->second >= kRed && row->second <= kAlpha) columns.back().scale = ColorScale(p);
@@ -109,7 +117,7 @@ class PlyBody {
   Status Vertices(const PlyElement& element) {
     Mesh& mesh = out_.mesh;
     std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has);
+    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
     if (!has[kX] || !has[kY] || !has[kZ])
       return DataLoss("{}: the vertices have no x, y and z", place_);
     std::array<double, kSlots + 1> row{};
@@ -131,7 +139,7 @@ class PlyBody {
   // Kept until all vertices are there: elements may come in any order.
   Status Faces(const PlyElement& element) {
     std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has);
+    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
     has_images_ = has_images_ || has[kTexNumber];
     has_face_colors_ = has_face_colors_ || HasColor(has);
     std::array<double, kSlots + 1> row{};
@@ -152,10 +160,6 @@ class PlyBody {
       faces_.push_back(face);
     }
     return {};
-  }
-
-  static bool IsIndices(const PlyProperty& property) {
-    return property.name == "vertex_indices" || property.name == "vertex_index";
   }
 
   // The corners in list_.
@@ -185,7 +189,7 @@ class PlyBody {
   // Strips of triangles, one after the other, with -1 between them.
   Status Strips(const PlyElement& element) {
     std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has);
+    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
     std::array<double, kSlots + 1> row{};
     for (std::size_t i = 0; i < element.count; ++i) {
       TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
@@ -236,10 +240,9 @@ class PlyBody {
     if (!mesh.corner_uvs.empty()) mesh.corner_uvs.resize(corners, glm::vec2(0));
     if (!mesh.corner_colors.empty()) mesh.corner_colors.resize(corners, glm::vec4(1));
     if (!images_.empty()) images_.resize(mesh.faces.size(), -1);
-    if (mesh.corner_uvs.empty() && !vertex_uvs_.empty()) {
-      for (const Face& face : mesh.faces) {
-        for (const std::int32_t v : face) mesh.corner_uvs.push_back(vertex_uvs_[v]);
-      }
+    if (!mesh.corner_uvs.empty() || vertex_uvs_.empty()) return;
+    for (const Face& face : mesh.faces) {
+      for (const std::int32_t v : face) mesh.corner_uvs.push_back(vertex_uvs_[v]);
     }
   }
 
@@ -248,8 +251,11 @@ class PlyBody {
       out_.mesh.corner_colors.clear();
       out_.warnings.push_back("colours of faces left out: the vertices have their own");
     }
-    if (!not_read_.empty())
-      out_.warnings.push_back(fmt::format("elements left out: {}", ShortList(not_read_)));
+    for (const auto& [what, names] :
+         {std::pair("elements", &not_read_), std::pair("properties", &properties_not_read_)}) {
+      if (!names->empty())
+        out_.warnings.push_back(fmt::format("{} left out: {}", what, ShortList(*names)));
+    }
   }
 
   Status Skip(const PlyElement& element) {
@@ -271,7 +277,7 @@ class PlyBody {
   std::vector<Face> strip_faces_;
   std::vector<double> images_;
   bool has_images_ = false, has_face_colors_ = false;
-  std::set<std::string, std::less<>> not_read_;
+  std::set<std::string, std::less<>> not_read_, properties_not_read_;
   std::vector<double> list_;  // scratch: the last list
   Polygon polygon_;           // scratch: the last polygon
 };

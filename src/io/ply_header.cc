@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/ply_header.h"
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 
 #include "base/error.h"
 #include "io/text_scan.h"
@@ -70,7 +72,10 @@ bool ParseProperty(std::string_view rest, PlyHeader& header) {
 }
 
 void ParseComment(std::string_view rest, PlyHeader& header) {
-  if (NextToken(rest) != "TextureFile") return;
+  std::string keyword(NextToken(rest));
+  std::transform(keyword.begin(), keyword.end(), keyword.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (keyword != "texturefile") return;
   const auto begin = rest.find_first_not_of(" \t");
   if (begin != std::string_view::npos) header.textures.emplace_back(rest.substr(begin));
 }

@@ -2,7 +2,11 @@
 // What Collada, FBX and 3DS say about images that is not read: a warning that names it.
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cstdint>
+
 #include "base/error.h"
+#include "io/fbx_wrapping.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
@@ -96,6 +100,155 @@ TEST_F(AssimpWarningsTest, ColladaSaysWhatIsNotRead) {
                                         1))),
       "uv set 1; set 0 stands in, its wrapping (clamped, mirrored or once); it repeats, its uv "
       "transform");
+}
+
+// A chunk of a 3DS file.
+std::string Chunk(std::uint16_t id, const std::string& body) {
+  const auto size = static_cast<std::uint32_t>(6 + body.size());
+  std::string head(6, '\0');
+  for (int i = 0; i < 2; ++i) head[i] = static_cast<char>(id >> (8 * i));
+  for (int i = 0; i < 4; ++i) head[2 + i] = static_cast<char>(size >> (8 * i));
+  return head + body;
+}
+
+std::string Words(std::initializer_list<std::uint16_t> words) {
+  std::string out;
+  for (const std::uint16_t w : words)
+    out += {static_cast<char>(w & 255), static_cast<char>(w >> 8)};
+  return out;
+}
+
+std::string Floats(std::initializer_list<float> values) {
+  std::string out;
+  for (const float value : values) {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    out += Words({static_cast<std::uint16_t>(bits), static_cast<std::uint16_t>(bits >> 16)});
+  }
+  return out;
+}
+
+std::string Name(const std::string& text) { return text + '\0'; }
+
+// A textured triangle of 3DS; `map` has further chunks of its image.
+std::string ThreeDs(const std::string& map) {
+  const std::string material = Chunk(
+      0xAFFF, Chunk(0xA000, Name("paint")) +
+                  Chunk(0xA200, Chunk(0x0030, Words({100})) + Chunk(0xA300, Name("q.png")) + map));
+  const std::string mesh =
+      Chunk(0x4110, Words({3}) + Floats({0, 0, 0, 1, 0, 0, 0, 1, 0})) +
+      Chunk(0x4140, Words({3}) + Floats({0, 0, 1, 0, 0, 1})) +
+      Chunk(0x4120, Words({1, 0, 1, 2, 7}) + Chunk(0x4130, Name("paint") + Words({1, 0})));
+  return Chunk(0x4D4D,
+               Chunk(0x0002, Words({3, 0})) +
+                   Chunk(0x3D3D, material + Chunk(0x4000, Name("t") + Chunk(0x4100, mesh))));
+}
+
+TEST_F(AssimpWarningsTest, ThreeDsSaysWhatIsNotRead) {
+  EXPECT_TRUE(WarningsOf(Write("a.3ds", ThreeDs(""))).empty());
+  EXPECT_TRUE(WarningsOf(Write("b.3ds", ThreeDs(Chunk(0xA351, Words({0}))))).empty());
+  ExpectOne(WarningsOf(Write("c.3ds", ThreeDs(Chunk(0xA351, Words({0x10}))))), "wrapping");
+  ExpectOne(WarningsOf(Write("d.3ds", ThreeDs(Chunk(0xA351, Words({2}))))), "wrapping");
+  ExpectOne(WarningsOf(Write("e.3ds", ThreeDs(Chunk(0xA354, Floats({2}))))), "uv transform");
+  ExpectOne(WarningsOf(Write("f.3ds", ThreeDs(Chunk(0xA358, Floats({.5f}))))), "uv transform");
+  ExpectOne(WarningsOf(Write("g.3ds", ThreeDs(Chunk(0xA35C, Floats({30}))))), "uv transform");
+}
+
+std::string FbxUv(int set) {
+  return fmt::format(
+      "LayerElementUV: {0} {{\nVersion: 101\nName: \"set{0}\"\nMappingInformationType: "
+      "\"ByPolygonVertex\"\nReferenceInformationType: \"Direct\"\nUV: *6 {{\na: "
+      "0,0,1,0,0,1\n}}\n}}\n",
+      set);
+}
+
+std::string FbxLayer(int set, const std::string& first) {
+  return fmt::format(
+      "Layer: {0} {{\nVersion: 100\n{1}LayerElement: {{\nType: \"LayerElementUV\"\nTypedIndex: "
+      "{0}\n}}\n}}\n",
+      set, first);
+}
+
+// A textured triangle of FBX with two sets of uv; `texture` has properties of its image, `more` and
+// `links` further objects and what they belong to.
+std::string Fbx(const std::string& texture, const std::string& more = "",
+                const std::string& links = "") {
+  return "; FBX 7.3.0 project file\nFBXHeaderExtension: {\nFBXHeaderVersion: 1003\nFBXVersion: "
+         "7300\n}\nObjects: {\nGeometry: 1, \"Geometry::g\", \"Mesh\" {\nVertices: *9 {\na: "
+         "0,0,0,1,0,0,0,1,0\n}\nPolygonVertexIndex: *3 {\na: 0,1,-3\n}\nLayerElementMaterial: 0 "
+         "{\nVersion: 101\nName: \"\"\nMappingInformationType: \"AllSame\"\n"
+         "ReferenceInformationType: \"IndexToDirect\"\nMaterials: *1 {\na: 0\n}\n}\n" +
+         FbxUv(0) + FbxUv(1) +
+         FbxLayer(0, "LayerElement: {\nType: \"LayerElementMaterial\"\nTypedIndex: 0\n}\n") +
+         FbxLayer(1, "") +
+         "}\nModel: 2, \"Model::t\", \"Mesh\" {\nVersion: 232\n}\nMaterial: 3, "
+         "\"Material::paint\", \"\" {\nVersion: 102\n}\nTexture: 4, \"Texture::t\", \"\" {\nType: "
+         "\"TextureVideoClip\"\nVersion: 202\nProperties70: {\n" +
+         texture + "}\nFileName: \"q.png\"\nRelativeFilename: \"q.png\"\n}\n" + more +
+         "}\nConnections: {\nC: \"OO\",2,0\nC: \"OO\",1,2\nC: \"OO\",3,2\nC: \"OP\",4,3, "
+         "\"DiffuseColor\"\n" +
+         links + "}\n";
+}
+
+TEST_F(AssimpWarningsTest, FbxSaysWhatIsNotRead) {
+  const auto warnings = [&](const std::string& texture) {
+    return WarningsOf(Write("a.fbx", Fbx(texture)));
+  };
+  EXPECT_TRUE(warnings("").empty());
+  EXPECT_TRUE(warnings("P: \"UVSet\", \"KString\", \"\", \"\", \"set0\"\n").empty());
+  EXPECT_TRUE(warnings("P: \"WrapModeU\", \"enum\", \"\", \"\",0\n").empty());
+  ExpectOne(warnings("P: \"UVSet\", \"KString\", \"\", \"\", \"set1\"\n"), "uv set 1");
+  ExpectOne(warnings("P: \"Translation\", \"Vector\", \"\", \"A\",0.5,0,0\n"), "uv transform");
+  ExpectOne(warnings("P: \"Scaling\", \"Vector\", \"\", \"A\",2,2,1\n"), "uv transform");
+  ExpectOne(warnings("P: \"Rotation\", \"Vector\", \"\", \"A\",0,0,30\n"), "uv transform");
+  for (const char* axis : {"U", "V"}) {
+    const auto wrapped =
+        warnings(fmt::format("P: \"WrapMode{}\", \"enum\", \"\", \"\", 1\r\n", axis));
+    ASSERT_EQ(wrapped.size(), 1u);
+    EXPECT_NE(wrapped[0].find("wrapping"), std::string::npos) << wrapped[0];
+  }
+}
+
+// The same property as binary files have it, whole, cut, and with a length beyond the end.
+TEST_F(AssimpWarningsTest, FbxWrappingOfBinaryFiles) {
+  const auto text = [](const std::string& t) {
+    return std::string("S") + static_cast<char>(t.size()) + std::string(3, '\0') + t;
+  };
+  const std::string head = "Kaydara" + text("WrapModeU") + text("enum") + text("") + text("");
+  const auto clamped = [](const std::string& bytes) {
+    return HasClampedFbxTexture(
+        {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  };
+  const std::string one = {'I', 1, 0, 0, 0}, none = {'I', 0, 0, 0, 0};
+  EXPECT_TRUE(clamped(head + one));
+  EXPECT_TRUE(clamped(head + none + head + one));
+  EXPECT_FALSE(clamped(head + none));
+  for (std::size_t size = 0; size < head.size() + one.size(); ++size)
+    EXPECT_FALSE(clamped((head + one).substr(0, size))) << size;
+  EXPECT_FALSE(clamped("WrapModeUS\xff\xff\xff\xff" + one));
+}
+
+// Skins and shapes move vertices in other programs.
+TEST_F(AssimpWarningsTest, BonesAndMorphTargetsAreSaid) {
+  const std::string shape =
+      "Geometry: 5, \"Geometry::s\", \"Shape\" {\nVersion: 100\nIndexes: *1 {\na: 0\n}\nVertices: "
+      "*3 {\na: 0,0,1\n}\nNormals: *3 {\na: 0,0,0\n}\n}\nDeformer: 6, \"Deformer::b\", "
+      "\"BlendShape\" {\nVersion: 100\n}\nDeformer: 7, \"SubDeformer::c\", \"BlendShapeChannel\" "
+      "{\nVersion: 100\nDeformPercent: 0\nFullWeights: *1 {\na: 100\n}\n}\n";
+  const std::string unit = "*16 {\na: 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n}\n";
+  const std::string skin =
+      "Model: 8, \"Model::bone\", \"LimbNode\" {\nVersion: 232\n}\nDeformer: 9, \"Deformer::s\", "
+      "\"Skin\" {\nVersion: 101\n}\nDeformer: 10, \"SubDeformer::cl\", \"Cluster\" {\nVersion: "
+      "100\nIndexes: *3 {\na: 0,1,2\n}\nWeights: *3 {\na: 1,1,1\n}\nTransform: " +
+      unit + "TransformLink: " + unit + "}\n";
+  for (const std::string& file :
+       {Fbx("", shape, "C: \"OO\",6,1\nC: \"OO\",7,6\nC: \"OO\",5,7\n"),
+        Fbx("", skin, "C: \"OO\",8,0\nC: \"OO\",9,1\nC: \"OO\",10,9\nC: \"OO\",8,10\n")}) {
+    const auto warnings = WarningsOf(Write("a.fbx", file));
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("part \"g\": bones and morph targets are not read"),
+              std::string::npos)
+        << warnings[0];
+  }
 }
 
 }  // namespace

@@ -93,6 +93,27 @@ TEST_F(BrokenGltfTest, ReferencesToNowhere) {
   }
 }
 
+// What only colours need is a warning.
+TEST_F(BrokenGltfTest, MaterialsAndTexturesThatAreNotThere) {
+  const auto expect_one = [&](const Json& json, const std::string& part) {
+    const auto loaded = LoadMesh(Write("a.gltf", json.dump()));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    ASSERT_EQ(loaded->warnings.size(), 1u);
+    EXPECT_NE(loaded->warnings[0].find(part), std::string::npos) << loaded->warnings[0];
+  };
+  Json json = Triangle();
+  json["meshes"][0]["primitives"][0]["material"] = 5;
+  expect_one(json, "material 5 does not exist");
+  json["meshes"][0]["primitives"][0]["material"] = 0;
+  json["materials"] =
+      Json::parse(R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 3}}}])");
+  expect_one(json, "texture 3 does not exist");
+  json["textures"] = Json::parse("[{}, {}, {}, {}]");
+  expect_one(json, "texture 3 has no image");
+  json["textures"][3]["source"] = 9;
+  expect_one(json, "texture 3 has no image");
+}
+
 TEST_F(BrokenGltfTest, IndexOutOfRange) {
   Json json = Triangle();
   json["accessors"][0]["count"] = 2;
@@ -174,6 +195,26 @@ TEST_F(BrokenGltfTest, CompressedGeometrySaysWhatToDo) {
   ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
   json["accessors"][0].erase("bufferView");
   ExpectMessage(Load(json), "bad.gltf", "KHR_draco_mesh_compression", "without compression");
+}
+
+// tinygltf quotes the whole of a buffer that it cannot decode.
+TEST_F(BrokenGltfTest, MessagesAreShort) {
+  Json json = Triangle();
+  json["buffers"][0]["byteLength"] = 5000;
+  json["buffers"][0]["uri"] = "data:application/octet-stream;base64," + std::string(100000, 'A');
+  const Status status = Load(json);
+  ExpectMessage(status, "bad.gltf", "not valid glTF");
+  EXPECT_LT(status.message().size(), 1000u);
+}
+
+TEST_F(BrokenGltfTest, VersionsThatA2Point0ReaderIsNotEnoughFor) {
+  Json json = Triangle();
+  json["asset"] = {{"version", "2.3"}, {"minVersion", "2.0"}};
+  EXPECT_TRUE(Load(json).ok());
+  json["asset"]["minVersion"] = "2.1";
+  ExpectMessage(Load(json), "bad.gltf", "\"2.1\"");
+  json["asset"]["minVersion"] = "3.0";
+  ExpectMessage(Load(json), "bad.gltf", "\"3.0\"");
 }
 
 TEST_F(BrokenGltfTest, Version1) {

@@ -69,6 +69,23 @@ TEST_F(FormatsTest, TruncatedImagesAreErrors) {
 }
 
 // A header with a right checksum that promises a gigabyte.
+// By their content: people rename what they have been sent.
+TEST_F(FormatsTest, ImagesOfOtherFormatsAreNamed) {
+  using namespace std::string_literals;
+  for (const auto& [bytes, format] : std::vector<std::pair<std::string, std::string>>{
+           {"RIFF\x24\0\0\0WEBPVP8 "s, "in WebP"},
+           {"\0\0\0\x18"s + "ftypheic\0\0\0\0"s, "in HEIC"},
+           {"\0\0\0\x1c"s + "ftypavif\0\0\0\0"s, "in AVIF"},
+           {"GIF89a\2\0\2\0"s, "in GIF"},
+           {"II*\0\x08\0\0\0"s, "in TIFF"},
+           {"P3\n1 1\n255\n1 2 3\n", "in text or bitmap PNM"},
+           {"<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "in SVG"}}) {
+    ExpectMessage(LoadImage(Write("photo.jpg", bytes)).status(), "photo.jpg", format, "save it as");
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+      EXPECT_FALSE(LoadImage(Write("cut.jpg", bytes.substr(0, size))).ok());
+  }
+}
+
 TEST_F(FormatsTest, PngThatPromisesMoreThanItCanHold) {
   Bytes png = EncodePng(Gradient(8, 8, 4)).value();
   for (const std::size_t at : {18u, 22u}) png[at] = 0x3f;  // 16,136 x 16,136

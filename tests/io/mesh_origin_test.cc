@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
@@ -186,6 +187,26 @@ TEST_F(MeshOriginTest, GltfNodesFarAway) {
   const auto& m = loaded.cameras[0].camera.node_to_world;
   EXPECT_EQ(glm::dvec3(m[3], m[7], m[11]), glm::dvec3(-0.625, -0.875, 3));
   EXPECT_EQ(loaded.warnings.size(), 1u) << fmt::format("{}", fmt::join(loaded.warnings, "|"));
+}
+
+// Normals that a part has not are made of its own small numbers, first or last: in float, all four
+// corners have one x.
+TEST_F(MeshOriginTest, NormalsOfPartsWithoutAny) {
+  const Json nodes = Json::array({{{"mesh", 0},
+                                   {"translation", {4600000, 300, 0.5}},
+                                   {"rotation", {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}},
+                                   {"scale", {0.1, 0.1, 0.1}}}});
+  Json with = Primitive(3, 1, 1);
+  with["attributes"]["NORMAL"] = 0;  // its own positions, which are no normals of the plane
+  for (const bool first : {false, true}) {
+    const Json parts = first ? Json{with, Primitive(0, 1, 0)} : Json{Primitive(0, 1, 0), with};
+    const auto loaded = Load(Write("a.gltf", Gltf(folder_.string(), nodes, parts)));
+    ASSERT_EQ(loaded.mesh.normals.size(), 8u);
+    for (std::size_t v = 0; v < 3; ++v) {  // the turned plane faces -y
+      const glm::vec3 n = loaded.mesh.normals[v + (first ? 4 : 0)];
+      EXPECT_LT(glm::length(n - glm::vec3(0, -1, 0)), 1e-6f) << n.x << " " << n.y << " " << n.z;
+    }
+  }
 }
 
 // Primitives of one mesh with one accessor of positions share its vertices; others do not.

@@ -159,6 +159,7 @@ TEST_F(ObjTest, WhatIsNotReadIsAWarning) {
   ExpectNames(Load(faces + "p 1\nl 1 2\n", 1).warnings[0], "points or lines");
   ExpectNames(Load(faces + "cstype bezier\ncurv 0 1 1 2\nend\n", 1).warnings[0],
               "\"cstype\", \"curv\", \"end\"");
+  ExpectNames(Load(faces + "#MRGB ffff0000ffff0000ffff0000ffff0000\n", 1).warnings[0], "#MRGB");
   ExpectNames(Load("v 5 5 5 1 1\n" + faces, 1).warnings[0], "1 vertices have 5");
   Load(faces + "s off\ng x\no y\nvp 0.1\nlod 3\n");
 }
@@ -166,7 +167,7 @@ TEST_F(ObjTest, WhatIsNotReadIsAWarning) {
 // --- colours ---
 
 TEST_F(ObjTest, VertexColors) {
-  const auto all = Load("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5 0.25\nf 1 2 3\n").mesh;
+  const auto all = Load("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5 0.25\nf 1 2 3\n", 1).mesh;
   EXPECT_EQ(all.colors, (std::vector<glm::vec4>{{1, 0, 0, 1}, {0, 1, 0, 1}, {0, 0, 0.5f, 0.25f}}));
   EXPECT_EQ(all.materials.at(0).base_color, glm::vec4(1));
   for (const std::string text :  // each its own, the others white, wherever they stand
@@ -243,6 +244,13 @@ TEST_F(ObjTest, NamesOfMaterials) {
   ASSERT_EQ(mesh.materials.size(), 3u);
   for (int c = 0; c < 3; ++c)
     EXPECT_EQ(mesh.materials[static_cast<std::size_t>(c)].base_color[c], 1);
+  Write("m.mtl", "newmtl y # shiny\nKd 1 0 0\nnewmtl Material #25\nKd 0 1 0\n");
+  const auto noted = Load("mtllib m.mtl\n" + kSquare +
+                              "usemtl y\nf 1 2 3\nusemtl Material #26\nf 1 2 3\nusemtl "
+                              "Material\nf 1 2 3\n",
+                          1);
+  EXPECT_EQ(noted.mesh.materials.at(0).base_color, glm::vec4(1, 0, 0, 1));
+  ExpectNames(noted.warnings[0], "has \"Material\", \"Material #26\": white");
   Write("m.mtl", "newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\n");
   const auto twice = Load("mtllib m.mtl\n" + kSquare + "usemtl a\nf 1 2 3\n", 1);
   ExpectNames(twice.warnings[0], "\"a\" is defined more than once");
@@ -290,6 +298,8 @@ TEST_F(ObjTest, OptionsOfImages) {
            {"-clamp on my -tex.png", {1, 1}, TextureWrap::kClamp},
            {"-clamp off -blendu on -blendv off -texres 4 -boost 2 \"my -tex.png\"", {1, 1}},
            {"sub\\q.png", {1, 1}},
+           {"q.png # the image", {1, 1}},
+           {"-s 2 2 1 my -tex.png\t# the image", {2, 2}},
            {"D:\\old\\my -tex.png", {1, 1}}}) {
     SCOPED_TRACE(c.line);
     Write("m.mtl", "newmtl m\nKd 0 0 0\nmap_Kd " + c.line + "\n");

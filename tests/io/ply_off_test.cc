@@ -67,7 +67,7 @@ TEST_F(PlyOffTest, PlyOfEveryEncodingIsTheSame) {
 TEST_F(PlyOffTest, PlyWithATexture) {
   ASSERT_TRUE(SavePng(folder_ / "my wood.png", ImageU8(2, 2, 3, 77)).ok());
   const std::string vertices =
-      "ply\nformat ascii 1.0\ncomment TextureFile my wood.png\nelement vertex 3\n"
+      "ply\nformat ascii 1.0\ncomment texturefile my wood.png\nelement vertex 3\n"
       "property float x\nproperty float y\nproperty float z\n";
   const std::string by_vertex = vertices +
                                 "property float s\nproperty float t\nelement face 1\nproperty list "
@@ -189,7 +189,7 @@ TEST_F(PlyOffTest, PlyColorsOfFaces) {
     const auto colors = FaceColors(loaded->mesh);
     const float alpha = header.find("alpha") == std::string::npos ? 1 : 0.2f;
     EXPECT_EQ(colors, (std::vector<glm::vec4>{kRed, kRed, {0, 0, 1, alpha}}));
-    EXPECT_TRUE(loaded->warnings.empty());
+    EXPECT_EQ(loaded->warnings.size(), alpha < 1 ? 1u : 0u);  // of alpha that is not drawn
   }
   std::string both = Header("ascii") + kTextBody;
   both.replace(both.find("end_header"), 0,
@@ -199,8 +199,9 @@ TEST_F(PlyOffTest, PlyColorsOfFaces) {
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_TRUE(loaded->mesh.corner_colors.empty());
   EXPECT_EQ(loaded->mesh.colors[1], kGreen);
-  ASSERT_EQ(loaded->warnings.size(), 1u);
+  ASSERT_EQ(loaded->warnings.size(), 2u);
   EXPECT_NE(loaded->warnings[0].find("colours of faces left out"), std::string::npos);
+  EXPECT_NE(loaded->warnings[1].find("left out: \"neighbours\""), std::string::npos);
 }
 
 TEST_F(PlyOffTest, PlyWithSeveralTextures) {
@@ -264,6 +265,45 @@ TEST_F(PlyOffTest, PlyElementsInAnyOrder) {
   EXPECT_NE(loaded->warnings[0].find("\"edge\""), std::string::npos);
 }
 
+TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty float quality\nproperty float f_dc_0\nproperty list uchar int ring\nelement "
+      "face 1\nproperty list uchar int vertex_index\nproperty int flags\nend_header\n"
+      "0 0 0 1 1 0\n1 0 0 1 1 0\n0 1 0 1 1 1 2\n3 0 1 2 0\n";
+  const auto loaded = LoadMesh(Write("a.ply", text));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_EQ(loaded->warnings.size(), 1u);
+  EXPECT_EQ(loaded->warnings[0],
+            "properties left out: \"f_dc_0\", \"flags\", \"quality\", \"ring\"");
+}
+
+// Of vertices and of faces; not where a material is transparent itself, or all alpha is 1.
+TEST_F(PlyOffTest, AlphaOfColorsThatIsNotDrawnIsSaid) {
+  const auto warnings = [&](const std::string& name, const std::string& text) {
+    const auto loaded = LoadMesh(Write(name, text));
+    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
+    return loaded.ok() ? loaded->warnings : std::vector<std::string>();
+  };
+  const std::string corners = "0 0 0\n1 0 0\n0 1 0\n";
+  for (const auto& [name, text] :
+       {std::pair("a.off", "OFF\n3 1 0\n" + corners + "3 0 1 2 255 0 0 128\n"),
+        std::pair("b.off", std::string("COFF\n3 1 0\n0 0 0 1 0 0 0.5\n1 0 0 1 0 0 1\n0 1 0 1 0 0 "
+                                       "1\n3 0 1 2\n")),
+        std::pair("a.obj",
+                  std::string("v 0 0 0 1 0 0 0.5\nv 1 0 0 1 0 0 1\nv 0 1 0 1 0 0 1\nf 1 2 3\n"))}) {
+    const auto said = warnings(name, text);
+    ASSERT_EQ(said.size(), 1u) << name;
+    EXPECT_NE(said[0].find("alpha of colours is not drawn"), std::string::npos) << said[0];
+  }
+  EXPECT_TRUE(warnings("c.off", "OFF\n3 1 0\n" + corners + "3 0 1 2 255 0 0 255\n").empty());
+  Write("m.mtl", std::string("newmtl m\nd 0.5\n"));
+  EXPECT_TRUE(warnings("b.obj",
+                       "mtllib m.mtl\nusemtl m\nv 0 0 0 1 0 0 0.5\nv 1 0 0 1 0 0 1\n"
+                       "v 0 1 0 1 0 0 1\nf 1 2 3\n")
+                  .empty());
+}
+
 TEST_F(PlyOffTest, PlyFractionsThatCountTo255) {
   std::string text = Header("ascii") + kTextBody;
   for (auto at = text.find("uchar red"); at != std::string::npos; at = text.find("uchar red"))
@@ -272,8 +312,8 @@ TEST_F(PlyOffTest, PlyFractionsThatCountTo255) {
   const auto loaded = LoadMesh(Write("a.ply", text));
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_EQ(loaded->mesh.colors[3], glm::vec4(0.2f, 0.2f, 0.2f, 1));
-  ASSERT_EQ(loaded->warnings.size(), 1u);
-  EXPECT_NE(loaded->warnings[0].find("0 to 255"), std::string::npos);
+  ASSERT_EQ(loaded->warnings.size(), 2u);  // one of "neighbours"
+  EXPECT_NE(loaded->warnings[1].find("0 to 255"), std::string::npos);
 }
 
 TEST_F(PlyOffTest, OffColors) {
@@ -287,17 +327,20 @@ TEST_F(PlyOffTest, OffColors) {
   };
   const std::string colored = "OFF\n3 1 0\n0 0 0 255 0 0\n1 0 0\n0 1 0 0 0 51 102\n";
   const std::vector<glm::vec4> want = {kRed, kWhite, {0, 0, 0.2f, 0.4f}};
-  EXPECT_EQ(load(colored, "3 0 1 2\n", 0).colors, want);
-  EXPECT_EQ(load("C" + colored, "3 0 1 2\n", 0).colors, want);
-  EXPECT_EQ(load(colored, "3 0 1 2 0 255 0\n", 1).colors, want);  // the face's are left out
+  EXPECT_EQ(load(colored, "3 0 1 2\n", 1).colors, want);  // an alpha that nothing draws
+  EXPECT_EQ(load("C" + colored, "3 0 1 2\n", 1).colors, want);
+  EXPECT_EQ(load(colored, "3 0 1 2 0 255 0\n", 2).colors, want);  // the face's are left out
   EXPECT_EQ(
-      load("OFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0.5 0.5 0.5\n0 1 0 0 0 1 0.5\n", "3 0 1 2\n", 0).colors,
+      load("OFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0.5 0.5 0.5\n0 1 0 0 0 1 0.5\n", "3 0 1 2\n", 1).colors,
       (std::vector<glm::vec4>{kRed, {0.5f, 0.5f, 0.5f, 1}, {0, 0, 1, 0.5f}}));
   const std::string plain = "OFF\n4 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
   const Mesh faces = load(plain, "4 0 1 2 3 255 0 0\n3 0 1 2\n3 0 1 3 0 255 0 255\n", 0);
   EXPECT_EQ(FaceColors(faces), (std::vector<glm::vec4>{kRed, kRed, kWhite, kGreen}));
   EXPECT_EQ(faces.positions.size(), 4u);
   EXPECT_EQ(FaceColors(load(plain, "3 0 1 2 0 0 1.0\n3 0 1 2 1 0 0\n3 0 1 2 0 1 0\n", 0)),
+            (std::vector<glm::vec4>{kBlue, kRed, kGreen}));
+  // Nothing beyond 1: nobody writes a black of 1/255.
+  EXPECT_EQ(FaceColors(load(plain, "3 0 1 2 0 0 1\n3 0 1 2 1 0 0 1\n3 0 1 2 0 1 0\n", 0)),
             (std::vector<glm::vec4>{kBlue, kRed, kGreen}));
   EXPECT_TRUE(load(plain, "3 0 1 2 17\n3 0 1 2 x\n3 0 1 3\n", 1).corner_colors.empty());
   EXPECT_TRUE(load("OFF\n3 1 0\n0 0 0 1 2\n1 0 0\n0 1 0\n", "3 0 1 2\n", 1).colors.empty());

@@ -75,6 +75,8 @@ Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
   const std::string_view compression = GltfCompression(JsonPart(bytes));
   if (!compression.empty()) return RefuseGltfCompression(compression, place);
   while (!error.empty() && std::isspace(static_cast<unsigned char>(error.back()))) error.pop_back();
+  constexpr std::size_t kMost = 300;  // it may quote a whole buffer
+  if (error.size() > kMost) error.replace(kMost, std::string::npos, "...");
   return DataLoss("{}: not valid glTF: {}", place, error.empty() ? "no reason given" : error);
 }
 
@@ -125,8 +127,13 @@ Status CheckImages(std::string_view text, const std::string& place) {
 }
 
 Status CheckVersion(const std::string& place, const tinygltf::Model& model) {
-  if (model.asset.version.starts_with("2.")) return {};
-  return DataLoss("{}: glTF version \"{}\"; 2.x is read", place, model.asset.version);
+  // Of 2.x, a reader of 2.0 reads what does not say that it is not enough.
+  const std::string& least = model.asset.minVersion;
+  if (!model.asset.version.starts_with("2.") || (!least.empty() && least != "2.0")) {
+    return DataLoss("{}: glTF version \"{}\"; 2.0 is read", place,
+                    least.empty() ? model.asset.version : least);
+  }
+  return {};
 }
 
 }  // namespace

@@ -80,15 +80,18 @@ std::string DecodePercent(const std::string& uri) {
 }
 
 int GltfWalk::ImageTexture(int texture) {
-  if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return -1;
-  const int image = model.textures[texture].source;
-  if (const std::string other = GltfImageExtension(model.textures[texture]); !other.empty()) {
-    Warn(
-        fmt::format("texture {} has its image in {} only, which is not read; the material's colour "
-                    "stands in",
-                    texture, other));
+  if (texture < 0) return -1;
+  const bool there = texture < static_cast<int>(model.textures.size());
+  const std::string other = there ? GltfImageExtension(model.textures[texture]) : "";
+  const int image = there ? model.textures[texture].source : -1;
+  const bool has_image = image >= 0 && image < static_cast<int>(model.images.size());
+  if (!other.empty() || !has_image) {
+    Warn(fmt::format("texture {} {}; the material's colour stands in", texture,
+                     !other.empty() ? "has its image in " + other + " only, which is not read"
+                     : there        ? "has no image"
+                                    : "does not exist"));
   }
-  if (image < 0 || image >= static_cast<int>(model.images.size())) return -1;
+  if (!has_image) return -1;
   if (!textures[image]) textures[image] = AddImage(model.images[image], image);
   return *textures[image];
 }
@@ -121,6 +124,8 @@ void GltfWalk::SetSampler(int texture, Material* material) {
 Material GltfWalk::ConvertMaterial(int index) {
   Material material;
   material.base_color = glm::vec4(1);  // glTF's default
+  if (index >= static_cast<int>(model.materials.size()))
+    Warn(fmt::format("material {} does not exist: white instead", index));
   if (index < 0 || index >= static_cast<int>(model.materials.size())) return material;
   const tinygltf::Material& from = model.materials[index];
   material.name = from.name;

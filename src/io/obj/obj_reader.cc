@@ -43,12 +43,14 @@ class ObjLibraries {
     return {};
   }
 
-  // Nothing if no library has it. Some writers put a comment behind usemtl's name.
+  // Nothing if no library has it.
   const MtlMaterial* Get(const std::string& name) const {
-    auto found = materials_.find(name);
-    if (found == materials_.end() && name.find(" #") != std::string::npos)
-      found = materials_.find(std::string(Trimmed(name.substr(0, name.find(" #")))));
-    return found == materials_.end() ? nullptr : &found->second;
+    for (const auto& [map, key] :
+         {std::pair(&materials_, name), std::pair(&materials_, std::string(WithoutComment(name))),
+          std::pair(&commented_, name)}) {
+      if (const auto found = map->find(key); found != map->end()) return &found->second;
+    }
+    return nullptr;
   }
 
  private:
@@ -95,6 +97,9 @@ class ObjLibraries {
   }
 
   void Define(MtlMaterial material) {
+    const std::string bare(WithoutComment(material.name));  // "#25" is no comment, "# shiny" is
+    if (material.name.find("# ", bare.size()) != std::string::npos)
+      commented_.try_emplace(bare, material);
     const auto [found, added] = materials_.try_emplace(material.name, material);
     if (added || found->second == material) return;
     warnings_.push_back(
@@ -115,6 +120,7 @@ class ObjLibraries {
   const std::string& obj_name_;
   std::vector<std::string>& warnings_;
   std::map<std::string, MtlMaterial> materials_;
+  std::map<std::string, MtlMaterial> commented_;  // by names without their comments
   std::set<std::string> read_;
 };
 
@@ -176,7 +182,9 @@ class ObjAssembly {
       corners_without_uv_ = true;
       return material;
     }
-    material.base_color_texture = AddTexture(source_, name_, from.image.name, out_);
+    const bool whole = FindBeside(source_, name_, from.image.name).has_value();
+    const std::string image(whole ? from.image.name : WithoutComment(from.image.name));
+    material.base_color_texture = AddTexture(source_, name_, image, out_);
     material.wrap.fill(from.image.clamp ? TextureWrap::kClamp : TextureWrap::kRepeat);
     // With a texture, Kd is often left black or grey by exporters; the image alone is what people
     // meant.
@@ -247,6 +255,8 @@ class ObjAssembly {
 Result<LoadedMesh> ReadObj(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes file, source.Read(name));
   TILEGRAD_ASSIGN(ObjStatements statements, ParseObj(TextOf(file), source.Describe(name)));
+  if (TextOf(file).find("\n#MRGB ") != std::string_view::npos)
+    statements.warnings.emplace_back("colours in comments (#MRGB, ZBrush's) are not read");
   return ObjAssembly(std::move(statements), source, name).Run();
 }
 

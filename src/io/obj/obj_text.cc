@@ -59,4 +59,11 @@ std::string_view WholeName(std::string_view rest) {
   return quoted ? rest.substr(1, rest.size() - 2) : rest;
 }
 
+std::string_view WithoutComment(std::string_view name) {
+  for (std::size_t at = name.find('#', 1); at < name.size(); at = name.find('#', at + 1)) {
+    if (name[at - 1] == ' ' || name[at - 1] == '\t') return WholeName(name.substr(0, at));
+  }
+  return name;
+}
+
 }  // namespace tilegrad::io

@@ -35,4 +35,8 @@ std::string_view Trimmed(std::string_view text);
 // The rest of a line as one name, which may contain spaces, without quotes around it.
 std::string_view WholeName(std::string_view rest);
 
+// What stands before " #", which begins a comment to some writers and belongs to the name for
+// others: for names that are not found whole.
+std::string_view WithoutComment(std::string_view name);
+
 }  // namespace tilegrad::io
