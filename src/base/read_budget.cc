@@ -12,12 +12,10 @@ namespace tilegrad {
 namespace {
 
 constexpr std::size_t kDefault = std::size_t{4} << 30;
-constexpr const char* kVariable = "TILEGRAD_READ_LIMIT";
 
 thread_local ReadBudget* t_outermost = nullptr;
 
-// "123", "500M", "16G", with any of K, M, G, T as powers of 1024; 0 for other text and for what is
-// too large.
+// 0 for what is no number of bytes.
 std::size_t ParseBytes(std::string_view text) {
   std::size_t value = 0;
   const char* const end = text.data() + text.size();
@@ -35,12 +33,17 @@ std::string Megabytes(std::size_t bytes) { return fmt::format("{} MB", (bytes >>
 
 }  // namespace
 
-Result<std::size_t> ReadLimit() {
-  const char* const text = std::getenv(kVariable);
-  if (text == nullptr || *text == '\0') return kDefault;
+Result<std::size_t> ParseByteCount(const std::string& text) {
   if (const std::size_t bytes = ParseBytes(text); bytes > 0) return bytes;
-  return InvalidArgument("{} is \"{}\"; it must be bytes, as 4294967296, 500M or 16G", kVariable,
-                         text);
+  return InvalidArgument("\"{}\" must be bytes, as 4294967296, 500M or 16G", text);
+}
+
+Result<std::size_t> ReadLimit() {
+  const char* const text = std::getenv(kReadLimitVariable);
+  if (text == nullptr || *text == '\0') return kDefault;
+  auto bytes = ParseByteCount(text);
+  if (!bytes.ok()) return bytes.status().Within(kReadLimitVariable);
+  return bytes;
 }
 
 ReadBudget::ReadBudget() : outer_(t_outermost), limit_(ReadLimit()) {
@@ -62,8 +65,8 @@ Status ReadBudget::Take(std::size_t bytes, const std::string& what) {
   if (status.ok() && bytes > *budget->limit_ - budget->taken_) {
     status = ResourceExhausted(
         "{}: takes {} more, beyond the limit of {} for a file with all that it names; allow more "
-        "with {} in the environment (bytes, or 16G)",
-        what, Megabytes(bytes), Megabytes(*budget->limit_ - 1), kVariable);
+        "(bytes, or 16G) with tilegrad's --read-limit or {} in the environment",
+        what, Megabytes(bytes), Megabytes(*budget->limit_ - 1), kReadLimitVariable);
   }
   if (status.ok()) budget->taken_ += bytes;
   if (budget->refused_.ok()) budget->refused_ = status;

@@ -10,8 +10,14 @@
 
 namespace tilegrad {
 
-// 4 GiB, or what the environment's TILEGRAD_READ_LIMIT says: bytes, or 500M, 16G. An error if that
-// is no such number.
+// Names the limit in the environment.
+inline constexpr const char* kReadLimitVariable = "TILEGRAD_READ_LIMIT";
+
+// The bytes of "4294967296", "500M" or "16G", with any of K, M, G, T as powers of 1024. Fails for
+// 0, other text and what is too large.
+Result<std::size_t> ParseByteCount(const std::string& text);
+
+// 4 GiB, or what kReadLimitVariable says. An error if that is no number of bytes.
 Result<std::size_t> ReadLimit();
 
 // The budget of whatever this thread reads while the object lives. Inside of another one it is a

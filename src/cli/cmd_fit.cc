@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
@@ -200,8 +201,7 @@ void AddWhat(CLI::App* command, Options* o) {
   command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
       ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))
       ->capture_default_str();
-  command->add_option("--light-direction", o->light_direction, "x y z towards the light, world")
-      ->expected(3);
+  AddVector(command, "--light-direction", &o->light_direction, 3, "x y z towards the light, world");
   command->add_option("--filter", o->filter, "texture lookup: bilinear or trilinear")
       ->check(CLI::IsMember({"bilinear", "trilinear"}))
       ->capture_default_str();
@@ -234,7 +234,8 @@ void AddFit(CLI::App& app, Action* action) {
       "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
   AddWhat(command, options.get());
   AddNumbers(command, &options->config);
-  command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)");
+  command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")
+      ->delimiter(',');
   command->add_flag("--resume", options->resume, "go on with the fit in --out");
   command->add_flag("--doctor", options->doctor,
                     "only say what gets a gradient at the start, and why not");

@@ -14,10 +14,13 @@
 #include <system_error>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/render_options.h"
+#include "cli/option_words.h"
+#include "cli/parse_errors.h"
+#include "cli/run_folder.h"
 #include "tilegrad/version.h"
 
 namespace tilegrad::cli {
@@ -50,9 +53,18 @@ Status FlushOutput() {
   return {StatusCode::kIo, fmt::format("standard output: {}", std::strerror(errno))};
 }
 
-bool IsCommand(const CLI::App& app, const std::string& name) {
-  return !app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; })
-              .empty();
+// The first word is a command, or asks for help or the version, with or without dashes.
+Status CheckFirstWord(const CLI::App& app, std::string* word) {
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    known.push_back(command->get_name());
+  if (*word == "help" || *word == "version") word->insert(0, "--");
+  if (std::find(known.begin(), known.end(), *word) != known.end()) return {};
+  const std::vector<std::string> options = {"--help", "--version"};
+  if (*word == "-h" || std::find(options.begin(), options.end(), *word) != options.end()) return {};
+  const bool option = word->starts_with('-');
+  return InvalidArgument("unknown {} \"{}\"{}; see tilegrad --help", option ? "option" : "command",
+                         *word, DidYouMean(*word, option ? options : known));
 }
 
 // An empty value is a variable that was not set: a folder of that name would be the current one.
@@ -67,31 +79,29 @@ Status CheckValues(const CLI::App& app) {
   return {};
 }
 
+void AddCommands(CLI::App& app, Action* action) {
+  for (const auto add : {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender,
+                         AddReport, AddDatasetView, AddFit, AddViews}) {
+    add(app, action);
+  }
+  for (CLI::App* reader : app.get_subcommands({})) AddReadLimitOption(reader);
+  for (const auto add : {AddFigure2, AddInfo, AddSelftest}) add(app, action);
+  EndOptions(app);
+}
+
 int Run(int argc, char** argv) {
   CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
                "tilegrad");
   app.set_version_flag("--version", TILEGRAD_VERSION);
   app.require_subcommand(1);
   Action action;
-  AddDataset(app, &action);
-  AddTradeoff(app, &action);
-  AddTrain(app, &action);
-  AddEval(app, &action);
-  AddPredict(app, &action);
-  AddRender(app, &action);
-  AddReport(app, &action);
-  AddDatasetView(app, &action);
-  AddFit(app, &action);
-  AddViews(app, &action);
-  AddFigure2(app, &action);
-  AddInfo(app, &action);
-  AddSelftest(app, &action);
-  if (argc > 1 && argv[1][0] != '-' && !IsCommand(app, argv[1])) {
-    return Report({StatusCode::kInvalidArgument,
-                   fmt::format("unknown command \"{}\"; see tilegrad --help", argv[1])});
+  AddCommands(app, &action);
+  app.failure_message(ExplainParseError);
+  std::vector<std::string> words = JoinLists({argv + std::min(argc, 1), argv + argc});
+  if (!words.empty()) {
+    if (const Status status = CheckFirstWord(app, &words[0]); !status.ok()) return Report(status);
   }
   try {
-    std::vector<std::string> words = JoinUpVector({argv + std::min(argc, 1), argv + argc});
     std::reverse(words.begin(), words.end());  // as CLI11 takes them
     app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
@@ -102,6 +112,7 @@ int Run(int argc, char** argv) {
     return code == 0 ? 0 : 2;
   }
   if (const Status status = CheckValues(app); !status.ok()) return Report(status);
+  if (const auto limit = ReadLimit(); !limit.ok()) return Report(limit.status());
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
   const Status done = action();
   PrintThreadNotice();

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "cli/parse_errors.h"
 #include "io/image_file.h"
 
 namespace tilegrad::cli {
@@ -12,7 +13,7 @@ void AddUpOption(CLI::App* command, UpAxis* up) {
   static const std::map<std::string, UpAxis> axes = {
       {"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}};
   command->add_option("--up", *up, "the axis of the mesh that points up: y (default), z or x")
-      ->transform(CLI::CheckedTransformer(axes, CLI::ignore_case).description("{y,z,x}"))
+      ->transform(OneOf(axes))
       ->type_name("TEXT");
 }
 

@@ -192,12 +192,13 @@ Status Writer::Exr() {
 }  // namespace
 
 Status RequestOutputs(const FileSettings& settings, PictureRequest* request) {
-  const std::vector<std::pair<std::string, bool*>> known = {
-      {"color", &request->color},     {"alpha", &request->alpha}, {"depth", &request->depth},
-      {"normals", &request->normals}, {"uv", &request->uv},       {"faces", &request->face_ids}};
-  for (const auto& [name, wanted] : known) *wanted = Wants(settings, name);
+  const std::array<bool*, kOutputNames.size()> wanted = {&request->color, &request->alpha,
+                                                         &request->depth, &request->normals,
+                                                         &request->uv,    &request->face_ids};
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    *wanted[i] = Wants(settings, std::string(kOutputNames[i]));
   for (const std::string& output : settings.outputs) {
-    if (std::none_of(known.begin(), known.end(), [&](const auto& k) { return k.first == output; }))
+    if (std::find(kOutputNames.begin(), kOutputNames.end(), output) == kOutputNames.end())
       return InvalidArgument("--outputs {}: not one of color, alpha, depth, normals, uv, faces",
                              output);
   }

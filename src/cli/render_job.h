@@ -2,7 +2,9 @@
 // Internal to cli: what `tilegrad render` was asked for, and its parts: which cameras, which files.
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/camera_file.h"
@@ -33,6 +35,9 @@ Result<std::vector<io::CameraView>> ChooseViews(const ViewSettings& settings,
 
 // The axis that --up names.
 Result<UpAxis> UpAxisOf(const ViewSettings& settings);
+
+inline constexpr std::array<std::string_view, 6> kOutputNames = {"color",   "alpha", "depth",
+                                                                 "normals", "uv",    "faces"};
 
 struct FileSettings {
   std::string out;     // a file for one picture, a folder for several; empty: this folder

@@ -6,21 +6,18 @@
 
 #include "base/error.h"
 #include "cli/mesh_options.h"
+#include "cli/option_words.h"
+#include "cli/parse_errors.h"
 #include "cli/run_folder.h"
 #include "render/scene_fields.h"
 
 namespace tilegrad::cli {
 namespace {
 
-// name -> value, as CLI11 takes it; --help shows the names, not the numbers behind them.
 template <class T>
 CLI::Option* AddChoice(CLI::App* command, const std::string& option, T* value,
                        const std::map<std::string, T>& choices, const std::string& help) {
-  std::string names;
-  for (const auto& [name, _] : choices) names += (names.empty() ? "" : ",") + name;
-  return command->add_option(option, *value, help)
-      ->transform(CLI::CheckedTransformer(choices).description("{" + names + "}"))
-      ->type_name("TEXT");
+  return command->add_option(option, *value, help)->transform(OneOf(choices))->type_name("TEXT");
 }
 
 void AddViewOptions(CLI::App* command, ViewSettings* view) {
@@ -40,9 +37,8 @@ void AddViewOptions(CLI::App* command, ViewSettings* view) {
       ->capture_default_str();
   auto* gltf = command->add_option("--gltf-camera", view->gltf_camera,
                                    "cameras of the glTF file: a name, a number from 0, or all");
-  auto* eye = command->add_option("--eye", view->eye, "stand at X Y Z")->expected(3);
-  command->add_option("--target", view->target, "with --eye: look at X Y Z")
-      ->expected(3)
+  auto* eye = AddVector(command, "--eye", &view->eye, 3, "stand at X Y Z");
+  AddVector(command, "--target", &view->target, 3, "with --eye: look at X Y Z")
       ->needs(eye)
       ->capture_default_str();
   command
@@ -86,8 +82,7 @@ void AddShadingOptions(CLI::App* command, RenderSettings* s) {
   command->add_option("--ambient", s->ambient, "light from everywhere")->capture_default_str();
   command->add_option("--specular", s->specular, "k_s of phong")->capture_default_str();
   command->add_option("--shininess", s->scene.shininess, "alpha of phong")->capture_default_str();
-  command->add_option("--sh", s->sh, "nine coefficients of spherical harmonics [a bright sky]")
-      ->expected(9);
+  AddVector(command, "--sh", &s->sh, 9, "nine coefficients of spherical harmonics [a bright sky]");
   AddChoice<NormalSource>(command, "--normals", &s->scene.normals,
                           {{"auto", NormalSource::kAuto},
                            {"smooth", NormalSource::kSmooth},
@@ -119,8 +114,8 @@ void AddFileOptions(CLI::App* command, RenderSettings* s) {
                    "any of color, alpha, depth, normals, uv, faces; separated by commas")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--background", s->file.background, "R G B, each 0 to 1, sRGB [transparent]")
-      ->expected(3)
+  AddVector(command, "--background", &s->file.background, 3,
+            "R G B, each 0 to 1, sRGB [transparent]")
       ->check(CLI::Range(0.0, 1.0));
   command
       ->add_option("--supersample", s->supersampling,
@@ -138,20 +133,6 @@ void AddFileOptions(CLI::App* command, RenderSettings* s) {
 }
 
 }  // namespace
-
-std::vector<std::string> JoinUpVector(std::vector<std::string> words) {
-  const auto is_number = [](const std::string& word) {
-    double number = 0;
-    return CLI::detail::lexical_cast(word, number);
-  };
-  for (std::size_t i = 0; i + 3 < words.size(); ++i) {
-    const auto first = words.begin() + static_cast<std::ptrdiff_t>(i) + 1;
-    if (words[i] != "--up" || !std::all_of(first, first + 3, is_number)) continue;
-    *first = fmt::format("{},{},{}", first[0], first[1], first[2]);
-    words.erase(first + 1, first + 3);
-  }
-  return words;
-}
 
 void AddRenderOptions(CLI::App* command, RenderSettings* settings) {
   command->add_option("meshes", settings->meshes, "mesh files: " + io::MeshFileEndings())

@@ -40,10 +40,6 @@ struct RenderSettings {
 // Declares them on `command`, which writes to `settings` when it is parsed.
 void AddRenderOptions(CLI::App* command, RenderSettings* settings);
 
-// --up takes one word or three numbers, which CLI11 cannot tell from the meshes that follow: in the
-// words of a command line, those numbers joined by commas.
-std::vector<std::string> JoinUpVector(std::vector<std::string> words);
-
 // After parsing. An option that would change nothing is a mistake: what it is for is not asked for.
 Status CheckRenderOptions(const CLI::App& command, const RenderSettings& settings);
 

@@ -2,11 +2,13 @@
 #include "cli/run_folder.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "base/error.h"
+#include "base/read_budget.h"
 #include "cli/console.h"
 #include "train/run/checkpoint.h"
 
@@ -19,6 +21,21 @@ void AddWorkersOption(CLI::App* command, int* workers) {
       ->envname("TILEGRAD_THREADS")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
+}
+
+// Without envname(): CLI11 would give the variable to the commands that were not chosen, too.
+void AddReadLimitOption(CLI::App* command) {
+  command
+      ->add_option_function<std::string>(
+          "--read-limit",
+          [](const std::string& text) {
+            ::setenv(kReadLimitVariable, text.c_str(), /*overwrite=*/1);  // processes inherit it
+          },
+          fmt::format("what one file may become in memory with all that it names: bytes, or 500M, "
+                      "16G [{} in the environment, else 4G]",
+                      kReadLimitVariable))
+      ->check([](const std::string& text) { return ParseByteCount(text).status().message(); })
+      ->type_name("BYTES");
 }
 
 void AddForceOption(CLI::App* command, bool* force) {

@@ -17,6 +17,8 @@ struct RunOptions {
 };
 void AddRunOptions(CLI::App* command, RunOptions* options);
 void AddWorkersOption(CLI::App* command, int* workers);
+// --read-limit (base/read_budget.h): the same as its variable of the environment.
+void AddReadLimitOption(CLI::App* command);
 // --force, for base/output_guard.h.
 void AddForceOption(CLI::App* command, bool* force);
 

@@ -127,6 +127,8 @@ Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder) {
         "{}: a file; a fit takes the folder of transforms.json and its images, or of COLMAP",
         folder.string());
   }
+  if (!std::filesystem::exists(folder, error))
+    return NotFound("{}: no such folder", folder.string());
   return NotFound(
       "{}: neither transforms.json nor transforms_train.json nor a COLMAP model in it (docs/fit.md "
       "says what a fit reads)",
