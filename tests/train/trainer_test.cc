@@ -14,7 +14,6 @@
 #include "support/temp_folder.h"
 #include "tiny_run.h"
 #include "train/data/trained_models.h"
-#include "train/models/mesh_network.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
 
@@ -171,42 +170,6 @@ TEST_F(TrainerTest, TheAverageOfTheWeightsPredicts) {
   const Status predicted = (*model)->Predict(image, &meshes);  // an error if the mesh is not finite
   EXPECT_TRUE(predicted.ok()) << predicted.message();
   EXPECT_EQ(meshes.size(), 1u);
-}
-
-// The mirror image of a picture gives the mirror image of the mesh: vertex v and the vertex at the
-// mirrored place of the template have changed places. Both are means of the same two numbers, so
-// only the scaling to the box rounds.
-TEST_F(TrainerTest, TheMeanOverTheMirrorImageIsMirrored) {
-  ValueOf<bool>(job_.config, "network.mirror_mean") = true;
-  RunWhole("run", 1);
-  const auto newest = LoadNewestCheckpoint(context_, folder_ / "run");
-  ASSERT_TRUE(newest.ok());
-  auto model = job_.config.task->LoadModel(context_, newest->checkpoint);
-  ASSERT_TRUE(model.ok()) << model.status().message();
-  const auto side = static_cast<std::size_t>(newest->checkpoint.info.image_size);
-  std::vector<std::uint8_t> images(2 * 4 * side * side);
-  Rng rng(4);
-  for (std::size_t row = 0; row < images.size() / 2; row += side) {
-    for (std::size_t x = 0; x < side; ++x) {
-      const auto byte = static_cast<std::uint8_t>(rng.Below(256));
-      images[row + x] = images[images.size() / 2 + row + side - 1 - x] = byte;
-    }
-  }
-  std::vector<Mesh> meshes;
-  ASSERT_TRUE((*model)->Predict(images, &meshes).ok());
-  ASSERT_EQ(meshes.size(), 2u);
-  const auto mirror = MirrorVertices((*model)->template_mesh());
-  float moved = 0;
-  for (std::size_t v = 0; v < mirror.size(); ++v) {
-    const auto to = static_cast<std::size_t>(mirror[v]);
-    const glm::vec3 a = meshes[0].positions[v], b = meshes[1].positions[to];
-    EXPECT_NEAR(a.x, -b.x, 1e-6f);
-    EXPECT_NEAR(a.y, b.y, 1e-6f);
-    EXPECT_NEAR(a.z, b.z, 1e-6f);
-    EXPECT_FLOAT_EQ(meshes[0].colors[v].r, meshes[1].colors[to].r);
-    moved = std::max(moved, std::abs(a.x - meshes[1].positions[v].x));
-  }
-  EXPECT_GT(moved, 1e-5f);
 }
 
 TEST_F(TrainerTest, RefusesAnExistingRun) {

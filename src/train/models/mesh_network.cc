@@ -91,6 +91,18 @@ nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
   });
 }
 
+// The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
+std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
+  std::map<std::tuple<float, float, float>, std::int64_t> at;
+  for (std::size_t v = 0; v < sphere.positions.size(); ++v) {
+    const glm::vec3& p = sphere.positions[v];
+    at[{p.x, p.y, p.z}] = static_cast<std::int64_t>(v);
+  }
+  std::vector<std::int64_t> mirror;
+  for (const glm::vec3& p : sphere.positions) mirror.push_back(at.at({-p.x, p.y, p.z}));
+  return mirror;
+}
+
 // Offsets [3 V] to the mean of themselves and their mirror image at x = 0, a projection.
 nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
   const std::vector<std::int64_t> mirror = MirrorVertices(sphere);
@@ -103,17 +115,6 @@ nn::AxisMap Symmetry(const nn::Var& like, const Mesh& sphere) {
 }
 
 }  // namespace
-
-std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
-  std::map<std::tuple<float, float, float>, std::int64_t> at;
-  for (std::size_t v = 0; v < sphere.positions.size(); ++v) {
-    const glm::vec3& p = sphere.positions[v];
-    at[{p.x, p.y, p.z}] = static_cast<std::int64_t>(v);
-  }
-  std::vector<std::int64_t> mirror;
-  for (const glm::vec3& p : sphere.positions) mirror.push_back(at.at({-p.x, p.y, p.z}));
-  return mirror;
-}
 
 void MeshNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
   encoder.Visit(prefix + "encoder.", visitor);

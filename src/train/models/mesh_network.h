@@ -23,8 +23,6 @@ struct NetworkConfig {
   std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
   bool symmetric = false;           // offsets are the mean of themselves and their mirror image at
                                     // x = 0, so every prediction is symmetric there
-  bool mirror_mean = false;  // what predicts is the mean of the predictions from a picture and
-                             // from its mirror image; training does not know of it
   bool fc_norm = true;       // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
@@ -46,9 +44,6 @@ struct PredictedMeshes {
   nn::Var positions;
   nn::Var colors;  // [B, V, 3] linear, not clamped
 };
-
-// The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
-std::vector<std::int64_t> MirrorVertices(const Mesh& sphere);
 
 class MeshNetwork {
  public:

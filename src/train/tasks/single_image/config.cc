@@ -20,8 +20,6 @@ ConfigFields FieldsOf(NetworkConfig* c) {
       {"network.smoothing", &c->smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
       {"network.symmetric", &c->symmetric, 0, 1, "every prediction is symmetric at x = 0"},
-      {"network.mirror_mean", &c->mirror_mean, 0, 1,
-       "what predicts is the mean over a picture and its mirror image"},
       {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
       {"network.fc_deviation", &c->fc_deviation, 0, 10,
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},

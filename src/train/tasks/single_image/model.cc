@@ -15,9 +15,7 @@ class SingleImageModel : public Model {
       : context_(context),
         image_size_(image_size),
         network_(context, config, image_size, /*seed=*/0),
-        template_(network_.template_mesh()) {
-    if (config.mirror_mean) mirror_ = MirrorVertices(template_);
-  }
+        template_(network_.template_mesh()) {}
 
   // Of the moving average of the weights, where the run kept one.
   Status Load(const std::vector<nn::NamedTensor>& state) {
@@ -33,17 +31,12 @@ class SingleImageModel : public Model {
   Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
 
  private:
-  Status Forward(std::span<const std::uint8_t> images, bool mirrored, std::vector<Mesh>* meshes);
-  nn::Tensor Input(std::span<const std::uint8_t> images, bool mirrored) const;
   Mesh MeshOf(const float* positions, const float* colors) const;
-  // The mean of a mesh and of one that was predicted from the mirror image.
-  Status AddMirrored(const Mesh& of_mirrored, Mesh* mesh) const;
 
   nn::Context& context_;
   int image_size_;
   MeshNetwork network_;
   Mesh template_;
-  std::vector<std::int64_t> mirror_;  // of vertices; empty: predictions are of the picture alone
   std::int64_t parameters_ = 0;
 };
 
@@ -58,35 +51,18 @@ Mesh SingleImageModel::MeshOf(const float* p, const float* c) const {
   return mesh;
 }
 
-Status SingleImageModel::AddMirrored(const Mesh& of_mirrored, Mesh* mesh) const {
-  for (std::size_t v = 0; v < mirror_.size(); ++v) {
-    const auto from = static_cast<std::size_t>(mirror_[v]);
-    const glm::vec3 p = of_mirrored.positions[from];
-    mesh->positions[v] = 0.5f * (mesh->positions[v] + glm::vec3(-p.x, p.y, p.z));
-    mesh->colors[v] = 0.5f * (mesh->colors[v] + of_mirrored.colors[from]);
-  }
-  return NormalizeToBox(*mesh, kPredictionHalfExtent);
-}
-
-nn::Tensor SingleImageModel::Input(std::span<const std::uint8_t> images, bool mirrored) const {
-  const auto size = static_cast<std::size_t>(image_size_);
-  const auto count = static_cast<std::int64_t>(images.size() / (4 * size * size));
-  nn::Tensor input = context_.Empty({count, 4, image_size_, image_size_});
-  float* to = input.data<float>();
-  for (std::size_t row = 0; row < images.size(); row += size) {
-    for (std::size_t x = 0; x < size; ++x)
-      to[row + x] = static_cast<float>(images[row + (mirrored ? size - 1 - x : x)]) / 255;
-  }
-  return input;
-}
-
-Status SingleImageModel::Forward(std::span<const std::uint8_t> images, bool mirrored,
-                                 std::vector<Mesh>* meshes) {
+Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
+  const nn::NoGrad off(context_);
+  const std::size_t bytes = 4 * static_cast<std::size_t>(image_size_ * image_size_);
+  const std::size_t count = images.size() / bytes;
+  nn::Tensor input =
+      context_.Empty({static_cast<std::int64_t>(count), 4, image_size_, image_size_});
+  std::transform(images.begin(), images.end(), input.data<float>(),
+                 [](std::uint8_t b) { return static_cast<float>(b) / 255; });
   const PredictedMeshes predicted =
-      network_.Forward(nn::Constant(context_, Input(images, mirrored)), nn::Mode::kEval);
+      network_.Forward(nn::Constant(context_, std::move(input)), nn::Mode::kEval);
   TILEGRAD_TRY(context_.TakeStatus());
   const std::size_t numbers = 3 * template_.positions.size();  // of a mesh
-  const auto count = static_cast<std::size_t>(predicted.positions.shape()[0]);
   for (std::size_t i = 0; i < count; ++i) {
     Mesh mesh = MeshOf(predicted.positions.value().data<float>() + i * numbers,
                        predicted.colors.value().data<float>() + i * numbers);
@@ -94,18 +70,6 @@ Status SingleImageModel::Forward(std::span<const std::uint8_t> images, bool mirr
       return InternalError("the prediction is broken: {}", valid.message());
     meshes->push_back(std::move(mesh));
   }
-  return {};
-}
-
-Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
-  const nn::NoGrad off(context_);
-  const std::size_t before = meshes->size();
-  TILEGRAD_TRY(Forward(images, false, meshes));
-  if (mirror_.empty()) return {};
-  std::vector<Mesh> mirrored;
-  TILEGRAD_TRY(Forward(images, true, &mirrored));
-  for (std::size_t i = 0; i < mirrored.size(); ++i)
-    TILEGRAD_TRY(AddMirrored(mirrored[i], &(*meshes)[before + i]));
   return {};
 }
 
