@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rivals on the tape: which images there are, what reaches the inputs, errors. Gradients
+// through a whole step: chain_test.cc.
+#include "train/ops/rival_op.h"
+
+#include <gtest/gtest.h>
+
+#include "nn/nn.h"
+#include "scene/shapes.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSide = 12;
+
+struct Setting {
+  Workers workers{1};
+  nn::Context context{workers};
+  RivalRenderer renderer{workers};
+  Mesh ball = Icosphere(1, 0.5f);
+  nn::Var positions, colors;
+  RivalJob job;
+
+  Setting() {
+    const auto v = static_cast<std::int64_t>(ball.positions.size());
+    const std::span<const float> flat(&ball.positions[0].x, 3 * ball.positions.size());
+    positions = nn::Parameter(context, context.From({1, v, 3}, flat));
+    colors = nn::Parameter(context, context.Full({1, v, 3}, 0.5));
+    job.faces = {ball.faces[0].data(), 3 * ball.faces.size()};
+    job.size = kSide;
+    for (int n = 0; n < 2; ++n)
+      job.cameras.push_back(OrbitCamera({50, kSide, kSide}, 30.0 + 70 * n, 10, 1.9));
+  }
+  RenderedImages Draw(const nn::Var& with_colors) {
+    return RenderRival(renderer, positions, with_colors, job);
+  }
+  // The error that was noted, if there is one.
+  std::string Error() { return context.TakeStatus().message(); }
+};
+
+double SizeOf(const nn::Var& x) { return nn::Sum(nn::Abs(x)).item(); }
+
+TEST(RenderRival, DrawsColorsWhereThereAreSome) {
+  for (const rivals::Rule rule : {rivals::Rule::kSoftRas, rivals::Rule::kN3mr}) {
+    Setting s;
+    s.job.options.rule = rule;
+    s.job.options.softras.near_plane = 0.1;
+    const RenderedImages alone = s.Draw({});
+    EXPECT_FALSE(alone.colors.valid());
+    EXPECT_EQ(alone.alpha.shape(), (nn::Shape{2, kSide, kSide}));
+    const RenderedImages both = s.Draw(s.colors);
+    EXPECT_EQ(both.colors.shape(), (nn::Shape{2, 3, kSide, kSide}));
+    EXPECT_EQ(SizeOf(both.alpha - alone.alpha), 0);
+    EXPECT_GT(SizeOf(both.colors), 10);
+  }
+}
+
+// A loss of one image leaves the adjoint of the other empty.
+TEST(RenderRival, EachImageMayPushAlone) {
+  for (const rivals::Rule rule : {rivals::Rule::kSoftRas, rivals::Rule::kN3mr}) {
+    Setting s;
+    s.job.options.rule = rule;
+    s.job.options.softras.near_plane = 0.1;
+    const auto of_alpha = nn::Grad(nn::Sum(s.Draw(s.colors).alpha), {s.positions, s.colors});
+    EXPECT_GT(SizeOf(of_alpha[0]), 0.01);
+    EXPECT_EQ(SizeOf(of_alpha[1]), 0);
+    const auto of_color = nn::Grad(nn::Sum(s.Draw(s.colors).colors), {s.positions, s.colors});
+    EXPECT_GT(SizeOf(of_color[0]), 0);  // little: all is grey, and the face has all of the weight
+    EXPECT_GT(SizeOf(of_color[1]), 1);
+    EXPECT_EQ(s.Error(), "");
+  }
+}
+
+TEST(RenderRival, ErrorsReachTheContext) {
+  Setting s;
+  const auto expect = [&](const std::string& part) {
+    const std::string error = s.Error();
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+  };
+  s.job.options.softras.sigma = -1;
+  EXPECT_FALSE(s.Draw({}).alpha.valid());
+  expect("SoftRas: sigma is -1");
+  s.job.options = {};
+  s.job.size = 0;
+  s.Draw({});
+  expect("for images of 0 pixels a side");
+  s.job.size = kSide;
+  s.Draw(nn::Constant(s.context, s.context.Full({1, 7, 3}, 0.5)));
+  expect("colors has 21 numbers, expected 126");
+  s.positions = nn::Constant(s.context, s.context.Full({42, 3}, 0.5));
+  s.Draw({});
+  expect("positions have the shape [42, 3]");
+}
+
+}  // namespace
+}  // namespace tilegrad::train
