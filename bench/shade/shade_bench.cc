@@ -23,11 +23,14 @@ struct RequestSpec {
   bool color = true, textured = false;
   Filter filter = Filter::kBilinear;
   Lighting lighting = Lighting::kNone;
+  float scale = 1;  // of colours
 };
 
 constexpr RequestSpec kRequests[] = {
     {"silhouette", false},
     {"color"},
+    // So large that images may leave float's range: what looking through them costs.
+    {"large color", true, false, Filter::kBilinear, Lighting::kNone, 0x1p21f},
     {"texture", true, true},
     {"trilinear texture", true, true, Filter::kTrilinear},
     {"Lambert", true, false, Filter::kBilinear, Lighting::kLambert},
@@ -52,6 +55,7 @@ class ShadedBatch {
     d_texture_.resize(texels_.size()), d_uvs_.resize(uvs_.size());
     d_texture_views_ = {d_texture_};
     d_colors_.resize(batch_.colors.size());
+    for (float& color : batch_.colors) color *= request.scale;
     for (std::size_t n = 0; n < batch_.scenes.size(); ++n) AddScene(n);
     if (request.color) d_frame_.color = batch_.d_attributes;
     d_frame_.alpha = batch_.d_alpha;

@@ -12,6 +12,7 @@
 #include "cli/console.h"
 #include "cli/dataset_source.h"
 #include "cli/mesh_options.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/data/build/build.h"
 
@@ -177,7 +178,7 @@ void AddBuildOptions(CLI::App* command, train::BuildOptions* build) {
   command
       ->add_option("--seed", build->split.seed,
                    "seed of the choice of models, the split and procedural shapes")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   command
       ->add_option("--test-share", build->split.test_share,

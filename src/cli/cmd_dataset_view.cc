@@ -8,7 +8,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/file_ending.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "io/image_file.h"
 #include "train/data/dataset.h"
@@ -113,7 +113,7 @@ void AddDatasetView(CLI::App& app, Action* action) {
       ->check(CLI::IsMember({"train", "validation", "test"}));
   command->add_option("--view", options->view, "which view")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
   command->add_option("--out", options->out, "PNG file")
       ->check(FileEnding(".png"))
       ->capture_default_str();

@@ -5,7 +5,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/file_ending.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "fit/figure2.h"
 
@@ -48,7 +48,7 @@ void AddFigure2(CLI::App& app, Action* action) {
       ->check(CLI::Range(8, 2048))
       ->capture_default_str();
   command->add_option("--steps", options->figure.steps, "of each optimisation")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->capture_default_str();
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);

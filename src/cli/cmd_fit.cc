@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_checks.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "fit/run.h"
@@ -210,7 +211,7 @@ void AddWhat(CLI::App* command, Options* o) {
       ->add_option("--hold-out", o->hold_out,
                    "hold out every N-th image to judge by; 0: those of transforms_test.json")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
 }
 
 // --views-per-step for "views_per_step", and so on.
@@ -222,7 +223,7 @@ void AddNumbers(CLI::App* command, FitConfig* config) {
         [&](auto* value) { command->add_option(name, *value, field.help)->capture_default_str(); },
         field.target);
   }
-  command->get_option("--seed")->check(CLI::NonNegativeNumber);
+  command->get_option("--seed")->check(NotNegative());
 }
 
 }  // namespace

@@ -78,7 +78,8 @@ class RenderRun {
         workers_(settings.workers),
         renderer_(workers_),
         guard_(settings.file.force) {
-    if (!settings.view.camera_file.empty()) guard_.AddInput(settings.view.camera_file);
+    const std::string& cameras = settings.view.camera_file;
+    if (!cameras.empty()) guard_.AddInput(io::FindColmapModel(cameras).value_or(cameras));
     for (const std::string& mesh : settings.meshes) guard_.AddInput(mesh);
   }
 

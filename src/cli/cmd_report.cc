@@ -3,6 +3,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/report/report.h"
 
@@ -50,7 +51,8 @@ void AddReport(CLI::App& app, Action* action) {
   command->add_option("--models", options->models, "held-out models to show")
       ->capture_default_str()
       ->check(CLI::Range(0, 200));
-  command->add_option("--out", options->out, "the page [RUN/report.html]");
+  command->add_option("--out", options->out, "the page [RUN/report.html]")
+      ->check(FileEnding(".html"));
   AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return RunReport(*options); }; });
 }

@@ -8,6 +8,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "proof/tradeoff_study.h"
 
@@ -119,7 +120,7 @@ void AddTradeoff(CLI::App& app, Action* action) {
                    "kernels: A = exp(-d^2 / delta), d in NDC (the paper's code: 1/7000)")
       ->delimiter(',')
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   command->add_option("--repetitions", options->repetitions, "timings of each setting")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));

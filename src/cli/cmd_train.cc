@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/trainer.h"
 
@@ -69,7 +70,7 @@ void AddTrain(CLI::App& app, Action* action) {
       ->add_option("--max-minutes", options->max_minutes,
                    "save and stop after this many minutes; 0: no limit")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunTraining(*options); }; });
 }

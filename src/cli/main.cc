@@ -112,6 +112,7 @@ int Run(int argc, char** argv) {
     return code == 0 ? 0 : 2;
   }
   if (const Status status = CheckValues(app); !status.ok()) return Report(status);
+  if (const auto threads = ThreadsFromEnvironment(); !threads.ok()) return Report(threads.status());
   if (const auto limit = ReadLimit(); !limit.ok()) return Report(limit.status());
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
   const Status done = action();

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "base/error.h"
-#include "cli/parse_errors.h"
+#include "cli/option_checks.h"
 #include "io/image_file.h"
 
 namespace tilegrad::cli {

@@ -32,13 +32,12 @@ std::vector<std::string> OptionNames(const CLI::App& app) {
   return names;
 }
 
-// The option among the words that nobody knows.
-std::string Suggestion(const CLI::App& command) {
-  for (const std::string& word : command.remaining()) {
-    if (word.starts_with('-'))
-      return DidYouMean(word.substr(0, word.find('=')), OptionNames(command));
-  }
-  return "";
+// Of the words that nobody takes, the first: what follows an unknown option is its value.
+std::string ExplainExtra(const CLI::App& command) {
+  const std::string word = command.remaining().front();
+  if (!word.starts_with('-')) return fmt::format("\"{}\" is one word too many", word);
+  const std::string name = word.substr(0, word.find('='));
+  return fmt::format("unknown option {}{}", name, DidYouMean(name, OptionNames(command)));
 }
 
 }  // namespace
@@ -63,9 +62,12 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
 
 std::string ExplainParseError(const CLI::App* app, const CLI::Error& error) {
   const auto chosen = app->get_subcommands();
-  const std::string name = "tilegrad" + (chosen.empty() ? "" : " " + chosen[0]->get_name());
-  return fmt::format("{}: {}{}\nSee {} --help\n", name, error.what(),
-                     Suggestion(chosen.empty() ? *app : *chosen[0]), name);
+  const CLI::App& command = chosen.empty() ? *app : *chosen[0];
+  const std::string name = "tilegrad" + (chosen.empty() ? "" : " " + command.get_name());
+  const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
+                     !command.remaining().empty();
+  return fmt::format("{}: {}\nSee {} --help\n", name, extra ? ExplainExtra(command) : error.what(),
+                     name);
 }
 
 }  // namespace tilegrad::cli

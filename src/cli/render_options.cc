@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "cli/mesh_options.h"
+#include "cli/option_checks.h"
 #include "cli/option_words.h"
-#include "cli/parse_errors.h"
 #include "cli/run_folder.h"
 #include "render/scene_fields.h"
 
@@ -25,10 +25,10 @@ void AddViewOptions(CLI::App* command, ViewSettings* view) {
       "--size", view->size,
       "pixels of the pictures, as 512 or 640x480 [what the cameras say; 512 without "
       "--cameras]");
-  auto* cameras = command->add_option(
-      "--cameras", view->camera_file,
-      "a picture for each camera of: a COLMAP model (folder), a NeRF transforms.json, or OpenCV's "
-      "K and poses (.json; docs/cameras.md)");
+  auto* cameras = command->add_option("--cameras", view->camera_file,
+                                      "a picture for each camera of: a COLMAP model or project "
+                                      "(folder), a NeRF transforms.json, or OpenCV's "
+                                      "K and poses (.json; docs/cameras.md)");
   command
       ->add_option("--opencv-centre", view->opencv_centre,
                    "where OpenCV's K has the centre of the first pixel: at (0,0), as OpenCV "
@@ -125,7 +125,7 @@ void AddFileOptions(CLI::App* command, RenderSettings* s) {
   command
       ->add_option("--soft-delta", s->soft_delta,
                    "alpha is the soft silhouette of equation 6 with this delta, above 0")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   command->add_option(
       "--write-cameras", s->write_cameras,
       "write the cameras too: FILE.json as NeRF's transforms, else a COLMAP folder");

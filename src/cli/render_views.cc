@@ -4,9 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 
 #include "base/error.h"
 #include "cli/render_job.h"
@@ -135,6 +132,12 @@ Result<std::vector<CameraView>> FramedViews(const ViewSettings& s, const Mesh& m
   return views;
 }
 
+double Dot(const glm::dvec3& a, const glm::dvec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+glm::dvec3 Cross(const glm::dvec3& a, const glm::dvec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
 }  // namespace
 
 // Far away, a rotation of float digits would put a camera that is written at -R^T t some tenths
@@ -143,14 +146,18 @@ Camera64 MovedCamera(Camera64 camera, const glm::dvec3& by) {
   if (by == glm::dvec3(0)) return camera;
   double* const r = camera.rotation;
   const glm::dvec3 rows[] = {{r[0], r[1], r[2]}, {r[3], r[4], r[5]}, {r[6], r[7], r[8]}};
-  const glm::dvec3 t(camera.translation[0], camera.translation[1], camera.translation[2]);
-  const glm::dvec3 eye = -glm::inverse(glm::transpose(glm::dmat3(rows[0], rows[1], rows[2]))) * t;
-  const glm::dvec3 x = glm::normalize(rows[0]);
-  const glm::dvec3 y = glm::normalize(rows[1] - glm::dot(rows[1], x) * x);
-  const glm::dvec3 units[] = {x, y, glm::cross(x, y)};
+  const double* const t = camera.translation;
+  const glm::dvec3 columns[] = {Cross(rows[1], rows[2]), Cross(rows[2], rows[0]),
+                                Cross(rows[0], rows[1])};  // of the inverse, times the determinant
+  const glm::dvec3 eye =
+      (t[0] * columns[0] + t[1] * columns[1] + t[2] * columns[2]) / -Dot(rows[0], columns[0]);
+  const glm::dvec3 x = rows[0] / std::sqrt(Dot(rows[0], rows[0]));
+  const glm::dvec3 across = rows[1] - Dot(rows[1], x) * x;
+  const glm::dvec3 y = across / std::sqrt(Dot(across, across));
+  const glm::dvec3 units[] = {x, y, Cross(x, y)};
   for (int row = 0; row < 3; ++row) {
     for (int axis = 0; axis < 3; ++axis) r[3 * row + axis] = units[row][axis];
-    camera.translation[row] = -glm::dot(units[row], eye + by);
+    camera.translation[row] = -Dot(units[row], eye + by);
   }
   return camera;
 }

@@ -2,7 +2,9 @@
 #include "cli/run_folder.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -14,16 +16,36 @@
 
 namespace tilegrad::cli {
 
-void AddWorkersOption(CLI::App* command, int* workers) {
-  command
-      ->add_option("--threads,--workers", *workers,
-                   "0: one per core. The result does not depend on it. --workers is the old name")
-      ->envname("TILEGRAD_THREADS")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+namespace {
+
+constexpr const char* kThreadsVariable = "TILEGRAD_THREADS";
+constexpr int kMostThreads = 1024;
+
+}  // namespace
+
+Result<int> ThreadsFromEnvironment() {
+  const char* const text = std::getenv(kThreadsVariable);
+  if (text == nullptr || *text == '\0') return 0;
+  int threads = 0;
+  const char* const end = text + std::strlen(text);
+  const auto [at, error] = std::from_chars(text, end, threads);
+  if (error == std::errc() && at == end && threads >= 0 && threads <= kMostThreads) return threads;
+  return InvalidArgument("{}: \"{}\" must be a number from 0 to {}", kThreadsVariable, text,
+                         kMostThreads);
 }
 
-// Without envname(): CLI11 would give the variable to the commands that were not chosen, too.
+void AddWorkersOption(CLI::App* command, int* workers) {
+  const auto threads = ThreadsFromEnvironment();  // main looks at its error
+  if (threads.ok()) *workers = *threads;
+  command
+      ->add_option("--threads,--workers", *workers,
+                   fmt::format("0: one per core. The result does not depend on it. Default: {} in "
+                               "the environment. --workers is the old name",
+                               kThreadsVariable))
+      ->capture_default_str()
+      ->check(CLI::Range(0, kMostThreads));
+}
+
 void AddReadLimitOption(CLI::App* command) {
   command
       ->add_option_function<std::string>(
@@ -104,6 +126,7 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
   const Path file = run / "run.json";
   std::error_code error;
+  if (!std::filesystem::exists(run, error)) return NotFound("{}: no such folder", run.string());
   if (!std::filesystem::exists(file, error)) {
     return NotFound("{}: not a run folder of tilegrad train: there is no run.json in it",
                     run.string());

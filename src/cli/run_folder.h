@@ -16,7 +16,11 @@ struct RunOptions {
   int workers = 0;
 };
 void AddRunOptions(CLI::App* command, RunOptions* options);
+// --threads. CLI11's envname() would give the variable to commands that were not chosen, and blame
+// the option.
 void AddWorkersOption(CLI::App* command, int* workers);
+// TILEGRAD_THREADS; 0 if it is not set.
+Result<int> ThreadsFromEnvironment();
 // --read-limit (base/read_budget.h): the same as its variable of the environment.
 void AddReadLimitOption(CLI::App* command);
 // --force, for base/output_guard.h.

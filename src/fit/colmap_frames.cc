@@ -51,15 +51,6 @@ Status CheckMasks(const std::vector<TransformsFrame>& frames) {
 
 }  // namespace
 
-std::optional<Path> FindColmapModel(const Path& folder) {
-  for (const Path& root : {folder, folder / "colmap"}) {
-    for (const Path& model : {root, root / "sparse/0", root / "sparse"}) {
-      if (IsThere(model / "cameras.txt") || IsThere(model / "cameras.bin")) return model;
-    }
-  }
-  return std::nullopt;
-}
-
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
   TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model));
   TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));

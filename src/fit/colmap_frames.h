@@ -7,15 +7,11 @@
 //   <project>/masks/a/1.jpg.png                  as COLMAP names masks, or masks/a/1.png
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "fit/transforms.h"
 
 namespace tilegrad::train {
-
-// `folder` is the project or the folder of the model itself. The model that is in it, or nothing.
-std::optional<Path> FindColmapModel(const Path& folder);
 
 // Images are looked for in folders `images`, and by their names alone, beside the model and up to
 // two folders above it. Either all images have a mask or none. Errors name the file.

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "fit/colmap_frames.h"
+#include "io/camera_file.h"
 #include "io/image_file.h"
 #include "io/orientation.h"
 #include "train/data/cutout.h"
@@ -117,7 +118,7 @@ Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder) {
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     if (std::filesystem::exists(folder / name, error)) return ReadTransforms(folder / name);
   }
-  if (const auto model = FindColmapModel(folder)) return ReadColmapFrames(*model);
+  if (const auto model = io::FindColmapModel(folder)) return ReadColmapFrames(*model);
   if (std::filesystem::exists(DatasetInfoPath(folder), error)) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
                            folder.string());

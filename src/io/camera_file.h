@@ -13,6 +13,7 @@
 // distortion is an error that explains how to remove it: the renderer's rays are straight.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -37,7 +38,12 @@ struct CameraFileOptions {
 // the file and the line or frame. At least one camera.
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options);
 
-// Whose sizes and pixel centres need no options.
+// The COLMAP model in `folder`, which is the model's own or its project's (sparse/0,
+// colmap/sparse/0,
+// ...); or nothing.
+std::optional<Path> FindColmapModel(const Path& folder);
+
+// Of what FindColmapModel finds; sizes and pixel centres need no options.
 Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder);
 
 // Writers for what LoadCameras reads; numbers come back as they were.

@@ -254,18 +254,32 @@ Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras
 
 }  // namespace
 
-Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
+std::optional<Path> FindColmapModel(const Path& folder) {
   std::error_code error;
-  const bool text = std::filesystem::exists(folder / "cameras.txt", error);
-  if (!text && !std::filesystem::exists(folder / "cameras.bin", error)) {
-    return NotFound("{}: not a COLMAP model: neither cameras.txt nor cameras.bin is in it",
-                    folder.string());
+  for (const Path& root : {folder, folder / "colmap"}) {
+    for (const Path& model : {root, root / "sparse/0", root / "sparse"}) {
+      for (const char* file : {"cameras.txt", "cameras.bin"}) {
+        if (std::filesystem::is_regular_file(model / file, error)) return model;
+      }
+    }
   }
-  TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(folder / "cameras.txt")
-                                              : ReadCamerasBinary(folder / "cameras.bin"));
-  TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(folder / "images.txt", cameras)
-                                   : ReadImagesBinary(folder / "images.bin", cameras));
-  if (views.empty()) return DataLoss("{}: no images in it", folder.string());
+  return std::nullopt;
+}
+
+Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
+  const auto model = FindColmapModel(folder);
+  if (!model) {
+    return NotFound(
+        "{}: not a COLMAP model: neither cameras.txt nor cameras.bin is in it or its sparse/0",
+        folder.string());
+  }
+  std::error_code error;
+  const bool text = std::filesystem::is_regular_file(*model / "cameras.txt", error);
+  TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(*model / "cameras.txt")
+                                              : ReadCamerasBinary(*model / "cameras.bin"));
+  TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(*model / "images.txt", cameras)
+                                   : ReadImagesBinary(*model / "images.bin", cameras));
+  if (views.empty()) return DataLoss("{}: no images in it", model->string());
   return views;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string_view>
 
 #include "base/error.h"
@@ -153,6 +154,10 @@ Result<CameraView> Named(std::string name, const Result<Camera64>& camera, Image
 Result<double> NerfFocal(const Frame& frame, const char* focal, const char* angle, int pixels) {
   if (frame.Find(focal) != nullptr) return frame.Number(focal);
   TILEGRAD_ASSIGN(const double radians, frame.Number(angle));
+  if (!(radians > 0 && radians < std::numbers::pi)) {
+    return DataLoss("{}: \"{}\" is {}; a field of view is above 0 and below pi (radians)",
+                    frame.place, angle, radians);
+  }
   return 0.5 * pixels / std::tan(0.5 * radians);
 }
 

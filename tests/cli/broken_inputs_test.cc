@@ -125,7 +125,7 @@ TEST_F(BrokenInputs, ConfigurationsAndCommandLines) {
   ExpectRefused(Train(Write("range.toml", "[schedule]\nbatch = -1\n"), Data()), "line 2",
                 "schedule.batch");
   ExpectRefused(Train(folder_ / "none.toml", Data()), "none.toml");
-  ExpectRefused(Train(Config(), folder_ / "nowhere"), "nowhere: not a folder of tilegrad dataset");
+  ExpectRefused(Train(Config(), folder_ / "nowhere"), "nowhere: no such folder");
   ExpectRefused("train --config " + Config() + " --data " + Data().string() + " --out " +
                     RunFolder().string(),
                 "--resume");

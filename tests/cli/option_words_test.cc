@@ -83,14 +83,25 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {"dataset_view", "did you mean dataset-view or dataset?"},
            {"--hlep", "did you mean --help?"},
            {"photo.png", "unknown command \"photo.png\"; see"},
-           {render + "--output x.png", "--output (did you mean --outputs or --out?)"},
-           {render + "--colour red", "tilegrad render: The following"},
+           {render + "--output x.png",
+            "unknown option --output (did you mean --outputs or --out?)"},
+           {render + "--colour red", "tilegrad render: unknown option --colour\n"},
+           {"dataset procedural", "\"procedural\" is one word too many"},
+           {"figure2 --steps 0", "0 must be a number above 0"},
+           {"dataset-view --data d --view -1", "-1 must be a number, 0 or above"},
+           {"report --out page.pdf", "page.pdf: it is written as .html"},
            {render + "--backgroud 1 1 1", "did you mean --background?"},
            {render + "--fvo=30", "did you mean --fov?"},
            {render + "--shading fancy", "fancy is not one of lambert,none,phong,sh"},
            {"views " + In("a.glb") + " --up w --out " + In("v"), "w is not one of x,y,z"},
            {render + "--size", "See tilegrad render --help"}}) {
     ExpectRefused(line, 2, part);
+  }
+  for (const std::string& line : {std::string("info"), render}) {
+    const Outcome outcome = RunProgram(line, "TILEGRAD_THREADS=many ");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_NE(outcome.output.find("TILEGRAD_THREADS: \"many\" must be"), std::string::npos)
+        << outcome.output;
   }
   ExpectRefused("help", 0, "Usage: tilegrad");
   ExpectRefused("version", 0, ".");

@@ -140,6 +140,34 @@ TEST_F(Outputs, DatasetsAndRuns) {
              "--force");
 }
 
+TEST_F(Outputs, PredictionsScoresAndReports) {
+  ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 2 --out d");
+  ExpectDone("train --config " TILEGRAD_CONFIGS
+             "/quick.toml --data d --out r --set schedule.steps=1 --set schedule.batch=2 --set "
+             "network.channels=2 --set network.code=8 --set network.hidden1=8 --set "
+             "network.hidden2=8 --set network.template_level=1");
+  ExpectDone("dataset-view --data d --split train --out p/x.png");
+  const std::string predict = "predict --run r --refine 0 --out p ";
+  Write("p/x_predicted.glb", std::string("mine"));
+  ExpectKept("p/x_predicted.glb", predict + "p/x.png", "--force");
+  EXPECT_FALSE(Exists("p/x_turntable.png"));
+  ExpectDone(predict + "p/x.png --force");
+  ExpectDone(predict + "p/x.png");
+  // A picture that is read here, and has the name of a result.
+  std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y.png");
+  std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y_turntable.png");
+  ExpectKept("p/y_turntable.png", predict + "--force p/y.png p/y_turntable.png", "is read here");
+  for (const auto& [file, command] :
+       {std::pair("r/eval.md", "eval --run r --views-per-model 1"),
+        std::pair("r/report.html", "report --run r --models 1"),
+        std::pair("page.html", "report --run r --models 1 --out page.html")}) {
+    Write(file, std::string("mine"));
+    ExpectKept(file, command, "--force");
+    ExpectDone(std::string(command) + " --force");
+    ExpectDone(command);
+  }
+}
+
 TEST_F(Outputs, PagesAndStudies) {
   Write("figure2.svg", std::string("mine"));
   ExpectKept("figure2.svg", "figure2 --size 8 --steps 1", "--force");

@@ -71,6 +71,27 @@ TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
   for (const char* name : {"report.html", "timelapse.png", "transforms_fitted.json"}) {
     EXPECT_TRUE(std::filesystem::exists(job.out / name)) << name;
   }
+  EXPECT_NE(ReadText(job.out / "report.html")->find("lighting = none\n"), std::string::npos);
+}
+
+// In the words of the options, not as numbers.
+TEST(FitConfigText, HasTheNamesOfChoices) {
+  FitConfig config;
+  const auto has = [&](const std::string& line) {
+    EXPECT_NE(DescribeConfig(config).find("\n" + line + "\n"), std::string::npos) << line;
+  };
+  for (const auto& [lighting, name] :
+       {std::pair(Lighting::kNone, "none"), std::pair(Lighting::kLambert, "lambert"),
+        std::pair(Lighting::kPhong, "phong"), std::pair(Lighting::kSphericalHarmonics, "sh")}) {
+    config.lighting = lighting;
+    has(std::string("lighting = ") + name);
+  }
+  config.filter = Filter::kTrilinear;
+  has("filter = trilinear");
+  config.filter = Filter::kBilinear;
+  has("filter = bilinear");
+  config.parameters[Parameter::kTexture] = config.parameters[Parameter::kPositions] = true;
+  has("parameters = positions,texture");
 }
 
 TEST_F(Fit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -156,6 +157,22 @@ TEST_F(CameraFiles, ColmapImagesWithoutPoints) {
   ExpectMessage(io::LoadColmapCameras(folder_).status(), "images.txt: line 3", "NAME");
 }
 
+// Where COLMAP and what calls it put models; the outermost one counts.
+TEST_F(CameraFiles, ColmapProjects) {
+  const std::string images = "1 1 0 0 0 0 0 0 1 a.png\n\n";
+  int width = 700;
+  for (const std::string place :
+       {"colmap/sparse", "colmap/sparse/0", "colmap", "sparse", "sparse/0", "."}) {
+    Write(place + "/images.txt", images);
+    Write(place + "/cameras.txt", fmt::format("1 SIMPLE_PINHOLE {} 480 500 320 240\n", ++width));
+    const auto got = io::LoadCameras(folder_, {});
+    ASSERT_TRUE(got.ok()) << got.status().message();
+    EXPECT_EQ(got->at(0).size.width, width) << place;
+  }
+  std::filesystem::create_directories(folder_ / "empty");
+  ExpectMessage(io::LoadCameras(folder_ / "empty", {}).status(), "empty", "cameras.txt", "sparse");
+}
+
 constexpr const char* kPose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
 
 TEST_F(CameraFiles, LensesThatBendRays) {
@@ -224,6 +241,11 @@ TEST_F(CameraFiles, BrokenJson) {
   ExpectRefused("a.json", "{\"w\": 4, \"h\": 0.5, \"frames\": [{}]}", "pixels");
   ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"frames\": [{}]}", "transform_matrix");
   ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"k1\": 0.1, \"frames\": [{}]}", "undistort");
+  for (const char* angle : {"0", "-0.7", "40", "3.15"}) {
+    ExpectRefused("a.json",
+                  fmt::format("{{\"w\": 4, \"h\": 4, \"camera_angle_x\": {}, {}}}", angle, kPose),
+                  "radians");
+  }
   ExpectRefused("a.json", R"({"w": 4, "h": 4, "fl_x": "x", "transform_matrix":
     [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})",
                 "fl_x");

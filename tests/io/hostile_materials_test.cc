@@ -61,6 +61,29 @@ TEST_F(HostileMaterials, OfObjFilesAreNamed) {
   }
 }
 
+// Other formats name the line; OFF has no word for a colour that is none, and leaves it out.
+TEST_F(HostileMaterials, OfOtherFormatsAreNamed) {
+  const std::string object =
+      "OBJECT poly\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x0\nmat 0\nrefs 3\n0 0 0\n"
+      "1 0 0\n2 0 0\nkids 0\n";
+  for (const char* numbers : {"rgb nan 0 0 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0",
+                              "rgb 1e39 0 0 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0",
+                              "rgb 1 0 0 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans -inf"}) {
+    const Path file =
+        Write("a.ac", std::string("AC3Db\nMATERIAL \"m\" ") + numbers + "\n" + object);
+    ExpectMessage(LoadMesh(file).status(), "a.ac: line 2", "finite");
+  }
+  const std::string corners = "v 0 0 0 nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  ExpectMessage(LoadMesh(Write("a.obj", corners)).status(), "a.obj: line 1", "finite");
+  for (const char* color : {"nan 0 0", "0 inf 0 1", "1e39 0 0"}) {
+    const auto loaded = LoadMesh(
+        Write("a.off", std::string("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 ") + color + "\n"));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_TRUE(loaded->mesh.corner_colors.empty());
+    EXPECT_EQ(loaded->warnings.size(), 1u);
+  }
+}
+
 TEST_F(HostileMaterials, OfGltfFilesAreNamed) {
   ASSERT_TRUE(LoadMesh(GlbWithFactor(0, "0.25")).ok());
   for (const char* number : {"1e39", "-1e39", "1e300"}) {

@@ -187,6 +187,71 @@ TEST(Jpeg, OfThreeComponentsIsYCbCrUnlessAdobeSaysRgb) {
   ExpectColor(DecodeImage(FlatJpeg({76, 85, 255}).Make(Adobe(0)), "a.jpg"), {76, 85, 255});
 }
 
+std::string PngChunk(const std::string& type, const std::string& body) {
+  const std::string both = type + body;
+  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(both.data()), both.size());
+  return Big(static_cast<std::uint32_t>(body.size()), 4) + both +
+         Big(static_cast<std::uint32_t>(crc), 4);
+}
+
+// Two columns, two rows of one kind of PNG; `rows` begin with their filter, which is none.
+Bytes SmallPng(int depth, int color_type, const std::string& rows, const std::string& chunks = "",
+               bool interlaced = false) {
+  Bytes packed(compressBound(rows.size()));
+  uLongf size = packed.size();
+  compress(packed.data(), &size, reinterpret_cast<const Bytef*>(rows.data()), rows.size());
+  const std::string header = Big(2, 4) + Big(2, 4) + static_cast<char>(depth) +
+                             static_cast<char>(color_type) + std::string(2, '\0') +
+                             static_cast<char>(interlaced);
+  return ToBytes("\x89PNG\r\n\x1a\n" + PngChunk("IHDR", header) + chunks +
+                 PngChunk("IDAT", {packed.begin(), packed.begin() + static_cast<long>(size)}) +
+                 PngChunk("IEND", ""));
+}
+
+// Red, green / blue, white in every way; greys are black, middle / white, quarter.
+TEST(Png, OfEveryKind) {
+  using namespace std::string_literals;
+  using Pixels = std::vector<std::uint8_t>;
+  const std::string r = "\xff\0\0"s, g = "\0\xff\0"s, b = "\0\0\xff"s, w = "\xff\xff\xff"s,
+                    zero = "\0"s, palette = PngChunk("PLTE", r + g + b + w);
+  const auto doubled = [](const std::string& text) {
+    std::string out;
+    for (const char c : text) out += {c, c};
+    return out;
+  };
+  const Pixels colors = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
+  const Pixels with_alpha = {255, 0, 0, 128, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
+  const Pixels keyed = {255, 0, 0, 0, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255};
+  struct Case {
+    const char* what;
+    Bytes png;
+    Pixels want;
+  };
+  const std::string rows = zero + r + g + zero + b + w;
+  for (const Case& c : std::vector<Case>{
+           {"RGB", SmallPng(8, 2, rows), colors},
+           {"16 bits", SmallPng(16, 2, zero + doubled(r + g) + zero + doubled(b + w)), colors},
+           {"palette", SmallPng(8, 3, "\0\0\1\0\2\3"s, palette), colors},
+           {"palette of 2 bits", SmallPng(2, 3, "\0\x10\0\xb0"s, palette), colors},
+           {"palette with alpha",
+            SmallPng(8, 3, "\0\0\1\0\2\3"s, palette + PngChunk("tRNS", "\x80")), with_alpha},
+           {"transparent red",
+            SmallPng(8, 2, rows, PngChunk("tRNS", Big(255, 2) + Big(0, 2) + Big(0, 2))), keyed},
+           {"interlaced", SmallPng(8, 2, zero + r + zero + g + zero + b + w, "", true), colors},
+           {"grey", SmallPng(8, 0, "\0\0\x80\0\xff\x40"s), {0, 128, 255, 64}},
+           {"grey of 1 bit", SmallPng(1, 0, "\0\x80\0\x40"s), {255, 0, 0, 255}},
+           {"grey of 2 bits", SmallPng(2, 0, "\0\x10\0\xb0"s), {0, 85, 170, 255}},
+           {"grey of 4 bits", SmallPng(4, 0, "\0\x0f\0\x88"s), {0, 255, 136, 136}},
+           {"grey of 16 bits", SmallPng(16, 0, "\0\0\0\x80\0\0\xff\xff\x40\0"s), {0, 128, 255, 64}},
+           {"grey and alpha",
+            SmallPng(8, 4, "\0\x80\xff\x80\x80\0\xff\0\x40\xff"s),
+            {128, 255, 128, 128, 255, 0, 64, 255}}}) {
+    const auto image = DecodeImage(c.png, "a.png");
+    ASSERT_TRUE(image.ok()) << c.what << ": " << image.status().message();
+    EXPECT_EQ(image->pixels, c.want) << c.what;
+  }
+}
+
 TEST(Image, GreyBecomesColor) {
   ImageU8 grey(1, 1, 2);
   grey.pixels = {70, 90};

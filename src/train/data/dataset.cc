@@ -22,6 +22,8 @@ Result<Dataset> Dataset::Open(const Path& folder) {
   Dataset dataset;
   dataset.folder_ = folder;
   std::error_code error;
+  if (!std::filesystem::exists(folder, error))
+    return NotFound("{}: no such folder", folder.string());
   if (!std::filesystem::exists(DatasetInfoPath(folder), error)) {
     return NotFound("{}: not a folder of tilegrad dataset: there is no dataset.json in it",
                     folder.string());
