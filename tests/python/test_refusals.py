@@ -113,7 +113,7 @@ class Memory(FolderTest):
                     load(self.folder / name)
                 load(self.folder / name, max_bytes=20 << 20)
             with mock.patch.dict(os.environ, {"TILEGRAD_READ_LIMIT": "many"}):
-                with self.assertRaisesRegex(ValueError, "LIMIT is \"many\""):
+                with self.assertRaisesRegex(ValueError, "LIMIT: \"many\""):
                     load(self.folder / name)
 
 
