@@ -23,7 +23,7 @@ struct NetworkConfig {
   std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
   bool symmetric = false;           // offsets are the mean of themselves and their mirror image at
                                     // x = 0, so every prediction is symmetric there
-  bool fc_norm = true;       // batch norm after hidden fully connected layers
+  bool fc_norm = true;              // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
