@@ -12,6 +12,7 @@
 #include "scene/keep_faces.h"
 #include "scene/shapes.h"
 #include "train/data/sources/package_textures.h"
+#include "train/data/sources/split_text.h"
 #include "train/data/sources/wheels.h"
 #include "train/data/split.h"
 
@@ -48,16 +49,6 @@ struct Row {
   std::string_view textures;      // package_textures.h
   std::vector<Wheel> wheels;
 };
-
-std::vector<std::string_view> SplitText(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (std::size_t end; (end = text.find(separator)) != std::string_view::npos;) {
-    parts.push_back(text.substr(0, end));
-    text.remove_prefix(end + 1);
-  }
-  parts.push_back(text);
-  return parts;
-}
 
 Result<std::vector<Row>> ReadRows(const PackageList& list) {
   std::vector<Row> rows;

@@ -7,6 +7,7 @@
 #include "io/mesh_file.h"
 #include "io/sh3f.h"
 #include "train/data/sources/model_source.h"
+#include "train/data/sources/split_text.h"
 #include "train/data/sources/sweethome3d_list.h"
 
 namespace tilegrad::train {
@@ -21,16 +22,6 @@ struct Library {
 struct Row {
   std::string class_name, furniture_library, license, name, model, creator;
 };
-
-std::vector<std::string_view> SplitText(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (std::size_t end; (end = text.find(separator)) != std::string_view::npos;) {
-    parts.push_back(text.substr(0, end));
-    text.remove_prefix(end + 1);
-  }
-  parts.push_back(text);
-  return parts;
-}
 
 std::vector<Row> ReadList() {
   std::vector<Row> rows;

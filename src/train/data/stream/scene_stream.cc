@@ -46,25 +46,28 @@ std::span<const float> Flat(const std::vector<glm::vec3>& values) {
 
 }  // namespace
 
-Result<StreamMeshes> LoadStreamMeshes(const Dataset& dataset, const std::vector<int>& models,
-                                      std::int64_t max_faces, const Workers& workers,
-                                      const ProgressSink& progress, const StopFlag& stop) {
-  StreamMeshes out;
-  out.meshes.resize(models.size());
+Result<std::vector<ColoredMesh>> LoadStreamMeshes(const Dataset& dataset,
+                                                  const std::vector<int>& models,
+                                                  std::int64_t max_faces, const Workers& workers,
+                                                  const ProgressSink& progress,
+                                                  const StopFlag& stop) {
+  std::vector<ColoredMesh> out(models.size());
   std::vector<Status> failures(models.size());
   std::mutex mutex;
   std::uint64_t done = 0;
+  std::size_t bytes = 0;
   workers.For(models.size(), [&](std::size_t i, std::size_t) {
     if (stop) return;
     auto mesh = LoadOne(dataset, models[i], max_faces);
     failures[i] = mesh.status();
-    if (mesh.ok()) out.meshes[i] = *std::move(mesh);
+    if (mesh.ok()) out[i] = *std::move(mesh);
     const std::scoped_lock lock(mutex);
-    if (progress) progress({"loading meshes", ++done, models.size(), ""});
+    bytes += BytesOf(out[i]);
+    if (progress)
+      progress({"loading meshes", ++done, models.size(), fmt::format("{:.1f} MB", bytes / 1e6)});
   });
   if (stop) return Cancelled("stopped while loading the dataset");
   for (const Status& failure : failures) TILEGRAD_TRY(failure);
-  for (const ColoredMesh& mesh : out.meshes) out.bytes += BytesOf(mesh);
   return out;
 }
 
@@ -100,8 +103,8 @@ void SceneStream::Worker::Average(std::size_t n, int samples, int size, std::spa
   }
 }
 
-SceneStream::SceneStream(const StreamConfig& config, StreamMeshes meshes, const DatasetInfo& info,
-                         std::uint64_t seed, const Workers& workers)
+SceneStream::SceneStream(const StreamConfig& config, std::vector<ColoredMesh> meshes,
+                         const DatasetInfo& info, std::uint64_t seed, const Workers& workers)
     : config_(config),
       meshes_(std::move(meshes)),
       rule_(info.camera),
@@ -120,7 +123,7 @@ Result<std::span<const float>> SceneStream::Render(int model, std::uint64_t posi
                                                    std::size_t worker, std::span<Camera> cameras) {
   const double start = ThreadSeconds();
   Worker& w = *workers_[worker];
-  const ColoredMesh& mesh = meshes_.meshes[static_cast<std::size_t>(model)];
+  const ColoredMesh& mesh = meshes_[static_cast<std::size_t>(model)];
   Rng rng(seed_ ^ kSceneStream, position);
   DrawObject(config_, mesh, static_cast<float>(rule_.half_extent), rng, &w.object);
   const std::array<Light, 2> lights = DrawLights(config_, rng);
@@ -156,7 +159,7 @@ double SceneStream::TakeSeconds() {
 }
 
 Result<ImageU8> SceneStream::Sheet(int objects, int views) {
-  const auto count = static_cast<std::size_t>(objects), models = meshes_.meshes.size();
+  const auto count = static_cast<std::size_t>(objects), models = meshes_.size();
   const std::size_t plane = static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_);
   std::vector<Camera> cameras(static_cast<std::size_t>(views));
   std::vector<ImageU8> pictures;

@@ -18,20 +18,18 @@
 
 namespace tilegrad::train {
 
-// The meshes of some models, in memory.
-struct StreamMeshes {
-  std::vector<ColoredMesh> meshes;
-  std::size_t bytes = 0;
-};
-// In the order of `models`. Errors: a model file that cannot be read, a model without a mesh (of
-// the source "nmr"). Stops between models when `stop` is set.
-Result<StreamMeshes> LoadStreamMeshes(const Dataset& dataset, const std::vector<int>& models,
-                                      std::int64_t max_faces, const Workers& workers,
-                                      const ProgressSink& progress, const StopFlag& stop);
+// The meshes of some models, in memory, in the order of `models`; progress notes how much they
+// take. Errors: a model file that cannot be read, a model without a mesh (of the source "nmr").
+// Stops between models when `stop` is set.
+Result<std::vector<ColoredMesh>> LoadStreamMeshes(const Dataset& dataset,
+                                                  const std::vector<int>& models,
+                                                  std::int64_t max_faces, const Workers& workers,
+                                                  const ProgressSink& progress,
+                                                  const StopFlag& stop);
 
 class SceneStream {
  public:
-  SceneStream(const StreamConfig& config, StreamMeshes meshes, const DatasetInfo& info,
+  SceneStream(const StreamConfig& config, std::vector<ColoredMesh> meshes, const DatasetInfo& info,
               std::uint64_t seed, const Workers& workers);
   ~SceneStream();
   SceneStream(SceneStream&&) noexcept;
@@ -54,7 +52,7 @@ class SceneStream {
  private:
   struct Worker;
   StreamConfig config_;
-  StreamMeshes meshes_;
+  std::vector<ColoredMesh> meshes_;
   CameraRule rule_;
   int size_;
   std::uint64_t seed_;

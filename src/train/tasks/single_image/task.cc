@@ -125,7 +125,7 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
 Status SingleImageTask::LoadMeshes(const TaskStart& start) {
   if (config_.stream.share <= 0) return {};
   TILEGRAD_ASSIGN(
-      StreamMeshes meshes,
+      std::vector<ColoredMesh> meshes,
       LoadStreamMeshes(*dataset_, dataset_->Select(Split::kTrain), config_.stream.max_faces,
                        start.context.workers(), start.progress, start.stop));
   stream_.emplace(config_.stream, std::move(meshes), dataset_->info(),

@@ -34,7 +34,9 @@ ColoredMesh Ball() {
   return out;
 }
 
-StreamMeshes Balls(std::size_t count) { return {std::vector<ColoredMesh>(count, Ball()), 0}; }
+std::vector<ColoredMesh> Balls(std::size_t count) {
+  return std::vector<ColoredMesh>(count, Ball());
+}
 
 DatasetInfo Info(int size) {
   DatasetInfo info;
