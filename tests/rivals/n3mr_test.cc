@@ -230,15 +230,8 @@ TEST(N3mr, OddFacesAreLeftOut) {
   Rng rng(2);
   const auto sound = RandomCorners<float>(3, 0.5, &rng);
   const auto d_alpha = Random<float>(kSide * kSide, -1, 1, &rng);
-  std::vector<float> all = sound;
-  const float inf = INFINITY, nan = NAN;
-  for (const std::vector<float>& odd : {std::vector<float>{0, 0, 2, 0.5f, 0.5f, 2, -0.5f, -0.5f, 2},
-                                        {nan, 0, 2, 1, 0, 2, 0, 1, 2},
-                                        {0, 0, 2, inf, 0, 2, 0, 1, 2},
-                                        {0, 0, 0, 1, 0, 0, 0, 1, 0},
-                                        {1e30f, 0, 2, -1e30f, 1e30f, 2, -1e30f, -1e30f, 2}}) {
-    all.insert(all.end(), odd.begin(), odd.end());
-  }
+  std::vector<float> all = WithOddFaces(sound);
+  for (const float v : {0, 0, 0, 1, 0, 0, 0, 1, 0}) all.push_back(v);  // at the eye
   const auto alone = Fast(sound, kSide, {}, d_alpha), mixed = Fast(all, kSide, {}, d_alpha);
   EXPECT_EQ(alone.alpha, mixed.alpha);
   std::vector<float> want = alone.d_corners;

@@ -88,4 +88,18 @@ std::vector<T> RandomCorners(std::size_t faces, double extent, Rng* rng) {
   return out;
 }
 
+// `sound` and after it faces that no rule draws: without area, without numbers, without bound.
+inline std::vector<float> WithOddFaces(std::vector<float> sound) {
+  const float inf = INFINITY, nan = NAN;
+  for (const std::vector<float>& odd :
+       {std::vector<float>{0, 0, 2, 0.5f, 0.5f, 2, -0.5f, -0.5f, 2},  // collinear
+        {nan, 0, 2, 1, 0, 2, 0, 1, 2},
+        {0, 0, 2, inf, 0, 2, 0, 1, 2},
+        {0, 0, nan, 1, 0, 2, 0, 1, 2},
+        {1e30f, 0, 2, -1e30f, 1e30f, 2, -1e30f, -1e30f, 2}}) {
+    sound.insert(sound.end(), odd.begin(), odd.end());
+  }
+  return sound;
+}
+
 }  // namespace tilegrad::rivals::test
