@@ -16,7 +16,6 @@ namespace tilegrad::train {
 namespace {
 
 constexpr int kColorViews = 4;  // that colours are compared in
-
 // `count` of `views`, evenly spread: 0, step, 2 step, ...
 std::vector<int> SpreadViews(int views, int count) {
   std::vector<int> out;
@@ -26,6 +25,8 @@ std::vector<int> SpreadViews(int views, int count) {
 
 // The training models, for the baselines that know nothing else.
 struct TrainingShapes {
+  std::vector<std::vector<std::uint8_t>> grids;  // of each shape, once
+  // Of those whose pictures are searched, in the order of `index`.
   std::vector<Shape> shapes;
   std::vector<std::vector<std::uint8_t>> color_images;  // [kColorViews][4][size][size] each
   ImageIndex index;
@@ -57,7 +58,7 @@ class Evaluator {
       TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
       template_scores_.push_back(Compare(undeformed, truth));
       single_scores_.push_back(Compare(single, truth));
-      retrieval_scores_.push_back(ScoreRetrieval(data, truth));
+      if (Retrieves()) retrieval_scores_.push_back(ScoreRetrieval(data, truth));
       TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], data, truth));
       predicted_scores_.push_back(score);
       const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
@@ -90,27 +91,38 @@ class Evaluator {
   Status LoadTrainingShapes() {
     const auto train = data_.Select(Split::kTrain);
     if (train.empty()) return InvalidArgument("the dataset has no training models");
+    const std::size_t searched =
+        Retrieves()
+            ? std::min<std::size_t>(train.size(), static_cast<std::size_t>(job_.retrieval_models))
+            : 0;
+    std::set<std::pair<int, std::string>> seen;
     for (std::size_t i = 0; i < train.size(); ++i) {
       TILEGRAD_TRY(Tick("training shapes", i, train.size()));
-      TILEGRAD_ASSIGN(const ModelData data, data_.Load(train[i]));
-      TILEGRAD_ASSIGN(Shape shape, TruthShape(data));
-      train_.shapes.push_back(std::move(shape));
-      train_.color_images.push_back(Images(data, color_views_));
-      train_.index.Add(data.images, data_.info().views, data_.info().image_size);
+      TILEGRAD_ASSIGN(ModelData data, data_.Load(train[i]));
+      // The i-th is searched where the rounded share of those up to it goes up.
+      if ((i + 1) * searched / train.size() > i * searched / train.size())
+        TILEGRAD_TRY(AddSearched(data));
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
+      if (seen.emplace(info.class_index, ShapeOf(info)).second)
+        train_.grids.push_back(std::move(data.occupancy));
     }
+    out_.retrieval_models = static_cast<int>(searched);
+    return {};
+  }
+
+  // A training model's own picture would be found.
+  bool Retrieves() const { return job_.split != Split::kTrain && job_.retrieval_models > 0; }
+
+  Status AddSearched(const ModelData& data) {
+    TILEGRAD_ASSIGN(Shape shape, TruthShape(data));
+    train_.shapes.push_back(std::move(shape));
+    train_.color_images.push_back(Images(data, color_views_));
+    train_.index.Add(data.images, data_.info().views, data_.info().image_size);
     return {};
   }
 
   Result<Shape> MakeSingleShape() {
-    const auto train = data_.Select(Split::kTrain);
-    std::vector<std::vector<std::uint8_t>> grids;
-    std::set<std::pair<int, std::string>> seen;
-    for (std::size_t i = 0; i < train.size(); ++i) {
-      const ModelInfo& info = data_.models()[static_cast<std::size_t>(train[i])];
-      if (seen.emplace(info.class_index, ShapeOf(info)).second)
-        grids.push_back(train_.shapes[i].occupancy);
-    }
-    SingleShape best = BestSingleShape(grids);
+    SingleShape best = BestSingleShape(train_.grids);
     out_.shape_threshold = best.threshold;
     // The grid itself is scored, not a voxelization of its surface, which might differ by rounding.
     TILEGRAD_ASSIGN(Shape shape, ShapeOf(VoxelSurface(best.occupancy, kOccupancyResolution), 1));
@@ -200,9 +212,10 @@ class Evaluator {
       out_.class_models.push_back(count);
     }
     out_.rows = {Row("undeformed template", template_scores_, members),
-                 Row("best single shape", single_scores_, members),
-                 Row("nearest training picture", retrieval_scores_, members),
-                 Row("tilegrad", predicted_scores_, members)};
+                 Row("best single shape", single_scores_, members)};
+    if (Retrieves())
+      out_.rows.push_back(Row("nearest training picture", retrieval_scores_, members));
+    out_.rows.push_back(Row("tilegrad", predicted_scores_, members));
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
     out_.dataset_source = data_.info().source;

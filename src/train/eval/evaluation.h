@@ -43,7 +43,9 @@ struct Evaluation {
   std::vector<int> class_models;     // how many
   std::vector<EvaluationRow> rows;   // baselines, and last the prediction
   std::vector<ModelScore> models;    // of the prediction
-  double shape_threshold = 0;    // share of training models above which the single shape is solid
+  double shape_threshold = 0;  // share of training models above which the single shape is solid
+  int retrieval_models =
+      0;  // whose pictures the row "nearest training picture" chose from; 0: no such row
   int unusable_predictions = 0;  // without extent or area: they score 0
 };
 

@@ -73,9 +73,14 @@ std::string Caption(const Evaluation& evaluation) {
 std::string Notes(const Evaluation& evaluation) {
   std::string notes = fmt::format(
       "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
-      "that scores best on the training models. Nearest training picture: the shape and the "
-      "colours of the training model that has the picture most like the input.",
+      "that scores best on the training models.",
       100 * evaluation.shape_threshold);
+  if (evaluation.retrieval_models > 0) {
+    notes += fmt::format(
+        " Nearest training picture: the shape and the colours of that of {} training models which "
+        "has the picture most like the input.",
+        evaluation.retrieval_models);
+  }
   if (HasAny(evaluation, &Score::carved_iou)) {
     notes +=
         " Carved IoU: mean over classes of the IoU with voxels by the paper's rule (binvox -cb -dc "
@@ -109,6 +114,7 @@ Json ToJson(const Evaluation& evaluation) {
                {"views_per_model", evaluation.views_per_model},
                {"f_score_threshold", kFScoreThreshold},
                {"shape_threshold", evaluation.shape_threshold},
+               {"retrieval_models", evaluation.retrieval_models},
                {"unusable_predictions", evaluation.unusable_predictions},
                {"classes", evaluation.classes},
                {"class_models", evaluation.class_models},

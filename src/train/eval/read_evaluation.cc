@@ -99,6 +99,8 @@ Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   fields.Read("split", &out.split);
   fields.Read("views_per_model", 1, most, &out.views_per_model);
   fields.Read("shape_threshold", &out.shape_threshold);
+  if (json.is_object() && json.contains("retrieval_models"))  // not in those of elder programs
+    fields.Read("retrieval_models", 0, most, &out.retrieval_models);
   fields.Read("unusable_predictions", 0, most, &out.unusable_predictions);
   fields.Read("classes", &out.classes);
   if (!fields.status().ok()) return fields.status();

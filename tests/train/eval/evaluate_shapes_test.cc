@@ -34,7 +34,9 @@ class EvaluateShapesTest : public FolderTest {
   }
 
   // Predicts a ball, then ever flatter boxes, so that scores differ.
-  static Result<Evaluation> Score(const Dataset& dataset) {
+  static Result<Evaluation> Score(
+      const Dataset& dataset,
+      const std::function<void(EvaluationJob&)>& change = [](EvaluationJob&) {}) {
     float height = 1;
     EvaluationJob job;
     job.dataset = &dataset;
@@ -44,6 +46,7 @@ class EvaluateShapesTest : public FolderTest {
       height *= 0.9f;
       return Result<std::vector<Mesh>>({Box(glm::vec3(0), {1, height, 1})});
     };
+    change(job);
     const StopFlag stop = false;
     return Evaluate(job, Workers(1), {}, stop);
   }
@@ -64,6 +67,30 @@ TEST_F(EvaluateShapesTest, LiveriesAreAveragedFirst) {
       EXPECT_EQ(scored->class_models[c], 4);
     }
   }
+}
+
+// Of six models a class two are trained on; what is searched is spread over all of them.
+TEST_F(EvaluateShapesTest, TheNearestPictureIsOfTrainingModelsThatItMayKnow) {
+  const Dataset dataset = WithShape("");
+  const auto names = [](const Evaluation& evaluation) {
+    std::vector<std::string> out;
+    for (const EvaluationRow& row : evaluation.rows) out.push_back(row.method);
+    return out;
+  };
+  const std::vector<std::string> three = {"undeformed template", "best single shape", "tilegrad"};
+  const std::vector<std::string> four = {three[0], three[1], "nearest training picture", three[2]};
+  const auto all = static_cast<int>(dataset.Select(Split::kTrain).size());
+  const auto score = [&](Split split, int searched) {
+    return Score(dataset,
+                 [=](EvaluationJob& job) { job.split = split, job.retrieval_models = searched; })
+        .value();
+  };
+  EXPECT_EQ(score(Split::kTest, 1000).retrieval_models, all);
+  EXPECT_EQ(names(score(Split::kTest, 1000)), four);
+  EXPECT_EQ(score(Split::kTest, 3).retrieval_models, 3);
+  EXPECT_EQ(names(score(Split::kTest, 3)), four);
+  EXPECT_EQ(names(score(Split::kTest, 0)), three);
+  EXPECT_EQ(names(score(Split::kTrain, 1000)), three);  // each would find itself
 }
 
 }  // namespace
