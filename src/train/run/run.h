@@ -33,7 +33,7 @@ struct RunPlan {
   std::string settings;         // text that every checkpoint keeps
   std::string pictures;         // how their names begin, in the folder: "samples/step_"
   std::int64_t image_size = 0;  // pixels; a run continues with the same
-  Schedule schedule;
+  Schedule schedule{};
   ExistingRun existing = ExistingRun::kRefuse;
   double max_minutes = 0;      // > 0: save and stop after this long
   WarningSink warn = nullptr;  // broken checkpoints that were passed over

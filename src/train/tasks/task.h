@@ -67,7 +67,7 @@ struct TaskEvaluation {
   const Predictor& predictor;
   bool training_models = false;  // scores what it was trained on instead of what it never saw
   int views_per_model = 24;
-  PredictionChange change;  // none: predictions are scored as they are
+  PredictionChange change{};  // none: predictions are scored as they are
 };
 
 // A picture of a report.
