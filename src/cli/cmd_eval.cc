@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside three baselines.
+#include <map>
+
 #include "base/error.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
@@ -13,10 +15,15 @@
 namespace tilegrad::cli {
 namespace {
 
+const std::map<std::string, train::Split> kSplits = {{"test", train::Split::kTest},
+                                                     {"validation", train::Split::kValidation},
+                                                     {"train", train::Split::kTrain}};
+
 struct EvalOptions {
   RunOptions on;
   int views_per_model = 24;
-  bool training_models = false, force = false;
+  std::string split = "test";
+  bool force = false;
   int refine = 0;
 };
 
@@ -37,14 +44,15 @@ Status RunEvaluation(const EvalOptions& options) {
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
   const OutputGuard guard(options.force);
   const Path files[] = {run / "eval.md", run / "eval.json"};
-  const bool writes = !options.training_models && options.refine == 0;
+  const train::Split split = kSplits.at(options.split);
+  const bool writes = split == train::Split::kTest && options.refine == 0;
   if (writes) TILEGRAD_TRY(guard.CheckAll(files));
   const Workers workers(options.on.workers);
   TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
   const train::TaskEvaluation job{run,
                                   data,
                                   predictor,
-                                  options.training_models,
+                                  split,
                                   options.views_per_model,
                                   RefineWith(options.refine, predictor.image_size())};
   ProgressLine line;
@@ -72,8 +80,11 @@ void AddEval(CLI::App& app, Action* action) {
                    "images of each model that are predicted from")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  command->add_flag("--training-models", options->training_models,
-                    "score the training models instead and write nothing");
+  command
+      ->add_option("--split", options->split,
+                   "which models are scored; the scores of others than test are printed only")
+      ->capture_default_str()
+      ->check(CLI::IsMember(kSplits));
   command
       ->add_option("--refine", options->refine,
                    "steps of refinement of each prediction on its image, as of predict; the scores "

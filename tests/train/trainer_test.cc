@@ -246,7 +246,7 @@ TEST_F(TrainerTest, RefusesOtherTrainingModels) {
   ExpectMessage(Run().status(), "noise/m0", "other training models");
   // What it was trained on is not held out then; runs without a list cannot tell.
   const Dataset split_anew = Dataset::Open(job_.data).value();
-  ExpectMessage(CheckHeldOut(job_.run, split_anew), "1 of the 3 test models", "noise/m0");
+  ExpectMessage(CheckHeldOut(job_.run, split_anew), "1 of the 3 held-out models", "noise/m0");
   EXPECT_TRUE(CheckHeldOut(folder_ / "other", split_anew).ok());
   Write("data/models.jsonl", models);
   EXPECT_TRUE(CheckHeldOut(job_.run, Dataset::Open(job_.data).value()).ok());

@@ -71,7 +71,7 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart s
       run.string(), dataset.folder().string(), FirstDifference(then, now));
 }
 
-Status CheckHeldOut(const Path& run, const Dataset& dataset) {
+Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
   const Path file = ListOf(run);
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return {};
@@ -79,16 +79,16 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset) {
   std::unordered_set<std::string> trained;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) trained.insert(MeshOf(line));
-  const std::vector<int> test = dataset.Select(Split::kTest);
+  const std::vector<int> held_out = dataset.Select(split);
   std::vector<std::string> seen;
-  for (const int model : test) {
+  for (const int model : held_out) {
     if (trained.count(MeshOf(LineOf(dataset, model))) > 0) seen.push_back(LineOf(dataset, model));
   }
   if (seen.empty()) return {};
   return InvalidArgument(
-      "{}: {} of the {} test models of {} were trained on ({}, ...): the dataset has been split "
+      "{}: {} of the {} held-out models of {} were trained on ({}, ...): the dataset has been split "
       "anew since; make it with the seed, shares and limits it had then, or train again",
-      run.string(), seen.size(), test.size(), dataset.folder().string(),
+      run.string(), seen.size(), held_out.size(), dataset.folder().string(),
       seen[0].substr(seen[0].find(' ') + 1));
 }
 

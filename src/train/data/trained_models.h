@@ -22,9 +22,8 @@ enum class RunStart {
 // cameras and files, and gets one.
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start);
 
-// InvalidArgument if the run was trained on models of the dataset's test split, or on other colours
-// of their meshes. Fine for a run
-// without a list, and for a single checkpoint.
-Status CheckHeldOut(const Path& run, const Dataset& dataset);
+// InvalidArgument if the run was trained on models of the dataset's `split`, or on other colours of
+// their meshes. Fine for a run without a list, and for a single checkpoint.
+Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split = Split::kTest);
 
 }  // namespace tilegrad::train

@@ -10,11 +10,13 @@
 #include "scene/shapes.h"
 #include "scene/topology.h"
 #include "train/models/sphere_vertices.h"
+#include "train/ops/sample_colors.h"
 
 namespace tilegrad::train {
 namespace {
 
 constexpr int kKernel = 5;
+constexpr double kWideStart = 1.4;  // narrowness of SampleColors: a deviation of half a picture's half
 constexpr nn::ConvOptions kHalve = {.stride = 2, .padding = 2};
 const nn::BatchNormOptions kRelu = {.relu = true};
 
@@ -73,6 +75,19 @@ nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t numb
   auto& output = b.Fc(net, "3", b.config.hidden2, numbers);
   nn::FillNormal(output.weight.value(), b.rng, b.config.output_deviation);
   return output;
+}
+
+// Colours that are read from the picture start as the mean of nearly all of it, all alike.
+void BuildColors(Builder& b, nn::Sequential& net, std::int64_t vertices) {
+  if (!b.config.picture_colors) {
+    nn::FillConstant(BuildDecoder(b, net, 3 * vertices).bias.value(), b.config.color_bias);
+    return;
+  }
+  nn::Tensor bias = BuildDecoder(b, net, 4 * vertices).bias.value();
+  nn::WithFloatType(bias.dtype(), [&]<class T>(T) {
+    const std::span<T> values = bias.span<T>();
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = i % 4 == 2 ? T(kWideStart) : T(0);
+  });
 }
 
 // A quarter of the unit sphere is what N3MR's vertices start from.
@@ -134,7 +149,7 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
   const auto vertices = static_cast<std::int64_t>(template_.positions.size());
   BuildEncoder(builder, all_.encoder, image_size);
   BuildDecoder(builder, all_.shape, 3 * vertices + (config.n3mr_vertices ? 3 : 0));
-  nn::FillConstant(BuildDecoder(builder, all_.color, 3 * vertices).bias.value(), config.color_bias);
+  BuildColors(builder, all_.color, vertices);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ = context.From({vertices, 3}, flat);
   std::vector<float> unit(flat.begin(), flat.end());
@@ -148,13 +163,22 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
 
 nn::Var MeshNetwork::Movement(const nn::Var& code, nn::Mode mode) {
   const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
-  nn::Var movement = all_.shape.Forward(code, mode);
-  if (config_.n3mr_vertices) return N3mrMovement(movement);
-  if (config_.symmetric) movement = nn::MapAxis(movement, 1, symmetry_);
-  movement = nn::Reshape(movement, {batch, vertices, 3});
+  const nn::Var raw = all_.shape.Forward(code, mode);
+  if (config_.n3mr_vertices) return N3mrMovement(raw);
+  nn::Var movement = raw;
+  if (config_.symmetric || config_.smoothing > 0) movement = nn::Transpose(Smoothed(raw));
+  return nn::Reshape(movement, {batch, vertices, 3});
+}
+
+// [3 V, B] of [B, 3 V]: with the batch last, lanes run over it.
+nn::Var MeshNetwork::Smoothed(const nn::Var& raw) const {
+  const std::int64_t batch = raw.shape()[0], vertices = template_positions_.shape()[0];
+  nn::Var movement = nn::Transpose(raw);
+  if (config_.symmetric) movement = nn::MapAxis(movement, 0, symmetry_);
+  movement = nn::Reshape(movement, {vertices, 3 * batch});
   for (std::int64_t round = 0; round < config_.smoothing; ++round)
-    movement = nn::MapAxis(movement, 1, diffusion_);
-  return movement;
+    movement = nn::MapAxis(movement, 0, diffusion_);
+  return nn::Reshape(movement, {3 * vertices, batch});
 }
 
 // The last three outputs are the centroid. Published, its layer learns at a tenth of the rate.
@@ -168,12 +192,18 @@ nn::Var MeshNetwork::N3mrMovement(const nn::Var& raw) const {
   return SphereVertices(bias, 0.1 * centroid, unit_sphere_) - start;
 }
 
+nn::Var MeshNetwork::Colors(const nn::Var& code, const nn::Var& images, nn::Mode mode) {
+  const std::int64_t batch = code.shape()[0], vertices = template_positions_.shape()[0];
+  const nn::Var raw = all_.color.Forward(code, mode);
+  if (!config_.picture_colors) return nn::Reshape(raw, {batch, vertices, 3});
+  return SampleColors(images.value(), nn::Reshape(raw, {batch, vertices, 4}));
+}
+
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {
-  const std::int64_t batch = images.shape()[0], vertices = template_positions_.shape()[0];
   const nn::Var code = all_.encoder.Forward(images, mode);
   PredictedMeshes out;
   out.movement = Movement(code, mode);
-  out.colors = nn::Reshape(all_.color.Forward(code, mode), {batch, vertices, 3});
+  out.colors = Colors(code, images, mode);
   out.positions = NormalizeMeshes(out.movement + nn::Constant(context_, template_positions_),
                                   kPredictionHalfExtent);
   return out;

@@ -29,6 +29,7 @@ struct NetworkConfig {
   double fc_deviation = 0.001;      // fully connected weights start as N(0, this^2); 0: uniform by
                                     // fan-in, as convolutions
   double color_bias = 0.0;          // what vertex colours start at
+  bool picture_colors = false;      // colours are read from the picture (ops/sample_colors.h)
   bool n3mr_vertices = false;       // sphere_vertices.h instead of offsets from the template
 };
 
@@ -59,7 +60,9 @@ class MeshNetwork {
 
  private:
   nn::Var Movement(const nn::Var& code, nn::Mode mode);
+  nn::Var Smoothed(const nn::Var& raw) const;
   nn::Var N3mrMovement(const nn::Var& raw) const;
+  nn::Var Colors(const nn::Var& code, const nn::Var& images, nn::Mode mode);
 
   nn::Context& context_;
   Mesh template_;

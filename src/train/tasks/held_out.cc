@@ -188,11 +188,11 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
                                      const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
-  if (!job.training_models) TILEGRAD_TRY(CheckHeldOut(job.run, dataset));
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   EvaluationJob evaluation;
   evaluation.dataset = &dataset;
-  evaluation.split = job.training_models ? Split::kTrain : Split::kTest;
+  evaluation.split = job.split;
   evaluation.predict = [&](auto images) { return PredictAndChange(job, images, workers); };
   evaluation.template_mesh = job.predictor.template_mesh();
   evaluation.views_per_model = job.views_per_model;

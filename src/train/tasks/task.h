@@ -16,6 +16,7 @@
 #include "nn/tape.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
+#include "train/data/dataset.h"
 #include "train/eval/evaluation.h"
 #include "train/run/checkpoint.h"
 #include "train/run/config_fields.h"
@@ -65,7 +66,7 @@ using PredictionChange =
 struct TaskEvaluation {
   Path run, data;
   const Predictor& predictor;
-  bool training_models = false;  // scores what it was trained on instead of what it never saw
+  Split split = Split::kTest;  // which models are scored
   int views_per_model = 24;
   PredictionChange change{};  // none: predictions are scored as they are
 };

@@ -25,7 +25,10 @@ ConfigFields FieldsOf(NetworkConfig* c) {
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
       {"network.output_deviation", &c->output_deviation, 0, 10,
        "the decoders' last weights start as N(0, this^2)"},
-      {"network.color_bias", &c->color_bias, -1, 2, "what vertex colours start at"},
+      {"network.color_bias", &c->color_bias, -1, 2,
+       "what vertex colours start at, without picture_colors"},
+      {"network.picture_colors", &c->picture_colors, 0, 1,
+       "vertices look up their colours in the picture"},
       {"network.n3mr_vertices", &c->n3mr_vertices, 0, 1,
        "N3MR's sigmoids and centroid instead of offsets"},
   };
