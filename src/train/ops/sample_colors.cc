@@ -1,14 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/ops/sample_colors.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "train/ops/sample_colors.cc"
+#include <hwy/foreach_target.h>
+//
+#include "train/ops/sample_colors-inl.h"
+
+#if HWY_ONCE
 #include <memory>
 #include <vector>
 
 #include "nn/nn.h"
-#include "train/ops/sample_colors_ref.h"
 
 namespace tilegrad::train {
 namespace {
+
+HWY_EXPORT(SampleForward);
+HWY_EXPORT(SampleBackward);
 
 // The mean of each cell of one picture.
 template <class T>
@@ -20,16 +29,32 @@ void FillCells(std::span<const T> image, std::size_t size, ColorCells<T>* cells)
     for (std::size_t y = 0; y < side * kColorCells; ++y) {
       auto& row = (*cells)[y / side];
       const T* from = &image[(c * size + y) * size];
-      for (std::size_t x = 0; x < side * kColorCells; ++x) row[4 * (x / side) + c] += scale * from[x];
+      for (std::size_t x = 0; x < side * kColorCells; ++x)
+        row[4 * (x / side) + c] += scale * from[x];
     }
   }
+}
+
+void ForwardOne(const ColorCells<float>& cells, const ColorSpans<float>& s) {
+  HWY_DYNAMIC_DISPATCH(SampleForward)(cells, s);
+}
+void ForwardOne(const ColorCells<double>& cells, const ColorSpans<double>& s) {
+  SampleForwardRef(cells, s);
+}
+void BackwardOne(const ColorCells<float>& cells, const ColorSpans<float>& s) {
+  HWY_DYNAMIC_DISPATCH(SampleBackward)(cells, s);
+}
+void BackwardOne(const ColorCells<double>& cells, const ColorSpans<double>& s) {
+  SampleBackwardRef(cells, s);
 }
 
 template <class T>
 class Sampling {
  public:
   Sampling(const nn::Tensor& images, nn::Tensor flow)
-      : flow_(std::move(flow)), batch_(static_cast<std::size_t>(images.shape()[0])), cells_(batch_) {
+      : flow_(std::move(flow)),
+        batch_(static_cast<std::size_t>(images.shape()[0])),
+        cells_(batch_) {
     const auto size = static_cast<std::size_t>(images.shape()[3]);
     const std::span<const T> all = images.span<T>();
     const std::size_t bytes = all.size() / batch_;
@@ -37,14 +62,23 @@ class Sampling {
       FillCells<T>(all.subspan(b * bytes, bytes), size, &cells_[b]);
   }
 
-  // visit(the vertex's colour, its number) of every vertex, in parallel.
-  template <class Visit>
-  void ForEach(const Workers& workers, const Visit& visit) const {
+  std::size_t vertices() const { return flow_.elements() / (4 * batch_); }
+
+  // colors: [B][V][3].
+  void Forward(const Workers& workers, T* colors) {
     const T* flow = flow_.span<T>().data();
-    const std::size_t vertices = flow_.elements() / (4 * batch_);
     workers.For(batch_, [&](std::size_t b, std::size_t) {
-      for (std::size_t v = b * vertices; v < (b + 1) * vertices; ++v)
-        visit(SampledColor<T>(cells_[b], flow + 4 * v), v);
+      const std::size_t v = b * vertices();
+      ForwardOne(cells_[b], {vertices(), flow + 4 * v, colors + 3 * v, nullptr, nullptr});
+    });
+  }
+  // by_color: [B][V][3]; by_flow: [B][V][4].
+  void Backward(const Workers& workers, const T* by_color, T* by_flow) {
+    const T* flow = flow_.span<T>().data();
+    workers.For(batch_, [&](std::size_t b, std::size_t) {
+      const std::size_t v = b * vertices();
+      BackwardOne(cells_[b],
+                  {vertices(), flow + 4 * v, nullptr, by_color + 3 * v, by_flow + 4 * v});
     });
   }
 
@@ -59,18 +93,12 @@ nn::ExternalOp MakeOp(nn::Context& context, const nn::Tensor& images, const nn::
   const nn::Shape& shape = flow.shape();
   const auto sampling = std::make_shared<Sampling<T>>(images, flow.value());
   nn::Tensor colors = context.Empty({shape[0], shape[1], 3}, flow.dtype());
-  T* out = colors.span<T>().data();
-  sampling->ForEach(context.workers(), [out](const SampledColor<T>& color, std::size_t v) {
-    color.Forward(out + 3 * v);
-  });
+  sampling->Forward(context.workers(), colors.span<T>().data());
   const auto backward = [&context, sampling, shape](std::span<const nn::Tensor> d_outputs) {
-    nn::Tensor d_flow = context.Empty(shape, d_outputs[0].dtype());
-    const T* d_colors = d_outputs[0].template span<T>().data();
-    T* d = d_flow.span<T>().data();
-    sampling->ForEach(context.workers(), [=](const SampledColor<T>& color, std::size_t v) {
-      color.Backward(d_colors + 3 * v, d + 4 * v);
-    });
-    return std::vector<nn::Tensor>{d_flow};
+    nn::Tensor by_flow = context.Empty(shape, d_outputs[0].dtype());
+    sampling->Backward(context.workers(), d_outputs[0].template span<T>().data(),
+                       by_flow.span<T>().data());
+    return std::vector<nn::Tensor>{by_flow};
   };
   return {"sampled colours", {flow}, {colors}, backward};
 }
@@ -86,3 +114,4 @@ nn::Var SampleColors(const nn::Tensor& images, const nn::Var& flow) {
 }
 
 }  // namespace tilegrad::train
+#endif  // HWY_ONCE

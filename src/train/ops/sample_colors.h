@@ -11,8 +11,8 @@ namespace tilegrad::train {
 // images: [B, 4, size, size], RGB over black and alpha; size is a multiple of 16. They are averaged
 // over 16 x 16 cells, and take no gradient.
 // flow: [B, V, 4]: (x, y) in [-1, 1] across the picture, x to the right and y down; n: the variance
-// of the bell around (x, y) is (1/8)^2 + e^-n, and without bound below n = -20; g: the colour is 1 + g times the mean under the bell,
-// of what the object covers. Any finite number is allowed.
+// of the bell around (x, y) is (1/8)^2 + e^-n, and without bound below n = -20; g: the colour is 1
+// + g times the mean under the bell, of what the object covers. Any finite number is allowed.
 // Returns [B, V, 3], linear as the picture, not clamped. Its gradient has no gradient.
 nn::Var SampleColors(const nn::Tensor& images, const nn::Var& flow);
 

@@ -10,22 +10,42 @@
 namespace tilegrad::train {
 
 inline constexpr std::size_t kColorCells = 16;  // along each side of the picture
-// Weight of a cell that is far away: every cell has some, so the mean exists wherever the centre is.
+// Weight of a cell that is far away: every cell has some, so the mean exists wherever the centre
+// is.
 inline constexpr double kFarWeight = 1e-4;
+
+// Least variance of the bell: a cell's side, squared. Below kWidest all cells weigh alike.
+inline constexpr double kLeastVariance = 4.0 / (kColorCells * kColorCells), kWidest = -20;
+inline constexpr double kNothing = 1e-12;  // added to the cover that is seen: nothing is black
 
 // Premultiplied RGBA of the cells, one row after the other.
 template <class T>
 using ColorCells = std::array<std::array<T, 4 * kColorCells>, kColorCells>;
 
-// The weights of one axis: of cell i, w[i] = exp(-tau (c_i - mean)^2) + kFarWeight, where c_i is its
-// centre in [-1, 1].
+template <class T>
+T CellCentre(std::size_t i) {
+  return T((2.0 * static_cast<double>(i) + 1) / kColorCells - 1);
+}
+
+// One picture's vertices. What a pass does not need is null.
+template <class T>
+struct ColorSpans {
+  std::size_t vertices;
+  const T* flow;      // [vertices][4]
+  T* colors;          // [vertices][3]
+  const T* by_color;  // [vertices][3]
+  T* by_flow;         // [vertices][4]
+};
+
+// The weights of one axis: of cell i, w[i] = exp(-tau (c_i - mean)^2) + kFarWeight, where c_i is
+// its centre in [-1, 1].
 template <class T>
 struct CellWeights {
   std::array<T, kColorCells> w, bell, offset;
 
   CellWeights(T mean, T tau) {
     for (std::size_t i = 0; i < kColorCells; ++i) {
-      offset[i] = T((2.0 * static_cast<double>(i) + 1) / kColorCells - 1) - mean;
+      offset[i] = CellCentre<T>(i) - mean;
       bell[i] = std::exp(-tau * offset[i] * offset[i]);
       w[i] = bell[i] + T(kFarWeight);
     }
@@ -46,7 +66,7 @@ class SampledColor {
   SampledColor(const ColorCells<T>& cells, const T* flow)
       : cells_(cells),
         wide_(std::real(flow[2]) > kWidest ? std::exp(-flow[2]) : T(0)),
-        tau_(std::real(flow[2]) > kWidest ? T(0.5) / (T(kLeast) + wide_) : T(0)),
+        tau_(std::real(flow[2]) > kWidest ? T(0.5) / (T(kLeastVariance) + wide_) : T(0)),
         gain_(T(1) + flow[3]),
         x_(flow[0], tau_),
         y_(flow[1], tau_) {
@@ -57,7 +77,7 @@ class SampledColor {
       }
       for (std::size_t c = 0; c < 4; ++c) sum_[c] += y_.w[j] * rows_[j][c];
     }
-    sum_[3] += T(1e-12);  // a picture of nothing is black
+    sum_[3] += T(kNothing);
   }
 
   void Forward(T* color) const {
@@ -91,13 +111,23 @@ class SampledColor {
   }
 
  private:
-  // Least variance: a cell's side, squared. Below kWidest all cells weigh alike.
-  static constexpr double kLeast = 4.0 / (kColorCells * kColorCells), kWidest = -20;
   const ColorCells<T>& cells_;
   T wide_, tau_, gain_;
   CellWeights<T> x_, y_;
   std::array<std::array<T, 4>, kColorCells> rows_;
   std::array<T, 4> sum_{};
 };
+
+template <class T>
+void SampleForwardRef(const ColorCells<T>& cells, const ColorSpans<T>& s) {
+  for (std::size_t v = 0; v < s.vertices; ++v)
+    SampledColor<T>(cells, s.flow + 4 * v).Forward(s.colors + 3 * v);
+}
+
+template <class T>
+void SampleBackwardRef(const ColorCells<T>& cells, const ColorSpans<T>& s) {
+  for (std::size_t v = 0; v < s.vertices; ++v)
+    SampledColor<T>(cells, s.flow + 4 * v).Backward(s.by_color + 3 * v, s.by_flow + 4 * v);
+}
 
 }  // namespace tilegrad::train

@@ -5,9 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <complex>
-#include <limits>
+#include <vector>
 
 #include "base/rng.h"
+#include "base/simd_target.h"
 #include "nn/nn.h"
 #include "train/ops/sample_colors_ref.h"
 
@@ -48,8 +49,8 @@ std::array<double, 3> ColorAt(const ColorCells<double>& cells, const Flow& flow)
 }
 
 // At n = 40 the deviation is a cell's side, 1/8. Seven and a half cells left of the border, what a
-// bell lets through from beyond is below e^-25 along the row, and kFarWeight of each of 8 columns of
-// four times the cover against the bell's sum of 2.4 of a quarter: 8e-4 / 0.63 of the colour.
+// bell lets through from beyond is below e^-25 along the row, and kFarWeight of each of 8 columns
+// of four times the cover against the bell's sum of 2.4 of a quarter: 8e-4 / 0.63 of the colour.
 TEST(SampleColors, SeesWhatIsThere) {
   const ColorCells<double> cells = TwoHalves<double>();
   const auto left = ColorAt(cells, {-0.9375, 0, 40, 0});
@@ -89,49 +90,92 @@ TEST(SampleColors, GradientsAreThoseOfTheComplexStep) {
   }
 }
 
-TEST(SampleColors, ExtremesStayFinite) {
-  constexpr float kFar = 1e18f;
-  const auto noise = Noise<float>(5);
-  const ColorCells<float> nothing{};
-  for (const float place : {0.0f, 3.0f, -kFar, kFar}) {
-    for (const float narrow : {-kFar, -80.0f, -19.0f, 0.0f, 80.0f, kFar}) {
-      for (const ColorCells<float>* cells : {&noise, &nothing}) {
-        const float flow[] = {place, -place, narrow, 0.1f}, d_color[] = {1, -1, 1};
-        float color[3], d_flow[4];
-        const SampledColor<float> sampled(*cells, flow);
-        sampled.Forward(color);
-        sampled.Backward(d_color, d_flow);
-        for (const float x : color) EXPECT_TRUE(std::isfinite(x)) << place << " " << narrow;
-        for (const float x : d_flow) EXPECT_TRUE(std::isfinite(x)) << place << " " << narrow;
-      }
-    }
-  }
-}
+struct OpResult {
+  std::vector<double> colors, gradient;
+};
 
-std::vector<float> OpAndGradient(int workers_count) {
-  const Workers workers(workers_count);
-  nn::Context context(workers, nn::DType::kF32);
+constexpr std::int64_t kPictures = 3;
+
+// The operation on noise of 32 x 32 pixels, of which the first picture has nothing; the gradient is
+// that of the sum of squares.
+OpResult RunOp(nn::DType type, const std::vector<double>& flows, int worker_count) {
+  const Workers workers(worker_count);
+  nn::Context context(workers, type);
+  constexpr std::int64_t size = 32, numbers = 4 * size * size;
   Rng rng(6, 0);
-  std::vector<double> pictures(3 * 4 * 32 * 32), flows(3 * 40 * 4);
-  for (double& x : pictures) x = rng.Uniform();
-  for (double& x : flows) x = 2 * rng.Uniform() - 1;
-  const nn::Tensor images = context.From({3, 4, 32, 32}, std::span<const double>(pictures));
-  const nn::Var flow =
-      nn::Parameter(context, context.From({3, 40, 4}, std::span<const double>(flows)));
+  std::vector<double> pictures(kPictures * numbers);
+  for (std::size_t i = numbers; i < pictures.size(); ++i) pictures[i] = rng.Uniform();
+  const nn::Tensor images =
+      context.From({kPictures, 4, size, size}, std::span<const double>(pictures));
+  const auto vertices = static_cast<std::int64_t>(flows.size()) / (4 * kPictures);
+  const nn::Var flow = nn::Parameter(
+      context, context.From({kPictures, vertices, 4}, std::span<const double>(flows)));
   const nn::Var colors = SampleColors(images, flow);
   const nn::Var inputs[] = {flow};
   const auto gradients = nn::Gradients(nn::Sum(nn::Square(colors)), inputs);
-  std::vector<float> out;
-  for (nn::Tensor tensor : {colors.value(), gradients[0].a().value()})
-    for (const float x : tensor.span<float>()) out.push_back(x);
-  return out;
+  const auto numbers_of = [&](nn::Tensor tensor) {
+    return nn::WithFloatType(type, [&]<class T>(T) {
+      const auto values = tensor.span<T>();
+      return std::vector<double>(values.begin(), values.end());
+    });
+  };
+  return {numbers_of(colors.value()), numbers_of(gradients[0].a().value())};
+}
+
+// 37 vertices: a tail for vectors of any length.
+std::vector<double> RandomFlows() {
+  Rng rng(8, 0);
+  std::vector<double> flows;
+  for (std::int64_t v = 0; v < kPictures * 37; ++v) {
+    for (const double x : {2.4 * rng.Uniform() - 1.2, 2.4 * rng.Uniform() - 1.2,
+                           8 * rng.Uniform() - 2, rng.Uniform() - 0.5})
+      flows.push_back(x);
+  }
+  return flows;
+}
+
+// A colour is a ratio of sums of 256 positive terms, each good to a few 2^-24, so it is good to
+// 256 * 2^-24 = 1.5e-5. A gradient sums terms of both signs, at most 2 tau |offset| < 64 times as
+// large as the colour: 64 * 1.5e-5.
+TEST(SampleColors, VectorsHoldToTheReference) {
+  const OpResult want = RunOp(nn::DType::kF64, RandomFlows(), 1);
+  for (const std::string& target : RunnableTargets()) {
+    const TargetScope scope(target);
+    SCOPED_TRACE(target);
+    const OpResult got = RunOp(nn::DType::kF32, RandomFlows(), 1);
+    for (std::size_t i = 0; i < want.colors.size(); ++i)
+      EXPECT_NEAR(got.colors[i], want.colors[i], 1.5e-5) << i;
+    for (std::size_t i = 0; i < want.gradient.size(); ++i)
+      EXPECT_NEAR(got.gradient[i], want.gradient[i], 1e-3) << i;
+  }
+}
+
+TEST(SampleColors, ExtremesStayFinite) {
+  constexpr double kFar = 3e38;
+  std::vector<double> flows;
+  for (std::int64_t picture = 0; picture < kPictures; ++picture) {
+    for (const double place : {0.0, 3.0, 1e5, -kFar, kFar}) {
+      for (const double narrow : {-kFar, -80.0, -19.0, 0.0, 80.0, kFar})
+        flows.insert(flows.end(), {place, -place, narrow, 0.1});
+    }
+  }
+  for (const std::string& target : RunnableTargets()) {
+    const TargetScope scope(target);
+    const OpResult got = RunOp(nn::DType::kF32, flows, 1);
+    for (const double x : got.colors) EXPECT_TRUE(std::isfinite(x)) << target;
+    for (const double x : got.gradient) EXPECT_TRUE(std::isfinite(x)) << target;
+  }
+  const OpResult reference = RunOp(nn::DType::kF64, flows, 1);
+  for (const double x : reference.gradient) EXPECT_TRUE(std::isfinite(x));
 }
 
 TEST(SampleColors, BitsDoNotDependOnWorkers) {
-  const std::vector<float> one = OpAndGradient(1);
-  EXPECT_EQ(one.size(), 3u * 40 * 7);
-  EXPECT_EQ(one, OpAndGradient(2));
-  EXPECT_EQ(one, OpAndGradient(5));
+  const OpResult one = RunOp(nn::DType::kF32, RandomFlows(), 1);
+  for (const int workers : {2, 5}) {
+    const OpResult more = RunOp(nn::DType::kF32, RandomFlows(), workers);
+    EXPECT_EQ(one.colors, more.colors);
+    EXPECT_EQ(one.gradient, more.gradient);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Table 1 of the paper: one network, several renderers, the same data, steps and hyperparameters.
+
+    tilegrad dataset --source thirteen --out datasets/thirteen
+    python3 bench/rivals/table1.py --data datasets/thirteen --out runs/table1 [--seeds 1 2]
+
+Trains and scores each renderer with each seed, one run after the other, and prints the table as
+Markdown: 3D IoU / F-score of each class, and both rules of IoU. A run that is finished is kept, one
+that was stopped goes on. Processor time is that of training, start-up included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import pathlib
+import resource
+import statistics
+import subprocess
+import sys
+from typing import Any
+
+METHODS = {
+    "N3MR": ["render.rule=n3mr"],
+    "SoftRas-Mesh": ["render.rule=softras"],
+    "SoftRas-Color": ["render.rule=softras", "softras.color=true"],
+    "DIB-R": ["render.rule=dibr"],
+    # Not the paper's: a soft band of several pixels at first.
+    "DIB-R-wide": ["render.rule=dibr", "render.sharpness_start=500"],
+}
+# Means over thirteen classes of ShapeNet as printed, 3D IoU / F-score; nobody printed SoftRas-Color's.
+PAPER = {"N3MR": (57.0, 54.7), "SoftRas-Mesh": (59.3, 49.9), "DIB-R": (61.2, 55.8)}
+SCORES = ("iou", "f_score", "carved_iou")
+
+
+def processor_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def train(options: argparse.Namespace, run: pathlib.Path, method: str, seed: int) -> None:
+    """Trains `run` to its end. Its processor time is kept in a file beside it."""
+    command = [options.program, "train", "--out", str(run)]
+    if (run / "run.json").exists():
+        command += ["--resume"]
+    settings = [*METHODS[method], f"schedule.steps={options.steps}", f"schedule.seed={seed}", *options.set]
+    command += ["--config", options.config, "--data", options.data]
+    for setting in settings:
+        command += ["--set", setting]
+    before = processor_seconds()
+    subprocess.run(command, check=True)
+    used = pathlib.Path(f"{run}.seconds")
+    earlier = float(used.read_text()) if used.exists() else 0.0
+    used.write_text(str(earlier + processor_seconds() - before))
+
+
+def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any]:
+    """The scores of a run, which is trained and evaluated first if need be."""
+    run = pathlib.Path(options.out) / f"{method.lower()}-{seed}"
+    if not (run / "eval.json").exists():
+        train(options, run, method, seed)
+        subprocess.run([options.program, "eval", "--run", str(run), "--data", options.data], check=True)
+    found = json.loads((run / "eval.json").read_text())
+    found["seconds"] = float(pathlib.Path(f"{run}.seconds").read_text())
+    return found
+
+
+def row_of(found: dict[str, Any], method: str) -> dict[str, Any]:
+    return next(row for row in found["rows"] if row["method"] == method)
+
+
+def mean_of(classes: list[dict[str, float]], score: str) -> float:
+    return 100 * statistics.fmean(one[score] for one in classes)
+
+
+def cells(rows: list[dict[str, Any]]) -> list[str]:
+    """One row of the table: the mean over runs of each class, then means over classes with spread."""
+    out = []
+    for number in range(len(rows[0]["classes"])):
+        iou, f_score = (statistics.fmean(100 * row["classes"][number][score] for row in rows)
+                        for score in SCORES[:2])
+        out.append(f"{iou:.1f} / {f_score:.1f}")
+    for score in SCORES:
+        means = [mean_of(row["classes"], score) for row in rows]
+        spread = f" ± {(max(means) - min(means)) / 2:.1f}" if len(means) > 1 else ""
+        out.append(f"{statistics.fmean(means):.1f}{spread}")
+    return out
+
+
+def table(results: dict[str, list[dict[str, Any]]], steps: int) -> str:
+    first = next(iter(results.values()))[0]
+    header = ["method", *first["classes"], "IoU", "F-score", "carved IoU", "ms of processor a step", "paper"]
+    lines = [header, ["---"] + ["--:"] * (len(header) - 1)]
+    for baseline in ("undeformed template", "best single shape", "nearest training picture"):
+        lines.append([baseline, *cells([row_of(first, baseline)]), "", ""])
+    for method, found in results.items():
+        paper = "%.1f / %.1f" % PAPER[method] if method in PAPER else ""
+        seconds = statistics.fmean(one["seconds"] for one in found)
+        lines.append([method, *cells([row_of(one, "tilegrad") for one in found]),
+                      f"{1000 * seconds / steps:.0f}", paper])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", required=True, help="dataset folder")
+    parser.add_argument("--out", required=True, help="folder of the runs")
+    parser.add_argument("--program", default="build/release/src/cli/tilegrad", help="tilegrad")
+    parser.add_argument("--config", default="configs/table1.toml", help="of all")
+    parser.add_argument("--steps", type=int, default=4000, help="of each run")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="for all")
+    options = parser.parse_args()
+    try:
+        results = {method: [scores(options, method, seed) for seed in options.seeds]
+                   for method in options.methods}
+    except subprocess.CalledProcessError as error:
+        print(f"table1: {error.cmd[1]} failed with exit code {error.returncode}; the same command "
+              "goes on from here", file=sys.stderr)
+        return 1
+    print(table(results, options.steps))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
