@@ -24,7 +24,7 @@ struct EvalOptions {
   int views_per_model = 24;
   std::string split = "test";
   bool force = false;
-  int refine = 0;
+  int refine = 0, oracle = 0;
 };
 
 // Refines on the calling thread: pictures are worked on side by side.
@@ -54,7 +54,8 @@ Status RunEvaluation(const EvalOptions& options) {
                                   predictor,
                                   split,
                                   options.views_per_model,
-                                  RefineWith(options.refine, predictor.image_size())};
+                                  RefineWith(options.refine, predictor.image_size()),
+                                  options.oracle};
   ProgressLine line;
   auto evaluation = predictor.task().Evaluate(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
@@ -89,6 +90,12 @@ void AddEval(CLI::App& app, Action* action) {
       ->add_option("--refine", options->refine,
                    "steps of refinement of each prediction on its image, as of predict; the scores "
                    "are printed only")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
+  command
+      ->add_option("--oracle", options->oracle,
+                   "steps of fitting the template to all views of each model, for a row that says "
+                   "how good predictions can be at best; 300 take a second a model or two")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   AddForceOption(command, &options->force);

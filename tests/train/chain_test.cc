@@ -45,7 +45,7 @@ NetworkConfig TinyNetwork() {
           .code = 6,
           .hidden1 = 5,
           .hidden2 = 7,
-          .template_level = 2,
+          .shape = {.level = 2},
           .output_deviation = 1};
 }
 
@@ -68,7 +68,7 @@ TEST(MeshNetwork, SmoothingSpreadsOffsets) {
   nn::Context context(workers);
   const auto roughness = [&](std::int64_t rounds) {
     NetworkConfig config = TinyNetwork();
-    config.smoothing = rounds;
+    config.shape.smoothing = rounds;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
@@ -99,7 +99,7 @@ TEST(MeshNetwork, SymmetricPredictionsAre) {
   nn::Context context(workers);
   for (const bool fc_norm : {false, true}) {
     NetworkConfig config = TinyNetwork();
-    config.smoothing = 2, config.symmetric = true, config.fc_norm = fc_norm;
+    config.shape.smoothing = 2, config.shape.symmetric = true, config.fc_norm = fc_norm;
     MeshNetwork network(context, config, 16, 1);
     const nn::Var images = nn::Constant(context, context.Full({2, 4, 16, 16}, 0.5));
     const PredictedMeshes out = network.Forward(images, nn::Mode::kEval);
@@ -131,8 +131,7 @@ struct SmallProblem {
                       .code = 6,
                       .hidden1 = 5,
                       .hidden2 = 7,
-                      .template_level = 1,
-                      .smoothing = 2,
+                      .shape = {.level = 1, .smoothing = 2},
                       .fc_deviation = 0,
                       .color_bias = 0.4};
     config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
@@ -213,13 +212,13 @@ TEST(Chain, Float64GradientsAgreeWithDifferences) {
 
 TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   SmallProblem p;
-  p.config.network.symmetric = true, p.config.network.fc_norm = false;
+  p.config.network.shape.symmetric = true, p.config.network.fc_norm = false;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
 TEST(Chain, SoDoThoseOfN3mrsVertices) {
   SmallProblem p;
-  p.config.network.n3mr_vertices = true, p.config.network.smoothing = 0;
+  p.config.network.shape.n3mr_vertices = true, p.config.network.shape.smoothing = 0;
   ExpectGradientsAgreeWithDifferences(p);
 }
 
@@ -318,7 +317,7 @@ TEST(Chain, RivalsHaveNoColorLoss) {
         w.iou * values.iou + w.smoothness * values.smoothness + w.laplacian * values.laplacian,
         1e-6);
     std::vector<LossTerm> terms;
-    step.AddTerms(values, &terms);
+    step.losses().AddTerms(values, &terms);
     EXPECT_EQ(terms.size(), 3u);
     const auto parameters = nn::Parameters(step.network().module());
     const auto gradients = nn::Grad(loss, step.adam().parameters());
@@ -380,9 +379,9 @@ TEST(Schedules, LearningRateAndSharpness) {
 
 TEST(SingleImageConfig, N3mrVerticesHaveNoOffsets) {
   SingleImageConfig config;
-  config.network.n3mr_vertices = true;
+  config.network.shape.n3mr_vertices = true;
   EXPECT_TRUE(CheckConfig(config).ok());
-  config.network.symmetric = true;
+  config.network.shape.symmetric = true;
   EXPECT_NE(CheckConfig(config).message().find("network.n3mr_vertices has no offsets"),
             std::string::npos);
 }

@@ -58,6 +58,7 @@ class Evaluator {
       TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
       template_scores_.push_back(Compare(undeformed, truth));
       single_scores_.push_back(Compare(single, truth));
+      TILEGRAD_TRY(ScoreOracle(held_out[i], data, truth));
       if (Retrieves()) retrieval_scores_.push_back(ScoreRetrieval(data, truth));
       TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], data, truth));
       predicted_scores_.push_back(score);
@@ -161,6 +162,15 @@ class Evaluator {
     return score;
   }
 
+  Status ScoreOracle(int model, const ModelData& data, const Shape& truth) {
+    if (!job_.oracle) return {};
+    TILEGRAD_ASSIGN(Mesh mesh, job_.oracle(data));
+    std::uint8_t unusable = 0;
+    oracle_scores_.push_back(ScorePrediction(std::move(mesh), static_cast<std::uint64_t>(model), 0,
+                                             data, truth, &unusable));
+    return {};
+  }
+
   Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth) {
     TILEGRAD_ASSIGN(auto meshes, job_.predict(Images(data, views_)));
     if (meshes.size() != views_.size()) {
@@ -215,6 +225,7 @@ class Evaluator {
                  Row("best single shape", single_scores_, members)};
     if (Retrieves())
       out_.rows.push_back(Row("nearest training picture", retrieval_scores_, members));
+    if (job_.oracle) out_.rows.push_back(Row("oracle", oracle_scores_, members));
     out_.rows.push_back(Row("tilegrad", predicted_scores_, members));
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
@@ -230,7 +241,8 @@ class Evaluator {
   std::vector<int> views_, color_views_;
   std::vector<std::unique_ptr<PredictionPictures>> pictures_;  // by worker
   TrainingShapes train_;
-  std::vector<Score> template_scores_, single_scores_, retrieval_scores_, predicted_scores_;
+  std::vector<Score> template_scores_, single_scores_, retrieval_scores_, oracle_scores_,
+      predicted_scores_;
   Evaluation out_;
 };
 

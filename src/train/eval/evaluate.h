@@ -18,10 +18,14 @@ namespace tilegrad::train {
 // Images [N][4][size][size] to N meshes, as Predictor::Predict. Called from one thread at a time.
 using PredictFunction = std::function<Result<std::vector<Mesh>>(std::span<const std::uint8_t>)>;
 
+// All views of a model to a mesh. Called from one thread at a time.
+using FitFunction = std::function<Result<Mesh>(const ModelData&)>;
+
 struct EvaluationJob {
   const Dataset* dataset = nullptr;
   Split split = Split::kTest;
   PredictFunction predict;
+  FitFunction oracle{};      // the row "oracle"; none: no such row
   Mesh template_mesh;        // the baseline "undeformed template"
   int views_per_model = 24;  // evenly spread over the dataset's views; at most all of them
   // Training models whose pictures are searched for the one nearest to each input; of more models

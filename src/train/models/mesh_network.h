@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "nn/layers.h"
-#include "nn/ops/axis_map.h"
 #include "scene/mesh.h"
+#include "train/models/deformable_template.h"
 
 namespace tilegrad::train {
 
@@ -18,11 +18,7 @@ struct NetworkConfig {
   std::int64_t code = 1024;     // width of the encoder's three fully connected layers
   std::int64_t hidden1 = 1024;  // widths of each decoder
   std::int64_t hidden2 = 2048;
-  std::int64_t template_level = 3;  // subdivisions of the icosahedron: 3 gives 642 vertices
-  double template_radius = 0.175;   // world units
-  std::int64_t smoothing = 0;       // rounds of diffusion over the template that offsets go through
-  bool symmetric = false;           // offsets are the mean of themselves and their mirror image at
-                                    // x = 0, so every prediction is symmetric there
+  TemplateConfig shape;             // what is deformed, and how freely
   bool fc_norm = true;              // batch norm after hidden fully connected layers
   double output_deviation = 0.001;  // the decoders' last weights start as N(0, this^2): the first
                                     // prediction is nearly the template
@@ -30,12 +26,10 @@ struct NetworkConfig {
                                     // fan-in, as convolutions
   double color_bias = 0.0;          // what vertex colours start at
   bool picture_colors = false;      // colours are read from the picture (ops/sample_colors.h)
-  bool n3mr_vertices = false;       // sphere_vertices.h instead of offsets from the template
 };
 
 // At 64 x 64 with NetworkConfig's defaults.
 inline constexpr std::int64_t kPaperParameters = 34'115'916;
-inline constexpr float kPredictionHalfExtent = 0.45f;  // world units, as the truth
 
 // What the network says of a batch of B images.
 struct PredictedMeshes {
@@ -45,6 +39,9 @@ struct PredictedMeshes {
   nn::Var positions;
   nn::Var colors;  // [B, V, 3] linear, not clamped
 };
+
+// Number i of a batch, with `faces` and with colours brought into [0, 1].
+Mesh MeshOf(const std::vector<Face>& faces, const PredictedMeshes& meshes, std::size_t i);
 
 class MeshNetwork {
  public:
@@ -56,21 +53,13 @@ class MeshNetwork {
   PredictedMeshes Forward(const nn::Var& images, nn::Mode mode);
 
   nn::Module& module() { return all_; }
-  const Mesh& template_mesh() const { return template_; }
+  const Mesh& template_mesh() const { return template_.mesh(); }
 
  private:
-  nn::Var Movement(const nn::Var& code, nn::Mode mode);
-  nn::Var Smoothed(const nn::Var& raw) const;
-  nn::Var N3mrMovement(const nn::Var& raw) const;
   nn::Var Colors(const nn::Var& code, const nn::Var& images, nn::Mode mode);
 
-  nn::Context& context_;
-  Mesh template_;
   NetworkConfig config_;
-  nn::Tensor template_positions_;  // [V, 3]
-  nn::Tensor unit_sphere_;         // [V, 3] the template at radius 1; n3mr_vertices
-  nn::AxisMap diffusion_;          // one round
-  nn::AxisMap symmetry_;           // of [3 V] offsets
+  DeformableTemplate template_;
   // The three parts, shown to visitors as one module.
   struct Parts : nn::Module {
     nn::Sequential encoder, shape, color;
@@ -78,10 +67,5 @@ class MeshNetwork {
     void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
   } all_;
 };
-
-// positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per
-// mesh of [B, V, 3]. The gradient flows through the extremes. A mesh without
-// extent stays finite.
-nn::Var NormalizeMeshes(const nn::Var& positions, double half_extent);
 
 }  // namespace tilegrad::train

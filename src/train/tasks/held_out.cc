@@ -186,14 +186,17 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
 }
 
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop) {
+                                     const ProgressSink& progress, const StopFlag& stop,
+                                     const MakeFitFunction& fit) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.oracle_steps > 0 && !fit) return InvalidArgument("this task has no oracle");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
   EvaluationJob evaluation;
   evaluation.dataset = &dataset;
   evaluation.split = job.split;
   evaluation.predict = [&](auto images) { return PredictAndChange(job, images, workers); };
+  if (job.oracle_steps > 0) evaluation.oracle = fit(dataset.info(), job.oracle_steps, workers);
   evaluation.template_mesh = job.predictor.template_mesh();
   evaluation.views_per_model = job.views_per_model;
   evaluation.predictor = job.predictor.description();

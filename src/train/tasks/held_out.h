@@ -6,15 +6,21 @@
 #include <vector>
 
 #include "train/data/dataset.h"
+#include "train/eval/evaluate.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {
 
 inline constexpr int kShownViews = 3;
 
+// Fits in so many steps, on the workers, what a task predicts.
+using MakeFitFunction = std::function<FitFunction(const DatasetInfo&, int steps, const Workers&)>;
+
 // Scores of eval/evaluate.h. Errors: as CheckHeldOut and Evaluate; images of another size.
+// `fit`: for TaskEvaluation::oracle_steps, which are an error without it.
 Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& workers,
-                                     const ProgressSink& progress, const StopFlag& stop);
+                                     const ProgressSink& progress, const StopFlag& stop,
+                                     const MakeFitFunction& fit = nullptr);
 
 // Showcase::data ("It learned from 299 models in 11 classes ..."), note, credits, camera and
 // examples of the test split: the truth of each shown view beside the prediction from the first.

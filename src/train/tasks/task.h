@@ -69,6 +69,9 @@ struct TaskEvaluation {
   Split split = Split::kTest;  // which models are scored
   int views_per_model = 24;
   PredictionChange change{};  // none: predictions are scored as they are
+  // Of fitting what is predicted to all views of each scored model, for a row that says how good
+  // predictions can be; 0: none. An error where a task has no such row.
+  int oracle_steps = 0;
 };
 
 // A picture of a report.

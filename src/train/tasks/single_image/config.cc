@@ -14,12 +14,12 @@ ConfigFields FieldsOf(NetworkConfig* c) {
       {"network.code", &c->code, 1, 65536, "width of the encoder's fully connected layers"},
       {"network.hidden1", &c->hidden1, 1, 65536, "width of each decoder's first layer"},
       {"network.hidden2", &c->hidden2, 1, 65536, "width of each decoder's second layer"},
-      {"network.template_level", &c->template_level, 0, 6,
+      {"network.template_level", &c->shape.level, 0, 6,
        "subdivisions of the icosahedron; 3: 642 vertices"},
-      {"network.template_radius", &c->template_radius, 1e-3, 10, "world units"},
-      {"network.smoothing", &c->smoothing, 0, 64,
+      {"network.template_radius", &c->shape.radius, 1e-3, 10, "world units"},
+      {"network.smoothing", &c->shape.smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
-      {"network.symmetric", &c->symmetric, 0, 1, "every prediction is symmetric at x = 0"},
+      {"network.symmetric", &c->shape.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
       {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
       {"network.fc_deviation", &c->fc_deviation, 0, 10,
        "fully connected weights start as N(0, this^2); 0: uniform by fan-in"},
@@ -29,7 +29,7 @@ ConfigFields FieldsOf(NetworkConfig* c) {
        "what vertex colours start at, without picture_colors"},
       {"network.picture_colors", &c->picture_colors, 0, 1,
        "vertices look up their colours in the picture"},
-      {"network.n3mr_vertices", &c->n3mr_vertices, 0, 1,
+      {"network.n3mr_vertices", &c->shape.n3mr_vertices, 0, 1,
        "N3MR's sigmoids and centroid instead of offsets"},
   };
 }
@@ -77,7 +77,7 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
 }  // namespace
 
 Status CheckConfig(const SingleImageConfig& config) {
-  const NetworkConfig& n = config.network;
+  const TemplateConfig& n = config.network.shape;
   if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
     return InvalidArgument(
         "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "

@@ -31,25 +31,12 @@ class SingleImageModel : public Model {
   Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
 
  private:
-  Mesh MeshOf(const float* positions, const float* colors) const;
-
   nn::Context& context_;
   int image_size_;
   MeshNetwork network_;
   Mesh template_;
   std::int64_t parameters_ = 0;
 };
-
-Mesh SingleImageModel::MeshOf(const float* p, const float* c) const {
-  const auto unit = [](float x) { return std::clamp(x, 0.0f, 1.0f); };
-  Mesh mesh;
-  mesh.faces = template_.faces;
-  for (std::size_t v = 0; v < template_.positions.size(); ++v, p += 3, c += 3) {
-    mesh.positions.emplace_back(p[0], p[1], p[2]);
-    mesh.colors.emplace_back(unit(c[0]), unit(c[1]), unit(c[2]), 1.0f);
-  }
-  return mesh;
-}
 
 Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
   const nn::NoGrad off(context_);
@@ -62,10 +49,8 @@ Status SingleImageModel::Predict(std::span<const std::uint8_t> images, std::vect
   const PredictedMeshes predicted =
       network_.Forward(nn::Constant(context_, std::move(input)), nn::Mode::kEval);
   TILEGRAD_TRY(context_.TakeStatus());
-  const std::size_t numbers = 3 * template_.positions.size();  // of a mesh
   for (std::size_t i = 0; i < count; ++i) {
-    Mesh mesh = MeshOf(predicted.positions.value().data<float>() + i * numbers,
-                       predicted.colors.value().data<float>() + i * numbers);
+    Mesh mesh = MeshOf(template_.faces, predicted, i);
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
     meshes->push_back(std::move(mesh));

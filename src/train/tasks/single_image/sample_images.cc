@@ -27,14 +27,14 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
   const PredictedMeshes meshes =
       step.network().Forward(nn::Constant(context, batch.input), nn::Mode::kEval);
   const int views = static_cast<int>(samples[0].views.size());
-  const RenderedImages images =
-      RenderScenes(step.renderer(), {.positions = meshes.positions, .colors = meshes.colors},
-                   {step.faces(), batch.cameras, views, step.OptionsAt(at_step)});
+  const RenderedImages images = RenderScenes(
+      step.losses().renderer(), {.positions = meshes.positions, .colors = meshes.colors},
+      {step.losses().faces(), batch.cameras, views, step.losses().OptionsAt(at_step)});
   TILEGRAD_TRY(context.TakeStatus());
   const std::size_t plane =
       static_cast<std::size_t>(store.size) * static_cast<std::size_t>(store.size);
   // Soft alpha is a signal for training, and rounds to 1 beside a face; people see what is covered.
-  const std::span<const std::int32_t> ids = step.renderer().frame.images().face_ids;
+  const std::span<const std::int32_t> ids = step.losses().renderer().frame.images().face_ids;
   std::vector<float> covered(ids.size());
   std::ranges::transform(ids, covered.begin(),
                          [](std::int32_t id) { return id < 0 ? 0.0f : 1.0f; });

@@ -7,6 +7,7 @@
 #include "train/data/trained_models.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/single_image/model.h"
+#include "train/tasks/single_image/oracle.h"
 #include "train/tasks/single_image/sample_images.h"
 #include "train/tasks/single_image/step.h"
 
@@ -48,7 +49,10 @@ class SingleImageTask : public Task {
   }
   Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
                               const ProgressSink& progress, const StopFlag& stop) override {
-    return EvaluateOnDataset(job, workers, progress, stop);
+    return EvaluateOnDataset(job, workers, progress, stop,
+                             [this](const DatasetInfo& info, int steps, const Workers& on) {
+                               return FitTemplates(config_, info, steps, on);
+                             });
   }
   Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
                         const ProgressSink& progress, const StopFlag& stop) override;
@@ -150,7 +154,7 @@ Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex
                   GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, at.step));
   TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at.step, &values));
   out->loss = values.total;
-  step_->AddTerms(values, &out->terms);
+  step_->losses().AddTerms(values, &out->terms);
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_.models);
   out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));

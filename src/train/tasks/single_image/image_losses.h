@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Equation 14: meshes -> renderer -> losses against the pictures.
+#pragma once
+
+#include <optional>
+
+#include "scene/topology.h"
+#include "train/models/mesh_network.h"
+#include "train/ops/render_op.h"
+#include "train/ops/rival_op.h"
+#include "train/run/step_values.h"
+#include "train/tasks/single_image/batch_tensors.h"
+#include "train/tasks/single_image/config.h"
+
+namespace tilegrad::train {
+
+struct LossValues {
+  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
+  bool has_color = true;  // false where the rule draws alpha alone
+};
+
+// 1/delta of a step: it follows a schedule of the configuration.
+double SharpnessAt(const SingleImageConfig& config, std::int64_t step);
+
+class ImageLosses {
+ public:
+  // Of meshes with the faces of `sphere`. The words of config.render and config.rivals are known
+  // (RivalOptions).
+  ImageLosses(nn::Context& context, const SingleImageConfig& config, const Mesh& sphere,
+              int image_size);
+
+  // On the tape; `values` gets the parts.
+  nn::Var Total(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step,
+                LossValues* values);
+  // Appends the same by name and weight.
+  void AddTerms(const LossValues& values, std::vector<LossTerm>* terms) const;
+
+  SceneRenderer& renderer() { return renderer_; }
+  RenderOptions OptionsAt(std::int64_t step) const;
+  std::span<const std::int32_t> faces() const { return {faces_[0].data(), 3 * faces_.size()}; }
+
+ private:
+  // Whether the rule draws colours, which the colour loss needs.
+  bool HasColor() const;
+  // The images that losses look at.
+  RenderedImages Draw(const PredictedMeshes& meshes, const BatchTensors& batch, std::int64_t step);
+
+  SingleImageConfig config_;
+  int image_size_;
+  std::vector<Face> faces_;
+  Topology topology_;
+  SceneRenderer renderer_;
+  std::optional<rivals::Options> rival_;  // instead of ours
+  RivalRenderer rival_renderer_;
+};
+
+}  // namespace tilegrad::train
