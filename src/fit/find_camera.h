@@ -11,7 +11,7 @@
 namespace tilegrad::train {
 
 struct FoundCamera {
-  Camera camera;
+  Camera camera{};
   double azimuth = 0, elevation = 0;  // degrees, of the orbit it began as
   double silhouette_iou = 0, color_l1 = 0;
   double cost() const { return 1 - silhouette_iou + color_l1; }

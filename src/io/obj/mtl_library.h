@@ -26,7 +26,7 @@ struct MtlMaterial {
   std::string name;
   glm::vec3 diffuse{1};  // Kd; white where the file has none
   float opacity = 1;     // d, else 1 - Tr
-  MtlImage image;        // map_Kd
+  MtlImage image{};      // map_Kd
   bool operator==(const MtlMaterial&) const = default;
 };
 

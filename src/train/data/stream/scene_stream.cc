@@ -132,7 +132,7 @@ Result<std::span<const float>> SceneStream::Render(int model, std::uint64_t posi
   w.scenes.assign(cameras.size(), {});
   for (std::size_t v = 0; v < w.scenes.size(); ++v) {
     Scene& scene = w.scenes[v];
-    cameras[v] = DrawCamera(config_, rule_, rng);
+    cameras[v] = DrawCamera(config_, rule_, v, rng);
     scene.camera = ScaledCamera(cameras[v], static_cast<float>(samples));
     scene.positions = Flat(w.object.positions);
     scene.faces = {mesh.faces[0].data(), 3 * mesh.faces.size()};

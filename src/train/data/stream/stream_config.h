@@ -20,8 +20,10 @@ struct StreamConfig {
   double stretch = 0.4;
   double taper = 0.15;
 
-  // The camera: any azimuth, and of the others any value of the range.
-  double elevation_low = 5, elevation_high = 45;  // degrees
+  // The camera: any azimuth, and of the others any value of the range. Views from below that only
+  // the losses see show undersides: silhouettes from above leave room for a cone beneath an object.
+  double elevation_low = 5, elevation_high = 45;  // degrees; of the view that the network sees
+  double around_low = -45, around_high = 60;      // degrees; of the others
   double fov_low = 30,
          fov_high = 55;  // degrees; the distance follows, so that objects keep their size
   double roll = 4;       // degrees, to either side

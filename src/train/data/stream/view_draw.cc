@@ -34,11 +34,12 @@ Light Turned(const Light& light, double azimuth, double elevation) {
 
 }  // namespace
 
-Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, Rng& rng) {
+Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, std::size_t view, Rng& rng) {
   Lens lens = rule.lens;
   lens.fov_y = rng.Uniform(config.fov_low, config.fov_high);
   const double azimuth = rng.Uniform(0, 360);
-  const double elevation = rng.Uniform(config.elevation_low, config.elevation_high);
+  const double elevation = view == 0 ? rng.Uniform(config.elevation_low, config.elevation_high)
+                                     : rng.Uniform(config.around_low, config.around_high);
   const double zoom = 1 + rng.Uniform(-config.jitter, config.jitter);
   const double focal = std::tan(0.5 * kDegree * rule.lens.fov_y);
   const double distance = zoom * rule.distance * focal / std::tan(0.5 * kDegree * lens.fov_y);

@@ -12,8 +12,9 @@
 
 namespace tilegrad::train {
 
-// Azimuth from all the circle; the size of objects in the image is that of `rule`, within jitter.
-Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, Rng& rng);
+// View 0 is what the network sees; the others have a range of elevations of their own. Azimuth from
+// all the circle; the size of objects in the image is that of `rule`, within jitter.
+Camera DrawCamera(const StreamConfig& config, const CameraRule& rule, std::size_t view, Rng& rng);
 
 // The key and the fill light of datasets, each turned about the vertical and up or down.
 std::array<Light, 2> DrawLights(const StreamConfig& config, Rng& rng);

@@ -115,7 +115,7 @@ TEST(ObjectDraw, OtherHuesHaveTheSameLuminance) {
 TEST(ViewDraw, WithoutChanceItIsAnOrbit) {
   const DatasetInfo info = Info(64);
   Rng rng(5);
-  const Camera camera = DrawCamera(Still(), info.camera, rng);
+  const Camera camera = DrawCamera(Still(), info.camera, 0, rng);
   // The eye is at the rule's distance and elevation, and looks at the origin.
   glm::vec3 eye(0);
   for (int i = 0; i < 3; ++i) {
@@ -138,8 +138,30 @@ TEST(ViewDraw, TheDistanceFollowsTheLens) {
   const float want = info.camera.View(0).fx / 1.45f;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Rng rng(seed);
-    const Camera camera = DrawCamera(config, info.camera, rng);
+    const Camera camera = DrawCamera(config, info.camera, seed % 3, rng);
     EXPECT_NEAR(camera.fx / -camera.translation[2], want, 1e-4f * want);
+  }
+}
+
+// The height of the eye over its distance is the sine of the elevation.
+TEST(ViewDraw, OtherViewsHaveTheirOwnElevations) {
+  StreamConfig config;
+  config.elevation_low = 10, config.elevation_high = 20;
+  config.around_low = -40, config.around_high = -30;
+  const DatasetInfo info = Info(64);
+  const auto elevation = [&](std::size_t view, std::uint64_t seed) {
+    Rng rng(seed);
+    const Camera camera = DrawCamera(config, info.camera, view, rng);
+    float height = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      height -= camera.rotation[3 * k + 1] * camera.translation[k];
+    const auto& t = camera.translation;
+    return std::asin(height / std::hypot(t[0], t[1], t[2])) * 180 / 3.14159265f;
+  };
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    EXPECT_NEAR(elevation(0, seed), 15, 5.001f);
+    EXPECT_NEAR(elevation(1, seed), -35, 5.001f);
+    EXPECT_NEAR(elevation(2, seed), -35, 5.001f);
   }
 }
 
