@@ -193,6 +193,7 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^assimp/.*"), {"src/io/"}},
       {std::regex("^(zip|zlib)\\.h$"), {"src/io/"}},
       {std::regex("^Imf.*"), {"src/io/exr_"}},
+      {std::regex("^webp/.*"), {"src/io/webp_"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/", "src/fit/"}},
       {std::regex("^CLI/.*"), {"src/cli/"}},
       {std::regex("^(pybind11/.*|Python\\.h)$"), {"python/bindings/"}},
