@@ -15,6 +15,7 @@
 #include "cli/run_folder.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
+#include "train/run/checkpoint.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -115,12 +116,23 @@ Status SetConfig(const Options& options, FitConfig* config) {
   return {};
 }
 
+// Before anything is read or made: a folder that was misspelt would get a fit of its own.
+Status CheckResume(const Options& options) {
+  if (!options.resume || !train::ListCheckpoints(options.out).empty()) return {};
+  return NotFound(
+      "{}: no fit to go on with: there is no checkpoint in it; leave out --resume to start one",
+      options.out);
+}
+
 Result<train::FitJob> MakeJob(const Options& options) {
   train::FitJob job;
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
   job.guard = OutputGuard(options.force);
-  if (!options.doctor) TILEGRAD_TRY(CheckRunFolder(options.out, job.guard));
+  if (!options.doctor) {
+    TILEGRAD_TRY(CheckRunFolder(options.out, job.guard));
+    TILEGRAD_TRY(CheckResume(options));
+  }
   TILEGRAD_ASSIGN(job.input, options.dataset_model.empty()
                                  ? train::ReadFitFolder(options.input, options.hold_out)
                                  : train::ReadFitDataset(options.input, options.dataset_model,
@@ -237,7 +249,8 @@ void AddFit(CLI::App& app, Action* action) {
   AddNumbers(command, &options->config);
   command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")
       ->delimiter(',');
-  command->add_flag("--resume", options->resume, "go on with the fit in --out");
+  command->add_flag("--resume", options->resume,
+                    "go on with the fit in --out, which has saved something");
   command->add_flag("--doctor", options->doctor,
                     "only say what gets a gradient at the start, and why not");
   AddWorkersOption(command, &options->workers);
