@@ -15,6 +15,7 @@
 #include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/data/build/build.h"
+#include "train/data/few_models.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -146,6 +147,8 @@ Status Make(const DatasetOptions& options) {
         Count(static_cast<std::size_t>(summary.info.views), "view"), summary.info.image_size,
         summary.info.image_size, static_cast<double>(summary.bytes) / 1e6, folder.string(),
         Count(static_cast<std::size_t>(summary.reused), "model file"), seconds.count());
+  if (const auto advice = train::AdviceOnFewModels(summary.models, /*streamed=*/false))
+    PrintNote("tilegrad: warning: {}\n", *advice);
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);
   Print("look at {}\n", (folder / "contact_sheet.png").string());
   return {};

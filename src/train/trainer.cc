@@ -71,7 +71,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(plan.settings, "configuration"));
   Training training(job, &config);
   TILEGRAD_TRY(CheckExistingRun(plan, training));
-  TILEGRAD_TRY(config.task->Start({context, config.schedule, job.data, progress, stop}));
+  TILEGRAD_TRY(config.task->Start({context, config.schedule, job.data, progress, stop, job.warn}));
   TILEGRAD_TRY(context.TakeStatus());
   plan.image_size = config.task->image_size();
   return ExecuteRun(plan, &training, context, progress, stop);

@@ -19,7 +19,7 @@ struct TrainJob {
   ExistingRun existing = ExistingRun::kRefuse;
   // > 0: save and stop after this long; a continued run ends in the same bits.
   double max_minutes = 0;
-  WarningSink warn = nullptr;  // broken checkpoints that were passed over
+  WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
 };
 
 // As ExecuteRun. Two runs have the same configuration if all keys but these are equal: name,

@@ -148,6 +148,22 @@ TEST_F(TrainerTest, StreamedRunsResumeAndDoNotDependOnWorkers) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / "stream.png"));
 }
 
+TEST_F(TrainerTest, ANewRunKeepsItsPicturesAndWarnsOfFewModels) {
+  int warnings = 0;
+  job_.warn = [&](const std::string& text) {
+    ++warnings;
+    EXPECT_TRUE(text.starts_with("10 training shapes are few")) << text;
+  };
+  StopAfter(4);
+  EXPECT_EQ(warnings, 1);
+  const Path pictures = folder_ / "run" / "thumbnails.npz";
+  const Bytes kept = ReadFile(pictures).value();
+  std::filesystem::remove(pictures);  // as in a run of an earlier version
+  ExpectFinishes();
+  EXPECT_EQ(warnings, 1);
+  EXPECT_EQ(ReadFile(pictures).value(), kept);
+}
+
 TEST_F(TrainerTest, WithoutMeshesNothingCanBeStreamed) {
   ValueOf<double>(job_.config, "stream.share") = 0.5;
   ExpectMessage(Run().status(), "stream.share");

@@ -35,6 +35,7 @@ struct TaskStart {
   Path data;  // dataset folder
   const ProgressSink& progress;
   const StopFlag& stop;
+  WarningSink warn = nullptr;  // of what is likely not what was meant
 };
 
 // A step is one or more updates, each of some parameters: a task with an adversary takes several of

@@ -4,7 +4,9 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
+#include "train/data/few_models.h"
 #include "train/data/trained_models.h"
+#include "train/eval/training_pictures.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/single_image/model.h"
 #include "train/tasks/single_image/oracle.h"
@@ -59,11 +61,14 @@ class SingleImageTask : public Task {
 
  private:
   Status CheckDataset() const;
+  Status KeepPictures(const Path& run, std::int64_t first_step) const;
+  void WarnOfFewModels() const;
   Status LoadImages(const TaskStart& start);
   Status LoadMeshes(const TaskStart& start);
 
   SingleImageConfig config_;
   nn::Context* context_ = nullptr;
+  WarningSink warn_;
   std::optional<Dataset> dataset_;
   ImageStore train_, held_out_;
   std::vector<Sample> samples_;  // of held_out_, for pictures
@@ -80,6 +85,7 @@ Status SingleImageTask::Start(const TaskStart& start) {
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
   TILEGRAD_TRY(LoadMeshes(start));
+  warn_ = start.warn;
   step_.emplace(*context_, config_, train_.size);
   order_.emplace(train_.models, train_.views, static_cast<std::uint64_t>(start.schedule.seed),
                  config_.mirrored);
@@ -89,6 +95,8 @@ Status SingleImageTask::Start(const TaskStart& start) {
 Status SingleImageTask::Begin(const Path& run, std::int64_t first_step) {
   TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
                                      first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  TILEGRAD_TRY(KeepPictures(run, first_step));
+  if (first_step == 0) WarnOfFewModels();
   if (!stream_ || first_step > 0) return {};
   TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
   return io::SavePng(run / "stream.png", sheet);
@@ -108,6 +116,20 @@ Status SingleImageTask::CheckDataset() const {
                            folder, info.image_size);
   }
   return {};
+}
+
+// A run of an earlier version gets them when it goes on.
+Status SingleImageTask::KeepPictures(const Path& run, std::int64_t first_step) const {
+  if (first_step > 0) {
+    const auto kept = TrainingPictures::Read(run);
+    if (!kept.ok() || *kept) return {};
+  }
+  return TrainingPictures::Of(*dataset_, train_, context_->workers()).Write(run);
+}
+
+void SingleImageTask::WarnOfFewModels() const {
+  const auto advice = AdviceOnFewModels(dataset_->models(), config_.stream.share > 0);
+  if (advice && warn_) warn_(*advice);
 }
 
 Status SingleImageTask::LoadImages(const TaskStart& start) {
