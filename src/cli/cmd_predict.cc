@@ -1,25 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// tilegrad predict: a coloured mesh and a turntable picture from each image.
+// tilegrad predict: a coloured mesh and pictures of it all around from each image.
 #include "base/error.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/predict_pictures.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
-#include "render/picture/composite.h"
-#include "render/picture/mesh_pictures.h"
 #include "train/data/cutout.h"
 #include "train/data/dataset.h"
+#include "train/eval/training_pictures.h"
 #include "train/predictor.h"
 
 namespace tilegrad::cli {
 namespace {
-
-constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableSize = 256;
 
 struct PredictOptions {
   std::string run, out = ".", mask;
@@ -28,6 +26,20 @@ struct PredictOptions {
   int refine = train::kRefineSteps;
   int workers = 0;
 };
+
+struct TrainedNetwork {
+  train::Predictor predictor;
+  std::optional<train::TrainingPictures> pictures;  // none: of an earlier version
+};
+
+// A run predicts without its pictures, too.
+Result<TrainedNetwork> LoadNetwork(const Path& run, const Workers& workers) {
+  TILEGRAD_ASSIGN(train::Predictor predictor, LoadPredictor(run, workers));
+  auto pictures = train::TrainingPictures::Read(run);
+  if (!pictures.ok())
+    PrintNote("tilegrad: warning: passed over: {}\n", pictures.status().message());
+  return TrainedNetwork{std::move(predictor), pictures.ok() ? std::move(*pictures) : std::nullopt};
+}
 
 train::Framing FramingOf(const PredictOptions& options) {
   return options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
@@ -41,18 +53,6 @@ Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& fil
   return masked.ok() ? std::move(masked) : masked.status().Within(file);
 }
 
-Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers) {
-  const train::CameraRule rule;
-  std::vector<Camera> cameras;
-  for (int i = 0; i < kTurntableViews; ++i) {
-    cameras.push_back(
-        OrbitCamera(rule.lens, -360.0 * i / kTurntableViews, rule.elevation, rule.distance));
-  }
-  TILEGRAD_ASSIGN(const auto views,
-                  DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers));
-  return io::SavePng(file, TileImages(views, kTurntableColumns));
-}
-
 // Image files and what their results are called: by the file, each name once.
 std::vector<std::pair<std::string, std::string>> NameResults(
     const std::vector<std::string>& images) {
@@ -61,21 +61,6 @@ std::vector<std::pair<std::string, std::string>> NameResults(
   for (const std::string& file : images)
     named.emplace_back(file, names.Take(Path(file).stem().string()));
   return named;
-}
-
-// What the picture shows, the network's mesh and the refined one, from where the picture was taken.
-Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
-                 const train::RefinedMesh& refined, const Path& file, const Workers& workers) {
-  constexpr int size = train::kRefineSize;
-  const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
-                                        picture.subspan(3 * size * size), size, size};
-  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
-  for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
-                                     std::pair(&refined.mesh, &refined.camera)}) {
-    TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));
-    cells.push_back(std::move(views[0]));
-  }
-  return io::SavePng(file, TileImages(cells, static_cast<int>(cells.size())));
 }
 
 Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& file, Mesh* mesh,
@@ -93,19 +78,34 @@ Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& 
   return {};
 }
 
-Status PredictOne(const train::Predictor& predictor, const PredictOptions& options,
+// Says so if the picture is like none that the network has learned from.
+Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutout,
+                    const std::string& file) {
+  TILEGRAD_ASSIGN(const auto match, trained.Nearest(cutout));
+  if (!match || !trained.IsUnlike(*match)) return {};
+  PrintNote(
+      "tilegrad: warning: {} is unlike the {} training pictures: nearest is {} ({}) at {:.2f}, "
+      "where {:.0f} % of them have another shape within {:.2f}; expect little\n",
+      file, fmt::group_digits(trained.count()), match->name, match->class_name, match->distance,
+      100 * train::kUsualShare, *trained.usual());
+  return {};
+}
+
+Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
                   const std::pair<std::string, std::string>& image, const OutputGuard& guard,
                   const Workers& workers) {
   const auto& [file, stem] = image;
   const Path out(options.out);
   const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
-             match = out / (stem + "_match.png");
-  std::vector<Path> written = {glb, turntable};
+             animation = out / (stem + "_turntable.webp"), match = out / (stem + "_match.png");
+  std::vector<Path> written = {glb, turntable, animation};
   if (options.refine > 0) written.push_back(match);
   TILEGRAD_TRY(guard.CheckAll(written));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
+  const train::Predictor& predictor = network.predictor;
   const auto input = train::PrepareCutout(cutout, predictor.image_size(), FramingOf(options));
   if (!input.ok()) return input.status().Within(file);
+  if (network.pictures) TILEGRAD_TRY(WarnOfUnlike(*network.pictures, cutout, file));
   TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
   if (options.refine > 0) {
     const Status refined = Refine(options, cutout, match, &meshes[0], workers);
@@ -113,8 +113,9 @@ Status PredictOne(const train::Predictor& predictor, const PredictOptions& optio
   }
   TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
+  TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
   guard.NoteAll(written);
-  Print("{} -> {}, {}\n", file, glb.string(), turntable.string());
+  Print("{} -> {}, {}, {}\n", file, glb.string(), turntable.string(), animation.string());
   return {};
 }
 
@@ -123,14 +124,14 @@ Status RunPrediction(const PredictOptions& options) {
     return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const Workers workers(options.workers);
-  TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
+  TILEGRAD_ASSIGN(const TrainedNetwork network, LoadNetwork(run, workers));
   // One bad image does not keep the others from being predicted; the first error is the result.
   Status first;
   OutputGuard guard(options.force);
   for (const std::string& image : options.images) guard.AddInput(image);
   guard.AddInput(options.mask);
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(predictor, options, image, guard, workers);
+    const Status status = PredictOne(network, options, image, guard, workers);
     if (status.ok()) continue;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
@@ -149,10 +150,10 @@ void AddPredict(CLI::App& app, Action* action) {
   command->add_option("--run", options->run,
                       "run folder or one checkpoint [the newest below runs/]");
   command
-      ->add_option(
-          "--out", options->out,
-          "folder for NAME_predicted.glb and NAME_turntable.png, named after the image; NAME_2 for "
-          "a second image of that name")
+      ->add_option("--out", options->out,
+                   "folder for NAME_predicted.glb, NAME_turntable.png and NAME_turntable.webp (an "
+                   "animation), "
+                   "named after the image; NAME_2 for a second image of that name")
       ->capture_default_str();
   AddForceOption(command, &options->force);
   command->add_option(

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// What predict says of its inputs, and the animation that it writes.
+#include <gtest/gtest.h>
+
+#include "io/image_file.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+class Predict : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    ExpectDone("dataset --source procedural --per-class 6 --size 16 --views 4 --out " + In("d"));
+    ExpectDone("train --config " TILEGRAD_CONFIGS "/quick.toml --data " + In("d") + " --out " +
+               In("r") +
+               " --set schedule.steps=1 --set schedule.batch=2 --set network.channels=2 --set "
+               "network.code=8 --set network.hidden1=8 --set network.hidden2=8 --set "
+               "network.template_level=1");
+    ExpectDone("dataset-view --data " + In("d") + " --split train --out " + In("known.png"));
+    // Red and white stripes.
+    ImageU8 stripes(64, 64, 4);
+    for (int y = 4; y < 60; y += 9) {
+      for (int x = 4; x < 60; ++x) {
+        for (int c = 0; c < 4; ++c) stripes.at(x, y)[c] = 255;
+        if (y % 2 == 0) stripes.at(x, y)[1] = stripes.at(x, y)[2] = 0;
+      }
+    }
+    ASSERT_TRUE(io::SavePng(folder_ / "text.png", stripes).ok());
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  std::string ExpectDone(const std::string& arguments) const {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    return outcome.output;
+  }
+  std::string Said(const std::string& image, const std::string& run = "r") const {
+    return ExpectDone("predict --refine 0 --run " + In(run) + " --out " + In("out") + " " +
+                      In(image));
+  }
+};
+
+TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
+  EXPECT_EQ(Said("known.png").find("unlike"), std::string::npos);
+  const std::string said = Said("text.png");
+  for (const char* part : {"text.png is unlike the ", " training pictures: nearest is ", " at 0.",
+                           "90 % of them have another shape within 0.", "; expect little"})
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  EXPECT_NE(Said("text.png", "r/checkpoints/step_00000001.safetensors").find("unlike"),
+            std::string::npos);
+  // It needs no dataset.
+  std::filesystem::rename(folder_ / "d", folder_ / "gone");
+  EXPECT_EQ(Said("text.png"), said);
+}
+
+TEST_F(Predict, DoesItsWorkWithoutTheTrainingPictures) {
+  Write("r/thumbnails.npz", std::string("broken"));
+  const std::string said = Said("text.png");
+  EXPECT_NE(said.find("passed over: " + In("r/thumbnails.npz")), std::string::npos) << said;
+  std::filesystem::remove(folder_ / "r/thumbnails.npz");
+  EXPECT_EQ(Said("text.png").find("warning"), std::string::npos);
+}
+
+TEST_F(Predict, TheAnimationIsTheSameAgain) {
+  const std::string said = Said("known.png");
+  EXPECT_NE(said.find("known_turntable.webp"), std::string::npos) << said;
+  const Bytes first = ReadFile(folder_ / "out/known_turntable.webp").value();
+  ASSERT_GT(first.size(), 1000u);
+  EXPECT_EQ(std::string(first.begin(), first.begin() + 4), "RIFF");
+  ExpectDone("predict --refine 0 --threads 3 --run " + In("r") + " --out " + In("out") + " " +
+             In("known.png"));
+  EXPECT_EQ(ReadFile(folder_ / "out/known_turntable.webp").value(), first);
+}
+
+}  // namespace
+}  // namespace tilegrad
