@@ -17,25 +17,37 @@ struct ReportOptions {
   bool force = false;
 };
 
+// RUN/summary.png, or PAGE_summary.png beside a page that was named.
+Path SheetBeside(const Path& page, bool in_run) {
+  const std::string stem = in_run ? "" : page.stem().string() + "_";
+  return page.parent_path() / (stem + "summary.png");
+}
+
 Status RunReport(const ReportOptions& options) {
   train::ReportJob job;
   TILEGRAD_ASSIGN(job.run, ChooseRun(options.on.run));
   TILEGRAD_ASSIGN(job.data, ChooseDataset(options.on.data, job.run));
   job.out = options.out.empty() ? job.run / "report.html" : Path(options.out);
+  job.sheet = SheetBeside(job.out, options.out.empty());
   job.models = options.models;
   const OutputGuard guard(options.force);
-  TILEGRAD_TRY(guard.Check(job.out));
+  const Path files[] = {job.out, job.sheet};
+  TILEGRAD_TRY(guard.CheckAll(files));
   const Workers workers(options.on.workers);
   ProgressLine line;
   const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!summary.ok()) return summary.status();
   guard.Note(job.out);
+  if (!summary->sheet_columns.empty()) guard.Note(job.sheet);
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: passed over: {}\n", warning);
   Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),
         Count(static_cast<std::size_t>(summary->models), "model"),
         static_cast<double>(summary->bytes) / 1e6);
+  if (!summary->sheet_columns.empty())
+    Print("{}: the same models in one picture; columns: {}\n", job.sheet.string(),
+          summary->sheet_columns);
   if (!summary->evaluated)
     Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
   return {};
@@ -51,7 +63,11 @@ void AddReport(CLI::App& app, Action* action) {
   command->add_option("--models", options->models, "held-out models to show")
       ->capture_default_str()
       ->check(CLI::Range(0, 200));
-  command->add_option("--out", options->out, "the page [RUN/report.html]")
+  command
+      ->add_option(
+          "--out", options->out,
+          "the page [RUN/report.html]; the models in one picture go to RUN/summary.png, or "
+          "PAGE_summary.png beside it")
       ->check(FileEnding(".html"));
   AddForceOption(command, &options->force);
   command->callback([options, action] { *action = [options] { return RunReport(*options); }; });

@@ -73,9 +73,10 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   const std::string gone = ".4194305.tmp", own = "." + std::to_string(::getpid()) + ".tmp";
   std::vector<Path> left;
   for (const std::string name :
-       {"run/eval.md", "run/eval.json", "run/report.html", "out/view_predicted.glb",
-        "out/view_turntable.png", "out/view_match.png", "out/view.png", "out/drawn.png",
-        "out/drawn_depth.png", "out/cameras.json", "out/colmap/images.txt"}) {
+       {"run/eval.md", "run/eval.json", "run/report.html", "run/summary.png",
+        "out/view_predicted.glb", "out/view_turntable.png", "out/view_turntable.webp",
+        "out/view_match.png", "out/view.png", "out/drawn.png", "out/drawn_depth.png",
+        "out/cameras.json", "out/colmap/images.txt"}) {
     left.push_back(Write(name + gone, "half"));
   }
   const Path kept[] = {Write("run/eval.md" + own, "of a process that runs"),

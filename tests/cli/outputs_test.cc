@@ -121,6 +121,11 @@ TEST_F(Outputs, ViewsAndFits) {
   EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "mine");
   Write("f/report.html", std::string("annotated"));
   ExpectKept("f/report.html", fit + "f --resume", "--force");
+  const Outcome resumed = Run(fit + "nowhere --resume");
+  EXPECT_EQ(resumed.exit_code, 3) << resumed.output;
+  EXPECT_NE(resumed.output.find("nowhere: no fit to go on with"), std::string::npos)
+      << resumed.output;
+  EXPECT_FALSE(Exists("nowhere"));
   ExpectKept("f/mesh.glb", fit + "f --force --resume --mesh f/mesh.glb", "is read here");
 }
 
@@ -151,6 +156,8 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
   Write("p/x_predicted.glb", std::string("mine"));
   ExpectKept("p/x_predicted.glb", predict + "p/x.png", "--force");
   EXPECT_FALSE(Exists("p/x_turntable.png"));
+  Write("p/x_turntable.webp", std::string("mine"));
+  ExpectKept("p/x_turntable.webp", predict + "p/x.png", "--force");
   ExpectDone(predict + "p/x.png --force");
   ExpectDone(predict + "p/x.png");
   // A picture that is read here, and has the name of a result.
@@ -160,7 +167,9 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
   for (const auto& [file, command] :
        {std::pair("r/eval.md", "eval --run r --views-per-model 1"),
         std::pair("r/report.html", "report --run r --models 1"),
-        std::pair("page.html", "report --run r --models 1 --out page.html")}) {
+        std::pair("r/summary.png", "report --run r --models 1"),
+        std::pair("page.html", "report --run r --models 1 --out page.html"),
+        std::pair("page_summary.png", "report --run r --models 1 --out page.html")}) {
     Write(file, std::string("mine"));
     ExpectKept(file, command, "--force");
     ExpectDone(std::string(command) + " --force");

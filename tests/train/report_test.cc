@@ -7,6 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/image_file.h"
+#include "render/picture/composite.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
 #include "train/eval/evaluation.h"
@@ -127,6 +129,34 @@ TEST_F(ReportTest, TextOfFilesStaysText) {
   EXPECT_EQ(Count(page, "</script>"), 2);  // the page's own
   // Name of the run in title and heading; name, creator and licence of the model in the credits.
   EXPECT_GE(Count(page, "&lt;/script&gt;&lt;b onclick=&quot;x&quot;&gt;&amp;&#39;"), 6);
+}
+
+TEST_F(ReportTest, DrawsTheModelsInOnePicture) {
+  job_.sheet = folder_ / "sheet.png";
+  const auto summary = Make();
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  EXPECT_EQ(summary->sheet_columns,
+            "input, prediction, prediction from another side, truth from there");
+  const ImageU8 sheet = io::LoadImage(job_.sheet).value();
+  // Two models; pictures of 32 pixels are drawn six times as large, 4 apart.
+  EXPECT_EQ(sheet.width, 4 * 192 + 3 * 4);
+  EXPECT_EQ(sheet.height, 2 * 192 + 4);
+  const Dataset dataset = Dataset::Open(job_.data).value();
+  const auto images = dataset.LoadImages(dataset.Select(Split::kTest)[1]).value();
+  const std::size_t bytes = images.size() / 4;
+  const auto shown = [&](int view, int left) {
+    const auto image = std::span(images).subspan(bytes * static_cast<std::size_t>(view), bytes);
+    const ImageU8 expected = OverGrey(
+        PlanarRgba<std::uint8_t>{image.first(bytes / 4 * 3), image.last(bytes / 4), 32, 32},
+        kPaper);
+    for (int y = 0; y < 192; ++y) {
+      for (int x = 0; x < 192; ++x)
+        ASSERT_EQ(sheet.at(left + x, 196 + y)[1], expected.at(x / 6, y / 6)[1]);
+    }
+  };
+  const std::vector<int> views = ShownViews(4);
+  shown(views[0], 0);
+  shown(views[1], 3 * 196);
 }
 
 TEST_F(ReportTest, SaysThatThereIsNoEvaluationYet) {

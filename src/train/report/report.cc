@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/temporary_file.h"
+#include "io/image_file.h"
 #include "train/predictor.h"
 #include "train/report/assets.h"
 #include "train/report/html.h"
@@ -43,10 +44,19 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   const ShowcaseRequest request{job.run, job.data, facts.run.header, predictor, job.models};
   TILEGRAD_ASSIGN(facts.showcase, predictor.task().Show(request, workers, progress, stop));
   TILEGRAD_ASSIGN(const std::string page, Page(facts));
+  ReportSummary summary;
+  summary.bytes = page.size();
+  summary.models = static_cast<int>(facts.showcase.examples.size());
+  summary.evaluated = facts.evaluation.has_value();
+  summary.warnings = predictor.warnings();
   RemoveTemporariesOf(job.out);  // of killed calls
   TILEGRAD_TRY(WriteTextAtomic(job.out, page));
-  return ReportSummary{page.size(), static_cast<int>(facts.showcase.examples.size()),
-                       facts.evaluation.has_value(), predictor.warnings()};
+  if (!job.sheet.empty() && !facts.showcase.sheet.empty()) {
+    RemoveTemporariesOf(job.sheet);
+    TILEGRAD_TRY(io::SavePng(job.sheet, facts.showcase.sheet));
+    summary.sheet_columns = facts.showcase.sheet_columns;
+  }
+  return summary;
 }
 
 }  // namespace tilegrad::train

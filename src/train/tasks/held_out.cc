@@ -11,6 +11,7 @@
 #include "train/data/trained_models.h"
 #include "train/eval/evaluate.h"
 #include "train/predictor.h"
+#include "train/tasks/example_sheet.h"
 
 namespace tilegrad::train {
 namespace {
@@ -182,6 +183,7 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
     out.examples.push_back(std::move(example));
     if (progress) progress({"predicting", out.examples.size(), chosen.size(), ""});
   }
+  TILEGRAD_TRY(AddSheet(dataset.info(), workers, &out));
   return out;
 }
 

@@ -103,6 +103,8 @@ struct Showcase {
   std::string note;     // sentences: what the pictures are
   std::vector<std::string> credits;
   std::vector<Example> examples;
+  ImageU8 sheet;              // the examples in one picture, a row each; empty: there is none
+  std::string sheet_columns;  // what its columns are
   double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the view on meshes; degrees
 };
 
