@@ -25,8 +25,8 @@ class Fit : public TempFolderTest {
   void SetUp() override {
     Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
     SetColor(box, {0.8f, 0.4f, 0.2f, 1});
-    const Status made =
-        MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views", {}, {}, stop_);
+    const Status made = MakeViews(box, {.views = 8, .held_out = 2, .size = 64}, folder_ / "views",
+                                  OutputGuard(), {}, stop_);
     ASSERT_TRUE(made.ok()) << made.message();
   }
   FitJob Job(const std::string& out) {
@@ -202,8 +202,8 @@ TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
 // Held-out views of another mesh would judge the fit.
 TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
   const auto make = [&](int held_out, const Path& folder) {
-    return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder, {},
-                     {}, stop_);
+    return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder,
+                     OutputGuard(), {}, stop_);
   };
   ASSERT_TRUE(make(0, folder_ / "views").ok());
   const auto input = ReadFitFolder(folder_ / "views", 3);
@@ -227,7 +227,7 @@ TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
 TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
   const auto make = [&](int views) {
     return MakeViews(Icosphere(1, 1), {.views = views, .held_out = 1, .size = 16}, folder_ / "few",
-                     {}, {}, stop_);
+                     OutputGuard(), {}, stop_);
   };
   ASSERT_TRUE(make(6).ok());
   const Path images = folder_ / "few" / "images";

@@ -201,12 +201,11 @@ Result<nn::StepVector<nn::Gradient>> ToyTask::Backward(const UpdateIndex& at, St
 
 Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /*workers*/,
                                      const ProgressSink& /*progress*/, const StopFlag& stop) {
-  Evaluation out{.predictor = job.predictor.description(),
-                 .split = "test",
-                 .dataset_source = "random numbers",
-                 .views_per_model = 1,
-                 .classes = {"box"},
-                 .class_models = {10}};
+  Evaluation out;
+  out.predictor = job.predictor.description();
+  out.split = "test", out.dataset_source = "random numbers";
+  out.views_per_model = 1;
+  out.classes = {"box"}, out.class_models = {10};
   Rng rng(0, kTestStream);
   double untrained = 0, predicted = 0;
   for (int i = 0; i < out.class_models[0]; ++i) {
@@ -225,10 +224,11 @@ Result<Evaluation> ToyTask::Evaluate(const TaskEvaluation& job, const Workers& /
 
 Result<Showcase> ToyTask::Show(const ShowcaseRequest& request, const Workers& /*workers*/,
                                const ProgressSink& /*progress*/, const StopFlag& stop) {
-  Showcase out{.purpose = "to tell the size of a box by its colour",
-               .data = "It saw random colours.",
-               .note = "Red, green and blue are width, height and depth.",
-               .credits = {"nobody"}};
+  Showcase out;
+  out.purpose = "to tell the size of a box by its colour";
+  out.data = "It saw random colours.";
+  out.note = "Red, green and blue are width, height and depth.";
+  out.credits = {"nobody"};
   Rng rng(0, kTestStream);
   for (int i = 0; i < request.examples; ++i) {
     if (stop) return Cancelled("stopped while predicting; nothing was written");
