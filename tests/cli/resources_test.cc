@@ -47,7 +47,8 @@ class Resources : public TempFolderTest {
       EXPECT_NE(outcome.output.find("4 models"), std::string::npos) << limit << outcome.output;
       EXPECT_EQ(outcome.output.find("could not be used"), std::string::npos)
           << limit << outcome.output;
-      EXPECT_EQ(outcome.output.find("warning"), std::string::npos) << limit << outcome.output;
+      EXPECT_EQ(outcome.output.find("of reading models"), std::string::npos)
+          << limit << outcome.output;
     } else {
       EXPECT_GT(outcome.exit_code, 0) << "a signal: " << limit << outcome.output;
       const auto rejected = ReadText(out / "rejected.jsonl");
