@@ -13,7 +13,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kDeltaShare = 0.7;                    // of the run, until delta is what it ends at
-constexpr double kFinalPixels = 0.7;                   // of the default delta
+constexpr double kFinalPixels = 0.3;                   // of the default delta
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 // By value, as the options of tilegrad fit call them.
@@ -50,7 +50,7 @@ ConfigFields FieldsOf(FitConfig* c) {
       {"views_per_step", &c->views_per_step, 1, 1e6, "images a step looks at"},
       {"levels", &c->levels, 1, 8, "resolutions, coarse to fine, each twice the one before"},
       {"delta_start", &c->delta_start, 1e-9, 1e3, "softness of outlines at the start, squared NDC"},
-      {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.7 pixels"},
+      {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.3 pixels"},
       {"texture_size", &c->texture_size, 2, 8192, "texels around a blank texture"},
       {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
       {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},

@@ -27,7 +27,7 @@ struct FitConfig {
   std::int64_t seed = 1;
   int levels = 3;             // of resolution, each half of the next; the last is the images' own
   double delta_start = 3e-3;  // of equation 5; falls geometrically to `delta` over 70 % of the run
-  double delta = 0;           // 0: 0.7 pixels of the whole image
+  double delta = 0;           // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
   double max_alpha_error = 1e-4;
 
   LearningRates rates;       // positions and cameras' translation: times the object's radius
