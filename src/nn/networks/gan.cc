@@ -91,16 +91,18 @@ void Critic::Visit(const std::string& prefix, ModuleVisitor& visitor) {
   }
 }
 
-Var GradientPenalty(Module& critic, const Var& x) {
-  if (!x.valid() || x.shape().rank() < 1) return Invalid({&x});
+PenalisedScore ScoreWithPenalty(Module& critic, const Var& x) {
+  if (!x.valid() || x.shape().rank() < 1) return {Invalid({&x}), Invalid({&x})};
   // sqrt has no finite gradient at 0, the value for a constant critic.
   constexpr double kTiny = 1e-12;
   const std::int64_t samples = x.shape()[0];
   const Var at = Parameter(x.context(), x.value());
-  const Var scores = Reshape(critic.Forward(at, Mode::kTrain), {samples, -1});
-  const Var d_x = Grad(Sum(Mean(scores, {1})), {at}, {.create_graph = true})[0];
+  const Var scores = Mean(Reshape(critic.Forward(at, Mode::kTrain), {samples, -1}), {1});
+  const Var d_x = Grad(Sum(scores), {at}, {.create_graph = true})[0];
   const Var norm = Sqrt(Sum(Square(Reshape(d_x, {samples, -1})), {1}) + kTiny);
-  return Mean(Square(norm - 1.0));
+  return {Mean(scores), Mean(Square(norm - 1.0))};
 }
+
+Var GradientPenalty(Module& critic, const Var& x) { return ScoreWithPenalty(critic, x).penalty; }
 
 }  // namespace tilegrad::nn

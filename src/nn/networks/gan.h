@@ -51,8 +51,13 @@ class Critic : public Module {
   std::vector<Sequential> levels_;
 };
 
-// mean over samples of (|d mean-of-scores / d x| - 1)^2 at x [n, ..], one norm for each sample
-// (Gulrajani et al. 2017, the paper's equation 15). Can be differentiated by the critic's weights.
-Var GradientPenalty(Module& critic, const Var& x);
+// A critic at x [n, ..]: the mean over samples of its mean score, and the mean over samples of
+// (|d mean score / d x| - 1)^2, one norm for each sample (Gulrajani et al. 2017, the paper's
+// equation 15). Both can be differentiated by the critic's weights, not by x.
+struct PenalisedScore {
+  Var score, penalty;  // scalars
+};
+PenalisedScore ScoreWithPenalty(Module& critic, const Var& x);
+Var GradientPenalty(Module& critic, const Var& x);  // the second of the two
 
 }  // namespace tilegrad::nn
