@@ -7,6 +7,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(LIBHWY REQUIRED IMPORTED_TARGET libhwy)    # libhwy-dev
 if(TILEGRAD_PROGRAM)
   find_package(assimp REQUIRED)             # libassimp-dev
+  find_package(Eigen3 REQUIRED NO_MODULE)   # libeigen3-dev
   find_package(CLI11 REQUIRED)              # libcli11-dev
   find_package(tomlplusplus REQUIRED)       # libtomlplusplus-dev
   pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)    # libzip-dev
