@@ -60,6 +60,8 @@ const Mesh& Predictor::template_mesh() const { return impl_->model->template_mes
 
 Task& Predictor::task() const { return *impl_->config.task; }
 
+Model& Predictor::model() const { return *impl_->model; }
+
 Result<std::vector<Mesh>> Predictor::Predict(std::span<const std::uint8_t> images) const {
   const std::size_t bytes = 4 * static_cast<std::size_t>(image_size() * image_size());
   if (images.size() % bytes != 0) {

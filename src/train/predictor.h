@@ -17,6 +17,7 @@
 
 namespace tilegrad::train {
 
+class Model;
 class Task;
 
 class Predictor {
@@ -36,6 +37,7 @@ class Predictor {
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"
   const Mesh& template_mesh() const;  // Model::template_mesh
   Task& task() const;                 // with the configuration of the run
+  Model& model() const;               // as the task loads it
 
   // images: [N][4][size][size] planar RGBA bytes, RGB over black. Returns N valid meshes with
   // smooth normals; unlit: their colours hold the light of the training images.

@@ -2,12 +2,12 @@
 #include "train/eval/evaluate.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <set>
 
 #include "base/error.h"
 #include "train/data/dataset_files.h"
+#include "train/eval/class_means.h"
 #include "train/eval/retrieval.h"
 #include "train/eval/scores.h"
 #include "train/eval/single_shape.h"
@@ -186,47 +186,18 @@ class Evaluator {
     return MeanScore(scores);
   }
 
-  // class -> shape -> positions in held_out
-  using Members = std::map<int, std::map<std::string, std::vector<std::size_t>>>;
-
-  EvaluationRow Row(const std::string& method, std::span<const Score> scores,
-                    const Members& members) const {
-    EvaluationRow row{.method = method, .classes = {}, .mean = {}};
-    for (const auto& [class_index, shapes] : members) {
-      std::vector<Score> of_class;
-      for (const auto& [shape, indices] : shapes) {
-        std::vector<Score> of_shape;
-        for (const std::size_t i : indices) of_shape.push_back(scores[i]);
-        of_class.push_back(MeanScore(of_shape));
-      }
-      row.classes.push_back(MeanScore(of_class));
-    }
-    row.mean = MeanScore(row.classes);
-    return row;
-  }
-
   const std::string& ClassOf(const ModelInfo& info) const {
     return data_.info().classes[static_cast<std::size_t>(info.class_index)];
   }
 
   void Fill(std::span<const int> held_out) {
-    Members members;
-    std::map<int, int> models;
-    for (std::size_t i = 0; i < held_out.size(); ++i) {
-      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
-      members[info.class_index][ShapeOf(info)].push_back(i);
-      ++models[info.class_index];
-    }
-    for (const auto& [class_index, count] : models) {
-      out_.classes.push_back(data_.info().classes[static_cast<std::size_t>(class_index)]);
-      out_.class_models.push_back(count);
-    }
-    out_.rows = {Row("undeformed template", template_scores_, members),
-                 Row("best single shape", single_scores_, members)};
-    if (Retrieves())
-      out_.rows.push_back(Row("nearest training picture", retrieval_scores_, members));
-    if (job_.oracle) out_.rows.push_back(Row("oracle", oracle_scores_, members));
-    out_.rows.push_back(Row("tilegrad", predicted_scores_, members));
+    const ClassMeans means(data_, held_out);
+    out_.classes = means.classes(), out_.class_models = means.class_models();
+    out_.rows = {means.Row("undeformed template", template_scores_),
+                 means.Row("best single shape", single_scores_)};
+    if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieval_scores_));
+    if (job_.oracle) out_.rows.push_back(means.Row("oracle", oracle_scores_));
+    out_.rows.push_back(means.Row("tilegrad", predicted_scores_));
     out_.predictor = job_.predictor;
     out_.split = SplitName(job_.split);
     out_.dataset_source = data_.info().source;

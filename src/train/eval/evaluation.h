@@ -14,8 +14,13 @@ namespace tilegrad::train {
 inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0.9
 
 struct Score {
+  // What methods are compared by, in [0, 1]; more is better.
+  double main() const { return accuracy.value_or(iou); }
+
   double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; voxels of Voxelize
   std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
+  // Share of pictures whose class was told right, of tasks that classify: `iou` means nothing then.
+  std::optional<double> accuracy = std::nullopt;
   // As iou, with voxels of VoxelizeCarved: the paper's rule; none: the truth has no mesh.
   std::optional<double> carved_iou = std::nullopt;
   // Mean |difference| of colour, [0, 1], over the channels and the pixels that the object or its
@@ -43,13 +48,19 @@ struct Evaluation {
   std::vector<int> class_models;     // how many
   std::vector<EvaluationRow> rows;   // baselines, and last the prediction
   std::vector<ModelScore> models;    // of the prediction
-  double shape_threshold = 0;  // share of training models above which the single shape is solid
+  double shape_threshold = 0;  // share of training models above which the single shape is solid;
+                               // 0: no such row
   int retrieval_models =
       0;  // whose pictures the row "nearest training picture" chose from; 0: no such row
   int unusable_predictions = 0;  // without extent or area: they score 0
 };
 
-// The table with methods as rows and classes as columns, each cell "IoU / F-score" in percent.
+// Whether its scores are accuracies.
+bool Classifies(const Evaluation& evaluation);
+// Score::main in words: "3D IoU" or "accuracy".
+const char* MainMeasure(const Evaluation& evaluation);
+// The table with methods as rows and classes as columns, each cell "IoU / F-score", or the
+// accuracy, in percent.
 std::string FormatTable(const Evaluation& evaluation);
 std::string FormatMarkdown(const Evaluation& evaluation);
 // <run>/eval.json and <run>/eval.md, each whole or not at all.

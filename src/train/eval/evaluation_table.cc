@@ -13,6 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string Cell(const Score& score) {
+  if (score.accuracy) return fmt::format("{:.1f}", 100 * *score.accuracy);
   return score.f_score ? fmt::format("{:.1f} / {:.1f}", 100 * score.iou, 100 * *score.f_score)
                        : fmt::format("{:.1f} / -", 100 * score.iou);
 }
@@ -64,13 +65,28 @@ std::string Join(const std::vector<std::string>& line, const std::vector<std::si
 std::string Caption(const Evaluation& evaluation) {
   int models = 0;
   for (const int n : evaluation.class_models) models += n;
-  return fmt::format(
-      "3D IoU at 32^3 (%) / F-score at {} (%) on {} models of the {} split, {} view{} each",
-      kFScoreThreshold, models, evaluation.split, evaluation.views_per_model,
-      evaluation.views_per_model == 1 ? "" : "s");
+  const std::string measures =
+      Classifies(evaluation)
+          ? "Accuracy (%)"
+          : fmt::format("3D IoU at 32^3 (%) / F-score at {} (%)", kFScoreThreshold);
+  return fmt::format("{} on {} models of the {} split, {} view{} each", measures, models,
+                     evaluation.split, evaluation.views_per_model,
+                     evaluation.views_per_model == 1 ? "" : "s");
+}
+
+std::string ClassifierNotes(const Evaluation& evaluation) {
+  std::string notes = "Most frequent class: always that of most training pictures.";
+  if (evaluation.retrieval_models > 0) {
+    notes += fmt::format(
+        " Nearest training picture: the class of that of {} training models which has the picture "
+        "most like the input.",
+        evaluation.retrieval_models);
+  }
+  return notes;
 }
 
 std::string Notes(const Evaluation& evaluation) {
+  if (Classifies(evaluation)) return ClassifierNotes(evaluation);
   std::string notes = fmt::format(
       "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
       "that scores best on the training models.",
@@ -100,6 +116,7 @@ std::string Notes(const Evaluation& evaluation) {
 }
 
 Json ToJson(const Score& score) {
+  if (score.accuracy) return {{"accuracy", *score.accuracy}};
   Json json = {{"iou", score.iou}, {"f_score", nullptr}};
   if (score.f_score) json["f_score"] = *score.f_score;
   if (score.carved_iou) json["carved_iou"] = *score.carved_iou;
@@ -136,6 +153,12 @@ Json ToJson(const Evaluation& evaluation) {
 }
 
 }  // namespace
+
+bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score::accuracy); }
+
+const char* MainMeasure(const Evaluation& evaluation) {
+  return Classifies(evaluation) ? "accuracy" : "3D IoU";
+}
 
 std::string FormatTable(const Evaluation& evaluation) {
   const auto cells = Cells(evaluation);

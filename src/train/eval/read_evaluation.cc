@@ -18,11 +18,12 @@ Result<const Json*> Array(const Json& json, const char* key, const std::string& 
 Result<Score> ReadScore(const Json& json, const std::string& place) {
   Score score;
   JsonFields fields(json, place);
-  fields.Read("iou", &score.iou);
   const auto read = [&](const char* key, std::optional<double>* out) {
     if (json.is_object() && json.contains(key) && !json[key].is_null())
       fields.Read(key, &out->emplace());
   };
+  read("accuracy", &score.accuracy);
+  if (!score.accuracy) fields.Read("iou", &score.iou);
   read("f_score", &score.f_score);
   read("carved_iou", &score.carved_iou);
   read("color_l1", &score.color_l1);

@@ -62,6 +62,7 @@ Score WorstScore(const Shape& truth) {
 Score MeanScore(std::span<const Score> scores) {
   Score mean{.iou = 0, .f_score = MeanOf(scores, &Score::f_score)};
   for (const Score& score : scores) mean.iou += score.iou / static_cast<double>(scores.size());
+  mean.accuracy = MeanOf(scores, &Score::accuracy);
   mean.carved_iou = MeanOf(scores, &Score::carved_iou);
   mean.color_l1 = MeanOf(scores, &Score::color_l1);
   return mean;

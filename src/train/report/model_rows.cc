@@ -21,7 +21,8 @@ std::string ModelScoreHtml(const ReportFacts& facts, const Example& example) {
   if (!facts.evaluation) return "";
   for (const ModelScore& entry : facts.evaluation->models) {
     if (entry.class_name != example.class_name || entry.id != example.id) continue;
-    std::string text = fmt::format("<span>3D IoU {:.1f} %</span>", 100 * entry.score.iou);
+    std::string text = fmt::format("<span>{} {:.1f} %</span>", MainMeasure(*facts.evaluation),
+                                   100 * entry.score.main());
     if (entry.score.f_score)
       text += fmt::format(" <span>F-score {:.1f} %</span>", 100 * *entry.score.f_score);
     return "<p class=\"score\">" + text + "</p>";

@@ -208,7 +208,7 @@ class Viewer {
 
 function startViewer() {
   const section = byId('viewer');
-  section.hidden = data.models.length === 0;
+  section.hidden = !data.models.some((model) => model.prediction);
   if (section.hidden) return;
   const views = ['prediction', 'truth'].map((kind) => MeshView.on(byId('viewer-' + kind), kind));
   if (views.includes(null)) {

@@ -38,18 +38,24 @@ std::string CellsHtml(const Values& values) {
 // `pick` gives the score of a method's row.
 template <class Pick>
 std::string LineHtml(const Evaluation& evaluation, const std::string& heading, Pick pick) {
-  Values iou, f_score;
+  Values main, f_score;
   for (const auto& row : evaluation.rows) {
-    iou.emplace_back(pick(row).iou);
+    main.emplace_back(pick(row).main());
     f_score.push_back(pick(row).f_score);
   }
-  return fmt::format("<tr><th scope=\"row\">{}</th>{}{}</tr>\n", heading, CellsHtml(iou),
-                     CellsHtml(f_score));
+  return fmt::format("<tr><th scope=\"row\">{}</th>{}{}</tr>\n", heading, CellsHtml(main),
+                     Classifies(evaluation) ? "" : CellsHtml(f_score));
+}
+
+std::string FScoreHead(const Evaluation& evaluation) {
+  return fmt::format("<th colspan=\"{}\" scope=\"colgroup\" class=\"first\">F-score at {}, %</th>",
+                     evaluation.rows.size(), kFScoreThreshold);
 }
 
 std::string HeadHtml(const Evaluation& evaluation) {
   std::string methods;
-  for (int group = 0; group < 2; ++group) {
+  const bool classifies = Classifies(evaluation);
+  for (int group = 0; group < (classifies ? 1 : 2); ++group) {
     for (std::size_t i = 0; i < evaluation.rows.size(); ++i) {
       methods += fmt::format("<th scope=\"col\" class=\"number{}\">{}</th>", i == 0 ? " first" : "",
                              EscapeHtml(evaluation.rows[i].method));
@@ -57,21 +63,26 @@ std::string HeadHtml(const Evaluation& evaluation) {
   }
   return fmt::format(
       "<thead><tr><th rowspan=\"2\" scope=\"col\">class (models)</th>"
-      "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">3D IoU at 32³, %</th>"
-      "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">F-score at {1}, %</th></tr>\n"
-      "<tr>{2}</tr></thead>\n",
-      evaluation.rows.size(), kFScoreThreshold, methods);
+      "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">{1}, %</th>{2}</tr>\n"
+      "<tr>{3}</tr></thead>\n",
+      evaluation.rows.size(), classifies ? "accuracy" : "3D IoU at 32³",
+      classifies ? "" : FScoreHead(evaluation), methods);
 }
 
 std::string NotesHtml(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::string out = fmt::format(
       "{} split, {} view{} of each model; the mean is over classes; the best of each measure is "
-      "bold. The best single shape holds the voxels that at least {:.0f} % of the training models "
-      "have, the share that scores best on the training models.",
+      "bold.",
       EscapeHtml(evaluation.split), evaluation.views_per_model,
-      evaluation.views_per_model == 1 ? "" : "s", 100 * evaluation.shape_threshold);
+      evaluation.views_per_model == 1 ? "" : "s");
   out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
+  if (evaluation.shape_threshold > 0) {
+    out += fmt::format(
+        " The best single shape holds the voxels that at least {:.0f} % of the training models "
+        "have, the share that scores best on the training models.",
+        100 * evaluation.shape_threshold);
+  }
   if (evaluation.unusable_predictions > 0) {
     out += fmt::format(" {} predictions without extent or area score 0.",
                        evaluation.unusable_predictions);

@@ -19,13 +19,13 @@ std::string WithCommas(std::int64_t number) {
 
 std::string Comparison(const Evaluation& evaluation) {
   const auto& rows = evaluation.rows;
-  const double own = rows.back().mean.iou;
+  const double own = rows.back().mean.main();
   const auto beaten = static_cast<std::size_t>(std::count_if(
-      rows.begin(), rows.end() - 1, [&](const auto& row) { return row.mean.iou < own; }));
+      rows.begin(), rows.end() - 1, [&](const auto& row) { return row.mean.main() < own; }));
   std::string baselines;
   for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
     baselines += fmt::format("{}the {} has {:.1f} %", i > 0 ? ", " : "", EscapeHtml(rows[i].method),
-                             100 * rows[i].mean.iou);
+                             100 * rows[i].mean.main());
   }
   if (baselines.empty()) return ".";
   const char* verdict = beaten + 1 == rows.size() ? "above every baseline"
@@ -39,9 +39,9 @@ std::string EvaluationSentence(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
-  return fmt::format("On {} models of the {} split it reaches a mean 3D IoU of <b>{:.1f} %</b>{}",
-                     WithCommas(models), EscapeHtml(evaluation.split),
-                     100 * evaluation.rows.back().mean.iou, Comparison(evaluation));
+  return fmt::format("On {} models of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}",
+                     WithCommas(models), EscapeHtml(evaluation.split), MainMeasure(evaluation),
+                     100 * evaluation.rows.back().mean.main(), Comparison(evaluation));
 }
 
 // A word as a shell reads it back.
@@ -71,17 +71,20 @@ std::string SummaryHtml(const ReportFacts& facts) {
 
 std::string ComparisonHtml(const ReportFacts& facts) {
   if (!facts.evaluation) return "";
-  std::string out = "<dl class=\"bars\" aria-label=\"Mean 3D IoU of each method\">\n";
+  const char* measure = MainMeasure(*facts.evaluation);
+  std::string out =
+      fmt::format("<dl class=\"bars\" aria-label=\"Mean {} of each method\">\n", measure);
   for (const auto& row : facts.evaluation->rows) {
     const bool own = &row == &facts.evaluation->rows.back();
     out += fmt::format(
         "<div{}><dt>{}</dt><dd><span class=\"bar\" style=\"width:{:.1f}%\"></span>"
         "<span class=\"value\">{:.1f} %</span></dd></div>\n",
         own ? " class=\"own\"" : "", EscapeHtml(row.method),
-        80 * std::clamp(row.mean.iou, 0.0, 1.0), 100 * row.mean.iou);
+        80 * std::clamp(row.mean.main(), 0.0, 1.0), 100 * row.mean.main());
   }
-  return out +
-         "</dl>\n<p class=\"note\">Mean 3D IoU over classes, held-out models, 32³ voxels.</p>";
+  const bool voxels = !Classifies(*facts.evaluation);
+  return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out models{}.</p>",
+                           measure, voxels ? ", 32³ voxels" : "");
 }
 
 std::string CommandsHtml(const ReportFacts& facts) {

@@ -20,7 +20,7 @@ struct ReportFacts {
 };
 
 std::string SummaryHtml(const ReportFacts& facts);  // what was trained on what, and how good it is
-std::string ComparisonHtml(const ReportFacts& facts);      // mean IoU of each method as bars
+std::string ComparisonHtml(const ReportFacts& facts);      // the mean of each method as bars
 Result<std::string> ModelsHtml(const ReportFacts& facts);  // a row of pictures a model
 std::string ScoresHtml(const ReportFacts& facts);          // the table, or that there is none yet
 std::string CommandsHtml(const ReportFacts& facts);        // how to make all this again

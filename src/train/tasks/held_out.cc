@@ -52,7 +52,7 @@ class Exhibitor {
       : dataset_(dataset), info_(dataset.info()), predictor_(predictor), workers_(workers) {}
 
   Result<Example> Show(int model) const {
-    Example out = Named(model);
+    Example out = NamedExample(dataset_, model);
     TILEGRAD_ASSIGN(ModelData data, dataset_.Load(model));
     out.truth = std::move(data.mesh);
     const std::vector<int> views = ShownViews(info_.views);
@@ -77,15 +77,6 @@ class Exhibitor {
   }
 
  private:
-  Example Named(int index) const {
-    const ModelInfo& model = dataset_.models()[static_cast<std::size_t>(index)];
-    Example out;
-    out.name = model.name.empty() ? model.id : model.name;
-    out.class_name = info_.classes[static_cast<std::size_t>(model.class_index)];
-    out.id = model.id;
-    out.creator = model.creator, out.license = model.license;
-    return out;
-  }
   std::span<const std::uint8_t> ImageOf(const ModelData& data, int view) const {
     const std::size_t bytes = data.images.size() / static_cast<std::size_t>(info_.views);
     return std::span(data.images).subspan(static_cast<std::size_t>(view) * bytes, bytes);
@@ -96,28 +87,6 @@ class Exhibitor {
   const Predictor& predictor_;
   const Workers& workers_;
 };
-
-Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
-  const DatasetInfo& info = dataset.info();
-  Showcase out;
-  const std::size_t classes = info.classes.size();
-  std::vector<ModelInfo> models;
-  for (const int m : dataset.Select(Split::kTrain))
-    models.push_back(dataset.models()[static_cast<std::size_t>(m)]);
-  const std::size_t shapes = CountShapes(models);
-  out.data = fmt::format("It learned from {} models{} in {} class{} {}.", header.training_models,
-                         shapes < models.size() ? fmt::format(" of {} shapes", shapes) : "",
-                         classes, classes == 1 ? "" : "es", SourceName(header.dataset_source));
-  out.note =
-      "The network saw none of these in training. From the first picture alone it predicted one "
-      "mesh, here from three sides beside the truth. The models are spread over the classes in the "
-      "dataset's order, not picked by hand.";
-  out.credits = info.credits;
-  out.fov_y = info.camera.lens.fov_y;
-  out.azimuth = info.camera.azimuth_step * ShownViews(info.views)[0];
-  out.elevation = info.camera.elevation, out.distance = info.camera.distance;
-  return out;
-}
 
 // N images to N meshes, each changed as the job wants it.
 Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
@@ -137,6 +106,34 @@ Result<std::vector<Mesh>> PredictAndChange(const TaskEvaluation& job,
 }
 
 }  // namespace
+
+Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
+  const DatasetInfo& info = dataset.info();
+  Showcase out;
+  const std::size_t classes = info.classes.size();
+  std::vector<ModelInfo> models;
+  for (const int m : dataset.Select(Split::kTrain))
+    models.push_back(dataset.models()[static_cast<std::size_t>(m)]);
+  const std::size_t shapes = CountShapes(models);
+  out.data = fmt::format("It learned from {} models{} in {} class{} {}.", header.training_models,
+                         shapes < models.size() ? fmt::format(" of {} shapes", shapes) : "",
+                         classes, classes == 1 ? "" : "es", SourceName(header.dataset_source));
+  out.credits = info.credits;
+  out.fov_y = info.camera.lens.fov_y;
+  out.azimuth = info.camera.azimuth_step * ShownViews(info.views)[0];
+  out.elevation = info.camera.elevation, out.distance = info.camera.distance;
+  return out;
+}
+
+Example NamedExample(const Dataset& dataset, int index) {
+  const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
+  Example out;
+  out.name = model.name.empty() ? model.id : model.name;
+  out.class_name = dataset.info().classes[static_cast<std::size_t>(model.class_index)];
+  out.id = model.id;
+  out.creator = model.creator, out.license = model.license;
+  return out;
+}
 
 std::vector<int> ChooseModels(const Dataset& dataset, int count) {
   std::vector<std::vector<int>> rounds;  // rounds[r]: the r-th test model of each class that has it
@@ -175,6 +172,10 @@ Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& work
   TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
   TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
   Showcase out = AboutDataset(dataset, request.header);
+  out.note =
+      "The network saw none of these in training. From the first picture alone it predicted one "
+      "mesh, here from three sides beside the truth. The models are spread over the classes in the "
+      "dataset's order, not picked by hand.";
   const Exhibitor exhibitor(dataset, request.predictor, workers);
   const std::vector<int> chosen = ChooseModels(dataset, request.examples);
   for (const int model : chosen) {

@@ -27,6 +27,11 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
 Result<Showcase> ShowHeldOut(const ShowcaseRequest& request, const Workers& workers,
                              const ProgressSink& progress, const StopFlag& stop);
 
+// Its parts. Showcase::data, credits and camera:
+Showcase AboutDataset(const Dataset& dataset, const RunHeader& header);
+// An example of one model, with its names only.
+Example NamedExample(const Dataset& dataset, int model);
+
 // At most `count` models of the test split, spread over the classes: one of each class, then a
 // second of each, ...; where a round has more classes than are left to choose, evenly spaced ones.
 std::vector<int> ChooseModels(const Dataset& dataset, int count);

@@ -45,16 +45,17 @@ struct UpdateIndex {
   int update = 0;         // of the step, from 0
 };
 
-// A trained network as a predictor uses it: images in, meshes out.
+// A trained network as commands use it. Of most tasks it predicts: images in, meshes out.
 class Model {
  public:
   virtual ~Model() = default;
   virtual std::int64_t parameters() const = 0;
-  // What it predicts before it has learned anything, normalised as predictions are.
-  virtual const Mesh& template_mesh() const = 0;
+  // What it predicts before it has learned anything, normalised as predictions are. Without
+  // vertices of a task that predicts no meshes.
+  virtual const Mesh& template_mesh() const;
   // images: [N][4][size][size] planar RGBA bytes, RGB over black, of the size it was trained on;
-  // N at most kImagesAtOnce. Appends N valid meshes.
-  virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) = 0;
+  // N at most kImagesAtOnce. Appends N valid meshes. InvalidArgument of a task that predicts none.
+  virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes);
 
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
 };

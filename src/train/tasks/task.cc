@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/task.h"
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+
+const Mesh& Model::template_mesh() const {
+  static const Mesh none;
+  return none;
+}
+
+Status Model::Predict(std::span<const std::uint8_t> /*images*/, std::vector<Mesh>* /*meshes*/) {
+  return InvalidArgument(
+      "this run predicts no meshes; name one that was trained to, such as of task.kind = "
+      "\"single_image\"");
+}
+
+}  // namespace tilegrad::train
