@@ -4,13 +4,15 @@
 #include <map>
 
 #include "base/error.h"
+#include "train/tasks/classify/task.h"
 #include "train/tasks/single_image/task.h"
 
 namespace tilegrad::train {
 namespace {
 
 std::map<std::string, TaskFactory>& Factories() {
-  static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask}};
+  static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask},
+                                                         {"classify", &MakeClassifyTask}};
   return factories;
 }
 

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys of `task.kind = "classify"`. What each does: config.cc, one line a key.
+#pragma once
+
+#include "train/models/classifier.h"
+#include "train/run/config_fields.h"
+#include "train/run/schedule.h"
+
+namespace tilegrad::train {
+
+struct ClassifyConfig {
+  ClassifierConfig network;
+  double learning_rate = 2e-3;
+  double final_factor = 0.01;
+  std::int64_t warmup = 20;  // steps
+  double weight_decay = 1e-2;
+  std::int64_t batch = 64;
+  double mirrored = 0.5;   // share of the pictures that are shown mirrored
+  std::int64_t shift = 4;  // pixels that a picture is moved by at most, each way, black beyond it
+  Schedule schedule;       // of the run; no keys of the task
+};
+
+ConfigFields FieldsOf(ClassifyConfig* config);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/classify/held_out.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "render/picture/composite.h"
+#include "train/data/batches.h"
+#include "train/data/dataset_files.h"
+#include "train/data/trained_models.h"
+#include "train/eval/class_means.h"
+#include "train/eval/retrieval.h"
+#include "train/predictor.h"
+#include "train/tasks/held_out.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::size_t kSearched = 1000;  // training models whose pictures are searched, at most
+
+Status CheckClasses(const Dataset& dataset, const ClassifierModel& model) {
+  if (dataset.info().classes == model.classes()) return {};
+  return InvalidArgument("{}: its {} classes are not the {} that the network was trained on",
+                         dataset.folder().string(), dataset.info().classes.size(),
+                         model.classes().size());
+}
+
+std::vector<int> SpreadViews(int views, int count) {
+  std::vector<int> out;
+  for (int i = 0; i < count; ++i) out.push_back(i * views / count);
+  return out;
+}
+
+// Some views of one model, one after the other.
+std::vector<std::uint8_t> Views(std::span<const std::uint8_t> images, int of,
+                                std::span<const int> views) {
+  const std::size_t bytes = images.size() / static_cast<std::size_t>(of);
+  std::vector<std::uint8_t> out;
+  for (const int view : views) {
+    const auto image = images.subspan(static_cast<std::size_t>(view) * bytes, bytes);
+    out.insert(out.end(), image.begin(), image.end());
+  }
+  return out;
+}
+
+Score Accuracy(std::span<const int> said, int truth) {
+  Score score;
+  score.accuracy = static_cast<double>(std::count(said.begin(), said.end(), truth)) /
+                   static_cast<double>(said.size());
+  return score;
+}
+
+class Examiner {
+ public:
+  Examiner(const Dataset& dataset, const TaskEvaluation& job, ClassifierModel& model,
+           const Workers& workers, const ProgressSink& progress, const StopFlag& stop)
+      : data_(dataset),
+        job_(job),
+        model_(model),
+        workers_(workers),
+        progress_(progress),
+        stop_(stop),
+        views_(SpreadViews(dataset.info().views,
+                           std::clamp(job.views_per_model, 1, dataset.info().views))) {}
+
+  Result<Evaluation> Run() {
+    const Split split = job_.split;
+    const std::vector<int> models = data_.Select(split);
+    if (models.empty()) {
+      return InvalidArgument("{}: no models in its {} split; `tilegrad dataset` makes the splits",
+                             data_.folder().string(), SplitName(split));
+    }
+    TILEGRAD_TRY(LearnBaselines());
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      TILEGRAD_TRY(Tick("evaluating", i, models.size()));
+      TILEGRAD_TRY(Examine(models[i]));
+    }
+    out_.split = SplitName(split);
+    Fill(models);
+    return std::move(out_);
+  }
+
+ private:
+  Status Tick(const char* stage, std::size_t done, std::size_t total) const {
+    if (stop_.load()) return Cancelled("stopped while {}; nothing was written", stage);
+    if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
+    return {};
+  }
+  const ModelInfo& Info(int model) const { return data_.models()[static_cast<std::size_t>(model)]; }
+  // A training model's own picture would be found.
+  bool Retrieves() const { return job_.split != Split::kTrain; }
+
+  Status LearnBaselines() {
+    const std::vector<int> train = data_.Select(Split::kTrain);
+    std::vector<int> counts(data_.info().classes.size(), 0);
+    for (const int m : train) ++counts[static_cast<std::size_t>(Info(m).class_index)];
+    most_frequent_ = static_cast<int>(std::ranges::max_element(counts) - counts.begin());
+    const std::size_t searched = Retrieves() ? std::min(train.size(), kSearched) : 0;
+    for (std::size_t i = 0; i < searched; ++i) {
+      TILEGRAD_TRY(Tick("training pictures", i, searched));
+      const int model = train[i * train.size() / searched];
+      TILEGRAD_ASSIGN(const auto images, data_.LoadImages(model));
+      index_.Add(images, data_.info().views, data_.info().image_size);
+      searched_.push_back(Info(model).class_index);
+    }
+    out_.retrieval_models = static_cast<int>(searched);
+    return {};
+  }
+
+  Status Examine(int model) {
+    const int truth = Info(model).class_index;
+    TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
+    const std::vector<std::uint8_t> images = Views(all, data_.info().views, views_);
+    std::vector<int> said, found(views_.size());
+    const std::size_t bytes = images.size() / views_.size();
+    for (std::size_t v = 0; v < views_.size(); v += Model::kImagesAtOnce) {
+      const std::size_t count = std::min(Model::kImagesAtOnce, views_.size() - v);
+      TILEGRAD_ASSIGN(const auto some,
+                      model_.Classify(std::span(images).subspan(v * bytes, count * bytes)));
+      said.insert(said.end(), some.begin(), some.end());
+    }
+    said_.push_back(Accuracy(said, truth));
+    frequent_.push_back(Accuracy(std::vector<int>{most_frequent_}, truth));
+    if (!Retrieves()) return {};
+    workers_.For(views_.size(), [&](std::size_t v, std::size_t) {
+      const auto match =
+          index_.Nearest(std::span(images).subspan(v * bytes, bytes), data_.info().image_size);
+      found[v] = searched_[static_cast<std::size_t>(match.model)];
+    });
+    retrieved_.push_back(Accuracy(found, truth));
+    return {};
+  }
+
+  void Fill(std::span<const int> models) {
+    const ClassMeans means(data_, models);
+    out_.classes = means.classes(), out_.class_models = means.class_models();
+    out_.rows = {means.Row("most frequent class", frequent_)};
+    if (Retrieves()) out_.rows.push_back(means.Row("nearest training picture", retrieved_));
+    out_.rows.push_back(means.Row("tilegrad", said_));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const ModelInfo& info = Info(models[i]);
+      out_.models.push_back(
+          {model_.classes()[static_cast<std::size_t>(info.class_index)], info.id, said_[i]});
+    }
+    out_.predictor = job_.predictor.description();
+    out_.dataset_source = data_.info().source;
+    out_.views_per_model = static_cast<int>(views_.size());
+  }
+
+  const Dataset& data_;
+  const TaskEvaluation& job_;
+  ClassifierModel& model_;
+  const Workers& workers_;
+  const ProgressSink& progress_;
+  const StopFlag& stop_;
+  std::vector<int> views_;
+  int most_frequent_ = 0;
+  ImageIndex index_;
+  std::vector<int> searched_;  // their classes, in the order of the index
+  std::vector<Score> frequent_, retrieved_, said_;
+  Evaluation out_;
+};
+
+Result<Example> Exhibit(const Dataset& dataset, int model, ClassifierModel& classifier) {
+  const DatasetInfo& info = dataset.info();
+  Example out = NamedExample(dataset, model);
+  TILEGRAD_ASSIGN(const auto all, dataset.LoadImages(model));
+  const std::vector<int> views = ShownViews(info.views);
+  const std::vector<std::uint8_t> images = Views(all, info.views, views);
+  TILEGRAD_ASSIGN(const auto said, classifier.Classify(images));
+  const std::size_t bytes = images.size() / views.size(), rgb = bytes / 4 * 3;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const auto planes = std::span(images).subspan(v * bytes, bytes);
+    const std::string& name = classifier.classes()[static_cast<std::size_t>(said[v])];
+    out.pictures.push_back(
+        {OverGrey(PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), info.image_size,
+                                           info.image_size},
+                  kPaper),
+         "called " + name, out.name + ": called " + name});
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<Evaluation> EvaluateClassifier(const TaskEvaluation& job, ClassifierModel& model,
+                                      const Workers& workers, const ProgressSink& progress,
+                                      const StopFlag& stop) {
+  if (job.change) return InvalidArgument("a classifier predicts no meshes that could be refined");
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.oracle_steps > 0) return InvalidArgument("a classifier has no oracle");
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
+  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  return Examiner(dataset, job, model, workers, progress, stop).Run();
+}
+
+Result<Showcase> ShowClassified(const ShowcaseRequest& request, ClassifierModel& model,
+                                const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
+  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
+  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  TILEGRAD_TRY(CheckClasses(dataset, model));
+  Showcase out = AboutDataset(dataset, request.header);
+  out.purpose = "to tell what an object is from one image";
+  out.note =
+      "The network saw none of these in training. Below each picture stands what it calls the "
+      "object. The models are spread over the classes in the dataset's order, not picked by hand.";
+  const std::vector<int> chosen = ChooseModels(dataset, request.examples);
+  for (const int m : chosen) {
+    if (stop) return Cancelled("stopped while classifying; nothing was written");
+    TILEGRAD_ASSIGN(Example example, Exhibit(dataset, m, model));
+    out.examples.push_back(std::move(example));
+    if (progress) progress({"classifying", out.examples.size(), chosen.size(), ""});
+  }
+  return out;
+}
+
+}  // namespace tilegrad::train

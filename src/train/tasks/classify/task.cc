@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/classify/task.h"
+
+#include <cmath>
+#include <set>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "render/picture/composite.h"
+#include "train/data/trained_models.h"
+#include "train/predictor.h"
+#include "train/tasks/classify/config.h"
+#include "train/tasks/classify/held_out.h"
+#include "train/tasks/classify/model.h"
+#include "train/tasks/classify/pictures.h"
+#include "train/tasks/held_out.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSampleModels = 24, kSampleColumns = 8, kFrame = 3, kGap = 2;
+constexpr std::uint8_t kRight[3] = {40, 110, 200}, kWrong[3] = {230, 120, 20};
+
+// The share of `scores` [n, classes] that is largest at its label.
+double ShareRight(const nn::Tensor& scores, const nn::Tensor& labels) {
+  const std::vector<int> said = MostLikely(scores);
+  int right = 0;
+  for (std::size_t i = 0; i < said.size(); ++i) right += said[i] == labels.data<std::int32_t>()[i];
+  return static_cast<double>(right) / static_cast<double>(said.size());
+}
+
+ImageU8 Framed(const ImageU8& image, const std::uint8_t (&color)[3]) {
+  ImageU8 out(image.width + 2 * kFrame, image.height + 2 * kFrame, 3);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const int u = x - kFrame, v = y - kFrame;
+      const bool inside = u >= 0 && v >= 0 && u < image.width && v < image.height;
+      std::copy_n(inside ? image.at(u, v) : color, 3, out.at(x, y));
+    }
+  }
+  return out;
+}
+
+class ClassifyTask : public Task {
+ public:
+  ConfigFields Fields() override { return FieldsOf(&config_); }
+  std::vector<TermLabel> Labels() const override {
+    return {{"cross_entropy", "Cross entropy of the classes"},
+            {"right", "Share of the step's pictures that are told right"}};
+  }
+
+  Status Start(const TaskStart& start) override;
+  int image_size() const override { return train_.images.size; }
+  RunHeader Header() override;
+  Status Begin(const Path& run, std::int64_t first_step) override {
+    return RememberTrainedModels(run, *dataset_,
+                                 first_step == 0 ? RunStart::kNew : RunStart::kContinued);
+  }
+
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
+    adam_->options().learning_rate = RateAt(at.step);
+    return adam_->Step(gradients);
+  }
+
+  std::vector<nn::NamedTensor> State() override;
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+  Result<ImageU8> SamplePicture(std::int64_t steps) override;
+
+  Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                           const Checkpoint& checkpoint) override {
+    TILEGRAD_ASSIGN(auto model, ClassifierModel::Load(context, config_.network, checkpoint));
+    return std::unique_ptr<Model>(std::move(model));
+  }
+  Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                              const ProgressSink& progress, const StopFlag& stop) override {
+    return EvaluateClassifier(job, ModelOf(job.predictor), workers, progress, stop);
+  }
+  Result<Showcase> Show(const ShowcaseRequest& request, const Workers& /*workers*/,
+                        const ProgressSink& progress, const StopFlag& stop) override {
+    return ShowClassified(request, ModelOf(request.predictor), progress, stop);
+  }
+
+ private:
+  // What LoadModel above made.
+  static ClassifierModel& ModelOf(const Predictor& predictor) {
+    return static_cast<ClassifierModel&>(predictor.model());
+  }
+  std::uint64_t seed() const { return static_cast<std::uint64_t>(config_.schedule.seed); }
+  double RateAt(std::int64_t step) const {
+    const nn::CosineSchedule cosine{config_.schedule.steps, config_.final_factor};
+    return nn::WarmedUp(nn::CosineRate(config_.learning_rate, cosine, step), config_.warmup, step);
+  }
+  Status CheckDataset() const;
+  Status LoadPictures(const TaskStart& start);
+  LabelledBatch Batch(std::int64_t step);
+
+  ClassifyConfig config_;
+  nn::Context* context_ = nullptr;
+  std::optional<Dataset> dataset_;
+  LabelledImages train_, held_out_;
+  std::optional<BatchOrder> order_;
+  std::optional<ClassifierNetwork> network_;
+  std::optional<nn::Adam> adam_;
+};
+
+Status ClassifyTask::CheckDataset() const {
+  const std::string folder = dataset_->folder().string();
+  std::set<int> classes;
+  for (const int m : dataset_->Select(Split::kTrain))
+    classes.insert(dataset_->models()[static_cast<std::size_t>(m)].class_index);
+  if (classes.size() < 2) {
+    return InvalidArgument(
+        "{}: its training models are of {} class{}; a classifier needs two or more, as the sources "
+        "\"sweethome3d\" and \"thirteen\" of tilegrad dataset have",
+        folder, classes.size(), classes.size() == 1 ? "" : "es");
+  }
+  const std::int64_t least = std::int64_t{1} << (config_.network.levels - 1);
+  if (dataset_->info().image_size >= least) return {};
+  return InvalidArgument(
+      "{}: images are {} pixels a side, but a network of {} levels needs at least {}; set "
+      "network.levels lower",
+      folder, dataset_->info().image_size, config_.network.levels, least);
+}
+
+Status ClassifyTask::LoadPictures(const TaskStart& start) {
+  const Workers& workers = start.context.workers();
+  TILEGRAD_ASSIGN(train_, LoadLabelled(*dataset_, dataset_->Select(Split::kTrain), workers,
+                                       start.progress, start.stop));
+  TILEGRAD_ASSIGN(held_out_, LoadLabelled(*dataset_, ChooseModels(*dataset_, kSampleModels),
+                                          workers, start.progress, start.stop));
+  return {};
+}
+
+Status ClassifyTask::Start(const TaskStart& start) {
+  context_ = &start.context;
+  config_.schedule = start.schedule;
+  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(CheckDataset());
+  TILEGRAD_TRY(LoadPictures(start));
+  order_.emplace(train_.images.models, train_.images.views, seed(), config_.mirrored);
+  network_.emplace(*context_, config_.network,
+                   static_cast<std::int64_t>(dataset_->info().classes.size()), seed());
+  adam_.emplace(*context_, nn::Parameters(*network_),
+                nn::AdamOptions{.learning_rate = config_.learning_rate,
+                                .weight_decay = config_.weight_decay});
+  return {};
+}
+
+RunHeader ClassifyTask::Header() {
+  RunHeader header;
+  header.dataset_source = dataset_->info().source;
+  header.training_models = train_.images.models;
+  header.parameters = nn::CountParameters(*network_);
+  return header;
+}
+
+LabelledBatch ClassifyTask::Batch(std::int64_t step) {
+  const auto batch = order_->Batch(step, static_cast<int>(config_.batch), /*views=*/1);
+  std::vector<Shift> shifts;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const auto position = static_cast<std::uint64_t>(step) * batch.size() + i;
+    shifts.push_back(RandomShift(seed(), position, static_cast<int>(config_.shift)));
+  }
+  return GatherLabelled(*context_, train_, batch, shifts);
+}
+
+Result<nn::StepVector<nn::Gradient>> ClassifyTask::Backward(const UpdateIndex& at,
+                                                            StepValues* out) {
+  const LabelledBatch batch = Batch(at.step);
+  const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kTrain);
+  const nn::Var loss = nn::CrossEntropy(scores, batch.labels);
+  auto gradients = nn::Gradients(loss, adam_->parameters());
+  TILEGRAD_TRY(context_->TakeStatus());
+  if (!std::isfinite(loss.item()) || !nn::IsFinite(*context_, gradients)) {
+    return InternalError("the loss is {}; a smaller optimizer.learning_rate may help", loss.item());
+  }
+  out->loss = loss.item();
+  out->terms.push_back({"cross_entropy", 1, loss.item()});
+  out->terms.push_back({"right", 0, ShareRight(scores.value(), batch.labels)});
+  out->also.emplace_back("epoch",
+                         static_cast<double>((at.step + 1) * config_.batch) / train_.images.models);
+  out->also.emplace_back("learning_rate", RateAt(at.step));
+  out->images = config_.batch;
+  return gradients;
+}
+
+std::vector<nn::NamedTensor> ClassifyTask::State() {
+  std::vector<nn::NamedTensor> out = nn::State(*network_);
+  const std::vector<nn::NamedTensor> moments = adam_->State();
+  out.insert(out.end(), moments.begin(), moments.end());
+  out.push_back(ClassNames(*context_, dataset_->info().classes));
+  return out;
+}
+
+Status ClassifyTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
+  TILEGRAD_ASSIGN(const auto classes, ReadClassNames(state));
+  if (classes != dataset_->info().classes)
+    return InvalidArgument("{}: its classes are not those that the run was started with",
+                           dataset_->folder().string());
+  TILEGRAD_TRY(nn::LoadState(*network_, state));
+  TILEGRAD_TRY(adam_->LoadState(state));
+  if (adam_->steps() == steps) return {};
+  return InvalidArgument("the optimizer has taken {} steps, the run {}", adam_->steps(), steps);
+}
+
+// Held-out models in a frame: blue where the class is told right, orange where not.
+Result<ImageU8> ClassifyTask::SamplePicture(std::int64_t /*steps*/) {
+  const ImageStore& store = held_out_.images;
+  if (store.models == 0) return ImageU8();
+  std::vector<Sample> samples;
+  for (int m = 0; m < store.models; ++m) samples.push_back({m, {ShownViews(store.views)[0]}});
+  const nn::NoGrad off(*context_);
+  const LabelledBatch batch = GatherLabelled(*context_, held_out_, samples);
+  const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kEval);
+  TILEGRAD_TRY(context_->TakeStatus());
+  const std::vector<int> said = MostLikely(scores.value());
+  std::vector<ImageU8> cells;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto planes = store.Image(samples[i].model, samples[i].views[0]);
+    const std::size_t rgb = planes.size() / 4 * 3;
+    const ImageU8 shown = OverGrey(
+        PlanarRgba<std::uint8_t>{planes.first(rgb), planes.subspan(rgb), store.size, store.size},
+        kPaper);
+    cells.push_back(Framed(shown, said[i] == held_out_.labels[i] ? kRight : kWrong));
+  }
+  return TileImages(cells, kSampleColumns, kGap);
+}
+
+}  // namespace
+
+std::unique_ptr<Task> MakeClassifyTask() { return std::make_unique<ClassifyTask>(); }
+
+}  // namespace tilegrad::train

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+// The classifier as a run: it learns, is stopped and continues to the same bits, is scored and
+// reported, and serves as the network of a perceptual loss.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "base/rng.h"
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "train/config.h"
+#include "train/data/dataset_files.h"
+#include "train/predictor.h"
+#include "train/report/report.h"
+#include "train/run/log.h"
+#include "train/tasks/classify/perceptual_network.h"
+#include "train/tasks/classify/pictures.h"
+#include "train/tiny_run.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr const char* kConfig = R"(name = "tiny"
+[task]
+kind = "classify"
+[network]
+channels = 4
+most = 8
+levels = 3
+[schedule]
+steps = 60
+batch = 8
+shift = 2
+log_every = 1
+sample_every = 30
+checkpoint_every = 7
+)";
+constexpr int kSize = 16, kViews = 4;
+const ProgressSink kSilent = [](const Progress&) {};
+
+// Noise with more red, green or blue in it, by class.
+void Paint(int class_index, Rng& rng, std::vector<std::uint8_t>* images) {
+  images->resize(std::size_t{kViews} * 4 * kSize * kSize);
+  for (std::size_t i = 0; i < images->size(); ++i) {
+    const auto channel = static_cast<int>(i / (kSize * kSize)) % 4;
+    (*images)[i] = static_cast<std::uint8_t>(rng.Below(150) + (channel == class_index ? 70 : 0));
+    if (channel == 3) (*images)[i] = 255;
+  }
+}
+
+Status WriteColored(const Path& folder, const std::vector<std::string>& classes) {
+  DatasetInfo info;
+  info.source = "folder";
+  info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
+  info.views = kViews;
+  info.classes = classes;
+  info.recipe = "0000000000000000";
+  ModelData data;
+  data.occupancy.resize(std::size_t{kOccupancyResolution} * kOccupancyResolution *
+                        kOccupancyResolution);
+  data.mesh = Box(glm::vec3(0), {0.9f, 0.4f, 0.6f});
+  data.points.resize(kTruthPoints);
+  std::vector<ModelInfo> models;
+  Rng rng(3);
+  for (int m = 0; m < 7 * static_cast<int>(classes.size()); ++m) {
+    ModelInfo model;
+    model.id = model.name = "m" + std::to_string(m);
+    model.class_index = m % static_cast<int>(classes.size());
+    model.split = m < 5 * static_cast<int>(classes.size()) ? Split::kTrain : Split::kTest;
+    Paint(model.class_index, rng, &data.images);
+    const Path file =
+        ModelFilePath(folder, classes[static_cast<std::size_t>(model.class_index)], model.id);
+    std::filesystem::create_directories(file.parent_path());
+    TILEGRAD_TRY(SaveModelFile(file, info, data, {info.recipe, 0, 0}));
+    models.push_back(model);
+  }
+  TILEGRAD_TRY(WriteDatasetInfo(folder, info));
+  return WriteModels(folder, info, models);
+}
+
+class ClassifyTest : public TempFolderTest {
+ protected:
+  void SetUp() override {
+    const Status written = WriteColored(folder_ / "data", {"blue", "green", "red"});
+    ASSERT_TRUE(written.ok()) << written.message();
+  }
+  Result<RunOutcome> TrainIn(const Path& run, int workers, const StopFlag& stop,
+                             const ProgressSink& progress = kSilent) {
+    TrainJob job;
+    TILEGRAD_ASSIGN(job.config, ParseConfig(kConfig, "tiny.toml"));
+    job.run = run;
+    job.data = folder_ / "data";
+    job.existing = ExistingRun::kContinue;
+    return Train(job, Workers(workers), progress, stop);
+  }
+  Path Trained() {
+    const auto outcome = TrainIn(folder_ / "run", 2, stop_);
+    EXPECT_TRUE(outcome.ok()) << outcome.status().message();
+    return folder_ / "run";
+  }
+  std::vector<nn::NamedTensor> Final(const std::string& run) {
+    auto found = LoadNewestCheckpoint(context_, folder_ / run);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
+  }
+
+  Workers workers_{2};
+  nn::Context context_{workers_};
+  StopFlag stop_ = false;
+};
+
+TEST_F(ClassifyTest, StoppedAndContinuedEndsInTheSameBits) {
+  ASSERT_TRUE(TrainIn(folder_ / "whole", 2, stop_).ok());
+  StopFlag stop = false;
+  int seen = 0;
+  const auto part = TrainIn(folder_ / "parts", 1, stop, [&](const Progress& p) {
+    stop = p.stage == "training" && ++seen > 20;
+  });
+  EXPECT_EQ(part.status().code(), StatusCode::kCancelled);
+  const auto rest = TrainIn(folder_ / "parts", 3, stop_);
+  ASSERT_TRUE(rest.ok()) << rest.status().message();
+  EXPECT_GT(rest->first_step, 0);
+  const auto left = Final("whole"), right = Final("parts");
+  ASSERT_EQ(left.size(), right.size());
+  ASSERT_FALSE(left.empty());
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    EXPECT_EQ(left[i].name, right[i].name);
+    ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
+    EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
+        << left[i].name;
+  }
+}
+
+TEST_F(ClassifyTest, LearnsAndIsScoredAndReported) {
+  const Path run = Trained();
+  EXPECT_TRUE(std::filesystem::exists(run / "samples" / "step_00000060.png"));
+  const auto log = ReadLog(run);
+  ASSERT_TRUE(log.ok());
+  EXPECT_LT(log->back().values[0].second, 0.7 * log->front().values[0].second);
+
+  const auto predictor = Predictor::Load(run, workers_);
+  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  EXPECT_TRUE(predictor->template_mesh().positions.empty());
+  ExpectMessage(predictor->Predict(std::vector<std::uint8_t>(4 * kSize * kSize)).status(),
+                "predicts no meshes");
+  const auto evaluation =
+      predictor->task().Evaluate({run, folder_ / "data", *predictor}, workers_, kSilent, stop_);
+  ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+  ASSERT_EQ(evaluation->rows.size(), 3u);
+  EXPECT_NEAR(evaluation->rows[0].mean.main(), 1.0 / 3, 1e-12);
+  EXPECT_GT(evaluation->rows[2].mean.main(), 0.9);
+  ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
+  const auto back = ReadEvaluation(run);
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ((*back)->rows[2].mean.accuracy, evaluation->rows[2].mean.accuracy);
+  EXPECT_EQ(ReadText(run / "eval.json")->find("\"iou\""), std::string::npos);
+  const std::string table = FormatTable(*evaluation);
+  EXPECT_NE(table.find("Accuracy (%) on 6 models of the test split, 4 views"), std::string::npos)
+      << table;
+  EXPECT_EQ(table.find("IoU"), std::string::npos) << table;
+
+  const ReportJob job{run, folder_ / "data", folder_ / "page.html", 3};
+  const auto report = WriteReport(job, workers_, kSilent, stop_);
+  ASSERT_TRUE(report.ok()) << report.status().message();
+  const std::string page = ReadText(job.out).value();
+  for (const char* part :
+       {"to tell what an object is", "a mean accuracy of", "nearest training picture",
+        "most frequent class", "called red", "accuracy, %"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  EXPECT_EQ(page.find("3D IoU at"), std::string::npos);
+}
+
+TEST_F(ClassifyTest, OtherClassesAreRefused) {
+  const Path run = Trained();
+  const auto predictor = Predictor::Load(run, workers_);
+  ASSERT_TRUE(predictor.ok());
+  ASSERT_TRUE(WriteColored(folder_ / "other", {"blue", "red"}).ok());
+  std::filesystem::remove(run / "training_models.txt");  // which would be refused before
+  ExpectMessage(predictor->task()
+                    .Evaluate({run, folder_ / "other", *predictor}, workers_, kSilent, stop_)
+                    .status(),
+                "other", "2 classes", "3 that the network was trained on");
+}
+
+TEST_F(ClassifyTest, OneClassIsNothingToLearn) {
+  std::filesystem::remove_all(folder_ / "data");
+  ASSERT_TRUE(WriteColored(folder_ / "data", {"red"}).ok());
+  ExpectMessage(TrainIn(folder_ / "run", 1, stop_).status(), "1 class;", "two or more");
+}
+
+TEST_F(ClassifyTest, ImagesTooSmallForTheLevelsAreRefused) {
+  TrainJob job;
+  job.config = ParseConfig(kConfig, "tiny.toml").value();
+  ASSERT_TRUE(ApplyOverrides({"network.levels=6"}, &job.config).ok());
+  job.run = folder_ / "run", job.data = folder_ / "data";
+  ExpectMessage(Train(job, workers_, kSilent, stop_).status(), "16 pixels", "at least 32");
+}
+
+TEST_F(ClassifyTest, PicturesAreMovedAndMirrored) {
+  LabelledImages data;
+  data.images.models = data.images.views = 1;
+  data.images.size = 2;
+  for (int i = 0; i < 16; ++i) data.images.bytes.push_back(static_cast<std::uint8_t>(i + 1));
+  data.labels = {7};
+  const Sample samples[] = {{0, {0}}, {0, {0}, true}, {0, {0}}};
+  const Shift shifts[] = {{}, {}, {1, -1}};
+  const LabelledBatch batch = GatherLabelled(context_, data, samples, shifts);
+  EXPECT_EQ(batch.labels.data<std::int32_t>()[2], 7);
+  std::vector<int> bytes;
+  for (const float x : batch.images.span<float>())
+    bytes.push_back(static_cast<int>(std::lround(255 * x)));
+  const std::vector<int> want = {1, 2, 3, 4, 5, 6, 7, 8, 9,  10, 11, 12,  // as it is
+                                 2, 1, 4, 3, 6, 5, 8, 7, 10, 9,  12, 11,  // mirrored
+                                 0, 3, 0, 0, 0, 7, 0, 0, 0,  11, 0,  0};  // right and up
+  EXPECT_EQ(bytes, want);
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    const Shift shift = RandomShift(1, i, 2);
+    EXPECT_LE(std::max(std::abs(shift.x), std::abs(shift.y)), 2);
+  }
+}
+
+TEST_F(ClassifyTest, ServesAPerceptualLoss) {
+  const Path run = Trained();
+  nn::Context context(workers_, nn::DType::kF64);  // whatever the run was trained in
+  const auto features = LoadPerceptualNetwork(context, {.file = run, .first_level = 1});
+  ASSERT_TRUE(features.ok()) << features.status().message();
+  Rng rng(1);
+  nn::Tensor numbers = context.Empty({2, 3, 16, 16});
+  nn::FillUniform(numbers, rng, 0, 1);
+  const nn::Var images = nn::Parameter(context, numbers);
+  const auto levels = (*features)(images);
+  ASSERT_EQ(levels.size(), 2u);
+  EXPECT_EQ(levels[0].shape(), (nn::Shape{2, 8, 8, 8}));
+  EXPECT_EQ((*features)(images)[0].value().data<double>()[5], levels[0].value().data<double>()[5]);
+  const nn::Var loss = FeatureL1Loss(*features, images, context.Zeros({2, 3, 16, 16}));
+  EXPECT_GT(loss.item(), 0);
+  EXPECT_EQ(nn::Grad(loss, {images})[0].shape(), images.shape());
+  EXPECT_TRUE(context.status().ok());
+  // More levels left out than there are: the last remains.
+  EXPECT_EQ((*LoadPerceptualNetwork(context, {.file = run, .first_level = 9}))(images).size(), 1u);
+}
+
+TEST_F(ClassifyTest, PerceptualNetworksThatAreNoneAreNamed) {
+  ExpectMessage(LoadPerceptualNetwork(context_, {.kind = "vgg19", .file = "x"}).status(),
+                "\"vgg19\"", "\"squeezenet\"");
+  EXPECT_EQ(LoadPerceptualNetwork(context_, {.file = folder_ / "none"}).status().code(),
+            StatusCode::kNotFound);
+  ASSERT_TRUE(WriteNoiseDataset(folder_ / "noise").ok());
+  TrainJob job;
+  job.config = ParseConfig(kTinyConfig, "tiny.toml").value();
+  ASSERT_TRUE(ApplyOverrides({"schedule.steps=1"}, &job.config).ok());
+  job.run = folder_ / "meshes", job.data = folder_ / "noise";
+  ASSERT_TRUE(Train(job, workers_, kSilent, stop_).ok());
+  ExpectMessage(LoadPerceptualNetwork(context_, {.file = job.run}).status(), "meshes",
+                "\"single_image\"", "\"classify\"");
+}
+
+// A user's network by torchvision's names, here a narrow AlexNet.
+TEST_F(ClassifyTest, PerceptualNetworkFromSafetensors) {
+  std::vector<nn::NamedTensor> weights;
+  Rng rng(2);
+  std::int64_t in = 3;
+  for (const auto& [index, kernel] : {std::pair(0, 11), {3, 5}, {6, 3}, {8, 3}, {10, 3}}) {
+    const std::string name = "features." + std::to_string(index);
+    nn::Tensor weight = context_.Empty({4, in, kernel, kernel});
+    nn::FillUniform(weight, rng, -0.1, 0.1);
+    weights.push_back({name + ".weight", weight});
+    weights.push_back({name + ".bias", context_.Zeros({4})});
+    in = 4;
+  }
+  const Path file = folder_ / "alexnet.safetensors";
+  ASSERT_TRUE(nn::WriteSafetensors(file, {weights, {}}).ok());
+  const auto features = LoadPerceptualNetwork(context_, {.kind = "alexnet", .file = file});
+  ASSERT_TRUE(features.ok()) << features.status().message();
+  const nn::Var images = nn::Constant(context_, context_.Full({1, 3, 64, 64}, 0.5));
+  EXPECT_EQ((*features)(images).size(), 5u);
+  EXPECT_TRUE(context_.status().ok());
+  ExpectMessage(LoadPerceptualNetwork(context_, {.kind = "vgg16", .file = file}).status(),
+                "alexnet.safetensors", "features.");
+}
+
+}  // namespace
+}  // namespace tilegrad::train
