@@ -216,6 +216,12 @@ TEST(Chain, SoDoThoseOfSymmetricShapesAndLayersWithoutNorm) {
   ExpectGradientsAgreeWithDifferences(p);
 }
 
+TEST(Chain, SoDoThoseOfColorsLookedUpInThePicture) {
+  SmallProblem p;
+  p.config.network.picture_colors = true;
+  ExpectGradientsAgreeWithDifferences(p);
+}
+
 TEST(Chain, SoDoThoseOfN3mrsVertices) {
   SmallProblem p;
   p.config.network.shape.n3mr_vertices = true, p.config.network.shape.smoothing = 0;

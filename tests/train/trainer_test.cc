@@ -128,6 +128,7 @@ TEST_F(TrainerTest, MirroredSmoothedAndAveragedRunsResumeToo) {
   ValueOf<bool>(job_.config, "network.symmetric") = true;
   ValueOf<std::int64_t>(job_.config, "network.blocks") = 1;
   ValueOf<bool>(job_.config, "network.fc_norm") = false;
+  ValueOf<bool>(job_.config, "network.picture_colors") = true;
   RunWhole("whole", 2);
   StopAfter(4);
   ExpectFinishes();

@@ -29,6 +29,33 @@ nn::AxisMap DiffusionRound(const nn::Var& like, const Mesh& mesh) {
   });
 }
 
+// (I + lambda L)^-1 [V, V] with L = D - A of the mesh's edges: by Gauss and Jordan, without pivots,
+// as the matrix is diagonally dominant.
+std::vector<double> StiffInverse(const Mesh& mesh, double lambda) {
+  const std::size_t n = mesh.positions.size();
+  const Topology topology = BuildTopology(mesh.faces, n);
+  std::vector<double> a(n * n);
+  for (std::size_t v = 0; v < n; ++v) {
+    const std::int32_t first = topology.offsets[v], last = topology.offsets[v + 1];
+    a[v * n + v] = 1 + lambda * (last - first);
+    for (std::int32_t i = first; i < last; ++i)
+      a[v * n + static_cast<std::size_t>(topology.neighbors[static_cast<std::size_t>(i)])] = -lambda;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    double* const pivot = &a[k * n];
+    const double scale = 1 / pivot[k];
+    pivot[k] = 1;
+    for (std::size_t j = 0; j < n; ++j) pivot[j] *= scale;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double factor = a[i * n + k];
+      if (i == k || factor == 0) continue;
+      a[i * n + k] = 0;
+      for (std::size_t j = 0; j < n; ++j) a[i * n + j] -= factor * pivot[j];
+    }
+  }
+  return a;
+}
+
 // The vertex at (-x, y, z) for each vertex of a sphere whose mirrored coordinates have equal bits.
 std::vector<std::int64_t> MirrorVertices(const Mesh& sphere) {
   std::map<std::tuple<float, float, float>, std::int64_t> at;
@@ -67,12 +94,16 @@ DeformableTemplate::DeformableTemplate(nn::Context& context, const TemplateConfi
   if (config.n3mr_vertices) unit_sphere_ = context.From({count, 3}, std::span<const float>(unit));
   const nn::Var like = nn::Constant(context, positions_);
   diffusion_ = DiffusionRound(like, mesh_);
+  if (config.stiffness > 0) {
+    const std::vector<double> inverse = StiffInverse(mesh_, config.stiffness);
+    stiff_ = context.From({count, count}, std::span<const double>(inverse));
+  }
   if (config.symmetric) symmetry_ = Symmetry(like, mesh_);
 }
 
 nn::Var DeformableTemplate::Movement(const nn::Var& raw) const {
   if (config_.n3mr_vertices) return N3mrMovement(raw);
-  const bool mapped = config_.symmetric || config_.smoothing > 0;
+  const bool mapped = config_.symmetric || config_.smoothing > 0 || config_.stiffness > 0;
   return nn::Reshape(mapped ? nn::Transpose(Smoothed(raw)) : raw, {raw.shape()[0], vertices(), 3});
 }
 
@@ -84,6 +115,8 @@ nn::Var DeformableTemplate::Smoothed(const nn::Var& raw) const {
   movement = nn::Reshape(movement, {vertices(), 3 * batch});
   for (std::int64_t round = 0; round < config_.smoothing; ++round)
     movement = nn::MapAxis(movement, 0, diffusion_);
+  if (config_.stiffness > 0)
+    movement = nn::Matmul(nn::Constant(context_, stiff_), movement);
   return nn::Reshape(movement, {3 * vertices(), batch});
 }
 

@@ -19,6 +19,8 @@ ConfigFields FieldsOf(NetworkConfig* c) {
       {"network.template_radius", &c->shape.radius, 1e-3, 10, "world units"},
       {"network.smoothing", &c->shape.smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
+      {"network.stiffness", &c->shape.stiffness, 0, 1e6,
+       "lambda of (I + lambda L)^-1, which offsets go through; 0: not"},
       {"network.symmetric", &c->shape.symmetric, 0, 1, "every prediction is symmetric at x = 0"},
       {"network.fc_norm", &c->fc_norm, 0, 1, "batch norm after hidden fully connected layers"},
       {"network.fc_deviation", &c->fc_deviation, 0, 10,
