@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "fit/figure2.h"
-#include "fit/sphere_uv.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::train {

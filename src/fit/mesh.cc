@@ -8,17 +8,20 @@
 #include "base/error.h"
 #include "fit/scene.h"
 #include "scene/shapes.h"
+#include "scene/sphere_uv.h"
 #include "scene/unlit.h"
 
 namespace tilegrad::train {
 namespace {
 
-// Corners of one vertex with the same coordinates share them.
-void SetUvs(const Mesh& mesh, FitScene* scene) {
+// `uvs` of the corners of a mesh with these faces. Corners of one vertex with the same coordinates
+// share them.
+void SetUvs(const std::vector<Face>& faces, const std::vector<glm::vec2>& uvs, FitScene* scene) {
+  scene->uvs.clear(), scene->uv_indices.clear();
   std::map<std::pair<std::int32_t, std::pair<float, float>>, std::int32_t> known;
-  for (std::size_t i = 0; i < mesh.corner_uvs.size(); ++i) {
-    const glm::vec2 uv = mesh.corner_uvs[i];
-    const std::int32_t vertex = mesh.faces[i / 3][i % 3];
+  for (std::size_t i = 0; i < uvs.size(); ++i) {
+    const glm::vec2 uv = uvs[i];
+    const std::int32_t vertex = faces[i / 3][i % 3];
     const auto [at, added] =
         known.try_emplace({vertex, {uv.x, uv.y}}, static_cast<std::int32_t>(scene->uvs.size() / 2));
     if (added) scene->uvs.insert(scene->uvs.end(), {uv.x, uv.y});
@@ -101,12 +104,16 @@ Result<FitScene> SceneOfMesh(const Mesh& mesh) {
     scene.positions.insert(scene.positions.end(), {p.x, p.y, p.z});
   }
   for (const Face& f : mesh.faces) scene.faces.insert(scene.faces.end(), f.begin(), f.end());
-  if (!mesh.corner_uvs.empty()) SetUvs(mesh, &scene);
+  if (!mesh.corner_uvs.empty()) SetUvs(mesh.faces, mesh.corner_uvs, &scene);
   const bool textured = !mesh.corner_uvs.empty() && !mesh.materials.empty() &&
                         mesh.materials[0].base_color_texture >= 0;
   if (textured) SetTexture(mesh, &scene);
   SetColors(mesh, textured, &scene);
   return scene;
+}
+
+void SetSphereUv(const Mesh& sphere, FitScene* scene) {
+  SetUvs(sphere.faces, SphereUvs(sphere), scene);
 }
 
 Mesh MeshOfScene(const FitScene& scene) {

@@ -195,6 +195,8 @@ Status Normalize(Mesh* mesh, Camera* camera) {
 
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers) {
+  if (!prediction.textures.empty())
+    return InvalidArgument("predictions with a texture map are not refined: use --refine 0");
   const bool coarse = prediction.positions.size() < kCoarse;
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(coarse ? Subdivided(prediction) : prediction));
   const auto [small, factor] = AtMost(picture, kSearchSide);

@@ -38,7 +38,8 @@ struct RefinedMesh {
 // `picture`: one square image. `prediction`: a mesh with vertex colours, normalised as predictions
 // are, y up. Faces of a coarse mesh are divided once, so that the result may have more
 // vertices than the prediction. A pure function of its arguments; any number of workers gives the
-// same bits. Errors: a picture without an object; those of the renderer.
+// same bits. Errors: a picture without an object; a prediction with a texture map; those of the
+// renderer.
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers);
 

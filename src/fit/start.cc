@@ -10,7 +10,6 @@
 #include "base/hash.h"
 #include "base/rng.h"
 #include "fit/run.h"
-#include "fit/sphere_uv.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::train {

@@ -149,5 +149,14 @@ TEST(RefineMesh, APictureWithoutAnObjectIsAnError) {
   EXPECT_NE(refined.status().message().find("no object"), std::string::npos);
 }
 
+TEST(RefineMesh, ATextureMapIsAnError) {
+  Mesh mesh = Figure({0.4f, 0.35f, 0.4f});
+  mesh.textures = {{"map", ImageU8(2, 2, 3)}};
+  const TargetImages picture = PictureOf(Figure({0.3f, 0.2f, 0.4f}), CameraAt(30));
+  const auto refined = RefineMesh(mesh, picture, {.steps = 5}, Workers(1));
+  ASSERT_FALSE(refined.ok());
+  EXPECT_NE(refined.status().message().find("--refine 0"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace tilegrad::train

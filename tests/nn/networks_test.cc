@@ -96,9 +96,42 @@ TEST_F(Networks, UNetDifferentiated) {
       ExpectGradient(net, [&] { return Mean(Square(net.Forward(x, Mode::kTrain) - 0.2)); });
     }
   }
+  UNet map(context_,
+           {.base = 3,
+            .most = 5,
+            .levels = 2,
+            .resize = true,
+            .skips = false,
+            .enlarge = 2,
+            .wrap = true,
+            .output = &Sigmoid},
+           rng_);
+  EXPECT_EQ(map.Forward(Input({2, 3, 8, 8}), Mode::kTrain).shape(), (Shape{2, 3, 32, 32}));
+  const Var image = Input({2, 3, 8, 8});
+  ExpectGradient(map, [&] { return Mean(Square(map.Forward(image, Mode::kTrain) - 0.2)); });
   UNet net(context_, {.base = 2, .levels = 2}, rng_);
   EXPECT_FALSE(net.Forward(Input({1, 3, 6, 8}), Mode::kTrain).valid());
   EXPECT_NE(context_.TakeStatus().message().find("multiple of 4"), std::string::npos);
+}
+
+// A map without edges has no place that differs from another: what one code gives is of one colour.
+// With zeros around it, it is not.
+TEST_F(Networks, AMapThatWrapsHasNoEdges) {
+  for (const bool wrap : {false, true}) {
+    UNet net(context_,
+             {.base = 3,
+              .levels = 3,
+              .norm = Norm::kNone,
+              .resize = true,
+              .skips = false,
+              .enlarge = 1,
+              .wrap = wrap},
+             rng_);
+    const Var y = net.Forward(Input({1, 3, 8, 8}), Mode::kTrain);
+    ASSERT_EQ(y.shape(), (Shape{1, 3, 16, 16}));
+    const Var span = ReduceMax(y, {2, 3}) - ReduceMin(y, {2, 3});
+    EXPECT_EQ(ReduceMax(span, {0, 1}).item() < 1e-12, wrap);
+  }
 }
 
 // 64 to 1024 channels: 31.0 million parameters, as the field's implementations count them.

@@ -166,6 +166,11 @@ TEST_F(KillResume, TwoKillsWithTheRulesOfOthers) {
   }
 }
 
+TEST_F(KillResume, TwoKillsWithTexturesAndLight) {
+  Write("tiny.toml", kTinyTextured);
+  CheckKills(2);
+}
+
 TEST_F(KillResume, LongTenKills) {
   steps_ = 1000;
   CheckKills(10);

@@ -34,6 +34,28 @@ checkpoint_every = 3
 keep_checkpoints = 2
 )";
 
+inline constexpr const char* kTinyTextured = R"(name = "tiny"
+[task]
+kind = "textured_image"
+[network]
+base = 4
+most = 8
+levels = 2
+latent = 12
+hidden = 12
+light_width = 8
+template_level = 1
+[render]
+sharpness = 500
+sharpness_start = 100
+[schedule]
+batch = 4
+log_every = 1
+sample_every = 10
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
 // The value behind a key of a configuration.
 template <class T>
 T& ValueOf(TrainConfig& config, const std::string& key) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "nn/ops/axis_map.h"
 #include "nn/ops/pointwise.h"
 #include "nn/ops/pool.h"
 
@@ -23,9 +24,55 @@ Status CheckImage(const Var& x, std::size_t halvings) {
                          step);
 }
 
+// Twice the height and the width, nearest, with one pixel around it: of the other edge to the left
+// and right, of the same edge above and below.
+class UpsampleMap : public Module {
+ public:
+  Var Forward(const Var& x, Mode) override {
+    if (!Usable("upsample map", {&x})) return Invalid({&x});
+    return Grow(Grow(x, 2), 3);
+  }
+  void Visit(const std::string&, ModuleVisitor&) override {}
+
+ private:
+  static Var Grow(const Var& x, int axis) {
+    const std::int64_t extent = x.shape()[axis], out = 2 * extent;
+    const auto row = [&](std::int64_t i, AxisTerms& terms) {
+      const std::int64_t at =
+          axis == 3 ? (i - 1 + out) % out : std::clamp(i - 1, std::int64_t{0}, out - 1);
+      terms.push_back({at / 2, 1.0});
+    };
+    return MapAxis(x, axis, MakeAxisMap(x, {extent, out + 2}, row));
+  }
+};
+
+// ReLU, then `block` at twice the size; the kernel and its options are the shape's.
+void AddDoubling(Sequential& net, Context& context, const UNetShape& shape, ConvBlock block,
+                 Rng& rng) {
+  net.Add<Activation>("act", &Relu);
+  block.conv.kernel = 4, block.conv.options = kHalve, block.transposed = true;
+  if (shape.resize) {
+    block.conv.kernel = 3, block.conv.options = {.padding = shape.wrap ? 0 : 1};
+    block.transposed = false;
+    if (shape.wrap) {
+      net.Add<UpsampleMap>("resize");
+    } else {
+      net.Add<Upsample>("resize", ResizeMode::kNearest);
+    }
+  }
+  AddConvBlock(net, "up", context, block, rng);
+}
+
+// The last one.
+void AddOutput(Sequential& net, Context& context, const UNetShape& shape, std::int64_t from,
+               Rng& rng) {
+  AddDoubling(net, context, shape,
+              {.conv = {.in = from, .out = shape.out}, .activation = shape.output}, rng);
+}
+
 }  // namespace
 
-UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) {
+UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) : skips_(shape.skips) {
   const int levels = shape.levels;
   const auto channels = [&](int level) {
     return std::min(shape.most, shape.base << std::min(level, 30));
@@ -42,39 +89,49 @@ UNet::UNet(Context& context, const UNetShape& shape, Rng& rng) {
                   .norm = norm},
                  rng);
     // Above the innermost level the decoder has the skip connection's channels beside its own.
-    const std::int64_t from = i + 1 == levels ? channels(i) : 2 * channels(i);
-    ConvBlock block{.conv = {.in = from,
-                             .out = i == 0 ? shape.out : channels(i - 1),
-                             .kernel = 4,
-                             .options = kHalve},
-                    .transposed = true,
-                    .norm = i == 0 ? Norm::kNone : shape.norm,
-                    .activation = i == 0 ? shape.output : nullptr};
-    up.Add<Activation>("act", &Relu);
-    if (shape.resize) {
-      up.Add<Upsample>("resize", ResizeMode::kNearest);
-      block.conv.kernel = 3, block.conv.options = {.padding = 1}, block.transposed = false;
+    const std::int64_t from = i + 1 == levels || !shape.skips ? channels(i) : 2 * channels(i);
+    if (i == 0 && shape.enlarge == 0) {
+      AddOutput(up, context, shape, from, rng);
+    } else {
+      AddDoubling(up, context, shape,
+                  {.conv = {.in = from, .out = channels(std::max(0, i - 1))}, .norm = shape.norm},
+                  rng);
     }
-    AddConvBlock(up, "up", context, block, rng);
     down_.push_back(std::move(down));
     up_.push_back(std::move(up));
   }
+  for (int k = 1; k <= shape.enlarge; ++k) {
+    Sequential& grow = grow_.emplace_back();
+    if (k == shape.enlarge) {
+      AddOutput(grow, context, shape, channels(0), rng);
+    } else {
+      AddDoubling(grow, context, shape,
+                  {.conv = {.in = channels(0), .out = channels(0)}, .norm = shape.norm}, rng);
+    }
+  }
+}
+
+StepVector<Var> UNet::Encode(const Var& x, Mode mode) {
+  const Status fits = x.valid() ? CheckImage(x, down_.size()) : Status();
+  StepVector<Var> levels({fits.ok() ? x : Fail(x, fits)}, x.context().allocator<Var>());
+  for (Sequential& down : down_) levels.push_back(down.Forward(levels.back(), mode));
+  return levels;
+}
+
+Var UNet::Decode(const Var& code, const StepVector<Var>& levels, Mode mode) {
+  Var y = code;
+  for (std::size_t i = up_.size(); i-- > 0;) {
+    if (skips_ && i + 1 < up_.size()) y = Concat({y, levels[i + 1]}, 1);
+    y = up_[i].Forward(y, mode);
+  }
+  for (Sequential& grow : grow_) y = grow.Forward(y, mode);
+  return y;
 }
 
 UNet::Result UNet::Run(const Var& x, Mode mode) {
-  if (!x.valid()) return {x, x};
-  if (const Status s = CheckImage(x, down_.size()); !s.ok()) {
-    const Var failed = Fail(x, s);
-    return {failed, failed};
-  }
-  StepVector<Var> levels({x}, x.context().allocator<Var>());
-  for (Sequential& down : down_) levels.push_back(down.Forward(levels.back(), mode));
-  Var y = levels.back();
-  for (std::size_t i = up_.size(); i-- > 0;) {
-    if (i + 1 < up_.size()) y = Concat({y, levels[i + 1]}, 1);
-    y = up_[i].Forward(y, mode);
-  }
-  return {y, levels.back()};
+  if (!x.has_context()) return {x, x};
+  const StepVector<Var> levels = Encode(x, mode);
+  return {Decode(levels.back(), levels, mode), levels.back()};
 }
 
 void UNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
@@ -83,6 +140,8 @@ void UNet::Visit(const std::string& prefix, ModuleVisitor& visitor) {
     down_[i].Visit(level, visitor);
     up_[i].Visit(level, visitor);
   }
+  for (std::size_t k = 0; k < grow_.size(); ++k)
+    grow_[k].Visit(prefix + "grow" + std::to_string(k + 1) + ".", visitor);
 }
 
 ConvUNet::ConvUNet(Context& context, const ConvUNetShape& shape, Rng& rng) {

@@ -17,6 +17,11 @@ struct UNetShape {
   Norm norm = Norm::kInstance;   // not of the first level, nor of one that is down to one pixel
   bool resize = false;           // the way up: nearest resizing and a 3x3 convolution, not a 4x4
                                  // transposed one: costs more and leaves no checkerboard
+  bool skips = true;             // false: the decoder sees the code alone
+  int enlarge = 0;               // further doublings behind the last level, of `base` channels
+  bool wrap = false;             // with `resize`: the image that comes out is a map whose left and
+                                 // right edges are neighbours, and what lies beyond its upper and
+                                 // lower edges is what lies at them
   Activation::Function output = nullptr;  // e.g. &Sigmoid
 };
 
@@ -25,15 +30,21 @@ class UNet : public Module {
   UNet(Context& context, const UNetShape& shape, Rng& rng);
 
   struct Result {
-    Var image;  // [n, out, h, w]
+    Var image;  // [n, out, h, w] times 2^enlarge
     Var code;   // [n, c, h / 2^levels, w / 2^levels]: what other heads start from
   };
   Result Run(const Var& x, Mode mode);  // x [n, in, h, w]
+  // Its two halves, for what stands between them. Levels: x, then each level's; the last is the
+  // code. `code` has the shape of that one.
+  StepVector<Var> Encode(const Var& x, Mode mode);
+  Var Decode(const Var& code, const StepVector<Var>& levels, Mode mode);
   Var Forward(const Var& x, Mode mode) override { return Run(x, mode).image; }
   void Visit(const std::string& prefix, ModuleVisitor& visitor) override;
 
  private:
   std::vector<Sequential> down_, up_;  // up_[i] undoes down_[i]
+  std::vector<Sequential> grow_;       // behind up_[0]
+  bool skips_;
 };
 
 // In the form of Ronneberger et al. 2015, with padding: two 3x3 convolutions with ReLU at each

@@ -27,6 +27,12 @@ struct Score {
   // prediction covers, black beyond them, in views of the dataset; none: of a shape without
   // colours.
   std::optional<double> color_l1 = std::nullopt;
+  // Table 2 of the paper, of tasks that predict texture and light. Mean |difference| over all
+  // pixels of the image, black beyond the object, and the channels, [0, 1]: of renders without
+  // light, and with the predicted light against the true one; and the angle between the lights'
+  // directions in degrees.
+  std::optional<double> texture_l1 = std::nullopt, lit_l1 = std::nullopt,
+                        light_angle = std::nullopt;
 };
 
 struct EvaluationRow {

@@ -23,23 +23,36 @@ bool HasAny(const Evaluation& evaluation, std::optional<double> Score::*measure)
                      [&](const EvaluationRow& row) { return (row.mean.*measure).has_value(); });
 }
 
+// Of the mean over classes, where a row has it.
+struct Column {
+  std::optional<double> Score::*measure;
+  const char* heading;
+  double factor;
+  int digits;
+};
+constexpr Column kColumns[] = {{&Score::carved_iou, "carved IoU", 100, 1},
+                               {&Score::color_l1, "colour L1", 1, 3},
+                               {&Score::texture_l1, "texture L1", 1, 4},
+                               {&Score::light_angle, "light, degrees", 1, 1},
+                               {&Score::lit_l1, "texture + light L1", 1, 4}};
+
 // Heading, then a line a method: the cells of the table as text.
 std::vector<std::vector<std::string>> Cells(const Evaluation& evaluation) {
   std::vector<std::vector<std::string>> cells = {{"method"}};
   for (const auto& name : evaluation.classes) cells[0].push_back(name);
   cells[0].push_back("mean");
-  const bool carved = HasAny(evaluation, &Score::carved_iou);
-  const bool color = HasAny(evaluation, &Score::color_l1);
-  if (carved) cells[0].push_back("carved IoU");
-  if (color) cells[0].push_back("colour L1");
+  for (const Column& column : kColumns) {
+    if (HasAny(evaluation, column.measure)) cells[0].emplace_back(column.heading);
+  }
   for (const auto& row : evaluation.rows) {
     auto& line = cells.emplace_back(1, row.method);
     for (const auto& score : row.classes) line.push_back(Cell(score));
     line.push_back(Cell(row.mean));
-    const Score& mean = row.mean;
-    if (carved)
-      line.push_back(mean.carved_iou ? fmt::format("{:.1f}", 100 * *mean.carved_iou) : "-");
-    if (color) line.push_back(mean.color_l1 ? fmt::format("{:.3f}", *mean.color_l1) : "-");
+    for (const Column& column : kColumns) {
+      if (!HasAny(evaluation, column.measure)) continue;
+      const std::optional<double>& value = row.mean.*column.measure;
+      line.push_back(value ? fmt::format("{:.{}f}", column.factor * *value, column.digits) : "-");
+    }
   }
   return cells;
 }
@@ -87,10 +100,13 @@ std::string ClassifierNotes(const Evaluation& evaluation) {
 
 std::string Notes(const Evaluation& evaluation) {
   if (Classifies(evaluation)) return ClassifierNotes(evaluation);
-  std::string notes = fmt::format(
-      "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
-      "that scores best on the training models.",
-      100 * evaluation.shape_threshold);
+  std::string notes;
+  if (evaluation.shape_threshold > 0) {
+    notes = fmt::format(
+        "Best single shape: voxels that at least {:.0f} % of the training models have, the share "
+        "that scores best on the training models.",
+        100 * evaluation.shape_threshold);
+  }
   if (evaluation.retrieval_models > 0) {
     notes += fmt::format(
         " Nearest training picture: the shape and the colours of that of {} training models which "
@@ -108,11 +124,17 @@ std::string Notes(const Evaluation& evaluation) {
         "object "
         "or its prediction covers, of 1.";
   }
+  if (HasAny(evaluation, &Score::texture_l1)) {
+    notes +=
+        " Texture L1 and texture + light L1: mean difference of colour over all pixels of the "
+        "input's view, without light and with it, of 1. Light: angle between its direction and the "
+        "true one.";
+  }
   if (evaluation.unusable_predictions > 0) {
     notes += fmt::format(" {} predictions without extent or area score 0.",
                          evaluation.unusable_predictions);
   }
-  return notes;
+  return notes.starts_with(' ') ? notes.substr(1) : notes;
 }
 
 Json ToJson(const Score& score) {
@@ -121,6 +143,9 @@ Json ToJson(const Score& score) {
   if (score.f_score) json["f_score"] = *score.f_score;
   if (score.carved_iou) json["carved_iou"] = *score.carved_iou;
   if (score.color_l1) json["color_l1"] = *score.color_l1;
+  if (score.texture_l1) json["texture_l1"] = *score.texture_l1;
+  if (score.lit_l1) json["lit_l1"] = *score.lit_l1;
+  if (score.light_angle) json["light_angle"] = *score.light_angle;
   return json;
 }
 

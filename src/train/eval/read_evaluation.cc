@@ -27,6 +27,9 @@ Result<Score> ReadScore(const Json& json, const std::string& place) {
   read("f_score", &score.f_score);
   read("carved_iou", &score.carved_iou);
   read("color_l1", &score.color_l1);
+  read("texture_l1", &score.texture_l1);
+  read("lit_l1", &score.lit_l1);
+  read("light_angle", &score.light_angle);
   if (!fields.status().ok()) return fields.status();
   return score;
 }

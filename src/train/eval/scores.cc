@@ -64,7 +64,9 @@ Score MeanScore(std::span<const Score> scores) {
   for (const Score& score : scores) mean.iou += score.iou / static_cast<double>(scores.size());
   mean.accuracy = MeanOf(scores, &Score::accuracy);
   mean.carved_iou = MeanOf(scores, &Score::carved_iou);
-  mean.color_l1 = MeanOf(scores, &Score::color_l1);
+  for (const auto measure :
+       {&Score::color_l1, &Score::texture_l1, &Score::lit_l1, &Score::light_angle})
+    mean.*measure = MeanOf(scores, measure);
   return mean;
 }
 

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "nn/ops/axis_map.h"
 #include "nn/tape.h"
 #include "scene/mesh.h"
+#include "train/models/offset_map.h"
 
 namespace tilegrad::train {
 
@@ -40,7 +40,6 @@ class DeformableTemplate {
   nn::Var Positions(const nn::Var& movement) const;
 
  private:
-  nn::Var Smoothed(const nn::Var& raw) const;
   nn::Var N3mrMovement(const nn::Var& raw) const;
 
   nn::Context& context_;
@@ -48,9 +47,7 @@ class DeformableTemplate {
   Mesh mesh_;
   nn::Tensor positions_;    // [V, 3]
   nn::Tensor unit_sphere_;  // [V, 3] at radius 1; n3mr_vertices
-  nn::AxisMap diffusion_;   // one round
-  nn::Tensor stiff_;        // [V, V], (I + lambda L)^-1; stiffness
-  nn::AxisMap symmetry_;    // of [3 V] offsets
+  OffsetMap offsets_;       // without n3mr_vertices
 };
 
 // positions - centre of the bounding box, scaled so that the largest coordinate is half_extent; per

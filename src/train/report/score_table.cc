@@ -94,6 +94,32 @@ std::string NotesHtml(const ReportFacts& facts) {
   return out;
 }
 
+// Texture and light, of tasks that predict them: a line a method.
+std::string LightHtml(const Evaluation& evaluation) {
+  const auto cell = [](const std::optional<double>& value, int digits) {
+    return fmt::format("<td class=\"number\">{}</td>",
+                       value ? fmt::format("{:.{}f}", *value, digits) : "–");
+  };
+  std::string lines;
+  for (const auto& row : evaluation.rows) {
+    if (!row.mean.texture_l1) continue;
+    lines += fmt::format("<tr><th scope=\"row\">{}</th>{}{}{}</tr>\n", EscapeHtml(row.method),
+                         cell(row.mean.texture_l1, 4), cell(row.mean.light_angle, 1),
+                         cell(row.mean.lit_l1, 4));
+  }
+  if (lines.empty()) return "";
+  return fmt::format(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Texture and light\">"
+      "<table class=\"scores\">\n<thead><tr><th scope=\"col\">method</th>"
+      "<th scope=\"col\" class=\"number\">texture L1</th>"
+      "<th scope=\"col\" class=\"number\">light, °</th>"
+      "<th scope=\"col\" class=\"number\">texture + light L1</th></tr></thead>\n"
+      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">L1: mean difference of colour over all "
+      "pixels of the input's view, without light and with it, of 1. Light: angle between its "
+      "direction and the true one. Less is better.</p>\n",
+      lines);
+}
+
 }  // namespace
 
 std::string ScoresHtml(const ReportFacts& facts) {
@@ -115,8 +141,8 @@ std::string ScoresHtml(const ReportFacts& facts) {
   return fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Scores\"><table "
       "class=\"scores\">\n{}<tbody>\n{}</tbody>\n<tfoot>\n{}</tfoot>\n</table></div>\n"
-      "<p class=\"note\">{}</p>",
-      HeadHtml(evaluation), lines, mean, NotesHtml(facts));
+      "<p class=\"note\">{}</p>{}",
+      HeadHtml(evaluation), lines, mean, NotesHtml(facts), LightHtml(evaluation));
 }
 
 }  // namespace tilegrad::train

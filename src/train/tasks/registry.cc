@@ -6,12 +6,14 @@
 #include "base/error.h"
 #include "train/tasks/classify/task.h"
 #include "train/tasks/single_image/task.h"
+#include "train/tasks/textured_image/task.h"
 
 namespace tilegrad::train {
 namespace {
 
 std::map<std::string, TaskFactory>& Factories() {
   static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask},
+                                                         {"textured_image", &MakeTexturedImageTask},
                                                          {"classify", &MakeClassifyTask}};
   return factories;
 }

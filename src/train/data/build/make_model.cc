@@ -17,12 +17,9 @@ constexpr int kRulesVersion = 3;
 
 Result<MadeModel> FromMesh(const SourceEntry& entry, Mesh mesh, const DatasetInfo& info,
                            LitRenderer& renderer) {
-  TILEGRAD_TRY(Validate(mesh));
   MadeModel made;
   made.stamp.source_faces = static_cast<int>(mesh.faces.size());
-  RemoveGlass(&mesh);
-  TurnUpright(info.up, &mesh);
-  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(info.camera.half_extent)));
+  TILEGRAD_TRY(PrepareMesh(info, &mesh));
   made.stamp.geometry = GeometryFingerprint(mesh);
   std::vector<Camera> cameras;
   for (int i = 0; i < info.views; ++i) cameras.push_back(info.camera.View(i));
@@ -48,6 +45,13 @@ Status CheckVisible(const ModelData& data, int size) {
 }
 
 }  // namespace
+
+Status PrepareMesh(const DatasetInfo& info, Mesh* mesh) {
+  TILEGRAD_TRY(Validate(*mesh));
+  RemoveGlass(mesh);
+  TurnUpright(info.up, mesh);
+  return NormalizeToBox(*mesh, static_cast<float>(info.camera.half_extent));
+}
 
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
                             LitRenderer& renderer) {

@@ -15,11 +15,15 @@ struct MadeModel {
   ModelStamp stamp;
 };
 
-// Glass goes (glass.h), the rest is centred and scaled to the rule's half-extent, rendered,
+// Prepared, rendered,
 // voxelised, sampled (seeded by class and id) and reduced for reports. A pure function of the
 // model, the entry and `info`.
 Result<MadeModel> MakeModel(const SourceEntry& entry, SourceModel model, const DatasetInfo& info,
                             LitRenderer& renderer);
+
+// A source's mesh as the dataset shows it: without glass (glass.h), upright, centred and scaled to
+// the rule's half-extent.
+Status PrepareMesh(const DatasetInfo& info, Mesh* mesh);
 
 // 16 hex digits that change whenever model files would: `info`'s sizes and camera, the source's
 // name and version (ModelSource::version), and a version of the rules.

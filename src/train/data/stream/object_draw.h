@@ -39,6 +39,11 @@ class AxisWarp {
   double knots_[kPieces + 1], slopes_[kPieces];
 };
 
+// Deforms a copy of `positions`, whose bounding box is centred with this largest half-extent; so is
+// the result's.
+void DrawShape(const StreamConfig& config, std::span<const glm::vec3> positions, float half_extent,
+               Rng& rng, std::vector<glm::vec3>* out);
+
 // Deforms and recolours; then the bounding box is centred and scaled to `half_extent` again.
 void DrawObject(const StreamConfig& config, const ColoredMesh& mesh, float half_extent, Rng& rng,
                 ObjectDraw* out);

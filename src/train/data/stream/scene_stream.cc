@@ -13,6 +13,7 @@
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
 #include "train/data/build/truth_mesh.h"
+#include "train/data/stream/average_samples.h"
 #include "train/data/stream/view_draw.h"
 
 namespace tilegrad::train {
@@ -79,29 +80,7 @@ struct SceneStream::Worker {
   std::vector<Scene> scenes;
   std::vector<float> rgba;
   double seconds = 0;
-
-  // The frame's image n, samples x samples a pixel, to planes of [0, 1].
-  void Average(std::size_t n, int samples, int size, std::span<float> to) const;
 };
-
-void SceneStream::Worker::Average(std::size_t n, int samples, int size, std::span<float> to) const {
-  const Images& images = frame.images();
-  const auto width = static_cast<std::size_t>(images.width), side = static_cast<std::size_t>(size),
-             k = static_cast<std::size_t>(samples), plane = width * width, pixels = side * side;
-  const float share = 1.0f / static_cast<float>(samples * samples);
-  std::fill(to.begin(), to.end(), 0.0f);
-  for (std::size_t y = 0; y < width; ++y) {
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t from = y * width + x, at = y / k * side + x / k;
-      if (images.face_ids[n * plane + from] < 0) continue;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float value = images.color[(3 * n + c) * plane + from];
-        to[c * pixels + at] += share * std::clamp(value, 0.0f, 1.0f);
-      }
-      to[3 * pixels + at] += share;
-    }
-  }
-}
 
 SceneStream::SceneStream(const StreamConfig& config, std::vector<ColoredMesh> meshes,
                          const DatasetInfo& info, std::uint64_t seed, const Workers& workers)
@@ -147,7 +126,7 @@ Result<std::span<const float>> SceneStream::Render(int model, std::uint64_t posi
   const std::size_t image = 4 * static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_);
   w.rgba.resize(image * cameras.size());
   for (std::size_t v = 0; v < cameras.size(); ++v)
-    w.Average(v, samples, size_, std::span(w.rgba).subspan(v * image, image));
+    AverageSamples(w.frame.images(), v, samples, std::span(w.rgba).subspan(v * image, image));
   w.seconds += ThreadSeconds() - start;
   return std::span<const float>(w.rgba);
 }

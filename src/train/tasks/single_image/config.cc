@@ -36,37 +36,6 @@ ConfigFields FieldsOf(NetworkConfig* c) {
   };
 }
 
-ConfigFields LossAndRenderFields(SingleImageConfig* c) {
-  return {
-      {"loss.iou", &c->loss.iou, 0, kNoLimit, "weight of equation 12"},
-      {"loss.color", &c->loss.color, 0, kNoLimit, "weight of equation 13"},
-      {"loss.smoothness", &c->loss.smoothness, 0, kNoLimit,
-       "weight of the normal difference of neighbouring faces"},
-      {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
-       "weight of the Laplacian of the movement"},
-      {"render.rule", &c->render.rule, 0, 0,
-       "whose renderer trains: \"dibr\", \"softras\" or \"n3mr\""},
-      {"render.sharpness", &c->render.sharpness, 1e-3, 1e9,
-       "1/delta of equation 5, per squared NDC unit"},
-      {"render.sharpness_start", &c->render.sharpness_start, 1e-3, 1e9,
-       "at step 0; reaches sharpness geometrically at half of the run"},
-      {"render.max_alpha_error", &c->render.max_alpha_error, 0, 1, "bound on the error of alpha"},
-  };
-}
-
-ConfigFields FieldsOf(OptimizerConfig* c) {
-  return {
-      {"optimizer.learning_rate", &c->learning_rate, 0, 1, "of Adam"},
-      {"optimizer.final_factor", &c->final_factor, 0, 1,
-       "share of the rate at the end (half cosine); 1: constant"},
-      {"optimizer.warmup", &c->warmup, 0, kNoLimit, "steps of linear rise"},
-      {"optimizer.beta1", &c->beta1, 0, 0.999999, "of Adam"},
-      {"optimizer.beta2", &c->beta2, 0, 0.99999999, "of Adam"},
-      {"optimizer.average", &c->average, 0, 0.999999,
-       "decay of a moving average of the weights, which predicts; 0: none"},
-  };
-}
-
 ConfigFields ScheduleFields(SingleImageConfig* c) {
   return {
       {"schedule.batch", &c->batch, 2, 65536, "objects a step; batch norm needs two"},
@@ -91,8 +60,8 @@ Status CheckConfig(const SingleImageConfig& config) {
 ConfigFields FieldsOf(SingleImageConfig* c) {
   ConfigFields fields;
   for (const ConfigFields& more :
-       {FieldsOf(&c->network), LossAndRenderFields(c), FieldsOf(&c->optimizer), ScheduleFields(c),
-        FieldsOf(&c->rivals), FieldsOf(&c->stream)})
+       {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render), FieldsOf(&c->optimizer),
+        ScheduleFields(c), FieldsOf(&c->rivals), FieldsOf(&c->stream)})
     fields.insert(fields.end(), more.begin(), more.end());
   return fields;
 }

@@ -14,10 +14,7 @@
 namespace tilegrad::train {
 
 double SharpnessAt(const SingleImageConfig& config, std::int64_t step) {
-  const double share =
-      std::min(1.0, 2.0 * static_cast<double>(step) / static_cast<double>(config.schedule.steps));
-  return config.render.sharpness_start *
-         std::pow(config.render.sharpness / config.render.sharpness_start, share);
+  return SharpnessAt(config.render, config.schedule.steps, step);
 }
 
 ImageLosses::ImageLosses(nn::Context& context, const SingleImageConfig& config, const Mesh& sphere,

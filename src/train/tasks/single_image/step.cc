@@ -9,9 +9,7 @@
 namespace tilegrad::train {
 
 double LearningRateAt(const SingleImageConfig& config, std::int64_t step) {
-  const OptimizerConfig& o = config.optimizer;
-  const nn::CosineSchedule cosine{config.schedule.steps, o.final_factor};
-  return nn::WarmedUp(nn::CosineRate(o.learning_rate, cosine, step), o.warmup, step);
+  return LearningRateAt(config.optimizer, config.schedule.steps, step);
 }
 
 TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int image_size)

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fit/sphere_uv.h"
+#include "scene/sphere_uv.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <utility>
 
-namespace tilegrad::train {
+namespace tilegrad {
 namespace {
 
 struct CornerUv {
@@ -45,22 +43,18 @@ void Unwrap(std::array<CornerUv, 3>* corners) {
 
 }  // namespace
 
-void SetSphereUv(const Mesh& sphere, FitScene* scene) {
-  scene->uvs.clear(), scene->uv_indices.clear();
-  std::map<std::pair<std::int32_t, float>, std::int32_t> known;
+std::vector<glm::vec2> SphereUvs(const Mesh& sphere) {
+  std::vector<glm::vec2> uvs;
+  uvs.reserve(3 * sphere.faces.size());
   for (const Face& face : sphere.faces) {
     std::array<CornerUv, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
       corners[k] = UvOf(sphere.positions[static_cast<std::size_t>(face[k])]);
     }
     Unwrap(&corners);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [at, added] = known.try_emplace({face[k], corners[k].u},
-                                                 static_cast<std::int32_t>(scene->uvs.size() / 2));
-      if (added) scene->uvs.insert(scene->uvs.end(), {corners[k].u, corners[k].v});
-      scene->uv_indices.push_back(at->second);
-    }
+    for (const CornerUv& c : corners) uvs.emplace_back(c.u, c.v);
   }
+  return uvs;
 }
 
-}  // namespace tilegrad::train
+}  // namespace tilegrad

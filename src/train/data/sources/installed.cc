@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/sources/installed.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr InstalledSource kSources[] = {{"sweethome3d", kSweetHome3dFolder, SweetHome3dSource},
+                                        {"planes", kGamesFolder, PlanesSource},
+                                        {"ships", kGamesFolder, ShipsSource},
+                                        {"cars", kGamesFolder, CarsSource}};
+
+std::vector<std::string> NamesIn(const std::string& name) {
+  std::vector<std::string> names;
+  if (name == kThirteen) {
+    for (const InstalledSource& source : kSources) names.emplace_back(source.name);
+    return names;
+  }
+  std::string_view rest = name;
+  while (true) {
+    const std::size_t end = rest.find('+');
+    names.emplace_back(rest.substr(0, end));
+    if (end == std::string_view::npos) return names;
+    rest.remove_prefix(end + 1);
+  }
+}
+
+}  // namespace
+
+std::span<const InstalledSource> InstalledSources() { return kSources; }
+
+const InstalledSource* FindInstalledSource(std::string_view name) {
+  const auto* found = std::find_if(std::begin(kSources), std::end(kSources),
+                                   [&](const InstalledSource& s) { return s.name == name; });
+  return found == std::end(kSources) ? nullptr : found;
+}
+
+Result<std::unique_ptr<ModelSource>> OpenInstalledSources(const std::string& name) {
+  const std::vector<std::string> names = NamesIn(name);
+  std::vector<std::unique_ptr<ModelSource>> sources;
+  for (auto at = names.begin(); at != names.end(); ++at) {
+    const InstalledSource* installed = FindInstalledSource(*at);
+    if (installed == nullptr || std::find(names.begin(), at, *at) != at) {
+      return InvalidArgument(
+          "the source {}: of several, each is sweethome3d, planes, ships or cars, and there once",
+          name);
+    }
+    TILEGRAD_ASSIGN(auto source, installed->open(installed->folder));
+    sources.push_back(std::move(source));
+  }
+  if (sources.size() == 1) return std::move(sources[0]);
+  return CombineSources(name, std::move(sources));
+}
+
+}  // namespace tilegrad::train

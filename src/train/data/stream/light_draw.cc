@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/data/stream/light_draw.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr int kMeanDraws = 4096;
+
+struct Word {
+  std::string_view word;
+  Lighting lighting;
+};
+constexpr Word kWords[] = {{"none", Lighting::kNone},
+                           {"lambert", Lighting::kLambert},
+                           {"phong", Lighting::kPhong},
+                           {"harmonics", Lighting::kSphericalHarmonics}};
+
+const Word* Find(std::string_view word) {
+  const auto* at = std::find_if(std::begin(kWords), std::end(kWords),
+                                [&](const Word& w) { return w.word == word; });
+  return at == std::end(kWords) ? nullptr : at;
+}
+
+std::array<float, 3> Unit(double x, double y, double z) {
+  const double length = std::sqrt(x * x + y * y + z * z);
+  if (!(length > 1e-12)) return {0, 0, 1};
+  return {static_cast<float>(x / length), static_cast<float>(y / length),
+          static_cast<float>(z / length)};
+}
+
+// Spread evenly over a spherical cap around z.
+std::array<float, 3> DrawDirection(double spread, Rng& rng) {
+  const double z = rng.Uniform(std::cos(spread * kPi / 180), 1), turn = rng.Uniform(0, 2 * kPi);
+  const double side = std::sqrt(std::max(0.0, 1 - z * z));
+  return Unit(side * std::cos(turn), side * std::sin(turn), z);
+}
+
+// The orthonormal basis of SceneT::sh at a unit direction.
+std::array<double, 9> Basis(const std::array<float, 3>& d) {
+  constexpr double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792,
+                   k3 = 0.31539156525252005;
+  const double x = d[0], y = d[1], z = d[2];
+  return {k0,
+          -k1 * y,
+          k1 * z,
+          -k1 * x,
+          k2 * x * y,
+          -k2 * y * z,
+          k3 * (3 * z * z - 1),
+          -k2 * x * z,
+          k2 / 2 * (x * x - y * y)};
+}
+
+// sky + (1 - sky) max(0, n . direction), by its first three bands: a cosine that is cut at 0 has
+// the factors pi, 2 pi / 3 and pi / 4 there (Ramamoorthi, Hanrahan 2001).
+std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& direction) {
+  const std::array<double, 9> basis = Basis(direction);
+  std::array<float, 9> out;
+  for (std::size_t i = 0; i < 9; ++i) {
+    const double band = i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4;
+    out[i] = static_cast<float>((1 - sky) * band * basis[i]);
+  }
+  out[0] += static_cast<float>(sky / basis[0]);
+  return out;
+}
+
+}  // namespace
+
+ConfigFields FieldsOf(LightConfig* c) {
+  return {
+      {"light.model", &c->model, 0, 0, "\"none\", \"lambert\", \"phong\" or \"harmonics\""},
+      {"light.spread", &c->spread, 0, 180,
+       "degrees; lights come from that far around the camera; 90: the hemisphere facing it"},
+      {"light.ambient", &c->ambient, 0, 1, "of Lambert and Phong surfaces; the paper has none"},
+      {"light.shininess_low", &c->shininess_low, 1, 1000, "of Phong surfaces, log-uniform"},
+      {"light.shininess_high", &c->shininess_high, 1, 1000, "of Phong surfaces"},
+      {"light.sky_low", &c->sky_low, 0, 1,
+       "of harmonics: share of the light that comes from everywhere"},
+      {"light.sky_high", &c->sky_high, 0, 1, "the rest comes from a direction"},
+  };
+}
+
+Status CheckConfig(const LightConfig& c) {
+  if (Find(c.model) == nullptr) {
+    return InvalidArgument(
+        "light.model is \"{}\", but must be \"none\", \"lambert\", \"phong\" or \"harmonics\"",
+        c.model);
+  }
+  if (c.shininess_low > c.shininess_high)
+    return InvalidArgument("light.shininess_low is above light.shininess_high");
+  if (c.sky_low > c.sky_high) return InvalidArgument("light.sky_low is above light.sky_high");
+  return {};
+}
+
+Lighting LightingOf(const LightConfig& config) { return Find(config.model)->lighting; }
+
+Surface SurfaceUnder(const LightConfig& config) {
+  Surface surface;
+  surface.ambient.fill(static_cast<float>(config.ambient));
+  surface.diffuse.fill(1), surface.specular.fill(0.4f);
+  return surface;
+}
+
+DrawnLight DrawLight(const LightConfig& config, Rng& rng) {
+  DrawnLight light;
+  light.direction = DrawDirection(config.spread, rng);
+  light.shininess = static_cast<float>(
+      config.shininess_low * std::pow(config.shininess_high / config.shininess_low, rng.Uniform()));
+  light.sh = SkyAndLight(rng.Uniform(config.sky_low, config.sky_high), light.direction);
+  return light;
+}
+
+DrawnLight MeanLight(const LightConfig& config) {
+  std::array<double, 3> direction = {};
+  std::array<double, 9> sh = {};
+  double log_shininess = 0;
+  Rng rng(0, /*stream=*/0x6d65616e);
+  for (int k = 0; k < kMeanDraws; ++k) {
+    const DrawnLight light = DrawLight(config, rng);
+    for (std::size_t i = 0; i < 3; ++i) direction[i] += light.direction[i];
+    for (std::size_t i = 0; i < 9; ++i) sh[i] += light.sh[i] / kMeanDraws;
+    log_shininess += std::log(static_cast<double>(light.shininess)) / kMeanDraws;
+  }
+  DrawnLight mean;
+  mean.direction = Unit(direction[0], direction[1], direction[2]);
+  mean.shininess = static_cast<float>(std::exp(log_shininess));
+  for (std::size_t i = 0; i < 9; ++i) mean.sh[i] = static_cast<float>(sh[i]);
+  return mean;
+}
+
+std::array<float, 3> DirectionOf(const std::array<float, 9>& sh) {
+  return Unit(-sh[3], -sh[1], sh[2]);
+}
+
+}  // namespace tilegrad::train

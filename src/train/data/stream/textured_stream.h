@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of textured objects, each view under a light of its own. A pure function of (seed,
+// position of the object in the run), as scene_stream.h.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "scene/image.h"
+#include "tilegrad/renderer.h"
+#include "train/data/stream/light_draw.h"
+#include "train/data/stream/stream_config.h"
+#include "train/data/stream/textured_meshes.h"
+
+namespace tilegrad::train {
+
+struct TexturedStreamConfig {
+  // Of it `share`, `max_faces` and `light` mean nothing here.
+  StreamConfig draw;
+  TexturedMeshRequest meshes;
+  double mirrored = 0.5;  // share of the objects that are shown mirrored at x = 0
+};
+// All of [stream] that means something.
+ConfigFields FieldsOf(TexturedStreamConfig* config);
+
+// Without stretch, taper, mirror, and other colours: what scores are taken on.
+TexturedStreamConfig WithoutChanges(TexturedStreamConfig config);
+
+// A view of an object.
+struct TexturedView {
+  Camera camera;
+  DrawnLight light;  // in the camera's axes
+};
+
+// How an object is shown.
+enum class Appearance { kLit, kTexture, kLight };  // light: on white
+
+class TexturedStream {
+ public:
+  // `meshes` outlive it. `seed` also decides which pictures these are: two streams of one seed show
+  // the same.
+  struct Job {
+    TexturedStreamConfig config;
+    LightConfig light;
+    CameraRule camera;
+    int size = 64;
+    std::uint64_t seed = 0;
+  };
+  TexturedStream(const Job& job, std::span<const TexturedMesh> meshes, const Workers& workers);
+  ~TexturedStream();
+  TexturedStream(TexturedStream&&) noexcept;
+
+  // The object at `position` of the run, made from mesh `model`, from as many views as there are
+  // `views`, which are chosen: [views][4][size][size], planar, RGB over black and the covered share
+  // of each pixel, in [0, 1]. Valid until the next call with the same `worker`, in [0, count()).
+  Result<std::span<const float>> Render(int model, std::uint64_t position, std::size_t worker,
+                                        std::span<TexturedView> views);
+  // The views of the last Render with this worker, the same size, in another way.
+  Result<std::span<const float>> Again(std::size_t worker, Appearance appearance);
+
+  // Of processor time that Render has taken since the last call. Between batches only.
+  double TakeSeconds();
+  // Rows of objects from models that are spread over all, to look at.
+  Result<ImageU8> Sheet(int objects, int views);
+
+ private:
+  struct Worker;
+  Job job_;
+  std::span<const TexturedMesh> meshes_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+};
+
+}  // namespace tilegrad::train

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/models/texture_network.h"
+
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "scene/shapes.h"
+#include "scene/sphere_uv.h"
+#include "train/models/mesh_network.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kResidualPairs = 3;    // of two layers: the six of section 5.2
+constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
+
+nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
+                           std::int64_t in, std::int64_t out, Rng& rng) {
+  return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
+}
+
+// Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
+// is at 1/2 - u (scene/sphere_uv.h): column i has W/2 - 1 - i.
+nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width) {
+  return nn::MakeAxisMap(nn::Constant(context, 0.0), {width, width},
+                         [&](std::int64_t i, nn::AxisTerms& terms) {
+                           terms.push_back({i, 0.5});
+                           terms.push_back({(width / 2 - 1 - i + width) % width, 0.5});
+                         });
+}
+
+std::int64_t LightNumbers(Lighting lighting) {
+  switch (lighting) {
+    case Lighting::kLambert:
+      return 3;
+    case Lighting::kPhong:
+      return 4;
+    case Lighting::kSphericalHarmonics:
+      return 9;
+    default:
+      return 0;
+  }
+}
+
+// What the head says of an image that it knows nothing about: light from the camera, or from
+// everywhere.
+void SetStartLight(Lighting lighting, nn::Tensor& bias) {
+  nn::WithFloatType(bias.dtype(), [&]<class T>(T) {
+    const std::span<T> b = bias.span<T>();
+    std::fill(b.begin(), b.end(), T(0));
+    if (lighting == Lighting::kSphericalHarmonics) {
+      b[0] = static_cast<T>(kStartLight / 0.28209479177387814);
+    } else {
+      b[2] = T(1);
+    }
+  });
+}
+
+nn::Var Unit(const nn::Var& v) {
+  return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
+}
+
+}  // namespace
+
+Status CheckImageSize(const TextureNetworkConfig& config, int image_size) {
+  const std::int64_t step = std::int64_t{1} << config.levels;
+  if (image_size % step == 0 && image_size >= 2 * step) return {};
+  return InvalidArgument(
+      "images of {} pixels a side cannot be halved {} times to at least two pixels: choose a "
+      "smaller "
+      "network.levels",
+      image_size, config.levels);
+}
+
+void TextureNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
+  unet->Visit(prefix + "unet.", visitor);
+  latent.Visit(prefix + "latent.", visitor);
+  map.Visit(prefix + "map.", visitor);
+  shape.Visit(prefix + "shape.", visitor);
+  light.Visit(prefix + "light.", visitor);
+}
+
+TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig& config,
+                               const LightHeadShape& light, int image_size, std::uint64_t seed)
+    : context_(context),
+      config_(config),
+      light_(light),
+      texture_size_(image_size << config.enlarge),
+      template_(Icosphere(static_cast<int>(config.template_level),
+                          static_cast<float>(config.template_radius))),
+      uvs_(SphereUvs(template_)) {
+  Rng rng(seed, /*stream=*/0x74657874);
+  const nn::UNetShape unet{.in = 4,
+                           .out = 3,
+                           .base = config.base,
+                           .most = config.most,
+                           .levels = static_cast<int>(config.levels),
+                           .norm = nn::Norm::kBatch,
+                           .resize = true,
+                           .skips = config.skips,
+                           .enlarge = static_cast<int>(config.enlarge),
+                           .wrap = config.wrap,
+                           .output = &nn::Sigmoid};
+  all_.unet = std::make_unique<nn::UNet>(context, unet, rng);
+  const std::int64_t side = image_size >> config.levels;
+  const std::int64_t channels = std::min(config.most, config.base << (config.levels - 1));
+  code_shape_ = {channels, side, side};
+  BuildHeads(rng);
+  const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
+  template_positions_ =
+      context.From({static_cast<std::int64_t>(template_.positions.size()), 3}, flat);
+  offsets_ =
+      OffsetMap(context, template_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
+  if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
+}
+
+void TextureNetwork::BuildHeads(Rng& rng) {
+  const std::int64_t code = code_shape_.elements(), latent = config_.latent;
+  all_.latent.Add<nn::Flatten>("flatten");
+  all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
+  AddLinear(all_.latent, "fc", context_, code, latent, rng);
+  all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
+  AddLinear(all_.map, "fc", context_, latent, code, rng);
+  AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
+  all_.shape.Add<nn::Activation>("act", &nn::Relu);
+  const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
+  auto& offsets = AddLinear(all_.shape, "fc2", context_, config_.hidden, numbers, rng);
+  nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
+  nn::FillConstant(offsets.bias.value(), 0);
+  const std::int64_t light = LightNumbers(light_.lighting), width = config_.light_width;
+  if (light == 0) return;
+  AddLinear(all_.light, "in", context_, latent, width, rng);
+  for (int i = 1; i <= kResidualPairs; ++i) {
+    auto& block = all_.light.Add<nn::Residual>("block" + std::to_string(i));
+    block.body.Add<nn::Activation>("act1", &nn::Relu);
+    AddLinear(block.body, "fc1", context_, width, width, rng);
+    block.body.Add<nn::Activation>("act2", &nn::Relu);
+    AddLinear(block.body, "fc2", context_, width, width, rng);
+  }
+  all_.light.Add<nn::Activation>("act", &nn::Relu);
+  SetStartLight(light_.lighting,
+                AddLinear(all_.light, "out", context_, width, light, rng).bias.value());
+}
+
+nn::Var TextureNetwork::Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels,
+                                nn::Mode mode) {
+  const nn::Var code =
+      nn::Reshape(all_.map.Forward(latent, mode),
+                  {latent.shape()[0], code_shape_[0], code_shape_[1], code_shape_[2]});
+  nn::Var image = all_.unet->Decode(code, levels, mode);
+  if (config_.symmetric_texture) image = nn::MapAxis(image, 3, mirror_);
+  return nn::Permute(image, {0, 2, 3, 1});
+}
+
+void TextureNetwork::Light(const nn::Var& latent, nn::Mode mode, PredictedObjects* out) {
+  if (light_.lighting == Lighting::kNone) return;
+  const nn::Var raw = all_.light.Forward(latent, mode);
+  if (light_.lighting == Lighting::kSphericalHarmonics) {
+    out->sh = raw;
+    return;
+  }
+  out->directions = Unit(nn::Slice(raw, 1, 0, 3));
+  if (light_.lighting != Lighting::kPhong) return;
+  const double low = std::log(light_.shininess_low), high = std::log(light_.shininess_high);
+  const nn::Var share = nn::Sigmoid(nn::Reshape(nn::Slice(raw, 1, 3, 4), {raw.shape()[0]}));
+  out->shininess = nn::Exp((high - low) * share + low);
+}
+
+PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
+  PredictedObjects out;
+  const nn::StepVector<nn::Var> levels = all_.unet->Encode(images, mode);
+  const nn::Var latent = all_.latent.Forward(levels.back(), mode);
+  if (!latent.valid()) return out;
+  out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
+  out.positions = NormalizeMeshes(out.movement + nn::Constant(context_, template_positions_),
+                                  kPredictionHalfExtent);
+  out.textures = Texture(latent, levels, mode);
+  Light(latent, mode, &out);
+  return out;
+}
+
+}  // namespace tilegrad::train

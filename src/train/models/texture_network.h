@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The network of sections 5.2 and 5.3: one RGBA image in; a deformed sphere, its texture map and
+// the light out. The paper's figure 3 shows its three heads; sizes are ours where it has none.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "nn/networks/unet.h"
+#include "scene/mesh.h"
+#include "tilegrad/scene.h"
+#include "train/models/offset_map.h"
+
+namespace tilegrad::train {
+
+struct TextureNetworkConfig {
+  std::int64_t base = 24;     // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 256;    // this many
+  std::int64_t levels = 4;    // halvings
+  std::int64_t enlarge = 1;   // the texture is 2^this times as large as the image
+  bool skips = true;          // the U-Net's skip connections
+  bool wrap = true;           // the texture's left and right edges are neighbours in the decoder
+  std::int64_t latent = 384;  // all heads start from this code, fully connected
+  std::int64_t hidden = 512;  // width of the head of vertices
+  std::int64_t light_width = 128;   // of the six layers of the head of light
+  std::int64_t template_level = 3;  // subdivisions of the icosahedron
+  double template_radius = 0.3;     // world units
+  std::int64_t smoothing = 4;       // OffsetRules
+  bool symmetric = true;
+  bool symmetric_texture = false;   // the texture is its mirror image at x = 0
+  double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)
+};
+
+// What light the network says, and in which range.
+struct LightHeadShape {
+  Lighting lighting = Lighting::kLambert;
+  double shininess_low = 3, shininess_high = 30;
+};
+
+// What the network says of a batch of B images. Light is in the axes of each image's camera.
+struct PredictedObjects {
+  nn::Var movement;    // [B, V, 3] offsets from the template
+  nn::Var positions;   // [B, V, 3] template + movement, box centred, largest half-extent 0.45
+  nn::Var textures;    // [B, h, w, 3] in [0, 1], by the sphere's longitude and latitude
+  nn::Var directions;  // [B, 3] unit; Lambert and Phong
+  nn::Var shininess;   // [B]; Phong
+  nn::Var sh;          // [B, 9]; harmonics
+};
+
+class TextureNetwork {
+ public:
+  // `image_size` in pixels, a multiple of 2^levels (CheckImageSize). The seed decides every weight.
+  TextureNetwork(nn::Context& context, const TextureNetworkConfig& config,
+                 const LightHeadShape& light, int image_size, std::uint64_t seed);
+
+  // images: [B, 4, size, size], RGBA in [0, 1], RGB over black.
+  PredictedObjects Forward(const nn::Var& images, nn::Mode mode);
+
+  nn::Module& module() { return all_; }
+  const Mesh& template_mesh() const { return template_; }
+  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
+  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
+  int texture_size() const { return texture_size_; }
+
+ private:
+  void BuildHeads(Rng& rng);
+  nn::Var Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels, nn::Mode mode);
+  void Light(const nn::Var& latent, nn::Mode mode, PredictedObjects* out);
+
+  nn::Context& context_;
+  TextureNetworkConfig config_;
+  LightHeadShape light_;
+  int texture_size_;
+  Mesh template_;
+  std::vector<glm::vec2> uvs_;
+  nn::Tensor template_positions_;  // [V, 3]
+  OffsetMap offsets_;
+  nn::AxisMap mirror_;    // of texel columns
+  nn::Shape code_shape_;  // of one image
+  // The parts, shown to visitors as one module.
+  struct Parts : nn::Module {
+    std::unique_ptr<nn::UNet> unet;
+    nn::Sequential latent, map, shape, light;
+    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return unet->Forward(x, mode); }
+    void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+  } all_;
+};
+
+// InvalidArgument says which key does not go with images of that size.
+Status CheckImageSize(const TextureNetworkConfig& config, int image_size);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keys that tasks with our renderer share: [loss], [render], [optimizer].
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "train/run/config_fields.h"
+#include "train/run/schedule.h"
+
+namespace tilegrad::train {
+
+// Weights of equation 14.
+struct LossConfig {
+  double iou = 1.0;
+  double color = 1.0;
+  double smoothness = 0.001;
+  double laplacian = 0.01;
+};
+
+struct RenderConfig {
+  // "dibr", "softras" or "n3mr". The rivals draw alpha alone, and there is no colour loss, unless
+  // RivalConfig says otherwise; the next three numbers mean nothing to them. Pictures and scores
+  // are always drawn by "dibr".
+  std::string rule = "dibr";
+  double sharpness = 7000;        // 1 / delta of equation 5, per squared NDC unit
+  double sharpness_start = 7000;  // at step 0; moves to `sharpness` geometrically over half of the
+                                  // run: a wide band first
+  double max_alpha_error = 1e-5;
+};
+
+struct OptimizerConfig {
+  double learning_rate = 1e-4;
+  // The rate falls to this share by a half cosine over the run; 1: constant.
+  double final_factor = 1.0;
+  std::int64_t warmup = 0;  // steps over which the rate rises linearly from 0
+  double beta1 = 0.9;
+  double beta2 = 0.999;
+  double average = 0;  // decay of a moving average of the weights, which is what predicts; 0: none
+};
+
+ConfigFields FieldsOf(LossConfig* config);
+ConfigFields FieldsOf(RenderConfig* config);
+ConfigFields FieldsOf(OptimizerConfig* config);
+
+// The learning rate and 1/delta at a step of a run of `steps`.
+double LearningRateAt(const OptimizerConfig& config, std::int64_t steps, std::int64_t step);
+double SharpnessAt(const RenderConfig& config, std::int64_t steps, std::int64_t step);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/config.h"
+
+namespace tilegrad::train {
+namespace {
+
+ConfigFields FieldsOf(TextureNetworkConfig* c) {
+  return {
+      {"network.base", &c->base, 1, 4096, "U-Net: channels of the first level; they double"},
+      {"network.most", &c->most, 1, 4096, "to at most this many"},
+      {"network.levels", &c->levels, 1, 10, "halvings"},
+      {"network.enlarge", &c->enlarge, 0, 4, "the texture is 2^this times as large as the image"},
+      {"network.skips", &c->skips, 0, 1, "the U-Net's skip connections"},
+      {"network.wrap", &c->wrap, 0, 1,
+       "left and right edge of the texture are neighbours in the decoder"},
+      {"network.latent", &c->latent, 1, 65536, "width of the code that all heads start from"},
+      {"network.hidden", &c->hidden, 1, 65536, "width of the head of vertices"},
+      {"network.light_width", &c->light_width, 1, 65536, "of the six layers of the head of light"},
+      {"network.template_level", &c->template_level, 0, 6,
+       "subdivisions of the icosahedron; 3: 642 vertices"},
+      {"network.template_radius", &c->template_radius, 1e-3, 10, "world units"},
+      {"network.smoothing", &c->smoothing, 0, 64,
+       "rounds of diffusion over the template that offsets go through"},
+      {"network.symmetric", &c->symmetric, 0, 1, "every shape is symmetric at x = 0"},
+      {"network.symmetric_texture", &c->symmetric_texture, 0, 1, "and so is every texture"},
+      {"network.output_deviation", &c->output_deviation, 0, 10,
+       "the last weights of vertices start as N(0, this^2)"},
+  };
+}
+
+}  // namespace
+
+Status CheckConfig(const TexturedImageConfig& config) { return CheckConfig(config.light); }
+
+LightHeadShape LightHeadOf(const LightConfig& config) {
+  return {LightingOf(config), config.shininess_low, config.shininess_high};
+}
+
+ConfigFields FieldsOf(TexturedImageConfig* c) {
+  ConfigFields render = FieldsOf(&c->render);
+  std::erase_if(render, [](const ConfigField& field) { return field.key == "render.rule"; });
+  ConfigFields fields;
+  for (const ConfigFields& more :
+       {FieldsOf(&c->network), FieldsOf(&c->loss), render, FieldsOf(&c->light),
+        FieldsOf(&c->optimizer),
+        ConfigFields{{"schedule.batch", &c->batch, 1, 65536,
+                      "objects a step, each in two views under two lights"}},
+        FieldsOf(&c->stream)})
+    fields.insert(fields.end(), more.begin(), more.end());
+  return fields;
+}
+
+}  // namespace tilegrad::train

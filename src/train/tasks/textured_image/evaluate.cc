@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/evaluate.h"
+
+#include <array>
+#include <cmath>
+
+#include "base/error.h"
+#include "train/data/dataset_files.h"
+#include "train/data/trained_models.h"
+#include "train/eval/class_means.h"
+#include "train/eval/scores.h"
+#include "train/predictor.h"
+#include "train/tasks/textured_image/held_out_views.h"
+#include "train/tasks/textured_image/model.h"
+#include "train/tasks/textured_image/object_pictures.h"
+#include "train/tasks/textured_image/step.h"
+
+namespace tilegrad::train {
+namespace {
+
+enum Method { kWithoutLight, kMeanLight, kOurs, kMethods };
+constexpr const char* kNames[kMethods] = {"without light", "mean light", "tilegrad"};
+using MethodScores = std::array<Score, kMethods>;
+
+// Over the colours of two pictures [4][size][size].
+double MeanDifference(std::span<const float> a, std::span<const float> b) {
+  const std::size_t numbers = a.size() / 4 * 3;
+  double sum = 0;
+  for (std::size_t i = 0; i < numbers; ++i)
+    sum += std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
+  return sum / static_cast<double>(numbers);
+}
+
+class Judge {
+ public:
+  Judge(const TexturedImageConfig& config, int size)
+      : lighting_(LightingOf(config.light)),
+        mean_(MeanLight(config.light)),
+        pictures_(config.light, size, static_cast<int>(config.stream.draw.samples)) {}
+
+  struct View {
+    const PredictedObject& object;
+    const HeldOutViews::Views& truth;
+    std::size_t index;
+  };
+  Result<MethodScores> Compare(const View& at) {
+    const auto& [object, truth, v] = at;
+    const std::span<const float> input = truth.Of(truth.lit, v);
+    TexturedView view = truth.views[v];
+    TILEGRAD_ASSIGN(const auto texture, pictures_.Draw(object.mesh, view, Appearance::kTexture));
+    MethodScores scores;
+    for (Score& score : scores)
+      score.texture_l1 = MeanDifference(texture, truth.Of(truth.texture, v));
+    scores[kWithoutLight].lit_l1 = MeanDifference(texture, input);
+    const std::pair<Method, const DrawnLight*> lights[] = {{kMeanLight, &mean_},
+                                                           {kOurs, &object.light}};
+    for (const auto& [method, light] : lights) {
+      view.light = *light;
+      TILEGRAD_ASSIGN(const auto lit, pictures_.Draw(object.mesh, view, Appearance::kLit));
+      scores[method].lit_l1 = MeanDifference(lit, input);
+      if (lighting_ == Lighting::kNone) continue;
+      scores[method].light_angle = AngleBetween(DirectionOf(*light, lighting_),
+                                                DirectionOf(truth.views[v].light, lighting_));
+    }
+    return scores;
+  }
+
+ private:
+  Lighting lighting_;
+  DrawnLight mean_;
+  ObjectPictures pictures_;
+};
+
+class Evaluator {
+ public:
+  Evaluator(const TexturedImageConfig& config, const TaskEvaluation& job, const Dataset& dataset,
+            const Workers& workers)
+      : config_(config),
+        job_(job),
+        dataset_(dataset),
+        workers_(workers),
+        model_(dynamic_cast<TexturedModel&>(job.predictor.model())) {
+    for (int w = 0; w < workers.count(); ++w)
+      judges_.push_back(std::make_unique<Judge>(config, dataset.info().image_size));
+  }
+
+  Result<Evaluation> Run(const ProgressSink& progress, const StopFlag& stop) {
+    const std::vector<int> models = dataset_.Select(job_.split);
+    out_.split = SplitName(job_.split);
+    if (models.empty()) {
+      return InvalidArgument("{}: no models in its {} split", dataset_.folder().string(),
+                             out_.split);
+    }
+    TILEGRAD_ASSIGN(HeldOutViews views,
+                    HeldOutViews::Load({config_, dataset_, models}, workers_, progress, stop));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      if (stop) return Cancelled("stopped while evaluating; nothing was written");
+      if (progress) progress({"evaluating", i, models.size(), ""});
+      TILEGRAD_TRY(Score(views, i));
+    }
+    Fill(models);
+    return std::move(out_);
+  }
+
+ private:
+  Result<std::vector<PredictedObject>> Predict(const std::vector<float>& pictures) {
+    const std::vector<std::uint8_t> images = ToBytes(pictures);
+    const std::size_t bytes = images.size() / static_cast<std::size_t>(job_.views_per_model);
+    std::vector<PredictedObject> objects;
+    for (std::size_t at = 0; at < images.size(); at += Model::kImagesAtOnce * bytes) {
+      const std::size_t size = std::min(Model::kImagesAtOnce * bytes, images.size() - at);
+      TILEGRAD_ASSIGN(auto some, model_.PredictObjects(std::span(images).subspan(at, size)));
+      for (PredictedObject& object : some) objects.push_back(std::move(object));
+    }
+    return objects;
+  }
+
+  Status Score(HeldOutViews& held_out, std::size_t i) {
+    TILEGRAD_ASSIGN(const HeldOutViews::Views truth, held_out.Draw(i, job_.views_per_model));
+    TILEGRAD_ASSIGN(const ModelData data, dataset_.Load(held_out.models()[i]));
+    TILEGRAD_ASSIGN(const Shape shape, TruthShape(data));
+    TILEGRAD_ASSIGN(const auto objects, Predict(truth.lit));
+    std::vector<MethodScores> scores(objects.size());
+    std::vector<Status> failures(objects.size());
+    std::vector<std::uint8_t> unusable(objects.size());
+    workers_.For(objects.size(), [&](std::size_t v, std::size_t worker) {
+      auto compared = judges_[worker]->Compare({objects[v], truth, v});
+      failures[v] = compared.status();
+      if (compared.ok()) scores[v] = *compared;
+      const auto seed = static_cast<std::uint64_t>(held_out.models()[i]) * 4096 + v;
+      const auto predicted = ShapeOf(objects[v].mesh, seed);
+      unusable[v] = !predicted.ok();
+      AddShape(predicted.ok() ? Compare(*predicted, shape) : WorstScore(shape), &scores[v]);
+    });
+    for (const Status& failure : failures) TILEGRAD_TRY(failure);
+    for (const auto flag : unusable) out_.unusable_predictions += flag;
+    for (int m = 0; m < kMethods; ++m) {
+      std::vector<train::Score> of_method;
+      for (const MethodScores& view : scores) of_method.push_back(view[m]);
+      scores_[m].push_back(MeanScore(of_method));
+    }
+    return {};
+  }
+
+  static void AddShape(const train::Score& shape, MethodScores* scores) {
+    for (train::Score& score : *scores) {
+      score.iou = shape.iou, score.f_score = shape.f_score;
+      score.carved_iou = shape.carved_iou;
+    }
+  }
+
+  void Fill(const std::vector<int>& models) {
+    const ClassMeans means(dataset_, models);
+    out_.classes = means.classes(), out_.class_models = means.class_models();
+    const bool lit = LightingOf(config_.light) != Lighting::kNone;
+    for (int m = lit ? kWithoutLight : kOurs; m < kMethods; ++m)
+      out_.rows.push_back(means.Row(kNames[m], scores_[m]));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const ModelInfo& info = dataset_.models()[static_cast<std::size_t>(models[i])];
+      out_.models.push_back({dataset_.info().classes[static_cast<std::size_t>(info.class_index)],
+                             info.id, scores_[kOurs][i]});
+    }
+    out_.predictor = job_.predictor.description();
+    out_.dataset_source = dataset_.info().source;
+    out_.views_per_model = job_.views_per_model;
+  }
+
+  const TexturedImageConfig& config_;
+  const TaskEvaluation& job_;
+  const Dataset& dataset_;
+  const Workers& workers_;
+  TexturedModel& model_;
+  std::vector<std::unique_ptr<Judge>> judges_;  // by worker
+  std::array<std::vector<train::Score>, kMethods> scores_;
+  Evaluation out_;
+};
+
+}  // namespace
+
+Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
+                                    const Workers& workers, const ProgressSink& progress,
+                                    const StopFlag& stop) {
+  if (job.change)
+    return InvalidArgument(
+        "predictions of textures and lights are scored as they are: no --refine");
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job.data));
+  if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
+  TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
+  return Evaluator(config, job, dataset, workers).Run(progress, stop);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Table 2 of the paper, beside baselines that know no light.
+#pragma once
+
+#include "train/tasks/task.h"
+#include "train/tasks/textured_image/config.h"
+
+namespace tilegrad::train {
+
+// On held-out models in views_per_model views each (HeldOutViews), whose cameras the renders of
+// predictions share. Of each view: texture L1, angle of the light, texture + light L1 as
+// evaluation.h says (means over the whole image), and the scores of the shape. Rows, all with the
+// predicted shape and texture: "without light", "mean light" (of training), "tilegrad". Without a
+// light model only the last. Errors: as CheckHeldOut and LoadTexturedMeshes; a job with a change.
+Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const TaskEvaluation& job,
+                                    const Workers& workers, const ProgressSink& progress,
+                                    const StopFlag& stop);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/held_out_views.h"
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::uint64_t kHeldOutSeed = 0x68656c64;
+
+std::vector<float> Copied(std::span<const float> pictures) {
+  return {pictures.begin(), pictures.end()};
+}
+
+}  // namespace
+
+Result<HeldOutViews> HeldOutViews::Load(const Request& request, const Workers& workers,
+                                        const ProgressSink& progress, const StopFlag& stop) {
+  HeldOutViews out;
+  out.models_ = request.models;
+  TILEGRAD_ASSIGN(auto meshes,
+                  LoadTexturedMeshes(request.dataset, request.models, request.config.stream.meshes,
+                                     workers, progress, stop));
+  out.meshes_ = std::make_unique<std::vector<TexturedMesh>>(std::move(meshes));
+  const DatasetInfo& info = request.dataset.info();
+  out.stream_.emplace(
+      TexturedStream::Job{WithoutChanges(request.config.stream), request.config.light, info.camera,
+                          info.image_size, kHeldOutSeed},
+      *out.meshes_, workers);
+  return out;
+}
+
+Result<HeldOutViews::Views> HeldOutViews::Draw(std::size_t i, int count) {
+  Views out;
+  out.views.resize(static_cast<std::size_t>(count));
+  const auto position = static_cast<std::uint64_t>(models_[i]);
+  TILEGRAD_ASSIGN(auto pictures, stream_->Render(static_cast<int>(i), position, 0, out.views));
+  out.lit = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kTexture));
+  out.texture = Copied(pictures);
+  TILEGRAD_ASSIGN(pictures, stream_->Again(0, Appearance::kLight));
+  out.light = Copied(pictures);
+  return out;
+}
+
+}  // namespace tilegrad::train

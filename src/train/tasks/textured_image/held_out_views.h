@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Views of the models that scores and reports are about: from fixed seeds, undeformed, each under a
+// light of its own.
+#pragma once
+
+#include <optional>
+
+#include "train/data/dataset.h"
+#include "train/tasks/textured_image/config.h"
+
+namespace tilegrad::train {
+
+class HeldOutViews {
+ public:
+  struct Request {
+    const TexturedImageConfig& config;
+    const Dataset& dataset;
+    std::vector<int> models;  // indices into the dataset's
+  };
+  static Result<HeldOutViews> Load(const Request& request, const Workers& workers,
+                                   const ProgressSink& progress, const StopFlag& stop);
+
+  // Pictures of `count` views of models[i], [count][4][size][size] in [0, 1] each. The same model
+  // of one dataset is always seen in the same views.
+  struct Views {
+    std::vector<TexturedView> views;
+    std::vector<float> lit, texture, light;
+    std::span<const float> Of(const std::vector<float>& pictures, std::size_t view) const {
+      const std::size_t size = pictures.size() / views.size();
+      return std::span(pictures).subspan(view * size, size);
+    }
+  };
+  Result<Views> Draw(std::size_t i, int count);
+  const std::vector<int>& models() const { return models_; }
+  const Mesh& mesh(std::size_t i) const { return (*meshes_)[i].mesh(); }
+
+ private:
+  HeldOutViews() = default;
+  std::vector<int> models_;
+  std::unique_ptr<std::vector<TexturedMesh>> meshes_;  // the stream refers to them
+  std::optional<TexturedStream> stream_;
+};
+
+}  // namespace tilegrad::train

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/model.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "render/picture/composite.h"
+#include "train/models/mesh_network.h"
+#include "train/tasks/textured_image/step.h"
+
+namespace tilegrad::train {
+namespace {
+
+Mesh MeshOf(const TextureNetwork& network, std::span<const float> p,
+            std::span<const float> texels) {
+  Mesh mesh;
+  mesh.faces = network.template_mesh().faces;
+  for (std::size_t i = 0; i < p.size(); i += 3)
+    mesh.positions.emplace_back(p[i], p[i + 1], p[i + 2]);
+  mesh.corner_uvs = network.corner_uvs();
+  const int side = network.texture_size();
+  ImageU8 image(side, side, 3);
+  std::ranges::transform(texels, image.pixels.begin(), ToByte);
+  mesh.textures = {{"predicted", std::move(image)}};
+  mesh.materials = {{.name = "predicted",
+                     .base_color = glm::vec4(1),
+                     .base_color_texture = 0,
+                     .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
+  return mesh;
+}
+
+class LoadedModel : public TexturedModel {
+ public:
+  LoadedModel(nn::Context& context, const TexturedImageConfig& config, int image_size)
+      : context_(context),
+        image_size_(image_size),
+        network_(context, config.network, LightHeadOf(config.light), image_size, /*seed=*/0),
+        template_(network_.template_mesh()) {}
+
+  // Of the moving average of the weights, where the run kept one.
+  Status Load(const std::vector<nn::NamedTensor>& state) {
+    TILEGRAD_TRY(context_.TakeStatus());
+    const std::vector<nn::NamedTensor> averages = nn::Averages(state);
+    TILEGRAD_TRY(nn::LoadState(network_.module(), averages.empty() ? state : averages));
+    parameters_ = nn::CountParameters(network_.module());
+    return NormalizeToBox(template_, kPredictionHalfExtent);
+  }
+
+  std::int64_t parameters() const override { return parameters_; }
+  const Mesh& template_mesh() const override { return template_; }
+  Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) override;
+  Result<std::vector<PredictedObject>> PredictObjects(
+      std::span<const std::uint8_t> images) override {
+    return train::PredictObjects(context_, network_, images, image_size_);
+  }
+
+ private:
+  nn::Context& context_;
+  int image_size_;
+  TextureNetwork network_;
+  Mesh template_;
+  std::int64_t parameters_ = 0;
+};
+
+Status LoadedModel::Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes) {
+  TILEGRAD_ASSIGN(std::vector<PredictedObject> objects, PredictObjects(images));
+  for (PredictedObject& object : objects) meshes->push_back(std::move(object.mesh));
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,
+                                                    std::span<const std::uint8_t> images,
+                                                    int image_size) {
+  const nn::NoGrad off(context);
+  const std::size_t bytes = 4 * static_cast<std::size_t>(image_size * image_size);
+  const std::size_t count = images.size() / bytes;
+  nn::Tensor input = context.Empty({static_cast<std::int64_t>(count), 4, image_size, image_size});
+  std::ranges::transform(images, input.data<float>(),
+                         [](std::uint8_t b) { return static_cast<float>(b) / 255; });
+  const PredictedObjects predicted =
+      network.Forward(nn::Constant(context, std::move(input)), nn::Mode::kEval);
+  TILEGRAD_TRY(context.TakeStatus());
+  const auto row = [&](const nn::Var& rows, std::size_t i) {
+    const std::span<const float> all = rows.value().span<float>();
+    return all.subspan(i * (all.size() / count), all.size() / count);
+  };
+  std::vector<PredictedObject> objects;
+  for (std::size_t i = 0; i < count; ++i) {
+    Mesh mesh = MeshOf(network, row(predicted.positions, i), row(predicted.textures, i));
+    if (const Status valid = Validate(mesh); !valid.ok())
+      return InternalError("the prediction is broken: {}", valid.message());
+    objects.push_back({std::move(mesh), LightOf(predicted, i)});
+  }
+  return objects;
+}
+
+Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
+                                                 const TexturedImageConfig& config,
+                                                 const Checkpoint& checkpoint) {
+  TILEGRAD_TRY(CheckConfig(config));
+  const std::int64_t size = checkpoint.info.image_size;
+  TILEGRAD_TRY(CheckImageSize(config.network, static_cast<int>(size)));
+  auto model = std::make_unique<LoadedModel>(context, config, static_cast<int>(size));
+  TILEGRAD_TRY(model->Load(checkpoint.tensors));
+  return std::unique_ptr<Model>(std::move(model));
+}
+
+}  // namespace tilegrad::train

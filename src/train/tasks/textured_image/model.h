@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The trained network of sections 5.2 and 5.3, ready to predict.
+#pragma once
+
+#include "train/tasks/task.h"
+#include "train/tasks/textured_image/config.h"
+
+namespace tilegrad::train {
+
+// What one image gives.
+struct PredictedObject {
+  Mesh mesh;         // with its texture, unlit colours; smooth normals are the renderer's
+  DrawnLight light;  // in the axes of the image's camera
+};
+
+// Of a network with the weights of now; batch statistics are those of training. images:
+// [N][4][size] [size] planar RGBA bytes, RGB over black.
+Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,
+                                                    std::span<const std::uint8_t> images,
+                                                    int image_size);
+
+class TexturedModel : public Model {
+ public:
+  // As Predict, with the light.
+  virtual Result<std::vector<PredictedObject>> PredictObjects(
+      std::span<const std::uint8_t> images) = 0;
+};
+
+// Meshes have the template's faces, positions with largest half-extent 0.45, centred, and one
+// texture. Batch statistics are those of training. Errors say what does not fit in the checkpoint.
+Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
+                                                 const TexturedImageConfig& config,
+                                                 const Checkpoint& checkpoint);
+
+}  // namespace tilegrad::train

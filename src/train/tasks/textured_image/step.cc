@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/losses/color_l1.h"
+#include "train/losses/iou.h"
+#include "train/losses/laplacian.h"
+#include "train/losses/smoothness.h"
+#include "train/ops/light_frames.h"
+
+namespace tilegrad::train {
+namespace {
+
+// A row for each image: that of the input whose view it shows.
+nn::Tensor InputsOfImages(nn::Context& context, std::size_t images) {
+  std::vector<std::int32_t> inputs(images);
+  for (std::size_t n = 0; n < images; ++n) inputs[n] = static_cast<std::int32_t>(InputOfImage(n));
+  return context.Indices(inputs);
+}
+
+template <std::size_t N>
+void ReadRow(const nn::Var& rows, std::size_t row, std::array<float, N>* out) {
+  if (!rows.valid()) return;
+  nn::WithFloatType(rows.dtype(), [&]<class T>(T) {
+    const std::span<const T> numbers = rows.value().template span<T>().subspan(row * N, N);
+    std::ranges::transform(numbers, out->begin(), [](T x) { return static_cast<float>(x); });
+  });
+}
+
+}  // namespace
+
+double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  double dot = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    dot += double{a[i]} * b[i], aa += double{a[i]} * a[i], bb += double{b[i]} * b[i];
+  }
+  return std::acos(std::clamp(dot / std::sqrt(aa * bb), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+DrawnLight LightOf(const PredictedObjects& objects, std::size_t row) {
+  DrawnLight light;
+  ReadRow(objects.directions, row, &light.direction);
+  ReadRow(objects.sh, row, &light.sh);
+  std::array<float, 1> shininess = {light.shininess};
+  ReadRow(objects.shininess, row, &shininess);
+  light.shininess = shininess[0];
+  return light;
+}
+
+std::array<float, 3> DirectionOf(const DrawnLight& light, Lighting lighting) {
+  return lighting == Lighting::kSphericalHarmonics ? DirectionOf(light.sh) : light.direction;
+}
+
+TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& config, int image_size)
+    : context_(context),
+      config_(config),
+      image_size_(image_size),
+      network_(context, config.network, LightHeadOf(config.light), image_size,
+               static_cast<std::uint64_t>(config.schedule.seed)),
+      adam_(context, nn::Parameters(network_.module()),
+            {.learning_rate = config.optimizer.learning_rate,
+             .beta1 = config.optimizer.beta1,
+             .beta2 = config.optimizer.beta2}),
+      average_(context,
+               config.optimizer.average > 0 ? nn::State(network_.module())
+                                            : std::vector<nn::NamedTensor>(),
+               config.optimizer.average),
+      topology_(
+          BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
+      renderer_(context.workers()) {}
+
+RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
+  const auto& faces = network_.template_mesh().faces;
+  RenderJob job{.faces = {faces[0].data(), 3 * faces.size()}, .cameras = batch.cameras, .views = 2};
+  job.options.width = job.options.height = image_size_;
+  job.options.delta = 1 / SharpnessAt(config_.render, config_.schedule.steps, step);
+  job.options.max_alpha_error = config_.render.max_alpha_error;
+  job.uvs = network_.uvs();
+  job.wrap = Wrap::kRepeatClamp;
+  job.shading = {.lighting = LightingOf(config_.light), .clamp = true};
+  job.surface = SurfaceUnder(config_.light);
+  return job;
+}
+
+TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step) {
+  TexturedRenders out;
+  out.objects = network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
+  SceneVars scenes{.positions = out.objects.positions, .textures = out.objects.textures};
+  const nn::Tensor inputs = InputsOfImages(context_, batch.cameras.size());
+  const auto seen = [&](const nn::Var& light) { return nn::Gather(light, 0, inputs); };
+  if (out.objects.directions.valid())
+    scenes.light_directions = DirectionsToWorld(seen(out.objects.directions), batch.cameras);
+  if (out.objects.shininess.valid()) scenes.shininess = seen(out.objects.shininess);
+  if (out.objects.sh.valid()) scenes.sh = HarmonicsToWorld(seen(out.objects.sh), batch.cameras);
+  out.images = RenderScenes(renderer_, scenes, JobAt(batch, step));
+  return out;
+}
+
+nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
+                           TexturedLossValues* values) {
+  const PredictedObjects& objects = renders.objects;
+  const nn::Var iou = IouLoss(renders.images.alpha, batch.truth_alpha);
+  const nn::Var color = ColorL1Loss(renders.images.colors, batch.truth_colors);
+  const nn::Var smoothness =
+      SmoothnessLoss(objects.positions, network_.template_mesh().faces, topology_);
+  const nn::Var laplacian = LaplacianLoss(objects.movement, topology_);
+  const LossConfig& w = config_.loss;
+  const nn::Var total =
+      w.iou * iou + w.color * color + w.smoothness * smoothness + w.laplacian * laplacian;
+  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item(), 0};
+  const Lighting lighting = LightingOf(config_.light);
+  if (lighting == Lighting::kNone || !objects.positions.valid()) return total;
+  for (std::size_t m = 0; m < batch.views.size(); ++m) {
+    values->light_angle += AngleBetween(DirectionOf(LightOf(objects, m), lighting),
+                                        DirectionOf(batch.views[m].light, lighting)) /
+                           static_cast<double>(batch.views.size());
+  }
+  return total;
+}
+
+void TexturedStep::AddTerms(const TexturedLossValues& v, std::vector<LossTerm>* terms) const {
+  const LossConfig& w = config_.loss;
+  terms->push_back({"iou", w.iou, v.iou});
+  terms->push_back({"color", w.color, v.color});
+  terms->push_back({"smoothness", w.smoothness, v.smoothness});
+  terms->push_back({"laplacian", w.laplacian, v.laplacian});
+  if (LightingOf(config_.light) != Lighting::kNone)
+    terms->push_back({"light_angle", 0, v.light_angle});
+}
+
+Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch& batch,
+                                                            std::int64_t step,
+                                                            TexturedLossValues* values) {
+  const nn::Var loss = Loss(Draw(batch, step), batch, values);
+  auto gradients = nn::Gradients(loss, adam_.parameters());
+  TILEGRAD_TRY(context_.TakeStatus());
+  if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
+  StepValues described;
+  AddTerms(*values, &described.terms);
+  return InternalError(
+      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
+      values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
+}
+
+Status TexturedStep::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
+  adam_.options().learning_rate = LearningRateAt(config_.optimizer, config_.schedule.steps, step);
+  TILEGRAD_TRY(adam_.Step(gradients));
+  average_.Update();
+  return {};
+}
+
+}  // namespace tilegrad::train

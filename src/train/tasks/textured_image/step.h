@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// One training step of section 5.2: images -> network -> renderer under the predicted lights ->
+// losses of equation 14 -> gradients -> Adam.
+//
+// One picture does not tell a dark paint from a dim light. So each object is seen in two views
+// under two lights, and the texture that is predicted from one has to explain the other under the
+// light that is predicted from that other one.
+#pragma once
+
+#include "nn/moving_average.h"
+#include "nn/optim.h"
+#include "scene/topology.h"
+#include "train/ops/render_op.h"
+#include "train/run/step_values.h"
+#include "train/tasks/textured_image/batch.h"
+#include "train/tasks/textured_image/config.h"
+
+namespace tilegrad::train {
+
+struct TexturedLossValues {
+  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
+  double light_angle = 0;  // degrees, mean over the inputs; watched, not learned from
+};
+
+// What losses, and critics of the images, look at.
+struct TexturedRenders {
+  PredictedObjects objects;  // of the inputs
+  RenderedImages images;     // of TexturedBatch::cameras
+};
+
+class TexturedStep {
+ public:
+  TexturedStep(nn::Context& context, const TexturedImageConfig& config, int image_size);
+
+  // Network and renderer, on the tape. One at a time: images are of one renderer.
+  TexturedRenders Draw(const TexturedBatch& batch, std::int64_t step);
+  // Equation 14 with textures and light; `values` gets the parts.
+  nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch,
+               TexturedLossValues* values);
+  // Gradients of the loss. A loss or gradient that is not finite is an error.
+  Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, std::int64_t step,
+                                                TexturedLossValues* values);
+  // One step of Adam, and of the moving average of the weights if there is one.
+  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
+  void AddTerms(const TexturedLossValues& values, std::vector<LossTerm>* terms) const;
+
+  TextureNetwork& network() { return network_; }
+  nn::Adam& adam() { return adam_; }
+  nn::MovingAverage& average() { return average_; }
+
+ private:
+  RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
+
+  nn::Context& context_;
+  TexturedImageConfig config_;
+  int image_size_;
+  TextureNetwork network_;
+  nn::Adam adam_;
+  nn::MovingAverage average_;
+  Topology topology_;
+  SceneRenderer renderer_;
+};
+
+// Degrees between two directions, neither 0.
+double AngleBetween(const std::array<float, 3>& a, const std::array<float, 3>& b);
+// Row `row` of the lights of a batch of predictions.
+DrawnLight LightOf(const PredictedObjects& objects, std::size_t row);
+// Of harmonics that of their linear part, else the light's own.
+std::array<float, 3> DirectionOf(const DrawnLight& light, Lighting lighting);
+
+}  // namespace tilegrad::train

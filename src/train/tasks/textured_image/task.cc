@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/task.h"
+
+#include "base/error.h"
+#include "io/image_file.h"
+#include "nn/nn.h"
+#include "train/data/build/truth_mesh.h"
+#include "train/data/trained_models.h"
+#include "train/predictor.h"
+#include "train/tasks/held_out.h"
+#include "train/tasks/textured_image/evaluate.h"
+#include "train/tasks/textured_image/held_out_views.h"
+#include "train/tasks/textured_image/pictures.h"
+#include "train/tasks/textured_image/step.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSampleRows = 8, kRowViews = 3;
+
+class TexturedImageTask : public Task {
+ public:
+  ConfigFields Fields() override { return FieldsOf(&config_); }
+  std::vector<TermLabel> Labels() const override {
+    return {{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
+            {"color", "Colour loss (mean L1)"},
+            {"smoothness", "Smoothness (normals of neighbouring faces)"},
+            {"laplacian", "Laplacian of the movement"},
+            {"light_angle", "Angle of the light (degrees, not learned from)"}};
+  }
+
+  Status Start(const TaskStart& start) override;
+  int image_size() const override { return dataset_->info().image_size; }
+  RunHeader Header() override;
+  Status Begin(const Path& run, std::int64_t first_step) override;
+
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
+    return step_->Update(gradients, at.step);
+  }
+
+  std::vector<nn::NamedTensor> State() override;
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+  Result<ImageU8> SamplePicture(std::int64_t steps) override;
+
+  Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                           const Checkpoint& checkpoint) override {
+    return LoadTexturedModel(context, config_, checkpoint);
+  }
+  Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                              const ProgressSink& progress, const StopFlag& stop) override {
+    return EvaluateTextured(config_, job, workers, progress, stop);
+  }
+  Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
+                        const ProgressSink& progress, const StopFlag& stop) override;
+
+ private:
+  ObjectPictures Pictures(int size) const {
+    return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
+  }
+
+  TexturedImageConfig config_;
+  nn::Context* context_ = nullptr;
+  std::optional<Dataset> dataset_;
+  std::vector<TexturedMesh> meshes_;  // of training, to which the stream refers
+  std::optional<TexturedStream> stream_;
+  std::optional<HeldOutViews> held_out_;  // for sample pictures
+  std::optional<BatchOrder> order_;
+  std::optional<TexturedStep> step_;
+};
+
+Status TexturedImageTask::Start(const TaskStart& start) {
+  context_ = &start.context;
+  config_.schedule = start.schedule;
+  TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(CheckImageSize(config_.network, image_size()));
+  const std::vector<int> train = dataset_->Select(Split::kTrain);
+  if (train.empty())
+    return InvalidArgument("{}: no training models in it", dataset_->folder().string());
+  const Workers& workers = start.context.workers();
+  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes, workers,
+                                              start.progress, start.stop));
+  TILEGRAD_ASSIGN(HeldOutViews held_out,
+                  HeldOutViews::Load({config_, *dataset_, ChooseModels(*dataset_, kSampleRows)},
+                                     workers, start.progress, start.stop));
+  held_out_.emplace(std::move(held_out));
+  const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
+  stream_.emplace(TexturedStream::Job{config_.stream, config_.light, dataset_->info().camera,
+                                      image_size(), seed},
+                  meshes_, workers);
+  order_.emplace(static_cast<int>(train.size()), 1, seed);
+  step_.emplace(*context_, config_, image_size());
+  return {};
+}
+
+Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
+                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  if (first_step > 0) return {};
+  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
+  return io::SavePng(run / "stream.png", sheet);
+}
+
+RunHeader TexturedImageTask::Header() {
+  RunHeader header;
+  header.dataset_source = dataset_->info().source;
+  header.training_models = static_cast<int>(meshes_.size());
+  header.parameters = nn::CountParameters(step_->network().module());
+  return header;
+}
+
+Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateIndex& at,
+                                                                 StepValues* out) {
+  const auto models = order_->Batch(at.step, static_cast<int>(config_.batch), 1);
+  TILEGRAD_ASSIGN(const TexturedBatch batch,
+                  RenderBatch(*context_, *stream_, image_size(), models, at.step));
+  TexturedLossValues values;
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at.step, &values));
+  out->loss = values.total;
+  step_->AddTerms(values, &out->terms);
+  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
+  out->also.emplace_back("epoch", seen / static_cast<double>(meshes_.size()));
+  out->also.emplace_back("learning_rate",
+                         LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
+  out->images = kViewsOfObject * config_.batch;
+  out->stream_seconds = stream_->TakeSeconds();
+  return gradients;
+}
+
+std::vector<nn::NamedTensor> TexturedImageTask::State() {
+  std::vector<nn::NamedTensor> tensors = nn::State(step_->network().module());
+  for (const auto& more : {step_->adam().State(), step_->average().State()})
+    tensors.insert(tensors.end(), more.begin(), more.end());
+  return tensors;
+}
+
+Status TexturedImageTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
+  TILEGRAD_TRY(nn::LoadState(step_->network().module(), state));
+  TILEGRAD_TRY(step_->adam().LoadState(state));
+  TILEGRAD_TRY(step_->average().LoadState(state));
+  if (step_->adam().steps() == steps) return {};
+  return InvalidArgument("the optimizer has taken {} steps, the run {}", step_->adam().steps(),
+                         steps);
+}
+
+Result<ImageU8> TexturedImageTask::SamplePicture(std::int64_t /*steps*/) {
+  std::vector<std::vector<ShownPicture>> rows;
+  ObjectPictures pictures = Pictures(image_size());
+  for (std::size_t i = 0; i < held_out_->models().size(); ++i) {
+    TILEGRAD_ASSIGN(const HeldOutViews::Views truth, held_out_->Draw(i, kRowViews));
+    TILEGRAD_ASSIGN(
+        const auto objects,
+        PredictObjects(*context_, step_->network(), ToBytes(truth.Of(truth.lit, 0)), image_size()));
+    TILEGRAD_ASSIGN(auto row, PicturesOf({"", objects[0], truth}, pictures, image_size()));
+    rows.push_back(std::move(row));
+  }
+  return rows.empty() ? ImageU8() : SheetOf(rows, image_size());
+}
+
+Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const Workers& workers,
+                                         const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
+  TILEGRAD_TRY(CheckHeldOut(request.run, dataset));
+  TILEGRAD_TRY(request.predictor.CheckImageSize(dataset));
+  Showcase out = AboutDataset(dataset, request.header);
+  out.purpose = "to predict shape, texture and light of an object from one image";
+  out.data += " It saw only pictures that were rendered while it trained, no 3D data.";
+  out.note =
+      "The network saw none of these in training. From the first picture alone it predicted a "
+      "mesh, its texture map and the light. The models are spread over the classes in the "
+      "dataset's "
+      "order, not picked by hand.";
+  auto& model = dynamic_cast<TexturedModel&>(request.predictor.model());
+  const int size = dataset.info().image_size;
+  ObjectPictures pictures = Pictures(size);
+  TILEGRAD_ASSIGN(HeldOutViews held_out,
+                  HeldOutViews::Load({config_, dataset, ChooseModels(dataset, request.examples)},
+                                     workers, progress, stop));
+  for (std::size_t i = 0; i < held_out.models().size(); ++i) {
+    if (stop) return Cancelled("stopped while predicting; nothing was written");
+    Example example = NamedExample(dataset, held_out.models()[i]);
+    TILEGRAD_ASSIGN(const HeldOutViews::Views truth, held_out.Draw(i, kRowViews));
+    TILEGRAD_ASSIGN(auto objects, model.PredictObjects(ToBytes(truth.Of(truth.lit, 0))));
+    TILEGRAD_ASSIGN(example.pictures,
+                    PicturesOf({example.name, objects[0], truth}, pictures, size));
+    example.prediction = MakeTruthMesh(objects[0].mesh, objects[0].mesh.faces.size());
+    TILEGRAD_ASSIGN(ModelData data, dataset.Load(held_out.models()[i]));
+    example.truth = std::move(data.mesh);
+    out.examples.push_back(std::move(example));
+    if (progress) progress({"predicting", out.examples.size(), held_out.models().size(), ""});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Task> MakeTexturedImageTask() { return std::make_unique<TexturedImageTask>(); }
+
+}  // namespace tilegrad::train

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// Textured pictures, each view under a light of its own: lights are drawn from where they should,
+// the same position gives the same bits, and what is shown is lit texture.
+#include "train/data/stream/textured_stream.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "io/glb_writer.h"
+#include "scene/shapes.h"
+#include "scene/sphere_uv.h"
+#include "support/temp_folder.h"
+#include "train/data/build/build.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSize = 24;
+
+// A ball whose upper half is red and whose lower one is blue.
+Mesh Ball() {
+  Mesh ball = Icosphere(2, 0.45f);
+  ball.corner_uvs = SphereUvs(ball);
+  ImageU8 image(32, 16, 3);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 32; ++x) image.at(x, y)[y < 8 ? 0 : 2] = 200;
+  }
+  ball.textures = {{"halves", image}};
+  ball.materials = {{.name = "", .base_color = glm::vec4(1), .base_color_texture = 0}};
+  return ball;
+}
+
+std::vector<TexturedMesh> Balls(int count) {
+  std::vector<TexturedMesh> out;
+  for (int i = 0; i < count; ++i) out.emplace_back(Ball());
+  return out;
+}
+
+// Nothing is left to chance but azimuth and light.
+TexturedStream::Job Still(const std::string& model) {
+  TexturedStream::Job job;
+  job.config = WithoutChanges({});
+  StreamConfig& draw = job.config.draw;
+  draw.roll = draw.jitter = 0;
+  draw.elevation_low = draw.elevation_high = 27;
+  draw.fov_low = draw.fov_high = Lens{}.fov_y;
+  job.light.model = model;
+  job.camera.lens.width = job.camera.lens.height = job.size = kSize;
+  return job;
+}
+
+TEST(LightDraw, ComesFromTheCapAroundTheCamera) {
+  for (const double spread : {20.0, 90.0}) {
+    LightConfig config;
+    config.spread = spread;
+    Rng rng(1);
+    double lowest = 1, side = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const DrawnLight light = DrawLight(config, rng);
+      const auto& d = light.direction;
+      EXPECT_NEAR(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-6);
+      lowest = std::min(lowest, static_cast<double>(d[2]));
+      side += d[0];
+      EXPECT_GE(light.shininess, 2.999f);
+      EXPECT_LE(light.shininess, 30.001f);
+    }
+    const double edge = std::cos(spread * 3.14159265358979 / 180);
+    EXPECT_GE(lowest, edge - 1e-6);
+    EXPECT_LT(lowest, edge + 0.01);
+    EXPECT_LT(std::abs(side / 2000), 0.05);
+  }
+  const DrawnLight mean = MeanLight({});
+  EXPECT_GT(mean.direction[2], 0.999f);
+}
+
+// Harmonics are brightest where their light comes from, and that is what is read back.
+TEST(LightDraw, HarmonicsHaveTheDirection) {
+  Rng rng(2);
+  for (int k = 0; k < 100; ++k) {
+    const DrawnLight light = DrawLight({}, rng);
+    const std::array<float, 3> read = DirectionOf(light.sh);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(read[i], light.direction[i], 1e-5);
+  }
+}
+
+TEST(LightDraw, WordsAndRangesAreChecked) {
+  LightConfig config;
+  config.model = "neon";
+  EXPECT_NE(CheckConfig(config).message().find("light.model is \"neon\""), std::string::npos);
+  config = {};
+  config.shininess_low = 40;
+  EXPECT_FALSE(CheckConfig(config).ok());
+  EXPECT_TRUE(CheckConfig(LightConfig()).ok());
+}
+
+TEST(TexturedStream, SamePositionSameBits) {
+  const Workers workers(2);
+  const std::vector<TexturedMesh> meshes = Balls(2);
+  TexturedStream::Job job = Still("phong");
+  job.config = {};
+  TexturedStream one(job, meshes, workers), other(job, meshes, workers);
+  std::vector<TexturedView> views(2), again(2);
+  const auto a = one.Render(1, 77, 0, views);
+  ASSERT_TRUE(a.ok()) << a.status().message();
+  ASSERT_TRUE(other.Render(0, 5, 1, again).ok());  // what came before does not matter
+  const auto b = other.Render(1, 77, 1, again);
+  ASSERT_TRUE(b.ok());
+  ASSERT_EQ(a->size(), 2u * 4 * kSize * kSize);
+  EXPECT_EQ(std::memcmp(a->data(), b->data(), a->size_bytes()), 0);
+  EXPECT_NE(views[0].light.direction, views[1].light.direction);
+  const std::vector<float> before(a->begin(), a->end());
+  const auto next = one.Render(1, 78, 0, views);
+  EXPECT_NE(std::memcmp(before.data(), next->data(), next->size_bytes()), 0);
+}
+
+// Of Lambert light without ambient, a picture is texture times light in every pixel that one face
+// covers wholly; at supersampled edges it is a mean of products.
+TEST(TexturedStream, LitIsTextureTimesLight) {
+  const Workers workers(1);
+  const std::vector<TexturedMesh> meshes = Balls(1);
+  TexturedStream::Job job = Still("lambert");
+  job.config.draw.samples = 1;
+  TexturedStream stream(job, meshes, workers);
+  std::vector<TexturedView> views(1);
+  const auto copy = [](const auto& pictures) {
+    return std::vector<float>(pictures->begin(), pictures->end());
+  };
+  const auto lit = copy(stream.Render(0, 3, 0, views));
+  const auto texture = copy(stream.Again(0, Appearance::kTexture));
+  const auto light = copy(stream.Again(0, Appearance::kLight));
+  double brightest = 0, reddest = 0;
+  for (std::size_t i = 0; i < 3 * kSize * kSize; ++i) {
+    EXPECT_NEAR(lit[i], texture[i] * light[i], 1e-6);
+    brightest = std::max(brightest, static_cast<double>(light[i]));
+    reddest = std::max(reddest, static_cast<double>(texture[i]));
+  }
+  EXPECT_GT(brightest, 0.8);
+  EXPECT_NEAR(reddest, 200.0 / 255, 0.01);
+}
+
+TEST(ShrunkImage, IsTheMeanOfWhatIsBehind) {
+  ImageU8 image(4, 2, 1);
+  image.pixels = {10, 20, 1, 1, 30, 40, 1, 3};
+  const ImageU8 small = ShrunkImage(image, 2);
+  ASSERT_EQ(small.width, 2);
+  ASSERT_EQ(small.height, 1);
+  EXPECT_EQ(small.pixels, (std::vector<std::uint8_t>{25, 2}));
+  EXPECT_EQ(ShrunkImage(image, 4).pixels, image.pixels);
+}
+
+class TexturedMeshes : public TempFolderTest {
+ protected:
+  TexturedMeshes() {
+    std::filesystem::create_directories(folder_ / "models" / "ball");
+    for (const char* name : {"a", "b"})
+      EXPECT_TRUE(
+          io::SaveGlb(folder_ / "models" / "ball" / (std::string(name) + ".glb"), Ball()).ok());
+    auto source = FolderSource(folder_ / "models");
+    EXPECT_TRUE(source.ok()) << source.status().message();
+    BuildOptions options;
+    options.image_size = 16, options.views = 2;
+    const auto built = BuildDataset(**source, options, folder_ / "data", workers_, nullptr, stop_);
+    EXPECT_TRUE(built.ok()) << built.status().message();
+  }
+  Result<std::vector<TexturedMesh>> Load(const std::string& folder) {
+    TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder_ / "data"));
+    return LoadTexturedMeshes(dataset, {1, 0}, {folder, 8}, workers_, nullptr, stop_);
+  }
+
+  Workers workers_{2};
+  StopFlag stop_ = false;
+};
+
+TEST_F(TexturedMeshes, AreReadAgainFromTheirFolder) {
+  const auto meshes = Load((folder_ / "models").string());
+  ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+  ASSERT_EQ(meshes->size(), 2u);
+  ASSERT_EQ((*meshes)[0].scene().textures.size(), 1u);
+  EXPECT_EQ((*meshes)[0].scene().textures[0].width, 8);
+  EXPECT_GT((*meshes)[0].bytes(), 1000u);
+}
+
+TEST_F(TexturedMeshes, WithoutAFolderColoursOfTheDatasetStandIn) {
+  const auto meshes = Load("");
+  ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+  EXPECT_TRUE((*meshes)[0].scene().textures.empty());
+  EXPECT_FALSE((*meshes)[0].scene().colors.values.empty());
+}
+
+TEST_F(TexturedMeshes, ChangesSinceThenAreErrors) {
+  Mesh box = Box(glm::vec3(0), glm::vec3(1));
+  ASSERT_TRUE(io::SaveGlb(folder_ / "models" / "ball" / "a.glb", box).ok());
+  ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "has another shape");
+  std::filesystem::remove(folder_ / "models" / "ball" / "a.glb");
+  ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "is not there any more");
+}
+
+}  // namespace
+}  // namespace tilegrad::train

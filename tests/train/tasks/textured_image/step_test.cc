@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gradient of the whole chain of sections 5.2 and 5.3: loss <- renderer under the predicted
+// lights <- texture, light and shape <- network weights.
+#include "train/tasks/textured_image/step.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "nn/nn.h"
+#include "scene/shapes.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSize = 16;
+
+TexturedImageConfig TinyConfig(const std::string& light) {
+  TexturedImageConfig config;
+  config.network = {.base = 2,
+                    .most = 4,
+                    .levels = 2,
+                    .enlarge = 1,
+                    .latent = 6,
+                    .hidden = 5,
+                    .light_width = 4,
+                    .template_level = 1,
+                    .smoothing = 1,
+                    .output_deviation = 0.3};
+  config.render = {.sharpness = 60, .sharpness_start = 60, .max_alpha_error = 0};
+  config.light.model = light;
+  config.batch = 2;
+  return config;
+}
+
+std::vector<TexturedMesh> Balls() {
+  Mesh ball = Icosphere(2, 0.45f);
+  for (const glm::vec3& p : ball.positions) ball.colors.emplace_back(glm::vec3(0.5f) + p, 1.0f);
+  std::vector<TexturedMesh> out;
+  out.emplace_back(ball);
+  return out;
+}
+
+struct SmallProblem {
+  TexturedImageConfig config;
+  Workers workers{1};
+  nn::Context context{workers, nn::DType::kF64};
+  std::vector<TexturedMesh> meshes = Balls();
+  TexturedStream stream;
+  TexturedStep step;
+  TexturedBatch batch;
+
+  explicit SmallProblem(const TexturedImageConfig& c)
+      : config(c), stream(JobOf(c), meshes, workers), step(context, c, kSize) {
+    auto drawn = RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 3);
+    EXPECT_TRUE(drawn.ok()) << drawn.status().message();
+    batch = std::move(*drawn);
+  }
+  static TexturedStream::Job JobOf(const TexturedImageConfig& config) {
+    TexturedStream::Job job{config.stream, config.light, {}, kSize, 1};
+    job.camera.lens.width = job.camera.lens.height = kSize;
+    return job;
+  }
+  double LossNow() {
+    TexturedLossValues values;
+    step.Loss(step.Draw(batch, 0), batch, &values);
+    return values.total;
+  }
+};
+
+// Central differences in float64, as in chain_test.cc: the chain is piecewise smooth, h = 1e-6,
+// gradients of single weights are 1e-4 and more. One entry in fifty may sit on a kink.
+void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config) {
+  SmallProblem p(config);
+  TexturedLossValues values;
+  const TexturedRenders renders = p.step.Draw(p.batch, 0);
+  const auto gradients =
+      nn::Grad(p.step.Loss(renders, p.batch, &values), p.step.adam().parameters());
+  ASSERT_TRUE(p.context.status().ok()) << p.context.status().message();
+  EXPECT_LT(values.iou, 0.95);  // silhouettes overlap
+  std::vector<nn::NamedVar> parameters = nn::Parameters(p.step.network().module());
+  Rng rng(9);
+  int checked = 0, off = 0, moving = 0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    nn::Tensor& weight = parameters[i].value.value();
+    for (int k = 0; k < 3; ++k, ++checked) {
+      const std::size_t at = rng.Below(weight.elements());
+      const double h = 1e-6, before = weight.data<double>()[at];
+      weight.data<double>()[at] = before + h;
+      const double up = p.LossNow();
+      weight.data<double>()[at] = before - h;
+      const double down = p.LossNow();
+      weight.data<double>()[at] = before;
+      const double want = (up - down) / (2 * h), got = gradients[i].value().data<double>()[at];
+      moving += std::abs(got) > 1e-9 ? 1 : 0;
+      if (std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8) continue;
+      ++off;
+      EXPECT_NEAR(got, want, 0.05 * std::abs(want) + 1e-3)
+          << parameters[i].name << "[" << at << "]";
+    }
+  }
+  EXPECT_LE(off, checked / 50) << "of " << checked;
+  EXPECT_GT(2 * moving, checked);
+}
+
+TEST(TexturedStep, GradientsUnderLambertLight) {
+  ExpectGradientsAgreeWithDifferences(TinyConfig("lambert"));
+}
+
+TEST(TexturedStep, GradientsUnderPhongLight) {
+  TexturedImageConfig config = TinyConfig("phong");
+  config.light.ambient = 0.2;
+  ExpectGradientsAgreeWithDifferences(config);
+}
+
+TEST(TexturedStep, GradientsUnderHarmonics) {
+  TexturedImageConfig config = TinyConfig("harmonics");
+  config.network.symmetric_texture = true;
+  ExpectGradientsAgreeWithDifferences(config);
+}
+
+TEST(TexturedStep, GradientsWithoutLightAndSkips) {
+  TexturedImageConfig config = TinyConfig("none");
+  config.network.skips = false, config.network.wrap = false, config.network.symmetric = false;
+  ExpectGradientsAgreeWithDifferences(config);
+}
+
+// Image 2m shows the view of input m, image 2m + 1 the other view of its object.
+TEST(TexturedBatch, EachMeshIsHeldToBothViews) {
+  SmallProblem p(TinyConfig("lambert"));
+  ASSERT_EQ(p.batch.cameras.size(), 8u);
+  const std::size_t want[] = {0, 1, 1, 0, 2, 3, 3, 2};
+  const std::size_t pixels = kSize * kSize;
+  for (std::size_t n = 0; n < 8; ++n) {
+    const std::size_t m = want[n];
+    EXPECT_EQ(InputOfImage(n), m);
+    EXPECT_EQ(p.batch.cameras[n].rotation[0], p.batch.views[m].camera.rotation[0]);
+    for (std::size_t i = 0; i < 3 * pixels; ++i) {
+      ASSERT_EQ(p.batch.truth_colors.data<double>()[3 * pixels * n + i],
+                p.batch.input.data<double>()[4 * pixels * m + i]);
+    }
+    for (std::size_t i = 0; i < pixels; ++i) {
+      ASSERT_EQ(p.batch.truth_alpha.data<double>()[pixels * n + i],
+                p.batch.input.data<double>()[4 * pixels * m + 3 * pixels + i]);
+    }
+  }
+}
+
+// A texture that is its own mirror image at x = 0: u and 1/2 - u.
+TEST(TextureNetwork, SymmetricTexturesAre) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  TextureNetworkConfig config = TinyConfig("none").network;
+  config.symmetric_texture = true;
+  TextureNetwork network(context, config, {.lighting = Lighting::kNone}, kSize, 1);
+  const PredictedObjects out = network.Forward(
+      nn::Constant(context, context.Full({1, 4, kSize, kSize}, 0.5)), nn::Mode::kEval);
+  ASSERT_EQ(out.textures.shape(), (nn::Shape{1, 32, 32, 3}));
+  const auto texel = [&](std::size_t row, std::size_t column) {
+    return out.textures.value().data<float>()[(32 * row + column % 32) * 3];
+  };
+  double spread = 0;
+  for (std::size_t row = 0; row < 32; ++row) {
+    for (std::size_t i = 0; i < 32; ++i) {
+      EXPECT_EQ(texel(row, i), texel(row, 47 - i));
+      spread = std::max(spread, std::abs(static_cast<double>(texel(row, i) - texel(row, 3))));
+    }
+  }
+  EXPECT_GT(spread, 1e-3);
+  EXPECT_FALSE(out.directions.valid());
+}
+
+TEST(TextureNetwork, ImageSizesAreChecked) {
+  EXPECT_TRUE(CheckImageSize({.levels = 4}, 64).ok());
+  EXPECT_NE(CheckImageSize({.levels = 6}, 64).message().find("smaller network.levels"),
+            std::string::npos);
+  EXPECT_FALSE(CheckImageSize({.levels = 4}, 72).ok());
+}
+
+}  // namespace
+}  // namespace tilegrad::train
