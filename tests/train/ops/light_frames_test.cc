@@ -9,6 +9,7 @@
 #include "base/rng.h"
 #include "nn/nn.h"
 #include "scene/camera.h"
+#include "scene/light_frame.h"
 #include "shade/spherical_harmonics_ref.h"
 
 namespace tilegrad::train {

@@ -9,11 +9,11 @@
 #include "render/picture/composite.h"
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
+#include "scene/light_frame.h"
 #include "train/data/stream/average_samples.h"
 #include "train/data/stream/object_draw.h"
 #include "train/data/stream/recolor.h"
 #include "train/data/stream/view_draw.h"
-#include "train/ops/light_frames.h"
 
 namespace tilegrad::train {
 namespace {

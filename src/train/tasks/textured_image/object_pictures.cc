@@ -8,8 +8,8 @@
 #include "render/picture/mesh_scene.h"
 #include "render/renderer.h"
 #include "scene/camera_conventions.h"
+#include "scene/light_frame.h"
 #include "train/data/stream/average_samples.h"
-#include "train/ops/light_frames.h"
 
 namespace tilegrad::train {
 namespace {
