@@ -91,6 +91,20 @@ TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
   EXPECT_FALSE(evaluation->rows[0].mean.light_angle);
 }
 
+// The files of configs/ name keys that there are, and sizes that go with their images.
+TEST(TexturedConfigs, AreRead) {
+  for (const auto& [file, size] : {std::pair("texture_quick", 64), {"texture_paper", 256}}) {
+    const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
+    const auto config = ParseConfig(ReadText(path).value(), path.string());
+    ASSERT_TRUE(config.ok()) << config.status().message();
+    EXPECT_EQ(config->name, file);
+    auto copy = ParseConfig(WriteConfig(*config), "its own text");
+    ASSERT_TRUE(copy.ok()) << copy.status().message();
+    const std::int64_t levels = ValueOf<std::int64_t>(*copy, "network.levels");
+    EXPECT_TRUE(CheckImageSize({.levels = levels}, size).ok());
+  }
+}
+
 TEST_F(TexturedTask, WordsThatAreNotKnownAreErrors) {
   TrainJob job;
   job.config = ParseConfig(std::string(kTinyTextured) + "[light]\nmodel = \"neon\"\n", "t").value();
