@@ -43,7 +43,7 @@ Result<std::vector<float>> ObjectPictures::Draw(const Mesh& mesh, const Textured
   scene.camera = ScaledCamera(view.camera, static_cast<float>(samples_));
   const Lighting lighting =
       appearance == Appearance::kTexture ? Lighting::kNone : LightingOf(light_);
-  scene.shading = {.lighting = lighting, .clamp = true};
+  scene.shading = {.lighting = lighting, .two_sided = true, .clamp = true};
   Light light;
   light.direction = DirectionToWorld(view.light.direction, view.camera);
   const std::array<float, 9> sh = HarmonicsToWorld(view.light.sh, view.camera);

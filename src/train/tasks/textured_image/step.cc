@@ -82,7 +82,7 @@ RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) con
   job.options.max_alpha_error = config_.render.max_alpha_error;
   job.uvs = network_.uvs();
   job.wrap = Wrap::kRepeatClamp;
-  job.shading = {.lighting = LightingOf(config_.light), .clamp = true};
+  job.shading = {.lighting = LightingOf(config_.light), .two_sided = true, .clamp = true};
   job.surface = SurfaceUnder(config_.light);
   return job;
 }
