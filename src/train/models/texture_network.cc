@@ -64,6 +64,11 @@ nn::Var Unit(const nn::Var& v) {
   return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
 }
 
+// The third number to above 0, smoothly; 1 stays about where it is.
+nn::Var Facing(const nn::Var& raw) {
+  return nn::Concat({nn::Slice(raw, 1, 0, 2), nn::Softplus(nn::Slice(raw, 1, 2, 3))}, 1);
+}
+
 }  // namespace
 
 Status CheckImageSize(const TextureNetworkConfig& config, int image_size) {
@@ -163,7 +168,7 @@ void TextureNetwork::Light(const nn::Var& latent, nn::Mode mode, PredictedObject
     out->sh = raw;
     return;
   }
-  out->directions = Unit(nn::Slice(raw, 1, 0, 3));
+  out->directions = Unit(light_.facing ? Facing(raw) : nn::Slice(raw, 1, 0, 3));
   if (light_.lighting != Lighting::kPhong) return;
   const double low = std::log(light_.shininess_low), high = std::log(light_.shininess_high);
   const nn::Var share = nn::Sigmoid(nn::Reshape(nn::Slice(raw, 1, 3, 4), {raw.shape()[0]}));

@@ -36,6 +36,9 @@ struct TextureNetworkConfig {
 struct LightHeadShape {
   Lighting lighting = Lighting::kLambert;
   double shininess_low = 3, shininess_high = 30;
+  // Directions are of the hemisphere that faces the camera. From behind, an object is dark, and a
+  // light that has got there would find no gradient that leads back.
+  bool facing = true;
 };
 
 // What the network says of a batch of B images. Light is in the axes of each image's camera.

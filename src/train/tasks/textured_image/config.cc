@@ -33,7 +33,7 @@ ConfigFields FieldsOf(TextureNetworkConfig* c) {
 Status CheckConfig(const TexturedImageConfig& config) { return CheckConfig(config.light); }
 
 LightHeadShape LightHeadOf(const LightConfig& config) {
-  return {LightingOf(config), config.shininess_low, config.shininess_high};
+  return {LightingOf(config), config.shininess_low, config.shininess_high, config.spread <= 90};
 }
 
 ConfigFields FieldsOf(TexturedImageConfig* c) {

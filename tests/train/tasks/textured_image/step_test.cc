@@ -170,6 +170,21 @@ TEST(TextureNetwork, SymmetricTexturesAre) {
   EXPECT_FALSE(out.directions.valid());
 }
 
+// Whatever the head says, unless lights may come from behind.
+TEST(TextureNetwork, LightsFaceTheCamera) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  for (const bool facing : {true, false}) {
+    TextureNetwork network(context, TinyConfig("lambert").network, {.facing = facing}, kSize, 1);
+    for (nn::NamedVar& p : nn::Parameters(network.module())) {
+      if (p.name == "light.out.bias") p.value.value().data<float>()[2] = -3;
+    }
+    const PredictedObjects out = network.Forward(
+        nn::Constant(context, context.Full({1, 4, kSize, kSize}, 0.5)), nn::Mode::kEval);
+    EXPECT_EQ(out.directions.value().data<float>()[2] > 0, facing);
+  }
+}
+
 TEST(TextureNetwork, ImageSizesAreChecked) {
   EXPECT_TRUE(CheckImageSize({.levels = 4}, 64).ok());
   EXPECT_NE(CheckImageSize({.levels = 6}, 64).message().find("smaller network.levels"),
