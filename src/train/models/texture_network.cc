@@ -12,10 +12,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kResidualPairs = 3;  // of two layers: the six of section 5.2
-// Of offsets: Adam's first steps move each output by about its rate times the width of the layer
-// before, and a sphere that is flattened too fast turns inside out.
-constexpr double kOffsetScale = 0.1;
+constexpr int kResidualPairs = 3;    // of two layers: the six of section 5.2
 constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
 
 nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
@@ -180,7 +177,7 @@ PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const nn::StepVector<nn::Var> levels = all_.unet->Encode(images, mode);
   const nn::Var latent = all_.latent.Forward(levels.back(), mode);
   if (!latent.valid()) return out;
-  out.movement = offsets_.Apply(kOffsetScale * all_.shape.Forward(latent, mode));
+  out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
   out.positions = NormalizeMeshes(out.movement + nn::Constant(context_, template_positions_),
                                   kPredictionHalfExtent);
   out.textures = Texture(latent, levels, mode);
