@@ -4,6 +4,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/match_file.h"
 #include "cli/predict_pictures.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
@@ -63,6 +64,8 @@ std::vector<std::pair<std::string, std::string>> NameResults(
   return named;
 }
 
+Path RecordOf(Path match) { return match.replace_extension(".json"); }
+
 Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& file, Mesh* mesh,
               const Workers& workers) {
   TILEGRAD_ASSIGN(const auto planar,
@@ -71,6 +74,7 @@ Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& 
                   train::RefineMesh(*mesh, train::TargetsOfPlanar(planar, train::kRefineSize),
                                     {.steps = options.refine}, workers));
   TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, workers));
+  TILEGRAD_TRY(WriteMatch(refined, RecordOf(file)));
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
         100 * refined.before.silhouette_iou, 100 * refined.after.silhouette_iou,
         refined.before.color_l1, refined.after.color_l1);
@@ -99,7 +103,7 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
   const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
              animation = out / (stem + "_turntable.webp"), match = out / (stem + "_match.png");
   std::vector<Path> written = {glb, turntable, animation};
-  if (options.refine > 0) written.push_back(match);
+  if (options.refine > 0) written.insert(written.end(), {match, RecordOf(match)});
   TILEGRAD_TRY(guard.CheckAll(written));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
   const train::Predictor& predictor = network.predictor;
@@ -164,7 +168,8 @@ void AddPredict(CLI::App& app, Action* action) {
   command
       ->add_option("--refine", options->refine,
                    "steps of gradient descent that move the prediction onto the image, and write "
-                   "NAME_match.png: image, prediction, refined; 0: the network alone")
+                   "NAME_match.png (image, prediction, refined) and NAME_match.json (how well they "
+                   "agree); 0: the network alone")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   AddWorkersOption(command, &options->workers);

@@ -75,8 +75,8 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   for (const std::string name :
        {"run/eval.md", "run/eval.json", "run/report.html", "run/summary.png",
         "out/view_predicted.glb", "out/view_turntable.png", "out/view_turntable.webp",
-        "out/view_match.png", "out/view.png", "out/drawn.png", "out/drawn_depth.png",
-        "out/cameras.json", "out/colmap/images.txt"}) {
+        "out/view_match.png", "out/view_match.json", "out/view.png", "out/drawn.png",
+        "out/drawn_depth.png", "out/cameras.json", "out/colmap/images.txt"}) {
     left.push_back(Write(name + gone, "half"));
   }
   const Path kept[] = {Write("run/eval.md" + own, "of a process that runs"),

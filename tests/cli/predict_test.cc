@@ -2,6 +2,10 @@
 // What predict says of its inputs, and the animation that it writes.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "fit/refine.h"
 #include "io/image_file.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
@@ -71,6 +75,23 @@ TEST_F(Predict, TheAnimationIsTheSameAgain) {
   ExpectDone("predict --refine 0 --threads 3 --run " + In("r") + " --out " + In("out") + " " +
              In("known.png"));
   EXPECT_EQ(ReadFile(folder_ / "out/known_turntable.webp").value(), first);
+}
+
+TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
+  const std::string in = In("known.png"), to = " --run " + In("r") + " --out " + In("out") + " ";
+  ExpectDone("predict --refine 40" + to + in);
+  const Bytes text = ReadFile(folder_ / "out/known_match.json").value();
+  const auto record = nlohmann::json::parse(text.begin(), text.end());
+  EXPECT_LT(record["silhouette_iou"][0], record["silhouette_iou"][1]);
+  EXPECT_GT(record["silhouette_iou"][0], 0);
+  EXPECT_LE(record["silhouette_iou"][1], 1);
+  EXPECT_GT(record["color_l1"][0], record["color_l1"][1]);
+  EXPECT_EQ(record["camera"]["size"], train::kRefineSize);
+  // A rotation: its rows have length 1.
+  const auto rows = record["camera"]["rotation"].get<std::vector<double>>();
+  for (int i = 0; i < 9; i += 3)
+    EXPECT_NEAR(std::hypot(rows[i], rows[i + 1], rows[i + 2]), 1, 1e-4) << i;
+  EXPECT_GT(record["camera"]["fx"], 0);
 }
 
 }  // namespace
