@@ -40,7 +40,7 @@ THUMBNAIL = 16
 IOU_WANTED, COLOR_WANTED = 0.90, 0.06
 CELL, COLUMNS = 128, 2  # of the sheet: pixels, objects side by side
 TURNED = (7, 3)  # of the turntable's eight views: 45 degrees, and the opposite side
-PAPER = 224
+GAP = 4  # between cells of predict's pictures
 
 
 @dataclasses.dataclass
@@ -179,17 +179,14 @@ class Retrieval:
         return self._data.truth(int(gaps.min(axis=1).argmin())).occupancy
 
 
-def cells_of(picture: pathlib.Path, count: int) -> list[Any]:
-    """The cells of a picture that shows `count` in a row, over paper, in the sheet's size."""
-    image = load_image(picture)
-    size = image.shape[1] // count
-    step = size // CELL
-    if image.shape[2] == 4:
-        alpha = image[..., 3:] / 255
-        image = image[..., :3] * alpha + PAPER * (1 - alpha)
-    small = image.reshape(image.shape[0] // step, step, image.shape[1] // step, step, 3).mean(axis=(1, 3))
-    return [small[y:y + CELL, x:x + CELL] for y in range(0, small.shape[0], CELL)
-            for x in range(0, small.shape[1], CELL)]
+def cells_of(picture: pathlib.Path, columns: int) -> list[Any]:
+    """The square cells of a picture that predict has tiled, row by row, in the sheet's size."""
+    image = load_image(picture)[..., :3]
+    side = (image.shape[1] - GAP * (columns - 1)) // columns
+    corners = [(y, x) for y in range(0, image.shape[0], side + GAP) for x in range(0, image.shape[1], side + GAP)]
+    step = side // CELL
+    return [image[y:y + side, x:x + side].reshape(CELL, step, CELL, step, 3).mean(axis=(1, 3))
+            for y, x in corners]
 
 
 def draw_sheet(objects: list[Object], predicted: pathlib.Path, file: pathlib.Path) -> None:
@@ -199,7 +196,7 @@ def draw_sheet(objects: list[Object], predicted: pathlib.Path, file: pathlib.Pat
         around = cells_of(predicted / f"{one.name}_turntable.png", 4)
         rows.append(np.concatenate([seen, match, *(around[i] for i in TURNED)], axis=1))
     length = -(-len(rows) // COLUMNS)
-    rows += [np.full_like(rows[0], PAPER)] * (COLUMNS * length - len(rows))
+    rows += [np.full_like(rows[0], 255)] * (COLUMNS * length - len(rows))
     gap = np.full((length * CELL, CELL // 8, 3), 255.0)
     columns: list[Any] = []
     for i in range(COLUMNS):
@@ -253,6 +250,7 @@ def main() -> int:
     parser.add_argument("--run", required=True, help="run folder")
     parser.add_argument("--out", required=True, help="folder to fill")
     parser.add_argument("--data", help="dataset that the run was trained on; without it no 3D IoU")
+    parser.add_argument("--keep", action="store_true", help="predictions that are there: only score and draw")
     parser.add_argument("--program", default="build/release/src/cli/tilegrad", help="tilegrad")
     options = parser.parse_args()
     out = pathlib.Path(options.out)
@@ -262,7 +260,8 @@ def main() -> int:
             raise SystemExit(f"cutouts: {place} is not there: apt-get install tuxpaint-stamps-default ufoai-data")
     make_inputs(options, objects, out / "inputs")
     pictures = [out / "inputs" / f"{one.name}.png" for one in objects]
-    tilegrad(options, "predict", "--run", options.run, "--out", out / "predicted", *pictures)
+    if not options.keep:
+        tilegrad(options, "predict", "--run", options.run, "--out", out / "predicted", *pictures)
     found = outcomes(options, objects, out)
     draw_sheet(objects, out / "predicted", out / "sheet.png")
     text = table(objects, found)

@@ -13,7 +13,7 @@
 
 namespace tilegrad::train {
 
-inline constexpr int kRefineSteps = 300;  // a few seconds on two cores
+inline constexpr int kRefineSteps = 800;  // a few seconds on two cores
 inline constexpr int kRefineSize = 128;   // pixels a side of the picture that predict refines on:
                                           // an edge of the divided template is about three
 
