@@ -28,7 +28,7 @@ constexpr std::size_t kCoarse = 2000;     // vertices below which faces are divi
 constexpr int kSearchSide = 64;           // pixels a side of pictures that cameras are searched in
 constexpr std::size_t kCandidates = 3;    // cameras that are tried by descent
 constexpr double kApart = 30;             // degrees between them: two steps of the search
-constexpr double kPilotShare = 0.2;       // of the steps, for each candidate
+constexpr double kPilotShare = 0.1;       // of the steps, for each candidate
 constexpr double kSymmetricShare = 0.75;  // of the steps that see the mirror image, too
 // Softness of outlines (equation 5), squared NDC, then pixels. Soft alpha lies outside of faces, so
 // a mesh that fits it is too small by about its width: it ends narrow, and before the last steps.
@@ -154,8 +154,9 @@ Result<PictureMatch> Match(const FitScene& scene, const TargetImages& picture,
 
 double Apart(double a, double b) { return std::abs(std::remainder(a - b, 360.0)); }
 
-// The best cameras that see the mesh from different sides.
-std::vector<Camera> Candidates(const std::vector<FoundCamera>& found) {
+// The best cameras that see the mesh from different sides; of pixels of a picture `factor` times
+// as large.
+std::vector<FoundCamera> Candidates(const std::vector<FoundCamera>& found, int factor) {
   std::vector<FoundCamera> kept;
   for (const FoundCamera& camera : found) {
     if (kept.size() == kCandidates) break;
@@ -163,21 +164,24 @@ std::vector<Camera> Candidates(const std::vector<FoundCamera>& found) {
             kept, [&](const FoundCamera& k) { return Apart(k.azimuth, camera.azimuth) > kApart; }))
       kept.push_back(camera);
   }
-  std::vector<Camera> out;
-  for (const FoundCamera& camera : kept) out.push_back(camera.camera);
-  return out;
+  for (FoundCamera& k : kept) k.camera = ScaledCamera(k.camera, static_cast<float>(factor));
+  return kept;
 }
 
-// The descent that has come furthest after its share of the steps.
-Result<Descent> BestStart(const FitScene& scene, const std::vector<Camera>& cameras,
+// The best descent after its share of the steps. What a camera cost before counts as well: a sphere
+// can be bent onto any outline, also onto that of a car that faces the other way.
+Result<Descent> BestStart(const FitScene& scene, const std::vector<FoundCamera>& cameras,
                           const TargetImages& picture, const RefineOptions& options,
                           const Workers& workers) {
   std::optional<Descent> best;
+  double best_cost = 0;
   const int pilot = static_cast<int>(kPilotShare * options.steps);
-  for (const Camera& camera : cameras) {
-    TILEGRAD_ASSIGN(Descent descent, Descent::Make(scene, camera, picture, workers));
+  for (const FoundCamera& start : cameras) {
+    TILEGRAD_ASSIGN(Descent descent, Descent::Make(scene, start.camera, picture, workers));
     TILEGRAD_TRY(descent.Run(0, pilot, options.steps));
-    if (!best || descent.loss() < best->loss()) best.emplace(std::move(descent));
+    const double cost = descent.loss() + kSilhouetteWeight * start.cost();
+    if (best && cost >= best_cost) continue;
+    best.emplace(std::move(descent)), best_cost = cost;
   }
   TILEGRAD_TRY(best->Run(pilot, options.steps, options.steps));
   return std::move(*best);
@@ -205,11 +209,10 @@ Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& pictu
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(coarse ? Subdivided(prediction) : prediction));
   const auto [small, factor] = AtMost(picture, kSearchSide);
   TILEGRAD_ASSIGN(const auto found, FindCameras(scene, small, options.camera, workers));
-  std::vector<Camera> cameras = Candidates(found);
-  for (Camera& camera : cameras) camera = ScaledCamera(camera, static_cast<float>(factor));
-  scene.cameras = {cameras[0]};
+  const std::vector<FoundCamera> cameras = Candidates(found, factor);
+  scene.cameras = {cameras[0].camera};
   RefinedMesh out;
-  out.camera_before = cameras[0];
+  out.camera_before = cameras[0].camera;
   TILEGRAD_ASSIGN(out.before, Match(scene, picture, workers));
   if (options.steps > 0) {
     TILEGRAD_ASSIGN(const Descent best, BestStart(scene, cameras, picture, options, workers));
