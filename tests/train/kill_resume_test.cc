@@ -223,7 +223,7 @@ TEST_F(KillResume, APipeThatNobodyReadsIsNoReasonToEnd) {
 TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
   Write("tiny.toml", std::string(kTinyConfig));  // without the picture of what is streamed
   const pid_t child = Start("run", 1, [] {
-    const rlimit limit = {8192, 8192};  // more than a configuration, less than a checkpoint
+    const rlimit limit = {65536, 65536};  // more than the thumbnails, less than a checkpoint
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   });
   const int status = Wait(child);

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "nn/networks/blocks.h"
 #include "nn/nn.h"
-#include "train/ops/sample_colors.h"
+#include "nn/ops/sample_colors.h"
 
 namespace tilegrad::train {
 namespace {
@@ -109,7 +109,7 @@ nn::Var MeshNetwork::Colors(const nn::Var& code, const nn::Var& images, nn::Mode
   const std::int64_t batch = code.shape()[0], vertices = template_.vertices();
   const nn::Var raw = all_.color.Forward(code, mode);
   if (!config_.picture_colors) return nn::Reshape(raw, {batch, vertices, 3});
-  return SampleColors(images.value(), nn::Reshape(raw, {batch, vertices, 4}));
+  return nn::SampleColors(images.value(), nn::Reshape(raw, {batch, vertices, 4}));
 }
 
 PredictedMeshes MeshNetwork::Forward(const nn::Var& images, nn::Mode mode) {

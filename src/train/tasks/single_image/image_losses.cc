@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "nn/nn.h"
-
 #include "train/losses/color_l1.h"
 #include "train/losses/iou.h"
 #include "train/losses/laplacian.h"

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "io/image_file.h"
+#include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
 #include "train/data/few_models.h"
 #include "train/data/trained_models.h"

@@ -6,7 +6,7 @@
 
 #include "nn/tape.h"
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 
 // images: [B, 4, size, size], RGB over black and alpha; size is a multiple of 16. They are averaged
 // over 16 x 16 cells, and take no gradient.
@@ -14,6 +14,6 @@ namespace tilegrad::train {
 // of the bell around (x, y) is (1/8)^2 + e^-n, and without bound below n = -20; g: the colour is 1
 // + g times the mean under the bell, of what the object covers. Any finite number is allowed.
 // Returns [B, V, 3], linear as the picture, not clamped. Its gradient has no gradient.
-nn::Var SampleColors(const nn::Tensor& images, const nn::Var& flow);
+Var SampleColors(const Tensor& images, const Var& flow);
 
-}  // namespace tilegrad::train
+}  // namespace tilegrad::nn

@@ -1,23 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/ops/sample_colors.h"
+#include "nn/ops/sample_colors.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "train/ops/sample_colors.cc"
-#include <hwy/foreach_target.h>
-//
-#include "train/ops/sample_colors-inl.h"
-
-#if HWY_ONCE
 #include <memory>
 #include <vector>
 
+#include "nn/kernels/sample_colors.h"
 #include "nn/nn.h"
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 namespace {
-
-HWY_EXPORT(SampleForward);
-HWY_EXPORT(SampleBackward);
 
 // The mean of each cell of one picture.
 template <class T>
@@ -35,23 +26,10 @@ void FillCells(std::span<const T> image, std::size_t size, ColorCells<T>* cells)
   }
 }
 
-void ForwardOne(const ColorCells<float>& cells, const ColorSpans<float>& s) {
-  HWY_DYNAMIC_DISPATCH(SampleForward)(cells, s);
-}
-void ForwardOne(const ColorCells<double>& cells, const ColorSpans<double>& s) {
-  SampleForwardRef(cells, s);
-}
-void BackwardOne(const ColorCells<float>& cells, const ColorSpans<float>& s) {
-  HWY_DYNAMIC_DISPATCH(SampleBackward)(cells, s);
-}
-void BackwardOne(const ColorCells<double>& cells, const ColorSpans<double>& s) {
-  SampleBackwardRef(cells, s);
-}
-
 template <class T>
 class Sampling {
  public:
-  Sampling(const nn::Tensor& images, nn::Tensor flow)
+  Sampling(const Tensor& images, Tensor flow)
       : flow_(std::move(flow)),
         batch_(static_cast<std::size_t>(images.shape()[0])),
         cells_(batch_) {
@@ -69,7 +47,7 @@ class Sampling {
     const T* flow = flow_.span<T>().data();
     workers.For(batch_, [&](std::size_t b, std::size_t) {
       const std::size_t v = b * vertices();
-      ForwardOne(cells_[b], {vertices(), flow + 4 * v, colors + 3 * v, nullptr, nullptr});
+      SampleColors(cells_[b], {vertices(), flow + 4 * v, colors + 3 * v, nullptr, nullptr});
     });
   }
   // by_color: [B][V][3]; by_flow: [B][V][4].
@@ -77,41 +55,40 @@ class Sampling {
     const T* flow = flow_.span<T>().data();
     workers.For(batch_, [&](std::size_t b, std::size_t) {
       const std::size_t v = b * vertices();
-      BackwardOne(cells_[b],
-                  {vertices(), flow + 4 * v, nullptr, by_color + 3 * v, by_flow + 4 * v});
+      SampleColorsBackward(cells_[b],
+                           {vertices(), flow + 4 * v, nullptr, by_color + 3 * v, by_flow + 4 * v});
     });
   }
 
  private:
-  nn::Tensor flow_;
+  Tensor flow_;
   std::size_t batch_;
   std::vector<ColorCells<T>> cells_;
 };
 
 template <class T>
-nn::ExternalOp MakeOp(nn::Context& context, const nn::Tensor& images, const nn::Var& flow) {
-  const nn::Shape& shape = flow.shape();
+ExternalOp MakeOp(Context& context, const Tensor& images, const Var& flow) {
+  const Shape& shape = flow.shape();
   const auto sampling = std::make_shared<Sampling<T>>(images, flow.value());
-  nn::Tensor colors = context.Empty({shape[0], shape[1], 3}, flow.dtype());
+  Tensor colors = context.Empty({shape[0], shape[1], 3}, flow.dtype());
   sampling->Forward(context.workers(), colors.span<T>().data());
-  const auto backward = [&context, sampling, shape](std::span<const nn::Tensor> d_outputs) {
-    nn::Tensor by_flow = context.Empty(shape, d_outputs[0].dtype());
+  const auto backward = [&context, sampling, shape](std::span<const Tensor> d_outputs) {
+    Tensor by_flow = context.Empty(shape, d_outputs[0].dtype());
     sampling->Backward(context.workers(), d_outputs[0].template span<T>().data(),
                        by_flow.span<T>().data());
-    return std::vector<nn::Tensor>{by_flow};
+    return std::vector<Tensor>{by_flow};
   };
   return {"sampled colours", {flow}, {colors}, backward};
 }
 
 }  // namespace
 
-nn::Var SampleColors(const nn::Tensor& images, const nn::Var& flow) {
+Var SampleColors(const Tensor& images, const Var& flow) {
   if (!flow.valid()) return flow;
-  nn::Context& context = flow.context();
-  return nn::WithFloatType(flow.dtype(), [&]<class T>(T) {
-    return nn::External(context, MakeOp<T>(context, images, flow))[0];
+  Context& context = flow.context();
+  return WithFloatType(flow.dtype(), [&]<class T>(T) {
+    return External(context, MakeOp<T>(context, images, flow))[0];
   });
 }
 
-}  // namespace tilegrad::train
-#endif  // HWY_ONCE
+}  // namespace tilegrad::nn

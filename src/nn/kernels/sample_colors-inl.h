@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vector body of sample_colors.h: lanes run over vertices, the numbers of a cell are the same in
 // all.
-#if defined(TILEGRAD_TRAIN_SAMPLE_COLORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TILEGRAD_TRAIN_SAMPLE_COLORS_INL_H_
-#undef TILEGRAD_TRAIN_SAMPLE_COLORS_INL_H_
+#if defined(TILEGRAD_NN_SAMPLE_COLORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
+#undef TILEGRAD_NN_SAMPLE_COLORS_INL_H_
 #else
-#define TILEGRAD_TRAIN_SAMPLE_COLORS_INL_H_
+#define TILEGRAD_NN_SAMPLE_COLORS_INL_H_
 #endif
 
 #include <hwy/contrib/math/math-inl.h>
@@ -13,10 +13,10 @@
 
 #include <algorithm>
 
-#include "train/ops/sample_colors_ref.h"
+#include "nn/kernels/sample_colors_ref.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tilegrad::train::HWY_NAMESPACE {
+namespace tilegrad::nn::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Tag = hn::ScalableTag<float>;
@@ -180,7 +180,7 @@ void SampleBackward(const ColorCells<float>& cells, const ColorSpans<float>& s) 
   });
 }
 
-}  // namespace tilegrad::train::HWY_NAMESPACE
+}  // namespace tilegrad::nn::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif  // per-target include guard

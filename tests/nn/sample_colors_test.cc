@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Colours looked up in the picture: values by hand, complex-step derivatives, extremes, bits.
-#include "train/ops/sample_colors.h"
+#include "nn/ops/sample_colors.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 
 #include "base/rng.h"
 #include "base/simd_target.h"
+#include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
-#include "train/ops/sample_colors_ref.h"
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 namespace {
 
 using Complex = std::complex<double>;
@@ -98,23 +98,22 @@ constexpr std::int64_t kPictures = 3;
 
 // The operation on noise of 32 x 32 pixels, of which the first picture has nothing; the gradient is
 // that of the sum of squares.
-OpResult RunOp(nn::DType type, const std::vector<double>& flows, int worker_count) {
+OpResult RunOp(DType type, const std::vector<double>& flows, int worker_count) {
   const Workers workers(worker_count);
-  nn::Context context(workers, type);
+  Context context(workers, type);
   constexpr std::int64_t size = 32, numbers = 4 * size * size;
   Rng rng(6, 0);
   std::vector<double> pictures(kPictures * numbers);
   for (std::size_t i = numbers; i < pictures.size(); ++i) pictures[i] = rng.Uniform();
-  const nn::Tensor images =
-      context.From({kPictures, 4, size, size}, std::span<const double>(pictures));
+  const Tensor images = context.From({kPictures, 4, size, size}, std::span<const double>(pictures));
   const auto vertices = static_cast<std::int64_t>(flows.size()) / (4 * kPictures);
-  const nn::Var flow = nn::Parameter(
-      context, context.From({kPictures, vertices, 4}, std::span<const double>(flows)));
-  const nn::Var colors = SampleColors(images, flow);
-  const nn::Var inputs[] = {flow};
-  const auto gradients = nn::Gradients(nn::Sum(nn::Square(colors)), inputs);
-  const auto numbers_of = [&](nn::Tensor tensor) {
-    return nn::WithFloatType(type, [&]<class T>(T) {
+  const Var flow =
+      Parameter(context, context.From({kPictures, vertices, 4}, std::span<const double>(flows)));
+  const Var colors = SampleColors(images, flow);
+  const Var inputs[] = {flow};
+  const auto gradients = Gradients(Sum(Square(colors)), inputs);
+  const auto numbers_of = [&](Tensor tensor) {
+    return WithFloatType(type, [&]<class T>(T) {
       const auto values = tensor.span<T>();
       return std::vector<double>(values.begin(), values.end());
     });
@@ -138,11 +137,11 @@ std::vector<double> RandomFlows() {
 // 256 * 2^-24 = 1.5e-5. A gradient sums terms of both signs, at most 2 tau |offset| < 64 times as
 // large as the colour: 64 * 1.5e-5.
 TEST(SampleColors, VectorsHoldToTheReference) {
-  const OpResult want = RunOp(nn::DType::kF64, RandomFlows(), 1);
+  const OpResult want = RunOp(DType::kF64, RandomFlows(), 1);
   for (const std::string& target : RunnableTargets()) {
     const TargetScope scope(target);
     SCOPED_TRACE(target);
-    const OpResult got = RunOp(nn::DType::kF32, RandomFlows(), 1);
+    const OpResult got = RunOp(DType::kF32, RandomFlows(), 1);
     for (std::size_t i = 0; i < want.colors.size(); ++i)
       EXPECT_NEAR(got.colors[i], want.colors[i], 1.5e-5) << i;
     for (std::size_t i = 0; i < want.gradient.size(); ++i)
@@ -161,22 +160,22 @@ TEST(SampleColors, ExtremesStayFinite) {
   }
   for (const std::string& target : RunnableTargets()) {
     const TargetScope scope(target);
-    const OpResult got = RunOp(nn::DType::kF32, flows, 1);
+    const OpResult got = RunOp(DType::kF32, flows, 1);
     for (const double x : got.colors) EXPECT_TRUE(std::isfinite(x)) << target;
     for (const double x : got.gradient) EXPECT_TRUE(std::isfinite(x)) << target;
   }
-  const OpResult reference = RunOp(nn::DType::kF64, flows, 1);
+  const OpResult reference = RunOp(DType::kF64, flows, 1);
   for (const double x : reference.gradient) EXPECT_TRUE(std::isfinite(x));
 }
 
 TEST(SampleColors, BitsDoNotDependOnWorkers) {
-  const OpResult one = RunOp(nn::DType::kF32, RandomFlows(), 1);
+  const OpResult one = RunOp(DType::kF32, RandomFlows(), 1);
   for (const int workers : {2, 5}) {
-    const OpResult more = RunOp(nn::DType::kF32, RandomFlows(), workers);
+    const OpResult more = RunOp(DType::kF32, RandomFlows(), workers);
     EXPECT_EQ(one.colors, more.colors);
     EXPECT_EQ(one.gradient, more.gradient);
   }
 }
 
 }  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::nn

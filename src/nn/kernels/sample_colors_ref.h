@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One vertex of sample_colors.h, forward and backward.
+// Scalar truth of sample_colors.h: one vertex, forward and backward.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 #include <complex>
 #include <cstddef>
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 
 inline constexpr std::size_t kColorCells = 16;  // along each side of the picture
 // Weight of a cell that is far away: every cell has some, so the mean exists wherever the centre
@@ -130,4 +130,4 @@ void SampleBackwardRef(const ColorCells<T>& cells, const ColorSpans<T>& s) {
     SampledColor<T>(cells, s.flow + 4 * v).Backward(s.by_color + 3 * v, s.by_flow + 4 * v);
 }
 
-}  // namespace tilegrad::train
+}  // namespace tilegrad::nn
