@@ -26,7 +26,7 @@ TEST(FewModels, CountsShapesToTrainOn) {
   EXPECT_TRUE(AdviceOnFewModels(liveries, false)->starts_with("1 training shape is few"));
 }
 
-TEST(FewModels, SaysWhatToDo) {
+TEST(FewModels, NamesTheRemedies) {
   const std::string fixed = *AdviceOnFewModels(Models(7, 2), false);
   for (const char* part : {"7 training shapes are few:", "--per-class", "stream.share=0.5",
                            "schedule.mirrored=0.5", "tilegrad fit"})

@@ -49,10 +49,10 @@ ConfigFields ScheduleFields(SingleImageConfig* c) {
 
 Status CheckConfig(const SingleImageConfig& config) {
   const TemplateConfig& n = config.network.shape;
-  if (n.n3mr_vertices && (n.smoothing > 0 || n.symmetric)) {
+  if (n.n3mr_vertices && (n.smoothing > 0 || n.stiffness > 0 || n.symmetric)) {
     return InvalidArgument(
-        "network.n3mr_vertices has no offsets, which network.smoothing and network.symmetric are "
-        "about: leave these at 0 and false");
+        "network.n3mr_vertices has no offsets, which network.smoothing, network.stiffness and "
+        "network.symmetric are about: leave these at 0, 0 and false");
   }
   return RivalOptions(config.render.rule, config.rivals).status();
 }
