@@ -8,8 +8,11 @@
 #include <limits>
 #include <utility>
 
+#include "base/rng.h"
 #include "nn/nn.h"
+#include "scene/shapes.h"
 #include "scene/topology.h"
+#include "train/models/offset_map.h"
 #include "train/tasks/single_image/step.h"
 
 namespace tilegrad::train {
@@ -163,7 +166,7 @@ struct SmallProblem {
 Result<LossValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int64_t number) {
   LossValues values;
   TILEGRAD_ASSIGN(const auto gradients, step.Backward(batch, number, &values));
-  TILEGRAD_TRY(step.Update(gradients, number));
+  TILEGRAD_TRY(step.weights().Update(gradients, number));
   return values;
 }
 
@@ -179,7 +182,7 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
   LossValues values;
   std::vector<nn::NamedVar> parameters = nn::Parameters(step.network().module());
-  const auto gradients = nn::Grad(step.Loss(batch, 0, &values), step.adam().parameters());
+  const auto gradients = nn::Grad(step.Loss(batch, 0, &values), step.weights().adam().parameters());
   ASSERT_TRUE(context.status().ok()) << context.status().message();
   EXPECT_LT(values.iou, 0.95);  // the scene is not empty: silhouettes overlap
   Rng rng(9);
@@ -204,6 +207,41 @@ void ExpectGradientsAgreeWithDifferences(const SmallProblem& p) {
     }
   }
   EXPECT_LE(off, checked / 50) << "of " << checked;
+}
+
+// (I + lambda L) undoes the map: v + lambda * sum over neighbours n of (v - n) is what went in.
+TEST(OffsetMap, StiffnessIsTheInverseOfOnePlusTheLaplacian) {
+  const Workers workers(1);
+  nn::Context context(workers, nn::DType::kF64);
+  const Mesh sphere = Icosphere(1, 1);
+  const Topology topology = BuildTopology(sphere.faces, sphere.positions.size());
+  const auto count = static_cast<std::int64_t>(sphere.positions.size());
+  constexpr double kLambda = 3;
+  Rng rng(2);
+  std::vector<double> raw(static_cast<std::size_t>(2 * 3 * count));
+  for (double& x : raw) x = rng.Uniform(-1, 1);
+  const OffsetMap map(context, sphere, {.stiffness = kLambda});
+  nn::Tensor out =
+      map.Apply(nn::Constant(context, context.From({2, 3 * count}, std::span<const double>(raw))))
+          .value();
+  const std::span<const double> offsets = out.span<double>();
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    const std::size_t axis = i % 3, v = i / 3 % static_cast<std::size_t>(count),
+                      mesh = i - axis - 3 * v;
+    double back = offsets[i];
+    for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n) {
+      const auto other = static_cast<std::size_t>(topology.neighbors[static_cast<std::size_t>(n)]);
+      back += kLambda * (offsets[i] - offsets[mesh + 3 * other + axis]);
+    }
+    EXPECT_NEAR(back, raw[i], 1e-12)
+        << i;  // of sums of some tens of numbers below 1, times 1 + 7 lambda
+  }
+}
+
+TEST(Chain, SoDoThoseOfStiffTemplates) {
+  SmallProblem p;
+  p.config.network.shape.smoothing = 0, p.config.network.shape.stiffness = 2;
+  ExpectGradientsAgreeWithDifferences(p);
 }
 
 TEST(Chain, Float64GradientsAgreeWithDifferences) {
@@ -250,9 +288,9 @@ TEST(Chain, TheTrainingPathAgreesWithFloat64) {
   ASSERT_TRUE(nn::LoadState(reference.network().module(), nn::State(fast.network().module())).ok());
   LossValues want, got;
   const auto d_want = nn::Grad(reference.Loss(GatherBatch(wide, p.store, p.samples), 0, &want),
-                               reference.adam().parameters());
+                               reference.weights().adam().parameters());
   const auto d_got = nn::Grad(fast.Loss(GatherBatch(narrow, p.store, p.samples), 0, &got),
-                              fast.adam().parameters());
+                              fast.weights().adam().parameters());
   EXPECT_NEAR(got.total, want.total, 1e-5);
   EXPECT_NEAR(got.iou, want.iou, 1e-5);
   EXPECT_NEAR(got.color, want.color, 1e-5);
@@ -326,7 +364,7 @@ TEST(Chain, RivalsHaveNoColorLoss) {
     step.losses().AddTerms(values, &terms);
     EXPECT_EQ(terms.size(), 3u);
     const auto parameters = nn::Parameters(step.network().module());
-    const auto gradients = nn::Grad(loss, step.adam().parameters());
+    const auto gradients = nn::Grad(loss, step.weights().adam().parameters());
     double moving = 0;
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       double largest = 0;
@@ -351,7 +389,7 @@ TEST(Chain, WhatIsNotFiniteIsRefusedBeforeAnythingChanges) {
   const BatchTensors batch = GatherBatch(context, p.store, p.samples);
   ASSERT_TRUE(RunStep(step, batch, 0).ok());
   const auto bits = [&] {  // of weights and moments
-    std::vector<nn::NamedTensor> all = step.adam().State();
+    std::vector<nn::NamedTensor> all = step.weights().adam().State();
     for (const nn::NamedVar& weight : nn::Parameters(step.network().module())) {
       all.push_back({weight.name, weight.value.value()});
     }

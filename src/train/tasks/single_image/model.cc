@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
+#include "train/tasks/learned_weights.h"
 
 namespace tilegrad::train {
 namespace {
@@ -17,11 +18,9 @@ class SingleImageModel : public Model {
         network_(context, config, image_size, /*seed=*/0),
         template_(network_.template_mesh()) {}
 
-  // Of the moving average of the weights, where the run kept one.
   Status Load(const std::vector<nn::NamedTensor>& state) {
     TILEGRAD_TRY(context_.TakeStatus());
-    const std::vector<nn::NamedTensor> averages = nn::Averages(state);
-    TILEGRAD_TRY(nn::LoadState(network_.module(), averages.empty() ? state : averages));
+    TILEGRAD_TRY(LoadPredictingWeights(network_.module(), state));
     parameters_ = nn::CountParameters(network_.module());
     return NormalizeToBox(template_, kPredictionHalfExtent);
   }

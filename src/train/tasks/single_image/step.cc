@@ -17,14 +17,7 @@ TrainStep::TrainStep(nn::Context& context, const SingleImageConfig& config, int 
       config_(config),
       network_(context, config.network, image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
-      adam_(context, nn::Parameters(network_.module()),
-            {.learning_rate = config.optimizer.learning_rate,
-             .beta1 = config.optimizer.beta1,
-             .beta2 = config.optimizer.beta2}),
-      average_(context,
-               config.optimizer.average > 0 ? nn::State(network_.module())
-                                            : std::vector<nn::NamedTensor>(),
-               config.optimizer.average),
+      weights_(context, network_.module(), config.optimizer, config.schedule.steps),
       losses_(context, config, network_.template_mesh(), image_size) {}
 
 nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues* values) {
@@ -36,7 +29,7 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
 Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& batch,
                                                          std::int64_t step, LossValues* values) {
   const nn::Var loss = Loss(batch, step, values);
-  auto gradients = nn::Gradients(loss, adam_.parameters());
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
   TILEGRAD_TRY(context_.TakeStatus());
   if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
   StepValues described;
@@ -44,13 +37,6 @@ Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& bat
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
       values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
-}
-
-Status TrainStep::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
-  adam_.options().learning_rate = LearningRateAt(config_, step);
-  TILEGRAD_TRY(adam_.Step(gradients));
-  average_.Update();
-  return {};
 }
 
 }  // namespace tilegrad::train

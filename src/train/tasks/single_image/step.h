@@ -3,8 +3,7 @@
 // gradients -> Adam.
 #pragma once
 
-#include "nn/moving_average.h"
-#include "nn/optim.h"
+#include "train/tasks/learned_weights.h"
 #include "train/tasks/single_image/image_losses.h"
 
 namespace tilegrad::train {
@@ -23,20 +22,16 @@ class TrainStep {
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, std::int64_t step,
                                                 LossValues* values);
-  // One step of Adam, and of the moving average of the weights if there is one.
-  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
 
   MeshNetwork& network() { return network_; }
-  nn::Adam& adam() { return adam_; }
-  nn::MovingAverage& average() { return average_; }  // of no tensors without optimizer.average
+  LearnedWeights& weights() { return weights_; }
   ImageLosses& losses() { return losses_; }
 
  private:
   nn::Context& context_;
   SingleImageConfig config_;
   MeshNetwork network_;
-  nn::Adam adam_;
-  nn::MovingAverage average_;
+  LearnedWeights weights_;
   ImageLosses losses_;
 };
 

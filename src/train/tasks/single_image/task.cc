@@ -36,11 +36,13 @@ class SingleImageTask : public Task {
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->Update(gradients, at.step);
+    return step_->weights().Update(gradients, at.step);
   }
 
-  std::vector<nn::NamedTensor> State() override;
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
+    return step_->weights().LoadState(state, steps);
+  }
   Result<ImageU8> SamplePicture(std::int64_t steps) override {
     if (samples_.empty()) return ImageU8();
     return SampleSheet(*context_, *step_, held_out_, samples_, steps);
@@ -184,24 +186,6 @@ Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex
   out->images = config_.batch;
   out->stream_seconds = stream_ ? stream_->TakeSeconds() : 0;
   return gradients;
-}
-
-std::vector<nn::NamedTensor> SingleImageTask::State() {
-  std::vector<nn::NamedTensor> tensors = nn::State(step_->network().module());
-  const std::vector<nn::NamedTensor> moments = step_->adam().State();
-  tensors.insert(tensors.end(), moments.begin(), moments.end());
-  const std::vector<nn::NamedTensor> averages = step_->average().State();
-  tensors.insert(tensors.end(), averages.begin(), averages.end());
-  return tensors;
-}
-
-Status SingleImageTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
-  TILEGRAD_TRY(nn::LoadState(step_->network().module(), state));
-  TILEGRAD_TRY(step_->adam().LoadState(state));
-  TILEGRAD_TRY(step_->average().LoadState(state));
-  if (step_->adam().steps() == steps) return {};
-  return InvalidArgument("the optimizer has taken {} steps, the run {}", step_->adam().steps(),
-                         steps);
 }
 
 Result<Showcase> SingleImageTask::Show(const ShowcaseRequest& request, const Workers& workers,

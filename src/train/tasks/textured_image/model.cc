@@ -7,6 +7,7 @@
 #include "nn/nn.h"
 #include "render/picture/composite.h"
 #include "train/models/mesh_network.h"
+#include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/step.h"
 
 namespace tilegrad::train {
@@ -38,11 +39,9 @@ class LoadedModel : public TexturedModel {
         network_(context, config.network, LightHeadOf(config.light), image_size, /*seed=*/0),
         template_(network_.template_mesh()) {}
 
-  // Of the moving average of the weights, where the run kept one.
   Status Load(const std::vector<nn::NamedTensor>& state) {
     TILEGRAD_TRY(context_.TakeStatus());
-    const std::vector<nn::NamedTensor> averages = nn::Averages(state);
-    TILEGRAD_TRY(nn::LoadState(network_.module(), averages.empty() ? state : averages));
+    TILEGRAD_TRY(LoadPredictingWeights(network_.module(), state));
     parameters_ = nn::CountParameters(network_.module());
     return NormalizeToBox(template_, kPredictionHalfExtent);
   }

@@ -62,14 +62,7 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
       image_size_(image_size),
       network_(context, config.network, LightHeadOf(config.light), image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
-      adam_(context, nn::Parameters(network_.module()),
-            {.learning_rate = config.optimizer.learning_rate,
-             .beta1 = config.optimizer.beta1,
-             .beta2 = config.optimizer.beta2}),
-      average_(context,
-               config.optimizer.average > 0 ? nn::State(network_.module())
-                                            : std::vector<nn::NamedTensor>(),
-               config.optimizer.average),
+      weights_(context, network_.module(), config.optimizer, config.schedule.steps),
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
       renderer_(context.workers()) {}
@@ -137,7 +130,7 @@ Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch&
                                                             std::int64_t step,
                                                             TexturedLossValues* values) {
   const nn::Var loss = Loss(Draw(batch, step), batch, values);
-  auto gradients = nn::Gradients(loss, adam_.parameters());
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
   TILEGRAD_TRY(context_.TakeStatus());
   if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
   StepValues described;
@@ -145,13 +138,6 @@ Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch&
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
       values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));
-}
-
-Status TexturedStep::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
-  adam_.options().learning_rate = LearningRateAt(config_.optimizer, config_.schedule.steps, step);
-  TILEGRAD_TRY(adam_.Step(gradients));
-  average_.Update();
-  return {};
 }
 
 }  // namespace tilegrad::train

@@ -7,11 +7,10 @@
 // light that is predicted from that other one.
 #pragma once
 
-#include "nn/moving_average.h"
-#include "nn/optim.h"
 #include "scene/topology.h"
 #include "train/ops/render_op.h"
 #include "train/run/step_values.h"
+#include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/batch.h"
 #include "train/tasks/textured_image/config.h"
 
@@ -40,13 +39,10 @@ class TexturedStep {
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, std::int64_t step,
                                                 TexturedLossValues* values);
-  // One step of Adam, and of the moving average of the weights if there is one.
-  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
   void AddTerms(const TexturedLossValues& values, std::vector<LossTerm>* terms) const;
 
   TextureNetwork& network() { return network_; }
-  nn::Adam& adam() { return adam_; }
-  nn::MovingAverage& average() { return average_; }
+  LearnedWeights& weights() { return weights_; }
 
  private:
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
@@ -55,8 +51,7 @@ class TexturedStep {
   TexturedImageConfig config_;
   int image_size_;
   TextureNetwork network_;
-  nn::Adam adam_;
-  nn::MovingAverage average_;
+  LearnedWeights weights_;
   Topology topology_;
   SceneRenderer renderer_;
 };

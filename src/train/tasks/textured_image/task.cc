@@ -36,11 +36,13 @@ class TexturedImageTask : public Task {
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->Update(gradients, at.step);
+    return step_->weights().Update(gradients, at.step);
   }
 
-  std::vector<nn::NamedTensor> State() override;
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override;
+  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
+    return step_->weights().LoadState(state, steps);
+  }
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
   Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
@@ -126,22 +128,6 @@ Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateInd
   out->images = kViewsOfObject * config_.batch;
   out->stream_seconds = stream_->TakeSeconds();
   return gradients;
-}
-
-std::vector<nn::NamedTensor> TexturedImageTask::State() {
-  std::vector<nn::NamedTensor> tensors = nn::State(step_->network().module());
-  for (const auto& more : {step_->adam().State(), step_->average().State()})
-    tensors.insert(tensors.end(), more.begin(), more.end());
-  return tensors;
-}
-
-Status TexturedImageTask::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
-  TILEGRAD_TRY(nn::LoadState(step_->network().module(), state));
-  TILEGRAD_TRY(step_->adam().LoadState(state));
-  TILEGRAD_TRY(step_->average().LoadState(state));
-  if (step_->adam().steps() == steps) return {};
-  return InvalidArgument("the optimizer has taken {} steps, the run {}", step_->adam().steps(),
-                         steps);
 }
 
 Result<ImageU8> TexturedImageTask::SamplePicture(std::int64_t /*steps*/) {
