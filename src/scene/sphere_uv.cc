@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 
 namespace tilegrad {
@@ -41,7 +43,60 @@ void Unwrap(std::array<CornerUv, 3>* corners) {
   }
 }
 
+glm::dvec3 DirectionAt(double u, double v) {
+  const double turn = 2 * std::numbers::pi * (u - 0.5), up = std::numbers::pi * (v - 0.5);
+  return {std::cos(turn) * std::cos(up), std::sin(up), -std::sin(turn) * std::cos(up)};
+}
+
+// The normals of the planes through the origin and each edge of a face.
+struct FaceCone {
+  std::array<glm::dvec3, 3> sides;
+  glm::dvec3 WeightsAt(const glm::dvec3& d) const {
+    return {glm::dot(d, sides[0]), glm::dot(d, sides[1]), glm::dot(d, sides[2])};
+  }
+};
+
+FaceCone ConeOf(const Mesh& sphere, const Face& face) {
+  const auto corner = [&](std::size_t k) {
+    return glm::dvec3(sphere.positions[static_cast<std::size_t>(face[k])]);
+  };
+  const glm::dvec3 a = corner(0), b = corner(1), c = corner(2);
+  return {{glm::cross(b, c), glm::cross(c, a), glm::cross(a, b)}};
+}
+
+// Of the face that the ray runs through; on an edge rounding may leave every face outside by a
+// hair.
+SurfacePoint PointAt(const Mesh& sphere, const std::vector<FaceCone>& cones, const glm::dvec3& d) {
+  std::size_t best = 0;
+  double inside = -std::numeric_limits<double>::infinity();
+  for (std::size_t f = 0; f < cones.size(); ++f) {
+    const glm::dvec3 w = cones[f].WeightsAt(d);
+    const double least =
+        std::min({w.x, w.y, w.z}) / (std::abs(w.x) + std::abs(w.y) + std::abs(w.z));
+    if (least > inside) inside = least, best = f;
+  }
+  const glm::dvec3 w = glm::max(cones[best].WeightsAt(d), glm::dvec3(0));
+  const double sum = w.x + w.y + w.z;
+  return {sphere.faces[best],
+          {static_cast<float>(w.x / sum), static_cast<float>(w.y / sum),
+           static_cast<float>(w.z / sum)}};
+}
+
 }  // namespace
+
+std::vector<SurfacePoint> SphereTexels(const Mesh& sphere, int width, int height) {
+  std::vector<FaceCone> cones;
+  cones.reserve(sphere.faces.size());
+  for (const Face& face : sphere.faces) cones.push_back(ConeOf(sphere, face));
+  std::vector<SurfacePoint> points;
+  points.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int i = 0; i < height; ++i) {
+    for (int j = 0; j < width; ++j)
+      points.push_back(
+          PointAt(sphere, cones, DirectionAt((j + 0.5) / width, 1 - (i + 0.5) / height)));
+  }
+  return points;
+}
 
 std::vector<glm::vec2> SphereUvs(const Mesh& sphere) {
   std::vector<glm::vec2> uvs;

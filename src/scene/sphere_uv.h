@@ -2,6 +2,9 @@
 // Texture coordinates for a template sphere.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "scene/mesh.h"
 
 namespace tilegrad {
@@ -12,5 +15,16 @@ namespace tilegrad {
 // the other two, so no face runs backwards through the map. The mirror image at x = 0 of a point at
 // u is at 1/2 - u.
 std::vector<glm::vec2> SphereUvs(const Mesh& sphere);
+
+// A point of a mesh: its face's vertices, and weights that sum to 1.
+struct SurfacePoint {
+  Face vertices;
+  std::array<float, 3> weights;
+};
+
+// The point of `sphere` behind each texel of such a map, [height][width]: where the ray from the
+// origin in the direction of the texel's centre leaves it. `sphere` is convex around the origin and
+// its faces run counter-clockwise, seen from outside.
+std::vector<SurfacePoint> SphereTexels(const Mesh& sphere, int width, int height);
 
 }  // namespace tilegrad

@@ -32,8 +32,28 @@ HWY_INLINE void MapLongRow(const AxisMapProblem<float>& p, std::size_t row) {
   }
 }
 
+// Rows of y where inner is 1 and each has one term, as of a nearest resize: a copy of numbers.
+HWY_INLINE void MapPoints(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
+  while (first < last) {
+    const std::size_t i = first % p.out, count = HWY_MIN(p.out - i, last - first);
+    const float* x = p.x + first / p.out * p.in;
+    float* y = p.y + first;
+    for (std::size_t k = 0; k < count; ++k) y[k] = 0.0f + p.weight[i + k] * x[p.index[i + k]];
+    first += count;
+  }
+}
+
+// Whether each row has one term.
+HWY_INLINE bool OneTermEach(const AxisMapProblem<float>& p) {
+  for (std::size_t i = 0; i <= p.out; ++i) {
+    if (p.begin[i] != static_cast<std::int32_t>(i)) return false;
+  }
+  return true;
+}
+
 // Rows [first, last) of y.
 void AxisMapRange(const AxisMapProblem<float>& p, std::size_t first, std::size_t last) {
+  if (p.inner == 1 && OneTermEach(p)) return MapPoints(p, first, last);
   if (p.inner == 1) return AxisMapRef(p, first, last);
   for (std::size_t row = first; row < last; ++row) MapLongRow(p, row);
 }

@@ -30,7 +30,7 @@ class UpsampleMap : public Module {
  public:
   Var Forward(const Var& x, Mode) override {
     if (!Usable("upsample map", {&x})) return Invalid({&x});
-    return Grow(Grow(x, 2), 3);
+    return Grow(Grow(x, 3), 2);
   }
   void Visit(const std::string&, ModuleVisitor&) override {}
 

@@ -15,4 +15,15 @@ nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth) {
                    });
 }
 
+nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft) {
+  const auto& shape = truth.shape();
+  const double scale = static_cast<double>(shape[1]) / static_cast<double>(shape.elements());
+  return ImageLoss(
+      "color loss", image, truth, scale,
+      [scale, soft]<class T>(std::span<const T> s, std::span<const T> p, std::span<T> d) {
+        HuberDifferenceBackward(s, p, soft, scale, d);
+        return HuberDifference(s, p, soft);
+      });
+}
+
 }  // namespace tilegrad::train

@@ -3,6 +3,7 @@
 // over pixels and images of |I - I'|, that is three times a plain mean for RGB.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
@@ -31,5 +32,28 @@ void AbsoluteDifferenceBackward(std::span<const T> truth, std::span<const T> pre
 
 // image and truth: [N, channels, H, W] of one dtype. A scalar.
 nn::Var ColorL1Loss(const nn::Var& image, const nn::Tensor& truth);
+
+// Huber's mixture instead of |d|: d^2 / (2 soft) up to |d| = soft, |d| - soft / 2 beyond. Where
+// something unknown makes colours bright or dark, L1 alone settles for their median, which may be
+// black, and this for nearly their mean.
+template <class T>
+double HuberDifference(std::span<const T> truth, std::span<const T> predicted, double soft) {
+  double sum = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double d = std::abs(static_cast<double>(predicted[i]) - static_cast<double>(truth[i]));
+    sum += d < soft ? 0.5 * d * d / soft : d - 0.5 * soft;
+  }
+  return sum;
+}
+template <class T>
+void HuberDifferenceBackward(std::span<const T> truth, std::span<const T> predicted, double soft,
+                             double scale, std::span<T> d_predicted) {
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double d = static_cast<double>(predicted[i]) - static_cast<double>(truth[i]);
+    d_predicted[i] = static_cast<T>(scale * std::clamp(d / soft, -1.0, 1.0));
+  }
+}
+// soft > 0, in units of colours.
+nn::Var ColorHuberLoss(const nn::Var& image, const nn::Tensor& truth, double soft);
 
 }  // namespace tilegrad::train

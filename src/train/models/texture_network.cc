@@ -12,7 +12,10 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kResidualPairs = 3;    // of two layers: the six of section 5.2
+constexpr int kResidualPairs = 3;          // of two layers: the six of section 5.2
+constexpr std::int64_t kPaintNumbers = 8;  // of a texel: three shares, two gains, a colour
+// Of what is above 1 this share is taken off; the rest leaves a gradient that leads back.
+constexpr double kTooBright = 0.9;
 constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
 
 nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
@@ -61,6 +64,11 @@ nn::Var Unit(const nn::Var& v) {
   return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
 }
 
+// A frame of one pixel around a map of the sphere: left and right edges are neighbours.
+nn::Var WrapAround(const nn::Var& map) {
+  return nn::Pad(nn::Pad(map, 3, 1, 1, nn::PadMode::kCircular), 2, 1, 1, nn::PadMode::kReplicate);
+}
+
 // The third number to above 0, smoothly; 1 stays about where it is.
 nn::Var Facing(const nn::Var& raw) {
   return nn::Concat({nn::Slice(raw, 1, 0, 2), nn::Softplus(nn::Slice(raw, 1, 2, 3))}, 1);
@@ -84,6 +92,8 @@ void TextureNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& 
   map.Visit(prefix + "map.", visitor);
   shape.Visit(prefix + "shape.", visitor);
   light.Visit(prefix + "light.", visitor);
+  pose.Visit(prefix + "pose.", visitor);
+  paint.Visit(prefix + "paint.", visitor);
 }
 
 TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig& config,
@@ -97,16 +107,16 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
       uvs_(SphereUvs(template_)) {
   Rng rng(seed, /*stream=*/0x74657874);
   const nn::UNetShape unet{.in = 4,
-                           .out = 3,
+                           .out = config.lookup ? config.lookup_width : 3,
                            .base = config.base,
                            .most = config.most,
                            .levels = static_cast<int>(config.levels),
                            .norm = nn::Norm::kBatch,
                            .resize = true,
                            .skips = config.skips,
-                           .enlarge = static_cast<int>(config.enlarge),
+                           .enlarge = config.lookup ? 0 : static_cast<int>(config.enlarge),
                            .wrap = config.wrap,
-                           .output = &nn::Sigmoid};
+                           .output = config.lookup ? &nn::LeakyRelu02 : &nn::Sigmoid};
   all_.unet = std::make_unique<nn::UNet>(context, unet, rng);
   const std::int64_t side = image_size >> config.levels;
   const std::int64_t channels = std::min(config.most, config.base << (config.levels - 1));
@@ -117,6 +127,7 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
       context.From({static_cast<std::int64_t>(template_.positions.size()), 3}, flat);
   offsets_ =
       OffsetMap(context, template_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
+  if (config.lookup) BuildLookup(image_size, rng);
   if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
 }
 
@@ -148,12 +159,52 @@ void TextureNetwork::BuildHeads(Rng& rng) {
                 AddLinear(all_.light, "out", context_, width, light, rng).bias.value());
 }
 
+void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
+  coarse_.emplace(template_, image_size);
+  fine_.emplace(template_, texture_size_);
+  AddLinear(all_.pose, "fc1", context_, config_.latent, config_.light_width, rng);
+  all_.pose.Add<nn::Activation>("act", &nn::Relu);
+  AddLinear(all_.pose, "fc2", context_, config_.light_width, kPoseNumbers, rng);
+  const std::int64_t width = config_.lookup_width;
+  const auto add = [&](const std::string& name, std::int64_t in, std::int64_t out) {
+    all_.paint.Add<nn::Activation>("wrap" + name, &WrapAround);
+    all_.paint.Add<nn::Conv2dLayer>("conv" + name, context_, nn::ConvShape{.in = in, .out = out},
+                                    rng);
+  };
+  add("1", width + 2 * PictureLookup::kChannels, width);
+  all_.paint.Add<nn::Activation>("act1", &nn::LeakyRelu02);
+  add("2", width, width);
+  all_.paint.Add<nn::Activation>("act2", &nn::LeakyRelu02);
+  add("3", width, kPaintNumbers);
+}
+
+// A mixture of three colours: what the picture shows at the texel and at its mirror image, brighter
+// or darker, and what the network makes up.
+nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
+                                const PredictedObjects& objects, nn::Mode mode) {
+  const nn::Tensor light = objects.directions.valid() ? objects.directions.value() : nn::Tensor();
+  const PictureLookup::Job job{images, objects.positions.value(), objects.pose.value(), light};
+  const nn::Var seen = nn::Constant(context_, coarse_->Look(context_, job));
+  const nn::Var raw = all_.paint.Forward(nn::Concat({map, seen}, 1), mode);
+  const nn::Var shares = nn::Softmax(nn::Slice(raw, 1, 0, 3), 1);
+  const nn::Var looked = nn::Slice(shares, 1, 0, 2) * nn::Exp(nn::Slice(raw, 1, 3, 5));
+  const nn::Var made = nn::Slice(shares, 1, 2, 3) * nn::Sigmoid(nn::Slice(raw, 1, 5, 8));
+  const nn::Var all = nn::Resize(nn::Concat({looked, made}, 1), {texture_size_, texture_size_},
+                                 nn::ResizeMode::kBilinear);
+  const nn::Var colors = nn::Constant(context_, fine_->Colors(context_, job));
+  const nn::Var sum = nn::Slice(all, 1, 0, 1) * nn::Slice(colors, 1, 0, 3) +
+                      nn::Slice(all, 1, 1, 2) * nn::Slice(colors, 1, 3, 6) +
+                      nn::Slice(all, 1, 2, 5);
+  return sum - kTooBright * nn::Relu(sum - 1.0);
+}
+
 nn::Var TextureNetwork::Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels,
-                                nn::Mode mode) {
+                                const PredictedObjects& objects, nn::Mode mode) {
   const nn::Var code =
       nn::Reshape(all_.map.Forward(latent, mode),
                   {latent.shape()[0], code_shape_[0], code_shape_[1], code_shape_[2]});
   nn::Var image = all_.unet->Decode(code, levels, mode);
+  if (config_.lookup) image = Painted(image, levels.front().value(), objects, mode);
   if (config_.symmetric_texture) image = nn::MapAxis(image, 3, mirror_);
   return nn::Permute(image, {0, 2, 3, 1});
 }
@@ -178,10 +229,11 @@ PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   const nn::Var latent = all_.latent.Forward(levels.back(), mode);
   if (!latent.valid()) return out;
   out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
-  out.positions = NormalizeMeshes(out.movement + nn::Constant(context_, template_positions_),
-                                  kPredictionHalfExtent);
-  out.textures = Texture(latent, levels, mode);
+  out.positions = out.movement + nn::Constant(context_, template_positions_);
+  if (config_.normalize) out.positions = NormalizeMeshes(out.positions, kPredictionHalfExtent);
   Light(latent, mode, &out);
+  if (config_.lookup) out.pose = all_.pose.Forward(latent, mode);
+  out.textures = Texture(latent, levels, out, mode);
   return out;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
 #include "train/models/offset_map.h"
+#include "train/models/picture_lookup.h"
 
 namespace tilegrad::train {
 
@@ -28,7 +30,12 @@ struct TextureNetworkConfig {
   double template_radius = 0.3;     // world units
   std::int64_t smoothing = 4;       // OffsetRules
   bool symmetric = true;
-  bool symmetric_texture = false;   // the texture is its mirror image at x = 0
+  bool normalize = true;           // shapes are brought to the truth's size and place, else learned
+  bool symmetric_texture = false;  // the texture is its mirror image at x = 0
+  // Texels are looked up in the picture where the shape and the camera that the network says have
+  // them, beside what the decoder says of them (picture_lookup.h).
+  bool lookup = false;
+  std::int64_t lookup_width = 16;   // channels of the decoder and of the layers behind it, then
   double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)
 };
 
@@ -44,11 +51,13 @@ struct LightHeadShape {
 // What the network says of a batch of B images. Light is in the axes of each image's camera.
 struct PredictedObjects {
   nn::Var movement;    // [B, V, 3] offsets from the template
-  nn::Var positions;   // [B, V, 3] template + movement, box centred, largest half-extent 0.45
+  nn::Var positions;   // [B, V, 3] template + movement; with `normalize` then box centred, largest
+                       // half-extent 0.45
   nn::Var textures;    // [B, h, w, 3] in [0, 1], by the sphere's longitude and latitude
   nn::Var directions;  // [B, 3] unit; Lambert and Phong
   nn::Var shininess;   // [B]; Phong
   nn::Var sh;          // [B, 9]; harmonics
+  nn::Var pose;        // [B, 10] Pose of the picture's camera; with `lookup`
 };
 
 class TextureNetwork {
@@ -68,7 +77,11 @@ class TextureNetwork {
 
  private:
   void BuildHeads(Rng& rng);
-  nn::Var Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels, nn::Mode mode);
+  void BuildLookup(int image_size, Rng& rng);
+  nn::Var Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels,
+                  const PredictedObjects& objects, nn::Mode mode);
+  nn::Var Painted(const nn::Var& map, const nn::Tensor& images, const PredictedObjects& objects,
+                  nn::Mode mode);
   void Light(const nn::Var& latent, nn::Mode mode, PredictedObjects* out);
 
   nn::Context& context_;
@@ -79,12 +92,13 @@ class TextureNetwork {
   std::vector<glm::vec2> uvs_;
   nn::Tensor template_positions_;  // [V, 3]
   OffsetMap offsets_;
-  nn::AxisMap mirror_;    // of texel columns
-  nn::Shape code_shape_;  // of one image
+  nn::AxisMap mirror_;                          // of texel columns
+  nn::Shape code_shape_;                        // of one image
+  std::optional<PictureLookup> coarse_, fine_;  // of the picture's size, and of the texture's
   // The parts, shown to visitors as one module.
   struct Parts : nn::Module {
     std::unique_ptr<nn::UNet> unet;
-    nn::Sequential latent, map, shape, light;
+    nn::Sequential latent, map, shape, light, pose, paint;
     nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return unet->Forward(x, mode); }
     void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
   } all_;

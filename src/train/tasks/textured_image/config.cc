@@ -22,9 +22,28 @@ ConfigFields FieldsOf(TextureNetworkConfig* c) {
       {"network.smoothing", &c->smoothing, 0, 64,
        "rounds of diffusion over the template that offsets go through"},
       {"network.symmetric", &c->symmetric, 0, 1, "every shape is symmetric at x = 0"},
+      {"network.normalize", &c->normalize, 0, 1,
+       "centre and scale every shape; else it learns its size and place"},
       {"network.symmetric_texture", &c->symmetric_texture, 0, 1, "and so is every texture"},
+      {"network.lookup", &c->lookup, 0, 1,
+       "texels are looked up in the picture, too, by a camera that the network learns to say"},
+      {"network.lookup_width", &c->lookup_width, 1, 4096, "channels of the layers that mix them"},
       {"network.output_deviation", &c->output_deviation, 0, 10,
        "the last weights of vertices start as N(0, this^2)"},
+  };
+}
+
+ConfigFields FieldsOf(ColorRule* c) {
+  return {
+      {"loss.color_masked", &c->masked, 0, 1,
+       "colours are compared where the true object is, not beside it"},
+      {"loss.color_from", &c->from, 0, 1, "share of the run after which colours count"},
+      {"loss.color_soft", &c->soft, 0, 10,
+       "differences below this count by their square; 0: none do"},
+      {"loss.color_soft_until", &c->soft_until, 0, 1, "share of the run after which none do"},
+      {"loss.color_own", &c->own, 0, 1,
+       "weight of colours in a picture's own view, beside those in the other one"},
+      {"loss.pose", &c->pose, 0, kNoLimit, "weight of the camera's error; network.lookup"},
   };
 }
 
@@ -41,7 +60,7 @@ ConfigFields FieldsOf(TexturedImageConfig* c) {
   std::erase_if(render, [](const ConfigField& field) { return field.key == "render.rule"; });
   ConfigFields fields;
   for (const ConfigFields& more :
-       {FieldsOf(&c->network), FieldsOf(&c->loss), render, FieldsOf(&c->light),
+       {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->color), render, FieldsOf(&c->light),
         FieldsOf(&c->optimizer),
         ConfigFields{{"schedule.batch", &c->batch, 1, 65536,
                       "objects a step, each in two views under two lights"}},

@@ -9,9 +9,22 @@
 
 namespace tilegrad::train {
 
+// How colours are compared, beside LossConfig::color.
+struct ColorRule {
+  bool masked = false;    // only where the truth's object is, by its cover of a pixel
+  double from = 0;        // share of the run after which colours count: shapes first
+  double soft = 0;        // ColorHuberLoss, up to `soft_until`; 0: L1
+  double soft_until = 1;  // share of the run
+  // Of the view that a texture was predicted from, beside the other one. There a texture that has
+  // the picture's shading in it is no worse than one without.
+  double own = 1;
+  double pose = 1;  // of the mean square error of Pose, which is learned from the known cameras
+};
+
 struct TexturedImageConfig {
   TextureNetworkConfig network;
   LossConfig loss;
+  ColorRule color;
   RenderConfig render;  // its rule is ours
   LightConfig light;
   TexturedStreamConfig stream;

@@ -23,6 +23,13 @@ nn::Tensor InputsOfImages(nn::Context& context, std::size_t images) {
   return context.Indices(inputs);
 }
 
+// [images, 1, 1, 1]: `own` where an image is the view that its mesh was predicted from, else 1.
+nn::Var ViewWeights(nn::Context& context, std::int64_t images, double own) {
+  std::vector<double> weights(static_cast<std::size_t>(images), 1.0);
+  for (std::size_t n = 0; n < weights.size(); n += kViewsOfObject) weights[n] = own;
+  return nn::Constant(context, context.From({images, 1, 1, 1}, std::span<const double>(weights)));
+}
+
 template <std::size_t N>
 void ReadRow(const nn::Var& rows, std::size_t row, std::array<float, N>* out) {
   if (!rows.valid()) return;
@@ -94,18 +101,68 @@ TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step
   return out;
 }
 
+double TexturedStep::ShareOfRun(std::int64_t step) const {
+  return static_cast<double>(step) / static_cast<double>(config_.schedule.steps);
+}
+
+LossConfig TexturedStep::WeightsAt(std::int64_t step) const {
+  LossConfig weights = config_.loss;
+  if (ShareOfRun(step) < config_.color.from) weights.color = 0;
+  return weights;
+}
+
+// The truth is over black, so cover times colour is what a prediction without an outline of its own
+// would look like.
+nn::Var TexturedStep::ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
+                                std::int64_t step) const {
+  const nn::Shape& shape = batch.truth_alpha.shape();
+  nn::Var predicted = images.colors;
+  nn::Tensor truth = batch.truth_colors;
+  if (config_.color.masked) {
+    const nn::Var cover =
+        nn::Reshape(nn::Constant(context_, batch.truth_alpha), {shape[0], 1, shape[1], shape[2]});
+    predicted = cover * predicted;
+  }
+  if (config_.color.own != 1) {
+    const nn::Var weights = ViewWeights(context_, shape[0], config_.color.own);
+    predicted = weights * predicted;
+    truth = (weights * nn::Constant(context_, truth)).value();
+  }
+  const ColorRule& rule = config_.color;
+  if (rule.soft > 0 && ShareOfRun(step) < rule.soft_until)
+    return ColorHuberLoss(predicted, truth, rule.soft);
+  return ColorL1Loss(predicted, truth);
+}
+
+nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const {
+  nn::Tensor truth = context_.Empty(pose.shape(), pose.dtype());
+  nn::WithFloatType(truth.dtype(), [&]<class T>(T) {
+    for (std::size_t m = 0; m < batch.views.size(); ++m) {
+      const Pose want = PoseOf(batch.views[m].camera, image_size_);
+      std::ranges::transform(want, truth.data<T>() + m * want.size(),
+                             [](double x) { return static_cast<T>(x); });
+    }
+  });
+  return nn::Mean(nn::Square(pose - nn::Constant(context_, std::move(truth))));
+}
+
 nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
-                           TexturedLossValues* values) {
+                           std::int64_t step, TexturedLossValues* values) {
   const PredictedObjects& objects = renders.objects;
   const nn::Var iou = IouLoss(renders.images.alpha, batch.truth_alpha);
-  const nn::Var color = ColorL1Loss(renders.images.colors, batch.truth_colors);
+  const nn::Var color = ColorLoss(renders.images, batch, step);
   const nn::Var smoothness =
       SmoothnessLoss(objects.positions, network_.template_mesh().faces, topology_);
   const nn::Var laplacian = LaplacianLoss(objects.movement, topology_);
-  const LossConfig& w = config_.loss;
-  const nn::Var total =
+  const LossConfig w = WeightsAt(step);
+  nn::Var total =
       w.iou * iou + w.color * color + w.smoothness * smoothness + w.laplacian * laplacian;
-  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item(), 0};
+  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item()};
+  if (objects.pose.valid()) {
+    const nn::Var pose = PoseLoss(objects.pose, batch);
+    total = total + config_.color.pose * pose;
+    values->pose = pose.item(), values->total = total.item();
+  }
   const Lighting lighting = LightingOf(config_.light);
   if (lighting == Lighting::kNone || !objects.positions.valid()) return total;
   for (std::size_t m = 0; m < batch.views.size(); ++m) {
@@ -116,12 +173,14 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   return total;
 }
 
-void TexturedStep::AddTerms(const TexturedLossValues& v, std::vector<LossTerm>* terms) const {
-  const LossConfig& w = config_.loss;
+void TexturedStep::AddTerms(const TexturedLossValues& v, std::int64_t step,
+                            std::vector<LossTerm>* terms) const {
+  const LossConfig w = WeightsAt(step);
   terms->push_back({"iou", w.iou, v.iou});
   terms->push_back({"color", w.color, v.color});
   terms->push_back({"smoothness", w.smoothness, v.smoothness});
   terms->push_back({"laplacian", w.laplacian, v.laplacian});
+  if (config_.network.lookup) terms->push_back({"pose", config_.color.pose, v.pose});
   if (LightingOf(config_.light) != Lighting::kNone)
     terms->push_back({"light_angle", 0, v.light_angle});
 }
@@ -129,12 +188,12 @@ void TexturedStep::AddTerms(const TexturedLossValues& v, std::vector<LossTerm>* 
 Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch& batch,
                                                             std::int64_t step,
                                                             TexturedLossValues* values) {
-  const nn::Var loss = Loss(Draw(batch, step), batch, values);
+  const nn::Var loss = Loss(Draw(batch, step), batch, step, values);
   auto gradients = nn::Gradients(loss, weights_.adam().parameters());
   TILEGRAD_TRY(context_.TakeStatus());
   if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
   StepValues described;
-  AddTerms(*values, &described.terms);
+  AddTerms(*values, step, &described.terms);
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
       values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));

@@ -17,7 +17,8 @@
 namespace tilegrad::train {
 
 struct TexturedLossValues {
-  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0;  // the parts are unweighted
+  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0,
+         pose = 0;         // the parts are unweighted
   double light_angle = 0;  // degrees, mean over the inputs; watched, not learned from
 };
 
@@ -34,18 +35,24 @@ class TexturedStep {
   // Network and renderer, on the tape. One at a time: images are of one renderer.
   TexturedRenders Draw(const TexturedBatch& batch, std::int64_t step);
   // Equation 14 with textures and light; `values` gets the parts.
-  nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch,
+  nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch, std::int64_t step,
                TexturedLossValues* values);
   // Gradients of the loss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, std::int64_t step,
                                                 TexturedLossValues* values);
-  void AddTerms(const TexturedLossValues& values, std::vector<LossTerm>* terms) const;
+  void AddTerms(const TexturedLossValues& values, std::int64_t step,
+                std::vector<LossTerm>* terms) const;
 
   TextureNetwork& network() { return network_; }
   LearnedWeights& weights() { return weights_; }
 
  private:
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
+  double ShareOfRun(std::int64_t step) const;
+  LossConfig WeightsAt(std::int64_t step) const;
+  nn::Var PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const;
+  nn::Var ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
+                    std::int64_t step) const;
 
   nn::Context& context_;
   TexturedImageConfig config_;

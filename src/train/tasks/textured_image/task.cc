@@ -26,6 +26,7 @@ class TexturedImageTask : public Task {
             {"color", "Colour loss (mean L1)"},
             {"smoothness", "Smoothness (normals of neighbouring faces)"},
             {"laplacian", "Laplacian of the movement"},
+            {"pose", "Camera (mean square error of its numbers)"},
             {"light_angle", "Angle of the light (degrees, not learned from)"}};
   }
 
@@ -120,7 +121,7 @@ Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateInd
   TexturedLossValues values;
   TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at.step, &values));
   out->loss = values.total;
-  step_->AddTerms(values, &out->terms);
+  step_->AddTerms(values, at.step, &out->terms);
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / static_cast<double>(meshes_.size()));
   out->also.emplace_back("learning_rate",

@@ -63,7 +63,7 @@ struct SmallProblem {
   }
   double LossNow() {
     TexturedLossValues values;
-    step.Loss(step.Draw(batch, 0), batch, &values);
+    step.Loss(step.Draw(batch, 0), batch, 0, &values);
     return values.total;
   }
 };
@@ -75,7 +75,7 @@ void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config) {
   TexturedLossValues values;
   const TexturedRenders renders = p.step.Draw(p.batch, 0);
   const auto gradients =
-      nn::Grad(p.step.Loss(renders, p.batch, &values), p.step.weights().adam().parameters());
+      nn::Grad(p.step.Loss(renders, p.batch, 0, &values), p.step.weights().adam().parameters());
   ASSERT_TRUE(p.context.status().ok()) << p.context.status().message();
   EXPECT_LT(values.iou, 0.95);  // silhouettes overlap
   std::vector<nn::NamedVar> parameters = nn::Parameters(p.step.network().module());
