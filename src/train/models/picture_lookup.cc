@@ -13,7 +13,7 @@ constexpr double kScale = 0.75, kNearness = 0.6;
 constexpr double kShiftUnit = 0.1, kScaleUnit = 0.1, kNearnessUnit = 0.5;
 constexpr double kLeastDepth = 0.2;  // of the distance: nothing is nearer
 constexpr double kLeastCover = 0.3;  // colours are not divided by less
-constexpr double kLeastLight = 0.1;
+constexpr double kLeastLight = 0.25;
 
 // A pose as it is used.
 struct View {

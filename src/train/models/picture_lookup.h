@@ -33,7 +33,7 @@ class PictureLookup {
   };
   // For each texel, and then for its mirror image at x = 0: RGB (what is seen, divided by the
   // cover), the cover, n.v towards the camera (< 0: turned away), ln of 1 over the Lambert light
-  // there, at most ln 10. Hidden surfaces are not told from others.
+  // there, at most ln 4. Hidden surfaces are not told from others.
   static constexpr std::int64_t kChannels = 6;
   // [M, 2 kChannels, side, side], or the first three of each alone: [M, 6, side, side].
   nn::Tensor Look(nn::Context& context, const Job& job) const;

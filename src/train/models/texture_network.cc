@@ -178,8 +178,9 @@ void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
   add("3", width, kPaintNumbers);
 }
 
-// A mixture of three colours: what the picture shows at the texel and at its mirror image, brighter
-// or darker, and what the network makes up.
+// A mixture of three colours: what the picture shows at the texel and at its mirror image, without
+// the predicted light and then brighter or darker, and what the network makes up. Were the light
+// left in it, textures would explain their own pictures best under no light at all.
 nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
                                 const PredictedObjects& objects, nn::Mode mode) {
   const nn::Tensor light = objects.directions.valid() ? objects.directions.value() : nn::Tensor();
@@ -187,7 +188,9 @@ nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
   const nn::Var seen = nn::Constant(context_, coarse_->Look(context_, job));
   const nn::Var raw = all_.paint.Forward(nn::Concat({map, seen}, 1), mode);
   const nn::Var shares = nn::Softmax(nn::Slice(raw, 1, 0, 3), 1);
-  const nn::Var looked = nn::Slice(shares, 1, 0, 2) * nn::Exp(nn::Slice(raw, 1, 3, 5));
+  const nn::Var unlit =
+      nn::Concat({nn::Slice(seen, 1, 5, 6), nn::Slice(seen, 1, 11, 12)}, 1);  // ln 1 / light
+  const nn::Var looked = nn::Slice(shares, 1, 0, 2) * nn::Exp(nn::Slice(raw, 1, 3, 5) + unlit);
   const nn::Var made = nn::Slice(shares, 1, 2, 3) * nn::Sigmoid(nn::Slice(raw, 1, 5, 8));
   const nn::Var all = nn::Resize(nn::Concat({looked, made}, 1), {texture_size_, texture_size_},
                                  nn::ResizeMode::kBilinear);
