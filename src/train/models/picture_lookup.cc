@@ -14,6 +14,7 @@ constexpr double kShiftUnit = 0.1, kScaleUnit = 0.1, kNearnessUnit = 0.5;
 constexpr double kLeastDepth = 0.2;  // of the distance: nothing is nearer
 constexpr double kLeastCover = 0.3;  // colours are not divided by less
 constexpr double kLeastLight = 0.25;
+constexpr double kBlack = 0.03;  // brightness of what no light reaches, at most
 
 // A pose as it is used.
 struct View {
@@ -95,37 +96,65 @@ PictureLookup::PictureLookup(const Mesh& sphere, int side)
       faces_(sphere.faces),
       texels_(SphereTexels(sphere, side, side)) {}
 
+// A texel of the surface as a picture shows it.
+struct SeenTexel {
+  std::array<double, 4> rgba;  // over black
+  glm::dvec3 normal;           // unit, in the axes of the camera
+  double facing;               // its cosine to the camera
+  double Color(std::size_t c) const { return rgba[c] / std::max(kLeastCover, rgba[3]); }
+};
+
 template <class T>
-void PictureLookup::LookAt(const Job& job, std::size_t m, std::size_t channels, T* out) const {
-  const std::int64_t size = job.images.shape()[3];
-  const auto vertices = static_cast<std::size_t>(job.positions.shape()[1]);
-  const T* image = job.images.data<T>() + m * static_cast<std::size_t>(4 * size * size);
-  const T* p = job.positions.data<T>() + 3 * vertices * m;
-  const View view(job.pose.data<T>() + kPoseNumbers * m);
-  const T* l = job.light.empty() ? nullptr : job.light.data<T>() + 3 * m;
-  const std::vector<glm::dvec3> normals = SmoothNormals(faces_, p, vertices);
-  const std::size_t plane = side_ * side_;
-  for (std::size_t t = 0; t < plane; ++t) {
-    const auto& [corners, weights] = texels_[t];
+class PictureLookup::Picture {
+ public:
+  Picture(const std::vector<Face>& faces, const Job& job, std::size_t m)
+      : size_(job.images.shape()[3]),
+        image_(job.images.data<T>() + m * static_cast<std::size_t>(4 * size_ * size_)),
+        positions_(job.positions.data<T>() +
+                   m * static_cast<std::size_t>(3 * job.positions.shape()[1])),
+        view_(job.pose.data<T>() + static_cast<std::size_t>(kPoseNumbers) * m),
+        normals_(
+            SmoothNormals(faces, positions_, static_cast<std::size_t>(job.positions.shape()[1]))) {}
+
+  SeenTexel At(const SurfacePoint& point) const {
     glm::dvec3 x(0), n(0);
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto v = static_cast<std::size_t>(corners[k]);
-      x += static_cast<double>(weights[k]) * glm::dvec3(p[3 * v], p[3 * v + 1], p[3 * v + 2]);
-      n += static_cast<double>(weights[k]) * normals[v];
+      const auto v = static_cast<std::size_t>(point.vertices[k]);
+      const double weight = static_cast<double>(point.weights[k]);
+      const T* p = positions_ + 3 * v;
+      x += weight * glm::dvec3(p[0], p[1], p[2]);
+      n += weight * normals_[v];
     }
-    x = view.Turned(x), n = view.Turned(n);
+    x = view_.Turned(x), n = view_.Turned(n);
     n /= glm::length(n) + 1e-12;
     // In units of the camera's distance: depth 1 at the origin.
-    const double depth = std::max(kLeastDepth, 1 - view.nearness * x.z);
-    const auto seen =
-        SampleAt(image, size, view.x + view.scale * x.x / depth, view.y - view.scale * x.y / depth);
-    const glm::dvec3 eye(-view.nearness * x.x, -view.nearness * x.y, depth);
+    const double depth = std::max(kLeastDepth, 1 - view_.nearness * x.z);
+    const glm::dvec3 eye(-view_.nearness * x.x, -view_.nearness * x.y, depth);
+    return {SampleAt(image_, size_, view_.x + view_.scale * x.x / depth,
+                     view_.y - view_.scale * x.y / depth),
+            n, glm::dot(n, eye) / glm::length(eye)};
+  }
+
+ private:
+  std::int64_t size_;
+  const T* image_;
+  const T* positions_;
+  View view_;
+  std::vector<glm::dvec3> normals_;
+};
+
+template <class T>
+void PictureLookup::LookAt(const Job& job, std::size_t m, std::size_t channels, T* out) const {
+  const Picture<T> picture(faces_, job, m);
+  const T* l = job.light.empty() ? nullptr : job.light.data<T>() + 3 * m;
+  const std::size_t plane = side_ * side_;
+  for (std::size_t t = 0; t < plane; ++t) {
+    const SeenTexel seen = picture.At(texels_[t]);
     const double lit =
-        l == nullptr ? 1.0 : std::max(kLeastLight, glm::dot(n, glm::dvec3(l[0], l[1], l[2])));
-    const double values[kChannels] = {
-        seen[0] / std::max(kLeastCover, seen[3]), seen[1] / std::max(kLeastCover, seen[3]),
-        seen[2] / std::max(kLeastCover, seen[3]), seen[3],
-        glm::dot(n, eye) / glm::length(eye),      -std::log(lit)};
+        l == nullptr ? 1.0
+                     : std::max(kLeastLight, glm::dot(seen.normal, glm::dvec3(l[0], l[1], l[2])));
+    const double values[kChannels] = {seen.Color(0), seen.Color(1), seen.Color(2),
+                                      seen.rgba[3],  seen.facing,   -std::log(lit)};
     // The mirror image of column j is side / 2 - 1 - j, as scene/sphere_uv.h says.
     const std::size_t j = t % side_, other = t - j + (side_ + side_ / 2 - 1 - j) % side_;
     for (std::size_t c = 0; c < channels; ++c) {
@@ -133,6 +162,43 @@ void PictureLookup::LookAt(const Job& job, std::size_t m, std::size_t channels, 
       out[(channels + c) * plane + other] = static_cast<T>(values[c]);
     }
   }
+}
+
+// Sums over texels, by their cover and their cosine to the camera.
+struct CueSums {
+  double all = 1e-9, bright = 0, lit = 1e-9;
+  glm::dvec3 normal{0}, bright_normal{0}, lit_normal{0};
+
+  void Add(const SeenTexel& seen) {
+    const double weight = std::max(0.0, seen.facing) * seen.rgba[3];
+    const double brightness = (seen.Color(0) + seen.Color(1) + seen.Color(2)) / 3;
+    all += weight, bright += weight * brightness;
+    normal += weight * seen.normal, bright_normal += weight * brightness * seen.normal;
+    if (brightness < kBlack) return;
+    lit += weight, lit_normal += weight * seen.normal;
+  }
+  std::array<double, PictureLookup::kCues> Numbers() const {
+    const double mean = bright / all;
+    const glm::dvec3 n = normal / all, goes = (bright_normal / all - mean * n) / (mean + kBlack),
+                     where = lit_normal / lit;
+    return {n.x,        n.y,       n.z,     mean,    4 * goes.x, 4 * goes.y,
+            4 * goes.z, lit / all, where.x, where.y, where.z};
+  }
+};
+
+nn::Tensor PictureLookup::Cues(nn::Context& context, const Job& job) const {
+  const std::int64_t images = job.images.shape()[0];
+  nn::Tensor out = context.Empty({images, kCues}, job.images.dtype());
+  nn::WithFloatType(out.dtype(), [&]<class T>(T) {
+    context.workers().For(static_cast<std::size_t>(images), [&](std::size_t m, std::size_t) {
+      const Picture<T> picture(faces_, job, m);
+      CueSums sums;
+      for (const SurfacePoint& texel : texels_) sums.Add(picture.At(texel));
+      std::ranges::transform(sums.Numbers(), out.data<T>() + m * kCues,
+                             [](double x) { return static_cast<T>(x); });
+    });
+  });
+  return out;
 }
 
 nn::Tensor PictureLookup::Run(nn::Context& context, const Job& job, std::int64_t channels) const {

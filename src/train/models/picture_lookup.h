@@ -29,7 +29,7 @@ class PictureLookup {
     const nn::Tensor& images;     // [M,4,size,size], RGB over black and cover
     const nn::Tensor& positions;  // [M,V,3]
     const nn::Tensor& pose;       // [M,10]: Pose, whose rows need not be orthonormal
-    const nn::Tensor& light;      // [M,3] unit, in the axes of the camera; empty: none
+    nn::Tensor light = {};        // [M,3] unit, in the axes of the camera; empty: none
   };
   // For each texel, and then for its mirror image at x = 0: RGB (what is seen, divided by the
   // cover), the cover, n.v towards the camera (< 0: turned away), ln of 1 over the Lambert light
@@ -39,7 +39,15 @@ class PictureLookup {
   nn::Tensor Look(nn::Context& context, const Job& job) const;
   nn::Tensor Colors(nn::Context& context, const Job& job) const;
 
+  // [M, kCues]: how brightness goes with the normals that the camera sees, from which a light's
+  // direction can be read. Their mean; the mean brightness; the covariance of both, by that mean;
+  // the share that is not black; the mean normal of what is not.
+  static constexpr std::int64_t kCues = 11;
+  nn::Tensor Cues(nn::Context& context, const Job& job) const;
+
  private:
+  template <class T>
+  class Picture;  // one of a Job
   template <class T>
   void LookAt(const Job& job, std::size_t m, std::size_t channels, T* out) const;
   nn::Tensor Run(nn::Context& context, const Job& job, std::int64_t channels) const;

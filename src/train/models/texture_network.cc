@@ -146,7 +146,8 @@ void TextureNetwork::BuildHeads(Rng& rng) {
   nn::FillConstant(offsets.bias.value(), 0);
   const std::int64_t light = LightNumbers(light_.lighting), width = config_.light_width;
   if (light == 0) return;
-  AddLinear(all_.light, "in", context_, latent, width, rng);
+  AddLinear(all_.light, "in", context_, latent + (config_.lookup ? PictureLookup::kCues : 0), width,
+            rng);
   for (int i = 1; i <= kResidualPairs; ++i) {
     auto& block = all_.light.Add<nn::Residual>("block" + std::to_string(i));
     block.body.Add<nn::Activation>("act1", &nn::Relu);
@@ -212,9 +213,16 @@ nn::Var TextureNetwork::Texture(const nn::Var& latent, const nn::StepVector<nn::
   return nn::Permute(image, {0, 2, 3, 1});
 }
 
-void TextureNetwork::Light(const nn::Var& latent, nn::Mode mode, PredictedObjects* out) {
+void TextureNetwork::Light(const nn::Var& latent, const nn::Tensor& images, nn::Mode mode,
+                           PredictedObjects* out) {
   if (light_.lighting == Lighting::kNone) return;
-  const nn::Var raw = all_.light.Forward(latent, mode);
+  nn::Var from = latent;
+  if (config_.lookup) {
+    const nn::Tensor cues =
+        coarse_->Cues(context_, {images, out->positions.value(), out->pose.value()});
+    from = nn::Concat({from, nn::Constant(context_, cues)}, 1);
+  }
+  const nn::Var raw = all_.light.Forward(from, mode);
   if (light_.lighting == Lighting::kSphericalHarmonics) {
     out->sh = raw;
     return;
@@ -234,8 +242,8 @@ PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
   out.positions = out.movement + nn::Constant(context_, template_positions_);
   if (config_.normalize) out.positions = NormalizeMeshes(out.positions, kPredictionHalfExtent);
-  Light(latent, mode, &out);
   if (config_.lookup) out.pose = all_.pose.Forward(latent, mode);
+  Light(latent, levels.front().value(), mode, &out);
   out.textures = Texture(latent, levels, out, mode);
   return out;
 }

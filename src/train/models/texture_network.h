@@ -82,7 +82,7 @@ class TextureNetwork {
                   const PredictedObjects& objects, nn::Mode mode);
   nn::Var Painted(const nn::Var& map, const nn::Tensor& images, const PredictedObjects& objects,
                   nn::Mode mode);
-  void Light(const nn::Var& latent, nn::Mode mode, PredictedObjects* out);
+  void Light(const nn::Var& latent, const nn::Tensor& images, nn::Mode mode, PredictedObjects* out);
 
   nn::Context& context_;
   TextureNetworkConfig config_;
