@@ -49,5 +49,28 @@ TEST(SphereUv, MirrorImagesAreAtOneHalfMinusU) {
   EXPECT_GT(checked, 100);
 }
 
+// The point behind a texel lies on the surface in the texel's direction, poles and seam included.
+TEST(SphereUv, TexelsArePointsOfTheSurface) {
+  const Mesh sphere = Icosphere(2, 1);
+  const int width = 24, height = 12;
+  const auto texels = SphereTexels(sphere, width, height);
+  ASSERT_EQ(texels.size(), 288u);
+  for (int t = 0; t < width * height; ++t) {
+    const SurfacePoint& at = texels[static_cast<std::size_t>(t)];
+    glm::vec3 p(0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_GE(at.weights[k], 0);
+      p += at.weights[k] * sphere.positions[static_cast<std::size_t>(at.vertices[k])];
+    }
+    EXPECT_NEAR(at.weights[0] + at.weights[1] + at.weights[2], 1, 1e-5f);
+    const float length = std::hypot(p.x, p.y, p.z), turn = std::atan2(-p.z, p.x);
+    EXPECT_GT(length, 0.9f);
+    const float u = (static_cast<float>(t % width) + 0.5f) / width;
+    const float v = 1 - (static_cast<float>(t / width) + 0.5f) / height;
+    EXPECT_NEAR(turn, 6.2831853f * (u - 0.5f), 1e-4f);
+    EXPECT_NEAR(std::asin(p.y / length), 3.14159265f * (v - 0.5f), 1e-4f);
+  }
+}
+
 }  // namespace
 }  // namespace tilegrad

@@ -91,6 +91,22 @@ TEST_F(Losses, ColorIsThreeTimesThePlainMean) {
       1e-12);
 }
 
+TEST_F(Losses, HuberGradientOnBothSidesOfItsBend) {
+  const nn::Shape shape = {2, 3, 3, 2};
+  const auto truth = context_.From(shape, std::span<const double>(Uniform(36, 0, 0.4, 3)));
+  ExpectGradient([&](const nn::Var& a) { return ColorHuberLoss(a, truth, 0.3); }, shape,
+                 Uniform(36, 0, 1, 4));
+}
+
+TEST_F(Losses, HuberKnownValues) {
+  const nn::Shape shape = {1, 1, 1, 2};
+  const auto truth = context_.Zeros(shape);
+  // 0.2^2 / (2 x 0.4) and 1 - 0.2
+  EXPECT_NEAR(
+      Value([&](const nn::Var& a) { return ColorHuberLoss(a, truth, 0.4); }, shape, {0.2, -1}),
+      (0.05 + 0.8) / 2, 1e-12);
+}
+
 TEST_F(Losses, LaplacianGradient) {
   const Mesh mesh = Icosphere(1, 1);
   const Topology topology = BuildTopology(mesh.faces, mesh.positions.size());

@@ -45,6 +45,8 @@ latent = 12
 hidden = 12
 light_width = 8
 template_level = 1
+lookup = true
+lookup_width = 4
 [render]
 sharpness = 500
 sharpness_start = 100

@@ -45,5 +45,25 @@ TEST(AxisMap, EqualsReference) {
   }
 }
 
+// A nearest resize along the last axis: cuts of the work fall within rows.
+TEST(AxisMap, OneTermEachAlongTheLastAxis) {
+  Rng rng(32);
+  const std::vector<std::int32_t> begin = {0, 1, 2, 3}, index = {1, 0, 1};
+  const std::size_t outer = 20000;
+  const auto x = RandomFloats(rng, outer * 2), weight = RandomFloats(rng, 3);
+  std::vector<float> y(outer * 3);
+  const AxisMapProblem<float> problem{
+      outer, 2, 3, 1, begin.data(), index.data(), weight.data(), x.data(), y.data()};
+  const std::vector<float> want = Reference(problem, x, weight);
+  for (const auto& target : RunnableTargets()) {
+    const OnTarget on(target);
+    for (const int workers : {1, 7}) {
+      std::fill(y.begin(), y.end(), -77.0f);
+      MapAxis(problem, Workers(workers));
+      EXPECT_EQ(y, want);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tilegrad::nn

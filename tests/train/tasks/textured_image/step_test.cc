@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "nn/nn.h"
@@ -70,7 +71,9 @@ struct SmallProblem {
 
 // Central differences in float64, as in chain_test.cc: the chain is piecewise smooth, h = 1e-6,
 // gradients of single weights are 1e-4 and more. One entry in fifty may sit on a kink.
-void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config) {
+// `within`: of parameters whose names contain one of these words; all without.
+void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config,
+                                         const std::vector<std::string>& within = {""}) {
   SmallProblem p(config);
   TexturedLossValues values;
   const TexturedRenders renders = p.step.Draw(p.batch, 0);
@@ -82,6 +85,10 @@ void ExpectGradientsAgreeWithDifferences(const TexturedImageConfig& config) {
   Rng rng(9);
   int checked = 0, off = 0, moving = 0;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (std::ranges::none_of(within, [&](const std::string& word) {
+          return parameters[i].name.find(word) != std::string::npos;
+        }))
+      continue;
     nn::Tensor& weight = parameters[i].value.value();
     for (int k = 0; k < 3; ++k, ++checked) {
       const std::size_t at = rng.Below(weight.elements());
@@ -123,6 +130,40 @@ TEST(TexturedStep, GradientsWithoutLightAndSkips) {
   TexturedImageConfig config = TinyConfig("none");
   config.network.skips = false, config.network.wrap = false, config.network.symmetric = false;
   ExpectGradientsAgreeWithDifferences(config);
+}
+
+TexturedImageConfig LookupConfig() {
+  TexturedImageConfig config = TinyConfig("lambert");
+  config.network.lookup = true, config.network.lookup_width = 4;
+  config.network.skips = false, config.network.normalize = false;
+  config.color = {.masked = true, .soft = 0.3, .own = 0.3, .pose = 2};
+  return config;
+}
+
+// What is looked up has no gradient: what decides where (shape, camera, light) is left out.
+TEST(TexturedStep, GradientsOfWhatMixesLookedUpColors) {
+  ExpectGradientsAgreeWithDifferences(LookupConfig(), {"paint.", "map.", ".up."});
+}
+
+TEST(TexturedStep, GradientsOfTheCamera) {
+  TexturedImageConfig config = LookupConfig();
+  config.loss.color = 0;
+  ExpectGradientsAgreeWithDifferences(config, {"unet.level", "latent.", "pose.", "shape."});
+}
+
+TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {
+  TexturedImageConfig config = TinyConfig("none");
+  config.schedule.steps = 10, config.color.from = 0.5;
+  SmallProblem p(config);
+  for (const auto& [step, counts] : {std::pair(4, false), {5, true}}) {
+    TexturedLossValues values;
+    std::vector<LossTerm> terms;
+    p.step.Loss(p.step.Draw(p.batch, step), p.batch, step, &values);
+    p.step.AddTerms(values, step, &terms);
+    EXPECT_EQ(terms[1].name, "color");
+    EXPECT_EQ(terms[1].weight > 0, counts);
+    EXPECT_GT(values.color, 0);
+  }
 }
 
 // Image 2m shows the view of input m, image 2m + 1 the other view of its object.
