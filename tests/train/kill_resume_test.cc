@@ -171,6 +171,18 @@ TEST_F(KillResume, TwoKillsWithTexturesAndLight) {
   CheckKills(2);
 }
 
+TEST_F(KillResume, TwoKillsWithACritic) {
+  Write("tiny.toml", kTinyTextured);
+  settings_ = {"--set", "adversarial.weight=0.5",
+               "--set", "adversarial.features=1",
+               "--set", "adversarial.base=4",
+               "--set", "adversarial.halvings=2",
+               "--set", "adversarial.updates=2",
+               "--set", "adversarial.learning_rate=1e-3",
+               "--set", "adversarial.place=interpolates"};
+  CheckKills(2);
+}
+
 TEST_F(KillResume, LongTenKills) {
   steps_ = 1000;
   CheckKills(10);

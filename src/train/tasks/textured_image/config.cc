@@ -60,9 +60,11 @@ ConfigFields FieldsOf(TexturedImageConfig* c) {
   std::erase_if(render, [](const ConfigField& field) { return field.key == "render.rule"; });
   ConfigFields fields;
   for (const ConfigFields& more :
-       {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->color), render, FieldsOf(&c->light),
-        FieldsOf(&c->optimizer),
-        ConfigFields{{"schedule.batch", &c->batch, 1, 65536,
+       {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->color), FieldsOf(&c->adversary),
+        render, FieldsOf(&c->light), FieldsOf(&c->optimizer),
+        ConfigFields{{"start.run", &c->start, 0, 0,
+                      "folder of a run whose network this one starts as; \"\": a new one"},
+                     {"schedule.batch", &c->batch, 1, 65536,
                       "objects a step, each in two views under two lights"}},
         FieldsOf(&c->stream)})
     fields.insert(fields.end(), more.begin(), more.end());

@@ -6,6 +6,7 @@
 #include "train/data/stream/textured_stream.h"
 #include "train/models/texture_network.h"
 #include "train/tasks/common_config.h"
+#include "train/tasks/textured_image/adversary.h"
 
 namespace tilegrad::train {
 
@@ -25,6 +26,8 @@ struct TexturedImageConfig {
   TextureNetworkConfig network;
   LossConfig loss;
   ColorRule color;
+  AdversaryConfig adversary;
+  std::string start;    // a run, or checkpoint, whose network this one starts as; empty: as new
   RenderConfig render;  // its rule is ours
   LightConfig light;
   TexturedStreamConfig stream;

@@ -113,18 +113,32 @@ LossConfig TexturedStep::WeightsAt(std::int64_t step) const {
 
 // The truth is over black, so cover times colour is what a prediction without an outline of its own
 // would look like.
+nn::Var TexturedStep::Covered(const nn::Var& colors, const TexturedBatch& batch) const {
+  if (!config_.color.masked) return colors;
+  const nn::Shape& shape = batch.truth_alpha.shape();
+  return colors *
+         nn::Reshape(nn::Constant(context_, batch.truth_alpha), {shape[0], 1, shape[1], shape[2]});
+}
+
+// Of the views that textures were not predicted from: there they are most in need of it, and half
+// as many pictures cost half as much.
+nn::Var TexturedStep::AdversaryLoss(const RenderedImages& images, const TexturedBatch& batch,
+                                    Adversary::Values* values) const {
+  std::vector<std::int32_t> others;
+  for (std::size_t n = 1; n < batch.cameras.size(); n += kViewsOfObject)
+    others.push_back(static_cast<std::int32_t>(n));
+  const nn::Tensor which = context_.Indices(others);
+  const nn::Var truth = nn::Gather(nn::Constant(context_, batch.truth_colors), 0, which);
+  return adversary_->GeneratorLoss(nn::Gather(Covered(images.colors, batch), 0, which),
+                                   truth.value(), values);
+}
+
 nn::Var TexturedStep::ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
                                 std::int64_t step) const {
-  const nn::Shape& shape = batch.truth_alpha.shape();
-  nn::Var predicted = images.colors;
+  nn::Var predicted = Covered(images.colors, batch);
   nn::Tensor truth = batch.truth_colors;
-  if (config_.color.masked) {
-    const nn::Var cover =
-        nn::Reshape(nn::Constant(context_, batch.truth_alpha), {shape[0], 1, shape[1], shape[2]});
-    predicted = cover * predicted;
-  }
   if (config_.color.own != 1) {
-    const nn::Var weights = ViewWeights(context_, shape[0], config_.color.own);
+    const nn::Var weights = ViewWeights(context_, truth.shape()[0], config_.color.own);
     predicted = weights * predicted;
     truth = (weights * nn::Constant(context_, truth)).value();
   }
@@ -157,11 +171,17 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
   const LossConfig w = WeightsAt(step);
   nn::Var total =
       w.iou * iou + w.color * color + w.smoothness * smoothness + w.laplacian * laplacian;
-  *values = {total.item(), iou.item(), color.item(), smoothness.item(), laplacian.item()};
+  *values = {};
+  values->total = total.item(), values->iou = iou.item(), values->color = color.item();
+  values->smoothness = smoothness.item(), values->laplacian = laplacian.item();
   if (objects.pose.valid()) {
     const nn::Var pose = PoseLoss(objects.pose, batch);
     total = total + config_.color.pose * pose;
     values->pose = pose.item(), values->total = total.item();
+  }
+  if (adversary_ != nullptr) {
+    const nn::Var more = AdversaryLoss(renders.images, batch, &values->adversary);
+    if (more.has_context()) total = total + more, values->total = total.item();
   }
   const Lighting lighting = LightingOf(config_.light);
   if (lighting == Lighting::kNone || !objects.positions.valid()) return total;
@@ -181,6 +201,7 @@ void TexturedStep::AddTerms(const TexturedLossValues& v, std::int64_t step,
   terms->push_back({"smoothness", w.smoothness, v.smoothness});
   terms->push_back({"laplacian", w.laplacian, v.laplacian});
   if (config_.network.lookup) terms->push_back({"pose", config_.color.pose, v.pose});
+  if (adversary_ != nullptr) adversary_->AddTerms(v.adversary, terms);
   if (LightingOf(config_.light) != Lighting::kNone)
     terms->push_back({"light_angle", 0, v.light_angle});
 }

@@ -18,7 +18,8 @@ namespace tilegrad::train {
 
 struct TexturedLossValues {
   double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0,
-         pose = 0;         // the parts are unweighted
+         pose = 0;  // the parts are unweighted
+  Adversary::Values adversary;
   double light_angle = 0;  // degrees, mean over the inputs; watched, not learned from
 };
 
@@ -43,6 +44,9 @@ class TexturedStep {
   void AddTerms(const TexturedLossValues& values, std::int64_t step,
                 std::vector<LossTerm>* terms) const;
 
+  // Its terms join Loss; without one there are none. `adversary` outlives the steps.
+  void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
+
   TextureNetwork& network() { return network_; }
   LearnedWeights& weights() { return weights_; }
 
@@ -50,6 +54,9 @@ class TexturedStep {
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
   double ShareOfRun(std::int64_t step) const;
   LossConfig WeightsAt(std::int64_t step) const;
+  nn::Var Covered(const nn::Var& colors, const TexturedBatch& batch) const;
+  nn::Var AdversaryLoss(const RenderedImages& images, const TexturedBatch& batch,
+                        Adversary::Values* values) const;
   nn::Var PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const;
   nn::Var ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
                     std::int64_t step) const;
@@ -61,6 +68,7 @@ class TexturedStep {
   LearnedWeights weights_;
   Topology topology_;
   SceneRenderer renderer_;
+  Adversary* adversary_ = nullptr;
 };
 
 // Degrees between two directions, neither 0.

@@ -27,6 +27,11 @@ class TexturedImageTask : public Task {
             {"smoothness", "Smoothness (normals of neighbouring faces)"},
             {"laplacian", "Laplacian of the movement"},
             {"pose", "Camera (mean square error of its numbers)"},
+            {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
+            {"critic_features", "Features of the critic (L1)"},
+            {"perceptual", "Features of a trained network (L1)"},
+            {"critic_distance", "How far the critic tells true from rendered pictures"},
+            {"critic_penalty", "Gradient penalty of the critic"},
             {"light_angle", "Angle of the light (degrees, not learned from)"}};
   }
 
@@ -36,13 +41,21 @@ class TexturedImageTask : public Task {
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  // The network's, then those of its critic, on the same pictures.
+  int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->weights().Update(gradients, at.step);
+    return at.update == 0 ? step_->weights().Update(gradients, at.step)
+                          : adversary_->UpdateCritic(gradients);
   }
 
-  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
+  std::vector<nn::NamedTensor> State() override {
+    std::vector<nn::NamedTensor> state = step_->weights().State();
+    for (const nn::NamedTensor& tensor : adversary_->State()) state.push_back(tensor);
+    return state;
+  }
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
-    return step_->weights().LoadState(state, steps);
+    TILEGRAD_TRY(step_->weights().LoadState(state, steps));
+    return adversary_->LoadState(state);
   }
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
@@ -58,6 +71,7 @@ class TexturedImageTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
+  Status StartAs(const Path& run);
   ObjectPictures Pictures(int size) const {
     return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
   }
@@ -69,6 +83,7 @@ class TexturedImageTask : public Task {
   std::optional<TexturedStream> stream_;
   std::optional<HeldOutViews> held_out_;  // for sample pictures
   std::optional<BatchOrder> order_;
+  std::unique_ptr<Adversary> adversary_;
   std::optional<TexturedStep> step_;
 };
 
@@ -94,13 +109,23 @@ Status TexturedImageTask::Start(const TaskStart& start) {
                   meshes_, workers);
   order_.emplace(static_cast<int>(train.size()), 1, seed);
   step_.emplace(*context_, config_, image_size());
+  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary, seed));
+  step_->SetAdversary(adversary_.get());
   return {};
+}
+
+// With the weights that predict there, and an optimiser that has taken no step.
+Status TexturedImageTask::StartAs(const Path& run) {
+  TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(*context_, run));
+  return LoadPredictingWeights(step_->network().module(), found.checkpoint.tensors)
+      .Within(run.string());
 }
 
 Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
   TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
                                      first_step == 0 ? RunStart::kNew : RunStart::kContinued));
   if (first_step > 0) return {};
+  if (!config_.start.empty()) TILEGRAD_TRY(StartAs(config_.start));
   TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
   return io::SavePng(run / "stream.png", sheet);
 }
@@ -115,6 +140,7 @@ RunHeader TexturedImageTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateIndex& at,
                                                                  StepValues* out) {
+  if (at.update > 0) return adversary_->CriticGradients({at.step, at.update - 1}, &out->terms);
   const auto models = order_->Batch(at.step, static_cast<int>(config_.batch), 1);
   TILEGRAD_ASSIGN(const TexturedBatch batch,
                   RenderBatch(*context_, *stream_, image_size(), models, at.step));

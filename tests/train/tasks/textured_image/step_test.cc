@@ -49,6 +49,7 @@ struct SmallProblem {
   std::vector<TexturedMesh> meshes = Balls();
   TexturedStream stream;
   TexturedStep step;
+  std::unique_ptr<Adversary> adversary;
   TexturedBatch batch;
 
   explicit SmallProblem(const TexturedImageConfig& c)
@@ -56,6 +57,10 @@ struct SmallProblem {
     auto drawn = RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 3);
     EXPECT_TRUE(drawn.ok()) << drawn.status().message();
     batch = std::move(*drawn);
+    auto made = Adversary::Make(context, c.adversary, 5);
+    EXPECT_TRUE(made.ok()) << made.status().message();
+    adversary = std::move(*made);
+    step.SetAdversary(adversary.get());
   }
   static TexturedStream::Job JobOf(const TexturedImageConfig& config) {
     TexturedStream::Job job{config.stream, config.light, {}, kSize, 1};
@@ -149,6 +154,69 @@ TEST(TexturedStep, GradientsOfTheCamera) {
   TexturedImageConfig config = LookupConfig();
   config.loss.color = 0;
   ExpectGradientsAgreeWithDifferences(config, {"unet.level", "latent.", "pose.", "shape."});
+}
+
+TexturedImageConfig AdversarialConfig() {
+  TexturedImageConfig config = TinyConfig("lambert");
+  config.adversary = {.weight = 3, .features = 2, .base = 3, .halvings = 2};
+  return config;
+}
+
+// Of the network: through critic and renderer.
+TEST(TexturedStep, GradientsOfTheAdversarialLoss) {
+  ExpectGradientsAgreeWithDifferences(AdversarialConfig());
+}
+
+// Of the critic: its penalty is a derivative at the rendered picture already. Central differences
+// in float64; leaky rectifiers kink, so one entry in ten may be off.
+TEST(TexturedStep, GradientsOfTheCriticAtTheRenderedPicture) {
+  for (const char* place : {"rendered", "interpolates"}) {
+    TexturedImageConfig config = AdversarialConfig();
+    config.adversary.place = place, config.adversary.penalty = 4;
+    SmallProblem p(config);
+    p.LossNow();
+    std::vector<LossTerm> terms;
+    const auto gradients = p.adversary->CriticGradients({2, 0}, &terms);
+    ASSERT_TRUE(gradients.ok()) << gradients.status().message();
+    ASSERT_EQ(terms.size(), 2u);
+    const auto loss = [&] {
+      std::vector<LossTerm> now;
+      EXPECT_TRUE(p.adversary->CriticGradients({2, 0}, &now).ok());
+      return 4 * now[1].value - now[0].value;
+    };
+    std::vector<nn::NamedVar> parameters = nn::Parameters(*p.adversary->critic());
+    Rng rng(4);
+    int off = 0, checked = 0;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      nn::Tensor& weight = parameters[i].value.value();
+      for (int k = 0; k < 4; ++k, ++checked) {
+        const std::size_t at = rng.Below(weight.elements());
+        const double h = 1e-6, before = weight.data<double>()[at];
+        weight.data<double>()[at] = before + h;
+        const double up = loss();
+        weight.data<double>()[at] = before - h;
+        const double down = loss();
+        weight.data<double>()[at] = before;
+        const double want = (up - down) / (2 * h);
+        const double got = (*gradients)[i].Value().value().data<double>()[at];
+        off += std::abs(got - want) <= 1e-5 * std::abs(want) + 1e-8 ? 0 : 1;
+      }
+    }
+    EXPECT_LE(off, checked / 10) << place;
+    EXPECT_GT(checked, 20);
+  }
+}
+
+TEST(Adversary, RefusesWordsAndMissingFiles) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  EXPECT_NE(Adversary::Make(context, {.place = "there"}, 1).status().message().find("\"there\""),
+            std::string::npos);
+  EXPECT_NE(Adversary::Make(context, {.perceptual = 1}, 1).status().message().find("network_file"),
+            std::string::npos);
+  AdversaryConfig absent{.perceptual = 1};
+  absent.network_file = "/no/such/run";
+  EXPECT_FALSE(Adversary::Make(context, absent, 1).ok());
 }
 
 TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {

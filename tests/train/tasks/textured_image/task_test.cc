@@ -22,13 +22,14 @@ class TexturedTask : public TempFolderTest {
     std::filesystem::create_directories(folder_ / "data");
     EXPECT_TRUE(WriteNoiseDataset(folder_ / "data", Meshes::kBoxes).ok());
   }
+  Path run_ = folder_ / "run";  // that Train makes
   void Train(const std::string& more) {
     TrainJob job;
     auto config = ParseConfig(std::string(kTinyTextured) + more, "tiny.toml");
     ASSERT_TRUE(config.ok()) << config.status().message();
     job.config = std::move(*config);
     ValueOf<std::int64_t>(job.config, "schedule.steps") = 12;
-    job.data = folder_ / "data", job.run = folder_ / "run";
+    job.data = folder_ / "data", job.run = run_;
     const auto outcome = train::Train(job, workers_, kSilent, stop_);
     ASSERT_TRUE(outcome.ok()) << outcome.status().message();
     EXPECT_TRUE(outcome->finished);
@@ -89,6 +90,47 @@ TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
   ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
   ASSERT_EQ(evaluation->rows.size(), 1u);
   EXPECT_FALSE(evaluation->rows[0].mean.light_angle);
+}
+
+// The second stage of section 5.3 goes on from the network of the first.
+TEST_F(TexturedTask, StartsAsTheNetworkOfAnotherRun) {
+  ASSERT_NO_FATAL_FAILURE(Train(""));
+  const std::string first = run_.string();
+  run_ = folder_ / "second";
+  ASSERT_NO_FATAL_FAILURE(Train("[start]\nrun = \"" + first +
+                                "\"\n[optimizer]\nlearning_rate = 0\n[adversarial]\nweight = "
+                                "0.5\nbase = 4\nhalvings = 2\nlearning_rate = 1e-3\n"));
+  nn::Context context(workers_);
+  const auto before = FindCheckpoint(context, first), after = FindCheckpoint(context, run_);
+  ASSERT_TRUE(before.ok() && after.ok());
+  int same = 0, critic = 0;
+  for (const nn::NamedTensor& tensor : before->checkpoint.tensors) {
+    if (tensor.name.starts_with("adam") || tensor.name.find("running_") != std::string::npos)
+      continue;
+    const nn::Tensor* now = nn::Find(after->checkpoint.tensors, tensor.name);
+    ASSERT_NE(now, nullptr) << tensor.name;
+    const auto a = tensor.value.span<float>(), b = now->span<float>();
+    EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << tensor.name;
+    ++same;
+  }
+  for (const nn::NamedTensor& tensor : after->checkpoint.tensors)
+    critic += tensor.name.starts_with("critic.adam.m") ? 1 : 0;
+  EXPECT_GT(same, 20);
+  EXPECT_EQ(critic, 6);  // weights and biases of two halvings and the scores
+  const auto log = ReadLog(run_);
+  ASSERT_TRUE(log.ok());
+  std::string names;
+  for (const auto& value : log->back().values) names += value.first + " ";
+  EXPECT_NE(names.find("adversarial "), std::string::npos) << names;
+  EXPECT_NE(names.find("critic_distance critic_penalty "), std::string::npos) << names;
+}
+
+TEST_F(TexturedTask, StartingAsARunThatIsNotThereIsAnError) {
+  TrainJob job;
+  job.config =
+      ParseConfig(std::string(kTinyTextured) + "[start]\nrun = \"/no/run\"\n", "t").value();
+  job.data = folder_ / "data", job.run = run_;
+  ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "/no/run");
 }
 
 // The files of configs/ name keys that there are, and sizes that go with their images.

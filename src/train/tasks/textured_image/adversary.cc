@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/textured_image/adversary.h"
+
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/tasks/classify/perceptual_network.h"
+
+namespace tilegrad::train {
+namespace {
+
+const std::string kPrefix = "critic.";
+constexpr std::uint64_t kWeightStream = 0x637269746963, kPenaltyStream = 0x70656e616c7479;
+
+}  // namespace
+
+ConfigFields FieldsOf(AdversaryConfig* c) {
+  return {
+      {"adversarial.weight", &c->weight, 0, kNoLimit, "of equation 15; 0.5 in the paper"},
+      {"adversarial.features", &c->features, 0, kNoLimit,
+       "weight of the difference of the critic's features"},
+      {"adversarial.perceptual", &c->perceptual, 0, kNoLimit,
+       "weight of the difference of a trained network's features; 1 in the paper"},
+      {"adversarial.network", &c->network, 0, 0,
+       "that network: \"classify\", \"vgg16\", \"alexnet\" or \"squeezenet\""},
+      {"adversarial.network_file", &c->network_file, 0, 0,
+       "its run folder, or the safetensors file of its weights"},
+      {"adversarial.penalty", &c->penalty, 0, kNoLimit, "weight of the gradient penalty"},
+      {"adversarial.place", &c->place, 0, 0,
+       "of the penalty: at \"rendered\" pictures or at \"interpolates\""},
+      {"adversarial.learning_rate", &c->learning_rate, 0, 1, "of the critic's Adam"},
+      {"adversarial.beta1", &c->beta1, 0, 0.999999, "of the critic's Adam"},
+      {"adversarial.beta2", &c->beta2, 0, 0.99999999, "of the critic's Adam"},
+      {"adversarial.base", &c->base, 1, 4096, "the critic's channels at half size; they double"},
+      {"adversarial.halvings", &c->halvings, 1, 8, "of the critic"},
+      {"adversarial.updates", &c->updates, 1, 100, "of the critic in each step"},
+  };
+}
+
+Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed)
+    : context_(context), config_(config), seed_(seed) {
+  if (!config.HasCritic()) return;
+  Rng rng(seed, kWeightStream);
+  critic_.emplace(
+      context, nn::CriticShape{.base = config.base, .halvings = static_cast<int>(config.halvings)},
+      rng);
+  adam_.emplace(
+      context, nn::Parameters(*critic_),
+      nn::AdamOptions{
+          .learning_rate = config.learning_rate, .beta1 = config.beta1, .beta2 = config.beta2});
+}
+
+Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
+                                                   const AdversaryConfig& config,
+                                                   std::uint64_t seed) {
+  TILEGRAD_ASSIGN(const PenaltyPlace place, PenaltyPlaceOf(config.place));
+  auto out = std::unique_ptr<Adversary>(new Adversary(context, config, seed));
+  out->place_ = place;
+  if (config.perceptual == 0) return out;
+  if (config.network_file.empty()) {
+    return InvalidArgument(
+        "adversarial.perceptual needs adversarial.network_file, e.g. the folder of a run of "
+        "configs/classify.toml");
+  }
+  TILEGRAD_ASSIGN(out->perceptual_,
+                  LoadPerceptualNetwork(context, {config.network, config.network_file}));
+  return out;
+}
+
+nn::Var Adversary::GeneratorLoss(const nn::Var& rendered, const nn::Tensor& truth, Values* values) {
+  nn::Var total;
+  const auto add = [&](double weight, const nn::Var& term, double* value) {
+    *value = term.item();
+    total = total.has_context() ? total + weight * term : weight * term;
+  };
+  rendered_ = rendered.value(), truth_ = truth;
+  if (config_.weight > 0)
+    add(config_.weight, WganGeneratorLoss(*critic_, rendered), &values->adversarial);
+  if (config_.features > 0)
+    add(config_.features, FeatureL1Loss(FeaturesOf(*critic_), rendered, truth), &values->features);
+  if (config_.perceptual > 0)
+    add(config_.perceptual, FeatureL1Loss(perceptual_, rendered, truth), &values->perceptual);
+  return total;
+}
+
+void Adversary::AddTerms(const Values& v, std::vector<LossTerm>* terms) const {
+  if (config_.weight > 0) terms->push_back({"adversarial", config_.weight, v.adversarial});
+  if (config_.features > 0) terms->push_back({"critic_features", config_.features, v.features});
+  if (config_.perceptual > 0) terms->push_back({"perceptual", config_.perceptual, v.perceptual});
+}
+
+Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep& at,
+                                                                std::vector<LossTerm>* terms) {
+  Rng rng(seed_ ^ kPenaltyStream,
+          static_cast<std::uint64_t>(at.step * config_.updates + at.update));
+  const CriticLoss loss =
+      WganCriticLoss(*critic_, nn::Constant(context_, truth_), nn::Constant(context_, rendered_),
+                     {.penalty = config_.penalty, .place = place_}, rng);
+  auto gradients = nn::Gradients(loss.total, adam_->parameters());
+  TILEGRAD_TRY(context_.TakeStatus());
+  if (!std::isfinite(loss.total.item()) || !nn::IsFinite(context_, gradients)) {
+    return InternalError(
+        "the critic's loss is {}; a smaller adversarial.learning_rate or a larger "
+        "adversarial.penalty may help",
+        loss.total.item());
+  }
+  if (at.update > 0) return gradients;
+  terms->push_back({"critic_distance", 0, loss.wasserstein.item()});
+  if (config_.penalty > 0) terms->push_back({"critic_penalty", 0, loss.penalty.item()});
+  return gradients;
+}
+
+std::vector<nn::NamedTensor> Adversary::State() {
+  if (!critic_) return {};
+  std::vector<nn::NamedTensor> out = nn::State(*critic_);
+  for (const nn::NamedTensor& moment : adam_->State()) out.push_back(moment);
+  for (nn::NamedTensor& tensor : out) tensor.name = kPrefix + tensor.name;
+  return out;
+}
+
+Status Adversary::LoadState(const std::vector<nn::NamedTensor>& state) {
+  if (!critic_) return {};
+  std::vector<nn::NamedTensor> own;
+  for (const nn::NamedTensor& tensor : state) {
+    if (tensor.name.starts_with(kPrefix))
+      own.push_back({tensor.name.substr(kPrefix.size()), tensor.value});
+  }
+  TILEGRAD_TRY(nn::LoadState(*critic_, own));
+  return adam_->LoadState(own);
+}
+
+}  // namespace tilegrad::train

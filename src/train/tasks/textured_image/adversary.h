@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Section 5.3: what sharpens textures beside equation 14. A critic that learns to tell rendered
+// pictures from true ones (equation 15), features of the critic, and features of a network trained
+// beforehand (equation 16).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nn/networks/gan.h"
+#include "nn/optim.h"
+#include "train/losses/feature_l1.h"
+#include "train/losses/wgan_gp.h"
+#include "train/run/config_fields.h"
+#include "train/run/step_values.h"
+
+namespace tilegrad::train {
+
+// Weights of 0 leave a part out. Section 5.3 has 0.5, 1, 1, a penalty of 0.5 and a rate of 1e-5.
+struct AdversaryConfig {
+  double weight = 0;                 // lambda_adv
+  double features = 0;               // of the critic's features
+  double perceptual = 0;             // lambda_per
+  std::string network = "classify";  // PerceptualSource
+  std::string network_file = {};
+  double penalty = 0.5;
+  std::string place = "rendered";                           // PenaltyPlace
+  double learning_rate = 1e-5, beta1 = 0.5, beta2 = 0.999;  // of the critic's Adam
+  std::int64_t base = 32, halvings = 4;                     // CriticShape
+  std::int64_t updates = 1;                                 // of the critic, each step
+
+  bool HasCritic() const { return weight > 0 || features > 0; }
+};
+
+ConfigFields FieldsOf(AdversaryConfig* config);
+
+class Adversary {
+ public:
+  // Errors: a word that is not known, a perceptual network that cannot be read.
+  static Result<std::unique_ptr<Adversary>> Make(nn::Context& context,
+                                                 const AdversaryConfig& config, std::uint64_t seed);
+
+  struct Values {
+    double adversarial = 0, features = 0, perceptual = 0;  // unweighted
+  };
+  // The three terms, weighted, of pictures [n, 3, size, size]; an invalid Var if none counts.
+  // Numbers of both are kept for the critic's updates, which come after this one.
+  nn::Var GeneratorLoss(const nn::Var& rendered, const nn::Tensor& truth, Values* values);
+  void AddTerms(const Values& values, std::vector<LossTerm>* terms) const;
+
+  // Updates of the critic in each step; 0 without one.
+  int updates() const { return critic_ ? static_cast<int>(config_.updates) : 0; }
+  struct CriticStep {
+    std::int64_t step = 0;
+    int update = 0;  // of the critic, from 0
+  };
+  // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
+  Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at,
+                                                       std::vector<LossTerm>* terms);
+  Status UpdateCritic(std::span<const nn::Gradient> gradients) { return adam_->Step(gradients); }
+
+  // Of the critic: weights and moments, as "critic...".
+  std::vector<nn::NamedTensor> State();
+  Status LoadState(const std::vector<nn::NamedTensor>& state);
+  nn::Critic* critic() { return critic_ ? &*critic_ : nullptr; }
+
+ private:
+  Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed);
+
+  nn::Context& context_;
+  AdversaryConfig config_;
+  std::uint64_t seed_;
+  PenaltyPlace place_ = PenaltyPlace::kRendered;
+  std::optional<nn::Critic> critic_;
+  std::optional<nn::Adam> adam_;
+  FeatureFunction perceptual_;
+  nn::Tensor rendered_, truth_;  // of the last step
+};
+
+}  // namespace tilegrad::train
