@@ -4,6 +4,7 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "base/error.h"
@@ -125,6 +126,21 @@ void PrintIgnored(const train::BuildSummary& summary) {
   if (count > kShown) Print("  ...\n");
 }
 
+void PrintJson(const train::BuildSummary& summary, const Path& folder) {
+  int counts[3] = {};
+  for (const auto& model : summary.models) ++counts[static_cast<int>(model.split)];
+  PrintResult({{"folder", folder.string()},
+               {"models", summary.models.size()},
+               {"training", counts[0]},
+               {"validation", counts[1]},
+               {"test", counts[2]},
+               {"rejected", summary.rejected.size()},
+               {"classes", summary.info.classes},
+               {"views", summary.info.views},
+               {"image_size", summary.info.image_size},
+               {"bytes", summary.bytes}});
+}
+
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.Name() : Path(options.out);
@@ -151,6 +167,7 @@ Status Make(const DatasetOptions& options) {
     PrintNote("tilegrad: warning: {}\n", *advice);
   for (const auto& credit : summary.info.credits) Print("{}\n", credit);
   Print("look at {}\n", (folder / "contact_sheet.png").string());
+  PrintJson(summary, folder);
   return {};
 }
 

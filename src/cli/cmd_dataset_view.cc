@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output_guard.h"
@@ -92,8 +93,13 @@ Status WriteView(const ViewOptions& options) {
   TILEGRAD_TRY(WriteGuarded(OutputGuard(options.force), options.out,
                             [&] { return io::SavePng(options.out, Straighten(image, size)); }));
   const auto& info = dataset.models()[static_cast<std::size_t>(model)];
-  Print("{}: {} ({}), view {}\n", options.out, info.name,
-        dataset.info().classes[static_cast<std::size_t>(info.class_index)], options.view);
+  const std::string& of_class = dataset.info().classes[static_cast<std::size_t>(info.class_index)];
+  Print("{}: {} ({}), view {}\n", options.out, info.name, of_class, options.view);
+  PrintResult({{"image", options.out},
+               {"name", info.name},
+               {"class", of_class},
+               {"id", info.id},
+               {"view", options.view}});
   return {};
 }
 

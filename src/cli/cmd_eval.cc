@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad eval: how good a run is on models that it never saw, beside three baselines.
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output_guard.h"
@@ -63,6 +64,7 @@ Status RunEvaluation(const EvalOptions& options) {
   // Files first: printing may fail. They keep the figures of the network alone on held-out models.
   if (writes) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
   Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
+  PrintResult(train::EvaluationJson(*evaluation));
   if (!writes) return {};
   guard.NoteAll(files);
   Print("written to {} and {}\n", files[0].string(), files[1].string());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad figure2: the paper's sanity check of all gradients.
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "base/output_guard.h"
 #include "cli/command.h"
@@ -30,6 +31,7 @@ Status Run(const Options& options) {
   TILEGRAD_ASSIGN(const std::string svg, train::Figure2Svg(results));
   TILEGRAD_TRY(WriteGuarded(guard, options.out, [&] { return WriteTextAtomic(options.out, svg); }));
   Print("{}look at {}\n", train::Figure2Table(results), options.out);
+  PrintResult({{"picture", options.out}});
   return {};
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "base/error.h"
@@ -179,12 +180,39 @@ void PrintOutcome(const Options& options, const train::FitOutcome& o) {
   Print("mesh {}\nlook at {}\n", (out / "mesh.glb").string(), (out / "report.html").string());
 }
 
+nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {
+  if (scores.empty()) return nullptr;
+  return {{"views", scores.size()},
+          {"psnr", train::MeanPsnr(scores)},
+          {"silhouette_iou", train::MeanIou(scores)}};
+}
+
+void PrintJson(const Options& options, const train::FitOutcome& o) {
+  const Path out = options.out;
+  nlohmann::ordered_json json = {{"folder", out.string()},
+                                 {"steps", o.last_step},
+                                 {"seconds", o.seconds},
+                                 {"training", ScoresJson(o.training)},
+                                 {"held_out", ScoresJson(o.held_out)},
+                                 {"voxel_iou", nullptr},
+                                 {"mesh", (out / "mesh.glb").string()},
+                                 {"report", (out / "report.html").string()}};
+  if (o.voxel_iou) json["voxel_iou"] = *o.voxel_iou;
+  PrintResult(json);
+}
+
 Status Run(const Options& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   if (options.doctor) {
     TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));
     PrintFindings(findings, true);
+    nlohmann::ordered_json json;
+    for (const auto& f : findings)
+      json.push_back({{"parameter", train::NameOf(f.parameter)},
+                      {"blocked", f.blocked},
+                      {"finding", f.sentence}});
+    PrintResult(json);
     return {};
   }
   ProgressLine line;
@@ -194,6 +222,7 @@ Status Run(const Options& options) {
   if (!outcome.ok()) return outcome.status();
   PrintFindings(outcome->findings, false);
   PrintOutcome(options, *outcome);
+  PrintJson(options, *outcome);
   return {};
 }
 

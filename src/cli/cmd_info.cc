@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad info: version, SIMD targets and why one was chosen, cores.
+#include <nlohmann/json.hpp>
+
 #include "base/parallel.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
@@ -18,6 +20,11 @@ Status PrintInfo() {
   Print(
       "\nin use: {} ({})\n", ActiveTarget(),
       forced ? "forced by TILEGRAD_TARGET" : "the best; set TILEGRAD_TARGET=NAME to force another");
+  PrintResult({{"version", TILEGRAD_VERSION},
+               {"cores", AvailableCores()},
+               {"targets", RunnableTargets()},
+               {"target", ActiveTarget()},
+               {"forced", forced}});
   return {};
 }
 

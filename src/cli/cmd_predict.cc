@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad predict: a coloured mesh and pictures of it all around from each image.
+#include <nlohmann/json.hpp>
+
 #include "base/error.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
@@ -97,7 +99,7 @@ Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutou
 
 Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
                   const std::pair<std::string, std::string>& image, const OutputGuard& guard,
-                  const Workers& workers) {
+                  const Workers& workers, nlohmann::ordered_json* json) {
   const auto& [file, stem] = image;
   const Path out(options.out);
   const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
@@ -120,6 +122,10 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
   TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
   guard.NoteAll(written);
   Print("{} -> {}, {}, {}\n", file, glb.string(), turntable.string(), animation.string());
+  json->push_back({{"image", file},
+                   {"mesh", glb.string()},
+                   {"turntable", turntable.string()},
+                   {"animation", animation.string()}});
   return {};
 }
 
@@ -134,12 +140,14 @@ Status RunPrediction(const PredictOptions& options) {
   OutputGuard guard(options.force);
   for (const std::string& image : options.images) guard.AddInput(image);
   guard.AddInput(options.mask);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(network, options, image, guard, workers);
+    const Status status = PredictOne(network, options, image, guard, workers, &json);
     if (status.ok()) continue;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
   }
+  PrintResult(json);
   return first;
 }
 

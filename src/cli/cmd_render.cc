@@ -2,6 +2,7 @@
 // tilegrad render: pictures of mesh files.
 #include <fmt/core.h>
 
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "base/error.h"
@@ -105,8 +106,7 @@ class RenderRun {
   std::vector<io::CameraView> views_;  // of all pictures, as they are named
   glm::dvec3 origin_{0};               // of the mesh that is rendered, see LoadedMesh
   std::set<Path> files_;               // that are written, or will be
-  std::size_t written_ = 0;
-  Path last_;
+  std::vector<Path> rendered_;         // those that are there
 };
 
 FaceCulling RenderRun::Culling(const MeshScene& scene) const {
@@ -155,7 +155,7 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
   const std::vector<Path> files = PictureFiles(settings_.file, name);
   guard_.NoteAll(files);
-  written_ += files.size(), last_ = files.back();
+  rendered_.insert(rendered_.end(), files.begin(), files.end());
   if (settings_.explain) Explain(picture, name.stem.string());
   views_.push_back(
       {name.stem.filename().string() + name.ending, MovedCamera(view.camera, origin_), view.size});
@@ -176,7 +176,7 @@ Status RenderRun::Mesh(const std::string& file) {
   TILEGRAD_ASSIGN(const auto names, NamePictures(stem, *views));
   const MeshScene scene(loaded.mesh, SceneOptionsOf(settings_));
   for (std::size_t i = 0; i < views->size(); ++i) {
-    if (stop_) return Cancelled("stopped after {}", Count(written_, "file"));
+    if (stop_) return Cancelled("stopped after {}", Count(rendered_.size(), "file"));
     line_.Sink()({"rendering " + stem, i, views->size(), ""});
     TILEGRAD_TRY(View(scene, (*views)[i], names[i]).Within(file));
   }
@@ -199,8 +199,12 @@ Result<std::vector<PictureName>> RenderRun::NamePictures(const std::string& stem
 
 Status RenderRun::Finish() {
   line_.Finish();
-  if (written_ == 1) Print("wrote {}\n", last_.string());
-  if (written_ > 1) Print("{}, the last is {}\n", Count(written_, "file"), last_.string());
+  std::vector<std::string> files;
+  for (const Path& file : rendered_) files.push_back(file.string());
+  PrintResult({{"files", files}});
+  if (rendered_.size() == 1) Print("wrote {}\n", rendered_.back().string());
+  if (rendered_.size() > 1)
+    Print("{}, the last is {}\n", Count(rendered_.size(), "file"), rendered_.back().string());
   return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad report: one page about a run.
+#include <nlohmann/json.hpp>
+
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -50,6 +52,11 @@ Status RunReport(const ReportOptions& options) {
           summary->sheet_columns);
   if (!summary->evaluated)
     Print("it has no scores yet: run tilegrad eval, then tilegrad report again\n");
+  PrintResult({{"page", job.out.string()},
+               {"sheet", summary->sheet_columns.empty() ? "" : job.sheet.string()},
+               {"models", summary->models},
+               {"bytes", summary->bytes},
+               {"evaluated", summary->evaluated}});
   return {};
 }
 

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <chrono>
 #include <exception>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/simd_target.h"
@@ -68,12 +69,16 @@ Result<selftest::Finding> RunGuarded(const Check& check, const CheckContext& con
   }
 }
 
-// Whether it holds.
-bool RunCheck(const Check& check, const CheckContext& context) {
+// Whether it holds. What it found is appended to `json`.
+bool RunCheck(const Check& check, const CheckContext& context, nlohmann::ordered_json* json) {
   const Stopwatch watch;
   const auto finding = RunGuarded(check, context);
   Print("{}  {:50} {} ({:.2f} s)\n", finding.ok() ? "ok  " : "FAIL", check.title,
         finding.ok() ? finding->text : finding.status().message(), watch.seconds());
+  json->push_back({{"check", check.title},
+                   {"holds", finding.ok()},
+                   {"found", finding.ok() ? finding->text : finding.status().message()},
+                   {"seconds", watch.seconds()}});
   std::fflush(stdout);  // a check that crashes is the one after the last line
   return finding.ok();
 }
@@ -93,6 +98,9 @@ Status RunSelftest(const SelftestOptions& options) {
   TILEGRAD_ASSIGN(const auto checks, ChooseChecks(options.only));
   if (options.list) {
     Print("{}", Titles(checks));
+    std::vector<std::string> titles;
+    for (const Check& check : checks) titles.push_back(check.title);
+    PrintResult(titles);
     return {};
   }
   const Workers workers(options.workers);
@@ -100,8 +108,11 @@ Status RunSelftest(const SelftestOptions& options) {
   const CheckContext context{workers, forced.empty() ? RunnableTargets() : std::vector{forced}};
   PrintHeader(context);
   const Stopwatch watch;
-  const auto failed = std::count_if(checks.begin(), checks.end(),
-                                    [&](const Check& check) { return !RunCheck(check, context); });
+  nlohmann::ordered_json json;
+  const auto failed = std::count_if(checks.begin(), checks.end(), [&](const Check& check) {
+    return !RunCheck(check, context, &json);
+  });
+  PrintResult(json);
   if (failed == 0) {
     Print("all {} checks hold ({:.1f} s)\n", checks.size(), watch.seconds());
     return {};

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "base/output_guard.h"
@@ -16,7 +17,7 @@ namespace tilegrad::cli {
 namespace {
 
 struct TradeoffOptions {
-  std::string mesh, out = "tradeoff", data, config = "configs/quick.toml";
+  std::string mesh, out = "tradeoff", data, config = "quick";
   int size = 256, repetitions = 7, steps = 1000, workers = 0;
   bool force = false;
   std::vector<double> errors = {0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
@@ -45,6 +46,9 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   guard.NoteAll(StudyFiles(folder, !training.empty()));
   Print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables, folder.string(),
         training.empty() ? "" : ", training.csv");
+  PrintResult({{"folder", folder.string()},
+               {"files", {"tradeoff.md", "tradeoff.csv", "tradeoff.svg"}},
+               {"trained", !training.empty()}});
   std::error_code error;
   if (training.empty() && std::filesystem::exists(folder / "training.csv", error)) {
     Print("training.csv there is of an earlier call\n");

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad train: a run from a configuration and a dataset.
+#include <nlohmann/json.hpp>
+
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/option_checks.h"
 #include "cli/run_folder.h"
+#include "train/named_configs.h"
 #include "train/trainer.h"
 
 namespace tilegrad::cli {
@@ -29,9 +32,17 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options)
   if (!outcome.finished) Print("continue with the same command and --resume\n");
 }
 
+void PrintJson(const train::RunOutcome& outcome, const TrainOptions& options) {
+  PrintResult({{"run", options.out},
+               {"first_step", outcome.first_step},
+               {"last_step", outcome.last_step},
+               {"finished", outcome.finished},
+               {"seconds", outcome.seconds}});
+}
+
 Status RunTraining(const TrainOptions& options) {
   train::TrainJob job;
-  TILEGRAD_ASSIGN(job.config, train::ReadConfig(options.config));
+  TILEGRAD_ASSIGN(job.config, train::FindConfig(options.config));
   TILEGRAD_TRY(train::ApplyOverrides(options.overrides, &job.config));
   TILEGRAD_TRY(CheckRunFolder(options.out, OutputGuard(options.force)));
   job.data = options.data;
@@ -45,6 +56,7 @@ Status RunTraining(const TrainOptions& options) {
   line.Finish();
   if (!outcome.ok()) return outcome.status();
   PrintOutcome(*outcome, options);
+  PrintJson(*outcome, options);
   return {};
 }
 
@@ -55,7 +67,7 @@ void AddTrain(CLI::App& app, Action* action) {
   auto* command = app.add_subcommand("train", "Train what a configuration names on a dataset");
   command
       ->add_option("--config", options->config,
-                   "TOML file, e.g. configs/quick.toml or configs/paper.toml")
+                   "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file")
       ->required();
   command->add_option("--data", options->data, "dataset folder (see: tilegrad dataset)")
       ->required();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad views: images of a mesh from all around, with their cameras.
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/console.h"
@@ -32,6 +33,9 @@ Status Run(const Options& options) {
   line.Finish();
   Print("{}: {} to fit, {} held out, the mesh as truth.glb\n", options.out,
         Count(static_cast<std::size_t>(options.views.views), "image"), options.views.held_out);
+  PrintResult({{"folder", options.out},
+               {"views", options.views.views},
+               {"held_out", options.views.held_out}});
   return {};
 }
 

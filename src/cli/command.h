@@ -15,12 +15,15 @@ namespace tilegrad::cli {
 using Action = std::function<Status()>;
 
 // Adds a subcommand to `app`; when it is given on the command line, sets *action.
+void AddCompletion(CLI::App& app, Action* action);
+void AddConfigs(CLI::App& app, Action* action);
 void AddDataset(CLI::App& app, Action* action);
 void AddDatasetView(CLI::App& app, Action* action);
 void AddEval(CLI::App& app, Action* action);
 void AddFigure2(CLI::App& app, Action* action);
 void AddFit(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
+void AddMan(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
 void AddRender(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);

@@ -7,6 +7,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
 #include "io/guarded_process.h"
@@ -18,6 +19,8 @@ constexpr double kSilentSeconds = 2, kTerminalInterval = 0.2, kLogInterval = 10;
 
 StopFlag g_stop = false;  // a signal handler can reach nothing but a global
 volatile std::sig_atomic_t g_signal = SIGINT;
+
+bool g_quiet = false, g_json = false;  // of this process, set by its command line
 
 extern "C" void HandleStop(int signal) {
   g_signal = signal;
@@ -34,6 +37,19 @@ double Seconds(std::chrono::steady_clock::duration d) {
 }
 
 }  // namespace
+
+Speech SpeechNow() { return g_json ? Speech::kJson : g_quiet ? Speech::kQuiet : Speech::kFull; }
+
+void AddSpeechOptions(CLI::App* command) {
+  command->add_flag("--quiet", g_quiet, "print warnings and errors only, no progress");
+  command->add_flag("--json", g_json,
+                    "print one JSON object on standard output at the end, for programs");
+}
+
+void PrintResult(const nlohmann::ordered_json& result) {
+  if (!g_json) return;
+  fmt::print("{}\n", result.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
 
 void OpenStandardStreams() {
   int fd = 0;
@@ -84,6 +100,7 @@ WarningSink ProgressLine::Warnings() {
 void ProgressLine::Show(const Progress& progress) {
   const auto now = Clock::now();
   PrintThreadNotice();
+  if (g_quiet) return;
   if (progress.stage != last_.stage) {
     Finish();
     stage_start_ = last_draw_ = now;

@@ -5,8 +5,10 @@
 
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "base/escape_text.h"
@@ -14,10 +16,24 @@
 
 namespace tilegrad::cli {
 
-// As fmt::print to stdout. Names of files and models, and all else that strangers wrote, may hold
-// what a terminal would obey: it is shown instead (EscapeControls).
+// What is said beside files, exit codes and errors.
+enum class Speech {
+  kFull,
+  kQuiet,  // --quiet: warnings and errors alone
+  kJson,   // --json: at the end one JSON object on stdout, instead of sentences
+};
+Speech SpeechNow();
+// --quiet and --json, which every command has that prints what it has done.
+void AddSpeechOptions(CLI::App* command);
+
+// What a command has done, for programs: printed under --json, else nothing.
+void PrintResult(const nlohmann::ordered_json& result);
+
+// As fmt::print to stdout, unless speech is less than full. Names of files and models, and all else
+// that strangers wrote, may hold what a terminal would obey: it is shown instead (EscapeControls).
 template <class... Args>
 void Print(fmt::format_string<Args...> format, Args&&... args) {
+  if (SpeechNow() != Speech::kFull) return;
   fmt::print("{}", EscapeControls(fmt::format(format, std::forward<Args>(args)...)));
 }
 
@@ -27,6 +43,12 @@ template <class... Args>
 void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   const std::string text = EscapeControls(fmt::format(format, std::forward<Args>(args)...));
   std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+// The same of what is no warning: under --quiet nothing.
+template <class... Args>
+void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
+  if (SpeechNow() != Speech::kQuiet) PrintNote(format, std::forward<Args>(args)...);
 }
 
 // "1 file", "2 files".
@@ -44,8 +66,8 @@ void OpenStandardStreams();
 void WritesFailWithoutSignals();
 
 // Draws "stage  12/820  1%  0:31 left  note" on stderr: rewritten in place on a terminal, a line
-// every ten seconds elsewhere. Work that ends within two seconds draws nothing. Finish() (or a new
-// stage, or the destructor) ends the line.
+// every ten seconds elsewhere. Work that ends within two seconds draws nothing, --quiet draws
+// nothing at all. Finish() (or a new stage, or the destructor) ends the line.
 class ProgressLine {
  public:
   ProgressLine();

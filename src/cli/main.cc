@@ -53,6 +53,12 @@ Status FlushOutput() {
   return {StatusCode::kIo, fmt::format("standard output: {}", std::strerror(errno))};
 }
 
+// "help fit" is "fit --help".
+void TurnHelpAround(std::vector<std::string>* words) {
+  if (words->size() < 2 || (*words)[0] != "help" || (*words)[1].starts_with('-')) return;
+  *words = {(*words)[1], "--help"};
+}
+
 // The first word is a command, or asks for help or the version, with or without dashes.
 Status CheckFirstWord(const CLI::App& app, std::string* word) {
   std::vector<std::string> known;
@@ -86,18 +92,25 @@ void AddCommands(CLI::App& app, Action* action) {
   }
   for (CLI::App* reader : app.get_subcommands({})) AddReadLimitOption(reader);
   for (const auto add : {AddFigure2, AddInfo, AddSelftest}) add(app, action);
+  for (CLI::App* worker : app.get_subcommands([](const CLI::App*) { return true; }))
+    AddSpeechOptions(worker);
+  for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(app, action);
   EndOptions(app);
 }
 
 int Run(int argc, char** argv) {
   CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
                "tilegrad");
+  app.footer(
+      "tilegrad help COMMAND shows the options of a command; tilegrad configs, the networks "
+      "that train knows by name.");
   app.set_version_flag("--version", TILEGRAD_VERSION);
   app.require_subcommand(1);
   Action action;
   AddCommands(app, &action);
   app.failure_message(ExplainParseError);
   std::vector<std::string> words = JoinLists({argv + std::min(argc, 1), argv + argc});
+  TurnHelpAround(&words);
   if (!words.empty()) {
     if (const Status status = CheckFirstWord(app, &words[0]); !status.ok()) return Report(status);
   }

@@ -38,11 +38,15 @@ void AddWorkersOption(CLI::App* command, int* workers) {
   const auto threads = ThreadsFromEnvironment();  // main looks at its error
   if (threads.ok()) *workers = *threads;
   command
-      ->add_option("--threads,--workers", *workers,
+      ->add_option("--threads", *workers,
                    fmt::format("0: one per core. The result does not depend on it. Default: {} in "
-                               "the environment. --workers is the old name",
+                               "the environment",
                                kThreadsVariable))
       ->capture_default_str()
+      ->check(CLI::Range(0, kMostThreads));
+  command
+      ->add_option("--workers", *workers)  // the name in earlier versions
+      ->group("")
       ->check(CLI::Range(0, kMostThreads));
 }
 
@@ -92,8 +96,8 @@ Result<Path> ChooseRun(const std::string& given) {
     return NotFound(
         "no run with a checkpoint below runs/; name one with --run, or train one (tilegrad train "
         "--help)");
-  PrintNote("{}: taking the newest run below runs/; --run chooses another\n",
-            newest->second.string());
+  PrintRemark("{}: taking the newest run below runs/; --run chooses another\n",
+              newest->second.string());
   return newest->second;
 }
 

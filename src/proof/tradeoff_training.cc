@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "proof/tradeoff_study.h"
+#include "train/named_configs.h"
 #include "train/predictor.h"
 #include "train/trainer.h"
 
@@ -11,7 +12,7 @@ namespace {
 Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, const Workers& workers,
                                 const ProgressSink& progress, const StopFlag& stop) {
   train::TrainJob job;
-  TILEGRAD_ASSIGN(job.config, train::ReadConfig(study.config));
+  TILEGRAD_ASSIGN(job.config, train::FindConfig(study.config));
   TILEGRAD_TRY(
       train::ApplyOverrides({fmt::format("render.max_alpha_error={}", error)}, &job.config));
   job.config.schedule.steps = study.steps;
@@ -33,7 +34,7 @@ Result<StudyTraining> TrainWith(const TrainingStudyJob& study, double error, con
 
 Status CheckTrainingStudy(const TrainingStudyJob& job) {
   if (auto dataset = train::Dataset::Open(job.data); !dataset.ok()) return dataset.status();
-  return train::ReadConfig(job.config).status();
+  return train::FindConfig(job.config).status();
 }
 
 Result<std::vector<StudyTraining>> RunTrainingStudy(const TrainingStudyJob& job,

@@ -3,6 +3,7 @@
 // `tilegrad eval`, read by reports.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -70,6 +71,8 @@ const char* MainMeasure(const Evaluation& evaluation);
 std::string FormatTable(const Evaluation& evaluation);
 std::string FormatMarkdown(const Evaluation& evaluation);
 // <run>/eval.json and <run>/eval.md, each whole or not at all.
+// What eval.json holds.
+nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation);
 Status WriteEvaluation(const Path& run, const Evaluation& evaluation);
 // What WriteEvaluation wrote; nothing if there is no eval.json.
 Result<std::optional<Evaluation>> ReadEvaluation(const Path& run);

@@ -149,34 +149,6 @@ Json ToJson(const Score& score) {
   return json;
 }
 
-Json ToJson(const Evaluation& evaluation) {
-  Json json = {{"predictor", evaluation.predictor},
-               {"dataset", evaluation.dataset_source},
-               {"split", evaluation.split},
-               {"views_per_model", evaluation.views_per_model},
-               {"f_score_threshold", kFScoreThreshold},
-               {"shape_threshold", evaluation.shape_threshold},
-               {"retrieval_models", evaluation.retrieval_models},
-               {"unusable_predictions", evaluation.unusable_predictions},
-               {"classes", evaluation.classes},
-               {"class_models", evaluation.class_models},
-               {"rows", Json::array()},
-               {"models", Json::array()}};
-  for (const auto& row : evaluation.rows) {
-    Json classes = Json::array();
-    for (const auto& score : row.classes) classes.push_back(ToJson(score));
-    json["rows"].push_back(
-        {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}});
-  }
-  for (const ModelScore& model : evaluation.models) {
-    Json entry = ToJson(model.score);
-    entry["class"] = model.class_name;
-    entry["id"] = model.id;
-    json["models"].push_back(std::move(entry));
-  }
-  return json;
-}
-
 }  // namespace
 
 bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score::accuracy); }
@@ -216,10 +188,39 @@ std::string FormatMarkdown(const Evaluation& evaluation) {
   return out + "\n" + Notes(evaluation) + "\n";
 }
 
+nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
+  Json json = {{"predictor", evaluation.predictor},
+               {"dataset", evaluation.dataset_source},
+               {"split", evaluation.split},
+               {"views_per_model", evaluation.views_per_model},
+               {"f_score_threshold", kFScoreThreshold},
+               {"shape_threshold", evaluation.shape_threshold},
+               {"retrieval_models", evaluation.retrieval_models},
+               {"unusable_predictions", evaluation.unusable_predictions},
+               {"classes", evaluation.classes},
+               {"class_models", evaluation.class_models},
+               {"rows", Json::array()},
+               {"models", Json::array()}};
+  for (const auto& row : evaluation.rows) {
+    Json classes = Json::array();
+    for (const auto& score : row.classes) classes.push_back(ToJson(score));
+    json["rows"].push_back(
+        {{"method", row.method}, {"classes", std::move(classes)}, {"mean", ToJson(row.mean)}});
+  }
+  for (const ModelScore& model : evaluation.models) {
+    Json entry = ToJson(model.score);
+    entry["class"] = model.class_name;
+    entry["id"] = model.id;
+    json["models"].push_back(std::move(entry));
+  }
+  return json;
+}
+
 Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
   for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
   // A class may be no UTF-8: then a replacement character, not an exception.
-  const std::string json = ToJson(evaluation).dump(1, ' ', false, Json::error_handler_t::replace);
+  const std::string json =
+      EvaluationJson(evaluation).dump(1, ' ', false, Json::error_handler_t::replace);
   TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", json + "\n"));
   return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
 }
