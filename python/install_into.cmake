@@ -1,10 +1,12 @@
-# cmake -P: puts the Python package of the build tree BUILD straight into the folder TO, wherever the tree installs it.
+# cmake -P: puts the Python package of the build tree BUILD, with the program in it, straight into the folder TO, wherever the tree installs it.
 file(STRINGS ${BUILD}/CMakeCache.txt ENTRY REGEX "^TILEGRAD_PYTHON_DIR:")
 if(NOT ENTRY)
   message(FATAL_ERROR "${BUILD} builds no Python module: python3-dev, python3-numpy and pybind11-dev must be there when it is configured")
 endif()
 string(REGEX REPLACE "^[^=]*=" "" FOLDER "${ENTRY}")
 set(STAGE ${TO}/.stage)
-execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --component python --prefix ${STAGE} COMMAND_ERROR_IS_FATAL ANY)
+foreach(component python wheel)
+  execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --component ${component} --prefix ${STAGE} COMMAND_ERROR_IS_FATAL ANY)
+endforeach()
 file(COPY ${STAGE}/${FOLDER}/tilegrad DESTINATION ${TO})
 file(REMOVE_RECURSE ${STAGE})
