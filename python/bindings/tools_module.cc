@@ -15,6 +15,8 @@ void BindWeights(py::module_& m);
 void BindPredictor(py::module_& m);
 void BindDataset(py::module_& m);
 void BindSurfaces(py::module_& m);
+void BindLosses(py::module_& m);
+void BindRuns(py::module_& m);
 
 }  // namespace tilegrad::python
 
@@ -32,4 +34,6 @@ PYBIND11_MODULE(_tools, m) {
   BindPredictor(m);
   BindDataset(m);
   BindSurfaces(m);
+  BindLosses(m);
+  BindRuns(m);
 }

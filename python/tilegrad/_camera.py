@@ -132,6 +132,25 @@ class Camera(Packed):
         return rows.camera(_core.camera_orbit, fov_y, size, np.hstack(rows.arrays))
 
     @classmethod
+    def framing(cls, mesh: Any, *, azimuth=60, elevation=20, fov_y: float = _core.FOV_Y,
+                margin: float = 0.05, width: int = 512, height: int = 512) -> "Camera":
+        """From that side, as near as all of the mesh is in the picture.
+
+        mesh: what `tilegrad.meshes.as_mesh` takes, or points (V, 3). azimuth, elevation: degrees;
+            numbers or (N,); azimuth 90 sees the side towards +z.
+        margin: share of the picture that stays free on each side, [0, 0.5).
+        """
+        from tilegrad import _show, meshes
+        function = "Camera.framing"
+        margin = _arrays.as_number(function, "margin", margin, float)
+        if not 0 <= margin < 0.5:
+            raise ValueError(f"{function}: margin is {margin}, must be in [0, 0.5)")
+        points = meshes.points_of(function, mesh)
+        return _show.framing(points, azimuth, elevation,
+                             _arrays.as_number(function, "fov_y", fov_y, float), margin,
+                             _size(function, width, height))
+
+    @classmethod
     def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer") -> "Camera":
         """OpenCV's: x right, y down, z forward.
 

@@ -52,12 +52,13 @@ class Frame:
     to change, or to keep for long while the frame may go.
     """
 
-    __slots__ = ("_frame", "_scenes", "_single", "_outputs", "_views")
+    __slots__ = ("_frame", "_scenes", "_single", "_outputs", "_views", "background")
 
     def __init__(self, frame: Union[_core.Frame32, _core.Frame64], scenes: tuple[Scene, ...],
                  single: bool, outputs: tuple[str, ...]) -> None:
         self._frame, self._scenes, self._single, self._outputs = frame, scenes, single, outputs
         self._views: dict[str, np.ndarray] = {}
+        self.background: Optional[Sequence[float]] = None  # r, g, b that pictures are drawn over
 
     @property
     def color(self) -> np.ndarray:
@@ -127,6 +128,23 @@ class Frame:
         take no other (torch.from_numpy). What is written changes what backward computes."""
         self._view(name)
         return self._frame.view(name, True)
+
+    def picture(self, index: int = 0) -> np.ndarray:
+        """An image for people: (H, W, 4) uint8, transparent, or over `background` if that is
+        set."""
+        from tilegrad._show import pixels_of
+        return pixels_of(self, index, self.background)
+
+    def save(self, path: Any, index: int = 0) -> None:
+        """Writes `picture(index)` as .png, or as another format that `tilegrad.images.save_image`
+        has."""
+        from tilegrad.images import save_image
+        save_image(path, self.picture(index))
+
+    def _repr_png_(self) -> bytes:
+        """What notebooks show: up to eight images side by side."""
+        from tilegrad import _png
+        return _png.encode(np.hstack([self.picture(i) for i in range(min(len(self), 8))]))
 
     def __len__(self) -> int:
         """N, the number of images."""

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fits and trainings, which call Python back as they go on.
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <optional>
+
+#include "bindings/camera_numbers.h"
+#include "bindings/mesh_dict.h"
+#include "bindings/to_python.h"
+#include "fit/run.h"
+#include "train/named_configs.h"
+#include "train/trainer.h"
+
+namespace tilegrad::python {
+
+void BindRuns(py::module_& m);
+
+namespace {
+
+Camera CameraOf(const CameraRow& row) {
+  const Camera64 from = CameraOfNumbers(row);
+  Camera out;
+  std::copy_n(from.rotation, 9, out.rotation), std::copy_n(from.translation, 3, out.translation);
+  out.fx = static_cast<float>(from.fx), out.fy = static_cast<float>(from.fy);
+  out.cx = static_cast<float>(from.cx), out.cy = static_cast<float>(from.cy);
+  out.near_plane = static_cast<float>(from.near_plane);
+  return out;
+}
+
+using Words = std::vector<std::string>;  // "key=value"
+
+// A Python function that is told of progress, and may stop the work: by returning True, by an
+// exception, by Ctrl-C. The work itself runs without the GIL.
+class Listener {
+ public:
+  explicit Listener(py::object function) : function_(std::move(function)) {}
+
+  ProgressSink Sink() {
+    return [this](const Progress& progress) { Tell(progress); };
+  }
+  const StopFlag& stop() const { return stop_; }
+  // After the work: what `function` raised goes on; that it wanted to stop is no error.
+  void Settle(const Status& status) const {
+    if (error_) {
+      py::error_already_set error = *error_;
+      throw error;
+    }
+    if (!(asked_ && status.code() == StatusCode::kCancelled)) ThrowIfError(status);
+  }
+  bool asked() const { return asked_; }
+
+ private:
+  void Tell(const Progress& progress) {
+    const py::gil_scoped_acquire held;
+    if (stop_) return;
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      asked_ = !function_.is_none() &&
+               function_(Text(progress.stage), progress.done, progress.total).is(py::bool_(true));
+      if (asked_) stop_ = true;
+    } catch (const py::error_already_set& error) {
+      error_.emplace(error);
+      stop_ = true;
+    }
+  }
+
+  py::object function_;
+  StopFlag stop_ = false;
+  bool asked_ = false;
+  std::optional<py::error_already_set> error_;
+};
+
+// ---- Fits.
+
+// views: color [N,3,H,W] straight and alpha [N,H,W], float32; cameras [N][17], names [N].
+train::FitInput InputOfArrays(const py::dict& views, int hold_out) {
+  const auto cameras = views["cameras"].cast<std::vector<CameraRow>>();
+  const auto n = static_cast<py::ssize_t>(cameras.size());
+  const auto image = views["color"].cast<py::array>();
+  const auto color = SpanOf<float>(image, "fit", "images", {n, 3, kAny, kAny});
+  const auto alpha =
+      SpanOf<float>(views["alpha"], "fit", "masks", {n, image.shape(2), image.shape(3)});
+  train::FitInput input;
+  input.images.width = static_cast<int>(image.shape(3));
+  input.images.height = static_cast<int>(image.shape(2));
+  input.images.color.assign(color.begin(), color.end());
+  input.images.alpha.assign(alpha.begin(), alpha.end());
+  input.names = views["names"].cast<Words>();
+  input.masked = std::any_of(alpha.begin(), alpha.end(), [](float a) { return a < 1; });
+  for (int i = 0; i < n; ++i) {
+    input.cameras.push_back(CameraOf(cameras[static_cast<std::size_t>(i)]));
+    const bool held = hold_out > 0 && (i + 1) % hold_out == 0;
+    (held ? input.held_out : input.training).push_back(i);
+  }
+  return input;
+}
+
+// views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out".
+train::FitInput InputOf(const py::dict& views) {
+  const int hold_out = views["hold_out"].cast<int>();
+  if (!views.contains("folder")) return InputOfArrays(views, hold_out);
+  const auto folder = views["folder"].cast<Path>();
+  const auto model = views["model"].cast<std::string>();
+  return ValueOrThrow(WithoutGil([&] {
+    return model.empty() ? train::ReadFitFolder(folder, hold_out)
+                         : train::ReadFitDataset(folder, model, hold_out);
+  }));
+}
+
+train::ParameterSet ParametersNamed(const Words& names) {
+  train::ParameterSet set;
+  for (const std::string& name : names) {
+    const auto found = std::find_if(train::kParameters.begin(), train::kParameters.end(),
+                                    [&](train::Parameter p) { return name == train::NameOf(p); });
+    if (found == train::kParameters.end())
+      throw py::value_error(fmt::format("fit: \"{}\" cannot be optimised", name));
+    set[*found] = true;
+  }
+  return set;
+}
+
+Lighting LightingNamed(const std::string& name) {
+  constexpr std::array kNames = {"none", "lambert", "phong", "spherical_harmonics"};
+  const auto at = std::find(kNames.begin(), kNames.end(), name);
+  if (at == kNames.end())
+    throw py::value_error(
+        fmt::format("fit: lighting is '{}', expected one of {}", name, fmt::join(kNames, ", ")));
+  return static_cast<Lighting>(at - kNames.begin());
+}
+
+train::ExistingRun ExistingOf(const py::dict& request) {
+  return request["resume"].cast<bool>() ? train::ExistingRun::kContinue
+                                        : train::ExistingRun::kRefuse;
+}
+
+// request: out, a path; options, of fit/config.h; optimize, names; lighting; start, truth: meshes
+// or None; resume; threads.
+train::FitJob JobOf(const py::dict& views, const py::dict& request) {
+  train::FitJob job;
+  job.input = InputOf(views);
+  job.config.parameters = ParametersNamed(request["optimize"].cast<Words>());
+  job.config.vertex_colors = job.config.parameters[train::Parameter::kColors];
+  job.config.lighting = LightingNamed(request["lighting"].cast<std::string>());
+  ThrowIfError(train::OverrideFields(request["options"].cast<Words>(), train::FieldsOf(&job.config))
+                   .Within("fit"));
+  if (!request["start"].is_none()) job.start = MeshFromDict("fit", request["start"]);
+  if (!request["truth"].is_none()) job.truth = MeshFromDict("fit", request["truth"]);
+  job.out = request["out"].cast<Path>();
+  job.existing = ExistingOf(request);
+  return job;
+}
+
+py::object ScoresToDict(const std::vector<train::ViewScore>& scores) {
+  if (scores.empty()) return py::none();
+  return py::dict(py::arg("views") = scores.size(), py::arg("psnr") = train::MeanPsnr(scores),
+                  py::arg("silhouette_iou") = train::MeanIou(scores));
+}
+
+py::dict Fit(const py::dict& views, const py::dict& request, const py::object& listener) {
+  const train::FitJob job = JobOf(views, request);
+  Listener listening(listener);
+  const Workers workers(request["threads"].cast<int>());
+  auto outcome =
+      WithoutGil([&] { return train::RunFit(job, workers, listening.Sink(), listening.stop()); });
+  listening.Settle(outcome.status());
+  if (!outcome.ok()) return py::dict(py::arg("finished") = false);
+  py::dict out(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,
+               py::arg("seconds") = outcome->seconds,
+               py::arg("training") = ScoresToDict(outcome->training),
+               py::arg("held_out") = ScoresToDict(outcome->held_out));
+  out["voxel_iou"] = outcome->voxel_iou ? py::cast(*outcome->voxel_iou) : py::none();
+  return out;
+}
+
+// ---- Trainings.
+
+// request: config, a name or a file; data and out, paths; overrides; resume; max_minutes; threads.
+py::dict Train(const py::dict& request, const py::object& listener) {
+  train::TrainJob job;
+  job.config = ValueOrThrow(train::FindConfig(request["config"].cast<std::string>()));
+  ThrowIfError(train::ApplyOverrides(request["overrides"].cast<Words>(), &job.config));
+  job.data = request["data"].cast<Path>(), job.run = request["out"].cast<Path>();
+  job.existing = ExistingOf(request);
+  job.max_minutes = request["max_minutes"].cast<double>();
+  Listener listening(listener);
+  const Workers workers(request["threads"].cast<int>());
+  auto outcome =
+      WithoutGil([&] { return train::Train(job, workers, listening.Sink(), listening.stop()); });
+  listening.Settle(outcome.status());
+  if (!outcome.ok()) return py::dict(py::arg("finished") = false);
+  return py::dict(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,
+                  py::arg("seconds") = outcome->seconds);
+}
+
+}  // namespace
+
+void BindRuns(py::module_& m) {
+  m.def("fit", &Fit, py::arg("views"), py::arg("request"), py::arg("listener"),
+        "listener(stage, done, total) is called at each step; True stops.");
+  m.def("train", &Train, py::arg("request"), py::arg("listener"), "As fit.");
+  m.def(
+      "config_names",
+      [] {
+        Words names;
+        for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
+        return names;
+      },
+      "The configurations that train knows by name.");
+}
+
+}  // namespace tilegrad::python

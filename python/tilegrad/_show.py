@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of a mesh in one call: what it is framed by, lit by, and drawn over."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Optional, Sequence
+
+import numpy as np
+
+from tilegrad import _arrays
+from tilegrad._camera import Camera
+from tilegrad._renderer import Frame, Renderer
+from tilegrad._scene import Light
+from tilegrad.meshes import as_mesh
+
+_SOFT_PIXELS = 0.6  # how far outlines fade, so that they do not look like stairs
+# Towards lights, in the camera's axes: from above on the left, from the right, and from behind it.
+_LIGHTS = ((-0.4, 0.6, 1.0), (1.0, -0.1, 0.4), (0.0, 0.0, 1.0))
+_INTENSITIES = (0.65, 0.2, 0.2)
+_renderers: dict[tuple[int, int], Renderer] = {}  # of this process, by threads
+
+
+def render(mesh: Any, camera: Optional[Camera] = None, *, width: int = 512, height: int = 512,
+           azimuth: float = 60, elevation: float = 20, background: Optional[Sequence[float]] = None,
+           outputs: Sequence[str] = ("color", "alpha"), threads: int = 0,
+           **arguments: Any) -> Frame:
+    """A picture of a mesh, framed and lit: `tilegrad.render("chair.glb").save("chair.png")`.
+
+    mesh: a file, a `Mesh`, an object of trimesh or Open3D, or (positions, faces); what
+        `tilegrad.meshes.as_mesh` takes.
+    camera: None: `Camera.framing` of the mesh, from azimuth and elevation (degrees; numbers, or
+        (N,) for N pictures).
+    background: r, g, b of what `save` draws the object over; None: transparent.
+    arguments: those of `Scene` (lighting, lights, colors, ...) and of `Renderer.render` (delta,
+        max_alpha_error, ...); without them Lambert light from behind the camera.
+    Returns a Frame, which notebooks show, `save` writes, and `Renderer.backward` takes.
+    """
+    mesh = as_mesh(mesh)
+    if camera is None:
+        camera = Camera.framing(mesh, azimuth=azimuth, elevation=elevation, width=width,
+                                height=height)
+    options = {name: arguments.pop(name) for name in list(arguments) if name in _OPTIONS}
+    options.setdefault("delta", (_SOFT_PIXELS * 2 / max(width, height)) ** 2)
+    scene = mesh.scene(camera, **{**_look(camera), **arguments})
+    frame = _renderer(threads).render(scene, width=width, height=height, outputs=outputs, **options)
+    frame.background = background
+    return frame
+
+
+_OPTIONS = ("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule", "paper_box",
+            "paper_faces")
+
+
+def _look(camera: Camera) -> dict[str, Any]:
+    towards = np.asarray(_LIGHTS, np.float32) @ np.asarray(camera.rotation, np.float32)
+    return {"lighting": "lambert",
+            "lights": Light(towards, np.broadcast_to(_INTENSITIES, towards.shape[:-1]))}
+
+
+def _renderer(threads: int) -> Renderer:
+    key = (os.getpid(), threads)
+    if key not in _renderers:
+        _renderers[key] = Renderer(threads)
+    return _renderers[key]
+
+
+def framing(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, margin: float,
+            size: tuple[int, int]) -> Camera:
+    """The camera from that side which is as near as the points allow that all are in the picture."""
+    width, height = size
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = (low + high) / 2
+    camera = Camera.orbit(azimuth, elevation, 1, fov_y=fov_y, width=width, height=height)
+    rotation = np.asarray(camera.rotation, np.float64)
+    seen = (points - centre) @ np.swapaxes(rotation, -1, -2)  # ([N,] V, 3), from the centre
+    free = 1 - 2 * margin
+    slopes = free * np.array([width, height]) / 2 / np.stack(
+        [np.asarray(camera.fx), np.asarray(camera.fy)], axis=-1)
+    needed = seen[..., 2:] + np.abs(seen[..., :2]) / slopes[..., None, :]
+    size = float(np.linalg.norm(high - low))
+    distance = needed.max(axis=(-1, -2)) + 1e-3 * size + 1e-12
+    back = rotation[..., 2, :]  # the camera's z in the world
+    camera = Camera.look_at(centre + distance[..., None] * back,
+                            np.broadcast_to(centre, back.shape), fov_y=fov_y, width=width,
+                            height=height)
+    numbers = np.array(camera.numbers)
+    numbers[..., -1] = np.minimum(numbers[..., -1], 5e-4 * size + 1e-12)  # the near plane
+    return Camera.of_numbers(numbers)
+
+
+def pixels_of(frame: Frame, index: int, background: Optional[Sequence[float]]) -> np.ndarray:
+    """(H, W, 4) uint8 of an image: colours as they are, over the background or transparent."""
+    color = np.moveaxis(np.array(frame.color[index], np.float32), 0, -1)
+    drawn = frame.face_ids[index] >= 0
+    if "alpha" not in frame.outputs:
+        alpha = drawn.astype(np.float32)
+    else:
+        alpha = np.array(frame.alpha[index], np.float32)
+        color = _extended(color, drawn)
+    if background is not None:
+        over = _arrays.as_array("Frame", "background", background, np.float32, (3,))
+        color = over + alpha[..., None] * (color - over)
+        alpha = np.ones_like(alpha)
+    picture = np.concatenate([color, alpha[..., None]], axis=-1)
+    return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+
+
+def _extended(color: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Colours carried outward by two pixels, where alpha fades: what is not drawn is black."""
+    color, known = color.copy(), drawn.copy()
+    for _ in range(2):
+        total, count = np.zeros_like(color), np.zeros(known.shape, np.float32)
+        for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+            beside = np.roll(known, shift, axis=(0, 1))
+            total += np.where(beside[..., None], np.roll(color, shift, axis=(0, 1)), 0)
+            count += beside
+        new = ~known & (count > 0)
+        color[new] = total[new] / count[new][:, None]
+        known |= new
+    return color

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits and trainings from Python: `tilegrad.fit`, `tilegrad.train`. They do what the commands of that
+name do, to the bit, and leave the same folders."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pathlib
+import tempfile
+from typing import Any, Callable, Mapping, Optional, Sequence
+
+import numpy as np
+
+from tilegrad import _arrays, _tools
+from tilegrad._camera import Camera
+from tilegrad._paths import Path
+from tilegrad._threads import thread_count
+from tilegrad.meshes import Mesh, as_mesh, load_mesh
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """Where a run is: steps that are done, of how many; `values` are those that were logged last,
+    by name ("loss", "silhouette", ...; "seconds")."""
+
+    step: int
+    steps: int
+    values: Mapping[str, float]
+
+
+Callback = Callable[[Progress], Optional[bool]]  # True stops; everything is saved
+
+
+@dataclasses.dataclass(frozen=True)
+class FitResult:
+    """What `fit` has made. training, held_out: {"views", "psnr" (dB), "silhouette_iou"} or None;
+    voxel_iou: at 32 voxels a side where a truth was given. finished: False if a callback stopped
+    it: mesh is None then, and resume=True goes on. folder: of the run, or None if it was not kept.
+    """
+
+    mesh: Optional[Mesh]
+    finished: bool
+    steps: int
+    seconds: float
+    training: Optional[dict[str, float]]
+    held_out: Optional[dict[str, float]]
+    voxel_iou: Optional[float]
+    folder: Optional[pathlib.Path]
+
+    def __repr__(self) -> str:
+        scores = self.held_out or self.training or {}
+        said = ", ".join(f"{name} {value:.4g}" for name, value in scores.items())
+        return f"<tilegrad FitResult: {self.mesh}, {self.steps} steps, {said}>"
+
+    def _repr_png_(self) -> Optional[bytes]:
+        return None if self.mesh is None else self.mesh._repr_png_()
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainResult:
+    """What `train` has made: its folder, and how far it came. finished: False if a callback or
+    max_minutes stopped it; resume=True goes on."""
+
+    folder: pathlib.Path
+    finished: bool
+    steps: int
+    seconds: float
+
+    def predictor(self, threads: int = 0) -> Any:
+        """`tilegrad.predict.Predictor` of its newest checkpoint."""
+        from tilegrad.predict import Predictor
+        return Predictor(self.folder, threads)
+
+
+def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
+        hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
+        lighting: str = "none", out: Optional[Path] = None, resume: bool = False,
+        callback: Optional[Callback] = None, threads: int = 0, **options: Any) -> FitResult:
+    """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
+
+    images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks; uint8, or real numbers 0 to
+        1. Or a folder, as of the command: with transforms.json, of COLMAP, or a dataset with
+        `model` "CLASS/ID".
+    cameras: a Camera of N views, in pixels of the images; none with a folder.
+    masks: (N, H, W), white is the object.
+    hold_out: every hold_out-th image is not fitted but judged by; 0: none.
+    start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
+    optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
+        and texture, or the colours that `start` has. lighting: as of `Scene`.
+    out: the run's folder; None: one that goes away. resume: goes on in it.
+    callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
+        the fit and goes on.
+    options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
+    ValueError, OSError: say what does not fit. KeyboardInterrupt: Ctrl-C; everything is saved.
+    """
+    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int)}
+    if isinstance(images, (str, os.PathLike)):
+        if cameras is not None or masks is not None:
+            raise ValueError("fit: a folder has its own cameras and masks")
+        views.update(folder=os.fspath(images), model=model)
+    else:
+        views.update(_views(images, cameras, masks))
+    request = {"options": _words(options), "optimize": list(optimize), "lighting": lighting,
+               "start": _mesh_dict(start), "truth": _mesh_dict(truth), "resume": bool(resume),
+               "threads": thread_count("fit", threads)}
+    if out is not None:
+        return _fit(views, request, pathlib.Path(out), callback, keep=True)
+    with tempfile.TemporaryDirectory() as folder:
+        return _fit(views, request, pathlib.Path(folder), callback, keep=False)
+
+
+def train(config: Path = "quick", *, data: Path, out: Path,
+          set: Optional[Mapping[str, Any]] = None,  # pylint: disable=redefined-builtin
+          resume: bool = False, max_minutes: float = 0, callback: Optional[Callback] = None,
+          threads: int = 0) -> TrainResult:
+    """Trains what a configuration names on a dataset.
+
+    config: a name (`config_names`) or a TOML file. data: a dataset's folder. out: the run's.
+    set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
+    resume, callback, threads, errors: as of `fit`.
+    """
+    request = {"config": os.fspath(config), "data": os.fspath(data), "out": os.fspath(out),
+               "overrides": _words(set or {}), "resume": bool(resume),
+               "max_minutes": float(max_minutes), "threads": thread_count("train", threads)}
+    listener = _Listener(pathlib.Path(out), callback)
+    done = _tools.train(request, listener)
+    return TrainResult(pathlib.Path(out), done["finished"], done.get("steps", listener.done),
+                       done.get("seconds", 0.0))
+
+
+def config_names() -> list[str]:
+    """The configurations that `train` knows by name."""
+    return _tools.config_names()
+
+
+def _fit(views: dict, request: dict, folder: pathlib.Path, callback: Optional[Callback],
+         keep: bool) -> FitResult:
+    listener = _Listener(folder, callback)
+    done = _tools.fit(views, {**request, "out": os.fspath(folder)}, listener)
+    finished = done["finished"]
+    return FitResult(load_mesh(folder / "mesh.glb") if finished else None, finished,
+                     done.get("steps", listener.done), done.get("seconds", 0.0),
+                     done.get("training"), done.get("held_out"), done.get("voxel_iou"),
+                     folder if keep else None)
+
+
+class _Listener:
+    """Calls back when there is a new line in the log."""
+
+    def __init__(self, folder: pathlib.Path, callback: Optional[Callback]) -> None:
+        if callback is not None and not callable(callback):
+            raise TypeError(f"callback is {callback!r}, expected a function")
+        self._log, self._callback = folder / "metrics.jsonl", callback
+        self._size, self.done = -1, 0
+
+    def __call__(self, stage: str, done: int, total: int) -> Optional[bool]:
+        if stage not in ("fitting", "training"):
+            return None
+        self.done = done
+        if self._callback is None or not self._log.exists():
+            return None
+        size = self._log.stat().st_size
+        if size == self._size:
+            return None
+        self._size = size
+        return self._callback(Progress(done, total, self._last_line()))
+
+    def _last_line(self) -> dict[str, float]:
+        with open(self._log, "rb") as file:
+            file.seek(max(0, self._size - 8192))
+            lines = file.read().splitlines()
+        values = json.loads(lines[-1]) if lines else {}
+        values.pop("step", None)
+        return values
+
+
+def _views(images: Any, cameras: Any, masks: Any) -> dict[str, Any]:
+    pixels = _unit("images", images)
+    if pixels.ndim != 4 or pixels.shape[-1] not in (3, 4):
+        raise ValueError(f"fit: images has shape {pixels.shape}, expected (N, H, W, 3 or 4)")
+    if masks is None and pixels.shape[-1] == 3:
+        raise ValueError("fit: images have no alpha: give masks (N, H, W), white is the object")
+    alpha = pixels[..., 3] if masks is None else _unit("masks", masks)
+    _arrays.check_shape("fit", "masks", alpha.shape, pixels.shape[:3])
+    if not isinstance(cameras, Camera):
+        raise TypeError(f"fit: cameras is {type(cameras).__name__}, expected a Camera of "
+                        f"{len(pixels)} views")
+    numbers = np.asarray(cameras.numbers, np.float64)
+    _arrays.check_shape("fit", "cameras", numbers.shape, (len(pixels), 17))
+    return {"names": [str(i) for i in range(len(pixels))], "cameras": numbers.tolist(),
+            "color": np.ascontiguousarray(np.moveaxis(pixels[..., :3], -1, 1)),
+            "alpha": np.ascontiguousarray(alpha)}
+
+
+def _unit(argument: str, value: Any) -> np.ndarray:
+    """float32, 0 to 1, of bytes or real numbers."""
+    array = _arrays.plain("fit", argument, value)
+    if array.dtype == np.uint8:
+        return array.astype(np.float32) / 255
+    if array.dtype.kind not in "bf":
+        raise TypeError(f"fit: {argument} has dtype {array.dtype}, expected uint8 or real numbers")
+    array = array.astype(np.float32)
+    if not (np.isfinite(array).all() and array.min(initial=0) >= 0 and array.max(initial=0) <= 1):
+        raise ValueError(f"fit: {argument} has numbers outside of [0, 1]")
+    return array
+
+
+def _words(options: Mapping[str, Any]) -> list[str]:
+    def text(value: Any) -> str:
+        return str(value).lower() if isinstance(value, (bool, np.bool_)) else str(value)
+
+    return [f"{key}={text(value)}" for key, value in options.items()]
+
+
+def _mesh_dict(mesh: Any) -> Optional[dict[str, Any]]:
+    return None if mesh is None else as_mesh(mesh)._checked("fit")

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Losses with gradients: against differences in float64, and on torch's tape."""
+
+import unittest
+
+import numpy as np
+
+import tilegrad
+from tilegrad import losses
+
+try:
+    import torch
+except ImportError:
+    torch = None
+
+FACES = tilegrad.icosphere(1)[1]
+RANDOM = np.random.default_rng(3)
+POSITIONS = tilegrad.icosphere(1)[0].astype(np.float64) + 0.05 * RANDOM.normal(size=(42, 3))
+POINTS = RANDOM.normal(size=(30, 3))
+TRUTH = RANDOM.uniform(size=(2, 6, 5))
+STEP = 1e-6
+
+# Each a loss of one array, and that array.
+CASES = {"edge_length": (lambda p: losses.edge_length(p, FACES), POSITIONS),
+         "normal_consistency": (lambda p: losses.normal_consistency(p, FACES), POSITIONS),
+         "laplacian": (lambda p: losses.laplacian(p, FACES), POSITIONS),
+         "laplacian of a movement": (lambda p: losses.laplacian(p, FACES, start=POSITIONS[::-1]),
+                                     POSITIONS),
+         "chamfer a": (lambda p: losses.chamfer(p, POINTS), POSITIONS),
+         "iou": (lambda a: losses.iou(a, TRUTH), RANDOM.uniform(size=(2, 6, 5)))}
+
+
+class Gradients(unittest.TestCase):
+    def test_are_those_of_differences(self):
+        """Central differences err by the third derivative times STEP^2 and by rounding over STEP:
+        1e-9 here, of values near 1."""
+        for name, (loss, at) in CASES.items():
+            with self.subTest(name):
+                gradient = loss(at)[1]
+                self.assertEqual(gradient.shape, at.shape)
+                for i in RANDOM.integers(at.size, size=12):
+                    moved = [at.copy(), at.copy()]
+                    for array, sign in zip(moved, (1, -1)):
+                        array.flat[i] += sign * STEP
+                    difference = (loss(moved[0]).value - loss(moved[1]).value) / (2 * STEP)
+                    self.assertAlmostEqual(gradient.flat[i], difference, delta=1e-7)
+
+    def test_chamfer_has_both(self):
+        forward, back = losses.chamfer(POSITIONS, POINTS), losses.chamfer(POINTS, POSITIONS)
+        self.assertAlmostEqual(forward.value, back.value, delta=1e-12)
+        np.testing.assert_allclose(forward.gradient_a, back.gradient_b, atol=1e-12)
+
+    def test_float32_is_close(self):
+        for name, (loss, at) in CASES.items():
+            small = loss(at.astype(np.float32)) if "movement" not in name else loss(at)
+            self.assertAlmostEqual(small.value, loss(at).value, delta=1e-4, msg=name)
+
+
+@unittest.skipIf(torch is None, "no torch (Debian: python3-torch)")
+class Torch(unittest.TestCase):
+    def test_tensors_give_the_same(self):
+        for name, (loss, at) in CASES.items():
+            with self.subTest(name):
+                tensor = torch.tensor(at, requires_grad=True)
+                value = loss(tensor)
+                (3 * value).backward()
+                self.assertAlmostEqual(value.item(), loss(at).value, delta=1e-12)
+                np.testing.assert_allclose(tensor.grad.numpy(), 3 * loss(at)[1], atol=1e-12)
+
+
+class Errors(unittest.TestCase):
+    def test_name_what_is_wrong(self):
+        for call, message in (
+                (lambda: losses.edge_length(POSITIONS, [[0, 1, 99]]), r"faces\[0,2\] is 99"),
+                (lambda: losses.edge_length(POSITIONS[:, :2], FACES), "positions has shape"),
+                (lambda: losses.laplacian(POSITIONS * np.nan, FACES), "not finite"),
+                (lambda: losses.iou(TRUTH, TRUTH[:1]), "expected the same"),
+                (lambda: losses.chamfer(POSITIONS, POINTS[:0]), "b has no points")):
+            with self.assertRaisesRegex(ValueError, message):
+                call()
+        with self.assertRaisesRegex(TypeError, "whole numbers"):
+            losses.edge_length(POSITIONS, FACES.astype(np.float32))
+
+
+if __name__ == "__main__":
+    unittest.main()

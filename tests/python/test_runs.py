@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tilegrad.fit and tilegrad.train: from arrays, with callbacks, stopped and continued."""
+
+import pathlib
+import tempfile
+import unittest
+
+import numpy as np
+
+import tilegrad
+from file_samples import dataset
+from tilegrad import files, runs
+
+
+def views(count=6, size=32):
+    positions, faces = tilegrad.icosphere(2, 0.5)
+    mesh = files.Mesh(positions * np.array([1, 0.6, 0.8], np.float32), faces)
+    mesh.colors = np.clip(0.5 + positions, 0, 1)
+    cameras = tilegrad.Camera.framing(mesh, azimuth=np.arange(count) * 360 / count, width=size,
+                                      height=size)
+    frame = tilegrad.render(mesh, cameras, width=size, height=size, lighting="none", lights=None)
+    return mesh, cameras, np.stack([frame.picture(i) for i in range(count)])
+
+
+MESH, CAMERAS, IMAGES = views()
+SMALL = {"steps": 60, "template_level": 2, "texture_size": 32}
+
+
+class Fit(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.out = pathlib.Path(folder.name) / "fit"
+
+    def test_finds_the_shape_and_reports(self):
+        told = []
+        result = tilegrad.fit(IMAGES, CAMERAS, hold_out=3, truth=MESH, callback=told.append, **SMALL)
+        self.assertTrue(result.finished)
+        self.assertEqual(result.steps, 60)
+        self.assertGreater(result.held_out["silhouette_iou"], 0.7)
+        self.assertGreater(result.voxel_iou, 0.4)
+        self.assertGreater(len(result.mesh.faces), 100)
+        self.assertEqual(result._repr_png_()[:4], b"\x89PNG")
+        self.assertIsNone(result.folder)
+        self.assertEqual(told[-1].step, 60)
+        self.assertLess(told[-1].values["loss"], told[0].values["loss"])
+
+    def test_stopped_and_continued_is_the_same(self):
+        whole = tilegrad.fit(IMAGES, CAMERAS, **SMALL)
+        part = tilegrad.fit(IMAGES, CAMERAS, out=self.out, callback=lambda at: at.step >= 20,
+                            **SMALL)
+        self.assertFalse(part.finished)
+        self.assertIsNone(part.mesh)
+        rest = tilegrad.fit(IMAGES, CAMERAS, out=self.out, resume=True, threads=1, **SMALL)
+        np.testing.assert_array_equal(rest.mesh.positions, whole.mesh.positions)
+        self.assertTrue((rest.folder / "report.html").exists())
+
+    def test_what_a_callback_raises_goes_on(self):
+        with self.assertRaises(ZeroDivisionError):
+            tilegrad.fit(IMAGES, CAMERAS, callback=lambda at: 1 / 0, **SMALL)
+
+    def test_errors(self):
+        for call, message in (
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "the closest known one is"),
+                (lambda: tilegrad.fit(IMAGES[..., :3], CAMERAS), "give masks"),
+                (lambda: tilegrad.fit(IMAGES[:3], CAMERAS), "cameras has shape"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, optimize=["shape"]), '"shape" cannot'),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, lighting="neon"), "expected one of"),
+                (lambda: tilegrad.fit("photos", CAMERAS), "a folder has its own"),
+                (lambda: tilegrad.fit(IMAGES / 100, CAMERAS), "outside of")):
+            with self.assertRaisesRegex(ValueError, message):
+                call()
+        with self.assertRaisesRegex(OSError, "nowhere"):
+            tilegrad.fit("nowhere")
+        with self.assertRaisesRegex(TypeError, "expected a function"):
+            tilegrad.fit(IMAGES, CAMERAS, callback=3)
+
+
+class Train(unittest.TestCase):
+    def test_names_a_configuration_and_stops(self):
+        self.assertIn("quick", runs.config_names())
+        changes = {"schedule.steps": 4, "schedule.batch": 2, "network.channels": 4,
+                   "network.code": 8, "network.hidden1": 8, "network.hidden2": 8,
+                   "schedule.log_every": 1}
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "run"
+            told = []
+            part = tilegrad.train("quick", data=dataset(), out=out, set=changes,
+                                  callback=lambda at: told.append(at) or at.step >= 2)
+            self.assertFalse(part.finished)
+            done = tilegrad.train("quick", data=dataset(), out=out, set=changes, resume=True)
+            self.assertTrue(done.finished)
+            self.assertEqual(done.steps, 4)
+            self.assertIn("loss", told[0].values)
+            self.assertEqual(done.predictor().image_size, IMAGES.shape[1])
+
+    def test_errors(self):
+        with self.assertRaisesRegex(OSError, "there are best, "):
+            tilegrad.train("qick", data="x", out="y")
+
+
+if __name__ == "__main__":
+    unittest.main()

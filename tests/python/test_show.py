@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures in one call, their framing, and meshes of other libraries."""
+
+import pathlib
+import struct
+import tempfile
+import types
+import unittest
+import zlib
+
+import numpy as np
+
+import tilegrad
+from tilegrad import images, meshes
+
+POSITIONS, FACES = tilegrad.icosphere(2, 0.5)
+LONG = POSITIONS * np.array([1, 0.2, 0.5], np.float32)
+
+
+def decoded(png):
+    """(H, W, 4) of one of our own PNGs: no filters."""
+    chunks, at = {}, 8
+    while at < len(png):
+        length, name = struct.unpack(">I4s", png[at:at + 8])
+        chunks[name] = png[at + 8:at + 8 + length]
+        at += 12 + length
+    width, height = struct.unpack(">II", chunks[b"IHDR"][:8])
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, -1)
+    return rows[:, 1:].reshape(height, width, 4)
+
+
+class Framing(unittest.TestCase):
+    def test_the_object_touches_the_margin_at_any_size_and_place(self):
+        for scale, shift in ((1, 0), (1e-4, 3e-4), (1e4, 2e4)):
+            points = LONG * np.float32(scale) + np.float32(shift)
+            frame = tilegrad.render((points, FACES), azimuth=[0, 90, 60], elevation=[0, 0, 40],
+                                    width=300, height=200)
+            for drawn in frame.face_ids >= 0:
+                rows, columns = np.nonzero(drawn)
+                gaps = (rows.min() - 10, 189 - rows.max(), columns.min() - 15, 284 - columns.max())
+                self.assertGreaterEqual(min(gaps), -1)
+                self.assertLessEqual(min(gaps), 3)
+
+    def test_points_alone(self):
+        camera = tilegrad.Camera.framing(POSITIONS, width=64, height=64)
+        same = tilegrad.Camera.framing((POSITIONS, FACES), width=64, height=64)
+        np.testing.assert_array_equal(camera.numbers, same.numbers)
+
+    def test_errors(self):
+        for mesh, message in ((np.zeros((0, 3)), "no faces"),
+                              (np.full((3, 3), np.nan), "not finite")):
+            with self.assertRaisesRegex(ValueError, message):
+                tilegrad.Camera.framing(mesh)
+        with self.assertRaisesRegex(ValueError, "margin is 0.5"):
+            tilegrad.Camera.framing(POSITIONS, margin=0.5)
+
+
+class Pictures(unittest.TestCase):
+    def test_save_and_notebook_show_the_same(self):
+        frame = tilegrad.render((POSITIONS, FACES), width=48, height=32)
+        with tempfile.TemporaryDirectory() as folder:
+            frame.save(pathlib.Path(folder) / "a.png")
+            saved = images.load_image(pathlib.Path(folder) / "a.png")
+        np.testing.assert_array_equal(saved, frame.picture())
+        np.testing.assert_array_equal(saved, decoded(frame._repr_png_()))
+        drawn = frame.face_ids[0] >= 0
+        self.assertTrue((saved[drawn][:, 3] == 255).all())
+        self.assertGreater(saved[drawn][:, :3].min(), 15)  # lit from more than one side
+        # No dark seam where alpha fades.
+        fading = (saved[..., 3] > 60) & ~drawn
+        self.assertTrue(fading.any())
+        self.assertGreater(saved[fading][:, :3].min(), 15)
+
+    def test_a_background_fills(self):
+        frame = tilegrad.render((POSITIONS, FACES), width=32, height=32, background=(1, 0, 0))
+        np.testing.assert_array_equal(frame.picture()[0, 0], [255, 0, 0, 255])
+
+    def test_several_stand_side_by_side(self):
+        frame = tilegrad.render((POSITIONS, FACES), azimuth=[0, 90], width=32, height=24)
+        self.assertEqual(decoded(frame._repr_png_()).shape, (24, 64, 4))
+
+    def test_gradients_flow(self):
+        frame = tilegrad.render((POSITIONS, FACES), width=32, height=32, delta=1e-3)
+        gradients = tilegrad.Renderer().backward(frame, alpha=np.ones_like(frame.alpha))
+        self.assertTrue((gradients.positions != 0).any())
+
+
+class Others(unittest.TestCase):
+    """Objects with the members that trimesh and Open3D have; neither is imported."""
+
+    def test_trimesh(self):
+        colors = np.full((len(POSITIONS), 4), 128, np.uint8)
+        visual = types.SimpleNamespace(vertex_colors=colors, uv=None)
+        mesh = meshes.as_mesh(types.SimpleNamespace(
+            vertices=POSITIONS.astype(np.float64), faces=FACES.astype(np.int64), visual=visual,
+            vertex_normals=POSITIONS * 2))
+        np.testing.assert_array_equal(mesh.positions, POSITIONS)
+        np.testing.assert_allclose(mesh.colors, 128 / 255)
+        made = mesh.to_trimesh(types.SimpleNamespace(Trimesh=lambda **given: given))
+        np.testing.assert_array_equal(made["faces"], FACES)
+        self.assertEqual(made["vertex_colors"].shape, (len(POSITIONS), 4))
+
+    def test_trimesh_with_a_texture(self):
+        image = np.zeros((4, 4, 3), np.uint8)
+        image[...] = (0, 255, 0)
+        visual = types.SimpleNamespace(uv=np.full((len(POSITIONS), 2), 0.5),
+                                       material=types.SimpleNamespace(image=image))
+        mesh = types.SimpleNamespace(vertices=POSITIONS, faces=FACES, visual=visual)
+        frame = tilegrad.render(mesh, width=32, height=32, lighting="none", lights=None)
+        np.testing.assert_allclose(frame.color[0, :, 16, 16], [0, 1, 0], atol=1e-6)
+
+    def test_open3d(self):
+        given = types.SimpleNamespace(vertices=POSITIONS, triangles=FACES,
+                                      vertex_colors=np.zeros((0, 3)), vertex_normals=[])
+        mesh = meshes.as_mesh(given)
+        self.assertIsNone(mesh.colors)
+        mesh.colors = np.ones((len(POSITIONS), 4), np.float32)
+        open3d = types.SimpleNamespace(
+            utility=types.SimpleNamespace(Vector3dVector=np.asarray, Vector3iVector=np.asarray),
+            geometry=types.SimpleNamespace(
+                TriangleMesh=lambda v, t: types.SimpleNamespace(vertices=v, triangles=t)))
+        back = meshes.as_mesh(mesh.to_open3d(open3d))
+        np.testing.assert_array_equal(back.positions, POSITIONS)
+        self.assertEqual(back.colors.shape, (len(POSITIONS), 3))
+
+    def test_what_is_no_mesh(self):
+        with self.assertRaisesRegex(TypeError, "got int, expected a Mesh"):
+            tilegrad.render(3)
+        with self.assertRaisesRegex(ValueError, "triangles"):
+            meshes.as_mesh((POSITIONS, [[0, 1, 2, 3]]))
+        with self.assertRaises(OSError):
+            tilegrad.render("none.glb")
+
+
+if __name__ == "__main__":
+    unittest.main()
