@@ -140,12 +140,12 @@ class Camera(Packed):
             numbers or (N,); azimuth 90 sees the side towards +z.
         margin: share of the picture that stays free on each side, [0, 0.5).
         """
-        from tilegrad import _show, meshes
+        from tilegrad import _interchange, _show
         function = "Camera.framing"
         margin = _arrays.as_number(function, "margin", margin, float)
         if not 0 <= margin < 0.5:
             raise ValueError(f"{function}: margin is {margin}, must be in [0, 0.5)")
-        points = meshes.points_of(function, mesh)
+        points = _interchange.points_of(function, mesh)
         return _show.framing(points, azimuth, elevation,
                              _arrays.as_number(function, "fov_y", fov_y, float), margin,
                              _size(function, width, height))

@@ -10,6 +10,7 @@ import numpy as np
 from tilegrad import _arrays, _core, _numbers
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed
+from tilegrad._picture import Pictured
 from tilegrad._scene import Light, Scene, Surface
 from tilegrad._threads import thread_count
 
@@ -45,7 +46,7 @@ _NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfac
           "light_directions", "sh", "attributes")
 
 
-class Frame:
+class Frame(Pictured):
     """The images of N scenes, row 0 on top, and what backward needs.
 
     Images are read-only views of the renderer's memory, which they keep alive: copy what you want
@@ -58,7 +59,6 @@ class Frame:
                  single: bool, outputs: tuple[str, ...]) -> None:
         self._frame, self._scenes, self._single, self._outputs = frame, scenes, single, outputs
         self._views: dict[str, np.ndarray] = {}
-        self.background: Optional[Sequence[float]] = None  # r, g, b that pictures are drawn over
 
     @property
     def color(self) -> np.ndarray:
@@ -129,31 +129,13 @@ class Frame:
         self._view(name)
         return self._frame.view(name, True)
 
-    def picture(self, index: int = 0) -> np.ndarray:
-        """An image for people: (H, W, 4) uint8, transparent, or over `background` if that is
-        set."""
-        from tilegrad._show import pixels_of
-        return pixels_of(self, index, self.background)
-
-    def save(self, path: Any, index: int = 0) -> None:
-        """Writes `picture(index)` as .png, or as another format that `tilegrad.images.save_image`
-        has."""
-        from tilegrad.images import save_image
-        save_image(path, self.picture(index))
-
-    def _repr_png_(self) -> bytes:
-        """What notebooks show: up to eight images side by side."""
-        from tilegrad import _png
-        return _png.encode(np.hstack([self.picture(i) for i in range(min(len(self), 8))]))
-
     def __len__(self) -> int:
         """N, the number of images."""
         return self._frame.count
 
     def __repr__(self) -> str:
-        f = self._frame
-        return (f"<tilegrad.Frame: {f.count} images of {f.width} x {f.height}, "
-                f"{', '.join(self._outputs)}>")
+        size, names = f"{self._frame.width} x {self._frame.height}", ", ".join(self._outputs)
+        return f"<tilegrad.Frame: {len(self)} images of {size}, {names}>"
 
     def _view(self, name: str) -> np.ndarray:
         if name not in self._views:

@@ -8,7 +8,6 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from tilegrad import _arrays
 from tilegrad._camera import Camera
 from tilegrad._renderer import Frame, Renderer
 from tilegrad._scene import Light
@@ -87,35 +86,3 @@ def framing(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, marg
     numbers = np.array(camera.numbers)
     numbers[..., -1] = np.minimum(numbers[..., -1], 5e-4 * size + 1e-12)  # the near plane
     return Camera.of_numbers(numbers)
-
-
-def pixels_of(frame: Frame, index: int, background: Optional[Sequence[float]]) -> np.ndarray:
-    """(H, W, 4) uint8 of an image: colours as they are, over the background or transparent."""
-    color = np.moveaxis(np.array(frame.color[index], np.float32), 0, -1)
-    drawn = frame.face_ids[index] >= 0
-    if "alpha" not in frame.outputs:
-        alpha = drawn.astype(np.float32)
-    else:
-        alpha = np.array(frame.alpha[index], np.float32)
-        color = _extended(color, drawn)
-    if background is not None:
-        over = _arrays.as_array("Frame", "background", background, np.float32, (3,))
-        color = over + alpha[..., None] * (color - over)
-        alpha = np.ones_like(alpha)
-    picture = np.concatenate([color, alpha[..., None]], axis=-1)
-    return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
-
-
-def _extended(color: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """Colours carried outward by two pixels, where alpha fades: what is not drawn is black."""
-    color, known = color.copy(), drawn.copy()
-    for _ in range(2):
-        total, count = np.zeros_like(color), np.zeros(known.shape, np.float32)
-        for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-            beside = np.roll(known, shift, axis=(0, 1))
-            total += np.where(beside[..., None], np.roll(color, shift, axis=(0, 1)), 0)
-            count += beside
-        new = ~known & (count > 0)
-        color[new] = total[new] / count[new][:, None]
-        known |= new
-    return color

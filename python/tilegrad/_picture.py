@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames as pictures for people: in files, and in notebooks."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence
+
+import numpy as np
+
+from tilegrad import _arrays, _png
+
+
+class Pictured:
+    """What a Frame has for people."""
+
+    __slots__ = ()
+    background: Optional[Sequence[float]]  # r, g, b that pictures are drawn over; unset: none
+
+    def picture(self, index: int = 0) -> np.ndarray:
+        """An image for people: (H, W, 4) uint8, transparent, or over `background` if that is
+        set."""
+        return pixels_of(self, index, getattr(self, "background", None))
+
+    def save(self, path: Any, index: int = 0) -> None:
+        """Writes `picture(index)` as .png, or as another format that `tilegrad.images.save_image`
+        has."""
+        from tilegrad.images import save_image
+        save_image(path, self.picture(index))
+
+    def _repr_png_(self) -> bytes:
+        """What notebooks show: up to eight images side by side."""
+        return _png.encode(np.hstack([self.picture(i) for i in range(min(len(self), 8))]))
+
+
+def pixels_of(frame: Any, index: int, background: Optional[Sequence[float]]) -> np.ndarray:
+    """(H, W, 4) uint8 of an image: colours as they are, over the background or transparent."""
+    color = np.moveaxis(np.array(frame.color[index], np.float32), 0, -1)
+    drawn = frame.face_ids[index] >= 0
+    if "alpha" not in frame.outputs:
+        alpha = drawn.astype(np.float32)
+    else:
+        alpha = np.array(frame.alpha[index], np.float32)
+        color = _extended(color, drawn)
+    if background is not None:
+        over = _arrays.as_array("Frame", "background", background, np.float32, (3,))
+        color = over + alpha[..., None] * (color - over)
+        alpha = np.ones_like(alpha)
+    picture = np.concatenate([color, alpha[..., None]], axis=-1)
+    return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+
+
+def _extended(color: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Colours carried outward by two pixels, where alpha fades: what is not drawn is black."""
+    color, known = color.copy(), drawn.copy()
+    for _ in range(2):
+        total, count = np.zeros_like(color), np.zeros(known.shape, np.float32)
+        for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+            beside = np.roll(known, shift, axis=(0, 1))
+            total += np.where(beside[..., None], np.roll(color, shift, axis=(0, 1)), 0)
+            count += beside
+        new = ~known & (count > 0)
+        color[new] = total[new] / count[new][:, None]
+        known |= new
+    return color
