@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 namespace tilegrad::train {
 namespace {
@@ -167,7 +168,8 @@ void PictureLookup::LookAt(const Job& job, std::size_t m, std::size_t channels, 
 // Sums over texels, by their cover and their cosine to the camera.
 struct CueSums {
   double all = 1e-9, bright = 0, lit = 1e-9;
-  glm::dvec3 normal{0}, bright_normal{0}, lit_normal{0};
+  glm::dvec3 normal{0}, bright_normal{0}, lit_normal{0}, lit_bright_normal{0};
+  glm::dmat3 lit_products{0};  // of normals with themselves
 
   void Add(const SeenTexel& seen) {
     const double weight = std::max(0.0, seen.facing) * seen.rgba[3];
@@ -176,13 +178,23 @@ struct CueSums {
     normal += weight * seen.normal, bright_normal += weight * brightness * seen.normal;
     if (brightness < kBlack) return;
     lit += weight, lit_normal += weight * seen.normal;
+    lit_bright_normal += weight * brightness * seen.normal;
+    lit_products += glm::outerProduct(weight * seen.normal, seen.normal);
+  }
+  // Least squares, drawn a little towards the camera where normals leave it open.
+  glm::dvec3 Light() const {
+    const double little = 0.02 * lit + 1e-9;
+    const glm::dvec3 d = glm::inverse(lit_products + glm::dmat3(little)) *
+                         (lit_bright_normal + glm::dvec3(0, 0, 1e-3 * little));
+    return d / (glm::length(d) + 1e-12);
   }
   std::array<double, PictureLookup::kCues> Numbers() const {
     const double mean = bright / all;
     const glm::dvec3 n = normal / all, goes = (bright_normal / all - mean * n) / (mean + kBlack),
                      where = lit_normal / lit;
-    return {n.x,        n.y,       n.z,     mean,    4 * goes.x, 4 * goes.y,
-            4 * goes.z, lit / all, where.x, where.y, where.z};
+    const glm::dvec3 light = Light();
+    return {n.x,       n.y,     n.z,     mean,    4 * goes.x, 4 * goes.y, 4 * goes.z,
+            lit / all, where.x, where.y, where.z, light.x,    light.y,    light.z};
   }
 };
 

@@ -41,8 +41,9 @@ class PictureLookup {
 
   // [M, kCues]: how brightness goes with the normals that the camera sees, from which a light's
   // direction can be read. Their mean; the mean brightness; the covariance of both, by that mean;
-  // the share that is not black; the mean normal of what is not.
-  static constexpr std::int64_t kCues = 11;
+  // the share that is not black; the mean normal of what is not; last the unit direction d that
+  // fits the brightness of what is not black best as a multiple of n.d, as if all had one paint.
+  static constexpr std::int64_t kCues = 14;
   nn::Tensor Cues(nn::Context& context, const Job& job) const;
 
  private:

@@ -222,10 +222,14 @@ void TextureNetwork::Light(const nn::Var& latent, const nn::Tensor& images, nn::
         coarse_->Cues(context_, {images, out->positions.value(), out->pose.value()});
     from = nn::Concat({from, nn::Constant(context_, cues)}, 1);
   }
-  const nn::Var raw = all_.light.Forward(from, mode);
+  nn::Var raw = all_.light.Forward(from, mode);
   if (light_.lighting == Lighting::kSphericalHarmonics) {
     out->sh = raw;
     return;
+  }
+  if (config_.lookup) {
+    const std::int64_t cues = from.shape()[1];
+    raw = raw + nn::Pad(nn::Slice(from, 1, cues - 3, cues), 1, 0, raw.shape()[1] - 3);
   }
   out->directions = Unit(light_.facing ? Facing(raw) : nn::Slice(raw, 1, 0, 3));
   if (light_.lighting != Lighting::kPhong) return;
