@@ -39,11 +39,20 @@ Status Validate(const Options& options);
 template <class T>
 struct BatchT {
   std::span<const T> positions;         // [B,V,3] world
-  std::span<const T> colors;            // [B,V,3], of vertices; empty: alpha alone
+  std::span<const T> colors;            // [B,V,3], of vertices; without textures, too: alpha alone
   std::span<const std::int32_t> faces;  // [F,3] indices in [0, V)
   std::span<const CameraT<T>> cameras;  // [N], N = B * views
   std::size_t meshes = 0;               // B
   int size = 0;                         // pixels a side of the images, which are square
+  std::span<const T> textures{};        // [B,F,texels,3] instead of colors; N3MR
+
+  bool colored() const { return !colors.empty() || !textures.empty(); }
+  // The texels of image n's mesh, of numbers like textures.
+  template <class U>
+  std::span<U> TexturesOf(std::span<U> numbers, std::size_t n) const {
+    const std::size_t count = numbers.size() / meshes;
+    return numbers.subspan(n / views() * count, count);
+  }
 
   std::size_t vertices() const { return meshes == 0 ? 0 : positions.size() / (3 * meshes); }
   std::size_t views() const { return meshes == 0 ? 0 : cameras.size() / meshes; }
@@ -73,7 +82,8 @@ struct ImagesT {
 template <class T>
 struct GradientsT {
   std::span<T> positions;
-  std::span<T> colors;  // empty: not wanted
+  std::span<T> colors;      // empty: not wanted
+  std::span<T> textures{};  // as BatchT::textures; empty: not wanted
 };
 
 }  // namespace tilegrad::rivals

@@ -52,6 +52,10 @@ void ImageStateT<T>::ProjectAdjoint(const BatchT<T>& batch, std::size_t n) {
 
 template <class T>
 void ImageStateT<T>::SetTextures(const BatchT<T>& batch, const Options& options, std::size_t n) {
+  if (!batch.textures.empty()) {
+    const std::span<const T> own = batch.TexturesOf(batch.textures, n);
+    return textures_.assign(own.begin(), own.end());
+  }
   const std::span<const T> colors = batch.MeshOf(batch.colors, n);
   const std::size_t texels = options.texels(), faces = batch.faces.size() / 3;
   textures_.resize(3 * faces * texels);
@@ -166,7 +170,7 @@ template <class T>
 void ImageStateT<T>::Render(const BatchT<T>& batch, const Options& options, std::size_t n,
                             const Workers::Part& part, const ImagesT<T>& out) {
   Project(batch, n);
-  if (!batch.colors.empty()) SetTextures(batch, options, n);
+  if (batch.colored()) SetTextures(batch, options, n);
   options.rule == Rule::kSoftRas ? SoftRas(options, batch.size, part, out)
                                  : N3mr(options, batch.size, part, out);
 }
@@ -175,7 +179,7 @@ template <class T>
 void ImageStateT<T>::Backward(const BatchT<T>& batch, const Options& options, std::size_t n,
                               const Workers::Part& part, const ImagesT<const T>& d_images) {
   d_corners_.resize(corners_.size());
-  if (!batch.colors.empty()) d_textures_.assign(textures_.size(), T(0));
+  if (batch.colored()) d_textures_.assign(textures_.size(), T(0));
   options.rule == Rule::kSoftRas ? SoftRasAdjoint(options, batch.size, part, d_images)
                                  : N3mrAdjoint(options, part, d_images);
   ProjectAdjoint(batch, n);

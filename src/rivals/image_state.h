@@ -26,6 +26,7 @@ class ImageStateT {
 
   std::span<const T> d_positions() const { return d_positions_; }  // [V,3]
   std::span<const T> d_colors() const { return d_colors_; }        // [V,3]
+  std::span<const T> d_textures() const { return d_textures_; }    // [F,texels,3]
 
  private:
   void Project(const BatchT<T>& batch, std::size_t n);

@@ -56,15 +56,23 @@ Status CheckResolution(const char* name, int value, int least, int most) {
   return InvalidArgument("{} is {}; {} to {} are possible", name, value, least, most);
 }
 
-// d_to[b] <- the sum of `part` of the mesh's images, in their order.
+// sum <- the sum of `part` of the images of mesh b, in their order.
 template <class T, class PartOf>
-void SumViews(const BatchT<T>& batch, std::size_t b, std::span<T> d_to, const PartOf& part_of) {
-  const std::span<T> sum = batch.MeshOf(d_to, b * batch.views());
+void SumViews(std::size_t views, std::size_t b, std::span<T> sum, const PartOf& part_of) {
   std::fill(sum.begin(), sum.end(), T(0));
-  for (std::size_t v = 0; v < batch.views(); ++v) {
-    const std::span<const T> part = part_of(b * batch.views() + v);
+  for (std::size_t v = 0; v < views; ++v) {
+    const std::span<const T> part = part_of(b * views + v);
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part[i];
   }
+}
+
+template <class T>
+Status CheckTextures(const BatchT<T>& batch, const Options& options) {
+  if (batch.textures.empty()) return {};
+  if (options.rule != Rule::kN3mr) return InvalidArgument("textures of faces are N3MR's alone");
+  if (!batch.colors.empty()) return InvalidArgument("a batch has colors or textures, not both");
+  return CheckSize("textures", batch.textures.size(),
+                   batch.meshes * batch.faces.size() * options.n3mr_colors.texels());
 }
 
 }  // namespace
@@ -91,9 +99,10 @@ template <class T>
 Status RendererT<T>::Render(const BatchT<T>& batch, const Options& options, const ImagesT<T>& out) {
   TILEGRAD_TRY(Validate(options));
   TILEGRAD_TRY(CheckBatch(batch));
+  TILEGRAD_TRY(CheckTextures(batch, options));
   const std::size_t pixels = batch.cameras.size() * batch.pixels();
   TILEGRAD_TRY(CheckSize("alpha", out.alpha.size(), pixels));
-  TILEGRAD_TRY(CheckSize("color", out.color.size(), batch.colors.empty() ? 0 : 3 * pixels));
+  TILEGRAD_TRY(CheckSize("color", out.color.size(), batch.colored() ? 3 * pixels : 0));
   if (options.rule == Rule::kN3mr && options.n3mr.reduction == N3mrReduction::kBilinear &&
       batch.size < 2)
     return InvalidArgument("N3MR: the bilinear reduction needs images of two pixels a side");
@@ -112,13 +121,15 @@ Status RendererT<T>::Backward(const BatchT<T>& batch, const Options& options,
   if (!d_images.alpha.empty())
     TILEGRAD_TRY(CheckSize("the adjoint of alpha", d_images.alpha.size(), pixels));
   if (!d_images.color.empty()) {
-    TILEGRAD_TRY(CheckSize("the adjoint of color", d_images.color.size(),
-                           batch.colors.empty() ? 0 : 3 * pixels));
+    TILEGRAD_TRY(
+        CheckSize("the adjoint of color", d_images.color.size(), batch.colored() ? 3 * pixels : 0));
   }
   TILEGRAD_TRY(
       CheckSize("the gradient of positions", out.positions.size(), batch.positions.size()));
   if (!out.colors.empty())
     TILEGRAD_TRY(CheckSize("the gradient of colors", out.colors.size(), batch.colors.size()));
+  if (!out.textures.empty())
+    TILEGRAD_TRY(CheckSize("the gradient of textures", out.textures.size(), batch.textures.size()));
   if (images_.size() < batch.cameras.size())
     return InvalidArgument("{} images were rendered, but there are {} cameras", images_.size(),
                            batch.cameras.size());
@@ -126,9 +137,17 @@ Status RendererT<T>::Backward(const BatchT<T>& batch, const Options& options,
     images_[n].Backward(batch, options, n, part, d_images.Image(n, batch.pixels()));
   });
   workers_.For(batch.meshes, [&](std::size_t b, std::size_t) {
-    SumViews(batch, b, out.positions, [&](std::size_t n) { return images_[n].d_positions(); });
-    if (out.colors.empty()) return;
-    SumViews(batch, b, out.colors, [&](std::size_t n) { return images_[n].d_colors(); });
+    const std::size_t views = batch.views(), first = b * views;
+    SumViews(views, b, batch.MeshOf(out.positions, first),
+             [&](std::size_t n) { return images_[n].d_positions(); });
+    if (!out.colors.empty()) {
+      SumViews(views, b, batch.MeshOf(out.colors, first),
+               [&](std::size_t n) { return images_[n].d_colors(); });
+    }
+    if (!out.textures.empty()) {
+      SumViews(views, b, batch.TexturesOf(out.textures, first),
+               [&](std::size_t n) { return images_[n].d_textures(); });
+    }
   });
   return {};
 }

@@ -77,7 +77,8 @@ SurfacePoint PointAt(const Mesh& sphere, const std::vector<FaceCone>& cones, con
   }
   const glm::dvec3 w = glm::max(cones[best].WeightsAt(d), glm::dvec3(0));
   const double sum = w.x + w.y + w.z;
-  return {sphere.faces[best],
+  return {static_cast<std::int32_t>(best),
+          sphere.faces[best],
           {static_cast<float>(w.x / sum), static_cast<float>(w.y / sum),
            static_cast<float>(w.z / sum)}};
 }

@@ -16,8 +16,9 @@ namespace tilegrad {
 // u is at 1/2 - u.
 std::vector<glm::vec2> SphereUvs(const Mesh& sphere);
 
-// A point of a mesh: its face's vertices, and weights that sum to 1.
+// A point of a mesh: its face, that one's vertices, and weights that sum to 1.
 struct SurfacePoint {
+  std::int32_t face;
   Face vertices;
   std::array<float, 3> weights;
 };

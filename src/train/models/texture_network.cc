@@ -128,6 +128,7 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
   offsets_ =
       OffsetMap(context, template_, {.smoothing = config.smoothing, .symmetric = config.symmetric});
   if (config.lookup) BuildLookup(image_size, rng);
+  if (config.cubes) cubes_ = FaceCubes(context, template_, texture_size_);
   if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
 }
 
@@ -249,6 +250,8 @@ PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   if (config_.lookup) out.pose = all_.pose.Forward(latent, mode);
   Light(latent, levels.front().value(), mode, &out);
   out.textures = Texture(latent, levels, out, mode);
+  if (config_.cubes && mode == nn::Mode::kEval)
+    out.textures = cubes_.Maps(cubes_.Cubes(out.textures));
   return out;
 }
 

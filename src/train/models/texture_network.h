@@ -11,6 +11,7 @@
 #include "nn/networks/unet.h"
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
+#include "train/models/face_cubes.h"
 #include "train/models/offset_map.h"
 #include "train/models/picture_lookup.h"
 
@@ -35,6 +36,7 @@ struct TextureNetworkConfig {
   // Texels are looked up in the picture where the shape and the camera that the network says have
   // them, beside what the decoder says of them (picture_lookup.h).
   bool lookup = false;
+  bool cubes = false;  // in evaluation textures are as N3MR's cubes show them (face_cubes.h)
   std::int64_t lookup_width = 16;   // channels of the decoder and of the layers behind it, then
   double output_deviation = 0.001;  // the head of vertices starts as N(0, this^2)
 };
@@ -74,6 +76,7 @@ class TextureNetwork {
   std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
   const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
   int texture_size() const { return texture_size_; }
+  const FaceCubes& cubes() const { return cubes_; }  // with TextureNetworkConfig::cubes
 
  private:
   void BuildHeads(Rng& rng);
@@ -92,8 +95,9 @@ class TextureNetwork {
   std::vector<glm::vec2> uvs_;
   nn::Tensor template_positions_;  // [V, 3]
   OffsetMap offsets_;
-  nn::AxisMap mirror_;                          // of texel columns
-  nn::Shape code_shape_;                        // of one image
+  nn::AxisMap mirror_;    // of texel columns
+  nn::Shape code_shape_;  // of one image
+  FaceCubes cubes_;
   std::optional<PictureLookup> coarse_, fine_;  // of the picture's size, and of the texture's
   // The parts, shown to visitors as one module.
   struct Parts : nn::Module {

@@ -30,6 +30,10 @@ struct RivalRenderer {
   rivals::RendererT<double> renderer64;
 };
 
+// textures: [B,F,texels,3], cubes of N3MR's faces, with Options::n3mr_colors. Otherwise as below.
+RenderedImages RenderTextured(RivalRenderer& renderer, const nn::Var& positions,
+                              const nn::Var& textures, RivalJob job);
+
 // positions, and colors of vertices: [B,V,3]. An invalid `colors` draws alpha alone: the images'
 // colors are then invalid, too. f64 draws SoftRas with the scalar reference (for proofs). Errors of
 // shapes and options reach the context's status.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/tasks/textured_image/config.h"
 
+#include "base/error.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -49,7 +51,26 @@ ConfigFields FieldsOf(ColorRule* c) {
 
 }  // namespace
 
-Status CheckConfig(const TexturedImageConfig& config) { return CheckConfig(config.light); }
+Status CheckConfig(const TexturedImageConfig& config) {
+  TILEGRAD_TRY(CheckConfig(config.light));
+  const std::string& rule = config.render.rule;
+  if (rule != "dibr" && rule != "n3mr") {
+    return InvalidArgument("render.rule is \"{}\", but textures are drawn by \"dibr\" or \"n3mr\"",
+                           rule);
+  }
+  const Lighting lighting = LightingOf(config.light);
+  if (rule == "dibr" || lighting == Lighting::kNone || lighting == Lighting::kLambert) return {};
+  return InvalidArgument("N3MR has no light.model = \"{}\": \"none\" or \"lambert\"",
+                         config.light.model);
+}
+
+TextureNetworkConfig NetworkOf(const TexturedImageConfig& config) {
+  TextureNetworkConfig network = config.network;
+  network.cubes = IsN3mr(config);
+  return network;
+}
+
+bool IsN3mr(const TexturedImageConfig& config) { return config.render.rule == "n3mr"; }
 
 LightHeadShape LightHeadOf(const LightConfig& config) {
   return {LightingOf(config), config.shininess_low, config.shininess_high, config.spread <= 90};
@@ -57,7 +78,9 @@ LightHeadShape LightHeadOf(const LightConfig& config) {
 
 ConfigFields FieldsOf(TexturedImageConfig* c) {
   ConfigFields render = FieldsOf(&c->render);
-  std::erase_if(render, [](const ConfigField& field) { return field.key == "render.rule"; });
+  for (ConfigField& field : render) {
+    if (field.key == "render.rule") field.help = "whose renderer trains: \"dibr\" or \"n3mr\"";
+  }
   ConfigFields fields;
   for (const ConfigFields& more :
        {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->color), FieldsOf(&c->adversary),

@@ -28,7 +28,7 @@ struct TexturedImageConfig {
   ColorRule color;
   AdversaryConfig adversary;
   std::string start;    // a run, or checkpoint, whose network this one starts as; empty: as new
-  RenderConfig render;  // its rule is ours
+  RenderConfig render;  // its rule is "dibr" or "n3mr"
   LightConfig light;
   TexturedStreamConfig stream;
   OptimizerConfig optimizer;
@@ -38,6 +38,9 @@ struct TexturedImageConfig {
 
 ConfigFields FieldsOf(TexturedImageConfig* config);
 Status CheckConfig(const TexturedImageConfig& config);
+// Whether N3MR's renderer trains, with texture cubes of which the network's maps are samples.
+bool IsN3mr(const TexturedImageConfig& config);
+TextureNetworkConfig NetworkOf(const TexturedImageConfig& config);  // as the rule wants it
 LightHeadShape LightHeadOf(const LightConfig& config);
 
 }  // namespace tilegrad::train

@@ -36,7 +36,7 @@ class LoadedModel : public TexturedModel {
   LoadedModel(nn::Context& context, const TexturedImageConfig& config, int image_size)
       : context_(context),
         image_size_(image_size),
-        network_(context, config.network, LightHeadOf(config.light), image_size, /*seed=*/0),
+        network_(context, NetworkOf(config), LightHeadOf(config.light), image_size, /*seed=*/0),
         template_(network_.template_mesh()) {}
 
   Status Load(const std::vector<nn::NamedTensor>& state) {

@@ -67,12 +67,13 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
     : context_(context),
       config_(config),
       image_size_(image_size),
-      network_(context, config.network, LightHeadOf(config.light), image_size,
+      network_(context, NetworkOf(config), LightHeadOf(config.light), image_size,
                static_cast<std::uint64_t>(config.schedule.seed)),
       weights_(context, network_.module(), config.optimizer, config.schedule.steps),
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
-      renderer_(context.workers()) {}
+      renderer_(context.workers()),
+      rival_renderer_(context.workers()) {}
 
 RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
   const auto& faces = network_.template_mesh().faces;
@@ -87,6 +88,26 @@ RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) con
   return job;
 }
 
+// Colours of faces differ from image to image with their light, so each image has a mesh of its
+// own.
+RenderedImages TexturedStep::DrawN3mr(const PredictedObjects& objects, const nn::Var& directions,
+                                      const TexturedBatch& batch) {
+  const auto& faces = network_.template_mesh().faces;
+  std::vector<std::int32_t> of_image;
+  for (std::size_t n = 0; n < batch.cameras.size(); ++n)
+    of_image.push_back(static_cast<std::int32_t>(n / kViewsOfObject));
+  const nn::Tensor meshes = context_.Indices(of_image);
+  const nn::Var positions = nn::Gather(objects.positions, 0, meshes);
+  nn::Var cubes = nn::Gather(network_.cubes().Cubes(objects.textures), 0, meshes);
+  if (directions.valid())
+    cubes = cubes * FaceLight(positions, faces, directions, config_.light.ambient);
+  RivalJob job{.faces = {faces[0].data(), 3 * faces.size()},
+               .cameras = batch.cameras,
+               .size = image_size_,
+               .options = {.rule = rivals::Rule::kN3mr}};
+  return RenderTextured(rival_renderer_, positions, cubes, std::move(job));
+}
+
 TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step) {
   TexturedRenders out;
   out.objects = network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
@@ -97,6 +118,10 @@ TexturedRenders TexturedStep::Draw(const TexturedBatch& batch, std::int64_t step
     scenes.light_directions = DirectionsToWorld(seen(out.objects.directions), batch.cameras);
   if (out.objects.shininess.valid()) scenes.shininess = seen(out.objects.shininess);
   if (out.objects.sh.valid()) scenes.sh = HarmonicsToWorld(seen(out.objects.sh), batch.cameras);
+  if (IsN3mr(config_)) {
+    out.images = DrawN3mr(out.objects, scenes.light_directions, batch);
+    return out;
+  }
   out.images = RenderScenes(renderer_, scenes, JobAt(batch, step));
   return out;
 }

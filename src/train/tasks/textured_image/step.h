@@ -9,6 +9,7 @@
 
 #include "scene/topology.h"
 #include "train/ops/render_op.h"
+#include "train/ops/rival_op.h"
 #include "train/run/step_values.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/batch.h"
@@ -51,6 +52,8 @@ class TexturedStep {
   LearnedWeights& weights() { return weights_; }
 
  private:
+  RenderedImages DrawN3mr(const PredictedObjects& objects, const nn::Var& directions,
+                          const TexturedBatch& batch);
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
   double ShareOfRun(std::int64_t step) const;
   LossConfig WeightsAt(std::int64_t step) const;
@@ -68,6 +71,7 @@ class TexturedStep {
   LearnedWeights weights_;
   Topology topology_;
   SceneRenderer renderer_;
+  RivalRenderer rival_renderer_;  // if the rule is N3MR's
   Adversary* adversary_ = nullptr;
 };
 
