@@ -71,6 +71,41 @@ TEST(RenderRival, EachImageMayPushAlone) {
   }
 }
 
+// Cubes of one colour each, that of their face's corners in the mean, draw the same and get the
+// same gradient.
+TEST(RenderTextured, CubesOfOneColorAreColorsOfFaces) {
+  Setting s;
+  s.job.options.rule = rivals::Rule::kN3mr;
+  Rng rng(3);
+  std::vector<float> at_vertices(3 * s.ball.positions.size());
+  for (float& x : at_vertices) x = static_cast<float>(rng.Uniform());
+  const auto v = static_cast<std::int64_t>(s.ball.positions.size());
+  const auto f = static_cast<std::int64_t>(s.ball.faces.size());
+  s.colors =
+      nn::Parameter(s.context, s.context.From({1, v, 3}, std::span<const float>(at_vertices)));
+  nn::Var faces;
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::vector<std::int32_t> corners;
+    for (const Face& face : s.ball.faces) corners.push_back(face[k]);
+    const nn::Var corner = nn::Gather(s.colors, 1, s.context.Indices(corners));
+    faces = k == 0 ? corner : faces + corner;
+  }
+  const nn::Var cubes = nn::BroadcastTo(nn::Reshape(faces * (1.0 / 3), {1, f, 1, 3}), {1, f, 8, 3});
+  const auto images = s.Draw(s.colors);
+  const nn::Var value = images.colors;
+  const auto want = nn::Grad(nn::Sum(nn::Square(images.colors)), {s.positions, s.colors});
+  const auto drawn = RenderTextured(s.renderer, s.positions, cubes, s.job);
+  EXPECT_LT(SizeOf(drawn.colors - nn::Detach(value)), 1e-3);
+  const auto got = nn::Grad(nn::Sum(nn::Square(drawn.colors)), {s.positions, s.colors});
+  EXPECT_GT(SizeOf(want[1]), 1);
+  EXPECT_LT(SizeOf(got[1] - want[1]), 1e-3 * SizeOf(want[1]));
+  EXPECT_LT(SizeOf(got[0] - want[0]), 1e-2 * SizeOf(want[0]));
+  EXPECT_EQ(s.Error(), "");
+  s.job.options.rule = rivals::Rule::kSoftRas;
+  EXPECT_FALSE(RenderTextured(s.renderer, s.positions, cubes, s.job).alpha.valid());
+  EXPECT_NE(s.Error().find("N3MR's alone"), std::string::npos);
+}
+
 TEST(RenderRival, ErrorsReachTheContext) {
   Setting s;
   const auto expect = [&](const std::string& part) {

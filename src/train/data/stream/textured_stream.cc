@@ -82,6 +82,7 @@ struct TexturedStream::Worker {
   double seconds = 0;
 
   void DrawColors(const Scene& scene, const Recolor& recolor);
+  void SetViews(const Job& job, std::span<const TexturedView> views);
   void DrawViews(const Job& job, const Scene& object, std::span<TexturedView> views, Rng& rng);
   Status Take(const Job& job);
 };
@@ -116,16 +117,24 @@ void TexturedStream::Worker::DrawViews(const Job& job, const Scene& object,
   for (std::size_t v = 0; v < views.size(); ++v) {
     views[v].camera = DrawCamera(job.config.draw, job.camera, /*view=*/0, rng);
     views[v].light = DrawLight(job.light, rng);
-    lights[v].direction = DirectionToWorld(views[v].light.direction, views[v].camera);
-    sh[v] = HarmonicsToWorld(views[v].light.sh, views[v].camera);
-    Scene& scene = scenes[v];
-    scene.camera = ScaledCamera(views[v].camera, static_cast<float>(job.config.draw.samples));
     if (v > 0)
       std::copy_n(surfaces.begin(), count,
                   surfaces.begin() + static_cast<std::ptrdiff_t>(v * count));
-    scene.surfaces = std::span(surfaces).subspan(v * count, count);
+    scenes[v].surfaces = std::span(surfaces).subspan(v * count, count);
+  }
+  SetViews(job, views);
+}
+
+// As many as there are scenes.
+void TexturedStream::Worker::SetViews(const Job& job, std::span<const TexturedView> views) {
+  const std::size_t count = surfaces.size() / scenes.size();
+  for (std::size_t v = 0; v < scenes.size(); ++v) {
+    const DrawnLight& light = views[v].light;
+    lights[v].direction = DirectionToWorld(light.direction, views[v].camera);
+    sh[v] = HarmonicsToWorld(light.sh, views[v].camera);
+    scenes[v].camera = ScaledCamera(views[v].camera, static_cast<float>(job.config.draw.samples));
     for (std::size_t s = v * count; s < (v + 1) * count; ++s)
-      surfaces[s].shininess = views[v].light.shininess;
+      surfaces[s].shininess = light.shininess;
   }
 }
 
@@ -194,6 +203,14 @@ Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appeara
   }
   TILEGRAD_TRY(w.Take(job_));
   return std::span<const float>(w.rgba);
+}
+
+Status TexturedStream::Change(std::size_t worker, std::span<const TexturedView> views) {
+  Worker& w = *workers_[worker];
+  if (views.size() != w.scenes.size())
+    return InvalidArgument("{} views were drawn, and {} are given", w.scenes.size(), views.size());
+  w.SetViews(job_, views);
+  return {};
 }
 
 double TexturedStream::TakeSeconds() {

@@ -60,6 +60,9 @@ class TexturedStream {
   // The views of the last Render with this worker, the same size, in another way.
   Result<std::span<const float>> Again(std::size_t worker, Appearance appearance);
 
+  // Other cameras and lights for Again, as many as there were.
+  Status Change(std::size_t worker, std::span<const TexturedView> views);
+
   // Of processor time that Render has taken since the last call. Between batches only.
   double TakeSeconds();
   // Rows of objects from models that are spread over all, to look at.

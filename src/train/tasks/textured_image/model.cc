@@ -35,6 +35,7 @@ class LoadedModel : public TexturedModel {
  public:
   LoadedModel(nn::Context& context, const TexturedImageConfig& config, int image_size)
       : context_(context),
+        config_(config),
         image_size_(image_size),
         network_(context, NetworkOf(config), LightHeadOf(config.light), image_size, /*seed=*/0),
         template_(network_.template_mesh()) {}
@@ -54,8 +55,11 @@ class LoadedModel : public TexturedModel {
     return train::PredictObjects(context_, network_, images, image_size_);
   }
 
+  const TexturedImageConfig& config() const override { return config_; }
+
  private:
   nn::Context& context_;
+  TexturedImageConfig config_;
   int image_size_;
   TextureNetwork network_;
   Mesh template_;

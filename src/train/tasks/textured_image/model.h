@@ -24,6 +24,7 @@ class TexturedModel : public Model {
   // As Predict, with the light.
   virtual Result<std::vector<PredictedObject>> PredictObjects(
       std::span<const std::uint8_t> images) = 0;
+  virtual const TexturedImageConfig& config() const = 0;
 };
 
 // Meshes have the template's faces, positions with largest half-extent 0.45, centred, and one

@@ -153,7 +153,7 @@ TEST(TexturedStep, GradientsOfWhatMixesLookedUpColors) {
 TEST(TexturedStep, GradientsOfTheCamera) {
   TexturedImageConfig config = LookupConfig();
   config.loss.color = 0;
-  ExpectGradientsAgreeWithDifferences(config, {"unet.level", "latent.", "pose.", "shape."});
+  ExpectGradientsAgreeWithDifferences(config, {".down.", "latent.", "pose.", "shape."});
 }
 
 TexturedImageConfig AdversarialConfig() {

@@ -78,6 +78,36 @@ TEST_F(TexturedTask, TrainsPredictsIsEvaluatedAndReported) {
   }
 }
 
+TEST_F(TexturedTask, TrainsAndIsEvaluatedByN3mr) {
+  std::string text(kTinyTextured);
+  text.replace(text.find("[render]"), 8, "[render]\nrule = \"n3mr\"");
+  TrainJob job;
+  job.config = ParseConfig(text, "tiny.toml").value();
+  ValueOf<std::int64_t>(job.config, "schedule.steps") = 4;
+  job.data = folder_ / "data", job.run = run_;
+  const auto outcome = train::Train(job, workers_, kSilent, stop_);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+  const auto predictor = Predictor::Load(run_, workers_);
+  ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+  const TaskEvaluation evaluation{
+      .run = run_, .data = folder_ / "data", .predictor = *predictor, .views_per_model = 2};
+  const auto scores = predictor->task().Evaluate(evaluation, workers_, kSilent, stop_);
+  ASSERT_TRUE(scores.ok()) << scores.status().message();
+  EXPECT_EQ(scores->rows.size(), 3u);
+}
+
+TEST_F(TexturedTask, RulesThatDrawNoTexturesAreErrors) {
+  for (const auto& [rule, light, part] : {std::tuple("softras", "lambert", "\"softras\""),
+                                          {"n3mr", "phong", "N3MR has no light.model"}}) {
+    std::string text(kTinyTextured);
+    text.replace(text.find("[render]"), 8, std::string("[render]\nrule = \"") + rule + "\"");
+    TrainJob job;
+    job.config = ParseConfig(text + "[light]\nmodel = \"" + light + "\"\n", "t").value();
+    job.data = folder_ / "data", job.run = run_;
+    ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), part);
+  }
+}
+
 TEST_F(TexturedTask, WithoutLightThereIsNoLightToScore) {
   ASSERT_NO_FATAL_FAILURE(Train("[light]\nmodel = \"none\"\n"));
   const auto predictor = Predictor::Load(folder_ / "run", workers_);
