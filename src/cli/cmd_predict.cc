@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/match_file.h"
+#include "cli/predict_light.h"
 #include "cli/predict_pictures.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
@@ -25,7 +26,7 @@ namespace {
 struct PredictOptions {
   std::string run, out = ".", mask;
   std::vector<std::string> images;
-  bool keep_framing = false, force = false;
+  bool keep_framing = false, force = false, relight = false;
   int refine = train::kRefineSteps;
   int workers = 0;
 };
@@ -97,14 +98,37 @@ Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutou
   return {};
 }
 
+// With the light, where the network says one.
+Status SaveResult(const train::Predictor& predictor, std::span<const std::uint8_t> picture,
+                  const Path& glb, Mesh* mesh) {
+  TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));
+  if (!lit) return io::SaveGlb(glb, *mesh);
+  for (Material& material : mesh->materials) material.unlit = false;
+  const auto& model = dynamic_cast<train::TexturedModel&>(predictor.model());
+  return io::SaveLitGlb(glb, *mesh, SunOf(*lit, model.config().light));
+}
+
+Status Relight(const train::Predictor& predictor, std::span<const std::uint8_t> picture,
+               const Mesh& mesh, const Path& file) {
+  TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));
+  if (!lit) {
+    return InvalidArgument(
+        "--relight: this run predicts no light and camera; train configs/texture_quick.toml");
+  }
+  const auto& model = dynamic_cast<train::TexturedModel&>(predictor.model());
+  return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size()}, file);
+}
+
 Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
                   const std::pair<std::string, std::string>& image, const OutputGuard& guard,
                   const Workers& workers, nlohmann::ordered_json* json) {
   const auto& [file, stem] = image;
   const Path out(options.out);
   const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
-             animation = out / (stem + "_turntable.webp"), match = out / (stem + "_match.png");
+             animation = out / (stem + "_turntable.webp"), match = out / (stem + "_match.png"),
+             relit = out / (stem + "_relit.webp");
   std::vector<Path> written = {glb, turntable, animation};
+  if (options.relight) written.push_back(relit);
   if (options.refine > 0) written.insert(written.end(), {match, RecordOf(match)});
   TILEGRAD_TRY(guard.CheckAll(written));
   TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
@@ -117,7 +141,11 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
     const Status refined = Refine(options, cutout, match, &meshes[0], workers);
     if (!refined.ok()) return refined.Within(file);
   }
-  TILEGRAD_TRY(io::SaveGlb(glb, meshes[0]));
+  TILEGRAD_TRY(SaveResult(predictor, *input, glb, &meshes[0]));
+  if (options.relight) {
+    const Status status = Relight(predictor, *input, meshes[0], relit);
+    if (!status.ok()) return status.Within(file);
+  }
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
   TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
   guard.NoteAll(written);
@@ -180,6 +208,9 @@ void AddPredict(CLI::App& app, Action* action) {
                    "agree); 0: the network alone")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
+  command->add_flag("--relight", options->relight,
+                    "also NAME_relit.webp: the object under a light that moves around; of a run "
+                    "that predicts light");
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunPrediction(*options); }; });
 }

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstring>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <unordered_map>
 
 #include "base/error.h"
@@ -268,11 +270,28 @@ Status CheckLinearColors(const Mesh& mesh) {
 
 }  // namespace
 
-Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
+namespace {
+
+// A node whose z axis points to the sun: lights shine along -z. Illuminance pi of a white surface
+// is what looks white.
+void AddSun(GlbBuilder& glb, const glm::dvec3& sun) {
+  const glm::dvec3 to = sun / glm::length(sun);
+  // Half-way quaternion from (0, 0, 1); from behind half a turn about x.
+  glm::dvec4 q(-to.y, to.x, 0, 1 + to.z);
+  q = glm::dot(q, q) < 1e-12 ? glm::dvec4(1, 0, 0, 0) : q / glm::length(q);
+  const Json light = {{"type", "directional"}, {"intensity", std::numbers::pi}, {"name", "sun"}};
+  glb.json["extensions"]["KHR_lights_punctual"]["lights"] = Json::array({light});
+  glb.json["extensionsUsed"].push_back("KHR_lights_punctual");
+  glb.json["nodes"].push_back({{"name", "sun"},
+                               {"rotation", {q.x, q.y, q.z, q.w}},
+                               {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  glb.json["scenes"][0]["nodes"].push_back(1);
+}
+
+Status AddScene(GlbBuilder& glb, const Mesh& mesh, const glm::dvec3& origin) {
   TILEGRAD_TRY(Validate(mesh));
   TILEGRAD_TRY(CheckLinearColors(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
-  GlbBuilder glb;
   glb.json["scene"] = 0;
   glb.json["scenes"] = Json::array({{{"nodes", {0}}}});
   glb.json["nodes"] = Json::array({{{"mesh", 0}}});
@@ -287,8 +306,29 @@ Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
   }
   glb.json["meshes"] = Json::array({{{"primitives", primitives}}});
   AddMaterials(glb, mesh);
-  TILEGRAD_TRY(AddImages(glb, mesh));
+  return AddImages(glb, mesh);
+}
+
+}  // namespace
+
+Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin) {
+  GlbBuilder glb;
+  TILEGRAD_TRY(AddScene(glb, mesh, origin));
   return Assemble(glb);
+}
+
+Result<Bytes> EncodeLitGlb(const Mesh& mesh, const glm::dvec3& sun) {
+  if (!(glm::length(sun) > 0) || !std::isfinite(glm::length(sun)))
+    return InvalidArgument("the direction of the sun is ({}, {}, {})", sun.x, sun.y, sun.z);
+  GlbBuilder glb;
+  TILEGRAD_TRY(AddScene(glb, mesh, glm::dvec3(0)));
+  AddSun(glb, sun);
+  return Assemble(glb);
+}
+
+Status SaveLitGlb(const Path& path, const Mesh& mesh, const glm::dvec3& sun) {
+  TILEGRAD_ASSIGN(const Bytes bytes, EncodeLitGlb(mesh, sun));
+  return WriteFileAtomic(path, bytes);
 }
 
 Status SaveGlb(const Path& path, const Mesh& mesh, const glm::dvec3& origin) {

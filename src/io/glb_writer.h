@@ -16,4 +16,9 @@ Result<Bytes> EncodeGlb(const Mesh& mesh, const glm::dvec3& origin = glm::dvec3(
 Status SaveGlb(const Path& path, const Mesh& mesh,
                const glm::dvec3& origin = glm::dvec3(0));  // whole or not at all
 
+// With a white directional light (KHR_lights_punctual) from the direction `sun`, not 0: a surface
+// that faces it has its base colour. It lights materials that are not `unlit`.
+Result<Bytes> EncodeLitGlb(const Mesh& mesh, const glm::dvec3& sun);
+Status SaveLitGlb(const Path& path, const Mesh& mesh, const glm::dvec3& sun);
+
 }  // namespace tilegrad::io

@@ -92,6 +92,19 @@ Pose PoseOf(const Camera& camera, int size) {
   return pose;
 }
 
+Camera CameraOf(const Pose& pose, int size) {
+  constexpr double kFarthest = 100;
+  const View view(pose.data());
+  Camera camera;
+  const glm::dvec3 rows[3] = {view.right, view.up, view.back};
+  for (int i = 0; i < 9; ++i) camera.rotation[i] = static_cast<float>(rows[i / 3][i % 3]);
+  const double distance = 1 / std::max(view.nearness, 1 / kFarthest);
+  camera.translation[2] = static_cast<float>(-distance);
+  camera.fx = camera.fy = static_cast<float>(view.scale * distance * size);
+  camera.cx = static_cast<float>(view.x * size), camera.cy = static_cast<float>(view.y * size);
+  return camera;
+}
+
 PictureLookup::PictureLookup(const Mesh& sphere, int side)
     : side_(static_cast<std::size_t>(side)),
       faces_(sphere.faces),

@@ -95,7 +95,11 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
     Mesh mesh = MeshOf(network, row(predicted.positions, i), row(predicted.textures, i));
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
-    objects.push_back({std::move(mesh), LightOf(predicted, i)});
+    objects.push_back({std::move(mesh), LightOf(predicted, i), {}});
+    if (!predicted.pose.valid()) continue;
+    Pose pose;
+    std::ranges::copy(row(predicted.pose, i), pose.begin());
+    objects.back().camera = CameraOf(pose, image_size);
   }
   return objects;
 }

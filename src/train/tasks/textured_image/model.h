@@ -11,6 +11,7 @@ namespace tilegrad::train {
 struct PredictedObject {
   Mesh mesh;         // with its texture, unlit colours; smooth normals are the renderer's
   DrawnLight light;  // in the axes of the image's camera
+  std::optional<Camera> camera;  // of the image, in its pixels; of a network with `lookup`
 };
 
 // Of a network with the weights of now; batch statistics are those of training. images:
