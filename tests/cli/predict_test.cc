@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "fit/refine.h"
@@ -92,6 +93,37 @@ TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   for (int i = 0; i < 9; i += 3)
     EXPECT_NEAR(std::hypot(rows[i], rows[i + 1], rows[i + 2]), 1, 1e-4) << i;
   EXPECT_GT(record["camera"]["fx"], 0);
+}
+
+// Of a run that predicts light: in the GLB, and moving.
+TEST_F(Predict, WritesTheLightAndMovesIt) {
+  ExpectDone("train --config " TILEGRAD_CONFIGS "/texture_quick.toml --data " + In("d") +
+             " --out " + In("lit") +
+             " --set schedule.steps=1 --set schedule.batch=2 --set network.base=2 --set "
+             "network.most=4 --set network.levels=2 --set network.latent=8 --set "
+             "network.hidden=8 --set network.light_width=8 --set network.lookup_width=4 --set "
+             "network.template_level=1");
+  const std::string said = ExpectDone("predict --refine 0 --relight --run " + In("lit") +
+                                      " --out " + In("out") + " " + In("known.png"));
+  const Bytes glb = ReadFile(folder_ / "out/known_predicted.glb").value();
+  std::uint32_t length = 0;
+  std::memcpy(&length, glb.data() + 12, 4);
+  const auto json = nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + length);
+  EXPECT_EQ(json["extensions"]["KHR_lights_punctual"]["lights"][0]["type"], "directional");
+  EXPECT_EQ(json["extensionsUsed"], nlohmann::json::array({"KHR_lights_punctual"}));
+  const auto& sun = json["nodes"][1];
+  EXPECT_EQ(sun["extensions"]["KHR_lights_punctual"]["light"], 0);
+  double square = 0;
+  for (const auto& x : sun["rotation"]) square += x.get<double>() * x.get<double>();
+  EXPECT_NEAR(square, 1, 1e-6);
+  EXPECT_EQ(json["scenes"][0]["nodes"].size(), 2u);
+  const Bytes relit = ReadFile(folder_ / "out/known_relit.webp").value();
+  EXPECT_EQ(std::string(relit.begin(), relit.begin() + 4), "RIFF");
+  // A run without light says so.
+  const Outcome plain = RunProgram("predict --refine 0 --relight --force --run " + In("r") +
+                                   " --out " + In("out") + " " + In("known.png"));
+  EXPECT_NE(plain.exit_code, 0);
+  EXPECT_NE(plain.output.find("predicts no light and camera"), std::string::npos) << plain.output;
 }
 
 }  // namespace

@@ -112,6 +112,17 @@ TEST_F(Lookup, TellsTheLightOfEachTexel) {
   }
 }
 
+TEST_F(Lookup, CamerasComeBackFromTheirNumbers) {
+  const Camera back = CameraOf(PoseOf(view_.camera, kSize), kSize);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(back.rotation[i], view_.camera.rotation[i], 1e-5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(back.translation[i], view_.camera.translation[i], 1e-4);
+  EXPECT_NEAR(back.fx, view_.camera.fx, 1e-3);
+  EXPECT_NEAR(back.cx, view_.camera.cx, 1e-4);
+  EXPECT_NEAR(back.cy, view_.camera.cy, 1e-4);
+  const Camera any = CameraOf({}, kSize);  // a network may say anything
+  for (const float x : any.rotation) EXPECT_TRUE(std::isfinite(x));
+}
+
 // A network may say anything.
 TEST_F(Lookup, SurvivesPosesThatAreNone) {
   ASSERT_NO_FATAL_FAILURE(Draw(ball_, {.model = "none"}, Appearance::kTexture));
