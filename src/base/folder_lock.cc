@@ -11,6 +11,12 @@
 #include "base/error.h"
 
 namespace tilegrad {
+namespace {
+
+constexpr int kAttempts = 2;
+constexpr unsigned kPauseMicroseconds = 10'000;
+
+}  // namespace
 
 FolderLock::~FolderLock() {
   if (fd_ >= 0) ::close(fd_);
@@ -22,10 +28,23 @@ Result<FolderLock> FolderLock::Take(const Path& folder) {
   FolderLock lock;
   lock.fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (lock.fd_ < 0) return IoError("{}: cannot create: {}", file.string(), std::strerror(errno));
-  if (::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    return InvalidArgument("{}: another process is at work in it", folder.string());
+  // IsHeld takes it for a moment: once more, then.
+  for (int attempt = 0; ::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+       ++attempt) {
+    if (attempt == kAttempts)
+      return InvalidArgument("{}: another process is at work in it", folder.string());
+    ::usleep(kPauseMicroseconds);
   }
   return lock;
+}
+
+bool FolderLock::IsHeld(const Path& folder) {
+  const FolderLock probe = [&] {
+    FolderLock lock;
+    lock.fd_ = ::open((folder / ".lock").c_str(), O_RDONLY | O_CLOEXEC);
+    return lock;
+  }();
+  return probe.fd_ >= 0 && ::flock(probe.fd_, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
 }  // namespace tilegrad

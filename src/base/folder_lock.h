@@ -22,6 +22,8 @@ class FolderLock {
   // Makes the folder and a file `.lock` in it. kInvalidArgument if another process holds it. On a
   // file system without locks the result locks nothing.
   static Result<FolderLock> Take(const Path& folder);
+  // Whether somebody holds it, this process included.
+  static bool IsHeld(const Path& folder);
 
  private:
   int fd_ = -1;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/live_server.h"
 #include "cli/option_checks.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
@@ -34,6 +35,7 @@ struct Options {
   int workers = 0, hold_out = 0;
   bool resume = false, doctor = false, force = false;
   FitConfig config;
+  LiveOption live;
 };
 
 Result<Parameter> ParameterNamed(const std::string& name) {
@@ -215,6 +217,8 @@ Status Run(const Options& options) {
     PrintResult(json);
     return {};
   }
+  TILEGRAD_ASSIGN(const auto live,
+                  StartLive(options.live, {options.out, {}, options.config.steps}));
   ProgressLine line;
   job.warn = line.Warnings();
   auto outcome = train::RunFit(job, workers, line.Sink(), StopOnSignals());
@@ -282,6 +286,7 @@ void AddFit(CLI::App& app, Action* action) {
                     "go on with the fit in --out, which has saved something");
   command->add_flag("--doctor", options->doctor,
                     "only say what gets a gradient at the start, and why not");
+  AddLiveOption(command, &options->live);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return Run(*options); }; });
 }

@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/live_server.h"
 #include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/named_configs.h"
@@ -19,6 +20,7 @@ struct TrainOptions {
   bool resume = false, force = false;
   double max_minutes = 0;
   int workers = 0;
+  LiveOption live;
 };
 
 void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options) {
@@ -49,6 +51,8 @@ Status RunTraining(const TrainOptions& options) {
   job.run = options.out;
   job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
   job.max_minutes = options.max_minutes;
+  TILEGRAD_ASSIGN(const auto live,
+                  StartLive(options.live, {options.out, options.data, job.config.schedule.steps}));
   const Workers workers(options.workers);
   ProgressLine line;
   job.warn = line.Warnings();
@@ -83,6 +87,7 @@ void AddTrain(CLI::App& app, Action* action) {
                    "save and stop after this many minutes; 0: no limit")
       ->capture_default_str()
       ->check(NotNegative());
+  AddLiveOption(command, &options->live);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunTraining(*options); }; });
 }

@@ -23,6 +23,7 @@ void AddEval(CLI::App& app, Action* action);
 void AddFigure2(CLI::App& app, Action* action);
 void AddFit(CLI::App& app, Action* action);
 void AddInfo(CLI::App& app, Action* action);
+void AddLive(CLI::App& app, Action* action);
 void AddMan(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
 void AddRender(CLI::App& app, Action* action);

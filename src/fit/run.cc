@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "fit/shown_mesh.h"
 #include "fit/texture_fill.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
@@ -85,6 +86,7 @@ class FitWork : public RunWork {
   }
   bool HasPicture(std::int64_t steps) const override { return ShowsAt(job_.config, steps); }
   Result<ImageU8> Picture(std::int64_t steps) override;
+  Mesh PictureMesh() const override { return ShownMesh(fitter_.scene()); }
 
   const FitScene& scene() const { return fitter_.scene(); }
 

@@ -119,20 +119,22 @@ Json MeshJson(const Mesh& mesh) {
           {"index_bytes", index_bytes}};
 }
 
-Json PageData(const ReportFacts& facts) {
-  const Showcase& show = facts.showcase;
-  const std::vector<std::string> names = CurveNames(facts.run.log);
-  Json out = {{"curves", CurvesJson(facts.run.log, names)},
-              {"charts", Json::array()},
-              {"camera",
-               {{"fov_y", show.fov_y},
-                {"azimuth", show.azimuth},
-                {"elevation", show.elevation},
-                {"distance", show.distance}}},
-              {"models", Json::array()}};
-  const auto labels = facts.run.config.task->Labels();
+Json CurveData(const std::vector<LogEntry>& log, const std::vector<TermLabel>& labels) {
+  const std::vector<std::string> names = CurveNames(log);
+  Json out = {{"curves", CurvesJson(log, names)}, {"charts", Json::array()}};
   for (const std::string& name : names)
     out["charts"].push_back({{"key", name}, {"title", TitleOf(name, labels)}});
+  return out;
+}
+
+Json PageData(const ReportFacts& facts) {
+  const Showcase& show = facts.showcase;
+  Json out = CurveData(facts.run.log, facts.run.config.task->Labels());
+  out["camera"] = {{"fov_y", show.fov_y},
+                   {"azimuth", show.azimuth},
+                   {"elevation", show.elevation},
+                   {"distance", show.distance}};
+  out["models"] = Json::array();
   for (const Example& example : show.examples) out["models"].push_back(ModelJson(example));
   return out;
 }

@@ -14,6 +14,11 @@ namespace tilegrad::train {
 // `index_bytes` bytes; all little-endian. An error never grows from a mesh that is valid.
 nlohmann::ordered_json MeshJson(const Mesh& mesh);
 
+// {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each value
+// of the log but the clock's.
+nlohmann::ordered_json CurveData(const std::vector<LogEntry>& log,
+                                 const std::vector<TermLabel>& labels);
+
 // {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}], "camera": {...},
 // "models": [...]}: a chart for each value of the log but the clock's.
 nlohmann::ordered_json PageData(const ReportFacts& facts);

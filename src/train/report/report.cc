@@ -28,7 +28,7 @@ Result<std::string> Page(const ReportFacts& facts) {
                                     {"credits", CreditsHtml(facts)},
                                     {"data", ScriptJson(PageData(facts))},
                                     {"style", std::string(kReportCss)},
-                                    {"script", std::string(kReportJs)}});
+                                    {"script", std::string(kPartsJs) + std::string(kReportJs)}});
 }
 
 }  // namespace

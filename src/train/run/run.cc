@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/folder_lock.h"
 #include "base/processor_time.h"
+#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "train/run/checkpoint.h"
 #include "train/run/first_difference.h"
@@ -136,7 +137,11 @@ void Session::LogStream(LogEntry* entry) {
 Status Session::Draw() {
   if (!work_.HasPicture(done_)) return {};
   TILEGRAD_ASSIGN(const ImageU8 picture, work_.Picture(done_));
-  return picture.empty() ? Status() : io::SavePng(PictureFile(plan_, done_), picture);
+  if (picture.empty()) return {};
+  const Path file = PictureFile(plan_, done_);
+  TILEGRAD_TRY(io::SavePng(file, picture));
+  const Mesh mesh = work_.PictureMesh();
+  return mesh.faces.empty() ? Status() : io::SaveGlb(Path(file).replace_extension(".glb"), mesh);
 }
 
 Status Session::OneStep() {

@@ -17,6 +17,7 @@
 #include "nn/context.h"
 #include "nn/named_tensors.h"
 #include "scene/image.h"
+#include "scene/mesh.h"
 #include "train/run/schedule.h"
 #include "train/run/step_values.h"
 
@@ -63,6 +64,9 @@ class RunWork {
   // one is not written.
   virtual bool HasPicture(std::int64_t steps) const = 0;
   virtual Result<ImageU8> Picture(std::int64_t steps) = 0;
+  // The mesh as it is then, with vertex colours, for pages that show it forming; without faces:
+  // none is written.
+  virtual Mesh PictureMesh() const { return {}; }
 };
 
 struct RunOutcome {
