@@ -179,7 +179,8 @@ void PrintOutcome(const Options& options, const train::FitOutcome& o) {
           *o.camera_error_after);
   }
   const Path out = options.out;
-  Print("mesh {}\nlook at {}\n", (out / "mesh.glb").string(), (out / "report.html").string());
+  Print("mesh {}\nlook at {}, or at it forming: tilegrad live {}\n", (out / "mesh.glb").string(),
+        (out / "report.html").string(), out.string());
 }
 
 nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {

@@ -2,6 +2,7 @@
 // tilegrad train: a run from a configuration and a dataset.
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -14,10 +15,14 @@
 namespace tilegrad::cli {
 namespace {
 
+// What --resume is given where no folder follows it.
+constexpr const char* kRunInOut = "the run in --out";
+
 struct TrainOptions {
-  std::string config, data, out;
+  std::string config, data, out, resume;
   std::vector<std::string> overrides;
-  bool resume = false, force = false;
+  std::int64_t steps = 0;
+  bool force = false;
   double max_minutes = 0;
   int workers = 0;
   LiveOption live;
@@ -31,7 +36,9 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options)
   Print("{}: {} at step {}, {} of training\n", options.out,
         outcome.finished ? "finished" : "stopped", outcome.last_step,
         FormatDuration(outcome.seconds));
-  if (!outcome.finished) Print("continue with the same command and --resume\n");
+  if (!outcome.finished) Print("continue with: tilegrad train --resume {}\n", options.out);
+  if (outcome.finished) Print("scores: tilegrad eval --run {}\n", options.out);
+  Print("curves: tensorboard --logdir {}\n", options.out);
 }
 
 void PrintJson(const train::RunOutcome& outcome, const TrainOptions& options) {
@@ -42,14 +49,47 @@ void PrintJson(const train::RunOutcome& outcome, const TrainOptions& options) {
                {"seconds", outcome.seconds}});
 }
 
-Status RunTraining(const TrainOptions& options) {
+// --resume RUN: what is not named is what the run was started with.
+Status TakeFromRun(TrainOptions* options) {
+  const Path run = options->resume;
+  std::error_code error;
+  if (!options->out.empty() && !std::filesystem::equivalent(run, options->out, error))
+    return InvalidArgument("--resume {}: it goes on there; leave out --out {}", run.string(),
+                           options->out);
+  if (!std::filesystem::exists(run / "config.toml", error))
+    return NotFound("{}: not a run of tilegrad train: there is no config.toml in it", run.string());
+  options->out = run.string();
+  if (options->config.empty()) options->config = (run / "config.toml").string();
+  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options->data, run));
+  options->data = data.string();
+  return {};
+}
+
+Status Complete(TrainOptions* options) {
+  if (!options->resume.empty() && options->resume != kRunInOut) return TakeFromRun(options);
+  for (const auto& [name, value] :
+       {std::pair("--config", options->config), std::pair("--data", options->data),
+        std::pair("--out", options->out)}) {
+    if (value.empty())
+      return InvalidArgument("train: {} is required; see tilegrad train --help", name);
+  }
+  return {};
+}
+
+Status RunTraining(TrainOptions options) {
+  TILEGRAD_TRY(Complete(&options));
   train::TrainJob job;
   TILEGRAD_ASSIGN(job.config, train::FindConfig(options.config));
+  if (options.steps > 0) {
+    options.overrides.push_back(fmt::format("schedule.steps={}", options.steps));
+    job.extends = !options.resume.empty();
+  }
   TILEGRAD_TRY(train::ApplyOverrides(options.overrides, &job.config));
   TILEGRAD_TRY(CheckRunFolder(options.out, OutputGuard(options.force)));
   job.data = options.data;
   job.run = options.out;
-  job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
+  job.existing =
+      !options.resume.empty() ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
   job.max_minutes = options.max_minutes;
   TILEGRAD_ASSIGN(const auto live,
                   StartLive(options.live, {options.out, options.data, job.config.schedule.steps}));
@@ -69,18 +109,24 @@ Status RunTraining(const TrainOptions& options) {
 void AddTrain(CLI::App& app, Action* action) {
   auto options = std::make_shared<TrainOptions>();
   auto* command = app.add_subcommand("train", "Train what a configuration names on a dataset");
-  command
-      ->add_option("--config", options->config,
-                   "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file")
-      ->required();
-  command->add_option("--data", options->data, "dataset folder (see: tilegrad dataset)")
-      ->required();
-  command->add_option("--out", options->out, "run folder: checkpoints, curves, samples")
-      ->required();
+  command->add_option("--config", options->config,
+                      "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file");
+  command->add_option("--data", options->data, "dataset folder (see: tilegrad dataset)");
+  command->add_option("--out", options->out, "run folder: checkpoints, curves, samples");
   command->add_option("--set", options->overrides,
                       "override a key: --set schedule.steps=100 (repeatable)");
-  command->add_flag("--resume", options->resume,
-                    "continue the run in --out (start it if there is none)");
+  command
+      ->add_option("--resume", options->resume,
+                   "continue the run in this folder, with its configuration and dataset; without a "
+                   "folder the one in --out (started if there is none)")
+      ->expected(0, 1)
+      ->default_str(kRunInOut)
+      ->option_text("[RUN]");
+  command
+      ->add_option(
+          "--steps", options->steps,
+          "as --set schedule.steps=N; with --resume it may be more than the run began with")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
   AddForceOption(command, &options->force);
   command
       ->add_option("--max-minutes", options->max_minutes,

@@ -29,6 +29,7 @@ void AddPredict(CLI::App& app, Action* action);
 void AddRender(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);
 void AddSelftest(CLI::App& app, Action* action);
+void AddTimelapse(CLI::App& app, Action* action);
 void AddTradeoff(CLI::App& app, Action* action);
 void AddTrain(CLI::App& app, Action* action);
 void AddViews(CLI::App& app, Action* action);

@@ -63,11 +63,11 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
 std::string ExplainParseError(const CLI::App* app, const CLI::Error& error) {
   const auto chosen = app->get_subcommands();
   const CLI::App& command = chosen.empty() ? *app : *chosen[0];
-  const std::string name = "tilegrad" + (chosen.empty() ? "" : " " + command.get_name());
+  const std::string name = chosen.empty() ? "" : command.get_name();
   const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
                      !command.remaining().empty();
-  return fmt::format("{}: {}\nSee {} --help\n", name, extra ? ExplainExtra(command) : error.what(),
-                     name);
+  return fmt::format("tilegrad: {}{}; see tilegrad {}--help\n", name.empty() ? "" : name + ": ",
+                     extra ? ExplainExtra(command) : error.what(), name.empty() ? "" : name + " ");
 }
 
 }  // namespace tilegrad::cli

@@ -64,6 +64,7 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
                .pictures = "samples/step_",
                .schedule = job.config.schedule,
                .existing = job.existing,
+               .may_differ = job.extends ? "schedule.steps" : "",
                .max_minutes = job.max_minutes,
                .warn = job.warn};
   nn::Context context(workers);

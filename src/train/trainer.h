@@ -17,6 +17,9 @@ struct TrainJob {
   Path data;  // dataset folder
   Path run;   // run folder
   ExistingRun existing = ExistingRun::kRefuse;
+  // Of a run that is continued: `config` may ask for another number of steps than it began with.
+  // What follows a schedule over all steps then follows the new one from where the run is.
+  bool extends = false;
   // > 0: save and stop after this long; a continued run ends in the same bits.
   double max_minutes = 0;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings

@@ -94,7 +94,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {render + "--fvo=30", "did you mean --fov?"},
            {render + "--shading fancy", "fancy is not one of lambert,none,phong,sh"},
            {"views " + In("a.glb") + " --up w --out " + In("v"), "w is not one of x,y,z"},
-           {render + "--size", "See tilegrad render --help"}}) {
+           {render + "--size", "; see tilegrad render --help"}}) {
     ExpectRefused(line, 2, part);
   }
   for (const std::string& line : {std::string("info"), render}) {

@@ -76,7 +76,8 @@ function showCurves() {
   if (key === shown.curves || step.length === 0) return;
   shown.curves = key;
   const moved = (index) => charts.forEach((chart) => chart.point(index));
-  charts = state.charts.map(({key: name, title}) => new Chart({title, values: state.curves[name]}, step, moved));
+  const told = state.charts.filter(({key: name}) => state.curves[name].some((value) => value));
+  charts = told.map(({key: name, title}) => new Chart({title, values: state.curves[name]}, step, moved));
   byId('curves').replaceChildren(...charts.map((chart) => chart.element));
   charts.forEach((chart) => chart.draw());
 }

@@ -2,6 +2,7 @@
 #include "train/run/run.h"
 
 #include <chrono>
+#include <sstream>
 
 #include "base/error.h"
 #include "base/folder_lock.h"
@@ -15,17 +16,30 @@
 namespace tilegrad::train {
 namespace {
 
+constexpr const char* kStepsKey = "schedule.steps";
+
 using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// `before`: settings that `place` holds.
+// Without the line "KEY = ...".
+std::string WithoutKey(const std::string& settings, const std::string& key) {
+  std::istringstream lines(settings);
+  std::string out;
+  for (std::string line; std::getline(lines, line);) {
+    if (key.empty() || !line.starts_with(key + " = ")) out += line + "\n";
+  }
+  return out;
+}
+
+// `before`: settings that `place` holds. That of `may_differ` is not compared.
 Status CheckSettings(const RunPlan& plan, const RunWork& work, const std::string& before,
-                     const Path& place) {
-  TILEGRAD_ASSIGN(const std::string then, work.ResultSettings(before, place.string()));
-  TILEGRAD_ASSIGN(const std::string now, work.ResultSettings(plan.settings, "this run"));
+                     const Path& place, const std::string& may_differ) {
+  TILEGRAD_ASSIGN(std::string then, work.ResultSettings(before, place.string()));
+  TILEGRAD_ASSIGN(std::string now, work.ResultSettings(plan.settings, "this run"));
+  then = WithoutKey(then, may_differ), now = WithoutKey(now, may_differ);
   if (then == now) return {};
   return InvalidArgument(
       "{}: this run was started with another configuration: {}; continue with the same, or give "
@@ -90,7 +104,16 @@ Status Session::Restore() {
   }
   const CheckpointInfo& info = found->checkpoint.info;
   const std::string file = found->file.string();
-  TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file));
+  // config.toml, which is written when a run is extended, was compared before: the newest
+  // checkpoint may be older than that.
+  std::error_code error;
+  const bool compared = std::filesystem::exists(plan_.folder / "config.toml", error);
+  TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
+                             compared ? kStepsKey : plan_.may_differ));
+  if (info.step > plan_.schedule.steps) {
+    return InvalidArgument("{}: it has {} steps already, more than {}", file, info.step,
+                           plan_.schedule.steps);
+  }
   if (info.image_size != plan_.image_size) {
     return InvalidArgument("{}: its images had {} pixels a side, now there are {}", file,
                            info.image_size, plan_.image_size);
@@ -196,7 +219,7 @@ Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
   }
   if (!started) return {};
   TILEGRAD_ASSIGN(const std::string before, ReadText(config_file));
-  return CheckSettings(plan, work, before, config_file);
+  return CheckSettings(plan, work, before, config_file, plan.may_differ);
 }
 
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,

@@ -36,6 +36,9 @@ struct RunPlan {
   std::int64_t image_size = 0;  // pixels; a run continues with the same
   Schedule schedule{};
   ExistingRun existing = ExistingRun::kRefuse;
+  // The setting that may differ from the run's own: its number of steps, "schedule.steps". Empty:
+  // none.
+  std::string may_differ = {};
   double max_minutes = 0;      // > 0: save and stop after this long
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad timelapse: the mesh of a fit, turning while it forms, as an animation.
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/output_guard.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/option_checks.h"
+#include "cli/run_folder.h"
+#include "io/mesh_file.h"
+#include "io/webp_animation.h"
+#include "render/picture/mesh_pictures.h"
+#include "scene/unlit.h"
+#include "train/data/dataset.h"
+
+namespace tilegrad::cli {
+namespace {
+
+constexpr float kHalfExtent = 0.45f;
+
+struct TimelapseOptions {
+  std::string run, out;
+  int size = 320, frames = 72, workers = 0;
+  double seconds = 6, turns = 1;
+  bool force = false;
+};
+
+// The meshes beside the pictures of a fit, by step.
+Result<std::vector<Path>> MeshFiles(const Path& run) {
+  std::vector<Path> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(run / "timelapse", error)) {
+    if (entry.path().extension() == ".glb") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());  // steps are padded with zeros
+  if (!files.empty()) return files;
+  return NotFound("{}: no meshes in it; fits keep them beside each picture of --timelapse",
+                  (run / "timelapse").string());
+}
+
+// All at the place and scale that put the last one into the middle.
+Result<std::vector<Mesh>> LoadMeshes(const std::vector<Path>& files) {
+  std::vector<Mesh> meshes;
+  for (const Path& file : files) {
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(file));
+    SetUnlit(loaded.mesh, "fitted");
+    meshes.push_back(std::move(loaded.mesh));
+  }
+  const Bounds bounds = MeshBounds(meshes.back());
+  const glm::vec3 centre = (bounds.low + bounds.high) / 2.0f, extent = bounds.high - bounds.low;
+  const float scale = 2 * kHalfExtent / std::max({extent.x, extent.y, extent.z, 1e-30f});
+  for (Mesh& mesh : meshes) {
+    for (glm::vec3& p : mesh.positions) p = (p - centre) * scale;
+  }
+  return meshes;
+}
+
+// Forming takes the first two thirds of the time; then the last mesh goes on turning.
+Result<std::vector<ImageU8>> DrawFrames(const TimelapseOptions& options,
+                                        const std::vector<Mesh>& meshes, const Workers& workers) {
+  const train::CameraRule rule;
+  std::vector<ImageU8> frames;
+  ProgressLine line;
+  const auto draw = line.Sink();
+  for (int i = 0; i < options.frames; ++i) {
+    const double time = static_cast<double>(i) / options.frames;
+    const auto count = static_cast<double>(meshes.size());
+    const auto shown =
+        static_cast<std::size_t>(std::min(count - 1, std::floor(1.5 * time * count)));
+    const Camera camera =
+        OrbitCamera(rule.lens, 60 - 360 * options.turns * time, rule.elevation, rule.distance);
+    TILEGRAD_ASSIGN(auto picture, DrawMesh(meshes[shown],
+                                           {{&camera, 1}, rule.lens.width, options.size}, workers));
+    frames.push_back(std::move(picture[0]));
+    if (StopOnSignals()) return Cancelled("stopped; nothing was written");
+    draw({"drawing", static_cast<std::uint64_t>(i + 1), static_cast<std::uint64_t>(options.frames),
+          ""});
+  }
+  return frames;
+}
+
+Status RunTimelapse(const TimelapseOptions& options) {
+  const Path run = options.run;
+  const Path out = options.out.empty() ? run / "timelapse.webp" : Path(options.out);
+  const OutputGuard guard(options.force);
+  TILEGRAD_TRY(guard.Check(out));
+  TILEGRAD_ASSIGN(const auto files, MeshFiles(run));
+  TILEGRAD_ASSIGN(const auto meshes, LoadMeshes(files));
+  const Workers workers(options.workers);
+  TILEGRAD_ASSIGN(const auto frames, DrawFrames(options, meshes, workers));
+  const int frame_ms =
+      std::clamp(static_cast<int>(1000 * options.seconds / options.frames), 1, 65535);
+  TILEGRAD_TRY(WriteGuarded(guard, out, [&] {
+    return io::SaveWebpAnimation(out, frames, {.frame_ms = frame_ms, .quality = 80});
+  }));
+  Print("{}: {} of {}\n", out.string(), Count(frames.size(), "frame"),
+        Count(meshes.size(), "mesh state"));
+  PrintResult({{"animation", out.string()}, {"frames", frames.size()}, {"meshes", meshes.size()}});
+  return {};
+}
+
+}  // namespace
+
+void AddTimelapse(CLI::App& app, Action* action) {
+  auto options = std::make_shared<TimelapseOptions>();
+  auto* command = app.add_subcommand(
+      "timelapse", "Animate a fit: its mesh turns while it forms, as an animated WebP");
+  command->add_option("run", options->run, "folder of a fit")->required();
+  command->add_option("--out", options->out, "the animation [RUN/timelapse.webp]")
+      ->check(FileEnding(".webp"));
+  command->add_option("--size", options->size, "pixels a side")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 2048));
+  command->add_option("--frames", options->frames, "pictures in it")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 2000));
+  command->add_option("--seconds", options->seconds, "how long it takes")
+      ->capture_default_str()
+      ->check(AboveZero());
+  command->add_option("--turns", options->turns, "about the object, in that time")
+      ->capture_default_str();
+  AddForceOption(command, &options->force);
+  AddWorkersOption(command, &options->workers);
+  command->callback([options, action] { *action = [options] { return RunTimelapse(*options); }; });
+}
+
+}  // namespace tilegrad::cli
