@@ -28,9 +28,8 @@ void Answer(const Result<std::string>& text, const char* type, httplib::Response
 }
 
 std::int64_t StepOf(const httplib::Request& request) {
-  std::int64_t step = -1;
-  CLI::detail::lexical_cast(request.get_param_value("step"), step);
-  return step;
+  std::int64_t step = 0;
+  return CLI::detail::lexical_cast(request.get_param_value("step"), step) ? step : -1;
 }
 
 }  // namespace

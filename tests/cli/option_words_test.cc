@@ -85,7 +85,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {"photo.png", "unknown command \"photo.png\"; see"},
            {render + "--output x.png",
             "unknown option --output (did you mean --outputs or --out?)"},
-           {render + "--colour red", "tilegrad render: unknown option --colour\n"},
+           {render + "--colour red", "tilegrad: render: unknown option --colour; see"},
            {"dataset procedural", "\"procedural\" is one word too many"},
            {"figure2 --steps 0", "0 must be a number above 0"},
            {"dataset-view --data d --view -1", "-1 must be a number, 0 or above"},
