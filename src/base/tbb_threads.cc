@@ -80,9 +80,9 @@ class TbbThreads {
   }
 
   // Until `threads` of them are in one loop, or for a second: loops of other workers may keep some.
-  // The arena is never destroyed: it keeps the threads.
+  // The arena is never destroyed: it keeps the threads. Nor is it forgotten, or it were a leak.
   void Start(int threads) {
-    auto* const arena = new tbb::task_arena(threads + 1);
+    auto* const arena = arenas_.emplace_back(new tbb::task_arena(threads + 1));
     std::atomic<int> waiting = threads + 1;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(1);
     arena->execute([&] {
@@ -97,6 +97,7 @@ class TbbThreads {
   }
 
   std::mutex mutex_;
+  std::vector<tbb::task_arena*> arenas_;
   tbb::global_control* limit_ = nullptr;
   bool plenty_ = false;
   // Beyond the threads of callers: oneTBB's limit and ours, what all workers ask for.
