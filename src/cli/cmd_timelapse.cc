@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad timelapse: the mesh of a fit, turning while it forms, as an animation.
 #include <algorithm>
-#include <charconv>
-#include <map>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -29,7 +28,7 @@ struct TimelapseOptions {
   bool force = false;
 };
 
-// The meshes beside the pictures of a fit, by step.
+// The meshes beside the pictures of a fit, by step; at the end the result, with its texture.
 Result<std::vector<Path>> MeshFiles(const Path& run) {
   std::vector<Path> files;
   std::error_code error;
@@ -37,6 +36,8 @@ Result<std::vector<Path>> MeshFiles(const Path& run) {
     if (entry.path().extension() == ".glb") files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());  // steps are padded with zeros
+  const Path result = run / "mesh.glb";
+  if (!files.empty() && std::filesystem::exists(result, error)) files.push_back(result);
   if (!files.empty()) return files;
   return NotFound("{}: no meshes in it; fits keep them beside each picture of --timelapse",
                   (run / "timelapse").string());

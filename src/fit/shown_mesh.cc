@@ -2,27 +2,45 @@
 #include "fit/shown_mesh.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 
 namespace tilegrad::train {
 namespace {
 
-// The texel that is nearest.
-glm::vec4 TexelAt(const Image& texture, float u, float v) {
+constexpr int kMostReach = 6;
+
+// The sum of texels up to `reach` away from the nearest; their number in alpha.
+glm::vec4 TexelsAround(const Image& texture, float u, float v, int reach) {
   const auto texel = [](float unit, int count) {
     return std::clamp(static_cast<int>(unit * static_cast<float>(count)), 0, count - 1);
   };
-  const float* rgb = texture.at(texel(u, texture.width), texel(1 - v, texture.height));
-  return {rgb[0], rgb[1], rgb[2], 1};
+  const int x = texel(u, texture.width), y = texel(1 - v, texture.height);
+  glm::vec4 sum(0);
+  for (int i = std::max(0, y - reach); i <= std::min(texture.height - 1, y + reach); ++i) {
+    for (int j = std::max(0, x - reach); j <= std::min(texture.width - 1, x + reach); ++j) {
+      const float* rgb = texture.at(j, i);
+      sum += glm::vec4(rgb[0], rgb[1], rgb[2], 1);
+    }
+  }
+  return sum;
+}
+
+// About as many texels as there are for each vertex.
+int ReachOf(const Image& texture, std::size_t vertices) {
+  const double each = static_cast<double>(texture.width) * texture.height /
+                      static_cast<double>(std::max<std::size_t>(vertices, 1));
+  return std::clamp(static_cast<int>(std::sqrt(each) / 2), 0, kMostReach);
 }
 
 // Means over the corners of each vertex.
 std::vector<glm::vec4> ColorsOfTexture(const FitScene& scene, std::size_t vertices) {
   std::vector<glm::vec4> colors(vertices, glm::vec4(0));
+  const int reach = ReachOf(scene.texture, vertices);
   for (std::size_t c = 0; c < scene.uv_indices.size(); ++c) {
     const auto at = 2 * static_cast<std::size_t>(scene.uv_indices[c]);
     colors[static_cast<std::size_t>(scene.faces[c])] +=
-        TexelAt(scene.texture, scene.uvs[at], scene.uvs[at + 1]);
+        TexelsAround(scene.texture, scene.uvs[at], scene.uvs[at + 1], reach);
   }
   for (glm::vec4& color : colors) color = color.a > 0 ? color / color.a : glm::vec4(1);
   return colors;

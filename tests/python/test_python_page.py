@@ -3,9 +3,11 @@
 
 import contextlib
 import io
+import os
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 
 import numpy as np
@@ -23,9 +25,13 @@ def blocks(page):
 
 def run(code):
     """The names that the code leaves, and what it prints."""
-    names, out = {}, io.StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(code, names)  # pylint: disable=exec-used
+    names, out, here = {}, io.StringIO(), os.getcwd()
+    with contextlib.redirect_stdout(out), tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            exec(code, names)  # pylint: disable=exec-used
+        finally:
+            os.chdir(here)
     return names, out.getvalue()
 
 

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs that go on from their folder alone, are extended, and are animated.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/glb_writer.h"
+#include "scene/shapes.h"
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad {
+namespace {
+
+using Json = nlohmann::json;
+
+class Runs : public TempFolderTest {
+ protected:
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  // Under --json, what it says.
+  Json Done(const std::string& arguments) const {
+    const Outcome outcome = RunProgram(arguments + " --json");
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    const auto begin = outcome.output.find('{');
+    return begin == std::string::npos ? Json() : Json::parse(outcome.output.substr(begin));
+  }
+  void ExpectRefused(const std::string& arguments, int code, const std::string& part) const {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << outcome.output;
+  }
+  Bytes Checkpoint(const std::string& run, const std::string& step) const {
+    return ReadFile(folder_ / run / "checkpoints" / ("step_" + step + ".safetensors")).value();
+  }
+  std::string Start(const std::string& run) const {
+    return "train --config " + In("tiny.toml") + " --data " + In("data") + " --out " + In(run);
+  }
+  void SetUp() override {
+    Write("tiny.toml", std::string("name = \"tiny\"\n[network]\nchannels = 4\ncode = 8\n"
+                                   "hidden1 = 8\nhidden2 = 8\ntemplate_level = 1\n[schedule]\n"
+                                   "batch = 2\nsteps = 3\ncheckpoint_every = 1\n"));
+  }
+  void MakeData() const {
+    Done("dataset --source procedural --per-class 3 --size 32 --views 2 --out " + In("data"));
+  }
+};
+
+TEST_F(Runs, GoOnFromTheirFolderAlone) {
+  MakeData();
+  Done(Start("whole"));
+  Done(Start("run") + " --set schedule.steps=3");
+  std::filesystem::remove(folder_ / "run/checkpoints/step_00000003.safetensors");
+  const Json rest = Done("train --resume " + In("run"));
+  EXPECT_EQ(rest["first_step"], 2);
+  EXPECT_EQ(rest["last_step"], 3);
+  EXPECT_EQ(rest["finished"], true);
+  // Seconds differ; the rest of the file follows its header.
+  const Bytes a = Checkpoint("run", "00000003"), b = Checkpoint("whole", "00000003");
+  EXPECT_TRUE(std::equal(a.end() - 1000, a.end(), b.end() - 1000));
+  const Outcome said = RunProgram("train --resume " + In("run") + " --steps 4");
+  EXPECT_NE(said.output.find("tensorboard --logdir " + In("run")), std::string::npos)
+      << said.output;
+}
+
+TEST_F(Runs, AreExtendedIfAskedTo) {
+  MakeData();
+  Done(Start("run"));
+  // The same command with other settings stays an error.
+  ExpectRefused(Start("run") + " --resume --set schedule.steps=5", 2, "schedule.steps");
+  const Json more = Done("train --resume " + In("run") + " --steps 5");
+  EXPECT_EQ(more["first_step"], 3);
+  EXPECT_EQ(more["last_step"], 5);
+  // It is a run of five steps now, also where its newest checkpoint is of before.
+  for (const char* step : {"00000004", "00000005"})
+    std::filesystem::remove(folder_ /
+                            ("run/checkpoints/step_" + std::string(step) + ".safetensors"));
+  EXPECT_EQ(Done("train --resume " + In("run"))["last_step"], 5);
+  ExpectRefused("train --resume " + In("run") + " --steps 2", 2, "it has 5 steps already");
+  ExpectRefused("train --resume " + In("run") + " --set network.code=9 --steps 9", 2,
+                "network.code");
+}
+
+TEST_F(Runs, SayWhatIsMissing) {
+  ExpectRefused("train --resume " + In("none"), 3, "none: not a run of tilegrad train");
+  ExpectRefused("train", 2, "tilegrad: train: --config is required; see tilegrad train --help");
+  ExpectRefused("train --config quick --data x", 2, "train: --out is required");
+  ExpectRefused("train --resume", 2, "--config is required");
+  Write("run/config.toml", std::string("name = \"a\"\n"));
+  ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
+}
+
+TEST_F(Runs, OfFitsAreAnimated) {
+  ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
+  Done("views " + In("a.glb") + " --views 3 --size 32 --out " + In("views"));
+  Done("fit " + In("views") + " --steps 6 --timelapse 3 --out " + In("fit"));
+  const Json made = Done("timelapse " + In("fit") + " --size 32 --frames 6");
+  EXPECT_EQ(made["meshes"], 4);  // at steps 0, 3 and 6, and the result
+  const Bytes file = ReadFile(folder_ / "fit/timelapse.webp").value();
+  EXPECT_EQ(std::string(file.begin() + 8, file.begin() + 12), "WEBP");
+  Done("fit " + In("views") + " --steps 2 --timelapse 0 --out " + In("bare"));
+  ExpectRefused("timelapse " + In("bare"), 3, "no meshes in it");
+}
+
+}  // namespace
+}  // namespace tilegrad
