@@ -59,7 +59,7 @@ def check_page(address):
     page = subprocess.run([*BROWSER, address], capture_output=True, text=True, timeout=120,
                           check=True).stdout
     assert "&lt;b&gt;fit &amp; co" in page and "<b>fit" not in page, page[-3000:]
-    assert "Step 40" in page and "mesh after 40 steps" in page, page[-3000:]
+    assert "Finished. Step 40 of 40" in page and "mesh after 40 steps" in page, page[-3000:]
     assert page.count('class="chart"') >= 3, page.count('class="chart"')
     assert 'src="picture?step=40"' in page
     assert not re.search(r'(src|href)="https?:', page)

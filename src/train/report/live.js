@@ -53,7 +53,7 @@ function showPicture(step) {
   if (step === null || shown.picture === step) return;
   shown.picture = step;
   byId('live-picture').src = `picture?step=${step}`;
-  byId('picture-caption').textContent = byId('live-picture').alt = `pictures after ${step.toLocaleString('en')} steps`;
+  byId('picture-caption').textContent = byId('live-picture').alt = `after ${step.toLocaleString('en')} steps`;
   byId('picture-figure').hidden = false;
 }
 

@@ -96,10 +96,14 @@ Result<std::string> LiveRun::State() {
   if (std::filesystem::exists(source_.run / "metrics.jsonl", error)) {
     TILEGRAD_ASSIGN(log, ReadLog(source_.run));
   }
+  const bool running = FolderLock::IsHeld(source_.run);
+  const std::int64_t step = log.empty() ? 0 : log.back().step;
+  // A fit writes its result at the end.
+  const bool fitted = !running && std::filesystem::exists(source_.run / "mesh.glb", error);
   Json json = {{"name", known.name},
-               {"running", FolderLock::IsHeld(source_.run)},
-               {"step", log.empty() ? 0 : log.back().step},
-               {"steps", known.steps},
+               {"running", running},
+               {"step", step},
+               {"steps", known.steps == 0 && fitted ? step : known.steps},
                {"pictures", StepsOf(Pictures(source_.run))},
                {"meshes", StepsOf(Meshes(source_.run))}};
   const std::int64_t saved = CheckpointStep(source_.run);
