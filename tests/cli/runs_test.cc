@@ -85,6 +85,9 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train", 2, "tilegrad: train: --config is required; see tilegrad train --help");
   ExpectRefused("train --config quick --data x", 2, "train: --out is required");
   ExpectRefused("train --resume", 2, "--config is required");
+  // The server ends with the command, however soon that is.
+  ExpectRefused("train --config quick --data none --out " + In("c") + " --live", 3, "none");
+  ExpectRefused("train --config quick --data none --out " + In("c") + " --live=x", 2, "--live=x");
   Write("run/config.toml", std::string("name = \"a\"\n"));
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
