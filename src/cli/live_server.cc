@@ -100,7 +100,8 @@ Result<LiveServer> LiveServer::Start(train::LiveSource source, int port) {
   TILEGRAD_TRY(impl->Bind(port));
   impl->thread = std::thread([server = &impl->server] { server->listen_after_bind(); });
   // Before it listens, stop() would be forgotten, and the thread never end.
-  while (!impl->server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  for (int i = 0; i < 5000 && !impl->server.is_running(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   PrintNote("live view: {}\n", impl->address);
   return LiveServer(std::move(impl));
 }
