@@ -153,8 +153,10 @@ Status Run(const Job& job, Change change, const char* name) {
     TILEGRAD_TRY(study.Add(truth));
   }
   const Tally& t = study.tally();
-  fmt::print("| {} | {:.4f} | {:.4f} | {:.1f} | {:.2f} |\n", name, t.spread / t.models,
-             t.texture_l1 / t.models, t.angle / t.models, t.shininess / t.models);
+  const bool phong = LightingOf(job.config.light) == Lighting::kPhong;
+  fmt::print("| {} | {:.4f} | {:.4f} | {:.1f} | {} |\n", name, t.spread / t.models,
+             t.texture_l1 / t.models, t.angle / t.models,
+             phong ? fmt::format("{:.2f}", t.shininess / t.models) : "");
   return io::SavePng(fmt::format("{}_{}.png", job.out, name), study.Sheet());
 }
 
