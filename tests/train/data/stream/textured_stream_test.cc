@@ -115,6 +115,28 @@ TEST(TexturedStream, SamePositionSameBits) {
   EXPECT_NE(std::memcmp(before.data(), next->data(), next->size_bytes()), 0);
 }
 
+// The same object in the views of another, and back.
+TEST(TexturedStream, ViewsCanBeChanged) {
+  const Workers workers(1);
+  const std::vector<TexturedMesh> meshes = Balls(1);
+  TexturedStream stream(Still("phong"), meshes, workers);
+  std::vector<TexturedView> first(2), other(2);
+  const auto drawn = stream.Render(0, 4, 0, first);
+  ASSERT_TRUE(drawn.ok()) << drawn.status().message();
+  const std::vector<float> before(drawn->begin(), drawn->end());
+  ASSERT_TRUE(stream.Render(0, 5, 0, other).ok());
+  ASSERT_TRUE(stream.Render(0, 4, 0, other).ok());
+  std::swap(other[0], other[1]);
+  ASSERT_TRUE(stream.Change(0, other).ok());
+  const auto swapped = stream.Again(0, Appearance::kLit);
+  ASSERT_TRUE(swapped.ok());
+  const std::size_t image = before.size() / 2;
+  EXPECT_EQ(std::memcmp(swapped->data(), before.data() + image, image * sizeof(float)), 0);
+  EXPECT_NE(std::memcmp(swapped->data(), before.data(), image * sizeof(float)), 0);
+  EXPECT_NE(stream.Change(0, std::span(other).first(1)).message().find("2 views were drawn"),
+            std::string::npos);
+}
+
 // Of Lambert light without ambient, a picture is texture times light in every pixel that one face
 // covers wholly; at supersampled edges it is a mean of products.
 TEST(TexturedStream, LitIsTextureTimesLight) {
