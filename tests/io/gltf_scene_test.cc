@@ -2,6 +2,7 @@
 // glTF beyond geometry: cameras, samplers, texture transforms, how materials are drawn.
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -136,6 +137,31 @@ TEST_F(GltfScene, MaterialsComeBackAsTheyWere) {
   EXPECT_EQ(loaded->mesh.materials, mesh.materials);
   EXPECT_EQ(loaded->mesh.textures.size(), 2u);  // each image once
   EXPECT_TRUE(loaded->warnings.empty());
+}
+
+// The light's node turns +z, against which it shines, to the sun: also straight behind.
+TEST_F(GltfScene, LightsPointToTheSun) {
+  Mesh triangle;
+  triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, triangle.faces = {{0, 1, 2}};
+  for (const glm::dvec3& sun :
+       {glm::dvec3(0, 0, 2), {0, 0, -1}, {1, 2, -3}, {-0.1, 0, -0.9}, {0, 1, 0}}) {
+    const auto bytes = io::EncodeLitGlb(triangle, sun);
+    ASSERT_TRUE(bytes.ok()) << bytes.status().message();
+    std::uint32_t length = 0;
+    std::memcpy(&length, bytes->data() + 12, 4);
+    const json scene = json::parse(bytes->begin() + 20, bytes->begin() + 20 + length);
+    const json& q = scene["nodes"][1]["rotation"];
+    const glm::dvec3 u(q[0], q[1], q[2]), z(0, 0, 1);
+    const double w = q[3];
+    const glm::dvec3 turned = z + 2.0 * glm::cross(u, glm::cross(u, z) + w * z);
+    EXPECT_LT(glm::length(turned - sun / glm::length(sun)), 1e-6);
+    Write("lit.glb", *bytes);
+    const auto loaded = io::LoadMesh(folder_ / "lit.glb");
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.positions.size(), 3u);
+  }
+  EXPECT_FALSE(io::EncodeLitGlb(triangle, glm::dvec3(0)).ok());
+  EXPECT_FALSE(io::EncodeLitGlb({}, glm::dvec3(0, 1, 0)).ok());
 }
 
 }  // namespace
