@@ -174,7 +174,7 @@ def draw_worst(options: argparse.Namespace, rows: list[dict[str, Any]], out: pat
                  "--format", "png", "--force")
         frames = json.loads(cameras.read_text())["frames"][:SHOWN]
         lines.append([over_white(folder / "views" / frame["file_path"]) for frame in frames])
-        lines.append([over_white(file) for file in sorted(shown.iterdir())[:SHOWN]])
+        lines.append([over_white(file) for file in sorted(shown.glob("*.png"))[:SHOWN]])
     picture = np.concatenate([np.concatenate(line, axis=1) for line in lines])
     save_image(out / "worst.png", np.round(picture).astype(np.uint8))
 

@@ -28,7 +28,7 @@ using train::Parameter;
 constexpr double kMostRate = 1e6;
 
 struct Options {
-  std::string input, dataset_model, out, mesh, truth, optimize;
+  std::string input, dataset_model, out, start = "auto", truth, optimize;
   std::string lighting = "none", filter = "bilinear";
   std::vector<std::string> rates;
   std::vector<float> light_direction;
@@ -140,8 +140,14 @@ Result<train::FitJob> MakeJob(const Options& options) {
                                  ? train::ReadFitFolder(options.input, options.hold_out)
                                  : train::ReadFitDataset(options.input, options.dataset_model,
                                                          options.hold_out));
-  if (!options.mesh.empty()) {
-    TILEGRAD_ASSIGN(job.start, Load(options.mesh, &job.guard));
+  static const std::map<std::string, train::StartShape> shapes = {
+      {"auto", train::StartShape::kAuto},
+      {"hull", train::StartShape::kHull},
+      {"sphere", train::StartShape::kSphere}};
+  if (const auto shape = shapes.find(options.start); shape != shapes.end()) {
+    job.config.start = shape->second;
+  } else {
+    TILEGRAD_ASSIGN(job.start, Load(options.start, &job.guard));
   }
   if (!options.truth.empty()) {
     TILEGRAD_ASSIGN(job.truth, Load(options.truth, &job.guard));
@@ -241,7 +247,11 @@ void AddWhat(CLI::App* command, Options* o) {
   command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
       ->capture_default_str();
   AddForceOption(command, &o->force);
-  command->add_option("--mesh", o->mesh, "start from this file instead of a sphere");
+  command
+      ->add_option("--start,--mesh", o->start,
+                   "hull: what all masks have in common; sphere; or a mesh file; auto: the hull "
+                   "where masks and cameras allow. --mesh is the old name")
+      ->capture_default_str();
   command->add_option("--optimize", o->optimize,
                       "any of positions, colors, texture, uv, camera, light, sh, material; "
                       "separated by commas [positions and texture, or the colors that --mesh has]");

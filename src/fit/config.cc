@@ -18,6 +18,7 @@ constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of 
 
 // By value, as the options of tilegrad fit call them.
 constexpr std::array kLightings = {"none", "lambert", "phong", "sh"};
+constexpr std::array kStarts = {"auto", "hull", "sphere"};
 constexpr std::array kFilters = {"nearest", "bilinear", "trilinear"};
 
 template <class Names, class Value>
@@ -51,7 +52,9 @@ ConfigFields FieldsOf(FitConfig* c) {
       {"levels", &c->levels, 1, 8, "resolutions, coarse to fine, each twice the one before"},
       {"delta_start", &c->delta_start, 1e-9, 1e3, "softness of outlines at the start, squared NDC"},
       {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.3 pixels"},
-      {"texture_size", &c->texture_size, 2, 8192, "texels around a blank texture"},
+      {"texture_size", &c->texture_size, 2, 8192, "texels along a blank texture"},
+      {"mask_tolerance", &c->mask_tolerance, 0, 0.5,
+       "share of the masks that may lack a point of the hull, if masks have gaps"},
       {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
       {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
       {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
@@ -80,6 +83,7 @@ std::string DescribeConfig(const FitConfig& config) {
   line("parameters", names);
   line("lighting", NameIn(kLightings, c.lighting));
   line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
+  line("start", NameIn(kStarts, c.start));
   line("filter", NameIn(kFilters, c.filter));
   line("vertex_colors", c.vertex_colors);
   line("max_alpha_error", c.max_alpha_error);

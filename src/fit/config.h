@@ -11,6 +11,11 @@
 
 namespace tilegrad::train {
 
+// kAuto: the visual hull where there are masks, at least kLeastHullViews views and cameras that are
+// not fitted; the sphere otherwise, and where masks have no point in common.
+enum class StartShape { kAuto, kHull, kSphere };
+inline constexpr int kLeastHullViews = 4;
+
 struct FitConfig {
   ParameterSet parameters;  // none: positions, and the texture or colours that the start has
   Lighting lighting = Lighting::kNone;
@@ -18,9 +23,11 @@ struct FitConfig {
   Filter filter = Filter::kBilinear;
 
   // The start, if no mesh is given.
+  StartShape start = StartShape::kAuto;
+  double mask_tolerance = 0;   // of the hull: the share of masks that may lack a point of it
   int template_level = 4;      // subdivisions of the icosahedron: 4 has 2,562 vertices
   bool vertex_colors = false;  // instead of a texture
-  int texture_size = 512;      // texels around; half of it from pole to pole
+  int texture_size = 512;      // texels a side; of a sphere: around, and half of it from pole to pole
 
   std::int64_t steps = 1000;
   int views_per_step = 4;

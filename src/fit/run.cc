@@ -190,7 +190,7 @@ double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
 
 Status FitResult::ScoreCameras(FitOutcome* outcome) const {
   if (job_.config.perturb_cameras == 0) return {};
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_));
+  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_, workers_));
   const std::vector<int>& views = job_.input.training;
   const std::vector<Camera> truth = Choose(job_.input.cameras, views);
   outcome->camera_error_before = MeanAngle(Choose(start.scene.cameras, views), truth);
@@ -270,20 +270,27 @@ double MeanIou(std::span<const ViewScore> scores) {
   return sum;
 }
 
-Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers) {
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job));
+namespace {
+Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& start,
+                                           const Workers& workers) {
   const FitSchedule schedule = ScheduleAt(job.config, 0, SizeOf(job.input));
   const TargetImages targets = Reduce(job.input.images, schedule.factor);
   return Diagnose(start.scene, start.options,
                   StepOf(job.config, schedule, targets, job.input.training), workers);
+}
+}  // namespace
+
+Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers) {
+  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job, workers));
+  return DiagnoseStart(job, start, workers);
 }
 
 Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop) {
   FitOutcome outcome;
   TILEGRAD_TRY(job.guard.CheckAll(ResultFiles(job.out)));  // before the work
-  TILEGRAD_ASSIGN(outcome.findings, DiagnoseFit(job, workers));
-  TILEGRAD_ASSIGN(FitStart start, PrepareFit(job));
+  TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers));
+  TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
   FitWork work(job, context, std::move(fitter));

@@ -26,7 +26,7 @@ namespace tilegrad::train {
 struct FitJob {
   FitConfig config;
   FitInput input;
-  std::optional<Mesh> start;  // none: a sphere about as large as the object
+  std::optional<Mesh> start;  // none: config.start
   std::optional<Mesh> truth;  // to compare with
   Path out;
   OutputGuard guard;  // of the files beside the run's own
@@ -54,7 +54,7 @@ struct FitStart {
   FitScene scene;
   FitterOptions options;
 };
-Result<FitStart> PrepareFit(const FitJob& job);
+Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
 
 // What shapes the result, as DescribeConfig says it, and the input's size.
 std::string DescribeJob(const FitJob& job);

@@ -9,8 +9,10 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/rng.h"
+#include "fit/hull/hull_mesh.h"
 #include "fit/run.h"
 #include "scene/shapes.h"
+#include "scene/unwrap.h"
 
 namespace tilegrad::train {
 namespace {
@@ -41,8 +43,8 @@ Status CheckMasks(const FitJob& job) {
       "(\"mask_path\" in transforms.json), or fit colours only with a silhouette weight of 0");
 }
 
-void SetBlankTexture(int size, FitScene* scene) {
-  scene->texture = Image(size, std::max(1, size / 2), 3, kGrey);
+void SetBlankTexture(int width, int height, FitScene* scene) {
+  scene->texture = Image(width, std::max(1, height), 3, kGrey);
   scene->colors.clear();
 }
 
@@ -55,9 +57,34 @@ Result<FitScene> SphereScene(const FitJob& job) {
   std::fill(scene.colors.begin(), scene.colors.end(), kGrey);
   if (!job.config.vertex_colors) {
     SetSphereUv(unit, &scene);
-    SetBlankTexture(job.config.texture_size, &scene);
+    SetBlankTexture(job.config.texture_size, job.config.texture_size / 2, &scene);
   }
   return scene;
+}
+
+Result<FitScene> HullScene(const FitJob& job, const Workers& workers) {
+  HullOptions options;
+  options.carve.tolerance = job.config.mask_tolerance;
+  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers));
+  const int size = job.config.texture_size;
+  if (!job.config.vertex_colors)
+    TILEGRAD_TRY(Unwrap({.width = size, .height = size}, &mesh).status());
+  TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(mesh));
+  std::fill(scene.colors.begin(), scene.colors.end(), kGrey);
+  if (!job.config.vertex_colors) SetBlankTexture(size, size, &scene);
+  return scene;
+}
+
+Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers) {
+  const FitConfig& config = job.config;
+  if (config.start == StartShape::kSphere) return SphereScene(job);
+  if (config.start == StartShape::kHull) return HullScene(job, workers);
+  const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
+  if (job.input.masked && known_cameras && job.input.training.size() >= kLeastHullViews) {
+    auto hull = HullScene(job, workers);
+    if (hull.ok()) return hull;
+  }
+  return SphereScene(job);
 }
 
 Result<FitScene> MeshScene(const FitJob& job) {
@@ -69,7 +96,7 @@ Result<FitScene> MeshScene(const FitJob& job) {
     return InvalidArgument(
         "the mesh has no texture coordinates, so it cannot get a texture: fit \"colors\" instead");
   }
-  SetBlankTexture(job.config.texture_size, &scene);
+  SetBlankTexture(job.config.texture_size, job.config.texture_size / 2, &scene);
   return scene;
 }
 
@@ -161,15 +188,16 @@ std::string DescribeJob(const FitJob& job) {
                      job.start.has_value()
                          ? fmt::format("{} vertices, {} faces", job.start->positions.size(),
                                        job.start->faces.size())
-                         : "sphere",
+                         : "none given",
                      InputHash(job));
 }
 
-Result<FitStart> PrepareFit(const FitJob& job) {
+Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_TRY(CheckConfig(job.config));
   TILEGRAD_TRY(CheckMasks(job));
   FitStart start;
-  TILEGRAD_ASSIGN(start.scene, job.start.has_value() ? MeshScene(job) : SphereScene(job));
+  TILEGRAD_ASSIGN(start.scene,
+                  job.start.has_value() ? MeshScene(job) : TemplateScene(job, workers));
   SetCameras(job, &start.scene);
   SetLight(job.config, &start.scene);
   FitterOptions& options = start.options;

@@ -386,7 +386,7 @@ TEST_F(Fit, PerturbedCamerasStillSeeTheObject) {
     for (int r = 0; r < 3; ++r) camera.translation[r] -= 50 * camera.rotation[3 * r];
   }
   job.config.perturb_cameras = 10;
-  const auto start = PrepareFit(job);
+  const auto start = PrepareFit(job, Workers(1));
   ASSERT_TRUE(start.ok()) << start.status().message();
   for (std::size_t i = 0; i < job.input.cameras.size(); ++i) {
     const Camera &before = job.input.cameras[i], &after = start->scene.cameras[i];

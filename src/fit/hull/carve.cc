@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/hull/carve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "base/error.h"
+#include "fit/hull/mask_distance.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kBlock = 8;           // points along a side of what is decided as one
+constexpr int kCoarse = 64;         // points along a side of the cube that is searched first
+constexpr float kSlack = 1.5f;      // pixels: of distances, which are not exact, and of lenses
+constexpr float kFirstSide = 6.0f;  // of the search, in radii of the sphere that masks suggest
+constexpr int kMostDoublings = 3;   // of the side
+constexpr float kMargin = 3;        // cells between the hull and the grid's border
+constexpr float kOutside = -1, kInside = 1;  // where no distance is needed, in cells
+
+struct View {
+  Camera camera;
+  MaskDistance distance;
+
+  // Depth, and pixels: see tilegrad/camera.h.
+  glm::vec3 Project(glm::vec3 p) const {
+    const float *r = camera.rotation, *t = camera.translation;
+    const float x = r[0] * p.x + r[1] * p.y + r[2] * p.z + t[0];
+    const float y = r[3] * p.x + r[4] * p.y + r[5] * p.z + t[1];
+    const float depth = -(r[6] * p.x + r[7] * p.y + r[8] * p.z + t[2]);
+    return {camera.cx + camera.fx * x / depth, camera.cy - camera.fy * y / depth, depth};
+  }
+  float focal() const { return std::max(std::abs(camera.fx), std::abs(camera.fy)); }
+};
+
+struct Box {
+  glm::vec3 low{HUGE_VALF}, high{-HUGE_VALF};
+  void Add(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
+  bool empty() const { return !(low.x <= high.x); }
+};
+
+enum class Verdict { kOut, kIn, kMixed };
+
+class Carver {
+ public:
+  Carver(const FitInput& input, const CarveOptions& options, const Workers& workers)
+      : workers_(workers), views_(input.training.size()) {
+    forgiven_ = static_cast<std::size_t>(options.tolerance * static_cast<double>(views_.size()));
+    forgiven_ = std::min(forgiven_, views_.size() - 1);
+    workers.For(views_.size(), [&](std::size_t i, std::size_t) {
+      const auto v = static_cast<std::size_t>(input.training[i]);
+      const std::size_t plane = input.images.pixels();
+      views_[i] = {input.cameras[v],
+                   DistanceOf(std::span(input.images.alpha).subspan(v * plane, plane),
+                              input.images.width, input.images.height)};
+    });
+  }
+
+  // World units of a pixel, the mean over the views, at a point.
+  float PixelAt(glm::vec3 point) const {
+    float sum = 0;
+    for (const View& v : views_) sum += v.Project(point).z / v.focal();
+    return sum / static_cast<float>(views_.size());
+  }
+
+  ScalarGrid Fill(glm::vec3 low, float cell, std::array<int, 3> size) const {
+    ScalarGrid grid{size, low, cell, {}};
+    grid.values.assign(grid.At(size[0] - 1, size[1] - 1, size[2] - 1) + 1, kOutside * cell);
+    std::array<std::size_t, 3> blocks;
+    for (std::size_t a = 0; a < 3; ++a)
+      blocks[a] = static_cast<std::size_t>((size[a] + kBlock - 1) / kBlock);
+    workers_.For(blocks[0] * blocks[1] * blocks[2], [&](std::size_t i, std::size_t) {
+      const std::size_t z = i % blocks[2], y = i / blocks[2] % blocks[1],
+                        x = i / blocks[2] / blocks[1];
+      FillBlock({static_cast<int>(x) * kBlock, static_cast<int>(y) * kBlock,
+                 static_cast<int>(z) * kBlock},
+                &grid);
+    });
+    return grid;
+  }
+
+  // What a ball around a point is known to be.
+  Verdict Judge(glm::vec3 centre, float radius) const {
+    std::size_t outside = 0, not_inside = 0;
+    for (const View& v : views_) {
+      const glm::vec3 at = v.Project(centre);
+      const float near = at.z - radius;
+      if (at.z + radius <= v.camera.near_plane) {
+        ++outside, ++not_inside;
+        continue;
+      }
+      if (near <= v.camera.near_plane) {
+        ++not_inside;
+        continue;
+      }
+      // Off the axis a ball's image is longer than its radius; the slant bounds by how much.
+      const float slant =
+          1 + std::hypot((at.x - v.camera.cx) / v.camera.fx, (at.y - v.camera.cy) / v.camera.fy);
+      const float reach = radius * v.focal() * slant / near + kSlack;
+      const float d = v.distance.At(at.x, at.y);
+      outside += d < -reach, not_inside += d < reach;
+    }
+    if (outside > forgiven_) return Verdict::kOut;
+    return not_inside <= forgiven_ ? Verdict::kIn : Verdict::kMixed;
+  }
+
+ private:
+  void FillBlock(const std::array<int, 3>& from, ScalarGrid* grid) const {
+    std::array<int, 3> to;
+    for (std::size_t a = 0; a < 3; ++a) to[a] = std::min(from[a] + kBlock, grid->size[a]);
+    const auto point = [&](float i, float j, float k) {
+      return grid->low + grid->cell * glm::vec3(i, j, k);
+    };
+    constexpr float kHalf = 0.5f * (kBlock - 1);
+    const glm::vec3 centre =
+        point(static_cast<float>(from[0]) + kHalf, static_cast<float>(from[1]) + kHalf,
+              static_cast<float>(from[2]) + kHalf);
+    const Verdict verdict = Judge(centre, kHalf * std::sqrt(3.0f) * grid->cell);
+    if (verdict == Verdict::kOut) return;
+    for (int i = from[0]; i < to[0]; ++i) {
+      for (int j = from[1]; j < to[1]; ++j) {
+        for (int k = from[2]; k < to[2]; ++k) {
+          grid->values[grid->At(i, j, k)] =
+              verdict == Verdict::kIn ? kInside * grid->cell
+                                      : Depth(point(static_cast<float>(i), static_cast<float>(j),
+                                                    static_cast<float>(k)));
+        }
+      }
+    }
+  }
+
+  // How far inside of the hull, world units.
+  float Depth(glm::vec3 p) const {
+    // The forgiven_ + 1 least, ascending.
+    std::array<float, 64> least;
+    const std::size_t wanted = std::min(forgiven_ + 1, least.size());
+    std::size_t count = 0;
+    for (const View& v : views_) {
+      const glm::vec3 at = v.Project(p);
+      const float d =
+          at.z > v.camera.near_plane ? v.distance.At(at.x, at.y) * at.z / v.focal() : -HUGE_VALF;
+      if (count == wanted && !(d < least[count - 1])) continue;
+      if (count < wanted) ++count;
+      std::size_t i = count - 1;
+      for (; i > 0 && least[i - 1] > d; --i) least[i] = least[i - 1];
+      least[i] = d;
+    }
+    const float d = least[count - 1];
+    return std::isfinite(d) ? d : kOutside;
+  }
+
+  const Workers& workers_;
+  std::vector<View> views_;
+  std::size_t forgiven_ = 0;
+};
+
+// Where the hull may be, on a coarse grid of balls over a cube around `middle`.
+Box Search(const Carver& carver, glm::vec3 middle, float side, const Workers& workers) {
+  const float step = side / kCoarse, radius = 0.5f * std::sqrt(3.0f) * step;
+  const auto centre = [&](int i, int j, int k) {
+    return middle - 0.5f * side + step * (glm::vec3(i, j, k) + 0.5f);
+  };
+  std::vector<Box> layers(kCoarse);
+  workers.For(kCoarse, [&](std::size_t x, std::size_t) {
+    for (int j = 0; j < kCoarse; ++j) {
+      for (int k = 0; k < kCoarse; ++k) {
+        const glm::vec3 c = centre(static_cast<int>(x), j, k);
+        if (carver.Judge(c, radius) == Verdict::kOut) continue;
+        layers[x].Add(c - 0.5f * step), layers[x].Add(c + 0.5f * step);
+      }
+    }
+  });
+  Box box;
+  for (const Box& b : layers)
+    if (!b.empty()) box.Add(b.low), box.Add(b.high);
+  return box;
+}
+
+// Twice, so that the second grid is fine where the hull is.
+Box FindHull(const Carver& carver, const Sphere& sphere, const Workers& workers) {
+  float side = kFirstSide * sphere.radius;
+  Box box = Search(carver, sphere.centre, side, workers);
+  const auto touches = [&] {
+    const glm::vec3 reach =
+        glm::max(glm::abs(box.low - sphere.centre), glm::abs(box.high - sphere.centre));
+    return std::max({reach.x, reach.y, reach.z}) > 0.499f * side;
+  };
+  for (int i = 0; i < kMostDoublings && !box.empty() && touches(); ++i) {
+    side *= 2;
+    box = Search(carver, sphere.centre, side, workers);
+  }
+  if (box.empty()) return box;
+  const glm::vec3 extent = box.high - box.low;
+  return Search(carver, 0.5f * (box.low + box.high), std::max({extent.x, extent.y, extent.z}),
+                workers);
+}
+
+Status NothingLeft() {
+  return InvalidArgument(
+      "no point lies inside of all masks, so there is no visual hull: check cameras and masks, "
+      "raise --mask-tolerance, or use --start sphere");
+}
+
+}  // namespace
+
+Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options,
+                         const Workers& workers) {
+  TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
+  const Carver carver(input, options, workers);
+  const Box box = FindHull(carver, sphere, workers);
+  if (box.empty()) return NothingLeft();
+  const glm::vec3 extent = box.high - box.low, middle = 0.5f * (box.low + box.high);
+  const float longest = std::max({extent.x, extent.y, extent.z});
+  const float cell = std::max(static_cast<float>(options.cell_pixels) * carver.PixelAt(middle),
+                              longest / static_cast<float>(options.most_cells));
+  std::array<int, 3> size;
+  for (int a = 0; a < 3; ++a)
+    size[static_cast<std::size_t>(a)] =
+        static_cast<int>(std::ceil(extent[a] / cell + 2 * kMargin)) + 1;
+  const glm::vec3 points(size[0] - 1, size[1] - 1, size[2] - 1);
+  ScalarGrid grid = carver.Fill(middle - 0.5f * cell * points, cell, size);
+  if (std::none_of(grid.values.begin(), grid.values.end(), [](float v) { return v > 0; }))
+    return NothingLeft();
+  return grid;
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/hull/hull_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "base/error.h"
+#include "scene/simplify.h"
+#include "scene/topology.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr double kSpeck = 8;  // cells' volumes: parts of less are left out
+// Taubin's two steps (A signal processing approach to fair surface design, 1995), which smooth what
+// the grid left without shrinking.
+constexpr float kShrink = 0.5f, kGrow = -0.53f;
+constexpr int kSmoothings = 3;
+
+void SmoothOnce(const Topology& topology, float factor, std::vector<glm::vec3>* positions) {
+  const std::vector<glm::vec3> before(*positions);
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    glm::vec3 sum(0);
+    for (std::int32_t n = topology.offsets[v]; n < topology.offsets[v + 1]; ++n)
+      sum += before[static_cast<std::size_t>(topology.neighbors[static_cast<std::size_t>(n)])];
+    const auto count = static_cast<float>(topology.offsets[v + 1] - topology.offsets[v]);
+    (*positions)[v] += factor * (sum / count - before[v]);
+  }
+}
+
+void Smooth(Mesh* mesh) {
+  const Topology topology = BuildTopology(mesh->faces, mesh->positions.size());
+  for (int i = 0; i < kSmoothings; ++i) {
+    SmoothOnce(topology, kShrink, &mesh->positions);
+    SmoothOnce(topology, kGrow, &mesh->positions);
+  }
+}
+
+// The part of each vertex, as the least vertex in it.
+std::vector<std::int32_t> PartsOf(const Mesh& mesh) {
+  std::vector<std::int32_t> parent(mesh.positions.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&](std::int32_t v) {
+    while (parent[static_cast<std::size_t>(v)] != v)
+      v = parent[static_cast<std::size_t>(v)] =
+          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(v)])];
+    return v;
+  };
+  for (const Face& f : mesh.faces) {
+    for (std::size_t k = 1; k < 3; ++k) {
+      const auto [low, high] = std::minmax({find(f[0]), find(f[k])});
+      parent[static_cast<std::size_t>(high)] = low;
+    }
+  }
+  for (std::int32_t v = 0; v < static_cast<std::int32_t>(parent.size()); ++v)
+    parent[static_cast<std::size_t>(v)] = find(v);
+  return parent;
+}
+
+// Faces of parts that enclose more than `volume`, in size; hollows are parts that enclose less than
+// nothing. The largest part stays in any case.
+void DropSpecks(double volume, Mesh* mesh) {
+  const std::vector<std::int32_t> parts = PartsOf(*mesh);
+  std::vector<double> volumes(parts.size(), 0.0);
+  const auto part = [&](const Face& f) {
+    return static_cast<std::size_t>(parts[static_cast<std::size_t>(f[0])]);
+  };
+  const auto at = [&](std::int32_t v) {
+    return glm::dvec3(mesh->positions[static_cast<std::size_t>(v)] - mesh->positions[0]);
+  };
+  for (const Face& f : mesh->faces)
+    volumes[part(f)] += glm::dot(at(f[0]), glm::cross(at(f[1]), at(f[2]))) / 6;
+  double largest = 0;
+  for (const double v : volumes) largest = std::max(largest, std::abs(v));
+  std::erase_if(mesh->faces, [&](const Face& f) {
+    return std::abs(volumes[part(f)]) < std::min(volume, largest);
+  });
+}
+
+}  // namespace
+
+Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers) {
+  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options.carve, workers));
+  Mesh mesh = LevelSet(grid);
+  DropSpecks(kSpeck * std::pow(static_cast<double>(grid.cell), 3), &mesh);
+  Smooth(&mesh);
+  // A cell is as many pixels as asked for, or more where the grid would be too large.
+  const double pixel = static_cast<double>(grid.cell) / options.carve.cell_pixels;
+  return Simplified(mesh, {.error = static_cast<float>(options.error_pixels * pixel),
+                           .longest = static_cast<float>(options.longest_pixels * pixel),
+                           .most_faces = options.most_faces});
+}
+
+}  // namespace tilegrad::train

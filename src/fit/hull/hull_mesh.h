@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The surface of the visual hull as a mesh to start a fit from.
+#pragma once
+
+#include "fit/hull/carve.h"
+#include "scene/mesh.h"
+
+namespace tilegrad::train {
+
+struct HullOptions {
+  CarveOptions carve;
+  // Pixels of an image where the object is: how far the surface may move to have fewer faces, and
+  // the longest edge.
+  double error_pixels = 0.25, longest_pixels = 16;
+  std::size_t most_faces = 40'000;  // `error_pixels` yields to it
+};
+
+// A closed manifold of any genus and number of parts, but for specks of less than a few cells.
+// Errors: as Carve.
+Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers);
+
+}  // namespace tilegrad::train

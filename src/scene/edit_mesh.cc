@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/edit_mesh.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "base/error.h"
+
+namespace tilegrad {
+namespace {
+
+glm::vec3 Normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) { return glm::cross(b - a, c - a); }
+
+// Whether two vectors, which need not be unit, are farther apart than the angle of this cosine.
+// One without length is.
+bool Apart(glm::vec3 a, glm::vec3 b, float cosine) {
+  return !(glm::dot(a, b) > cosine * glm::length(a) * glm::length(b));
+}
+
+bool Has(const Face& face, std::int32_t vertex) {
+  return face[0] == vertex || face[1] == vertex || face[2] == vertex;
+}
+
+std::size_t CornerOf(const Face& face, std::int32_t vertex) {
+  return face[0] == vertex ? 0 : face[1] == vertex ? 1 : 2;
+}
+
+}  // namespace
+
+Result<EditMesh> EditMesh::Make(VertexRows vertices, std::vector<Face> faces) {
+  EditMesh mesh;
+  mesh.vertices_ = std::move(vertices), mesh.faces_ = std::move(faces);
+  mesh.around_.resize(mesh.vertices_.count());
+  for (std::size_t f = 0; f < mesh.faces_.size(); ++f) {
+    for (const std::int32_t v : mesh.faces_[f]) {
+      if (v < 0 || Index(v) >= mesh.around_.size())
+        return InvalidArgument("face {} names vertex {} of {}", f, v, mesh.around_.size());
+      mesh.around_[Index(v)].push_back(static_cast<std::int32_t>(f));
+    }
+  }
+  for (std::int32_t v = 0; Index(v) < mesh.around_.size(); ++v) {
+    const auto& fan = mesh.around_[Index(v)];
+    if (fan.empty()) continue;
+    // Round the vertex from face to face: the way must come back after all of them.
+    std::int32_t face = fan[0];
+    std::size_t seen = 0;
+    do {
+      const Face& f = mesh.faces_[Index(face)];
+      const std::int32_t next = f[(CornerOf(f, v) + 2) % 3];
+      face = mesh.FaceRunning(v, next), ++seen;
+    } while (face >= 0 && face != fan[0] && seen <= fan.size());
+    if (face != fan[0] || seen != fan.size())
+      return InvalidArgument("the mesh is not a closed manifold at vertex {}", v);
+  }
+  return mesh;
+}
+
+std::int32_t EditMesh::FaceRunning(std::int32_t a, std::int32_t b) const {
+  std::int32_t found = -1;
+  for (const std::int32_t f : around_[Index(a)]) {
+    const Face& face = faces_[Index(f)];
+    if (face[(CornerOf(face, a) + 1) % 3] != b) continue;
+    if (found >= 0) return -1;  // two: no manifold
+    found = f;
+  }
+  return found;
+}
+
+std::int32_t EditMesh::ThirdCorner(std::int32_t face, std::int32_t a, std::int32_t b) const {
+  const Face& f = faces_[Index(face)];
+  return f[0] != a && f[0] != b ? f[0] : f[1] != a && f[1] != b ? f[1] : f[2];
+}
+
+std::vector<std::array<std::int32_t, 2>> EditMesh::Edges() const {
+  std::vector<std::array<std::int32_t, 2>> out;
+  for (std::int32_t a = 0; Index(a) < around_.size(); ++a) {
+    for (const std::int32_t f : around_[Index(a)]) {
+      const Face& face = faces_[Index(f)];
+      const std::int32_t b = face[(CornerOf(face, a) + 1) % 3];
+      if (a < b) out.push_back({a, b});
+    }
+    // Edges that run from b to a in a's faces run from a to b in another.
+  }
+  return out;
+}
+
+bool EditMesh::HasEdge(std::int32_t a, std::int32_t b) const {
+  const auto& fan = around_[Index(a)];
+  return std::any_of(fan.begin(), fan.end(),
+                     [&](std::int32_t f) { return Has(faces_[Index(f)], b); });
+}
+
+std::array<std::int32_t, 2> EditMesh::Across(std::int32_t a, std::int32_t b) const {
+  return {ThirdCorner(FaceRunning(a, b), a, b), ThirdCorner(FaceRunning(b, a), a, b)};
+}
+
+bool EditMesh::CanCollapse(std::int32_t a, std::int32_t b) const {
+  const auto [c, d] = Across(a, b);
+  if (Valence(c) <= 3 || Valence(d) <= 3) return false;
+  std::size_t shared = 0;
+  for (const std::int32_t f : around_[Index(a)]) {
+    const Face& face = faces_[Index(f)];
+    // Each neighbour once: as the one that follows a.
+    const std::int32_t n = face[(CornerOf(face, a) + 1) % 3];
+    if (n != b && HasEdge(b, n)) ++shared;
+  }
+  return shared == 2;
+}
+
+bool EditMesh::CollapseTurnsFaces(std::int32_t a, std::int32_t b, glm::vec3 place,
+                                  float cosine) const {
+  for (const std::int32_t moved : {a, b}) {
+    for (const std::int32_t f : around_[Index(moved)]) {
+      const Face& face = faces_[Index(f)];
+      if (Has(face, a) && Has(face, b)) continue;
+      const std::size_t k = CornerOf(face, moved);
+      const glm::vec3 p = vertices_.Position(face[(k + 1) % 3]),
+                      q = vertices_.Position(face[(k + 2) % 3]);
+      if (Apart(Normal(vertices_.Position(moved), p, q), Normal(place, p, q), cosine)) return true;
+    }
+  }
+  return false;
+}
+
+void EditMesh::Forget(std::int32_t vertex, std::int32_t face) {
+  auto& fan = around_[Index(vertex)];
+  fan.erase(std::find(fan.begin(), fan.end(), face));
+}
+
+void EditMesh::RemoveFace(std::int32_t face) {
+  for (const std::int32_t v : faces_[Index(face)]) Forget(v, face);
+  faces_[Index(face)] = {-1, -1, -1};
+}
+
+void EditMesh::ReplaceCorner(std::int32_t face, std::int32_t from, std::int32_t to) {
+  Face& f = faces_[Index(face)];
+  f[CornerOf(f, from)] = to;
+  Forget(from, face);
+  around_[Index(to)].push_back(face);
+}
+
+void EditMesh::Collapse(std::int32_t a, std::int32_t b, glm::vec3 place) {
+  for (const std::int32_t face : {FaceRunning(a, b), FaceRunning(b, a)}) RemoveFace(face);
+  while (!around_[Index(b)].empty()) ReplaceCorner(around_[Index(b)].back(), b, a);
+  float* to = &vertices_.values[Index(a) * vertices_.width];
+  const float* from = &vertices_.values[Index(b) * vertices_.width];
+  for (std::size_t i = 3; i < vertices_.width; ++i) to[i] = 0.5f * (to[i] + from[i]);
+  to[0] = place.x, to[1] = place.y, to[2] = place.z;
+}
+
+std::int32_t EditMesh::Split(std::int32_t a, std::int32_t b) {
+  const auto middle = static_cast<std::int32_t>(vertices_.count());
+  const std::size_t width = vertices_.width, i = Index(a) * width, j = Index(b) * width;
+  for (std::size_t k = 0; k < width; ++k) {
+    const float mean = 0.5f * (vertices_.values[i + k] + vertices_.values[j + k]);
+    vertices_.values.push_back(mean);
+  }
+  around_.emplace_back();
+  for (const std::int32_t face : {FaceRunning(a, b), FaceRunning(b, a)}) {
+    Face half = faces_[Index(face)];
+    half[CornerOf(half, a)] = middle;  // the half at b; the face itself keeps a
+    ReplaceCorner(face, b, middle);
+    for (const std::int32_t v : half)
+      around_[Index(v)].push_back(static_cast<std::int32_t>(faces_.size()));
+    faces_.push_back(half);
+  }
+  return middle;
+}
+
+bool EditMesh::CanFlip(std::int32_t a, std::int32_t b) const {
+  const auto [c, d] = Across(a, b);
+  return Valence(a) > 3 && Valence(b) > 3 && c != d && !HasEdge(c, d);
+}
+
+bool EditMesh::FlipTurnsFaces(std::int32_t a, std::int32_t b, float cosine) const {
+  const auto [c, d] = Across(a, b);
+  const glm::vec3 pa = vertices_.Position(a), pb = vertices_.Position(b),
+                  pc = vertices_.Position(c), pd = vertices_.Position(d);
+  const glm::vec3 before[] = {Normal(pa, pb, pc), Normal(pb, pa, pd)};
+  const glm::vec3 after[] = {Normal(pa, pd, pc), Normal(pb, pc, pd)};
+  return Apart(after[0], before[0], cosine) || Apart(after[0], before[1], cosine) ||
+         Apart(after[1], before[0], cosine) || Apart(after[1], before[1], cosine);
+}
+
+void EditMesh::Flip(std::int32_t a, std::int32_t b) {
+  const auto [c, d] = Across(a, b);
+  const std::int32_t at_c = FaceRunning(a, b), at_d = FaceRunning(b, a);
+  ReplaceCorner(at_c, b, d);  // (a, b, c) becomes (a, d, c)
+  ReplaceCorner(at_d, a, c);  // (b, a, d) becomes (b, c, d)
+}
+
+EditMesh::Packed EditMesh::Pack() const {
+  Packed out;
+  out.vertices.width = vertices_.width;
+  std::vector<std::int32_t> number(around_.size(), -1);
+  for (std::size_t v = 0; v < around_.size(); ++v) {
+    if (around_[v].empty()) continue;
+    number[v] = static_cast<std::int32_t>(out.vertices.count());
+    const auto row = vertices_.values.begin() + static_cast<std::ptrdiff_t>(v * vertices_.width);
+    out.vertices.values.insert(out.vertices.values.end(), row,
+                               row + static_cast<std::ptrdiff_t>(vertices_.width));
+  }
+  for (const Face& f : faces_) {
+    if (f[0] >= 0)
+      out.faces.push_back({number[Index(f[0])], number[Index(f[1])], number[Index(f[2])]});
+  }
+  return out;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/simplify.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <queue>
+#include <tuple>
+
+#include "scene/edit_mesh.h"
+
+namespace tilegrad {
+namespace {
+
+constexpr float kMostTurn = 0.5f;  // cosine: faces turn by less than 60 degrees a collapse
+constexpr double kTowardsMiddle =
+    1e-3;                        // of a quadric's weight: holds vertices in planes and lines
+constexpr double kShape = 1e-6;  // of an edge's squared length, as error: short ones first
+
+// Weighted sum of squared distances from planes: p.A p - 2 b.p + c.
+struct Quadric {
+  glm::dmat3 a = glm::dmat3(0);
+  glm::dvec3 b = {0, 0, 0};
+  double c = 0, weight = 0;
+
+  void AddPlane(const glm::dvec3& unit, const glm::dvec3& on, double w) {
+    const double d = glm::dot(unit, on);
+    a += w * glm::outerProduct(unit, unit), b += w * d * unit, c += w * d * d, weight += w;
+  }
+  Quadric& operator+=(const Quadric& q) {
+    a += q.a, b += q.b, c += q.c, weight += q.weight;
+    return *this;
+  }
+  double At(const glm::dvec3& p) const {
+    return std::max(0.0, glm::dot(p, a * p) - 2 * glm::dot(b, p) + c);
+  }
+  // The least, held near `middle` where planes do not say.
+  glm::dvec3 Best(const glm::dvec3& middle) const {
+    const double w = kTowardsMiddle * weight;
+    return glm::inverse(a + glm::dmat3(w)) * (b + w * middle);
+  }
+};
+
+struct Candidate {
+  float cost = 0;
+  std::int32_t a = 0, b = 0;
+  std::uint32_t stamp = 0;  // the sum of both ends', which only grow
+};
+struct Later {
+  bool operator()(const Candidate& x, const Candidate& y) const {
+    return std::tie(x.cost, x.a, x.b) > std::tie(y.cost, y.a, y.b);
+  }
+};
+
+class Simplification {
+ public:
+  Simplification(EditMesh mesh, const SimplifyLimits& limits)
+      : mesh_(std::move(mesh)),
+        limits_(limits),
+        faces_(mesh_.faces().size()),
+        stamps_(mesh_.vertices().count()),
+        quadrics_(stamps_.size()) {
+    // About the first vertex: sums of squares far from the origin lose digits.
+    if (!stamps_.empty()) origin_ = mesh_.vertices().Position(0);
+    for (const Face& f : mesh_.faces()) AddPlaneOf(f);
+    for (const Quadric& q : quadrics_) unit_ += q.weight / static_cast<double>(quadrics_.size());
+    for (const auto& [a, b] : mesh_.Edges()) Push(a, b);
+  }
+
+  void Run() {
+    while (!queue_.empty()) {
+      const Candidate next = queue_.top();
+      queue_.pop();
+      if (next.stamp != stamps_[Index(next.a)] + stamps_[Index(next.b)]) continue;
+      if (IsTooFar(next)) break;
+      if (!mesh_.CanCollapse(next.a, next.b)) continue;
+      const auto place = glm::vec3(BestOf(next.a, next.b).place + glm::dvec3(origin_));
+      if (mesh_.CollapseTurnsFaces(next.a, next.b, place, kMostTurn) || IsTooLong(next, place))
+        continue;
+      Take(next, place);
+    }
+  }
+
+  const EditMesh& mesh() const { return mesh_; }
+
+ private:
+  static std::size_t Index(std::int32_t i) { return static_cast<std::size_t>(i); }
+  glm::dvec3 At(std::int32_t v) const {
+    return glm::dvec3(mesh_.vertices().Position(v)) - glm::dvec3(origin_);
+  }
+
+  void AddPlaneOf(const Face& f) {
+    const glm::dvec3 normal = glm::cross(At(f[1]) - At(f[0]), At(f[2]) - At(f[0]));
+    const double length = glm::length(normal);
+    if (!(length > 0)) return;
+    for (const std::int32_t v : f) quadrics_[Index(v)].AddPlane(normal / length, At(v), length);
+  }
+
+  struct Place {
+    glm::dvec3 place;
+    double cost;
+  };
+  Place BestOf(std::int32_t a, std::int32_t b) const {
+    Quadric sum = quadrics_[Index(a)];
+    sum += quadrics_[Index(b)];
+    const glm::dvec3 middle = 0.5 * (At(a) + At(b)), edge = At(b) - At(a);
+    glm::dvec3 best = sum.weight > 0 ? sum.Best(middle) : middle;
+    const double square = glm::dot(edge, edge);
+    const glm::dvec3 away = best - middle;
+    if (!(glm::dot(away, away) < 4 * square)) best = middle;
+    return {best, sum.At(best) + kShape * square * sum.weight};
+  }
+
+  void Push(std::int32_t a, std::int32_t b) {
+    queue_.push(
+        {static_cast<float>(BestOf(a, b).cost), a, b, stamps_[Index(a)] + stamps_[Index(b)]});
+  }
+
+  bool IsTooFar(const Candidate& c) const {
+    if (faces_ > limits_.most_faces && limits_.most_faces > 0) return false;
+    const auto most = static_cast<double>(limits_.error);
+    return static_cast<double>(c.cost) > most * most * unit_;
+  }
+
+  bool IsTooLong(const Candidate& c, glm::vec3 place) const {
+    const float most = limits_.longest * limits_.longest;
+    for (const std::int32_t moved : {c.a, c.b}) {
+      for (const std::int32_t f : mesh_.FacesAt(moved)) {
+        for (const std::int32_t v : mesh_.faces()[Index(f)]) {
+          const glm::vec3 d = mesh_.vertices().Position(v) - place;
+          if (v != c.a && v != c.b && glm::dot(d, d) > most) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  void Take(const Candidate& c, glm::vec3 place) {
+    mesh_.Collapse(c.a, c.b, place);
+    quadrics_[Index(c.a)] += quadrics_[Index(c.b)];
+    faces_ -= 2;
+    ++stamps_[Index(c.a)], ++stamps_[Index(c.b)];
+    for (const std::int32_t f : mesh_.FacesAt(c.a)) {
+      const Face& face = mesh_.faces()[Index(f)];
+      for (std::size_t k = 0; k < 3; ++k)
+        if (face[k] == c.a) Push(c.a, face[(k + 1) % 3]);
+    }
+  }
+
+  EditMesh mesh_;
+  SimplifyLimits limits_;
+  std::size_t faces_;
+  double unit_ = 0;  // mean weight of a vertex
+  glm::vec3 origin_ = {0, 0, 0};
+  std::vector<std::uint32_t> stamps_;
+  std::vector<Quadric> quadrics_;
+  std::priority_queue<Candidate, std::vector<Candidate>, Later> queue_;
+};
+
+}  // namespace
+
+Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
+  VertexRows rows;
+  for (const glm::vec3& p : mesh.positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
+  TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(std::move(rows), mesh.faces));
+  Simplification work(std::move(edit), limits);
+  work.Run();
+  const EditMesh::Packed packed = work.mesh().Pack();
+  Mesh out;
+  out.faces = packed.faces;
+  for (std::size_t v = 0; v < packed.vertices.count(); ++v)
+    out.positions.push_back(packed.vertices.Position(static_cast<std::int32_t>(v)));
+  return out;
+}
+
+}  // namespace tilegrad

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fewer faces for the same surface.
+#pragma once
+
+#include "scene/mesh.h"
+#include "tilegrad/status.h"
+
+namespace tilegrad {
+
+struct SimplifyLimits {
+  float error = 0;  // as if the faces around one vertex, of mean area, moved by this; world units
+  float longest = 1e30f;  // edge that a collapse may make; world units
+  std::size_t most_faces =
+      0;  // as long as there are more, `error` does not stop; 0: it always does
+};
+
+// Collapses edges, the one of the least quadric error first (Garland, Heckbert 1997), and keeps the
+// surface a closed manifold of the same topology; no face turns over. Positions and faces only. An
+// error if `mesh` is not a closed manifold (scene/edit_mesh.h).
+Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits);
+
+}  // namespace tilegrad
