@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kDeltaShare = 0.7;                    // of the run, until delta is what it ends at
 constexpr double kFinalPixels = 0.3;                   // of the default delta
+constexpr double kHullPixels = 0.7, kWideDelta = 3e-3;  // softness at the start
+constexpr int kSphereLevels = 3;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 // By value, as the options of tilegrad fit call them.
@@ -26,10 +28,13 @@ std::string NameIn(const Names& names, Value value) {
   return names[static_cast<std::size_t>(value)];
 }
 
-double FinalDelta(const FitConfig& config, ImageSize size) {
-  if (config.delta > 0) return config.delta;
-  const double ndc = kFinalPixels * 2 / std::max(size.width, size.height);
+double DeltaOf(double pixels, ImageSize size) {
+  const double ndc = pixels * 2 / std::max(size.width, size.height);
   return ndc * ndc;
+}
+
+double FinalDelta(const FitConfig& config, ImageSize size) {
+  return config.delta > 0 ? config.delta : DeltaOf(kFinalPixels, size);
 }
 
 // The coarsest level that the sizes allow.
@@ -49,8 +54,10 @@ ConfigFields FieldsOf(FitConfig* c) {
   return {
       {"steps", &c->steps, 1, 1e7, "gradient steps"},
       {"views_per_step", &c->views_per_step, 1, 1e6, "images a step looks at"},
-      {"levels", &c->levels, 1, 8, "resolutions, coarse to fine, each twice the one before"},
-      {"delta_start", &c->delta_start, 1e-9, 1e3, "softness of outlines at the start, squared NDC"},
+      {"levels", &c->levels, 0, 8,
+       "resolutions, coarse to fine, each twice the one before; 0: as it suits the start"},
+      {"delta_start", &c->delta_start, 0, 1e3,
+       "softness of outlines at the start, squared NDC; 0: as it suits the start"},
       {"delta", &c->delta, 0, 1e3, "and at the end; 0: 0.3 pixels"},
       {"texture_size", &c->texture_size, 2, 8192, "texels along a blank texture"},
       {"mask_tolerance", &c->mask_tolerance, 0, 0.5,
@@ -92,6 +99,13 @@ std::string DescribeConfig(const FitConfig& config) {
   line("color_region", static_cast<int>(c.loss.region));
   line("silhouette_loss", static_cast<int>(c.loss.silhouette));
   return out;
+}
+
+FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
+  if (config.levels == 0) config.levels = from_hull ? 1 : kSphereLevels;
+  if (config.delta_start == 0)
+    config.delta_start = from_hull ? DeltaOf(kHullPixels, size) : kWideDelta;
+  return config;
 }
 
 FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size) {

@@ -32,15 +32,19 @@ struct FitConfig {
   std::int64_t steps = 1000;
   int views_per_step = 4;
   std::int64_t seed = 1;
-  int levels = 3;             // of resolution, each half of the next; the last is the images' own
-  double delta_start = 3e-3;  // of equation 5; falls geometrically to `delta` over 70 % of the run
+  // Of resolution, each half of the next; the last is the images' own. 0: one from a hull, which is
+  // near the object everywhere, else 3.
+  int levels = 0;
+  // Of equation 5; falls geometrically to `delta` over 70 % of the run. 0: 0.7 pixels from a hull,
+  // else 3e-3.
+  double delta_start = 0;
   double delta = 0;           // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
   double max_alpha_error = 1e-4;
 
   LearningRates rates;       // positions and cameras' translation: times the object's radius
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
-  ImageLoss loss;
+  ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
   RegularizerTerms regularizers;
   double perturb_cameras = 0;  // degrees, each by a random turn about the object: for experiments
 
@@ -55,6 +59,9 @@ ConfigFields FieldsOf(FitConfig* config);
 // One line "key = value" for each that shapes the result; two runs with the same lines and input
 // do the same.
 std::string DescribeConfig(const FitConfig& config);
+
+// What is 0 for "as it suits the start" gets its value. Later functions want that.
+FitConfig Settled(FitConfig config, bool from_hull, ImageSize size);
 
 // The state of the schedules at a step.
 struct FitSchedule {

@@ -31,7 +31,8 @@ Result<TargetImages> RenderTarget(const Figure2Case& one, const FitRenderer::Job
   return TargetImages{images.width,
                       images.height,
                       {images.color.begin(), images.color.end()},
-                      {images.alpha.begin(), images.alpha.end()}};
+                      {images.alpha.begin(), images.alpha.end()},
+                      {}};
 }
 
 // A half cosine from 1 to kFinalRate.

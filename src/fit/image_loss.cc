@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/image_loss.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "train/losses/color_l1.h"
@@ -11,7 +12,7 @@ namespace {
 
 // One image; color is [3,H,W].
 struct OneImage {
-  std::span<const float> truth, truth_alpha, color, alpha;
+  std::span<const float> truth, truth_alpha, silhouette, color, alpha;
   std::span<const std::int32_t> faces;
   std::span<float> d_color, d_alpha;
 };
@@ -42,9 +43,28 @@ double MeanL1(std::span<const float> truth, std::span<const float> predicted, do
 }
 
 double Iou(const OneImage& image, double scale) {
-  const IouSums<float> sums(image.truth_alpha, image.alpha);
-  IouBackward<float>(sums, image.truth_alpha, scale, image.d_alpha);
+  const IouSums<float> sums(image.silhouette, image.alpha);
+  IouBackward<float>(sums, image.silhouette, scale, image.d_alpha);
   return sums.loss();
+}
+
+double Squared(const OneImage& image, double scale) {
+  double area = 0, sum = 0;
+  for (const float s : image.silhouette) area += static_cast<double>(s);
+  area = std::max(area, 1.0);
+  const auto step = static_cast<float>(2 * scale / area);
+  for (std::size_t p = 0; p < image.silhouette.size(); ++p) {
+    const float gap = image.alpha[p] - image.silhouette[p];
+    sum += static_cast<double>(gap * gap);
+    image.d_alpha[p] = step * gap;
+  }
+  return sum / area;
+}
+
+double Silhouette(SilhouetteLoss loss, const OneImage& image, double scale) {
+  if (loss == SilhouetteLoss::kIou) return Iou(image, scale);
+  if (loss == SilhouetteLoss::kSquared) return Squared(image, scale);
+  return MeanL1(image.silhouette, image.alpha, scale, image.d_alpha);
 }
 
 ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double share) {
@@ -57,9 +77,7 @@ ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double 
   }
   if (loss.silhouette_weight > 0) {
     const double scale = share * loss.silhouette_weight;
-    value.silhouette = loss.silhouette == SilhouetteLoss::kIou
-                           ? Iou(image, scale)
-                           : MeanL1(image.truth_alpha, image.alpha, scale, image.d_alpha);
+    value.silhouette = Silhouette(loss.silhouette, image, scale);
   }
   value.total = loss.color_weight * value.color + loss.silhouette_weight * value.silhouette;
   return value;
@@ -81,6 +99,7 @@ ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages
       return array.empty() ? std::span(array) : std::span(array).subspan(n * size, size);
     };
     const OneImage image{part(targets.color, v, 3 * plane), part(targets.alpha, v, plane),
+                         part(targets.silhouette.empty() ? targets.alpha : targets.silhouette, v, plane),
                          part(frame.color, i, 3 * plane),   part(frame.alpha, i, plane),
                          part(frame.face_ids, i, plane),    part(d_color_, i, 3 * plane),
                          part(d_alpha_, i, plane)};

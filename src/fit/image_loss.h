@@ -16,6 +16,8 @@ struct TargetImages {
   int width = 0, height = 0;
   AlignedVector<float> color;  // [N,3,H,W]
   AlignedVector<float> alpha;  // [N,H,W] in [0, 1]
+  // What silhouettes are held to, of the same shape; empty: alpha.
+  AlignedVector<float> silhouette;
 
   std::size_t pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -26,7 +28,9 @@ enum class ColorRegion {
   kEverywhere,  // targets are 0 where there is nothing, as renders are
   kOnObject,    // where a face is drawn, weighted by the target's alpha
 };
-enum class SilhouetteLoss { kL1, kIou };  // mean |difference|, or equation 12
+// Mean |difference|; equation 12; or the squared differences' sum over the silhouette's area, which is
+// least where both agree also between 0 and 1, while the other two want 0 or 1.
+enum class SilhouetteLoss { kL1, kIou, kSquared };
 
 struct ImageLoss {
   double color_weight = 1, silhouette_weight = 1;

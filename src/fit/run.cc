@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "fit/shown_mesh.h"
+#include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
@@ -67,8 +68,8 @@ bool ShowsAt(const FitConfig& config, std::int64_t step) {
 
 class FitWork : public RunWork {
  public:
-  FitWork(const FitJob& job, nn::Context& context, Fitter fitter)
-      : job_(job), context_(context), fitter_(std::move(fitter)) {}
+  FitWork(const FitJob& job, const FitConfig& config, nn::Context& context, Fitter fitter)
+      : job_(job), config_(config), context_(context), fitter_(std::move(fitter)) {}
 
   // All lines count; earlier versions wrote them in another order.
   Result<std::string> ResultSettings(const std::string& settings,
@@ -91,26 +92,33 @@ class FitWork : public RunWork {
   const FitScene& scene() const { return fitter_.scene(); }
 
  private:
-  const TargetImages& Targets(int factor);
+  // What views are held to at a schedule's resolution and softness.
+  const TargetImages& Targets(const FitSchedule& schedule, std::span<const int> views);
 
   const FitJob& job_;
+  const FitConfig config_;
   nn::Context& context_;
   Fitter fitter_;
-  std::map<int, TargetImages> targets_;  // by factor
+  std::map<int, SoftTargets> targets_;  // by factor
 };
 
-const TargetImages& FitWork::Targets(int factor) {
-  auto [at, added] = targets_.try_emplace(factor);
-  if (added) at->second = Reduce(job_.input.images, factor);
-  return at->second;
+const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<const int> views) {
+  auto at = targets_.find(schedule.factor);
+  if (at == targets_.end()) {
+    at = targets_
+             .emplace(schedule.factor, SoftTargets(Reduce(job_.input.images, schedule.factor),
+                                                   context_.workers()))
+             .first;
+  }
+  return at->second.At(schedule.delta, views, context_.workers());
 }
 
 Status FitWork::Step(std::int64_t step, StepValues* values) {
-  const FitConfig& config = job_.config;
+  const FitConfig& config = config_;
   const FitSchedule schedule = ScheduleAt(config, step, SizeOf(job_.input));
   const std::vector<int> views = ViewsAt(config, step, job_.input.training);
   TILEGRAD_ASSIGN(const FitValues v,
-                  fitter_.Step(StepOf(config, schedule, Targets(schedule.factor), views)));
+                  fitter_.Step(StepOf(config, schedule, Targets(schedule, views), views)));
   const RegularizerTerms& weights = config.regularizers;
   values->loss = v.total;
   values->terms = {{"color", config.loss.color_weight, v.image.color},
@@ -273,10 +281,10 @@ double MeanIou(std::span<const ViewScore> scores) {
 namespace {
 Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& start,
                                            const Workers& workers) {
-  const FitSchedule schedule = ScheduleAt(job.config, 0, SizeOf(job.input));
+  const FitSchedule schedule = ScheduleAt(start.config, 0, SizeOf(job.input));
   const TargetImages targets = Reduce(job.input.images, schedule.factor);
   return Diagnose(start.scene, start.options,
-                  StepOf(job.config, schedule, targets, job.input.training), workers);
+                  StepOf(start.config, schedule, targets, job.input.training), workers);
 }
 }  // namespace
 
@@ -293,7 +301,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
-  FitWork work(job, context, std::move(fitter));
+  FitWork work(job, start.config, context, std::move(fitter));
   const RunPlan plan = PlanOf(job);
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));

@@ -53,6 +53,7 @@ Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& worke
 struct FitStart {
   FitScene scene;
   FitterOptions options;
+  FitConfig config;  // the job's, settled
 };
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
 

@@ -75,13 +75,15 @@ Result<FitScene> HullScene(const FitJob& job, const Workers& workers) {
   return scene;
 }
 
-Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers) {
+Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, bool* from_hull) {
   const FitConfig& config = job.config;
+  *from_hull = config.start == StartShape::kHull;
   if (config.start == StartShape::kSphere) return SphereScene(job);
   if (config.start == StartShape::kHull) return HullScene(job, workers);
   const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
   if (job.input.masked && known_cameras && job.input.training.size() >= kLeastHullViews) {
     auto hull = HullScene(job, workers);
+    *from_hull = hull.ok();
     if (hull.ok()) return hull;
   }
   return SphereScene(job);
@@ -196,8 +198,10 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_TRY(CheckConfig(job.config));
   TILEGRAD_TRY(CheckMasks(job));
   FitStart start;
-  TILEGRAD_ASSIGN(start.scene,
-                  job.start.has_value() ? MeshScene(job) : TemplateScene(job, workers));
+  bool from_hull = false;
+  TILEGRAD_ASSIGN(start.scene, job.start.has_value() ? MeshScene(job)
+                                                     : TemplateScene(job, workers, &from_hull));
+  start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
   SetCameras(job, &start.scene);
   SetLight(job.config, &start.scene);
   FitterOptions& options = start.options;

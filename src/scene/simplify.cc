@@ -64,7 +64,6 @@ class Simplification {
     // About the first vertex: sums of squares far from the origin lose digits.
     if (!stamps_.empty()) origin_ = mesh_.vertices().Position(0);
     for (const Face& f : mesh_.faces()) AddPlaneOf(f);
-    for (const Quadric& q : quadrics_) unit_ += q.weight / static_cast<double>(quadrics_.size());
     for (const auto& [a, b] : mesh_.Edges()) Push(a, b);
   }
 
@@ -120,7 +119,8 @@ class Simplification {
   bool IsTooFar(const Candidate& c) const {
     if (faces_ > limits_.most_faces && limits_.most_faces > 0) return false;
     const auto most = static_cast<double>(limits_.error);
-    return static_cast<double>(c.cost) > most * most * unit_;
+    // Each face counts at three vertices, with twice its area.
+    return static_cast<double>(c.cost) > most * most * 6 * static_cast<double>(limits_.patch);
   }
 
   bool IsTooLong(const Candidate& c, glm::vec3 place) const {
@@ -151,7 +151,6 @@ class Simplification {
   EditMesh mesh_;
   SimplifyLimits limits_;
   std::size_t faces_;
-  double unit_ = 0;  // mean weight of a vertex
   glm::vec3 origin_ = {0, 0, 0};
   std::vector<std::uint32_t> stamps_;
   std::vector<Quadric> quadrics_;

@@ -8,7 +8,9 @@
 namespace tilegrad {
 
 struct SimplifyLimits {
-  float error = 0;  // as if the faces around one vertex, of mean area, moved by this; world units
+  // How far a patch of the surface of `patch` may move, world units; larger ones less, smaller ones
+  // more, as volume goes.
+  float error = 0, patch = 1;
   float longest = 1e30f;  // edge that a collapse may make; world units
   std::size_t most_faces =
       0;  // as long as there are more, `error` does not stop; 0: it always does

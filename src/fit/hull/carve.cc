@@ -47,7 +47,9 @@ enum class Verdict { kOut, kIn, kMixed };
 class Carver {
  public:
   Carver(const FitInput& input, const CarveOptions& options, const Workers& workers)
-      : workers_(workers), views_(input.training.size()) {
+      : workers_(workers),
+        views_(input.training.size()),
+        margin_(static_cast<float>(options.margin_pixels)) {
     forgiven_ = static_cast<std::size_t>(options.tolerance * static_cast<double>(views_.size()));
     forgiven_ = std::min(forgiven_, views_.size() - 1);
     workers.For(views_.size(), [&](std::size_t i, std::size_t) {
@@ -99,7 +101,7 @@ class Carver {
       // Off the axis a ball's image is longer than its radius; the slant bounds by how much.
       const float slant =
           1 + std::hypot((at.x - v.camera.cx) / v.camera.fx, (at.y - v.camera.cy) / v.camera.fy);
-      const float reach = radius * v.focal() * slant / near + kSlack;
+      const float reach = radius * v.focal() * slant / near + kSlack + margin_;
       const float d = v.distance.At(at.x, at.y);
       outside += d < -reach, not_inside += d < reach;
     }
@@ -120,40 +122,35 @@ class Carver {
               static_cast<float>(from[2]) + kHalf);
     const Verdict verdict = Judge(centre, kHalf * std::sqrt(3.0f) * grid->cell);
     if (verdict == Verdict::kOut) return;
+    std::vector<float> least;
     for (int i = from[0]; i < to[0]; ++i) {
       for (int j = from[1]; j < to[1]; ++j) {
         for (int k = from[2]; k < to[2]; ++k) {
           grid->values[grid->At(i, j, k)] =
               verdict == Verdict::kIn ? kInside * grid->cell
-                                      : Depth(point(static_cast<float>(i), static_cast<float>(j),
-                                                    static_cast<float>(k)));
+                                      : Depth(point(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)), &least);
         }
       }
     }
   }
 
   // How far inside of the hull, world units.
-  float Depth(glm::vec3 p) const {
-    // The forgiven_ + 1 least, ascending.
-    std::array<float, 64> least;
-    const std::size_t wanted = std::min(forgiven_ + 1, least.size());
-    std::size_t count = 0;
+  float Depth(glm::vec3 p, std::vector<float>* least) const {
+    least->clear();  // the forgiven_ + 1 least, ascending
     for (const View& v : views_) {
       const glm::vec3 at = v.Project(p);
       const float d =
-          at.z > v.camera.near_plane ? v.distance.At(at.x, at.y) * at.z / v.focal() : -HUGE_VALF;
-      if (count == wanted && !(d < least[count - 1])) continue;
-      if (count < wanted) ++count;
-      std::size_t i = count - 1;
-      for (; i > 0 && least[i - 1] > d; --i) least[i] = least[i - 1];
-      least[i] = d;
+          at.z > v.camera.near_plane ? (v.distance.At(at.x, at.y) + margin_) * at.z / v.focal() : -HUGE_VALF;
+      if (least->size() > forgiven_ && !(d < least->back())) continue;
+      least->insert(std::upper_bound(least->begin(), least->end(), d), d);
+      if (least->size() > forgiven_ + 1) least->pop_back();
     }
-    const float d = least[count - 1];
-    return std::isfinite(d) ? d : kOutside;
+    return std::isfinite(least->back()) ? least->back() : kOutside;
   }
 
   const Workers& workers_;
   std::vector<View> views_;
+  float margin_;
   std::size_t forgiven_ = 0;
 };
 

@@ -10,8 +10,11 @@
 namespace tilegrad::train {
 
 struct CarveOptions {
-  double cell_pixels = 1;  // a cell's side, in pixels of an image where the object is
-  int most_cells = 256;    // along the longest side
+  double cell_pixels = 0.7;  // a cell's side, in pixels of an image where the object is
+  int most_cells = 320;      // along the longest side
+  // Pixels that masks are widened by, so that what is thin is not cut by one view that shows it
+  // half a pixel off.
+  double margin_pixels = 0.25;
   // How many views may see a point outside of their mask that is kept all the same, as a share of
   // the views: for masks that lack something. Each makes the rest less sharp.
   double tolerance = 0;

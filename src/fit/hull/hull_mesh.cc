@@ -88,7 +88,9 @@ Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const W
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
   const double pixel = static_cast<double>(grid.cell) / options.carve.cell_pixels;
+  const double patch = options.patch_pixels * pixel;
   return Simplified(mesh, {.error = static_cast<float>(options.error_pixels * pixel),
+                           .patch = static_cast<float>(patch * patch),
                            .longest = static_cast<float>(options.longest_pixels * pixel),
                            .most_faces = options.most_faces});
 }

@@ -12,6 +12,7 @@ struct HullOptions {
   // Pixels of an image where the object is: how far the surface may move to have fewer faces, and
   // the longest edge.
   double error_pixels = 0.25, longest_pixels = 16;
+  double patch_pixels = 1.5;        // side of the patch that may move as far (scene/simplify.h)
   std::size_t most_faces = 40'000;  // `error_pixels` yields to it
 };
 
