@@ -12,8 +12,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kDeltaShare = 0.7;                    // of the run, until delta is what it ends at
-constexpr double kFinalPixels = 0.3;                   // of the default delta
+constexpr double kDeltaShare = 0.7;   // of the run, until delta is what it ends at
+constexpr double kFinalPixels = 0.3;  // of the default delta
 constexpr double kHullPixels = 0.7, kWideDelta = 3e-3;  // softness at the start
 constexpr int kSphereLevels = 3;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
@@ -67,6 +67,7 @@ ConfigFields FieldsOf(FitConfig* c) {
       {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
       {"flatness", &c->regularizers.flatness, 0, 1e6, "weight of the angles between faces"},
       {"edge_length", &c->regularizers.edge_length, 0, 1e6, "weight of unequal edges"},
+      {"area", &c->regularizers.area, 0, 1e6, "weight of the surface's area"},
       {"color_weight", &c->loss.color_weight, 0, 1e6, "of the L1 loss of colours"},
       {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "of the IoU loss of masks"},
       {"perturb_cameras", &c->perturb_cameras, 0, 180,

@@ -27,7 +27,7 @@ struct FitConfig {
   double mask_tolerance = 0;   // of the hull: the share of masks that may lack a point of it
   int template_level = 4;      // subdivisions of the icosahedron: 4 has 2,562 vertices
   bool vertex_colors = false;  // instead of a texture
-  int texture_size = 512;      // texels a side; of a sphere: around, and half of it from pole to pole
+  int texture_size = 512;  // texels a side; of a sphere: around, and half of it from pole to pole
 
   std::int64_t steps = 1000;
   int views_per_step = 4;
@@ -38,7 +38,7 @@ struct FitConfig {
   // Of equation 5; falls geometrically to `delta` over 70 % of the run. 0: 0.7 pixels from a hull,
   // else 3e-3.
   double delta_start = 0;
-  double delta = 0;           // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
+  double delta = 0;  // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
   double max_alpha_error = 1e-4;
 
   LearningRates rates;       // positions and cameras' translation: times the object's radius

@@ -97,7 +97,7 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   }
   const RegularizerTerms& r = values.regularizers;
   values.total = values.image.total + w.laplacian * r.laplacian + w.flatness * r.flatness +
-                 w.edge_length * r.edge_length;
+                 w.edge_length * r.edge_length + w.area * r.area;
   ForEachOfViews(step.views, [&](ParameterBlock& block, std::size_t rendered) {
     PullBlock(scene_, gradients_, rendered, &block);
   });

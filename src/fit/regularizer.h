@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The mesh regularisers of a fit, on one mesh: Laplacian of the movement since the start, flatness
-// (losses/smoothness.h) and edge length.
+// (losses/smoothness.h), edge length and area.
 #pragma once
 
 #include <memory>
@@ -16,6 +16,7 @@ namespace tilegrad::train {
 // Weights, >= 0; or the values of the losses.
 struct RegularizerTerms {
   double laplacian = 0, flatness = 0, edge_length = 0;
+  double area = 0;  // of the surface, over what it was at the start
 };
 
 // Keeps its scratch: nothing is allocated after the first call.
@@ -31,7 +32,10 @@ class Regularizer {
  private:
   double AddLaplacian(float weight, std::span<const float> positions, std::span<float> d_positions);
 
+  double AddArea(double weight, std::span<const float> positions, std::span<float> d_positions);
+
   std::vector<Face> faces_;
+  double start_area_ = 0;
   std::vector<float> start_, movement_, residual_, d_movement_;
   std::unique_ptr<Topology> topology_;  // stays where it is when this is moved
   std::vector<FaceNormal<float>> normals_;

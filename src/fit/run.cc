@@ -106,8 +106,8 @@ const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<cons
   auto at = targets_.find(schedule.factor);
   if (at == targets_.end()) {
     at = targets_
-             .emplace(schedule.factor, SoftTargets(Reduce(job_.input.images, schedule.factor),
-                                                   context_.workers()))
+             .emplace(schedule.factor,
+                      SoftTargets(Reduce(job_.input.images, schedule.factor), context_.workers()))
              .first;
   }
   return at->second.At(schedule.delta, views, context_.workers());
@@ -125,7 +125,8 @@ Status FitWork::Step(std::int64_t step, StepValues* values) {
                    {"silhouette", config.loss.silhouette_weight, v.image.silhouette},
                    {"laplacian", weights.laplacian, v.regularizers.laplacian},
                    {"flatness", weights.flatness, v.regularizers.flatness},
-                   {"edge_length", weights.edge_length, v.regularizers.edge_length}};
+                   {"edge_length", weights.edge_length, v.regularizers.edge_length},
+                   {"area", weights.area, v.regularizers.area}};
   values->also = {{"delta", schedule.delta}, {"factor", static_cast<double>(schedule.factor)}};
   values->images = static_cast<std::int64_t>(views.size());
   return {};

@@ -199,8 +199,8 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_TRY(CheckMasks(job));
   FitStart start;
   bool from_hull = false;
-  TILEGRAD_ASSIGN(start.scene, job.start.has_value() ? MeshScene(job)
-                                                     : TemplateScene(job, workers, &from_hull));
+  TILEGRAD_ASSIGN(start.scene,
+                  job.start.has_value() ? MeshScene(job) : TemplateScene(job, workers, &from_hull));
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
   SetCameras(job, &start.scene);
   SetLight(job.config, &start.scene);

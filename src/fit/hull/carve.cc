@@ -128,7 +128,9 @@ class Carver {
         for (int k = from[2]; k < to[2]; ++k) {
           grid->values[grid->At(i, j, k)] =
               verdict == Verdict::kIn ? kInside * grid->cell
-                                      : Depth(point(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)), &least);
+                                      : Depth(point(static_cast<float>(i), static_cast<float>(j),
+                                                    static_cast<float>(k)),
+                                              &least);
         }
       }
     }
@@ -139,8 +141,9 @@ class Carver {
     least->clear();  // the forgiven_ + 1 least, ascending
     for (const View& v : views_) {
       const glm::vec3 at = v.Project(p);
-      const float d =
-          at.z > v.camera.near_plane ? (v.distance.At(at.x, at.y) + margin_) * at.z / v.focal() : -HUGE_VALF;
+      const float d = at.z > v.camera.near_plane
+                          ? (v.distance.At(at.x, at.y) + margin_) * at.z / v.focal()
+                          : -HUGE_VALF;
       if (least->size() > forgiven_ && !(d < least->back())) continue;
       least->insert(std::upper_bound(least->begin(), least->end(), d), d);
       if (least->size() > forgiven_ + 1) least->pop_back();
