@@ -42,6 +42,9 @@ struct FitConfig {
   double max_alpha_error = 1e-4;
 
   LearningRates rates;       // positions and cameras' translation: times the object's radius
+  // How often, over the first kRemeshShare of the run, edges are made as long as they should be; -1:
+  // kHullRemeshes from a hull, else not at all. Not where uv is fitted.
+  int remeshes = -1;
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
@@ -62,6 +65,9 @@ std::string DescribeConfig(const FitConfig& config);
 
 // What is 0 for "as it suits the start" gets its value. Later functions want that.
 FitConfig Settled(FitConfig config, bool from_hull, ImageSize size);
+
+// Whether edges are remade before this step.
+bool RemeshesAt(const FitConfig& config, std::int64_t step);
 
 // The state of the schedules at a step.
 struct FitSchedule {

@@ -23,10 +23,52 @@ auto StateArrays(Block& block) {
                     std::pair{"v", &block.v}};
 }
 
+// Names of the mesh's tensors in a state.
+constexpr const char *kFaces = "mesh.faces", *kUvs = "mesh.uvs", *kUvIndices = "mesh.uv_indices",
+                     *kStart = "mesh.start", *kColors = "mesh.colors";
+
+nn::Tensor Numbers(nn::Context& context, std::span<const float> values) {
+  nn::Tensor tensor =
+      context.Empty({static_cast<std::int64_t>(values.size())}, nn::DType::kF32);
+  std::copy(values.begin(), values.end(), tensor.data<float>());
+  return tensor;
+}
+
 const nn::Tensor* FindTensor(std::span<const nn::NamedTensor> state, const std::string& name) {
   const auto at = std::find_if(state.begin(), state.end(),
                                [&](const nn::NamedTensor& t) { return t.name == name; });
   return at == state.end() ? nullptr : &at->value;
+}
+
+template <class T>
+Status Take(std::span<const nn::NamedTensor> state, const char* name, std::vector<T>* to) {
+  const nn::Tensor* tensor = FindTensor(state, name);
+  const nn::DType type = std::is_same_v<T, float> ? nn::DType::kF32 : nn::DType::kI32;
+  if (tensor == nullptr || tensor->dtype() != type)
+    return DataLoss("\"{}\" is missing or of another type", name);
+  to->resize(tensor->elements());
+  std::copy_n(tensor->data<T>(), to->size(), to->begin());
+  return {};
+}
+
+bool AllBelow(std::span<const std::int32_t> indices, std::size_t count) {
+  return std::all_of(indices.begin(), indices.end(), [count](std::int32_t i) {
+    return i >= 0 && static_cast<std::size_t>(i) < count;
+  });
+}
+
+// What a checkpoint has, beside the start: indices within their arrays, and the same kinds of
+// arrays.
+Status CheckMesh(const FitScene& scene, const FitScene& start) {
+  const bool good = scene.faces.size() % 3 == 0 && scene.positions.size() % 3 == 0 &&
+                    scene.uvs.size() % 2 == 0 && AllBelow(scene.faces, scene.vertices()) &&
+                    AllBelow(scene.uv_indices, scene.uvs.size() / 2) &&
+                    (scene.uv_indices.empty() || scene.uv_indices.size() == scene.faces.size()) &&
+                    scene.uv_indices.empty() == start.uv_indices.empty() &&
+                    (scene.colors.empty() ? start.colors.empty()
+                                          : scene.colors.size() == scene.positions.size()) &&
+                    AllFinite(scene.positions) && AllFinite(scene.uvs);
+  return good ? Status() : DataLoss("the arrays of \"mesh.\" do not fit together");
 }
 
 }  // namespace
@@ -91,7 +133,8 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   FrameGradients d_frame;
   d_frame.color = rule_.d_color(), d_frame.alpha = rule_.d_alpha();
   TILEGRAD_TRY(renderer_->Backward(scene_, job, d_frame, options_.parameters, &gradients_));
-  const RegularizerTerms& w = options_.regularizers;
+  RegularizerTerms w = options_.regularizers;
+  w.area *= step.area_factor;
   if (options_.parameters[Parameter::kPositions]) {
     values.regularizers = regularizer_.Add(w, scene_.positions, gradients_.positions);
   }
@@ -141,8 +184,22 @@ Result<FitValues> Fitter::Step(const FitStep& step) {
   return values;
 }
 
+Result<RemeshCount> Fitter::Remesh(const RemeshLimits& limits) {
+  TILEGRAD_ASSIGN(RemeshedScene made, RemeshScene(scene_, blocks_, limits, *workers_));
+  Fitter next(std::move(made.scene), options_, *workers_);
+  next.blocks_ = std::move(made.blocks);
+  *this = std::move(next);
+  return made.count;
+}
+
 std::vector<nn::NamedTensor> Fitter::State(nn::Context& context) const {
-  std::vector<nn::NamedTensor> state;
+  std::vector<nn::NamedTensor> state = {
+      {kFaces, context.Indices(scene_.faces)},
+      {kUvs, Numbers(context, scene_.uvs)},
+      {kUvIndices, context.Indices(scene_.uv_indices)},
+      {kStart, Numbers(context, regularizer_.start())},
+      {kColors, Numbers(context, scene_.colors)},
+  };
   for (const ParameterBlock& block : blocks_) {
     for (const auto& [part, array] : StateArrays(block)) {
       nn::Tensor tensor =
@@ -157,7 +214,22 @@ std::vector<nn::NamedTensor> Fitter::State(nn::Context& context) const {
   return state;
 }
 
+// Checkpoints of earlier versions have no connectivity: theirs is the start's.
+Status Fitter::LoadMesh(std::span<const nn::NamedTensor> state) {
+  if (FindTensor(state, kFaces) == nullptr) return {};
+  FitScene scene = scene_;
+  TILEGRAD_TRY(Take(state, kFaces, &scene.faces));
+  TILEGRAD_TRY(Take(state, kUvs, &scene.uvs));
+  TILEGRAD_TRY(Take(state, kUvIndices, &scene.uv_indices));
+  TILEGRAD_TRY(Take(state, kStart, &scene.positions));
+  TILEGRAD_TRY(Take(state, kColors, &scene.colors));
+  TILEGRAD_TRY(CheckMesh(scene, scene_));
+  *this = Fitter(std::move(scene), options_, *workers_);
+  return {};
+}
+
 Status Fitter::LoadState(std::span<const nn::NamedTensor> state) {
+  TILEGRAD_TRY(LoadMesh(state));
   for (ParameterBlock& block : blocks_) {
     for (const auto& [part, array] : StateArrays(block)) {
       const std::string name = block.name() + "." + part;

@@ -13,6 +13,7 @@
 #include "fit/image_loss.h"
 #include "fit/parameter_block.h"
 #include "fit/regularizer.h"
+#include "fit/remesh_scene.h"
 #include "nn/layers.h"
 
 namespace tilegrad::train {
@@ -42,6 +43,7 @@ struct FitStep {
   const TargetImages* targets = nullptr;
   FitRenderer::Job job;  // `views` is set from above
   double rate_factor = 1;
+  double area_factor = 1;  // of the weight of the surface's area
 };
 
 struct FitValues {
@@ -66,12 +68,18 @@ class Fitter {
   const ImageLossRule& rule() const { return rule_; }
   std::span<const ParameterBlock> blocks() const { return blocks_; }
 
-  // All that a later Step depends on: values and moments of each block, by name.
+  // Other vertices and faces for the same surface; moments are carried along (remesh_scene.h).
+  // Errors leave everything as it was.
+  Result<RemeshCount> Remesh(const RemeshLimits& limits);
+
+  // All that a later Step depends on, by name: values and moments of each block, connectivity and
+  // texture coordinates.
   std::vector<nn::NamedTensor> State(nn::Context& context) const;
   Status LoadState(std::span<const nn::NamedTensor> state);
 
  private:
   Fitter(FitScene scene, const FitterOptions& options, const Workers& workers);
+  Status LoadMesh(std::span<const nn::NamedTensor> state);
   Status CheckFinite(const FitValues& values) const;
   Status Move(ParameterBlock* block, double rate_factor);
   Diffusion* SmoothingOf(Parameter what);

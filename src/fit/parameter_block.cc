@@ -102,6 +102,11 @@ ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_
   return block;
 }
 
+void ReadBlock(const FitScene& scene, ParameterBlock* block) {
+  ReadValues(scene, block);
+  block->gradient.resize(block->values.size());
+}
+
 Status WriteBlock(ParameterBlock* block, FitScene* scene) {
   AlignedVector<float>& x = block->values;
   const auto copy = [&](auto to) { std::copy(x.begin(), x.end(), to); };

@@ -28,6 +28,9 @@ struct ParameterBlock {
 ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate,
                          int view = -1);
 
+// The block's values anew from the scene; the gradient has their size, moments stay.
+void ReadBlock(const FitScene& scene, ParameterBlock* block);
+
 // From the block into the scene. Colours and texels are held to [0, 1], materials to >= 0, in the
 // block too. Writing twice changes nothing. An error if a camera has lost its rotation.
 Status WriteBlock(ParameterBlock* block, FitScene* scene);

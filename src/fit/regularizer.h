@@ -25,6 +25,7 @@ class Regularizer {
   Regularizer(std::span<const std::int32_t> faces, std::span<const float> start);
 
   const Topology& topology() const { return *topology_; }
+  std::span<const float> start() const { return start_; }
   // Values of the terms that have a weight; d_positions += weight times their gradients.
   RegularizerTerms Add(const RegularizerTerms& weights, std::span<const float> positions,
                        std::span<float> d_positions);

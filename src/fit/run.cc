@@ -38,7 +38,7 @@ FitStep StepOf(const FitConfig& config, const FitSchedule& schedule, const Targe
   step.job.options.width = targets.width, step.job.options.height = targets.height;
   step.job.options.delta = schedule.delta;
   step.job.options.max_alpha_error = config.max_alpha_error;
-  step.rate_factor = schedule.rate;
+  step.rate_factor = step.area_factor = schedule.rate;
   return step;
 }
 
@@ -68,8 +68,12 @@ bool ShowsAt(const FitConfig& config, std::int64_t step) {
 
 class FitWork : public RunWork {
  public:
-  FitWork(const FitJob& job, const FitConfig& config, nn::Context& context, Fitter fitter)
-      : job_(job), config_(config), context_(context), fitter_(std::move(fitter)) {}
+  FitWork(const FitJob& job, FitStart start, nn::Context& context, Fitter fitter)
+      : job_(job),
+        config_(start.config),
+        remesh_(start.remesh),
+        context_(context),
+        fitter_(std::move(fitter)) {}
 
   // All lines count; earlier versions wrote them in another order.
   Result<std::string> ResultSettings(const std::string& settings,
@@ -97,6 +101,7 @@ class FitWork : public RunWork {
 
   const FitJob& job_;
   const FitConfig config_;
+  const RemeshLimits remesh_;
   nn::Context& context_;
   Fitter fitter_;
   std::map<int, SoftTargets> targets_;  // by factor
@@ -115,6 +120,7 @@ const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<cons
 
 Status FitWork::Step(std::int64_t step, StepValues* values) {
   const FitConfig& config = config_;
+  if (RemeshesAt(config, step)) TILEGRAD_TRY(fitter_.Remesh(remesh_).status());
   const FitSchedule schedule = ScheduleAt(config, step, SizeOf(job_.input));
   const std::vector<int> views = ViewsAt(config, step, job_.input.training);
   TILEGRAD_ASSIGN(const FitValues v,
@@ -302,7 +308,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
-  FitWork work(job, start.config, context, std::move(fitter));
+  FitWork work(job, std::move(start), context, std::move(fitter));
   const RunPlan plan = PlanOf(job);
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));

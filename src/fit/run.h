@@ -54,6 +54,7 @@ struct FitStart {
   FitScene scene;
   FitterOptions options;
   FitConfig config;  // the job's, settled
+  RemeshLimits remesh;
 };
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
 

@@ -17,6 +17,8 @@
 namespace tilegrad::train {
 namespace {
 
+// Pixels: the shortest edge that remeshing leaves, and how far it may move the surface.
+constexpr double kShortestPixels = 1.2, kRemeshError = 0.1;
 constexpr float kGrey = 0.5f;                 // what is to be coloured
 constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
 
@@ -120,6 +122,30 @@ float RadiusOf(const FitScene& scene) {
   return 0.5f * std::max({extent.x, extent.y, extent.z, 0.0f});
 }
 
+// World units of a pixel in the middle of the scene, the mean over the training views.
+double PixelOf(const FitJob& job, const FitScene& scene) {
+  const Bounds box = BoundsOf(scene);
+  const glm::vec3 middle = 0.5f * (box.low + box.high);
+  double sum = 0;
+  for (const int i : job.input.training) {
+    const Camera& c = job.input.cameras[static_cast<std::size_t>(i)];
+    const glm::vec3 axis(c.rotation[6], c.rotation[7], c.rotation[8]);
+    const float depth = -(glm::dot(axis, middle) + c.translation[2]);
+    sum += std::abs(static_cast<double>(depth / c.fx));
+  }
+  return sum / static_cast<double>(job.input.training.size());
+}
+
+RemeshLimits LimitsOf(double pixel) {
+  const HullOptions hull;
+  const auto of = [&](double pixels) { return static_cast<float>(pixels * pixel); };
+  return {.shortest = of(kShortestPixels),
+          .longest = of(hull.longest_pixels),
+          .error = of(kRemeshError),
+          .patch = of(hull.patch_pixels) * of(hull.patch_pixels),
+          .most_faces = hull.most_faces};
+}
+
 // Turns a camera about the object's middle by `degrees` around a random axis: it moves and looks
 // elsewhere, but still at the object.
 Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees, Rng* rng) {
@@ -202,6 +228,7 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_ASSIGN(start.scene,
                   job.start.has_value() ? MeshScene(job) : TemplateScene(job, workers, &from_hull));
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
+  start.remesh = LimitsOf(PixelOf(job, start.scene));
   SetCameras(job, &start.scene);
   SetLight(job.config, &start.scene);
   FitterOptions& options = start.options;

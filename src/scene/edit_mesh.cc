@@ -146,6 +146,11 @@ void EditMesh::Collapse(std::int32_t a, std::int32_t b, glm::vec3 place) {
   float* to = &vertices_.values[Index(a) * vertices_.width];
   const float* from = &vertices_.values[Index(b) * vertices_.width];
   for (std::size_t i = 3; i < vertices_.width; ++i) to[i] = 0.5f * (to[i] + from[i]);
+  Move(a, place);
+}
+
+void EditMesh::Move(std::int32_t vertex, glm::vec3 place) {
+  float* to = &vertices_.values[Index(vertex) * vertices_.width];
   to[0] = place.x, to[1] = place.y, to[2] = place.z;
 }
 

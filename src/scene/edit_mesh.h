@@ -57,6 +57,8 @@ class EditMesh {
   // b goes; a stands at `place`, and its other numbers are the means of both.
   void Collapse(std::int32_t a, std::int32_t b, glm::vec3 place);
 
+  void Move(std::int32_t vertex, glm::vec3 place);
+
   // The new vertex, in the middle.
   std::int32_t Split(std::int32_t a, std::int32_t b);
 

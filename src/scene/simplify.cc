@@ -55,15 +55,18 @@ struct Later {
 
 class Simplification {
  public:
-  Simplification(EditMesh mesh, const SimplifyLimits& limits)
-      : mesh_(std::move(mesh)),
+  Simplification(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh)
+      : mesh_(*mesh),
+        keep_(keep),
         limits_(limits),
-        faces_(mesh_.faces().size()),
         stamps_(mesh_.vertices().count()),
         quadrics_(stamps_.size()) {
     // About the first vertex: sums of squares far from the origin lose digits.
     if (!stamps_.empty()) origin_ = mesh_.vertices().Position(0);
-    for (const Face& f : mesh_.faces()) AddPlaneOf(f);
+    for (std::int32_t f = 0; f < static_cast<std::int32_t>(mesh_.faces().size()); ++f) {
+      if (!mesh_.IsFaceAlive(f)) continue;
+      AddPlaneOf(mesh_.faces()[Index(f)]), ++faces_;
+    }
     for (const auto& [a, b] : mesh_.Edges()) Push(a, b);
   }
 
@@ -80,8 +83,6 @@ class Simplification {
       Take(next, place);
     }
   }
-
-  const EditMesh& mesh() const { return mesh_; }
 
  private:
   static std::size_t Index(std::int32_t i) { return static_cast<std::size_t>(i); }
@@ -112,6 +113,7 @@ class Simplification {
   }
 
   void Push(std::int32_t a, std::int32_t b) {
+    if (!keep_.empty() && (keep_[Index(a)] || keep_[Index(b)])) return;
     queue_.push(
         {static_cast<float>(BestOf(a, b).cost), a, b, stamps_[Index(a)] + stamps_[Index(b)]});
   }
@@ -148,9 +150,10 @@ class Simplification {
     }
   }
 
-  EditMesh mesh_;
+  EditMesh& mesh_;
+  std::span<const char> keep_;
   SimplifyLimits limits_;
-  std::size_t faces_;
+  std::size_t faces_ = 0;
   glm::vec3 origin_ = {0, 0, 0};
   std::vector<std::uint32_t> stamps_;
   std::vector<Quadric> quadrics_;
@@ -159,13 +162,16 @@ class Simplification {
 
 }  // namespace
 
+void Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh) {
+  Simplification(limits, keep, mesh).Run();
+}
+
 Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
   VertexRows rows;
   for (const glm::vec3& p : mesh.positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
   TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(std::move(rows), mesh.faces));
-  Simplification work(std::move(edit), limits);
-  work.Run();
-  const EditMesh::Packed packed = work.mesh().Pack();
+  Simplify(limits, {}, &edit);
+  const EditMesh::Packed packed = edit.Pack();
   Mesh out;
   out.faces = packed.faces;
   for (std::size_t v = 0; v < packed.vertices.count(); ++v)

@@ -2,6 +2,7 @@
 // Fewer faces for the same surface.
 #pragma once
 
+#include "scene/edit_mesh.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
 
@@ -20,5 +21,9 @@ struct SimplifyLimits {
 // surface a closed manifold of the same topology; no face turns over. Positions and faces only. An
 // error if `mesh` is not a closed manifold (scene/edit_mesh.h).
 Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits);
+
+// The same in place, with what vertices carry. Vertices for which `keep` is not 0 stay where they
+// are and are not taken out; empty: none.
+void Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh);
 
 }  // namespace tilegrad
