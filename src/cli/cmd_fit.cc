@@ -28,7 +28,7 @@ using train::Parameter;
 constexpr double kMostRate = 1e6;
 
 struct Options {
-  std::string input, dataset_model, out, start = "auto", truth, optimize;
+  std::string input, dataset_model, out, start = "auto", truth, optimize, quality = "normal";
   std::string lighting = "none", filter = "bilinear";
   std::vector<std::string> rates;
   std::vector<float> light_direction;
@@ -270,6 +270,10 @@ void AddWhat(CLI::App* command, Options* o) {
       ->check(NotNegative());
 }
 
+// Steps of each; --steps counts before it.
+const std::map<std::string, std::int64_t> kQualities = {
+    {"fast", 300}, {"normal", FitConfig().steps}, {"best", 3000}};
+
 // --views-per-step for "views_per_step", and so on.
 void AddNumbers(CLI::App* command, FitConfig* config) {
   for (const train::ConfigField& field : train::FieldsOf(config)) {
@@ -282,6 +286,17 @@ void AddNumbers(CLI::App* command, FitConfig* config) {
   command->get_option("--seed")->check(NotNegative());
 }
 
+void AddQuality(CLI::App* command, Options* options) {
+  command
+      ->add_option("--quality", options->quality, "fast, normal or best: 300, 1000 or 3000 steps")
+      ->check(CLI::IsMember({"fast", "normal", "best"}))
+      ->excludes(command->get_option("--steps"))
+      ->each([options](const std::string& word) {
+        const auto at = kQualities.find(word);
+        if (at != kQualities.end()) options->config.steps = at->second;
+      });
+}
+
 }  // namespace
 
 void AddFit(CLI::App& app, Action* action) {
@@ -291,6 +306,7 @@ void AddFit(CLI::App& app, Action* action) {
       "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
   AddWhat(command, options.get());
   AddNumbers(command, &options->config);
+  AddQuality(command, options.get());
   command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")
       ->delimiter(',');
   command->add_flag("--resume", options->resume,

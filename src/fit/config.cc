@@ -15,8 +15,11 @@ namespace {
 constexpr double kDeltaShare = 0.7;   // of the run, until delta is what it ends at
 constexpr double kFinalPixels = 0.3;  // of the default delta
 constexpr double kHullPixels = 0.7, kWideDelta = 3e-3;  // softness at the start
-constexpr int kSphereLevels = 3, kHullRemeshes = 3;
-constexpr double kRemeshShare = 0.6;  // of the run
+constexpr int kSphereLevels = 3;
+// What a hull has too much of, tents on flat sides, has more area than what is right; masks hold
+// the rest. At 1 thin things vanish.
+constexpr double kHullArea = 0.3;
+constexpr double kRemeshShare = 0.6;                   // of the run
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 // By value, as the options of tilegrad fit call them.
@@ -65,12 +68,12 @@ ConfigFields FieldsOf(FitConfig* c) {
        "share of the masks that may lack a point of the hull, if masks have gaps"},
       {"template_level", &c->template_level, 0, 7, "of the sphere: 3 has 642 vertices, 4 has 2562"},
       {"smoothing", &c->smoothing, 0, 1e4, "of vertex steps (lambda of Large Steps); 0: none"},
-      {"remeshes", &c->remeshes, -1, 1000,
-       "times that edges are made as long as they should be; -1: as it suits the start"},
+      {"remeshes", &c->remeshes, 0, 1000, "times that edges are made as long as they should be"},
       {"laplacian", &c->regularizers.laplacian, 0, 1e6, "weight of the movement's Laplacian"},
       {"flatness", &c->regularizers.flatness, 0, 1e6, "weight of the angles between faces"},
       {"edge_length", &c->regularizers.edge_length, 0, 1e6, "weight of unequal edges"},
-      {"area", &c->regularizers.area, 0, 1e6, "weight of the surface's area"},
+      {"area", &c->regularizers.area, -1, 1e6,
+       "weight of the surface's area; -1: as it suits the start"},
       {"color_weight", &c->loss.color_weight, 0, 1e6, "of the L1 loss of colours"},
       {"silhouette_weight", &c->loss.silhouette_weight, 0, 1e6, "of the IoU loss of masks"},
       {"perturb_cameras", &c->perturb_cameras, 0, 180,
@@ -109,7 +112,7 @@ FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
   if (config.levels == 0) config.levels = from_hull ? 1 : kSphereLevels;
   if (config.delta_start == 0)
     config.delta_start = from_hull ? DeltaOf(kHullPixels, size) : kWideDelta;
-  if (config.remeshes < 0) config.remeshes = from_hull ? kHullRemeshes : 0;
+  if (config.regularizers.area < 0) config.regularizers.area = from_hull ? kHullArea : 0;
   if (config.parameters[Parameter::kUv]) config.remeshes = 0;
   return config;
 }
@@ -118,7 +121,8 @@ bool RemeshesAt(const FitConfig& config, std::int64_t step) {
   if (config.remeshes <= 0 || step == 0) return false;
   const double each = kRemeshShare * static_cast<double>(config.steps) / config.remeshes;
   const auto done = [&](std::int64_t s) {
-    return std::min<std::int64_t>(config.remeshes, static_cast<std::int64_t>(static_cast<double>(s) / each));
+    return std::min<std::int64_t>(config.remeshes,
+                                  static_cast<std::int64_t>(static_cast<double>(s) / each));
   };
   return done(step) != done(step - 1);
 }

@@ -41,14 +41,15 @@ struct FitConfig {
   double delta = 0;  // 0: 0.3 pixels of the whole image; wider ones make shapes thinner
   double max_alpha_error = 1e-4;
 
-  LearningRates rates;       // positions and cameras' translation: times the object's radius
-  // How often, over the first kRemeshShare of the run, edges are made as long as they should be; -1:
-  // kHullRemeshes from a hull, else not at all. Not where uv is fitted.
-  int remeshes = -1;
+  LearningRates rates;  // positions and cameras' translation: times the object's radius
+  // How often, over the first 60 % of the run, edges are made as long as they should be. Not where
+  // uv is fitted, or a texture is not. Only of closed manifolds, as hulls and spheres are.
+  int remeshes = 0;
   double final_rate = 0.05;  // of the first; rates fall by a half cosine
   double smoothing = 10;
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
-  RegularizerTerms regularizers;
+  RegularizerTerms regularizers = {.area =
+                                       -1};  // area: -1: 0.3 from a hull, else 0; falls with rates
   double perturb_cameras = 0;  // degrees, each by a random turn about the object: for experiments
 
   std::int64_t checkpoint_every = 100;

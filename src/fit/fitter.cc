@@ -28,8 +28,7 @@ constexpr const char *kFaces = "mesh.faces", *kUvs = "mesh.uvs", *kUvIndices = "
                      *kStart = "mesh.start", *kColors = "mesh.colors";
 
 nn::Tensor Numbers(nn::Context& context, std::span<const float> values) {
-  nn::Tensor tensor =
-      context.Empty({static_cast<std::int64_t>(values.size())}, nn::DType::kF32);
+  nn::Tensor tensor = context.Empty({static_cast<std::int64_t>(values.size())}, nn::DType::kF32);
   std::copy(values.begin(), values.end(), tensor.data<float>());
   return tensor;
 }

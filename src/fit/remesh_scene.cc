@@ -39,7 +39,8 @@ template <class Array>
 void TakePart(const VertexRows& rows, std::size_t part, Array* to) {
   to->resize(3 * rows.count());
   for (std::size_t v = 0; v < rows.count(); ++v)
-    std::copy_n(&rows.values[v * rows.width + 3 * part], 3, to->begin() + static_cast<std::ptrdiff_t>(3 * v));
+    std::copy_n(&rows.values[v * rows.width + 3 * part], 3,
+                to->begin() + static_cast<std::ptrdiff_t>(3 * v));
 }
 
 std::vector<char> BusyVertices(const FitScene& scene, const std::vector<ParameterBlock>& blocks) {
@@ -50,7 +51,8 @@ std::vector<char> BusyVertices(const FitScene& scene, const std::vector<Paramete
     for (std::size_t v = 0; v < moves.size(); ++v)
       moves[v] = block.v[3 * v] + block.v[3 * v + 1] + block.v[3 * v + 2];
     std::vector<float> sorted(moves);
-    const auto rank = static_cast<std::size_t>((1 - kBusyShare) * static_cast<double>(moves.size()));
+    const auto rank =
+        static_cast<std::size_t>((1 - kBusyShare) * static_cast<double>(moves.size()));
     const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(std::min(rank, moves.size() - 1));
     std::nth_element(sorted.begin(), at, sorted.end());
     for (std::size_t v = 0; v < moves.size(); ++v) busy[v] = moves[v] > *at;

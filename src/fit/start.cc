@@ -17,8 +17,9 @@
 namespace tilegrad::train {
 namespace {
 
-// Pixels: the shortest edge that remeshing leaves, and how far it may move the surface.
-constexpr double kShortestPixels = 1.2, kRemeshError = 0.1;
+// Pixels: the shortest edge that remeshing leaves (legs and rods are about two across), the longest
+// where the surface still moves, and how far remeshing may move it.
+constexpr double kShortestPixels = 0.3, kBusyPixels = 2.5, kRemeshError = 0.03;
 constexpr float kGrey = 0.5f;                 // what is to be coloured
 constexpr float kFirstHarmonic = 3.5449077f;  // 2 sqrt(pi): light 1 from everywhere
 
@@ -140,6 +141,7 @@ RemeshLimits LimitsOf(double pixel) {
   const HullOptions hull;
   const auto of = [&](double pixels) { return static_cast<float>(pixels * pixel); };
   return {.shortest = of(kShortestPixels),
+          .busy = of(kBusyPixels),
           .longest = of(hull.longest_pixels),
           .error = of(kRemeshError),
           .patch = of(hull.patch_pixels) * of(hull.patch_pixels),
@@ -238,9 +240,12 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
     options.parameters[start.scene.texture.empty() ? Parameter::kColors : Parameter::kTexture] =
         true;
   }
+  // Texels that are not fitted would have to be kept in every checkpoint.
+  if (!start.scene.texture.empty() && !options.parameters[Parameter::kTexture])
+    start.config.remeshes = 0;
   options.rates = job.config.rates;
   options.rates[Parameter::kPositions] *= static_cast<double>(RadiusOf(start.scene));
-  options.loss = job.config.loss, options.regularizers = job.config.regularizers;
+  options.loss = job.config.loss, options.regularizers = start.config.regularizers;
   options.smoothing = job.config.smoothing;
   return start;
 }

@@ -56,9 +56,9 @@ void AddPlaces(const FitScene& scene, std::size_t face, std::vector<Place>* out)
       const glm::dvec2 c(x, y);
       const double a = Cross(p[1] - c, p[2] - c) / area, b = Cross(p[2] - c, p[0] - c) / area;
       if (a < 0 || b < 0 || a + b > 1) continue;
-      const auto texel = static_cast<std::size_t>(y) *
-                             static_cast<std::size_t>(scene.texture.width) +
-                         static_cast<std::size_t>(x);
+      const auto texel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(scene.texture.width) +
+          static_cast<std::size_t>(x);
       out->push_back({texel, a * corners[0] + b * corners[1] + (1 - a - b) * corners[2]});
     }
   }
@@ -96,8 +96,7 @@ std::vector<bool> TransferTexels(const FitScene& from, const FitScene& to, const
   std::vector<Lookup> lookups(places.size());
   constexpr std::size_t kGrain = 256;
   workers.ForRanges(places.size(), kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i)
-      lookups[i] = LookupAt(from, tree.Find(places[i].at));
+    for (std::size_t i = begin; i < end; ++i) lookups[i] = LookupAt(from, tree.Find(places[i].at));
   });
   std::vector<bool> set(to.texture.pixels.size() / 3, false);
   for (AlignedVector<float>* const array : arrays) {

@@ -43,7 +43,8 @@ int Unfold(EditMesh* mesh) {
   for (const std::int32_t v : folded) {
     glm::vec3 sum(0);
     for (const std::int32_t f : mesh->FacesAt(v))
-      for (const std::int32_t n : mesh->faces()[Index(f)]) sum += n == v ? glm::vec3(0) : At(*mesh, n);
+      for (const std::int32_t n : mesh->faces()[Index(f)])
+        sum += n == v ? glm::vec3(0) : At(*mesh, n);
     mesh->Move(v, sum / static_cast<float>(2 * mesh->Valence(v)));  // each neighbour twice
   }
   return static_cast<int>(folded.size());
@@ -72,7 +73,7 @@ int SplitLong(const RemeshLimits& limits, std::vector<char>* busy, EditMesh* mes
   for (std::int32_t f = 0; Index(f) < mesh->faces().size(); ++f) faces += mesh->IsFaceAlive(f);
   for (const Sized& e : EdgesByLength(*mesh, true)) {
     const bool both = (*busy)[Index(e.a)] && (*busy)[Index(e.b)];
-    if (!(e.length > (both ? 2 * limits.shortest : limits.longest))) continue;
+    if (!(e.length > (both ? limits.busy : limits.longest))) continue;
     if (faces + 2 > limits.most_faces) break;
     mesh->Split(e.a, e.b);
     busy->push_back(both), faces += 2, ++count;

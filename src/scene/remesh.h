@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges as long as they should be, on a surface that is being fitted: after W. Palfinger, Continuous
-// remeshing for inverse rendering (2022).
+// Edges as long as they should be, on a surface that is being fitted: after W. Palfinger,
+// Continuous remeshing for inverse rendering (2022).
 #pragma once
 
 #include <span>
@@ -10,7 +10,9 @@
 namespace tilegrad {
 
 struct RemeshLimits {
-  float shortest = 0, longest = 0;  // edges, world units; longest at least twice the other
+  // Edges, world units: shorter ones are collapsed, longer ones split, and those between busy
+  // vertices if they are longer than `busy`, which is at least twice `shortest`.
+  float shortest = 0, busy = 0, longest = 0;
   // Of collapses, as of scene/simplify.h: where the surface is flat, edges become long.
   float error = 0, patch = 1;
   std::size_t most_faces = 0;  // no edge is split beyond
@@ -23,7 +25,7 @@ struct RemeshCount {
 // `busy`: for each vertex, not 0 where the surface is still far from what it should be. In order,
 // each deterministic:
 //   vertices whose faces fold over each other move to the middle of their neighbours;
-//   edges longer than `longest` are split, and busy ones longer than twice `shortest`;
+//   edges longer than `longest` are split, and busy ones longer than `busy`;
 //   edges are collapsed, the least error first, where the surface is flat and not busy, or where
 //   they are shorter than `shortest`; no face turns over;
 //   edges are flipped where that makes the least angle larger and the surface is nearly flat.
