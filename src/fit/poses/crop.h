@@ -34,8 +34,8 @@ std::optional<Crop> CropOf(const CropSource& image, const Camera& camera);
 // of colours where both show the object.
 double CropCost(const Crop& a, const Crop& b, double color_weight);
 
-// `seen` is the crop of an object at the origin of the world from `from`, which looks along -z at it
-// from some distance. The camera with the lens of `from` that sees it at the place and size of
+// `seen` is the crop of an object at the origin of the world from `from`, which looks along -z at
+// it from some distance. The camera with the lens of `from` that sees it at the place and size of
 // `wanted`, from the same direction.
 Camera Aligned(const Crop& seen, const Crop& wanted, const Camera& from);
 

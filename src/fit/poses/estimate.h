@@ -1,77 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-// A rough object and the cameras of those pictures that are placed around it so far.
+// A rough object, and cameras around it: what a search for cameras improves.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
 #include "fit/fitter.h"
-#include "fit/poses/crop.h"
+#include "fit/poses/pictures.h"
 
 namespace tilegrad::train {
 
-// What a search knows of its pictures; the same for all starts.
-struct PosePictures {
-  TargetImages images;         // of few pixels
-  std::vector<Camera> lenses;  // intrinsics of such a picture; poses mean nothing
-  std::vector<Crop> crops;
-  double color_weight = 1;  // of CropCost
-  std::array<float, 3> mean_color = {};
-};
-
-Result<PosePictures> Prepare(const TargetImages& images, std::span<const Camera> lenses);
-
-// Where an object is looked at from.
-struct Viewpoint {
-  Camera camera;  // looks at the origin
-  Crop crop;      // what it sees
-};
-
 struct RefitOptions {
   int steps = 40;
-  int views_per_step = 8;
   bool shape = true, cameras = true;
-  double delta_start = 2e-3, delta_end = 3e-4;
-  double rate = 1, camera_rate = 0.008;
-  double silhouette_weight = 1, color_weight = 1;
+  double shape_rate = 1;  // times the usual rates
 };
 
 class PoseEstimate {
  public:
-  PoseEstimate(const PosePictures& pictures, const Workers& workers);
+  // A sphere of `level` (scene/shapes.h). Both references must outlive this.
+  PoseEstimate(const PosePictures& pictures, int level, const Workers& workers);
 
-  // A grey sphere again; cameras stay.
+  // A sphere of the pictures' mean colour again; cameras stay.
   void ForgetShape();
-  void Place(int picture, const Camera& camera);
-  void Remove(int picture) { placed_[static_cast<std::size_t>(picture)] = false; }
-  bool is_placed(int picture) const { return placed_[static_cast<std::size_t>(picture)]; }
-  std::vector<int> Placed() const;
-  const Camera& camera(int picture) const {
-    return scene_.cameras[static_cast<std::size_t>(picture)];
-  }
+  // The pose of `camera` for a picture, whose lens stays.
+  void Place(std::size_t picture, const Camera& camera);
+
+  const std::vector<Camera>& cameras() const { return scene_.cameras; }
   const FitScene& scene() const { return scene_; }
+  // Cameras that are held upright have their x axes across it.
+  std::array<double, 3> Up() const;
 
-  // Descends on `views`. The loss of the last steps, mean.
-  Result<double> Refit(const RefitOptions& options, std::span<const int> views);
-  // Loss of each picture, as it stands.
-  Result<std::vector<double>> Losses(std::span<const int> views);
+  // Descends on some of the pictures, from soft outlines to narrow ones; the mean loss of the last
+  // quarter of the steps.
+  Result<double> Refit(const RefitOptions& options, std::span<const int> pictures);
 
-  // The object from all around: roll 0 about the direction that is up for the placed cameras.
-  Result<std::vector<Viewpoint>> LookAround();
-  // Crops of the object from the placed cameras.
-
-  // Middle to the origin, size to 1: what pictures leave open.
+  // The object's middle to the origin and its longest side to 1, cameras with it: what pictures
+  // leave open.
   void Normalize();
 
  private:
-  std::array<double, 3> Up() const;
+  FitStep StepAt(double t) const;
 
   const PosePictures& pictures_;
+  const int level_;
   const Workers& workers_;
-  FitRenderer renderer_;
   FitScene scene_;
-  std::vector<bool> placed_;
-  int refits_ = 0;
+  std::uint64_t refits_ = 0;  // each chooses its pictures anew
 };
 
 }  // namespace tilegrad::train

@@ -1,5 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras of pictures that came without: from masks and colours alone.
+// Cameras of pictures that came without: from masks and colours alone, by expectation maximisation
+// from random starts, as structures of molecules are found from micrographs (A. Punjani et al.,
+// cryoSPARC, Nature Methods 2017).
+//
+// A start puts the cameras anywhere. In each sweep a random half of the pictures makes a rough
+// coloured mesh by gradient descent, every picture of the other half looks for its place among some
+// 150 viewpoints around it, then the halves change places, and shape and cameras descend together.
+// Pictures that are unlike keep apart in the first sweeps: else all gather at a few viewpoints of a
+// mesh that is the mean of everything. Starts end once two agree.
 #pragma once
 
 #include <span>
@@ -11,17 +19,28 @@
 
 namespace tilegrad::train {
 
+inline constexpr int kLeastPictures = 6;
+
 struct PoseOptions {
-  int starts = 4;
-  std::vector<Camera> truth;  // debugging
+  int starts = 8;  // at most
+  std::int64_t seed = 1;
 };
 
 struct FoundPoses {
-  std::vector<Camera> cameras;  // of the images, in their pixels
-  double loss = 0;
+  std::vector<Camera> cameras;  // of the images, in their pixels; the object is about 1 across and
+                                // around the origin, up is +y
+  double loss = 0;              // of the best start
+  int starts = 0;               // taken
+  // Degrees between the cameras of the best start and those of the start nearest to it; 180 if
+  // there is none. Where this is large, cameras are in doubt.
+  double agreement = 180;
 };
 
-// `lenses`: intrinsics of each image; their poses are not looked at.
+// Assumes that masks are right; that the whole object is in every picture, near its middle; that
+// cameras were held upright, between 45 degrees below the object and 80 above; that it looks alike
+// in no two of them by symmetry. `lenses`: intrinsics of each image; their poses are not looked at.
+// A pure function of its arguments for any number of workers. Errors: fewer than kLeastPictures; an
+// image whose mask is empty; the loss is not finite; kCancelled.
 Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera> lenses,
                              const PoseOptions& options, const Workers& workers,
                              const ProgressSink& progress, const StopFlag& stop);
