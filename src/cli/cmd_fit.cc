@@ -15,6 +15,8 @@
 #include "cli/option_checks.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
+#include "fit/bare_frames.h"
+#include "fit/poses/input_poses.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
 #include "train/run/checkpoint.h"
@@ -33,7 +35,9 @@ struct Options {
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
-  bool resume = false, doctor = false, force = false;
+  bool resume = false, doctor = false, force = false, find_cameras = false;
+  std::string background = "auto";
+  double fov = train::kUsualFov;
   FitConfig config;
   LiveOption live;
 };
@@ -127,6 +131,39 @@ Status CheckResume(const Options& options) {
       options.out);
 }
 
+train::InputOptions InputOptionsOf(const Options& options) {
+  static const std::map<std::string, train::Background> backgrounds = {
+      {"auto", train::Background::kAuto},
+      {"mask", train::Background::kMask},
+      {"plain", train::Background::kPlain},
+      {"none", train::Background::kNone}};
+  return {options.hold_out, backgrounds.at(options.background), options.fov};
+}
+
+// From the `first` on; several of one kind become one.
+void PrintWarnings(const train::FitInput& input, std::size_t first) {
+  constexpr std::size_t kShown = 3;
+  const std::size_t count = input.warnings.size() - first;
+  for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
+    PrintNote("tilegrad: warning: {}\n", input.warnings[first + i]);
+  }
+  if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
+}
+
+// Cameras of images that came without, or that are not to be believed.
+Status FindCameras(const Options& options, train::FitJob* job, const Workers& workers,
+                   const ProgressSink& progress) {
+  if (job->input.posed && !options.find_cameras) return {};
+  train::InputPosesJob find;
+  find.options.seed = options.config.seed;
+  find.file = Path(options.out) / "cameras_found.json";
+  find.guard = job->guard, find.reuse = options.resume;
+  const std::size_t before = job->input.warnings.size();
+  TILEGRAD_TRY(train::FindInputPoses(find, &job->input, workers, progress, StopOnSignals()));
+  PrintWarnings(job->input, before);
+  return {};
+}
+
 Result<train::FitJob> MakeJob(const Options& options) {
   train::FitJob job;
   job.config = options.config;
@@ -137,9 +174,10 @@ Result<train::FitJob> MakeJob(const Options& options) {
     TILEGRAD_TRY(CheckResume(options));
   }
   TILEGRAD_ASSIGN(job.input, options.dataset_model.empty()
-                                 ? train::ReadFitFolder(options.input, options.hold_out)
+                                 ? train::ReadFitFolder(options.input, InputOptionsOf(options))
                                  : train::ReadFitDataset(options.input, options.dataset_model,
                                                          options.hold_out));
+  PrintWarnings(job.input, 0);
   static const std::map<std::string, train::StartShape> shapes = {
       {"auto", train::StartShape::kAuto},
       {"hull", train::StartShape::kHull},
@@ -213,6 +251,10 @@ void PrintJson(const Options& options, const train::FitOutcome& o) {
 Status Run(const Options& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
+  ProgressLine line;
+  const Status cameras = FindCameras(options, &job, workers, line.Sink());
+  line.Finish();
+  TILEGRAD_TRY(cameras);
   if (options.doctor) {
     TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));
     PrintFindings(findings, true);
@@ -226,7 +268,6 @@ Status Run(const Options& options) {
   }
   TILEGRAD_ASSIGN(const auto live,
                   StartLive(options.live, {options.out, {}, options.config.steps}));
-  ProgressLine line;
   job.warn = line.Warnings();
   auto outcome = train::RunFit(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
@@ -241,7 +282,8 @@ void AddWhat(CLI::App* command, Options* o) {
   command
       ->add_option("input", o->input,
                    "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
-                   "COLMAP project; or a dataset, with --model")
+                   "COLMAP project; or pictures alone, whose cameras are then found; or a dataset, "
+                   "with --model")
       ->required();
   command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
@@ -261,6 +303,21 @@ void AddWhat(CLI::App* command, Options* o) {
   AddVector(command, "--light-direction", &o->light_direction, 3, "x y z towards the light, world");
   command->add_option("--filter", o->filter, "texture lookup: bilinear or trilinear")
       ->check(CLI::IsMember({"bilinear", "trilinear"}))
+      ->capture_default_str();
+  command
+      ->add_option("--background", o->background,
+                   "where masks come from: the images' alpha or masks (mask), their plain "
+                   "backgrounds (plain), the former if there are any (auto); none: every pixel "
+                   "shows the object")
+      ->check(CLI::IsMember({"auto", "mask", "plain", "none"}))
+      ->capture_default_str();
+  command->add_flag("--find-cameras", o->find_cameras,
+                    "look for the cameras in the images, though the folder has some; these judge "
+                    "the result");
+  command
+      ->add_option("--fov", o->fov,
+                   "degrees that images without cameras see along their longer side")
+      ->check(CLI::Range(5.0, 150.0))
       ->capture_default_str();
   command->add_option("--truth", o->truth, "a mesh to compare with (3D IoU)");
   command

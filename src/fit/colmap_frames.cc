@@ -29,9 +29,11 @@ Result<Path> FindImages(const Path& model, const std::string& first) {
       model.string(), first);
 }
 
-// Nothing where the image has none.
-Path FindMask(const Path& images, const Path& name) {
-  for (const Path& folder : {images.parent_path() / "masks", images.parent_path() / "mask"}) {
+}  // namespace
+
+Path MaskFileOf(const Path& images, const Path& name) {
+  for (const Path& folder :
+       {images.parent_path() / "masks", images.parent_path() / "mask", images / "masks"}) {
     for (const Path& candidate : {folder / (name.string() + ".png"),
                                   (folder / name).replace_extension(".png"), folder / name}) {
       if (IsThere(candidate)) return candidate;
@@ -40,7 +42,7 @@ Path FindMask(const Path& images, const Path& name) {
   return {};
 }
 
-Status CheckMasks(const std::vector<TransformsFrame>& frames) {
+Status CheckAllMasked(const std::vector<TransformsFrame>& frames) {
   const TransformsFrame* masked = nullptr;
   const TransformsFrame* bare = nullptr;
   for (const TransformsFrame& frame : frames) (frame.mask.empty() ? bare : masked) = &frame;
@@ -48,8 +50,6 @@ Status CheckMasks(const std::vector<TransformsFrame>& frames) {
   return DataLoss("{}: has no mask, though {} has {}", bare->image.string(), masked->image.string(),
                   masked->mask.string());
 }
-
-}  // namespace
 
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
   TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model));
@@ -59,13 +59,13 @@ Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
     const std::string name = io::PortablePath(view.name);
     TransformsFrame frame;
     frame.image = images / name;
-    frame.mask = FindMask(images, name);
+    frame.mask = MaskFileOf(images, name);
     frame.stored_order = true;  // COLMAP ignores the tag of orientation
     frame.pose = ToNerf(view.camera);
     frame.size = view.size;
     frames.push_back(std::move(frame));
   }
-  TILEGRAD_TRY(CheckMasks(frames));
+  TILEGRAD_TRY(CheckAllMasked(frames));
   return frames;
 }
 

@@ -17,4 +17,10 @@ namespace tilegrad::train {
 // two folders above it. Either all images have a mask or none. Errors name the file.
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model);
 
+// The mask of `images`/`name`, in a folder "masks" or "mask" beside `images` or in it; empty where
+// there is none.
+Path MaskFileOf(const Path& images, const Path& name);
+// An error names an image without a mask where others have one.
+Status CheckAllMasked(const std::vector<TransformsFrame>& frames);
+
 }  // namespace tilegrad::train

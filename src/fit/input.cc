@@ -10,6 +10,8 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
+#include "fit/background.h"
+#include "fit/bare_frames.h"
 #include "fit/colmap_frames.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
@@ -104,21 +106,32 @@ void HoldOut(int every, FitInput* input) {
   }
 }
 
+bool HasAlpha(const FitInput& input) {
+  return std::ranges::any_of(input.images.alpha, [](float a) { return a < 1; });
+}
+
 Status Finish(FitInput* input) {
   if (input->training.empty())
     return InvalidArgument("all views are held out: none is left to fit");
-  input->masked = std::any_of(input->images.alpha.begin(), input->images.alpha.end(),
-                              [](float a) { return a < 1; });
+  input->masked = HasAlpha(*input);
   return {};
 }
 
-// Of transforms.json, or of a COLMAP model where there is none.
-Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder) {
+void ApplyBackground(Background background, FitInput* input) {
+  if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
+  const bool looks = background == Background::kAuto && !HasAlpha(*input);
+  if (background == Background::kPlain || looks) TakePlainBackgrounds(input);
+}
+
+// Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
+Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, bool* posed) {
+  *posed = true;
   std::error_code error;
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     if (std::filesystem::exists(folder / name, error)) return ReadTransforms(folder / name);
   }
   if (const auto model = io::FindColmapModel(folder)) return ReadColmapFrames(*model);
+  TILEGRAD_ASSIGN(auto bare, ReadBareFrames(folder, fov));
   if (std::filesystem::exists(DatasetInfoPath(folder), error)) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
                            folder.string());
@@ -130,8 +143,13 @@ Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder) {
   }
   if (!std::filesystem::exists(folder, error))
     return NotFound("{}: no such folder", folder.string());
+  if (!bare.empty()) {
+    *posed = false;
+    return bare;
+  }
   return NotFound(
-      "{}: neither transforms.json nor transforms_train.json nor a COLMAP model in it (docs/fit.md "
+      "{}: neither transforms.json nor transforms_train.json nor a COLMAP model nor pictures in it "
+      "(docs/fit.md "
       "says what a fit reads)",
       folder.string());
 }
@@ -167,26 +185,40 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
   return out;
 }
 
-Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
-  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder));
+void TakePlainBackgrounds(FitInput* input) {
+  TargetImages& all = input->images;
+  for (std::size_t n = 0; n < input->names.size(); ++n) {
+    const auto color = std::span(all.color).subspan(3 * n * all.pixels(), 3 * all.pixels());
+    const BackgroundMask mask = MaskFromPlainBackground(color, all.width, all.height);
+    std::ranges::copy(mask.alpha,
+                      all.alpha.begin() + static_cast<std::ptrdiff_t>(n * all.pixels()));
+    if (!mask.doubt.empty()) {
+      input->warnings.push_back(fmt::format("{}: {}", input->names[n], mask.doubt));
+    }
+  }
+}
+
+Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {
   FitInput input;
+  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input.posed));
   for (const TransformsFrame& frame : frames) TILEGRAD_TRY(AddView(frame, &input));
   std::error_code error;
   const Path test = folder / "transforms_test.json";
   const bool has_test = std::filesystem::exists(test, error);
-  if (has_test && hold_out > 0) {
+  if (has_test && options.hold_out > 0) {
     return InvalidArgument(
         "{}: already says which views are held out: leave out --hold-out, or that file",
         test.string());
   }
-  HoldOut(hold_out, &input);
-  if (has_test) {
+  HoldOut(options.hold_out, &input);
+  if (has_test && input.posed) {
     TILEGRAD_ASSIGN(const auto more, ReadTransforms(test));
     for (const TransformsFrame& frame : more) {
       input.held_out.push_back(static_cast<int>(input.cameras.size()));
       TILEGRAD_TRY(AddView(frame, &input));
     }
   }
+  ApplyBackground(options.background, &input);
   TILEGRAD_TRY(Finish(&input));
   return input;
 }

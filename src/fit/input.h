@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "fit/bare_frames.h"
 #include "fit/image_loss.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
@@ -21,16 +22,43 @@ struct FitInput {
   TargetImages images;                  // straight colours (not multiplied by alpha)
   std::vector<int> training, held_out;  // indices of views; every view is in one of them
   bool masked = false;                  // some image says where the object is
+  bool posed = true;                    // cameras are known; else only their lenses are
+  bool found = false;                   // cameras were found by looking at the images
+  // Cameras as they were given, where those above were found by looking at the images all the same;
+  // else empty. In a world of their own.
+  std::vector<Camera> given_cameras;
+  std::vector<std::string> warnings;  // for people
 
   // Of a dataset, what is known of the truth: occupancy at kOccupancyResolution. Else empty.
   std::vector<std::uint8_t> occupancy;
 };
 
+// Where masks come from.
+enum class Background {
+  kAuto,   // as kMask where an image has an alpha or a mask, else as kPlain
+  kMask,   // alpha and masks of the input
+  kPlain,  // plain backgrounds are recognised (background.h); alpha and masks are ignored
+  kNone,   // there is none: every pixel shows the object
+};
+
+struct InputOptions {
+  int hold_out = 0;  // every n-th view; 0: none
+  Background background = Background::kAuto;
+  double fov = kUsualFov;  // of images without cameras, degrees along their longer side
+};
+
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
-// none). An image's mask is its alpha, or the mask_path of its frame (grey or alpha). All images
-// must have one size. Errors name the file.
-Result<FitInput> ReadFitFolder(const Path& folder, int hold_out);
+// none). Or a folder of pictures alone, which come without cameras (bare_frames.h). An image's mask
+// is its alpha, or the mask_path of its frame (grey or alpha). All images must have one size.
+// Errors name the file.
+Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
+inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
+  return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});
+}
+
+// Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
+void TakePlainBackgrounds(FitInput* input);
 
 // One model of a dataset (train/data/dataset.h), named "CLASS/ID".
 Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, int hold_out);

@@ -203,12 +203,21 @@ double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
   return a.empty() ? 0 : sum / static_cast<double>(a.size());
 }
 
+// Cameras as the input gave them; those that were found live in a world of their own.
+const std::vector<Camera>& GivenCameras(const FitInput& input) {
+  return input.given_cameras.empty() ? input.cameras : input.given_cameras;
+}
+
 Status FitResult::ScoreCameras(FitOutcome* outcome) const {
-  if (job_.config.perturb_cameras == 0) return {};
+  const bool found = !job_.input.given_cameras.empty();
+  if (job_.config.perturb_cameras == 0 && !found) return {};
   TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_, workers_));
   const std::vector<int>& views = job_.input.training;
-  const std::vector<Camera> truth = Choose(job_.input.cameras, views);
-  outcome->camera_error_before = MeanAngle(Choose(start.scene.cameras, views), truth);
+  const std::vector<Camera> truth = Choose(GivenCameras(job_.input), views);
+  std::vector<Camera> before = Choose(start.scene.cameras, views);
+  const Alignment first = found ? AlignCameras(before, truth) : Alignment();
+  for (Camera& camera : before) camera = Moved(camera, first);
+  outcome->camera_error_before = MeanAngle(before, truth);
   std::vector<Camera> fitted = Choose(scene_.cameras, views);
   const Alignment alignment = AlignCameras(fitted, truth);
   for (Camera& camera : fitted) camera = Moved(camera, alignment);
@@ -222,11 +231,12 @@ Status FitResult::Score(FitOutcome* outcome) const {
   TILEGRAD_ASSIGN(outcome->training, ScoreViews(scene_, input, input.training, fitted, workers_));
   // Cameras that moved fix the scene only up to a similarity; held-out ones did not move.
   FitScene scene = scene_;
-  if (job_.config.parameters[Parameter::kCamera]) {
-    Move(AlignCameras(fitted, Choose(input.cameras, input.training)), &scene.positions);
+  const std::vector<Camera>& given = GivenCameras(input);
+  if (job_.config.parameters[Parameter::kCamera] || input.found) {
+    Move(AlignCameras(fitted, Choose(given, input.training)), &scene.positions);
   }
   TILEGRAD_ASSIGN(outcome->held_out, ScoreViews(scene, input, input.held_out,
-                                                Choose(input.cameras, input.held_out), workers_));
+                                                Choose(given, input.held_out), workers_));
   std::vector<std::uint8_t> truth = input.occupancy;
   if (job_.truth.has_value()) {
     TILEGRAD_ASSIGN(truth, Voxelize(*job_.truth, kOccupancyResolution));

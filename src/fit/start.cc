@@ -239,6 +239,7 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
     options.parameters[Parameter::kPositions] = true;
     options.parameters[start.scene.texture.empty() ? Parameter::kColors : Parameter::kTexture] =
         true;
+    options.parameters[Parameter::kCamera] = job.input.found;  // to a few degrees so far
   }
   // Texels that are not fitted would have to be kept in every checkpoint.
   if (!start.scene.texture.empty() && !options.parameters[Parameter::kTexture])

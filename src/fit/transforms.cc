@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/transforms.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "io/transforms_lens.h"
@@ -110,6 +111,7 @@ Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image) {
   NerfCamera pose = frame.pose;
   pose.fl_x = focal(own.width, frame.angle_x, pose.fl_x);
   pose.fl_y = focal(own.height, frame.angle_y, pose.fl_y);
+  if (pose.fl_x == 0) pose.fl_x = focal(std::max(own.width, own.height), frame.angle_long, 0);
   if (pose.fl_y == 0) pose.fl_y = pose.fl_x;
   if (pose.cx == 0) pose.cx = 0.5 * own.width;
   if (pose.cy == 0) pose.cy = 0.5 * own.height;

@@ -22,7 +22,8 @@ struct TransformsFrame {
   bool stored_order = false;  // pixels are counted as the image stores them (io/orientation.h)
   NerfCamera pose;            // its intrinsics are 0 where they are not given
   double angle_x = 0, angle_y = 0;
-  ImageSize size;  // that intrinsics are meant for; 0: of the image
+  double angle_long = 0;  // along the longer side, where nothing else is known; else 0
+  ImageSize size;         // that intrinsics are meant for; 0: of the image
 };
 
 // Errors name the file, the frame and the key.

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// A folder of pictures without cameras.
+//
+//   <folder>/images/a.jpg or <folder>/a.jpg     PNG, JPEG or WebP, in the order of their names
+//   <folder>/masks/a.jpg.png or masks/a.png     beside images/ or in <folder>; all or none
+#pragma once
+
+#include <vector>
+
+#include "fit/transforms.h"
+
+namespace tilegrad::train {
+
+inline constexpr double kUsualFov = 65;  // degrees along the longer side: main cameras of phones
+
+// Empty if there are no pictures. The frames' poses mean nothing; their lens sees `fov` degrees
+// along the longer side. Errors: a mask is missing.
+Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double fov);
+
+}  // namespace tilegrad::train

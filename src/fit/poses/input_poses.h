@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// An input's cameras, found and kept beside the run.
+#pragma once
+
+#include "base/output_guard.h"
+#include "fit/input.h"
+#include "fit/poses/find_poses.h"
+
+namespace tilegrad::train {
+
+struct InputPosesJob {
+  PoseOptions options;
+  Path file;  // keeps what was found, so that a fit that goes on need not look again
+  OutputGuard guard;
+  bool reuse = false;  // reads `file` if it is there
+};
+
+// The cameras of an input without, or of one whose cameras are not to be believed: all views of the
+// former, the training views of the latter, whose held-out cameras follow by alignment. Adds a
+// warning where they are in doubt. Errors: those of FindPoses; no masks; `file` cannot be written,
+// or belongs to other images.
+Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& workers,
+                      const ProgressSink& progress, const StopFlag& stop);
+
+}  // namespace tilegrad::train
