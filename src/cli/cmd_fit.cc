@@ -295,7 +295,8 @@ void AddWhat(CLI::App* command, Options* o) {
                    "where masks and cameras allow. --mesh is the old name")
       ->capture_default_str();
   command->add_option("--optimize", o->optimize,
-                      "any of positions, colors, texture, uv, camera, light, sh, material; "
+                      "any of positions, colors, texture, uv, camera, light, sh, material, "
+                      "exposure, focal; "
                       "separated by commas [positions and texture, or the colors that --mesh has]");
   command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
       ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))

@@ -22,6 +22,8 @@ constexpr double kHullArea = 0.3;
 constexpr double kRemeshShare = 0.6;                   // of the run
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
+constexpr std::size_t kFirstRates = 8;
+
 // By value, as the options of tilegrad fit call them.
 constexpr std::array kLightings = {"none", "lambert", "phong", "sh"};
 constexpr std::array kStarts = {"auto", "hull", "sphere"};
@@ -101,7 +103,11 @@ std::string DescribeConfig(const FitConfig& config) {
   line("filter", NameIn(kFilters, c.filter));
   line("vertex_colors", c.vertex_colors);
   line("max_alpha_error", c.max_alpha_error);
-  line("rates", fmt::format("{}", fmt::join(c.rates.of, ",")));
+  // Fits from before these parameters go on.
+  line("rates", fmt::format("{}", fmt::join(std::span(c.rates.of).first(kFirstRates), ",")));
+  for (const Parameter p : {Parameter::kExposure, Parameter::kFocal}) {
+    if (c.parameters[p]) line(fmt::format("rate_{}", NameOf(p)).c_str(), c.rates[p]);
+  }
   line("final_rate", c.final_rate);
   line("color_region", static_cast<int>(c.loss.region));
   line("silhouette_loss", static_cast<int>(c.loss.silhouette));

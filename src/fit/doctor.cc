@@ -128,7 +128,9 @@ std::string FarSentence(const Sight& s, const FitStep& step) {
       std::max(2 * delta, delta * (needed / reach) * (needed / reach) * 2));
 }
 
-bool OnlyColor(Parameter p) { return p != Parameter::kPositions && p != Parameter::kCamera; }
+bool OnlyColor(Parameter p) {
+  return p != Parameter::kPositions && p != Parameter::kCamera && p != Parameter::kFocal;
+}
 
 std::string WhyNoColor(const FitterOptions& options, const Sight& s, Parameter p) {
   if (options.loss.color_weight == 0) {

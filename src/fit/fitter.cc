@@ -83,11 +83,12 @@ Fitter::Fitter(FitScene scene, const FitterOptions& options, const Workers& work
   for (const Parameter what : kParameters) {
     if (!options.parameters[what]) continue;
     const double rate = options.rates[what];
-    if (what != Parameter::kCamera) {
+    if (!IsOfOneView(what)) {
       blocks_.push_back(MakeBlock(scene_, what, rate));
       continue;
     }
     for (int i = 0; i < static_cast<int>(scene_.cameras.size()); ++i) {
+      if (what == Parameter::kExposure && i == options.exposure_reference) continue;
       blocks_.push_back(MakeBlock(scene_, what, rate, i));
     }
   }
@@ -102,12 +103,12 @@ Result<Fitter> Fitter::Make(FitScene scene, const FitterOptions& options, const 
   return Fitter(std::move(scene), options, workers);
 }
 
-// Blocks whose parameter some of the views sees, with the entry of a camera's view among them.
+// Blocks whose parameter some of the views sees, with the entry of a block's view among them.
 template <class Visit>
 void Fitter::ForEachOfViews(std::span<const int> views, const Visit& visit) {
   for (ParameterBlock& block : blocks_) {
     const auto at = std::find(views.begin(), views.end(), block.view);
-    if (block.what == Parameter::kCamera && at == views.end()) continue;
+    if (IsOfOneView(block.what) && at == views.end()) continue;
     visit(block, static_cast<std::size_t>(at - views.begin()));
   }
 }
@@ -128,10 +129,12 @@ Result<FitValues> Fitter::Evaluate(const FitStep& step) {
   job.alpha = options_.loss.silhouette_weight > 0;
   TILEGRAD_TRY(renderer_->Render(scene_, job));
   FitValues values;
-  values.image = rule_.Evaluate(options_.loss, *step.targets, step.views, images(), *workers_);
+  values.image =
+      rule_.Evaluate(options_.loss, *step.targets, {step.views, scene_.gains}, images(), *workers_);
   FrameGradients d_frame;
   d_frame.color = rule_.d_color(), d_frame.alpha = rule_.d_alpha();
   TILEGRAD_TRY(renderer_->Backward(scene_, job, d_frame, options_.parameters, &gradients_));
+  gradients_.gains.assign(rule_.d_gains().begin(), rule_.d_gains().end());
   RegularizerTerms w = options_.regularizers;
   w.area *= step.area_factor;
   if (options_.parameters[Parameter::kPositions]) {

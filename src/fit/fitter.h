@@ -19,9 +19,11 @@
 namespace tilegrad::train {
 
 // Learning rates by parameter: world units, colours and texels in [0, 1], uv, radians and world
-// units of cameras, unit directions, coefficients, factors.
+// units of cameras, unit directions, coefficients, factors, logarithms of gains and of focal
+// lengths.
 struct LearningRates {
-  std::array<double, kParameters.size()> of = {0.03, 0.02, 0.02, 0.005, 0.005, 0.02, 0.02, 0.02};
+  std::array<double, kParameters.size()> of = {0.03, 0.02, 0.02, 0.005, 0.005,
+                                               0.02, 0.02, 0.02, 0.01,  0.002};
   double operator[](Parameter p) const { return of[static_cast<std::size_t>(p)]; }
   double& operator[](Parameter p) { return of[static_cast<std::size_t>(p)]; }
 };
@@ -32,6 +34,9 @@ struct FitterOptions {
   ImageLoss loss;
   RegularizerTerms regularizers;
   double smoothing = 10;  // lambda of Diffusion
+  // The view whose gain stays, where exposures are fitted: else colours and gains could share any
+  // factor.
+  int exposure_reference = 0;
   // Lambda of the same for vertex colours, which then take one step size: those that are hardly
   // seen move little, with their neighbours. None: each colour has a step size of its own.
   std::optional<double> color_smoothing;

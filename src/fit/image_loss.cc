@@ -15,23 +15,29 @@ struct OneImage {
   std::span<const float> truth, truth_alpha, silhouette, color, alpha;
   std::span<const std::int32_t> faces;
   std::span<float> d_color, d_alpha;
+  float gain = 1;
+  float* d_gain = nullptr;  // none: the gain is 1
 };
 
-// Mean of weight * |difference|; the gradient times `scale`.
-double WeightedL1(const OneImage& image, double scale) {
+// Mean of weight * |gain * color - truth|; the gradient times `scale`.
+double WeightedL1(const OneImage& image, ColorRegion region, double scale) {
   const std::size_t plane = image.faces.size();
   const double step = scale / static_cast<double>(3 * plane);
-  double sum = 0;
+  double sum = 0, d_gain = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t p = 0; p < plane; ++p) {
       const std::size_t i = c * plane + p;
-      const float weight = image.faces[p] >= 0 ? image.truth_alpha[p] : 0.0f;
-      const float gap = image.color[i] - image.truth[i];
+      const float on_object = image.faces[p] >= 0 ? image.truth_alpha[p] : 0.0f;
+      const float weight = region == ColorRegion::kOnObject ? on_object : 1.0f;
+      const float gap = image.gain * image.color[i] - image.truth[i];
       sum += static_cast<double>(weight * std::abs(gap));
       const float sign = gap > 0 ? 1.0f : gap < 0 ? -1.0f : 0.0f;
-      image.d_color[i] = static_cast<float>(step) * weight * sign;
+      const float d_gap = static_cast<float>(step) * weight * sign;
+      image.d_color[i] = image.gain * d_gap;
+      d_gain += static_cast<double>(d_gap * image.color[i]);
     }
   }
+  if (image.d_gain != nullptr) *image.d_gain = static_cast<float>(d_gain);
   return sum / static_cast<double>(3 * plane);
 }
 
@@ -71,9 +77,9 @@ ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double 
   ImageLossValue value;
   if (loss.color_weight > 0) {
     const double scale = share * loss.color_weight;
-    value.color = loss.region == ColorRegion::kOnObject
-                      ? WeightedL1(image, scale)
-                      : MeanL1(image.truth, image.color, scale, image.d_color);
+    const bool weighted = loss.region == ColorRegion::kOnObject || image.d_gain != nullptr;
+    value.color = weighted ? WeightedL1(image, loss.region, scale)
+                           : MeanL1(image.truth, image.color, scale, image.d_color);
   }
   if (loss.silhouette_weight > 0) {
     const double scale = share * loss.silhouette_weight;
@@ -86,9 +92,11 @@ ImageLossValue EvaluateOne(const ImageLoss& loss, const OneImage& image, double 
 }  // namespace
 
 ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages& targets,
-                                       std::span<const int> views, const Images& frame,
+                                       const Views& of, const Images& frame,
                                        const Workers& workers) {
+  const std::span<const int> views = of.views;
   const std::size_t plane = targets.pixels(), images = views.size();
+  d_gains_.assign(of.gains.empty() ? 0 : images, 0.0f);
   d_color_.resize(loss.color_weight > 0 ? 3 * plane * images : 0);
   d_alpha_.resize(loss.silhouette_weight > 0 ? plane * images : 0);
   parts_.resize(images);
@@ -98,7 +106,7 @@ ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages
     const auto part = [&](auto& array, std::size_t n, std::size_t size) {
       return array.empty() ? std::span(array) : std::span(array).subspan(n * size, size);
     };
-    const OneImage image{
+    OneImage image{
         part(targets.color, v, 3 * plane),
         part(targets.alpha, v, plane),
         part(targets.silhouette.empty() ? targets.alpha : targets.silhouette, v, plane),
@@ -107,6 +115,7 @@ ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages
         part(frame.face_ids, i, plane),
         part(d_color_, i, 3 * plane),
         part(d_alpha_, i, plane)};
+    if (!of.gains.empty()) image.gain = of.gains[v], image.d_gain = &d_gains_[i];
     parts_[i] = EvaluateOne(loss, image, share);
   });
   ImageLossValue mean;

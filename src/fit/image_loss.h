@@ -47,15 +47,21 @@ struct ImageLossValue {
 // Means over the views. Keeps its arrays: the same sizes allocate nothing.
 class ImageLossRule {
  public:
-  // Image i of the frame is held to image views[i] of `targets`. Fills d_color and d_alpha with
-  // the gradient of the total.
-  ImageLossValue Evaluate(const ImageLoss& loss, const TargetImages& targets,
-                          std::span<const int> views, const Images& frame, const Workers& workers);
+  // Image i of the frame, its colours times gains[views[i]], is held to image views[i] of
+  // `targets`. Fills d_color, d_alpha and, where there are gains, d_gains with the gradient of the
+  // total.
+  struct Views {
+    std::span<const int> views;
+    std::span<const float> gains;  // of all views, or none: 1
+  };
+  ImageLossValue Evaluate(const ImageLoss& loss, const TargetImages& targets, const Views& views,
+                          const Images& frame, const Workers& workers);
   const AlignedVector<float>& d_color() const { return d_color_; }
   const AlignedVector<float>& d_alpha() const { return d_alpha_; }
+  const AlignedVector<float>& d_gains() const { return d_gains_; }  // [views]
 
  private:
-  AlignedVector<float> d_color_, d_alpha_;
+  AlignedVector<float> d_color_, d_alpha_, d_gains_;
   std::vector<ImageLossValue> parts_;  // of each view
 };
 

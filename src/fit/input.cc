@@ -120,7 +120,12 @@ Status Finish(FitInput* input) {
 void ApplyBackground(Background background, FitInput* input) {
   if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
   const bool looks = background == Background::kAuto && !HasAlpha(*input);
-  if (background == Background::kPlain || looks) TakePlainBackgrounds(input);
+  if (background != Background::kPlain && !looks) return;
+  FitInput masked = *input;
+  TakePlainBackgrounds(&masked);
+  // Backgrounds that are not plain make no masks unless somebody says so.
+  if (looks && 2 * masked.warnings.size() > masked.names.size()) return;
+  *input = std::move(masked);
 }
 
 // Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.

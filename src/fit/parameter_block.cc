@@ -11,6 +11,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr float kMostShininess = 1e5f;
+constexpr float kMostLogGain = 3, kMostLogFocal = 1.5f;  // a factor of 20, and of 4.5
 constexpr std::size_t kMaterialNumbers = 10, kCameraNumbers = 9;
 
 void PutCamera(const CameraParameters& p, float* to) {
@@ -73,6 +74,14 @@ void ReadValues(const FitScene& scene, ParameterBlock* block) {
     case Parameter::kMaterial:
       x.resize(kMaterialNumbers);
       return PutMaterial(scene.surface, x.data());
+    case Parameter::kExposure:
+      x.assign(1, std::log(scene.gains[static_cast<std::size_t>(block->view)]));
+      return;
+    case Parameter::kFocal:
+      x.assign(1, 0.0f);
+      block->focal.clear();
+      for (const Camera& c : scene.cameras) block->focal.push_back({c.fx, c.fy});
+      return;
   }
 }
 
@@ -133,6 +142,17 @@ Status WriteBlock(ParameterBlock* block, FitScene* scene) {
       Clamp(0, std::log(kMostShininess), &x, x.size());
       TakeSurface(x.data(), &scene->surface);
       break;
+    case Parameter::kExposure:
+      Clamp(-kMostLogGain, kMostLogGain, &x, 1);
+      scene->gains[static_cast<std::size_t>(block->view)] = std::exp(x[0]);
+      break;
+    case Parameter::kFocal:
+      Clamp(-kMostLogFocal, kMostLogFocal, &x, 1);
+      for (std::size_t i = 0; i < block->focal.size(); ++i) {
+        scene->cameras[i].fx = std::exp(x[0]) * block->focal[i][0];
+        scene->cameras[i].fy = std::exp(x[0]) * block->focal[i][1];
+      }
+      break;
     case Parameter::kCamera:
       return WriteCamera(*block, scene);
   }
@@ -159,6 +179,12 @@ void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t
     case Parameter::kMaterial:
       PutSurface(gradients.surface, d.data());
       d[9] = gradients.surface.shininess * (scene.surface.shininess + 1);
+      return;
+    case Parameter::kExposure:
+      d.assign(1, scene.gains[static_cast<std::size_t>(block->view)] * gradients.gains[rendered]);
+      return;
+    case Parameter::kFocal:
+      d.assign(1, static_cast<float>(gradients.focal));
       return;
     case Parameter::kCamera: {
       const Camera& camera = scene.cameras[static_cast<std::size_t>(block->view)];

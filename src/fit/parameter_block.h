@@ -3,6 +3,7 @@
 // gradient, and Adam's moments.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,19 +13,26 @@
 
 namespace tilegrad::train {
 
+// Each view has a block of its own.
+inline bool IsOfOneView(Parameter what) {
+  return what == Parameter::kCamera || what == Parameter::kExposure;
+}
+
 struct ParameterBlock {
   Parameter what = Parameter::kPositions;
-  int view = -1;             // of kCamera: each camera is a block of its own
+  int view = -1;             // where IsOfOneView
   double learning_rate = 0;  // in the values' units
   AlignedVector<float> values, gradient, m, v;
-  std::int64_t steps = 0;  // taken so far
+  std::int64_t steps = 0;                   // taken so far
+  std::vector<std::array<float, 2>> focal;  // of kFocal: focal lengths that the value multiplies
 
   std::string name() const;  // "positions", "camera/3"
 };
 
 // kPositions, kColors, kTexture, kUv: as they are. kCamera: the six numbers of rotation, then the
 // translation (tilegrad/camera.h). kLight: directions. kMaterial: ambient, diffuse,
-// specular, and the logarithm of shininess + 1.
+// specular, and the logarithm of shininess + 1. kExposure: the logarithm of the view's gain.
+// kFocal: the logarithm of one factor of all focal lengths, at first 0.
 ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate,
                          int view = -1);
 

@@ -185,7 +185,8 @@ Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
 Status FitResult::WriteCameras() const {
   std::vector<TransformsView> views;
   for (std::size_t i = 0; i < job_.input.names.size(); ++i) {
-    views.push_back({job_.input.names[i], scene_.cameras[i]});
+    const double gain = scene_.gains.empty() ? 1.0 : static_cast<double>(scene_.gains[i]);
+    views.push_back({job_.input.names[i], scene_.cameras[i], gain});
   }
   return WriteTextAtomic(job_.out / "transforms_fitted.json",
                          WriteTransforms(views, SizeOf(job_.input)));

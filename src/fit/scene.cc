@@ -19,8 +19,8 @@ std::span<float> Wanted(bool wanted, std::size_t size, AlignedVector<float>* arr
 }  // namespace
 
 const char* NameOf(Parameter parameter) {
-  static constexpr std::array kNames = {"positions", "colors", "texture", "uv",
-                                        "camera",    "light",  "sh",      "material"};
+  static constexpr std::array kNames = {"positions", "colors", "texture",  "uv",       "camera",
+                                        "light",     "sh",     "material", "exposure", "focal"};
   return kNames[static_cast<std::size_t>(parameter)];
 }
 
@@ -49,6 +49,8 @@ std::string WhyExcluded(const FitScene& scene, Parameter parameter) {
                  : "the light is not made of spherical harmonics";
     case Parameter::kMaterial:
       return scene.uses_lights() ? "" : "only Lambert and Phong light read a material";
+    case Parameter::kExposure:
+      return scene.gains.size() > 1 ? "" : "there is one image, and nothing to compare it with";
     default:
       return "";
   }
@@ -111,7 +113,7 @@ void FitRenderer::SetGradients(const FitScene& scene, const ParameterSet& wanted
     d.sh = gradients->sh;
   }
   d_scenes_.assign(scenes_.size(), d);
-  if (!wanted[Parameter::kCamera]) return;
+  if (!wanted[Parameter::kCamera] && !wanted[Parameter::kFocal]) return;
   gradients->cameras.resize(scenes_.size());
   for (std::size_t n = 0; n < scenes_.size(); ++n) d_scenes_[n].camera = &gradients->cameras[n];
 }
@@ -131,9 +133,16 @@ Status FitRenderer::Backward(const FitScene& scene, const Job& job, const FrameG
   SetGradients(scene, wanted, gradients);
   TILEGRAD_TRY(renderer_.Backward(frame_, d_frame, d_scenes_));
   if (wanted[Parameter::kUv] && !scene.texture.empty()) GatherUvs(scene, gradients);
-  if (!wanted[Parameter::kCamera]) return {};
+  if (!wanted[Parameter::kCamera] && !wanted[Parameter::kFocal]) return {};
   // Intrinsics were multiplied by the scale.
   for (Camera& d_camera : gradients->cameras) d_camera = ScaledCamera(d_camera, job.scale);
+  gradients->focal = 0;
+  for (std::size_t n = 0; n < job.views.size(); ++n) {
+    const Camera& d = gradients->cameras[n];
+    const Camera& camera = scene.cameras[static_cast<std::size_t>(job.views[n])];
+    gradients->focal +=
+        static_cast<double>(camera.fx * d.fx) + static_cast<double>(camera.fy * d.fy);
+  }
   return {};
 }
 

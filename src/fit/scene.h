@@ -32,16 +32,30 @@ struct FitScene {
   std::array<float, 9> sh = {};
   ShadingModel shading;
   std::vector<Camera> cameras;  // one for each view
+  std::vector<float> gains;     // one for each view: its image has the scene's colours times this;
+                                // empty: 1
 
   std::size_t vertices() const { return positions.size() / 3; }
   bool uses_lights() const { return UsesLights(shading); }
 };
 
 // What can be fitted.
-enum class Parameter { kPositions, kColors, kTexture, kUv, kCamera, kLight, kSh, kMaterial };
+enum class Parameter {
+  kPositions,
+  kColors,
+  kTexture,
+  kUv,
+  kCamera,
+  kLight,
+  kSh,
+  kMaterial,
+  kExposure,
+  kFocal
+};
 inline constexpr std::array kParameters = {
     Parameter::kPositions, Parameter::kColors, Parameter::kTexture, Parameter::kUv,
-    Parameter::kCamera,    Parameter::kLight,  Parameter::kSh,      Parameter::kMaterial};
+    Parameter::kCamera,    Parameter::kLight,  Parameter::kSh,      Parameter::kMaterial,
+    Parameter::kExposure,  Parameter::kFocal};
 const char* NameOf(Parameter parameter);  // "positions", ..., as on the command line
 
 struct ParameterSet {
@@ -55,13 +69,16 @@ struct ParameterSet {
 std::string WhyExcluded(const FitScene& scene, Parameter parameter);
 
 // dL/d(FitScene), of the shapes there. Cameras are those of the views that were rendered, in their
-// order. What is not wanted is left as it is.
+// order; so are gains, and `focal` is that of the logarithm of one factor of all focal lengths.
+// What is not wanted is left as it is.
 struct FitGradients {
   AlignedVector<float> positions, colors, uvs, texture;
   Surface surface;
   std::vector<Light> lights;
   std::array<float, 9> sh = {};
   std::vector<Camera> cameras;
+  std::vector<float> gains;
+  double focal = 0;
 };
 
 // Renders views of a scene, and takes gradients of images back. Allocates nothing once it has seen

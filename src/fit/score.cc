@@ -108,9 +108,13 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
   const ImageSize size{input.images.width, input.images.height};
   std::vector<ViewScore> scores;
   for (int i = 0; i < static_cast<int>(views.size()); ++i) {
-    TILEGRAD_ASSIGN(const Picture rendered, DrawView(renderer, seen, i, size));
+    TILEGRAD_ASSIGN(Picture rendered, DrawView(renderer, seen, i, size));
     ViewScore score;
     score.view = views[static_cast<std::size_t>(i)];
+    if (!scene.gains.empty()) {
+      const float gain = scene.gains[static_cast<std::size_t>(score.view)];
+      for (float& x : rendered.color) x *= gain;
+    }
     const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
     score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
     score.iou = Iou(rendered.alpha, truth.alpha);

@@ -21,7 +21,7 @@ struct ViewScore {
 // A view of the scene as a picture of `size`, 3 x 3 samples a pixel.
 Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view, ImageSize size);
 
-// Views of the input rendered from `cameras` (one for each of `views`).
+// Views of the input rendered from `cameras` (one for each of `views`), with their gains.
 Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
                                           std::span<const int> views,
                                           std::span<const Camera> cameras, const Workers& workers);

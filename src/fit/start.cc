@@ -42,7 +42,8 @@ Status CheckConfig(const FitConfig& config) {
 Status CheckMasks(const FitJob& job) {
   if (job.input.masked || job.config.loss.silhouette_weight == 0) return {};
   return InvalidArgument(
-      "no image has an alpha channel or a mask, so it is not known where the object is: add masks "
+      "no image has an alpha channel, a mask or a plain background, so it is not known where the "
+      "object is: add masks "
       "(\"mask_path\" in transforms.json), or fit colours only with a silhouette weight of 0");
 }
 
@@ -246,6 +247,10 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
     start.config.remeshes = 0;
   options.rates = job.config.rates;
   options.rates[Parameter::kPositions] *= static_cast<double>(RadiusOf(start.scene));
+  if (options.parameters[Parameter::kExposure]) {
+    start.scene.gains.assign(start.scene.cameras.size(), 1.0f);
+    options.exposure_reference = job.input.training.front();
+  }
   options.loss = job.config.loss, options.regularizers = start.config.regularizers;
   options.smoothing = job.config.smoothing;
   return start;

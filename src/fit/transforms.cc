@@ -129,12 +129,11 @@ std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize 
       const double* row = &pose.camera_to_world[4 * r];
       matrix.push_back({row[0], row[1], row[2], row[3]});
     }
-    frames.push_back({{"file_path", view.image},
-                      {"fl_x", pose.fl_x},
-                      {"fl_y", pose.fl_y},
-                      {"cx", pose.cx},
-                      {"cy", pose.cy},
-                      {"transform_matrix", matrix}});
+    nlohmann::ordered_json frame = {{"file_path", view.image}, {"fl_x", pose.fl_x},
+                                    {"fl_y", pose.fl_y},       {"cx", pose.cx},
+                                    {"cy", pose.cy},           {"transform_matrix", matrix}};
+    if (view.gain != 1) frame["exposure_gain"] = view.gain;
+    frames.push_back(std::move(frame));
   }
   const nlohmann::ordered_json file = {{"w", size.width}, {"h", size.height}, {"frames", frames}};
   return file.dump(1) + "\n";

@@ -36,6 +36,7 @@ Result<Camera> CameraOfFrame(const TransformsFrame& frame, ImageSize image);
 struct TransformsView {
   std::string image;
   Camera camera;
+  double gain = 1;  // of exposure; written as "exposure_gain" where it is not 1
 };
 std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize size);
 
