@@ -18,23 +18,31 @@ constexpr double kBorder = 0.02;  // of the shorter side
 constexpr int kRounds = 5;        // of the fit to the border
 constexpr double kKept = 2.5;     // standard deviations: what is farther off is left out
 constexpr double kThreshold = 4, kLeastThreshold = 0.05;
-constexpr double kHole = 5e-4;        // of the picture
-constexpr double kSpeck = 0.02;       // of the object's largest part
-constexpr double kMostUneven = 0.1;   // standard deviation of a background that is still plain
-constexpr double kMostForeign = 0.3;  // share of the border that may show the object
+constexpr double kToDeviation = 1.4826;  // from the median of |gaps|, of a normal distribution
+constexpr double kHole = 5e-4;           // of the picture
+constexpr double kSpeck = 0.02;          // of the object's largest part
+constexpr double kMostUneven = 0.1;      // standard deviation of a background that is still plain
+constexpr double kMostForeign = 0.3;     // share of the border that may show the object
 constexpr double kLeastObject = 0.002, kMostObject = 0.95;
 
 enum class Place : std::uint8_t { kUnknown, kBackground, kObject };
 
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+  std::ranges::nth_element(*values, middle);
+  return *middle;
+}
+
 class Separation {
  public:
   Separation(std::span<const float> color, int width, int height)
-      : width_(width), height_(height), color_(Averaged(color)) {}
+      : width_(width), height_(height), raw_(color), color_(Averaged(color)) {}
 
   BackgroundMask Run() {
     FitBorder();
     Measure();
     Flood();
+    Peel();
     DropSpecks();
     return {Soft(), Doubt()};
   }
@@ -46,7 +54,7 @@ class Separation {
   std::size_t At(int x, int y) const { return static_cast<std::size_t>(y * width_ + x); }
   bool OnBorder(std::size_t p) const;
   glm::dvec3 Terms(std::size_t p) const;  // 1, x, y, the latter in [-1, 1]
-  double Gap(std::size_t p) const;
+  double Gap(std::span<const float> color, std::size_t p) const;
 
   template <class Value>  // float(std::size_t pixel)
   std::vector<float> Mean3x3(const Value& value) const;
@@ -54,6 +62,7 @@ class Separation {
   void FitBorder();
   void Measure();
   void Flood();
+  void Peel();
   void DropSpecks();
   std::vector<float> Soft() const;
   std::string Doubt() const;
@@ -63,6 +72,7 @@ class Separation {
   std::vector<std::size_t> Spread(std::size_t first, Place mark, const Belongs& belongs);
 
   const int width_, height_;
+  const std::span<const float> raw_;
   std::vector<float> color_;         // averaged
   std::array<glm::dvec3, 3> model_;  // of each channel
   std::vector<std::size_t> border_;
@@ -108,11 +118,11 @@ glm::dvec3 Separation::Terms(std::size_t p) const {
   return {1, 2.0 * (x + 0.5) / width_ - 1, 2.0 * (y + 0.5) / height_ - 1};
 }
 
-double Separation::Gap(std::size_t p) const {
+double Separation::Gap(std::span<const float> color, std::size_t p) const {
   const glm::dvec3 terms = Terms(p);
   double most = 0;
   for (std::size_t c = 0; c < 3; ++c) {
-    const double value = static_cast<double>(color_[c * pixels() + p]);
+    const double value = static_cast<double>(color[c * pixels() + p]);
     most = std::max(most, std::abs(value - glm::dot(model_[c], terms)));
   }
   return most;
@@ -136,13 +146,12 @@ void Separation::FitBorder() {
     for (std::size_t c = 0; c < 3; ++c) model_[c] = glm::inverse(normal) * right[c];
     // The median bears with an object on half of the border.
     std::vector<double> gaps;
-    for (const std::size_t p : border_) gaps.push_back(Gap(p));
-    std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
-    deviation_ = 1.4826 * gaps[gaps.size() / 2];
+    for (const std::size_t p : border_) gaps.push_back(Gap(color_, p));
+    deviation_ = kToDeviation * Median(&gaps);
     const double most = std::max(kKept * deviation_, kLeastThreshold / 2);
     kept.clear();
     for (const std::size_t p : border_) {
-      if (Gap(p) <= most) kept.push_back(p);
+      if (Gap(color_, p) <= most) kept.push_back(p);
     }
   }
 }
@@ -150,7 +159,7 @@ void Separation::FitBorder() {
 void Separation::Measure() {
   threshold_ = std::max(kLeastThreshold, kThreshold * deviation_);
   gap_.resize(pixels()), place_.resize(pixels());
-  for (std::size_t p = 0; p < pixels(); ++p) gap_[p] = static_cast<float>(Gap(p));
+  for (std::size_t p = 0; p < pixels(); ++p) gap_[p] = static_cast<float>(Gap(color_, p));
   const auto outside = std::ranges::count_if(
       border_, [&](std::size_t p) { return static_cast<double>(gap_[p]) > threshold_; });
   foreign_ = static_cast<double>(outside) / static_cast<double>(border_.size());
@@ -191,6 +200,17 @@ void Separation::Flood() {
   }
   for (Place& place : place_) {
     if (place == Place::kUnknown) place = Place::kObject;
+  }
+}
+
+void Separation::Peel() {
+  std::vector<double> gaps;
+  for (const std::size_t p : border_) gaps.push_back(Gap(raw_, p));
+  const double threshold = std::max(kLeastThreshold, kThreshold * kToDeviation * Median(&gaps));
+  const std::vector<float> share =
+      Mean3x3([&](std::size_t p) { return place_[p] == Place::kObject ? 1.0f : 0.0f; });
+  for (std::size_t p = 0; p < pixels(); ++p) {
+    if (share[p] < 1 && Gap(raw_, p) <= threshold) place_[p] = Place::kBackground;
   }
 }
 

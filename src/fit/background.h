@@ -9,7 +9,10 @@
 // 3. Background is what such pixels connect with the border (4 neighbours), so that an object may
 //    have the background's colour inside. Enclosed areas are holes, and background, if they lie
 //    within half the threshold and have at least 0.05 % of the picture's pixels.
-// 4. Specks below 2 % of the object's largest part go. Edges are softened over 3 x 3 pixels.
+// 4. The averages reach a pixel too far: of the object's outermost pixels, those that are
+// themselves
+//    within the threshold are background.
+// 5. Specks below 2 % of the object's largest part go. Edges are softened over 3 x 3 pixels.
 #pragma once
 
 #include <span>

@@ -74,6 +74,7 @@ bool RemeshesAt(const FitConfig& config, std::int64_t step);
 struct FitSchedule {
   int factor = 1;  // pixels of the images for a pixel of this step
   double delta = 0, rate = 1;
+  double camera_rate = 1;  // of cameras, times `rate`: they rest until there is a shape to go by
 };
 // Levels that the sizes do not divide by are left out.
 FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size);

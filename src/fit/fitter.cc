@@ -156,8 +156,11 @@ Diffusion* Fitter::SmoothingOf(Parameter what) {
   return colors ? &color_diffusion_ : nullptr;
 }
 
-Status Fitter::Move(ParameterBlock* block, double rate_factor) {
-  const double rate = rate_factor * block->learning_rate;
+Status Fitter::Move(ParameterBlock* block, const FitStep& step) {
+  const bool camera = block->what == Parameter::kCamera || block->what == Parameter::kFocal;
+  if (camera && step.camera_factor == 0) return {};
+  const double factor = step.rate_factor * (camera ? step.camera_factor : 1);
+  const double rate = factor * block->learning_rate;
   const auto t = static_cast<double>(++block->steps);
   if (Diffusion* const smooth = SmoothingOf(block->what); smooth != nullptr) {
     UniformAdamStep({rate, kBeta1, kBeta2, block->steps}, smooth, block->gradient, block->m,
@@ -180,7 +183,7 @@ Result<FitValues> Fitter::Step(const FitStep& step) {
   TILEGRAD_TRY(CheckFinite(values));
   Status status;
   ForEachOfViews(step.views, [&](ParameterBlock& block, std::size_t) {
-    if (status.ok()) status = Move(&block, step.rate_factor);
+    if (status.ok()) status = Move(&block, step);
   });
   if (!status.ok()) return status;
   return values;

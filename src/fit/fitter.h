@@ -49,6 +49,7 @@ struct FitStep {
   FitRenderer::Job job;  // `views` is set from above
   double rate_factor = 1;
   double area_factor = 1;  // of the weight of the surface's area
+  double camera_factor = 1;  // of cameras and focal lengths, beside that; 0: they rest
 };
 
 struct FitValues {
@@ -86,7 +87,7 @@ class Fitter {
   Fitter(FitScene scene, const FitterOptions& options, const Workers& workers);
   Status LoadMesh(std::span<const nn::NamedTensor> state);
   Status CheckFinite(const FitValues& values) const;
-  Status Move(ParameterBlock* block, double rate_factor);
+  Status Move(ParameterBlock* block, const FitStep& step);
   Diffusion* SmoothingOf(Parameter what);
   template <class Visit>
   void ForEachOfViews(std::span<const int> views, const Visit& visit);

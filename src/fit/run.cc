@@ -39,6 +39,7 @@ FitStep StepOf(const FitConfig& config, const FitSchedule& schedule, const Targe
   step.job.options.delta = schedule.delta;
   step.job.options.max_alpha_error = config.max_alpha_error;
   step.rate_factor = step.area_factor = schedule.rate;
+  step.camera_factor = schedule.camera_rate;
   return step;
 }
 

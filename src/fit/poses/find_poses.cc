@@ -21,7 +21,6 @@ namespace {
 // Chosen on twelve models (docs/lab/poses.md).
 constexpr int kSide = 64, kLevel = 3;           // pixels and template of the search
 constexpr int kFineSide = 128, kFineLevel = 4;  // of the last refinement
-constexpr int kSweeps = 8;
 // With a third of these steps half of the pictures are looked for around a mesh that tells nothing.
 constexpr int kShapeSteps = 150;
 constexpr double kShapeRate = 2;
@@ -57,7 +56,7 @@ class Search {
   }
 
   // Whether a camera moved.
-  Result<bool> Sweep(int sweep);
+  Result<bool> Sweep(double repulsion);
   Result<Start> Finish();
 
  private:
@@ -116,7 +115,7 @@ Result<bool> Search::LookForPictures(std::span<const int> pictures, double repul
   return moved;
 }
 
-Result<bool> Search::Sweep(int sweep) {
+Result<bool> Search::Sweep(double repulsion) {
   std::vector<int> order = all_;
   for (std::size_t k = 0; k + 1 < order.size(); ++k) {
     std::swap(order[k], order[k + rng_.Below(order.size() - k)]);
@@ -131,7 +130,6 @@ Result<bool> Search::Sweep(int sweep) {
         estimate_
             .Refit({.steps = kShapeSteps, .cameras = false, .shape_rate = kShapeRate}, parts[side])
             .status());
-    const double repulsion = kRepulsion * (kSweeps - sweep) / kSweeps;
     TILEGRAD_ASSIGN(const bool some, LookForPictures(parts[1 - side], repulsion));
     moved = moved || some;
   }
@@ -170,7 +168,12 @@ Result<std::vector<Camera>> Refine(const PosePictures& pictures, std::span<const
   return out;
 }
 
-Status Check(const TargetImages& images, std::span<const Camera> lenses) {
+Status Check(const TargetImages& images, std::span<const Camera> lenses,
+             const PoseOptions& options) {
+  if (options.starts < 1 || options.sweeps < 1) {
+    return InvalidArgument("{} starts of {} sweeps: needs one or more", options.starts,
+                           options.sweeps);
+  }
   if (lenses.size() < static_cast<std::size_t>(kLeastPictures)) {
     return InvalidArgument("{} images without cameras are too few to find these: needs {} or more",
                            lenses.size(), kLeastPictures);
@@ -181,44 +184,82 @@ Status Check(const TargetImages& images, std::span<const Camera> lenses) {
   return {};
 }
 
-// Of the start nearest to `best`.
-double Agreement(const std::vector<Start>& starts, const Start& best) {
-  double least = 180;
-  for (const Start& other : starts) {
-    if (&other != &best) least = std::min(least, MeanGap(other.cameras, best.cameras));
+class Searches {
+ public:
+  Searches(const PosePictures& pictures, const PoseOptions& options, const Workers& workers,
+           const ProgressSink& progress)
+      : pictures_(pictures), options_(options), workers_(workers), progress_(progress) {}
+
+  // The best, once two agree or all are done.
+  Result<Start> Run(const StopFlag& stop) {
+    while (static_cast<int>(done_.size()) < options_.starts && agreement_ > kAgree) {
+      TILEGRAD_ASSIGN(Start start, Next(stop));
+      done_.push_back(std::move(start));
+      best_ = static_cast<std::size_t>(std::ranges::min_element(done_, {}, &Start::loss) -
+                                       done_.begin());
+      agreement_ = Agreement();
+    }
+    return done_[best_];
   }
-  return least;
-}
+  double agreement() const { return agreement_; }
+  int starts() const { return static_cast<int>(done_.size()); }
+
+ private:
+  Result<Start> Next(const StopFlag& stop) {
+    Search search(pictures_, workers_, static_cast<std::uint64_t>(options_.seed), starts());
+    bool moved = true;
+    for (int sweep = 0; sweep < options_.sweeps && moved; ++sweep) {
+      if (stop) return Cancelled("stopped while looking for cameras");
+      Tell(sweep);
+      TILEGRAD_ASSIGN(moved,
+                      search.Sweep(kRepulsion * (options_.sweeps - sweep) / options_.sweeps));
+    }
+    return search.Finish();
+  }
+
+  void Tell(int sweep) const {
+    if (!progress_) return;
+    const auto total = static_cast<std::uint64_t>(options_.starts * options_.sweeps);
+    const auto done = static_cast<std::uint64_t>(starts() * options_.sweeps + sweep);
+    const std::string note = done_.empty()
+                                 ? ""
+                                 : fmt::format("loss {:.3f}, the best two agree to {:.0f} degrees",
+                                               done_[best_].loss, agreement_);
+    progress_({"looking for cameras", done, total, note});
+  }
+
+  // Of the search nearest to the best.
+  double Agreement() const {
+    double least = kNone;
+    for (std::size_t i = 0; i < done_.size(); ++i) {
+      if (i != best_) least = std::min(least, MeanGap(done_[i].cameras, done_[best_].cameras));
+    }
+    return least;
+  }
+
+  static constexpr double kNone = 180;
+
+  const PosePictures& pictures_;
+  const PoseOptions& options_;
+  const Workers& workers_;
+  const ProgressSink& progress_;
+  std::vector<Start> done_;
+  std::size_t best_ = 0;
+  double agreement_ = kNone;
+};
 
 }  // namespace
 
 Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera> lenses,
                              const PoseOptions& options, const Workers& workers,
                              const ProgressSink& progress, const StopFlag& stop) {
-  TILEGRAD_TRY(Check(images, lenses));
+  TILEGRAD_TRY(Check(images, lenses, options));
   TILEGRAD_ASSIGN(const PosePictures pictures, PreparePictures(images, lenses, kSide));
   TILEGRAD_ASSIGN(const PosePictures fine, PreparePictures(images, lenses, kFineSide));
-  std::vector<Start> starts;
-  FoundPoses out;
-  const Start* best = nullptr;
-  while (out.starts < options.starts && out.agreement > kAgree) {
-    Search search(pictures, workers, static_cast<std::uint64_t>(options.seed), out.starts);
-    bool moved = true;
-    for (int sweep = 0; sweep < kSweeps && moved; ++sweep) {
-      if (stop) return Cancelled("stopped while looking for cameras");
-      if (progress) {
-        progress({"looking for cameras", static_cast<std::uint64_t>(out.starts * kSweeps + sweep),
-                  static_cast<std::uint64_t>(options.starts * kSweeps),
-                  best == nullptr ? "" : fmt::format("loss {:.3f}", best->loss)});
-      }
-      TILEGRAD_ASSIGN(moved, search.Sweep(sweep));
-    }
-    TILEGRAD_ASSIGN(Start start, search.Finish());
-    starts.push_back(std::move(start));
-    best = &*std::ranges::min_element(starts, {}, &Start::loss);
-    out.agreement = Agreement(starts, *best), out.loss = best->loss, ++out.starts;
-  }
-  TILEGRAD_ASSIGN(out.cameras, Refine(fine, best->cameras, workers));
+  Searches searches(pictures, options, workers, progress);
+  TILEGRAD_ASSIGN(const Start best, searches.Run(stop));
+  FoundPoses out{{}, best.loss, searches.starts(), searches.agreement()};
+  TILEGRAD_ASSIGN(out.cameras, Refine(fine, best.cameras, workers));
   for (std::size_t i = 0; i < lenses.size(); ++i) {
     Camera& camera = out.cameras[i];
     camera.fx = lenses[i].fx, camera.fy = lenses[i].fy;

@@ -23,6 +23,7 @@ inline constexpr int kLeastPictures = 6;
 
 struct PoseOptions {
   int starts = 8;  // at most
+  int sweeps = 8;  // of each, at most
   std::int64_t seed = 1;
 };
 

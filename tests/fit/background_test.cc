@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fit/background.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/rng.h"
+#include "fit/input.h"
+#include "fit/make_views.h"
+#include "io/image_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSide = 96;
+constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
+
+// A ring around the middle.
+bool OnRing(int x, int y) {
+  const double r = std::hypot(x + 0.5 - kSide / 2.0, y + 0.5 - kSide / 2.0);
+  return r > 12 && r < 30;
+}
+
+// Red ring before a wall that gets darker to the right, with noise.
+std::vector<float> Ring(double noise, double texture = 0) {
+  Rng rng(5);
+  std::vector<float> out(3 * kPixels);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::size_t c = i / kPixels, p = i % kPixels;
+    const int x = static_cast<int>(p) % kSide, y = static_cast<int>(p) / kSide;
+    const double wall = 0.85 - 0.25 * x / kSide + texture * ((x / 4 + y / 4) % 2);
+    const double object = c == 0 ? 0.7 : 0.2;
+    out[i] = static_cast<float>((OnRing(x, y) ? object : wall) + noise * rng.Normal());
+  }
+  return out;
+}
+
+double IouWithRing(const std::vector<float>& alpha) {
+  double both = 0, either = 0;
+  for (std::size_t p = 0; p < kPixels; ++p) {
+    const bool a = alpha[p] >= 0.5f,
+               b = OnRing(static_cast<int>(p) % kSide, static_cast<int>(p) / kSide);
+    both += a && b, either += a || b;
+  }
+  return both / either;
+}
+
+TEST(Background, LeavesTheObjectWithItsHole) {
+  for (const double noise : {0.0, 0.02, 0.04}) {
+    const BackgroundMask mask = MaskFromPlainBackground(Ring(noise), kSide, kSide);
+    EXPECT_GT(IouWithRing(mask.alpha), 0.95) << noise;
+    EXPECT_EQ(mask.doubt, "") << noise;
+  }
+}
+
+TEST(Background, AnObjectMayHaveItsColourInside) {
+  std::vector<float> color = Ring(0);
+  // A speck of the wall's colour, 2 x 2 pixels: below 0.05 % of the picture.
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const int x : {69, 70}) {
+      for (const int y : {47, 48}) {
+        color[c * kPixels + static_cast<std::size_t>(y * kSide + x)] =
+            static_cast<float>(0.85 - 0.25 * x / kSide);
+      }
+    }
+  }
+  const BackgroundMask mask = MaskFromPlainBackground(color, kSide, kSide);
+  EXPECT_EQ(mask.alpha[48 * kSide + 69], 1);
+}
+
+TEST(Background, DropsSpecks) {
+  std::vector<float> color = Ring(0);
+  for (std::size_t c = 0; c < 3; ++c) color[c * kPixels + 8 * kSide + 80] = 0;
+  const BackgroundMask mask = MaskFromPlainBackground(color, kSide, kSide);
+  EXPECT_EQ(mask.alpha[8 * kSide + 80], 0);
+}
+
+TEST(Background, SaysWhenItIsNotPlain) {
+  const auto doubt = [](const std::vector<float>& color) {
+    return MaskFromPlainBackground(color, kSide, kSide).doubt;
+  };
+  EXPECT_NE(doubt(Ring(0, 0.4)).find("not plain"), std::string::npos);
+  EXPECT_NE(doubt(std::vector<float>(3 * kPixels, 0.5f)).find("nothing stands out"),
+            std::string::npos);
+  // A foot on the lower edge is no reason to doubt.
+  std::vector<float> foot = Ring(0);
+  for (std::size_t y = 70; y < kSide; ++y) {
+    for (std::size_t x = 40; x < 56; ++x)
+      foot[y * kSide + x] = foot[kPixels + y * kSide + x] = 0.1f;
+  }
+  EXPECT_EQ(doubt(foot), "");
+}
+
+class BackgroundInput : public TempFolderTest {};
+
+// Renders before a grey wall with noise, as files; masks are compared with the renders' alpha.
+TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
+  StopFlag stop = false;
+  Mesh box = Box({0, 0, 0}, {0.8f, 0.6f, 0.7f});
+  SetColor(box, {0.8f, 0.4f, 0.2f, 1});
+  ASSERT_TRUE(MakeViews(box, {.views = 4, .held_out = 0, .size = 64}, folder_ / "views",
+                        OutputGuard(), {}, stop)
+                  .ok());
+  const auto truth = ReadFitFolder(folder_ / "views", 0);
+  ASSERT_TRUE(truth.ok());
+  Rng rng(3);
+  for (int i = 0; i < 4; ++i) {
+    const Path file = folder_ / "views" / "images" / (std::string("00") + char('0' + i) + ".png");
+    const auto image = io::LoadImage(file);
+    ASSERT_TRUE(image.ok());
+    ImageU8 photo(64, 64, 3);
+    for (std::size_t p = 0; p < 64 * 64; ++p) {
+      const double alpha = image->pixels[4 * p + 3] / 255.0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double value =
+            alpha * image->pixels[4 * p + c] + (1 - alpha) * 205 + 5 * rng.Normal();
+        photo.pixels[3 * p + c] = static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
+      }
+    }
+    ASSERT_TRUE(io::SavePng(file, photo).ok());
+  }
+  const auto found = ReadFitFolder(folder_ / "views", InputOptions{});
+  ASSERT_TRUE(found.ok());
+  EXPECT_TRUE(found->masked);
+  EXPECT_TRUE(found->warnings.empty());
+  double both = 0, either = 0;
+  for (std::size_t p = 0; p < found->images.alpha.size(); ++p) {
+    const bool a = found->images.alpha[p] >= 0.5f, b = truth->images.alpha[p] >= 0.5f;
+    both += a && b, either += a || b;
+  }
+  EXPECT_GT(both / either, 0.96);
+  // Only what is asked for.
+  const auto bare = ReadFitFolder(folder_ / "views", {.background = Background::kMask});
+  ASSERT_TRUE(bare.ok());
+  EXPECT_FALSE(bare->masked);
+  const auto none = ReadFitFolder(folder_ / "views", {.background = Background::kNone});
+  ASSERT_TRUE(none.ok());
+  EXPECT_FALSE(none->masked);
+  // Without its cameras, the same folder.
+  std::filesystem::remove(folder_ / "views" / "transforms_train.json");
+  const auto lone = ReadFitFolder(folder_ / "views", {.fov = 90});
+  ASSERT_TRUE(lone.ok()) << lone.status().message();
+  EXPECT_FALSE(lone->posed);
+  EXPECT_EQ(lone->cameras.size(), 4u);
+  EXPECT_NEAR(lone->cameras[0].fx, 32, 1e-4);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
