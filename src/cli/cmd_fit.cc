@@ -150,17 +150,31 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
   if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
 }
 
-// Cameras of images that came without, or that are not to be believed.
-Status FindCameras(const Options& options, train::FitJob* job, const Workers& workers,
-                   const ProgressSink& progress) {
-  if (job->input.posed && !options.find_cameras) return {};
+constexpr double kCamerasRest = 0.4;  // of the steps: van and cat, turned by 2 degrees
+
+// Cameras of images that came without, or that are not to be believed; else, where cameras are to
+// be fitted together with a shape, better ones to start from.
+Status StartCameras(const Options& options, train::FitJob* job, const Workers& workers,
+                    const ProgressSink& progress) {
   train::InputPosesJob find;
   find.options.seed = options.config.seed;
-  find.file = Path(options.out) / "cameras_found.json";
+  find.file = Path(options.out) / "cameras_start.json";
   find.guard = job->guard, find.reuse = options.resume;
-  const std::size_t before = job->input.warnings.size();
-  TILEGRAD_TRY(train::FindInputPoses(find, &job->input, workers, progress, StopOnSignals()));
-  PrintWarnings(job->input, before);
+  const bool unknown = !job->input.posed || options.find_cameras;
+  const bool shaped = job->start.has_value();
+  if (unknown) {
+    const std::size_t before = job->input.warnings.size();
+    TILEGRAD_TRY(train::FindInputPoses(find, &job->input, workers, progress, StopOnSignals()));
+    PrintWarnings(job->input, before);
+  } else if (job->config.parameters[Parameter::kCamera] && !shaped && job->input.masked) {
+    if (progress) progress({"refining cameras", 0, 0, ""});
+    TILEGRAD_ASSIGN(const train::Sphere sphere, train::GuessSphere(job->input));
+    const std::array<float, 3> middle = {sphere.centre.x, sphere.centre.y, sphere.centre.z};
+    TILEGRAD_ASSIGN(
+        job->start_cameras,
+        train::RefineInputPoses(find, job->input, train::TurnedCameras(*job, middle), workers));
+  }
+  if (!shaped) job->config.cameras_rest = kCamerasRest;
   return {};
 }
 
@@ -252,7 +266,7 @@ Status Run(const Options& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   ProgressLine line;
-  const Status cameras = FindCameras(options, &job, workers, line.Sink());
+  const Status cameras = StartCameras(options, &job, workers, line.Sink());
   line.Finish();
   TILEGRAD_TRY(cameras);
   if (options.doctor) {

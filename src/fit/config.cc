@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
 #include "base/error.h"
@@ -147,9 +146,7 @@ FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize siz
   }
   const double end = FinalDelta(config, size), start = std::max(config.delta_start, end);
   out.delta = start * std::pow(end / start, std::min(1.0, t / kDeltaShare));
-  static const double from = std::getenv("CF") ? atof(std::getenv("CF")) : 0,
-                      cr = std::getenv("CR") ? atof(std::getenv("CR")) : 1;
-  out.camera_rate = t < from ? 0 : cr;
+  out.camera_rate = t < config.cameras_rest ? 0 : 1;
   out.rate =
       config.final_rate + (1 - config.final_rate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
   return out;

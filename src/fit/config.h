@@ -50,6 +50,9 @@ struct FitConfig {
   ImageLoss loss = {.silhouette = SilhouetteLoss::kSquared};
   RegularizerTerms regularizers = {.area =
                                        -1};  // area: -1: 0.3 from a hull, else 0; falls with rates
+  // Share of the steps until cameras move: those that are nearly right wait for shape and texture.
+  // 0 where the start is the object's own shape.
+  double cameras_rest = 0;
   double perturb_cameras = 0;  // degrees, each by a random turn about the object: for experiments
 
   std::int64_t checkpoint_every = 100;

@@ -14,17 +14,35 @@ constexpr float kMostShininess = 1e5f;
 constexpr float kMostLogGain = 3, kMostLogFocal = 1.5f;  // a factor of 20, and of 4.5
 constexpr std::size_t kMaterialNumbers = 10, kCameraNumbers = 9;
 
-void PutCamera(const CameraParameters& p, float* to) {
-  std::copy_n(p.rotation, 6, to);
-  std::copy_n(p.translation, 3, to + 6);
+// R c, for the pivot c.
+float TurnedPivot(const FitScene& scene, const float* rotation, int row) {
+  const float* r = rotation + 3 * row;
+  return r[0] * scene.pivot[0] + r[1] * scene.pivot[1] + r[2] * scene.pivot[2];
 }
 
-// Intrinsics stay those of `camera`.
+void PutCamera(const FitScene& scene, const Camera& camera, float* to) {
+  std::copy_n(ParametersOf(camera).rotation, 6, to);
+  for (int r = 0; r < 3; ++r) {
+    to[6 + r] = (camera.translation[r] + TurnedPivot(scene, camera.rotation, r)) / scene.unit;
+  }
+}
+
+// Six numbers of rotation and a place; intrinsics stay those of `camera`.
 CameraParameters CameraOf(const Camera& camera, const float* from) {
   CameraParameters p = ParametersOf(camera);
   std::copy_n(from, 6, p.rotation);
-  std::copy_n(from + 6, 3, p.translation);
   return p;
+}
+
+// dL/d(block) of a camera that the values give: t = unit v - R c.
+void PullCamera(const FitScene& scene, const Camera& camera, const Camera& d_camera,
+                AlignedVector<float>* values, float* to) {
+  Camera d = d_camera;
+  for (int i = 0; i < 9; ++i) {
+    d.rotation[i] -= d_camera.translation[i / 3] * scene.pivot[static_cast<std::size_t>(i % 3)];
+  }
+  std::copy_n(PullBack(CameraOf(camera, values->data()), d).rotation, 6, to);
+  for (int r = 0; r < 3; ++r) to[6 + r] = scene.unit * d_camera.translation[r];
 }
 
 void PutSurface(const Surface& s, float* to) {
@@ -65,8 +83,7 @@ void ReadValues(const FitScene& scene, ParameterBlock* block) {
       return Put(scene.sh, &x);
     case Parameter::kCamera:
       x.resize(kCameraNumbers);
-      return PutCamera(ParametersOf(scene.cameras[static_cast<std::size_t>(block->view)]),
-                       x.data());
+      return PutCamera(scene, scene.cameras[static_cast<std::size_t>(block->view)], x.data());
     case Parameter::kLight:
       x.resize(3 * scene.lights.size());
       for (std::size_t i = 0; i < x.size(); ++i) x[i] = scene.lights[i / 3].direction[i % 3];
@@ -93,6 +110,10 @@ Status WriteCamera(const ParameterBlock& block, FitScene* scene) {
   Camera& camera = scene->cameras[static_cast<std::size_t>(block.view)];
   auto moved = CameraFromParameters(CameraOf(camera, block.values.data()), camera.near_plane);
   if (!moved.ok()) return moved.status().Within(fmt::format("camera {}", block.view));
+  for (int r = 0; r < 3; ++r) {
+    moved->translation[r] = scene->unit * block.values[static_cast<std::size_t>(6 + r)] -
+                            TurnedPivot(*scene, moved->rotation, r);
+  }
   camera = *moved;
   return {};
 }
@@ -188,8 +209,7 @@ void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t
       return;
     case Parameter::kCamera: {
       const Camera& camera = scene.cameras[static_cast<std::size_t>(block->view)];
-      return PutCamera(
-          PullBack(CameraOf(camera, block->values.data()), gradients.cameras[rendered]), d.data());
+      return PullCamera(scene, camera, gradients.cameras[rendered], &block->values, d.data());
     }
   }
 }

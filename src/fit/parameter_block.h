@@ -29,10 +29,11 @@ struct ParameterBlock {
   std::string name() const;  // "positions", "camera/3"
 };
 
-// kPositions, kColors, kTexture, kUv: as they are. kCamera: the six numbers of rotation, then the
-// translation (tilegrad/camera.h). kLight: directions. kMaterial: ambient, diffuse,
-// specular, and the logarithm of shininess + 1. kExposure: the logarithm of the view's gain.
-// kFocal: the logarithm of one factor of all focal lengths, at first 0.
+// kPositions, kColors, kTexture, kUv: as they are. kCamera: the six numbers of rotation
+// (tilegrad/camera.h), then where the scene's pivot is in camera axes, by the scene's unit. kLight:
+// directions. kMaterial: ambient, diffuse, specular, and the logarithm of shininess + 1. kExposure:
+// the logarithm of the view's gain. kFocal: the logarithm of one factor of all focal lengths, at
+// first 0.
 ParameterBlock MakeBlock(const FitScene& scene, Parameter what, double learning_rate,
                          int view = -1);
 

@@ -216,7 +216,7 @@ Status FitResult::ScoreCameras(FitOutcome* outcome) const {
   TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_, workers_));
   const std::vector<int>& views = job_.input.training;
   const std::vector<Camera> truth = Choose(GivenCameras(job_.input), views);
-  std::vector<Camera> before = Choose(start.scene.cameras, views);
+  std::vector<Camera> before = Choose(TurnedCameras(job_, start.scene.pivot), views);
   const Alignment first = found ? AlignCameras(before, truth) : Alignment();
   for (Camera& camera : before) camera = Moved(camera, first);
   outcome->camera_error_before = MeanAngle(before, truth);

@@ -28,6 +28,8 @@ struct FitJob {
   FitInput input;
   std::optional<Mesh> start;  // none: config.start
   std::optional<Mesh> truth;  // to compare with
+  // Where cameras start; none: where the input has them, turned as the configuration says.
+  std::vector<Camera> start_cameras;
   Path out;
   OutputGuard guard;  // of the files beside the run's own
   ExistingRun existing = ExistingRun::kRefuse;
@@ -57,6 +59,9 @@ struct FitStart {
   RemeshLimits remesh;
 };
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
+
+// The input's cameras, turned as the configuration says about `middle`.
+std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>& middle);
 
 // What shapes the result, as DescribeConfig says it, and the input's size.
 std::string DescribeJob(const FitJob& job);

@@ -32,8 +32,11 @@ struct FitScene {
   std::array<float, 9> sh = {};
   ShadingModel shading;
   std::vector<Camera> cameras;  // one for each view
-  std::vector<float> gains;     // one for each view: its image has the scene's colours times this;
-                                // empty: 1
+  // Cameras turn about `pivot` and move in steps of `unit`: the object's middle and size.
+  std::array<float, 3> pivot = {};
+  float unit = 1;
+  std::vector<float> gains;  // one for each view: its image has the scene's colours times this;
+                             // empty: 1
 
   std::size_t vertices() const { return positions.size() / 3; }
   bool uses_lights() const { return UsesLights(shading); }

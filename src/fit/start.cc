@@ -169,16 +169,12 @@ Camera Perturbed(const Camera& camera, const glm::dvec3& middle, double degrees,
 }
 
 void SetCameras(const FitJob& job, FitScene* scene) {
-  scene->cameras = job.input.cameras;
-  if (job.config.perturb_cameras == 0) return;
-  constexpr std::uint64_t kStream = 0x6361'6d65'7261;  // apart from those of the steps
-  Rng rng(static_cast<std::uint64_t>(job.config.seed), kStream);
   const Bounds box = BoundsOf(*scene);
-  const glm::dvec3 middle = 0.5 * (glm::dvec3(box.low) + glm::dvec3(box.high));
-  for (const int i : job.input.training) {
-    Camera& camera = scene->cameras[static_cast<std::size_t>(i)];
-    camera = Perturbed(camera, middle, job.config.perturb_cameras, &rng);
-  }
+  const glm::vec3 middle = 0.5f * (box.low + box.high);
+  scene->pivot = {middle.x, middle.y, middle.z};
+  scene->unit = 2 * RadiusOf(*scene);
+  if (!(scene->unit > 0)) scene->unit = 1;  // a single point
+  scene->cameras = job.start_cameras.empty() ? TurnedCameras(job, scene->pivot) : job.start_cameras;
 }
 
 void SetLight(const FitConfig& config, FitScene* scene) {
@@ -210,6 +206,18 @@ std::string InputHash(const FitJob& job) {
 }
 
 }  // namespace
+
+std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>& middle) {
+  std::vector<Camera> cameras = job.input.cameras;
+  if (job.config.perturb_cameras == 0) return cameras;
+  constexpr std::uint64_t kStream = 0x6361'6d65'7261;  // apart from those of the steps
+  Rng rng(static_cast<std::uint64_t>(job.config.seed), kStream);
+  for (const int i : job.input.training) {
+    Camera& camera = cameras[static_cast<std::size_t>(i)];
+    camera = Perturbed(camera, {middle[0], middle[1], middle[2]}, job.config.perturb_cameras, &rng);
+  }
+  return cameras;
+}
 
 std::string DescribeJob(const FitJob& job) {
   return DescribeConfig(job.config) +

@@ -184,6 +184,11 @@ Status Check(const TargetImages& images, std::span<const Camera> lenses,
   return {};
 }
 
+void CopyLens(const Camera& from, Camera* to) {
+  to->fx = from.fx, to->fy = from.fy, to->cx = from.cx, to->cy = from.cy;
+  to->near_plane = from.near_plane;
+}
+
 class Searches {
  public:
   Searches(const PosePictures& pictures, const PoseOptions& options, const Workers& workers,
@@ -255,16 +260,20 @@ Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera>
                              const ProgressSink& progress, const StopFlag& stop) {
   TILEGRAD_TRY(Check(images, lenses, options));
   TILEGRAD_ASSIGN(const PosePictures pictures, PreparePictures(images, lenses, kSide));
-  TILEGRAD_ASSIGN(const PosePictures fine, PreparePictures(images, lenses, kFineSide));
   Searches searches(pictures, options, workers, progress);
   TILEGRAD_ASSIGN(const Start best, searches.Run(stop));
   FoundPoses out{{}, best.loss, searches.starts(), searches.agreement()};
-  TILEGRAD_ASSIGN(out.cameras, Refine(fine, best.cameras, workers));
-  for (std::size_t i = 0; i < lenses.size(); ++i) {
-    Camera& camera = out.cameras[i];
-    camera.fx = lenses[i].fx, camera.fy = lenses[i].fy;
-    camera.cx = lenses[i].cx, camera.cy = lenses[i].cy;
-  }
+  std::vector<Camera> cameras = best.cameras;
+  for (std::size_t i = 0; i < lenses.size(); ++i) CopyLens(lenses[i], &cameras[i]);
+  TILEGRAD_ASSIGN(out.cameras, RefinePoses(images, cameras, workers));
+  return out;
+}
+
+Result<std::vector<Camera>> RefinePoses(const TargetImages& images, std::span<const Camera> cameras,
+                                        const Workers& workers) {
+  TILEGRAD_ASSIGN(const PosePictures fine, PreparePictures(images, cameras, kFineSide));
+  TILEGRAD_ASSIGN(std::vector<Camera> out, Refine(fine, cameras, workers));
+  for (std::size_t i = 0; i < out.size(); ++i) CopyLens(cameras[i], &out[i]);
   return out;
 }
 

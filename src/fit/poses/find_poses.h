@@ -46,4 +46,10 @@ Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera>
                              const PoseOptions& options, const Workers& workers,
                              const ProgressSink& progress, const StopFlag& stop);
 
+// Cameras that are some degrees off, brought nearer with a rough mesh: silhouettes and vertex
+// colours of pictures of about 128 pixels. The object must be about 1 across and around the origin;
+// it is so afterwards. Up is made +y.
+Result<std::vector<Camera>> RefinePoses(const TargetImages& images, std::span<const Camera> cameras,
+                                        const Workers& workers);
+
 }  // namespace tilegrad::train

@@ -72,6 +72,13 @@ Status ReadPoses(const Path& path, std::span<const Camera> lenses, FoundPoses* o
   return {};
 }
 
+Status Keep(const InputPosesJob& job, const FoundPoses& found) {
+  std::error_code error;
+  std::filesystem::create_directories(job.file.parent_path(), error);
+  return WriteGuarded(job.guard, job.file,
+                      [&] { return WriteTextAtomic(job.file, TextOf(found)); });
+}
+
 // Held-out cameras were given in another world.
 void MoveHeldOut(const std::vector<Camera>& given, FitInput* input) {
   const Alignment alignment =
@@ -101,9 +108,7 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
   } else {
     TILEGRAD_ASSIGN(found, FindPoses(Chosen(input->images, views), lenses, job.options, workers,
                                      progress, stop));
-    std::filesystem::create_directories(job.file.parent_path(), error);
-    TILEGRAD_TRY(WriteGuarded(job.guard, job.file,
-                              [&] { return WriteTextAtomic(job.file, TextOf(found)); }));
+    TILEGRAD_TRY(Keep(job, found));
   }
   const std::vector<Camera> given = input->cameras;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -121,6 +126,37 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
         found.agreement));
   }
   return {};
+}
+
+Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const FitInput& input,
+                                             std::span<const Camera> cameras,
+                                             const Workers& workers) {
+  const std::vector<Camera> from = Chosen(cameras, input.training);
+  FoundPoses refined;
+  refined.agreement = 0;
+  std::error_code error;
+  if (job.reuse && std::filesystem::exists(job.file, error)) {
+    TILEGRAD_TRY(ReadPoses(job.file, from, &refined));
+  } else {
+    TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
+    Alignment shrink;
+    shrink.scale = 0.5 / static_cast<double>(sphere.radius);
+    for (int i = 0; i < 3; ++i) {
+      shrink.offset[i] = -shrink.scale * static_cast<double>(sphere.centre[i]);
+    }
+    std::vector<Camera> near = from;
+    for (Camera& camera : near) camera = Moved(camera, shrink);
+    TILEGRAD_ASSIGN(refined.cameras,
+                    RefinePoses(Chosen(input.images, input.training), near, workers));
+    const Alignment back = AlignCameras(refined.cameras, from);
+    for (Camera& camera : refined.cameras) camera = Moved(camera, back);
+    TILEGRAD_TRY(Keep(job, refined));
+  }
+  std::vector<Camera> out(cameras.begin(), cameras.end());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    out[static_cast<std::size_t>(input.training[i])] = refined.cameras[i];
+  }
+  return out;
 }
 
 }  // namespace tilegrad::train

@@ -10,7 +10,8 @@ namespace tilegrad::train {
 
 struct InputPosesJob {
   PoseOptions options;
-  Path file;  // keeps what was found, so that a fit that goes on need not look again
+  Path file;  // cameras_start.json: keeps what was found, so that a fit that goes on need not look
+              // again
   OutputGuard guard;
   bool reuse = false;  // reads `file` if it is there
 };
@@ -21,5 +22,12 @@ struct InputPosesJob {
 // or belongs to other images.
 Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& workers,
                       const ProgressSink& progress, const StopFlag& stop);
+
+// `cameras`, those of the training views brought nearer to what the images show, in the world that
+// they had. Keeps and reads `job.file` in the same way; `job.options` are not looked at. Errors
+// also: those of GuessSphere.
+Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const FitInput& input,
+                                             std::span<const Camera> cameras,
+                                             const Workers& workers);
 
 }  // namespace tilegrad::train

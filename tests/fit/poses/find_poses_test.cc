@@ -46,7 +46,7 @@ class Poses : public TempFolderTest {
   }
   InputPosesJob Job() const {
     InputPosesJob job;
-    job.file = folder_ / "run" / "cameras_found.json";
+    job.file = folder_ / "run" / "cameras_start.json";
     return job;
   }
   Status Find(const InputPosesJob& job, FitInput* input, int workers = 2) {
@@ -111,7 +111,7 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
   job.options.starts = job.options.sweeps = 1;
   FitInput one = input, two = input, again = input;
   ASSERT_TRUE(Find(job, &one, 1).ok());
-  job.file = folder_ / "other" / "cameras_found.json";
+  job.file = folder_ / "other" / "cameras_start.json";
   ASSERT_TRUE(Find(job, &two, 2).ok());
   job.reuse = true;
   ASSERT_TRUE(Find(job, &again, 1).ok());
@@ -120,7 +120,7 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
     EXPECT_EQ(std::memcmp(&one.cameras[i], &again.cameras[i], sizeof(Camera)), 0) << i;
   }
   // One that does not fit these images.
-  Write("other/cameras_found.json", std::string(R"({"agreement": 1, "poses": [[1, 2]]})"));
+  Write("other/cameras_start.json", std::string(R"({"agreement": 1, "poses": [[1, 2]]})"));
   FitInput broken = input;
   const Status refused = Find(job, &broken);
   EXPECT_NE(refused.message().find("8 poses of twelve numbers"), std::string::npos)
