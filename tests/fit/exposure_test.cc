@@ -86,7 +86,7 @@ class Exposure : public TempFolderTest {
 TEST_F(Exposure, GradientsAreThoseOfDifferences) {
   FitJob job = Job();
   job.config.parameters[Parameter::kExposure] = true;
-  const auto start = PrepareFit(job);
+  const auto start = PrepareFit(job, workers_);
   ASSERT_TRUE(start.ok()) << start.status().message();
   FitScene scene = start->scene;
   ASSERT_EQ(scene.gains.size(), 10u);
@@ -110,7 +110,7 @@ TEST_F(Exposure, GradientsAreThoseOfDifferences) {
 
 TEST_F(Exposure, FocalGradientIsThatOfDifferences) {
   const FitJob job = Job();
-  const auto start = PrepareFit(job);
+  const auto start = PrepareFit(job, workers_);
   ASSERT_TRUE(start.ok());
   FitScene scene = start->scene;
   const auto scaled = [&](double by) {
@@ -136,7 +136,7 @@ TEST_F(Exposure, GainsAreRecovered) {
   FitJob job = Job();
   const double gains[10] = {0.9, 1.2, 0.7, 1.0, 1.3, 0.8, 1.1, 0.6, 0.95, 1.15};
   job.config.parameters[Parameter::kColors] = job.config.parameters[Parameter::kExposure] = true;
-  const auto start = PrepareFit(job);
+  const auto start = PrepareFit(job, workers_);
   ASSERT_TRUE(start.ok());
   Photograph(start->scene, gains, &job.input);
   SetColor(*job.start, {0.5f, 0.5f, 0.5f, 1});  // to be found, too
@@ -179,7 +179,7 @@ TEST_F(Exposure, TheFocalLengthIsRecovered) {
 // One image has no other to be brighter than.
 TEST_F(Exposure, OneViewHasNone) {
   FitJob job = Job();
-  FitScene scene = PrepareFit(job)->scene;
+  FitScene scene = PrepareFit(job, workers_)->scene;
   scene.gains = {1};
   FitterOptions options;
   options.parameters[Parameter::kExposure] = true;
