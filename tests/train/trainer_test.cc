@@ -318,11 +318,14 @@ TEST_F(TrainerTest, RefusesOtherCamerasAndImages) {
 }
 
 TEST_F(TrainerTest, OneProcessAtATimeInARun) {
+  EXPECT_FALSE(FolderLock::IsHeld(job_.run));
   {
     const auto lock = FolderLock::Take(job_.run);
     ASSERT_TRUE(lock.ok()) << lock.status().message();
+    EXPECT_TRUE(FolderLock::IsHeld(job_.run));
     ExpectMessage(Run().status(), "another process", "run");
   }
+  EXPECT_FALSE(FolderLock::IsHeld(job_.run));
   ExpectFinishes();
 }
 
