@@ -18,13 +18,6 @@ std::vector<std::string> ChoicesOf(const std::string& type) {
   return choices;
 }
 
-// What the value of --config may be, beside a file.
-std::vector<std::string> ConfigNames() {
-  std::vector<std::string> names;
-  for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
-  return names;
-}
-
 // What a value is called: option_text "FLOAT x 3", or the type without its range or choices.
 std::string ValueOf(const CLI::Option& option) {
   if (option.get_type_size_max() == 0 || option.get_expected_max() == 0) return "";
@@ -59,6 +52,12 @@ CommandNode NodeOf(const CLI::App& command) {
 }
 
 }  // namespace
+
+std::vector<std::string> ConfigNames() {
+  std::vector<std::string> names;
+  for (const auto& config : train::NamedConfigs()) names.emplace_back(config.name);
+  return names;
+}
 
 std::vector<CommandNode> ReadCommandTree(const CLI::App& app) {
   std::vector<CommandNode> tree = {NodeOf(app)};

@@ -24,6 +24,9 @@ struct CommandNode {
   std::vector<OptionNode> options;  // as --help lists them
 };
 
+// Those that train knows, beside files.
+std::vector<std::string> ConfigNames();
+
 // The program's own options first, under the program's name, then its commands.
 std::vector<CommandNode> ReadCommandTree(const CLI::App& app);
 

@@ -61,9 +61,7 @@ std::string ZshValue(const OptionNode& option) {
   if (option.value.empty()) return "";
   std::string action = option.path ? "_files" : " ";
   if (!option.choices.empty()) action = fmt::format("({})", fmt::join(option.choices, " "));
-  if (option.names.back() == "--config")
-    action = fmt::format("{{_alternative 'names:name:({})' 'files:file:_files'}}",
-                         fmt::join(option.choices, " "));
+  if (option.names.back() == "--config") action = "_tilegrad_configs";
   return ":" + ZshEscaped(option.value) + ":" + action;
 }
 
@@ -146,6 +144,7 @@ std::string ZshCompletion(std::span<const CommandNode> tree) {
     cases += options + "        && return ;;\n";
   }
   return fmt::format(R"(#compdef tilegrad
+_tilegrad_configs() {{ _alternative 'names:name:({2})' 'files:file:_files' }}
 _tilegrad() {{
   local -a commands=(
 {0}    'help:Show the options of a command'
@@ -163,7 +162,7 @@ _tilegrad() {{
 }}
 if [ "$funcstack[1]" = "_tilegrad" ]; then _tilegrad "$@"; else compdef _tilegrad tilegrad; fi
 )",
-                     names, cases);
+                     names, cases, fmt::join(ConfigNames(), " "));
 }
 
 std::string FishCompletion(std::span<const CommandNode> tree) {
