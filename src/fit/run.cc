@@ -193,18 +193,6 @@ Status FitResult::WriteCameras() const {
                          WriteTransforms(views, SizeOf(job_.input)));
 }
 
-std::vector<Camera> Choose(std::span<const Camera> cameras, std::span<const int> views) {
-  std::vector<Camera> out;
-  for (const int v : views) out.push_back(cameras[static_cast<std::size_t>(v)]);
-  return out;
-}
-
-double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += AngleBetween(a[i], b[i]);
-  return a.empty() ? 0 : sum / static_cast<double>(a.size());
-}
-
 // Cameras as the input gave them; those that were found live in a world of their own.
 const std::vector<Camera>& GivenCameras(const FitInput& input) {
   return input.given_cameras.empty() ? input.cameras : input.given_cameras;
@@ -284,18 +272,6 @@ Status FillTexture(const FitJob& job, const Workers& workers, FitScene* scene) {
 }
 
 }  // namespace
-
-double MeanPsnr(std::span<const ViewScore> scores) {
-  double sum = 0;
-  for (const ViewScore& s : scores) sum += s.psnr / static_cast<double>(scores.size());
-  return sum;
-}
-
-double MeanIou(std::span<const ViewScore> scores) {
-  double sum = 0;
-  for (const ViewScore& s : scores) sum += s.iou / static_cast<double>(scores.size());
-  return sum;
-}
 
 namespace {
 Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& start,

@@ -66,10 +66,6 @@ std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>&
 // What shapes the result, as DescribeConfig says it, and the input's size.
 std::string DescribeJob(const FitJob& job);
 
-// Means over views; 0 for none.
-double MeanPsnr(std::span<const ViewScore> scores);
-double MeanIou(std::span<const ViewScore> scores);
-
 // The page. `sheet` is the timelapse in one picture, or empty.
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const ImageU8& sheet);
 

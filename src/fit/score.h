@@ -26,6 +26,10 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
                                           std::span<const int> views,
                                           std::span<const Camera> cameras, const Workers& workers);
 
+// Means over views; 0 for none.
+double MeanPsnr(std::span<const ViewScore> scores);
+double MeanIou(std::span<const ViewScore> scores);
+
 // The similarity p' = scale * rotation * p + offset that brings cameras `from` to stand and look
 // like `to` as well as possible: rotation from their axes, the rest from their centres. Refined
 // cameras fix a scene only up to it.
@@ -40,5 +44,9 @@ Camera Moved(const Camera& camera, const Alignment& a);
 void Move(const Alignment& a, std::vector<float>* positions);
 // Degrees between the two cameras' orientations.
 double AngleBetween(const Camera& a, const Camera& b);
+// The mean of pairs; 0 for none.
+double MeanAngle(std::span<const Camera> a, std::span<const Camera> b);
+// Those of `cameras` that `views` index.
+std::vector<Camera> Choose(std::span<const Camera> cameras, std::span<const int> views);
 
 }  // namespace tilegrad::train
