@@ -11,12 +11,11 @@
 #include "base/error.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/fit_pictures.h"
 #include "cli/live_server.h"
 #include "cli/option_checks.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
-#include "fit/bare_frames.h"
-#include "fit/poses/input_poses.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
 #include "train/run/checkpoint.h"
@@ -35,9 +34,8 @@ struct Options {
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
-  bool resume = false, doctor = false, force = false, find_cameras = false;
-  std::string background = "auto";
-  double fov = train::kUsualFov;
+  bool resume = false, doctor = false, force = false;
+  FitPictures pictures;
   FitConfig config;
   LiveOption live;
 };
@@ -131,53 +129,6 @@ Status CheckResume(const Options& options) {
       options.out);
 }
 
-train::InputOptions InputOptionsOf(const Options& options) {
-  static const std::map<std::string, train::Background> backgrounds = {
-      {"auto", train::Background::kAuto},
-      {"mask", train::Background::kMask},
-      {"plain", train::Background::kPlain},
-      {"none", train::Background::kNone}};
-  return {options.hold_out, backgrounds.at(options.background), options.fov};
-}
-
-// From the `first` on; several of one kind become one.
-void PrintWarnings(const train::FitInput& input, std::size_t first) {
-  constexpr std::size_t kShown = 3;
-  const std::size_t count = input.warnings.size() - first;
-  for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
-    PrintNote("tilegrad: warning: {}\n", input.warnings[first + i]);
-  }
-  if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
-}
-
-constexpr double kCamerasRest = 0.4;  // of the steps: van and cat, turned by 2 degrees
-
-// Cameras of images that came without, or that are not to be believed; else, where cameras are to
-// be fitted together with a shape, better ones to start from.
-Status StartCameras(const Options& options, train::FitJob* job, const Workers& workers,
-                    const ProgressSink& progress) {
-  train::InputPosesJob find;
-  find.options.seed = options.config.seed;
-  find.file = Path(options.out) / "cameras_start.json";
-  find.guard = job->guard, find.reuse = options.resume;
-  const bool unknown = !job->input.posed || options.find_cameras;
-  const bool shaped = job->start.has_value();
-  if (unknown) {
-    const std::size_t before = job->input.warnings.size();
-    TILEGRAD_TRY(train::FindInputPoses(find, &job->input, workers, progress, StopOnSignals()));
-    PrintWarnings(job->input, before);
-  } else if (job->config.parameters[Parameter::kCamera] && !shaped && job->input.masked) {
-    if (progress) progress({"refining cameras", 0, 0, ""});
-    TILEGRAD_ASSIGN(const train::Sphere sphere, train::GuessSphere(job->input));
-    const std::array<float, 3> middle = {sphere.centre.x, sphere.centre.y, sphere.centre.z};
-    TILEGRAD_ASSIGN(
-        job->start_cameras,
-        train::RefineInputPoses(find, job->input, train::TurnedCameras(*job, middle), workers));
-  }
-  if (!shaped) job->config.cameras_rest = kCamerasRest;
-  return {};
-}
-
 Result<train::FitJob> MakeJob(const Options& options) {
   train::FitJob job;
   job.config = options.config;
@@ -187,10 +138,11 @@ Result<train::FitJob> MakeJob(const Options& options) {
     TILEGRAD_TRY(CheckRunFolder(options.out, job.guard));
     TILEGRAD_TRY(CheckResume(options));
   }
-  TILEGRAD_ASSIGN(job.input, options.dataset_model.empty()
-                                 ? train::ReadFitFolder(options.input, InputOptionsOf(options))
-                                 : train::ReadFitDataset(options.input, options.dataset_model,
-                                                         options.hold_out));
+  TILEGRAD_ASSIGN(
+      job.input,
+      options.dataset_model.empty()
+          ? train::ReadFitFolder(options.input, InputOptionsOf(options.pictures, options.hold_out))
+          : train::ReadFitDataset(options.input, options.dataset_model, options.hold_out));
   PrintWarnings(job.input, 0);
   static const std::map<std::string, train::StartShape> shapes = {
       {"auto", train::StartShape::kAuto},
@@ -266,7 +218,8 @@ Status Run(const Options& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   ProgressLine line;
-  const Status cameras = StartCameras(options, &job, workers, line.Sink());
+  const Status cameras =
+      StartCameras({options.pictures, options.resume}, &job, workers, line.Sink());
   line.Finish();
   TILEGRAD_TRY(cameras);
   if (options.doctor) {
@@ -319,21 +272,6 @@ void AddWhat(CLI::App* command, Options* o) {
   command->add_option("--filter", o->filter, "texture lookup: bilinear or trilinear")
       ->check(CLI::IsMember({"bilinear", "trilinear"}))
       ->capture_default_str();
-  command
-      ->add_option("--background", o->background,
-                   "where masks come from: the images' alpha or masks (mask), their plain "
-                   "backgrounds (plain), the former if there are any (auto); none: every pixel "
-                   "shows the object")
-      ->check(CLI::IsMember({"auto", "mask", "plain", "none"}))
-      ->capture_default_str();
-  command->add_flag("--find-cameras", o->find_cameras,
-                    "look for the cameras in the images, though the folder has some; these judge "
-                    "the result");
-  command
-      ->add_option("--fov", o->fov,
-                   "degrees that images without cameras see along their longer side")
-      ->check(CLI::Range(5.0, 150.0))
-      ->capture_default_str();
   command->add_option("--truth", o->truth, "a mesh to compare with (3D IoU)");
   command
       ->add_option("--hold-out", o->hold_out,
@@ -377,6 +315,7 @@ void AddFit(CLI::App& app, Action* action) {
   auto* command = app.add_subcommand(
       "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
   AddWhat(command, options.get());
+  AddPictureOptions(command, &options->pictures);
   AddNumbers(command, &options->config);
   AddQuality(command, options.get());
   command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")

@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
-#include "fit/background.h"
 #include "fit/bare_frames.h"
 #include "fit/colmap_frames.h"
 #include "io/camera_file.h"
@@ -106,26 +105,11 @@ void HoldOut(int every, FitInput* input) {
   }
 }
 
-bool HasAlpha(const FitInput& input) {
-  return std::ranges::any_of(input.images.alpha, [](float a) { return a < 1; });
-}
-
 Status Finish(FitInput* input) {
   if (input->training.empty())
     return InvalidArgument("all views are held out: none is left to fit");
   input->masked = HasAlpha(*input);
   return {};
-}
-
-void ApplyBackground(Background background, FitInput* input) {
-  if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
-  const bool looks = background == Background::kAuto && !HasAlpha(*input);
-  if (background != Background::kPlain && !looks) return;
-  FitInput masked = *input;
-  TakePlainBackgrounds(&masked);
-  // Backgrounds that are not plain make no masks unless somebody says so.
-  if (looks && 2 * masked.warnings.size() > masked.names.size()) return;
-  *input = std::move(masked);
 }
 
 // Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
@@ -188,19 +172,6 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
     }
   }
   return out;
-}
-
-void TakePlainBackgrounds(FitInput* input) {
-  TargetImages& all = input->images;
-  for (std::size_t n = 0; n < input->names.size(); ++n) {
-    const auto color = std::span(all.color).subspan(3 * n * all.pixels(), 3 * all.pixels());
-    const BackgroundMask mask = MaskFromPlainBackground(color, all.width, all.height);
-    std::ranges::copy(mask.alpha,
-                      all.alpha.begin() + static_cast<std::ptrdiff_t>(n * all.pixels()));
-    if (!mask.doubt.empty()) {
-      input->warnings.push_back(fmt::format("{}: {}", input->names[n], mask.doubt));
-    }
-  }
 }
 
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {

@@ -57,6 +57,10 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});
 }
 
+// Whether some pixel is not opaque.
+bool HasAlpha(const FitInput& input);
+// Masks as `background` says.
+void ApplyBackground(Background background, FitInput* input);
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
 void TakePlainBackgrounds(FitInput* input);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "fit/camera_score.h"
 #include "fit/shown_mesh.h"
 #include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
@@ -160,7 +161,6 @@ class FitResult {
   Status Write(const RunPlan& plan, FitOutcome* outcome) const;
   Result<ImageU8> Sheet(const RunPlan& plan) const;
   Status Score(FitOutcome* outcome) const;
-  Status ScoreCameras(FitOutcome* outcome) const;
   Status WriteCameras() const;
 
   const FitJob& job_;
@@ -191,28 +191,6 @@ Status FitResult::WriteCameras() const {
   }
   return WriteTextAtomic(job_.out / "transforms_fitted.json",
                          WriteTransforms(views, SizeOf(job_.input)));
-}
-
-// Cameras as the input gave them; those that were found live in a world of their own.
-const std::vector<Camera>& GivenCameras(const FitInput& input) {
-  return input.given_cameras.empty() ? input.cameras : input.given_cameras;
-}
-
-Status FitResult::ScoreCameras(FitOutcome* outcome) const {
-  const bool found = !job_.input.given_cameras.empty();
-  if (job_.config.perturb_cameras == 0 && !found) return {};
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job_, workers_));
-  const std::vector<int>& views = job_.input.training;
-  const std::vector<Camera> truth = Choose(GivenCameras(job_.input), views);
-  std::vector<Camera> before = Choose(TurnedCameras(job_, start.scene.pivot), views);
-  const Alignment first = found ? AlignCameras(before, truth) : Alignment();
-  for (Camera& camera : before) camera = Moved(camera, first);
-  outcome->camera_error_before = MeanAngle(before, truth);
-  std::vector<Camera> fitted = Choose(scene_.cameras, views);
-  const Alignment alignment = AlignCameras(fitted, truth);
-  for (Camera& camera : fitted) camera = Moved(camera, alignment);
-  outcome->camera_error_after = MeanAngle(fitted, truth);
-  return {};
 }
 
 Status FitResult::Score(FitOutcome* outcome) const {
@@ -253,7 +231,7 @@ Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
 Status FitResult::Write(const RunPlan& plan, FitOutcome* outcome) const {
   TILEGRAD_TRY(io::SaveGlb(job_.out / "mesh.glb", MeshOfScene(scene_)));
   TILEGRAD_TRY(WriteCameras());
-  TILEGRAD_TRY(ScoreCameras(outcome));
+  TILEGRAD_TRY(ScoreCameras(job_, scene_, workers_, outcome));
   TILEGRAD_TRY(Score(outcome));
   TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet(plan));
   if (!sheet.empty()) TILEGRAD_TRY(io::SavePng(job_.out / "timelapse.png", sheet));

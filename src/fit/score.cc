@@ -177,18 +177,6 @@ double AngleBetween(const Camera& a, const Camera& b) {
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-double MeanAngle(std::span<const Camera> a, std::span<const Camera> b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += AngleBetween(a[i], b[i]);
-  return a.empty() ? 0 : sum / static_cast<double>(a.size());
-}
-
-std::vector<Camera> Choose(std::span<const Camera> cameras, std::span<const int> views) {
-  std::vector<Camera> out;
-  for (const int v : views) out.push_back(cameras[static_cast<std::size_t>(v)]);
-  return out;
-}
-
 double MeanPsnr(std::span<const ViewScore> scores) {
   double sum = 0;
   for (const ViewScore& s : scores) sum += s.psnr / static_cast<double>(scores.size());

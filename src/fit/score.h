@@ -44,9 +44,4 @@ Camera Moved(const Camera& camera, const Alignment& a);
 void Move(const Alignment& a, std::vector<float>* positions);
 // Degrees between the two cameras' orientations.
 double AngleBetween(const Camera& a, const Camera& b);
-// The mean of pairs; 0 for none.
-double MeanAngle(std::span<const Camera> a, std::span<const Camera> b);
-// Those of `cameras` that `views` index.
-std::vector<Camera> Choose(std::span<const Camera> cameras, std::span<const int> views);
-
 }  // namespace tilegrad::train

@@ -81,7 +81,7 @@ TEST_F(Poses, AreFoundFromMasksAndColours) {
     std::fill_n(c.translation, 3, std::numeric_limits<float>::quiet_NaN());
   }
   InputPosesJob job = Job();
-  job.options.starts = 1, job.options.sweeps = 4;
+  job.options.starts = 1;
   const Status found = Find(job, &input);
   ASSERT_TRUE(found.ok()) << found.message();
   input.given_cameras = given;
