@@ -44,4 +44,5 @@ Camera Moved(const Camera& camera, const Alignment& a);
 void Move(const Alignment& a, std::vector<float>* positions);
 // Degrees between the two cameras' orientations.
 double AngleBetween(const Camera& a, const Camera& b);
+
 }  // namespace tilegrad::train

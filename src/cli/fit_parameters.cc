@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/fit_parameters.h"
+
+#include <sstream>
+
+#include "base/error.h"
+#include "cli/command.h"
+
+namespace tilegrad::cli {
+namespace {
+
+using train::Parameter;
+
+constexpr double kMostRate = 1e6;
+
+Result<Parameter> ParameterNamed(const std::string& name) {
+  std::string known;
+  for (const Parameter p : train::kParameters) {
+    if (name == train::NameOf(p)) return p;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", train::NameOf(p));
+  }
+  return InvalidArgument("\"{}\" cannot be fitted; what can: {}", name, known);
+}
+
+// Whether a fit of these, which are the mesh and its colours if none is named, may move `p`.
+bool MayMove(const train::ParameterSet& set, Parameter p) {
+  const bool usual =
+      p == Parameter::kPositions || p == Parameter::kColors || p == Parameter::kTexture;
+  return set.empty() ? usual : set[p];
+}
+
+}  // namespace
+
+Status ParseParameters(const std::string& text, train::ParameterSet* out) {
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(word));
+    (*out)[p] = true;
+  }
+  return {};
+}
+
+Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
+                 train::LearningRates* rates) {
+  const auto equals = text.find('=');
+  TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(text.substr(0, equals)));
+  const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
+  double rate = 0;
+  if (!CLI::detail::lexical_cast(number, rate) || !(rate >= 0 && rate < kMostRate)) {
+    return InvalidArgument("--rate {}: expected NAME=NUMBER with a number in [0, {})", text,
+                           kMostRate);
+  }
+  if (!MayMove(fitted, p)) {
+    return InvalidArgument("--rate {}: {} is not fitted; name it in --optimize", text,
+                           train::NameOf(p));
+  }
+  (*rates)[p] = rate;
+  return {};
+}
+
+}  // namespace tilegrad::cli
