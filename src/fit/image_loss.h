@@ -17,7 +17,7 @@ struct TargetImages {
   AlignedVector<float> color;  // [N,3,H,W]
   AlignedVector<float> alpha;  // [N,H,W] in [0, 1]
   // What silhouettes are held to, of the same shape; empty: alpha.
-  AlignedVector<float> silhouette;
+  AlignedVector<float> silhouette = {};
 
   std::size_t pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
