@@ -234,6 +234,9 @@ std::string DescribeJob(const FitJob& job) {
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_TRY(CheckConfig(job.config));
   TILEGRAD_TRY(CheckMasks(job));
+  if (!job.input.posed && !job.input.found) {
+    return InvalidArgument("the images have no cameras, which `tilegrad fit` would look for first");
+  }
   FitStart start;
   bool from_hull = false;
   TILEGRAD_ASSIGN(start.scene,
