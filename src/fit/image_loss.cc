@@ -106,15 +106,14 @@ ImageLossValue ImageLossRule::Evaluate(const ImageLoss& loss, const TargetImages
     const auto part = [&](auto& array, std::size_t n, std::size_t size) {
       return array.empty() ? std::span(array) : std::span(array).subspan(n * size, size);
     };
-    OneImage image{
-        part(targets.color, v, 3 * plane),
-        part(targets.alpha, v, plane),
-        part(targets.silhouette.empty() ? targets.alpha : targets.silhouette, v, plane),
-        part(frame.color, i, 3 * plane),
-        part(frame.alpha, i, plane),
-        part(frame.face_ids, i, plane),
-        part(d_color_, i, 3 * plane),
-        part(d_alpha_, i, plane)};
+    OneImage image{part(targets.color, v, 3 * plane),
+                   part(targets.alpha, v, plane),
+                   part(targets.silhouette.empty() ? targets.alpha : targets.silhouette, v, plane),
+                   part(frame.color, i, 3 * plane),
+                   part(frame.alpha, i, plane),
+                   part(frame.face_ids, i, plane),
+                   part(d_color_, i, 3 * plane),
+                   part(d_alpha_, i, plane)};
     if (!of.gains.empty()) image.gain = of.gains[v], image.d_gain = &d_gains_[i];
     parts_[i] = EvaluateOne(loss, image, share);
   });
