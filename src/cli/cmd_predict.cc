@@ -149,11 +149,13 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
   TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
   guard.NoteAll(written);
-  Print("{} -> {}, {}, {}\n", file, glb.string(), turntable.string(), animation.string());
+  Print("{} -> {}, {}, {}{}\n", file, glb.string(), turntable.string(), animation.string(),
+        options.relight ? ", " + relit.string() : "");
   json->push_back({{"image", file},
                    {"mesh", glb.string()},
                    {"turntable", turntable.string()},
                    {"animation", animation.string()}});
+  if (options.relight) json->back()["relit"] = relit.string();
   return {};
 }
 
