@@ -271,6 +271,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   FitOutcome outcome;
   TILEGRAD_TRY(job.guard.CheckAll(ResultFiles(job.out)));  // before the work
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers));
+  if (!start.note.empty() && job.warn) job.warn(start.note);
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);

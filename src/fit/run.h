@@ -57,6 +57,7 @@ struct FitStart {
   FitterOptions options;
   FitConfig config;  // the job's, settled
   RemeshLimits remesh;
+  std::string note;  // why it is not what one would expect, or empty
 };
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
 

@@ -66,20 +66,33 @@ Result<FitScene> SphereScene(const FitJob& job) {
   return scene;
 }
 
+// Gives the mesh charts in a texture of `side` x `side` texels, or of twice or four times as many a
+// side: ragged things fall into thousands of charts. Returns that side.
+Result<int> UnwrapRagged(int side, Mesh* mesh) {
+  for (const int most = 4 * side;; side *= 2) {
+    const Status done = Unwrap({.width = side, .height = side}, mesh).status();
+    if (done.ok()) return side;
+    if (2 * side > most) return done;
+  }
+}
+
 Result<FitScene> HullScene(const FitJob& job, const Workers& workers) {
   HullOptions options;
   options.carve.tolerance = job.config.mask_tolerance;
   TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers));
-  const int size = job.config.texture_size;
-  if (!job.config.vertex_colors)
-    TILEGRAD_TRY(Unwrap({.width = size, .height = size}, &mesh).status());
+  int size = job.config.texture_size;
+  if (!job.config.vertex_colors) {
+    TILEGRAD_ASSIGN(size, UnwrapRagged(size, &mesh));
+  }
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(mesh));
   std::fill(scene.colors.begin(), scene.colors.end(), kGrey);
   if (!job.config.vertex_colors) SetBlankTexture(size, size, &scene);
   return scene;
 }
 
-Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, bool* from_hull) {
+// `note` gets why there is no hull where one was tried.
+Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, bool* from_hull,
+                               std::string* note) {
   const FitConfig& config = job.config;
   *from_hull = config.start == StartShape::kHull;
   if (config.start == StartShape::kSphere) return SphereScene(job);
@@ -89,6 +102,8 @@ Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, bool* 
     auto hull = HullScene(job, workers);
     *from_hull = hull.ok();
     if (hull.ok()) return hull;
+    *note = fmt::format("the fit starts from a sphere, because there is no hull: {}",
+                        hull.status().message());
   }
   return SphereScene(job);
 }
@@ -239,8 +254,9 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   }
   FitStart start;
   bool from_hull = false;
-  TILEGRAD_ASSIGN(start.scene,
-                  job.start.has_value() ? MeshScene(job) : TemplateScene(job, workers, &from_hull));
+  TILEGRAD_ASSIGN(start.scene, job.start.has_value()
+                                   ? MeshScene(job)
+                                   : TemplateScene(job, workers, &from_hull, &start.note));
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
   start.remesh = LimitsOf(PixelOf(job, start.scene));
   SetCameras(job, &start.scene);

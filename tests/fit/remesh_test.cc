@@ -165,6 +165,21 @@ TEST_F(RemeshedFit, StoppedAndResumedEndsInTheSameBitsForAnyWorkers) {
   }
 }
 
+// A hull whose charts have no room in the texture gets a larger one; where four times the side is
+// not enough, a fit that need not start from the hull says why it starts from a sphere.
+TEST_F(RemeshedFit, ChartsWithoutRoomGetALargerTexture) {
+  FitJob job = Job("run");
+  job.config.texture_size = 16;
+  const auto larger = PrepareFit(job, Workers(1));
+  ASSERT_TRUE(larger.ok()) << larger.status().message();
+  EXPECT_GT(larger->scene.texture.width, 16);
+  EXPECT_LE(larger->scene.texture.width, 64);
+  job.config.texture_size = 2, job.config.start = StartShape::kAuto;
+  const auto sphere = PrepareFit(job, Workers(1));
+  ASSERT_TRUE(sphere.ok()) << sphere.status().message();
+  EXPECT_NE(sphere->note.find("no hull: a texture of 8 x 8"), std::string::npos) << sphere->note;
+}
+
 // What a sphere cannot: the hole of a ring.
 TEST_F(RemeshedFit, KeepsTheHole) {
   FitJob job = Job("ring");
