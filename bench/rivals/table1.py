@@ -21,6 +21,8 @@ import subprocess
 import sys
 from typing import Any
 
+import runs
+
 METHODS = {
     "N3MR": ["render.rule=n3mr"],
     "SoftRas-Mesh": ["render.rule=softras"],
@@ -41,15 +43,8 @@ def processor_seconds() -> float:
 
 def train(options: argparse.Namespace, run: pathlib.Path, method: str, seed: int) -> None:
     """Trains `run` to its end. Its processor time is kept in a file beside it."""
-    command = [options.program, "train", "--out", str(run)]
-    if (run / "run.json").exists():
-        command += ["--resume"]
-    settings = [*METHODS[method], f"schedule.steps={options.steps}", f"schedule.seed={seed}", *options.set]
-    command += ["--config", options.config, "--data", options.data]
-    for setting in settings:
-        command += ["--set", setting]
     before = processor_seconds()
-    subprocess.run(command, check=True)
+    runs.train(options, run, [*METHODS[method], f"schedule.seed={seed}"])
     used = pathlib.Path(f"{run}.seconds")
     earlier = float(used.read_text()) if used.exists() else 0.0
     used.write_text(str(earlier + processor_seconds() - before))
@@ -60,14 +55,10 @@ def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any
     run = pathlib.Path(options.out) / f"{method.lower()}-{seed}"
     if not (run / "eval.json").exists():
         train(options, run, method, seed)
-        subprocess.run([options.program, "eval", "--run", str(run), "--data", options.data], check=True)
+        runs.evaluate(options, run)
     found = json.loads((run / "eval.json").read_text())
     found["seconds"] = float(pathlib.Path(f"{run}.seconds").read_text())
     return found
-
-
-def row_of(found: dict[str, Any], method: str) -> dict[str, Any]:
-    return next(row for row in found["rows"] if row["method"] == method)
 
 
 def mean_of(classes: list[dict[str, float]], score: str) -> float:
@@ -93,33 +84,24 @@ def table(results: dict[str, list[dict[str, Any]]], steps: int) -> str:
     header = ["method", *first["classes"], "IoU", "F-score", "carved IoU", "ms of processor a step", "paper"]
     lines = [header, ["---"] + ["--:"] * (len(header) - 1)]
     for baseline in ("undeformed template", "best single shape", "nearest training picture"):
-        lines.append([baseline, *cells([row_of(first, baseline)]), "", ""])
+        lines.append([baseline, *cells([runs.row_of(first, baseline)]), "", ""])
     for method, found in results.items():
         paper = "%.1f / %.1f" % PAPER[method] if method in PAPER else ""
         seconds = statistics.fmean(one["seconds"] for one in found)
-        lines.append([method, *cells([row_of(one, "tilegrad") for one in found]),
+        lines.append([method, *cells([runs.row_of(one, "tilegrad") for one in found]),
                       f"{1000 * seconds / steps:.0f}", paper])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", required=True, help="dataset folder")
-    parser.add_argument("--out", required=True, help="folder of the runs")
-    parser.add_argument("--program", default="build/release/src/cli/tilegrad", help="tilegrad")
-    parser.add_argument("--config", default="configs/table1.toml", help="of all")
-    parser.add_argument("--steps", type=int, default=4000, help="of each run")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="for all")
+    parser = runs.parser(__doc__, METHODS)
+    parser.set_defaults(config="configs/table1.toml", steps=4000, seeds=[1, 2])
     options = parser.parse_args()
     try:
         results = {method: [scores(options, method, seed) for seed in options.seeds]
                    for method in options.methods}
     except subprocess.CalledProcessError as error:
-        print(f"table1: {error.cmd[1]} failed with exit code {error.returncode}; the same command "
-              "goes on from here", file=sys.stderr)
+        print(f"table1: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results, options.steps))
     return 0

@@ -21,6 +21,8 @@ import subprocess
 import sys
 from typing import Any
 
+import runs
+
 METHODS = {"N3MR": "render.rule=n3mr", "DIB-R": "render.rule=dibr"}
 # Cars of ShapeNet as printed: texture L1, angle of the light, texture + light L1.
 PAPER = {"N3MR": (0.03640, 23.5585, 0.02208), "DIB-R": (0.02179, 9.7096, 0.01362)}
@@ -32,13 +34,8 @@ def scores(options: argparse.Namespace, method: str, seed: int) -> dict[str, Any
     """The scores of a run, which is trained and evaluated first if need be."""
     run = pathlib.Path(options.out) / f"{method.lower()}-{seed}"
     if not (run / "eval.json").exists():
-        command = [options.program, "train", "--out", str(run), "--config", options.config, "--data", options.data]
-        if (run / "run.json").exists():
-            command += ["--resume"]
-        for setting in [METHODS[method], f"schedule.seed={seed}", f"schedule.steps={options.steps}", *options.set]:
-            command += ["--set", setting]
-        subprocess.run(command, check=True)
-        subprocess.run([options.program, "eval", "--run", str(run), "--data", options.data], check=True)
+        runs.train(options, run, [METHODS[method], f"schedule.seed={seed}"])
+        runs.evaluate(options, run)
     return json.loads((run / "eval.json").read_text())
 
 
@@ -55,36 +52,25 @@ def cells(rows: list[dict[str, Any]]) -> list[str]:
             for score in SCORES]
 
 
-def row_of(found: dict[str, Any], method: str) -> dict[str, Any]:
-    return next(row for row in found["rows"] if row["method"] == method)
-
-
 def table(results: dict[str, list[dict[str, Any]]]) -> str:
     lines = [["method", "texture L1", "light (degrees)", "texture + light L1", "paper"], ["---"] + ["--:"] * 4]
     for method, found in results.items():
         printed = " / ".join(str(value) for value in PAPER[method])
-        lines.append([method, *cells([row_of(one, "tilegrad") for one in found]), printed])
+        lines.append([method, *cells([runs.row_of(one, "tilegrad") for one in found]), printed])
         for baseline in BASELINES:
-            lines.append([f"{method}, {baseline}", *cells([row_of(one, baseline) for one in found]), ""])
+            lines.append([f"{method}, {baseline}", *cells([runs.row_of(one, baseline) for one in found]), ""])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", required=True, help="dataset folder")
-    parser.add_argument("--out", required=True, help="folder of the runs")
-    parser.add_argument("--program", default="build/release/src/cli/tilegrad", help="tilegrad")
-    parser.add_argument("--config", default="configs/texture_quick.toml", help="of both")
-    parser.add_argument("--steps", type=int, default=6000, help="of each run")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="for all")
+    parser = runs.parser(__doc__, METHODS)
+    parser.set_defaults(config="configs/texture_quick.toml", steps=6000, seeds=[1])
     options = parser.parse_args()
     try:
         results = {method: [scores(options, method, seed) for seed in options.seeds]
                    for method in options.methods}
     except subprocess.CalledProcessError as error:
-        print(f"table2.py: {error}", file=sys.stderr)
+        print(f"table2: {runs.failure(error)}", file=sys.stderr)
         return 1
     print(table(results))
     return 0
