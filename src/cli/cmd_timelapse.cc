@@ -19,8 +19,6 @@
 namespace tilegrad::cli {
 namespace {
 
-constexpr float kHalfExtent = 0.45f;
-
 struct TimelapseOptions {
   std::string run, out;
   int size = 320, frames = 72, workers = 0;
@@ -53,7 +51,8 @@ Result<std::vector<Mesh>> LoadMeshes(const std::vector<Path>& files) {
   }
   const Bounds bounds = MeshBounds(meshes.back());
   const glm::vec3 centre = (bounds.low + bounds.high) / 2.0f, extent = bounds.high - bounds.low;
-  const float scale = 2 * kHalfExtent / std::max({extent.x, extent.y, extent.z, 1e-30f});
+  const auto half_extent = static_cast<float>(train::CameraRule().half_extent);
+  const float scale = 2 * half_extent / std::max({extent.x, extent.y, extent.z, 1e-30f});
   for (Mesh& mesh : meshes) {
     for (glm::vec3& p : mesh.positions) p = (p - centre) * scale;
   }

@@ -12,10 +12,10 @@ namespace {
 // Where the numbers of Pose are 0, and what 1 is.
 constexpr double kScale = 0.75, kNearness = 0.6;
 constexpr double kShiftUnit = 0.1, kScaleUnit = 0.1, kNearnessUnit = 0.5;
-constexpr double kLeastDepth = 0.2;  // of the distance: nothing is nearer
-constexpr double kLeastCover = 0.3;  // colours are not divided by less
-constexpr double kLeastLight = 0.25;
-constexpr double kBlack = 0.03;  // brightness of what no light reaches, at most
+constexpr double kLeastDepth = 0.2;   // of the distance: nothing is nearer
+constexpr double kLeastCover = 0.3;   // colours are not divided by less
+constexpr double kLeastLight = 0.25;  // nor by less light: dark pixels would turn into noise
+constexpr double kBlack = 0.03;       // brightness of what no light reaches, at most
 
 // A pose as it is used.
 struct View {

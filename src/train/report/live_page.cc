@@ -20,8 +20,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Files = std::map<std::int64_t, Path>;  // by step
 
-constexpr float kHalfExtent = 0.45f;
-
 // Files "BEGINNING00001500.ENDING" of a folder.
 Files FilesOfSteps(const Path& folder, const std::string& beginning, const std::string& ending) {
   Files files;
@@ -59,7 +57,7 @@ Json StepsOf(const Files& files) {
 
 Result<Json> MeshOf(Mesh mesh) {
   if (mesh.faces.empty()) return Json();
-  TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
+  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule().half_extent)));
   Json json = MeshJson(mesh);
   json["face_count"] = mesh.faces.size();
   return json;
