@@ -32,7 +32,7 @@ typedef enum tilegrad_status {
 typedef struct tilegrad_renderer tilegrad_renderer; /* threads and scratch memory */
 typedef struct tilegrad_frame tilegrad_frame;       /* images, and what the way back needs */
 
-TILEGRAD_C_API const char* tilegrad_version(void); /* "0.1.0" */
+TILEGRAD_C_API const char* tilegrad_version(void); /* "0.2.0" */
 
 /* threads: 0: one for each core; 1: only the caller's. NULL if there is no memory. */
 TILEGRAD_C_API tilegrad_renderer* tilegrad_renderer_create(int32_t threads);

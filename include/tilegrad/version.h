@@ -3,6 +3,6 @@
 // test compares).
 #pragma once
 #define TILEGRAD_VERSION_MAJOR 0
-#define TILEGRAD_VERSION_MINOR 1
+#define TILEGRAD_VERSION_MINOR 2
 #define TILEGRAD_VERSION_PATCH 0
-#define TILEGRAD_VERSION "0.1.0"
+#define TILEGRAD_VERSION "0.2.0"

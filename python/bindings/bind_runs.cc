@@ -5,9 +5,12 @@
 
 #include <optional>
 
+#include "base/error.h"
 #include "bindings/camera_numbers.h"
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
+#include "fit/bare_frames.h"
+#include "fit/poses/start_cameras.h"
 #include "fit/run.h"
 #include "train/named_configs.h"
 #include "train/trainer.h"
@@ -73,10 +76,22 @@ class Listener {
 
 // ---- Fits.
 
-// views: color [N,3,H,W] straight and alpha [N,H,W], float32; cameras [N][17], names [N].
-train::FitInput InputOfArrays(const py::dict& views, int hold_out) {
-  const auto cameras = views["cameras"].cast<std::vector<CameraRow>>();
-  const auto n = static_cast<py::ssize_t>(cameras.size());
+// Of `count` images, which have none if `cameras` is None.
+std::vector<Camera> CamerasOf(const py::object& cameras, std::size_t count, ImageSize size,
+                              double fov) {
+  if (cameras.is_none()) {
+    const auto lens = train::CameraOfFrame(train::BareFrame(fov), size);
+    return std::vector<Camera>(count, ValueOrThrow(lens));
+  }
+  std::vector<Camera> out;
+  for (const CameraRow& row : cameras.cast<std::vector<CameraRow>>()) out.push_back(CameraOf(row));
+  return out;
+}
+
+// views: color [N,3,H,W] straight and alpha [N,H,W], float32; names [N]; cameras [N][17] or None.
+train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& options) {
+  const auto names = views["names"].cast<Words>();
+  const auto n = static_cast<py::ssize_t>(names.size());
   const auto image = views["color"].cast<py::array>();
   const auto color = SpanOf<float>(image, "fit", "images", {n, 3, kAny, kAny});
   const auto alpha =
@@ -86,25 +101,37 @@ train::FitInput InputOfArrays(const py::dict& views, int hold_out) {
   input.images.height = static_cast<int>(image.shape(2));
   input.images.color.assign(color.begin(), color.end());
   input.images.alpha.assign(alpha.begin(), alpha.end());
-  input.names = views["names"].cast<Words>();
-  input.masked = std::any_of(alpha.begin(), alpha.end(), [](float a) { return a < 1; });
+  input.names = names;
+  input.posed = !views["cameras"].is_none();
+  input.cameras = CamerasOf(views["cameras"], names.size(),
+                            {input.images.width, input.images.height}, options.fov);
   for (int i = 0; i < n; ++i) {
-    input.cameras.push_back(CameraOf(cameras[static_cast<std::size_t>(i)]));
-    const bool held = hold_out > 0 && (i + 1) % hold_out == 0;
+    const bool held = options.hold_out > 0 && (i + 1) % options.hold_out == 0;
     (held ? input.held_out : input.training).push_back(i);
   }
+  train::ApplyBackground(options.background, &input);
   return input;
 }
 
-// views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out".
+train::InputOptions InputOptionsOf(const py::dict& views) {
+  const auto background = views["background"].cast<std::string>();
+  const auto known = train::BackgroundNamed(background);
+  if (!known)
+    throw py::value_error(
+        fmt::format("fit: background is '{}', expected auto, mask, plain or none", background));
+  return {views["hold_out"].cast<int>(), *known, views["fov"].cast<double>()};
+}
+
+// views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out", "background",
+// "fov".
 train::FitInput InputOf(const py::dict& views) {
-  const int hold_out = views["hold_out"].cast<int>();
-  if (!views.contains("folder")) return InputOfArrays(views, hold_out);
+  const train::InputOptions options = InputOptionsOf(views);
+  if (!views.contains("folder")) return InputOfArrays(views, options);
   const auto folder = views["folder"].cast<Path>();
   const auto model = views["model"].cast<std::string>();
   return ValueOrThrow(WithoutGil([&] {
-    return model.empty() ? train::ReadFitFolder(folder, hold_out)
-                         : train::ReadFitDataset(folder, model, hold_out);
+    return model.empty() ? train::ReadFitFolder(folder, options)
+                         : train::ReadFitDataset(folder, model, options.hold_out);
   }));
 }
 
@@ -157,12 +184,25 @@ py::object ScoresToDict(const std::vector<train::ViewScore>& scores) {
                   py::arg("silhouette_iou") = train::MeanIou(scores));
 }
 
+// As Python's warnings.
+void WarnOf(const train::FitInput& input) {
+  for (const std::string& warning : input.warnings) {
+    if (PyErr_WarnEx(PyExc_UserWarning, ("fit: " + warning).c_str(), 1) != 0)
+      throw py::error_already_set();
+  }
+}
+
 py::dict Fit(const py::dict& views, const py::dict& request, const py::object& listener) {
-  const train::FitJob job = JobOf(views, request);
+  train::FitJob job = JobOf(views, request);
   Listener listening(listener);
   const Workers workers(request["threads"].cast<int>());
-  auto outcome =
-      WithoutGil([&] { return train::RunFit(job, workers, listening.Sink(), listening.stop()); });
+  const train::CameraSearch search = {views["find_cameras"].cast<bool>(),
+                                      request["resume"].cast<bool>()};
+  auto outcome = WithoutGil([&]() -> Result<train::FitOutcome> {
+    TILEGRAD_TRY(train::StartCameras(search, &job, workers, listening.Sink(), listening.stop()));
+    return train::RunFit(job, workers, listening.Sink(), listening.stop());
+  });
+  WarnOf(job.input);
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
   py::dict out(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,

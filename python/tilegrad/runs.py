@@ -75,16 +75,21 @@ class TrainResult:
 
 
 def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
+        background: str = "auto", fov: float = 65, find_cameras: bool = False,
         hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
         lighting: str = "none", out: Optional[Path] = None, resume: bool = False,
         callback: Optional[Callback] = None, threads: int = 0, **options: Any) -> FitResult:
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
-    images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks; uint8, or real numbers 0 to
-        1. Or a folder, as of the command: with transforms.json, of COLMAP, or a dataset with
-        `model` "CLASS/ID".
-    cameras: a Camera of N views, in pixels of the images; none with a folder.
+    images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or before a plain background;
+        uint8, or real numbers 0 to 1. Or a folder, as of the command: with transforms.json, of
+        COLMAP, of pictures alone, or a dataset with `model` "CLASS/ID".
+    cameras: a Camera of N views, in pixels of the images. None: the folder's, or if it has none,
+        cameras are found in the images, which see `fov` degrees along their longer side.
     masks: (N, H, W), white is the object.
+    background: where masks come from: "mask", alpha and masks; "plain", plain backgrounds; "auto",
+        the former if there are any; "none": every pixel shows the object.
+    find_cameras: looks for the cameras in the images, though there are some.
     hold_out: every hold_out-th image is not fitted but judged by; 0: none.
     start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
@@ -93,9 +98,14 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
         the fit and goes on.
     options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
+    Warns of masks and cameras that are in doubt.
     ValueError, OSError: say what does not fit. KeyboardInterrupt: Ctrl-C; everything is saved.
     """
-    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int)}
+    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
+             "background": background, "find_cameras": bool(find_cameras),
+             "fov": _arrays.as_number("fit", "fov", fov, float)}
+    if not 5 <= views["fov"] <= 150:
+        raise ValueError(f"fit: fov is {fov}, expected 5 to 150 degrees")
     if isinstance(images, (str, os.PathLike)):
         if cameras is not None or masks is not None:
             raise ValueError("fit: a folder has its own cameras and masks")
@@ -180,18 +190,27 @@ def _views(images: Any, cameras: Any, masks: Any) -> dict[str, Any]:
     pixels = _unit("images", images)
     if pixels.ndim != 4 or pixels.shape[-1] not in (3, 4):
         raise ValueError(f"fit: images has shape {pixels.shape}, expected (N, H, W, 3 or 4)")
-    if masks is None and pixels.shape[-1] == 3:
-        raise ValueError("fit: images have no alpha: give masks (N, H, W), white is the object")
-    alpha = pixels[..., 3] if masks is None else _unit("masks", masks)
+    if masks is not None:
+        alpha = _unit("masks", masks)
+    elif pixels.shape[-1] == 4:
+        alpha = pixels[..., 3]
+    else:
+        alpha = np.ones(pixels.shape[:3], np.float32)
     _arrays.check_shape("fit", "masks", alpha.shape, pixels.shape[:3])
-    if not isinstance(cameras, Camera):
-        raise TypeError(f"fit: cameras is {type(cameras).__name__}, expected a Camera of "
-                        f"{len(pixels)} views")
-    numbers = np.asarray(cameras.numbers, np.float64)
-    _arrays.check_shape("fit", "cameras", numbers.shape, (len(pixels), 17))
-    return {"names": [str(i) for i in range(len(pixels))], "cameras": numbers.tolist(),
+    return {"names": [str(i) for i in range(len(pixels))], "cameras": _rows(cameras, len(pixels)),
             "color": np.ascontiguousarray(np.moveaxis(pixels[..., :3], -1, 1)),
             "alpha": np.ascontiguousarray(alpha)}
+
+
+def _rows(cameras: Any, views: int) -> Optional[list[list[float]]]:
+    if cameras is None:
+        return None
+    if not isinstance(cameras, Camera):
+        raise TypeError(f"fit: cameras is {type(cameras).__name__}, expected a Camera of {views} "
+                        "views")
+    numbers = np.asarray(cameras.numbers, np.float64)
+    _arrays.check_shape("fit", "cameras", numbers.shape, (views, 17))
+    return numbers.tolist()
 
 
 def _unit(argument: str, value: Any) -> np.ndarray:

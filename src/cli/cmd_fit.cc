@@ -16,6 +16,7 @@
 #include "cli/option_checks.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
+#include "fit/poses/start_cameras.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
 #include "train/run/checkpoint.h"
@@ -171,9 +172,11 @@ Status Run(const Options& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   ProgressLine line;
-  const Status cameras =
-      StartCameras({options.pictures, options.resume}, &job, workers, line.Sink());
+  const std::size_t warnings = job.input.warnings.size();
+  const Status cameras = train::StartCameras({options.pictures.find_cameras, options.resume}, &job,
+                                             workers, line.Sink(), StopOnSignals());
   line.Finish();
+  PrintWarnings(job.input, warnings);
   TILEGRAD_TRY(cameras);
   if (options.doctor) {
     TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));

@@ -20,13 +20,4 @@ train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out);
 // Warnings of the input from the `first` on, a few of them.
 void PrintWarnings(const train::FitInput& input, std::size_t first);
 
-// Cameras of images that came without, or that are not to be believed; else, where cameras are to
-// be fitted together with a shape, better ones to start from.
-struct CameraSearch {
-  const FitPictures& pictures;
-  bool resume = false;  // reads what an earlier call found
-};
-Status StartCameras(const CameraSearch& search, train::FitJob* job, const Workers& workers,
-                    const ProgressSink& progress);
-
 }  // namespace tilegrad::cli

@@ -33,17 +33,22 @@ std::vector<Path> PicturesIn(const Path& folder) {
 
 }  // namespace
 
+TransformsFrame BareFrame(double fov) {
+  TransformsFrame frame;
+  frame.pose.fl_x = frame.pose.fl_y = 0;
+  frame.angle_long = fov * std::numbers::pi / 180;
+  return frame;
+}
+
 Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double fov) {
   Path images = folder / "images";
   std::vector<Path> names = PicturesIn(images);
   if (names.empty()) images = folder, names = PicturesIn(images);
   std::vector<TransformsFrame> frames;
   for (const Path& name : names) {
-    TransformsFrame frame;
+    TransformsFrame frame = BareFrame(fov);
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
-    frame.pose.fl_x = frame.pose.fl_y = 0;
-    frame.angle_long = fov * std::numbers::pi / 180;
     frames.push_back(std::move(frame));
   }
   TILEGRAD_TRY(CheckAllMasked(frames));

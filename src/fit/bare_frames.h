@@ -13,8 +13,11 @@ namespace tilegrad::train {
 
 inline constexpr double kUsualFov = 65;  // degrees along the longer side: main cameras of phones
 
-// Empty if there are no pictures. The frames' poses mean nothing; their lens sees `fov` degrees
-// along the longer side. Errors: a mask is missing.
+// Without a picture: a lens that sees `fov` degrees along the longer side, and a pose that means
+// nothing.
+TransformsFrame BareFrame(double fov);
+
+// Empty if there are no pictures. Errors: a mask is missing.
 Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double fov);
 
 }  // namespace tilegrad::train

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/file.h"
@@ -41,6 +42,9 @@ enum class Background {
   kNone,   // there is none: every pixel shows the object
 };
 
+// auto, mask, plain or none.
+std::optional<Background> BackgroundNamed(std::string_view name);
+
 struct InputOptions {
   int hold_out = 0;  // every n-th view; 0: none
   Background background = Background::kAuto;
@@ -59,7 +63,7 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
 
 // Whether some pixel is not opaque.
 bool HasAlpha(const FitInput& input);
-// Masks as `background` says.
+// Masks as `background` says, of images with alpha or opaque ones. Sets `masked`.
 void ApplyBackground(Background background, FitInput* input);
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
 void TakePlainBackgrounds(FitInput* input);

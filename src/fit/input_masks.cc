@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the masks of an input come from.
 #include <algorithm>
+#include <array>
 
 #include "base/error.h"
 #include "fit/background.h"
 #include "fit/input.h"
 
 namespace tilegrad::train {
+
+std::optional<Background> BackgroundNamed(std::string_view name) {
+  constexpr std::array<std::string_view, 4> kNames = {"auto", "mask", "plain", "none"};
+  const auto at = std::ranges::find(kNames, name);
+  if (at == kNames.end()) return std::nullopt;
+  return static_cast<Background>(at - kNames.begin());
+}
 
 bool HasAlpha(const FitInput& input) {
   return std::ranges::any_of(input.images.alpha, [](float a) { return a < 1; });
@@ -25,15 +33,24 @@ void TakePlainBackgrounds(FitInput* input) {
   }
 }
 
-void ApplyBackground(Background background, FitInput* input) {
-  if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
-  const bool looks = background == Background::kAuto && !HasAlpha(*input);
-  if (background != Background::kPlain && !looks) return;
+namespace {
+
+void LookForPlainBackgrounds(bool asked, FitInput* input) {
   FitInput masked = *input;
   TakePlainBackgrounds(&masked);
   // Backgrounds that are not plain make no masks unless somebody says so.
-  if (looks && 2 * masked.warnings.size() > masked.names.size()) return;
-  *input = std::move(masked);
+  if (asked || 2 * masked.warnings.size() <= masked.names.size()) *input = std::move(masked);
+}
+
+}  // namespace
+
+void ApplyBackground(Background background, FitInput* input) {
+  if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
+  const bool asked = background == Background::kPlain;
+  if (asked || (background == Background::kAuto && !HasAlpha(*input))) {
+    LookForPlainBackgrounds(asked, input);
+  }
+  input->masked = HasAlpha(*input);
 }
 
 }  // namespace tilegrad::train

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -72,10 +74,31 @@ glm::dvec3 CentreOf(const Camera& camera) {
   return -(glm::transpose(RotationOf(camera)) * TranslationOf(camera));
 }
 
-// The rotation nearest to m, by Newton's iteration for the polar decomposition.
-glm::dmat3 NearestRotation(glm::dmat3 m) {
-  for (int i = 0; i < 60; ++i) m = 0.5 * (m + glm::inverse(glm::transpose(m)));
-  return m;
+// The rotation R with the largest trace(R^T m), as B. Horn finds it (JOSA A 4, 1987): its
+// quaternion is the eigenvector of the largest eigenvalue of a symmetric 4x4 matrix. Always a
+// rotation, also where the orthogonal matrix nearest to m is a reflection.
+glm::dmat3 NearestRotation(const glm::dmat3& m) {
+  const auto at = [&m](int row, int column) { return m[column][row]; };
+  const double w[3] = {at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)};
+  glm::dmat4 k(0);
+  k[0][0] = at(0, 0) + at(1, 1) + at(2, 2);
+  for (int i = 0; i < 3; ++i) {
+    k[0][i + 1] = k[i + 1][0] = w[i];
+    for (int j = 0; j < 3; ++j) k[i + 1][j + 1] = at(i, j) + at(j, i) - (i == j ? k[0][0] : 0);
+  }
+  double size = 0;
+  for (int i = 0; i < 16; ++i) size += std::abs(k[i / 4][i % 4]);
+  if (!(size > 0)) return glm::dmat3(1);
+  k += glm::dmat4(size);  // no eigenvalue is negative: the largest is that of largest magnitude
+  constexpr int kSquarings = 40;
+  for (int i = 0; i < kSquarings; ++i) {
+    k = k * k;
+    k /= k[0][0] + k[1][1] + k[2][2] + k[3][3];
+  }
+  glm::dvec4 q = k[0];
+  for (int i = 1; i < 4; ++i) q = glm::dot(k[i], k[i]) > glm::dot(q, q) ? k[i] : q;
+  q = glm::normalize(q);
+  return glm::mat3_cast(glm::dquat(q[0], q[1], q[2], q[3]));
 }
 
 glm::dmat3 MatrixOf(const Alignment& a) {

@@ -432,5 +432,25 @@ TEST(FitScore, AlignmentFindsASimilarity) {
   EXPECT_NEAR(AngleBetween(from[0], to[0]), angle * 180 / M_PI, 1e-2);
 }
 
+// Half turns about three axes: their sum is -1, and the orthogonal matrix nearest to it a
+// reflection.
+TEST(FitScore, AlignmentIsARotationWhateverTheCameras) {
+  std::vector<Camera> from(3), to(3);
+  const double half_turns[3][9] = {
+      {1, 0, 0, 0, -1, 0, 0, 0, -1}, {-1, 0, 0, 0, 1, 0, 0, 0, -1}, {-1, 0, 0, 0, -1, 0, 0, 0, 1}};
+  for (int i = 0; i < 3; ++i) {
+    from[i] = to[i] = OrbitCamera({50, 40, 30}, 0, 0, 2);
+    Alignment turn;
+    std::copy_n(half_turns[i], 9, turn.rotation);
+    to[i] = Moved(from[i], turn);
+  }
+  const Alignment found = AlignCameras(from, to);
+  const double* r = found.rotation;
+  const double determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
+                             r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                             r[2] * (r[3] * r[7] - r[4] * r[6]);
+  EXPECT_NEAR(determinant, 1, 1e-12);
+}
+
 }  // namespace
 }  // namespace tilegrad::train

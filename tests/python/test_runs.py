@@ -4,12 +4,14 @@
 import pathlib
 import tempfile
 import unittest
+import warnings
 
 import numpy as np
 
 import tilegrad
 from file_samples import dataset
 from tilegrad import files, runs
+from tilegrad.images import save_image
 
 
 def views(count=6, size=32):
@@ -55,6 +57,29 @@ class Fit(unittest.TestCase):
         np.testing.assert_array_equal(rest.mesh.positions, whole.mesh.positions)
         self.assertTrue((rest.folder / "report.html").exists())
 
+    def test_a_plain_background_makes_masks(self):
+        alpha = IMAGES[..., 3:]
+        before_white = IMAGES[..., :3] * alpha + (1 - alpha)
+        result = tilegrad.fit(before_white, CAMERAS, background="plain", hold_out=3, **SMALL)
+        self.assertGreater(result.held_out["silhouette_iou"], 0.7)
+
+    def test_finds_cameras_of_arrays_and_of_pictures_in_a_folder(self):
+        with self.assertRaisesRegex(ValueError, "needs 6 or more"):
+            tilegrad.fit(IMAGES[:3], fov=40, **SMALL)
+        folder = self.out.parent / "pictures"
+        folder.mkdir()
+        images = np.round(255 * IMAGES).astype(np.uint8)
+        for i, image in enumerate(images):
+            save_image(folder / f"{i}.png", image)
+        with warnings.catch_warnings(record=True) as caught:  # an ellipsoid: in doubt
+            warnings.simplefilter("always")
+            of_arrays = tilegrad.fit(images, fov=40, out=self.out, **SMALL)
+            of_folder = tilegrad.fit(folder, fov=40, **SMALL)
+        self.assertTrue(all("fit: " in str(w.message) for w in caught))
+        self.assertTrue((self.out / "cameras_start.json").exists())
+        self.assertGreater(of_arrays.training["silhouette_iou"], 0.7)
+        np.testing.assert_array_equal(of_folder.mesh.positions, of_arrays.mesh.positions)
+
     def test_what_a_callback_raises_goes_on(self):
         with self.assertRaises(ZeroDivisionError):
             tilegrad.fit(IMAGES, CAMERAS, callback=lambda at: 1 / 0, **SMALL)
@@ -62,7 +87,9 @@ class Fit(unittest.TestCase):
     def test_errors(self):
         for call, message in (
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "the closest known one is"),
-                (lambda: tilegrad.fit(IMAGES[..., :3], CAMERAS), "give masks"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "mask, plain or none"),
+                (lambda: tilegrad.fit(IMAGES, fov=200), "5 to 150 degrees"),
+                (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "no image says where"),
                 (lambda: tilegrad.fit(IMAGES[:3], CAMERAS), "cameras has shape"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, optimize=["shape"]), '"shape" cannot'),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, lighting="neon"), "expected one of"),
