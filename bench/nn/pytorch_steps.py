@@ -74,14 +74,14 @@ class Painter(nn.Module):
 
 
 class Judge(nn.Module):
-    def __init__(self):
+    def __init__(self, batch=32, base=64):
         super().__init__()
-        c = [3, 64, 128, 256, 512]
+        c = [3] + [base << i for i in range(4)]
         layers = []
         for i in range(4):
             layers += [nn.Conv2d(c[i], c[i + 1], 4, stride=2, padding=1), nn.LeakyReLU(0.2)]
-        self.net = nn.Sequential(*layers, nn.Conv2d(512, 1, 3, padding=1))
-        self.real, self.fake = torch.rand(32, 3, 64, 64), torch.rand(32, 3, 64, 64)
+        self.net = nn.Sequential(*layers, nn.Conv2d(c[-1], 1, 3, padding=1))
+        self.real, self.fake = torch.rand(batch, 3, 64, 64), torch.rand(batch, 3, 64, 64)
 
     def penalty(self, x):
         x = x.detach().requires_grad_()
@@ -95,7 +95,8 @@ class Judge(nn.Module):
                 10 * self.penalty(0.5 * self.real + 0.5 * self.fake))
 
 
-NETWORKS = {"reconstruction": Reconstruction, "unet": Painter, "critic": Judge}
+NETWORKS = {"reconstruction": Reconstruction, "unet": Painter, "critic": Judge,
+            "adversarial": lambda: Judge(batch=24, base=32)}
 
 
 def main():

@@ -100,12 +100,13 @@ class Painter {
   ConvUNet net_;
 };
 
+template <std::int64_t batch, std::int64_t base>
 class Judge {
  public:
   explicit Judge(Context& context)
-      : real_(RandomImages(context, {32, 3, 64, 64}, 2)),
-        fake_(RandomImages(context, {32, 3, 64, 64}, 3)),
-        net_(context, {}, rng_) {}
+      : real_(RandomImages(context, {batch, 3, 64, 64}, 2)),
+        fake_(RandomImages(context, {batch, 3, 64, 64}, 3)),
+        net_(context, {.base = base}, rng_) {}
   std::vector<NamedVar> All() { return Parameters(net_); }
   Var Loss() {
     return Mean(net_.Forward(fake_, Mode::kTrain)) - Mean(net_.Forward(real_, Mode::kTrain)) +
@@ -123,7 +124,8 @@ class Judge {
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context) {
   if (name == "reconstruction") return std::make_unique<StepOf<Reconstruction>>(context);
   if (name == "unet") return std::make_unique<StepOf<Painter>>(context);
-  if (name == "critic") return std::make_unique<StepOf<Judge>>(context);
+  if (name == "critic") return std::make_unique<StepOf<Judge<32, 64>>>(context);
+  if (name == "adversarial") return std::make_unique<StepOf<Judge<24, 32>>>(context);
   return nullptr;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three training steps that this library is measured by. pytorch_steps.py has the same ones.
+// The training steps that this library is measured by. pytorch_steps.py has the same ones.
 #pragma once
 
 #include <array>
@@ -22,8 +22,9 @@ class TrainingStep {
 // "unet": a U-Net of 31 million parameters on 4 images of 256 x 256. 1155 GFLOP.
 // "critic": the critic of a WGAN with gradient penalty, channels 64 to 512, 32 images of 64 x 64:
 //   three forward passes, one inner gradient, the backward pass through both. 66 GFLOP.
-inline constexpr std::array<std::string_view, 3> kTrainingSteps = {"reconstruction", "unet",
-                                                                   "critic"};
+// "adversarial": the critic of configs/texture_adversarial.toml: channels 32 to 256, 24 images.
+inline constexpr std::array<std::string_view, 4> kTrainingSteps = {"reconstruction", "unet",
+                                                                   "critic", "adversarial"};
 
 // One of the above; null for another name.
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context);
