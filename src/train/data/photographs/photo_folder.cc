@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+// The third form of photographs.h: a folder of pictures with alpha or masks.
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/json_nesting.h"
+#include "io/camera_file.h"
+#include "io/image_file.h"
+#include "train/data/cutout.h"
+#include "train/data/photographs/factorization.h"
+#include "train/data/photographs/photographs.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kTestEvery = 6;  // the last of each six pictures is held out
+constexpr std::size_t kMostNames = 256;
+
+std::error_code ignored;
+
+bool IsPicture(const Path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
+}
+
+std::vector<Path> PicturesIn(const Path& folder) {
+  std::vector<Path> out;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    if (entry.is_regular_file() && IsPicture(entry.path())) out.push_back(entry.path());
+  }
+  std::ranges::sort(out);
+  return out;
+}
+
+// masks/<name>.png of a picture without alpha.
+Result<ImageU8> Masked(const Path& folder, const Path& picture) {
+  TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(picture));
+  const Path mask = folder / "masks" / (picture.stem().string() + ".png");
+  if (!std::filesystem::exists(mask, ignored)) return io::ToColor(std::move(image));
+  TILEGRAD_ASSIGN(const ImageU8 values, io::LoadImage(mask));
+  const ImageU8 color = io::ToColor(std::move(image));
+  ImageU8 rgb(color.width, color.height, 3);
+  for (std::size_t i = 0; i < rgb.pixels.size(); ++i)
+    rgb.pixels[i] = color.pixels[i / 3 * static_cast<std::size_t>(color.channels) + i % 3];
+  auto both = WithMask(rgb, values);
+  if (!both.ok()) return both.status().Within(mask.string());
+  return both;
+}
+
+Status SetMask(const ImageU8& rgba, Photograph* photo) {
+  if (rgba.channels != 4)
+    return InvalidArgument("{}: no alpha, and no mask in masks/{}.png", photo->image.string(),
+                           photo->image.stem().string());
+  photo->mask = {rgba.width, rgba.height, {}};
+  photo->box = {1e9, 1e9, -1e9, -1e9};
+  for (int y = 0; y < rgba.height; ++y) {
+    for (int x = 0; x < rgba.width; ++x) {
+      const bool inside = rgba.at(x, y)[3] >= 128;
+      photo->mask.inside.push_back(inside);
+      if (!inside) continue;
+      PhotoBox& box = photo->box;
+      box.left = std::min(box.left, double(x)), box.right = std::max(box.right, x + 1.0);
+      box.top = std::min(box.top, double(y)), box.bottom = std::max(box.bottom, y + 1.0);
+    }
+  }
+  if (photo->box.right > photo->box.left) return {};
+  return InvalidArgument("{}: its mask is empty", photo->image.string());
+}
+
+class FolderReader {
+ public:
+  explicit FolderReader(Path folder) : folder_(std::move(folder)) {}
+
+  Result<PhotographSet> Read(const std::vector<Path>& pictures) {
+    set_.folder = folder_, set_.source = "photographs";
+    int index = 0;
+    for (const Path& picture : pictures) {
+      Photograph photo;
+      photo.id = picture.filename().string(), photo.image = picture;
+      photo.split = ++index % kTestEvery == 0 ? Split::kTest : Split::kTrain;
+      TILEGRAD_ASSIGN(const ImageU8 image, Masked(folder_, picture));
+      TILEGRAD_TRY(SetMask(image, &photo));
+      set_.photographs.push_back(std::move(photo));
+    }
+    TILEGRAD_TRY(ReadCameras());
+    if (std::filesystem::exists(folder_ / "keypoints.json", ignored)) TILEGRAD_TRY(ReadKeypoints());
+    return std::move(set_);
+  }
+
+ private:
+  Status ReadCameras() {
+    const Path file = folder_ / "transforms.json";
+    const bool colmap = io::FindColmapModel(folder_).has_value();
+    if (!colmap && !std::filesystem::exists(file, ignored)) return {};
+    auto cameras = colmap ? io::LoadColmapCameras(folder_) : io::LoadCameras(file, {});
+    TILEGRAD_TRY(cameras.status());
+    std::map<std::string, const io::CameraView*> by_stem;
+    for (const io::CameraView& view : *cameras) by_stem[Path(view.name).stem().string()] = &view;
+    for (Photograph& photo : set_.photographs) {
+      const auto found = by_stem.find(photo.image.stem().string());
+      if (found == by_stem.end())
+        return InvalidArgument("{}: no camera for it among the {} of {}", photo.image.string(),
+                               cameras->size(), folder_.string());
+      const auto& [name, camera, size] = *found->second;
+      const Camera64 resized = ResizeCamera(camera, size, {photo.mask.width, photo.mask.height});
+      auto weak = WeakPerspectiveOf(resized, {0, 0, 0});
+      if (!weak.ok()) return weak.status().Within(photo.image.string());
+      photo.camera = *weak;
+    }
+    return {};
+  }
+
+  Result<int> IndexOf(const Json& name) const {
+    const auto found = name.is_string()
+                           ? std::ranges::find(set_.keypoint_names, name.get<std::string>())
+                           : set_.keypoint_names.end();
+    if (found == set_.keypoint_names.end())
+      return InvalidArgument("{}: {} is none of its \"names\"", file_, name.dump());
+    return static_cast<int>(found - set_.keypoint_names.begin());
+  }
+
+  // [[a, b], ...] of names.
+  Result<std::vector<std::pair<int, int>>> Pairs(const Json& json, const char* key) const {
+    std::vector<std::pair<int, int>> out;
+    const auto found = json.find(key);
+    if (found == json.end()) return out;
+    if (!found->is_array()) return InvalidArgument("{}: \"{}\" is no list of pairs", file_, key);
+    for (const Json& pair : *found) {
+      if (!pair.is_array() || pair.size() != 2)
+        return InvalidArgument("{}: \"{}\" is no list of pairs of names", file_, key);
+      TILEGRAD_ASSIGN(const int a, IndexOf(pair[0]));
+      TILEGRAD_ASSIGN(const int b, IndexOf(pair[1]));
+      out.emplace_back(a, b);
+    }
+    return out;
+  }
+
+  Status ReadNames(const Json& json) {
+    const auto names = json.find("names");
+    if (names == json.end() || !names->is_array() || names->empty() || names->size() > kMostNames)
+      return InvalidArgument("{}: \"names\" has to be a list of 1 to {} names", file_, kMostNames);
+    for (const Json& name : *names) {
+      if (!name.is_string()) return InvalidArgument("{}: {} is no name", file_, name.dump());
+      set_.keypoint_names.push_back(name.get<std::string>());
+    }
+    TILEGRAD_ASSIGN(const auto sides, Pairs(json, "mirror"));
+    for (std::size_t k = 0; k < names->size(); ++k) set_.mirror.push_back(static_cast<int>(k));
+    for (const auto& [left, right] : sides) {
+      std::swap(set_.mirror[static_cast<std::size_t>(left)],
+                set_.mirror[static_cast<std::size_t>(right)]);
+      views_.left.emplace_back(right, left);
+    }
+    TILEGRAD_ASSIGN(views_.up, Pairs(json, "up"));
+    TILEGRAD_ASSIGN(views_.front, Pairs(json, "front"));
+    return {};
+  }
+
+  Result<Keypoint> ReadKeypoint(const Json& json, const std::string& where) const {
+    if (json.is_null()) return Keypoint{};
+    if (json.is_array() && json.size() == 2 && json[0].is_number() && json[1].is_number())
+      return Keypoint{json[0].get<double>(), json[1].get<double>(), true};
+    return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, json.dump());
+  }
+
+  Status ReadPlaces(const Json& json) {
+    const auto places = json.find("photographs");
+    if (places == json.end() || !places->is_object())
+      return InvalidArgument("{}: no \"photographs\" in it", file_);
+    for (Photograph& photo : set_.photographs) {
+      const auto found = places->find(photo.id);
+      if (found == places->end() || !found->is_array() ||
+          found->size() != set_.keypoint_names.size())
+        return InvalidArgument("{}: \"{}\" needs {} keypoints, each [x, y] or null", file_,
+                               photo.id, set_.keypoint_names.size());
+      for (const Json& place : *found) {
+        TILEGRAD_ASSIGN(const Keypoint keypoint, ReadKeypoint(place, photo.id));
+        photo.keypoints.push_back(keypoint);
+      }
+    }
+    return {};
+  }
+
+  Status ReadKeypoints() {
+    file_ = (folder_ / "keypoints.json").string();
+    TILEGRAD_ASSIGN(const std::string text, ReadText(file_));
+    if (FirstNestedDeeper(text, 16) != std::string::npos)
+      return InvalidArgument("{}: nested too deeply", file_);
+    const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (!json.is_object()) return InvalidArgument("{}: not a JSON object", file_);
+    TILEGRAD_TRY(ReadNames(json));
+    TILEGRAD_TRY(ReadPlaces(json));
+    const bool known = set_.photographs[0].camera.has_value();
+    return known ? PlaceKeypoints() : FindCameras();
+  }
+
+  Status FindCameras() {
+    views_.mirror = set_.mirror;
+    for (const Photograph& photo : set_.photographs) views_.views.push_back(photo.keypoints);
+    auto found = FactorizeKeypoints(views_);
+    if (!found.ok()) return found.status().Within(file_);
+    set_.mean_keypoints = found->shape;
+    for (std::size_t i = 0; i < set_.photographs.size(); ++i)
+      set_.photographs[i].camera = found->cameras[i];
+    return {};
+  }
+
+  // Where cameras are known: the points that they see at the keypoints, in the mean.
+  Status PlaceKeypoints() {
+    std::vector<std::vector<Keypoint>> views;
+    std::vector<WeakPerspective> cameras;
+    for (const Photograph& photo : set_.photographs)
+      views.push_back(photo.keypoints), cameras.push_back(*photo.camera);
+    set_.mean_keypoints = LocateKeypoints(views, cameras);
+    return {};
+  }
+
+  Path folder_;
+  std::string file_;
+  PhotographSet set_;
+  KeypointViews views_;
+};
+
+}  // namespace
+
+Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder) {
+  const Path images = folder / "images";
+  const std::vector<Path> pictures =
+      PicturesIn(std::filesystem::is_directory(images, ignored) ? images : folder);
+  if (pictures.empty()) return std::optional<PhotographSet>();
+  TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(pictures));
+  return std::optional(std::move(set));
+}
+
+}  // namespace tilegrad::train
