@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/ops/picture_samples.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Along one axis: the first of two pixels, the share of the second, and d share / d place.
+template <class T>
+struct Place {
+  std::size_t low, step;  // step: to the second pixel, 0 of a picture of one pixel
+  T share, slope;
+};
+
+template <class T>
+Place<T> PlaceOf(T at, std::size_t extent) {
+  const T pixels = static_cast<T>(extent), raw = (at + T(1)) * pixels / T(2) - T(0.5);
+  const T last = pixels - T(1), cut = std::clamp(raw, T(0), last);
+  if (extent == 1) return {0, 0, T(0), T(0)};
+  const std::size_t low = std::min(static_cast<std::size_t>(cut), extent - 2);
+  return {low, 1, cut - static_cast<T>(low), raw > T(0) && raw < last ? pixels / T(2) : T(0)};
+}
+
+struct Sampling {
+  nn::Tensor pictures, flow;
+  std::size_t Extent(const nn::Tensor& t, std::size_t axis) const {
+    return static_cast<std::size_t>(t.shape()[static_cast<int>(axis)]);
+  }
+  std::size_t places() const { return Extent(flow, 2) * Extent(flow, 3); }
+
+  // visit(picture's first channel, number of the place, x, y)
+  template <class T, class Visit>
+  void ForEach(std::size_t b, const Visit& visit) const {
+    const std::size_t height = Extent(pictures, 2), width = Extent(pictures, 3);
+    const T* const picture = pictures.span<T>().data() + b * Extent(pictures, 1) * height * width;
+    const T* const at = flow.span<T>().data() + 2 * b * places();
+    for (std::size_t i = 0; i < places(); ++i)
+      visit(picture, i, PlaceOf(at[i], width), PlaceOf(at[places() + i], height));
+  }
+
+  template <class T>
+  void Forward(std::size_t b, T* out) const {
+    const std::size_t channels = Extent(pictures, 1), width = Extent(pictures, 3),
+                      plane = Extent(pictures, 2) * width;
+    ForEach<T>(b, [&](const T* picture, std::size_t i, const Place<T>& x, const Place<T>& y) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const T* const p = picture + c * plane + y.low * width + x.low;
+        const T* const q = p + y.step * width;
+        const T upper = p[0] + x.share * (p[x.step] - p[0]);
+        const T lower = q[0] + x.share * (q[x.step] - q[0]);
+        out[(b * channels + c) * places() + i] = upper + y.share * (lower - upper);
+      }
+    });
+  }
+
+  template <class T>
+  void Backward(std::size_t b, const T* d_out, T* d_flow) const {
+    const std::size_t channels = Extent(pictures, 1), width = Extent(pictures, 3),
+                      plane = Extent(pictures, 2) * width;
+    T* const d_at = d_flow + 2 * b * places();
+    ForEach<T>(b, [&](const T* picture, std::size_t i, const Place<T>& x, const Place<T>& y) {
+      T d_x(0), d_y(0);
+      for (std::size_t c = 0; c < channels; ++c) {
+        const T* const p = picture + c * plane + y.low * width + x.low;
+        const T* const q = p + y.step * width;
+        const T d = d_out[(b * channels + c) * places() + i];
+        const T upper = p[0] + x.share * (p[x.step] - p[0]);
+        const T lower = q[0] + x.share * (q[x.step] - q[0]);
+        d_x += d * ((T(1) - y.share) * (p[x.step] - p[0]) + y.share * (q[x.step] - q[0]));
+        d_y += d * (lower - upper);
+      }
+      d_at[i] = d_x * x.slope, d_at[places() + i] = d_y * y.slope;
+    });
+  }
+};
+
+}  // namespace
+
+nn::Var SamplePictures(const nn::Tensor& pictures, const nn::Var& flow) {
+  if (!flow.valid()) return flow;
+  const nn::Shape &p = pictures.shape(), &f = flow.shape();
+  if (p.rank() != 4 || f.rank() != 4 || f[1] != 2 || p[0] != f[0] ||
+      pictures.dtype() != flow.dtype())
+    return nn::Fail(
+        flow, InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
+  nn::Context& context = flow.context();
+  const Sampling at{pictures, flow.value()};
+  const auto batch = static_cast<std::size_t>(p[0]);
+  nn::Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
+  nn::WithFloatType(flow.dtype(), [&]<class T>(T) {
+    context.workers().For(batch, [&](std::size_t b, std::size_t) { at.Forward(b, out.data<T>()); });
+  });
+  auto backward = [at, batch, &context](std::span<const nn::Tensor> d) {
+    nn::Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
+    nn::WithFloatType(at.flow.dtype(), [&]<class T>(T) {
+      context.workers().For(batch, [&](std::size_t b, std::size_t) {
+        at.Backward(b, d[0].span<T>().data(), d_flow.data<T>());
+      });
+    });
+    return std::vector<nn::Tensor>{d_flow};
+  };
+  return nn::External(context, {.name = "sample pictures",
+                                .inputs = {flow},
+                                .outputs = {out},
+                                .backward = std::move(backward)})[0];
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/ops/weak_cameras.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "scene/weak_perspective_ref.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::size_t kRow = kWeakNumbers, kPinholeRow = 16;
+
+template <class T>
+WeakPerspectiveT<T> CameraAt(const T* row) {
+  return {row[0], {row[1], row[2]}, {row[3], row[4], row[5], row[6]}};
+}
+
+template <class T>
+void PutCamera(const WeakPerspectiveT<T>& camera, T* row) {
+  row[0] = camera.scale;
+  std::ranges::copy(camera.translation, row + 1);
+  std::ranges::copy(camera.quaternion, row + 3);
+}
+
+// From [-1, 1] to pixels.
+template <class T>
+WeakPerspectiveT<T> InPixels(WeakPerspectiveT<T> camera, int size) {
+  const T half = T(size) / T(2);
+  camera.scale *= half;
+  for (T& t : camera.translation) t = (t + T(1)) * half;
+  return camera;
+}
+
+template <class T>
+std::array<T, 3> PointAt(const T* p) {
+  return {p[0], p[1], p[2]};
+}
+
+struct Projection {
+  nn::Tensor points, cameras;
+  std::size_t batch() const { return static_cast<std::size_t>(points.shape()[0]); }
+  std::size_t count() const { return static_cast<std::size_t>(points.shape()[1]); }
+
+  template <class T>
+  void Forward(T* out) const {
+    for (std::size_t b = 0; b < batch(); ++b) {
+      const auto camera = CameraAt(cameras.span<T>().data() + kRow * b);
+      for (std::size_t k = b * count(); k < (b + 1) * count(); ++k) {
+        const auto seen = ProjectWeakly(camera, PointAt(points.span<T>().data() + 3 * k));
+        out[2 * k] = seen[0], out[2 * k + 1] = seen[1];
+      }
+    }
+  }
+  template <class T>
+  void Backward(const T* d, T* d_points, T* d_cameras) const {
+    for (std::size_t b = 0; b < batch(); ++b) {
+      const auto camera = CameraAt(cameras.span<T>().data() + kRow * b);
+      WeakPerspectiveT<T> d_camera{T(0), {}, {}};
+      d_camera.quaternion = {};
+      for (std::size_t k = b * count(); k < (b + 1) * count(); ++k) {
+        std::array<T, 3> d_point{};
+        ProjectWeaklyAdjoint(camera, PointAt(points.span<T>().data() + 3 * k),
+                             {d[2 * k], d[2 * k + 1]}, &d_camera, &d_point);
+        std::ranges::copy(d_point, d_points + 3 * k);
+      }
+      PutCamera(d_camera, d_cameras + kRow * b);
+    }
+  }
+};
+
+template <class T>
+void PutPinhole(const CameraT<T>& camera, T* row) {
+  std::copy_n(camera.rotation, 9, row), std::copy_n(camera.translation, 3, row + 9);
+  row[12] = camera.fx, row[13] = camera.fy, row[14] = camera.cx, row[15] = camera.cy;
+}
+
+template <class T>
+CameraT<T> PinholeAt(const T* row) {
+  CameraT<T> camera;
+  std::copy_n(row, 9, camera.rotation), std::copy_n(row + 9, 3, camera.translation);
+  camera.fx = row[12], camera.fy = row[13], camera.cx = row[14], camera.cy = row[15];
+  return camera;
+}
+
+template <class T>
+void PinholesBackward(const nn::Tensor& cameras, int size, const T* d, T* d_cameras) {
+  const auto batch = static_cast<std::size_t>(cameras.shape()[0]);
+  const T half = T(size) / T(2);
+  for (std::size_t b = 0; b < batch; ++b) {
+    WeakPerspectiveT<T> d_camera;
+    const auto camera = InPixels(CameraAt(cameras.span<T>().data() + kRow * b), size);
+    PinholeOfAdjoint(camera, T(kPinholeDistance), PinholeAt(d + kPinholeRow * b), &d_camera);
+    d_camera.scale *= half;
+    for (T& t : d_camera.translation) t *= half;
+    PutCamera(d_camera, d_cameras + kRow * b);
+  }
+}
+
+}  // namespace
+
+nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras) {
+  if (!points.valid() || !cameras.valid()) return points.valid() ? cameras : points;
+  const nn::Shape& shape = points.shape();
+  if (shape.rank() != 3 || shape[2] != 3 || cameras.shape() != nn::Shape{shape[0], kWeakNumbers})
+    return nn::Fail(points, InternalError("points {} and cameras {} do not go together",
+                                          shape.ToString(), cameras.shape().ToString()));
+  nn::Context& context = points.context();
+  const Projection at{points.value(), cameras.value()};
+  nn::Tensor out = context.Empty({shape[0], shape[1], 2}, points.dtype());
+  nn::WithFloatType(points.dtype(), [&]<class T>(T) { at.Forward(out.data<T>()); });
+  auto backward = [at, &context](std::span<const nn::Tensor> d) {
+    nn::Tensor d_points = context.Empty(at.points.shape(), at.points.dtype());
+    nn::Tensor d_cameras = context.Empty(at.cameras.shape(), at.cameras.dtype());
+    nn::WithFloatType(at.points.dtype(), [&]<class T>(T) {
+      at.Backward(d[0].span<T>().data(), d_points.data<T>(), d_cameras.data<T>());
+    });
+    return std::vector<nn::Tensor>{d_points, d_cameras};
+  };
+  return nn::External(context, {.name = "project points",
+                                .inputs = {points, cameras},
+                                .outputs = {out},
+                                .backward = std::move(backward)})[0];
+}
+
+nn::Var PinholeCameras(const nn::Var& cameras, int size) {
+  if (!cameras.valid()) return cameras;
+  nn::Context& context = cameras.context();
+  const std::int64_t batch = cameras.shape()[0];
+  nn::Tensor out = context.Empty({batch, 16}, cameras.dtype());
+  const nn::Tensor at = cameras.value();
+  nn::WithFloatType(cameras.dtype(), [&]<class T>(T) {
+    for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b)
+      PutPinhole(
+          PinholeOf(InPixels(CameraAt(at.span<T>().data() + kRow * b), size), T(kPinholeDistance)),
+          out.data<T>() + kPinholeRow * b);
+  });
+  auto backward = [at, size, &context](std::span<const nn::Tensor> d) {
+    nn::Tensor d_cameras = context.Empty(at.shape(), at.dtype());
+    nn::WithFloatType(at.dtype(), [&]<class T>(T) {
+      PinholesBackward<T>(at, size, d[0].span<T>().data(), d_cameras.data<T>());
+    });
+    return std::vector<nn::Tensor>{d_cameras};
+  };
+  return nn::External(context, {.name = "pinhole cameras",
+                                .inputs = {cameras},
+                                .outputs = {out},
+                                .backward = std::move(backward)})[0];
+}
+
+Camera PinholeIn(const WeakPerspective& camera, int size) {
+  return CameraCast<float>(PinholeOf(InPixels(camera, size), kPinholeDistance));
+}
+
+nn::Tensor CameraRows(nn::Context& context, std::span<const WeakPerspective> cameras) {
+  std::vector<double> rows(kRow * cameras.size());
+  for (std::size_t b = 0; b < cameras.size(); ++b) PutCamera(cameras[b], &rows[kRow * b]);
+  return context.From({static_cast<std::int64_t>(cameras.size()), kWeakNumbers},
+                      std::span<const double>(rows));
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras of weak perspective (scene/weak_perspective.h) on the tape: rows of seven numbers, scale,
+// x, y and a quaternion (w, x, y, z) of any length > 0, in image units of [-1, 1], x right, y down.
+#pragma once
+
+#include <span>
+
+#include "nn/tape.h"
+#include "scene/weak_perspective.h"
+
+namespace tilegrad::train {
+
+inline constexpr std::int64_t kWeakNumbers = 7;
+
+// points [B, K, 3], cameras [B, 7] -> [B, K, 2]: where they are seen. Gradients to both.
+nn::Var ProjectPoints(const nn::Var& points, const nn::Var& cameras);
+
+// cameras [B, 7] -> [B, 16], SceneVars::cameras of images of `size` pixels a side: pinholes at
+// kPinholeDistance. With a gradient.
+nn::Var PinholeCameras(const nn::Var& cameras, int size);
+
+// World units; objects are about 2 large, so depth changes their image by at most a thousandth. 32
+// bits still tell depths of 1e-4 apart.
+inline constexpr double kPinholeDistance = 1000;
+
+// The same of one camera, in pixels of such an image.
+Camera PinholeIn(const WeakPerspective& camera, int size);
+
+// [B, 7] without gradient.
+nn::Tensor CameraRows(nn::Context& context, std::span<const WeakPerspective> cameras);
+
+}  // namespace tilegrad::train

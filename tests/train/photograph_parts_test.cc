@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// Operations, losses and scores of photographs: values by hand, gradients against central
+// differences in float64.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "base/rng.h"
+#include "nn/nn.h"
+#include "scene/shapes.h"
+#include "scene/weak_perspective_ref.h"
+#include "train/data/photographs/distance_barrier.h"
+#include "train/losses/cotangent_laplacian.h"
+#include "train/metrics/keypoint_score.h"
+#include "train/ops/picture_samples.h"
+#include "train/ops/weak_cameras.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Function = std::function<nn::Var(const nn::Var&)>;
+
+std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
+  Rng rng(seed);
+  std::vector<double> out(n);
+  for (double& x : out) x = rng.Uniform(low, high);
+  return out;
+}
+
+class PhotographParts : public testing::Test {
+ protected:
+  PhotographParts() : workers_(2), context_(workers_, nn::DType::kF64) {}
+
+  nn::Var Const(const nn::Shape& shape, const std::vector<double>& x) {
+    return nn::Constant(context_, context_.From(shape, std::span<const double>(x)));
+  }
+  // Of a fixed weighted sum of f. As tests/train/losses_test.cc: h = 1e-6.
+  void ExpectGradient(const Function& f, const nn::Shape& shape, std::vector<double> x) {
+    const auto weighed = [&](const nn::Var& at) {
+      const nn::Var y = f(at);
+      if (y.shape().elements() == 1) return y;
+      return nn::Sum(y * Const(y.shape(), Uniform(y.value().elements(), -1, 1, 99)));
+    };
+    const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(x)));
+    const nn::Tensor gradient = nn::Grad(weighed(input), {input})[0].value();
+    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
+    double largest = 0;
+    for (const double g : gradient.span<double>()) largest = std::max(largest, std::abs(g));
+    ASSERT_GT(largest, 0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double h = 1e-6, at = x[i];
+      x[i] = at + h;
+      const double up = weighed(Const(shape, x)).item();
+      x[i] = at - h;
+      const double down = weighed(Const(shape, x)).item();
+      x[i] = at;
+      EXPECT_NEAR(gradient.data<double>()[i], (up - down) / (2 * h), 1e-7 * (1 + largest)) << i;
+    }
+  }
+
+  Workers workers_;
+  nn::Context context_;
+};
+
+TEST_F(PhotographParts, ProjectionsAndTheirGradients) {
+  const nn::Shape points = {2, 5, 3}, cameras = {2, 7};
+  const auto p = Uniform(30, -1, 1, 1), c = Uniform(14, 0.2, 1, 2);
+  const nn::Var seen = ProjectPoints(Const(points, p), Const(cameras, c));
+  const auto want = ProjectWeakly<double>({c[7], {c[8], c[9]}, {c[10], c[11], c[12], c[13]}},
+                                          {p[15], p[16], p[17]});
+  EXPECT_NEAR(seen.value().span<double>()[10], want[0], 1e-14);
+  EXPECT_NEAR(seen.value().span<double>()[11], want[1], 1e-14);
+  ExpectGradient([&](const nn::Var& x) { return ProjectPoints(x, Const(cameras, c)); }, points, p);
+  ExpectGradient([&](const nn::Var& x) { return ProjectPoints(Const(points, p), x); }, cameras, c);
+  const nn::Var wrong = ProjectPoints(Const(points, p), Const({1, 7}, Uniform(7, 0, 1, 3)));
+  EXPECT_FALSE(wrong.valid());
+  EXPECT_FALSE(context_.TakeStatus().ok());
+}
+
+TEST_F(PhotographParts, PinholesAndTheirGradients) {
+  const auto c = Uniform(14, 0.2, 1, 2);
+  ExpectGradient([&](const nn::Var& x) { return 1e-3 * PinholeCameras(x, 64); }, {2, 7}, c);
+  const nn::Var rows = PinholeCameras(Const({2, 7}, c), 64);
+  const Camera camera = PinholeIn({c[0], {c[1], c[2]}, {c[3], c[4], c[5], c[6]}}, 64);
+  EXPECT_NEAR(rows.value().span<double>()[12], camera.fx, 1e-2);
+  EXPECT_NEAR(rows.value().span<double>()[14], camera.cx, 1e-5);
+  EXPECT_NEAR(camera.cx, 32 * (c[1] + 1), 1e-5);
+}
+
+// A picture of 4 x 2 pixels whose values are their columns, and twice their rows.
+TEST_F(PhotographParts, PicturesAreSampledBetweenPixelCentres) {
+  std::vector<double> pixels;
+  for (int channel = 0; channel < 2; ++channel)
+    for (int y = 0; y < 2; ++y)
+      for (int x = 0; x < 4; ++x) pixels.push_back(channel == 0 ? x : 2 * y);
+  const nn::Tensor picture = context_.From({1, 2, 2, 4}, std::span<const double>(pixels));
+  // Centres are at -3/4, -1/4, 1/4, 3/4 and -1/2, 1/2; beyond them the edge goes on.
+  const nn::Var seen =
+      SamplePictures(picture, Const({1, 2, 1, 4}, {-0.25, 0, 1, -7, 0.5, 0, 0, 9}));
+  const double want[] = {1, 1.5, 3, 0, 2, 1, 1, 2};
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(seen.value().span<double>()[i], want[i], 1e-12);
+  const nn::Tensor noise =
+      context_.From({2, 3, 5, 4}, std::span<const double>(Uniform(120, 0, 1, 5)));
+  ExpectGradient([&](const nn::Var& x) { return SamplePictures(noise, x); }, {2, 2, 3, 3},
+                 Uniform(36, -0.7, 0.7, 6));
+}
+
+// By hand: a right-angled corner with legs of 1 in a plane. The angle at the right corner has
+// cotangent 0, the others 1: L of the tip (1, 0, 0) is 1/2 (0, 0, 0) - (1, 0, 0)) + 0.
+TEST_F(PhotographParts, CotangentLaplacianOfATriangle) {
+  const std::vector<Face> faces = {{0, 1, 2}};
+  const std::vector<double> p = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  std::vector<double> out(9, 0);
+  AddCotangentLaplacian<double>(faces, p, p, out);
+  const double want[9] = {0.5, 0.5, 0, -0.5, 0, 0, 0, -0.5, 0};
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(out[i], want[i], 1e-15);
+  const double loss = CotangentLaplacianLoss(Const({1, 3, 3}, p), faces).item();
+  EXPECT_NEAR(loss, (std::sqrt(0.5) + 0.5 + 0.5) / 3, 1e-15);
+}
+
+// A flat fan has none in its middle, however it is cut up: cotangent weights see no tangent.
+TEST_F(PhotographParts, CotangentLaplacianOfAFlatFanIsNone) {
+  std::vector<double> p = {0.1, -0.05, 0};
+  std::vector<Face> faces;
+  for (int i = 0; i < 7; ++i) {
+    const double angle = 0.8 * i + 0.1 * (i % 3);
+    p.insert(p.end(), {std::cos(angle), std::sin(angle), 0});
+    faces.push_back({0, 1 + i, 1 + (i + 1) % 7});
+  }
+  std::vector<double> out(p.size(), 0);
+  AddCotangentLaplacian<double>(faces, p, p, out);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(out[c], 0, 1e-14);
+}
+
+// The weights are constants for the gradient, so it is compared with differences of L v with those
+// weights.
+TEST_F(PhotographParts, CotangentLaplacianGradientWithFixedWeights) {
+  const Mesh mesh = Icosphere(1, 1);
+  std::vector<double> p = Uniform(3 * mesh.positions.size(), -0.1, 0.1, 7);
+  for (std::size_t i = 0; i < p.size(); ++i) p[i] += (&mesh.positions[0].x)[i];
+  const nn::Shape shape = {1, static_cast<std::int64_t>(mesh.positions.size()), 3};
+  const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(p)));
+  const nn::Tensor d = nn::Grad(CotangentLaplacianLoss(input, mesh.faces), {input})[0].value();
+  const auto loss = [&](const std::vector<double>& v) {
+    std::vector<double> out(p.size(), 0);
+    AddCotangentLaplacian<double>(mesh.faces, p, v, out);
+    double sum = 0;
+    for (std::size_t i = 0; i < out.size(); i += 3)
+      sum += std::hypot(out[i], out[i + 1], out[i + 2]);
+    return sum / static_cast<double>(mesh.positions.size());
+  };
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    std::vector<double> v = p;
+    v[i] += 1e-6;
+    const double up = loss(v);
+    v[i] -= 2e-6;
+    EXPECT_NEAR(d.span<double>()[i], (up - loss(v)) / 2e-6, 1e-8) << i;
+  }
+}
+
+TEST_F(PhotographParts, SliversStayFinite) {
+  const std::vector<Face> faces = {{0, 1, 2}};
+  const double loss =
+      CotangentLaplacianLoss(Const({1, 3, 3}, {0, 0, 0, 1, 0, 0, 2, 0, 0}), faces).item();
+  EXPECT_TRUE(std::isfinite(loss));
+}
+
+// By hand. Keypoint 0 is right in one of two pictures, keypoint 1 in its only one, keypoint 2 is
+// never seen: the mean of 1/2 and 1.
+TEST(KeypointScores, AreMeansOverKeypoints) {
+  KeypointScore score(3, 0.1);
+  EXPECT_FALSE(score.Mean());
+  score.Add(0, 0.05), score.Add(0, 0.1), score.Add(1, 0.0);
+  EXPECT_EQ(score.Mean(), 0.75);
+}
+
+TEST(DistanceBarriers, DistancesAreEuclidean) {
+  std::vector<float> mask(49, 0.0f);
+  mask[3 * 7 + 2] = 1, mask[0] = 1;
+  const auto squares = SquaredDistances(mask, 7, true);
+  for (int y = 0; y < 7; ++y) {
+    for (int x = 0; x < 7; ++x) {
+      const int want = std::min(x * x + y * y, (x - 2) * (x - 2) + (y - 3) * (y - 3));
+      EXPECT_EQ(squares[static_cast<std::size_t>(y * 7 + x)], want) << x << " " << y;
+    }
+  }
+}
+
+TEST(DistanceBarriers, AreAboutNothingInsideAndOneOutside) {
+  std::vector<float> mask(32 * 32, 0.0f), barrier(32 * 32);
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = i % 32 < 16 ? 1.0f : 0.0f;
+  DistanceBarrier(mask, 32, barrier);
+  EXPECT_LT(barrier[5 * 32 + 2], 1e-6f);
+  EXPECT_GT(barrier[5 * 32 + 29], 1 - 1e-6f);
+  EXPECT_NEAR(barrier[5 * 32 + 15], 1 / (1 + std::exp(50.0 / 32)), 1e-6);
+  EXPECT_NEAR(barrier[5 * 32 + 16], 1 / (1 + std::exp(-50.0 / 32)), 1e-6);
+  std::fill(mask.begin(), mask.end(), 1.0f);  // nothing outside: still finite
+  DistanceBarrier(mask, 32, barrier);
+  EXPECT_EQ(barrier[0], 0.0f);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
