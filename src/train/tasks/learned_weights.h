@@ -26,6 +26,8 @@ class LearnedWeights {
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
 
   nn::Adam& adam() { return adam_; }
+  std::int64_t steps() const { return steps_; }  // of the run
+  double RateAt(std::int64_t step) const { return LearningRateAt(config_, steps_, step); }
 
  private:
   nn::Module& network_;

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "train/tasks/classify/task.h"
+#include "train/tasks/gan/task.h"
 #include "train/tasks/single_image/task.h"
 #include "train/tasks/textured_image/task.h"
 
@@ -14,7 +15,8 @@ namespace {
 std::map<std::string, TaskFactory>& Factories() {
   static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask},
                                                          {"textured_image", &MakeTexturedImageTask},
-                                                         {"classify", &MakeClassifyTask}};
+                                                         {"classify", &MakeClassifyTask},
+                                                         {"gan", &MakeGanTask}};
   return factories;
 }
 

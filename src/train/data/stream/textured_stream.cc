@@ -78,6 +78,7 @@ struct TexturedStream::Worker {
   std::vector<Light> lights;
   std::vector<std::array<float, 9>> sh;
   std::vector<Scene> scenes, shown;  // without light, and as they are drawn
+  std::vector<TexturedView> drawn;   // of SetUp, which passes them over
   std::vector<float> rgba;
   double seconds = 0;
 
@@ -160,11 +161,10 @@ TexturedStream::TexturedStream(const Job& job, std::span<const TexturedMesh> mes
 TexturedStream::~TexturedStream() = default;
 TexturedStream::TexturedStream(TexturedStream&&) noexcept = default;
 
-Result<std::span<const float>> TexturedStream::Render(int model, std::uint64_t position,
-                                                      std::size_t worker,
-                                                      std::span<TexturedView> views) {
-  const double start = ThreadSeconds();
-  Worker& w = *workers_[worker];
+// Everything that is drawn by lot.
+void TexturedStream::Place(int model, std::uint64_t position, Worker* worker,
+                           std::span<TexturedView> views) {
+  Worker& w = *worker;
   const TexturedMesh& mesh = meshes_[static_cast<std::size_t>(model)];
   Rng rng(job_.seed ^ kTexturedStream, position);
   DrawShape(job_.config.draw, mesh.mesh().positions, static_cast<float>(job_.camera.half_extent),
@@ -178,9 +178,25 @@ Result<std::span<const float>> TexturedStream::Render(int model, std::uint64_t p
   object.textures = w.textures;
   object.colors.values = w.colors;
   w.DrawViews(job_, object, views, rng);
+}
+
+Result<std::span<const float>> TexturedStream::Render(int model, std::uint64_t position,
+                                                      std::size_t worker,
+                                                      std::span<TexturedView> views) {
+  const double start = ThreadSeconds();
+  Worker& w = *workers_[worker];
+  Place(model, position, &w, views);
   TILEGRAD_TRY(Again(worker, Appearance::kLit).status());
   w.seconds += ThreadSeconds() - start;
   return std::span<const float>(w.rgba);
+}
+
+Status TexturedStream::SetUp(int model, std::uint64_t position, std::size_t worker,
+                             std::span<const TexturedView> views) {
+  Worker& w = *workers_[worker];
+  w.drawn.resize(views.size());
+  Place(model, position, &w, w.drawn);
+  return Change(worker, views);
 }
 
 Result<std::span<const float>> TexturedStream::Again(std::size_t worker, Appearance appearance) {

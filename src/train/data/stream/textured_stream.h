@@ -57,7 +57,10 @@ class TexturedStream {
   // of each pixel, in [0, 1]. Valid until the next call with the same `worker`, in [0, count()).
   Result<std::span<const float>> Render(int model, std::uint64_t position, std::size_t worker,
                                         std::span<TexturedView> views);
-  // The views of the last Render with this worker, the same size, in another way.
+  // Sets the object up as Render does, for Again, in views that are given instead of drawn ones.
+  Status SetUp(int model, std::uint64_t position, std::size_t worker,
+               std::span<const TexturedView> views);
+  // The views of the last Render or SetUp with this worker, the same size, in another way.
   Result<std::span<const float>> Again(std::size_t worker, Appearance appearance);
 
   // Other cameras and lights for Again, as many as there were.
@@ -70,6 +73,7 @@ class TexturedStream {
 
  private:
   struct Worker;
+  void Place(int model, std::uint64_t position, Worker* worker, std::span<TexturedView> views);
   Job job_;
   std::span<const TexturedMesh> meshes_;
   std::vector<std::unique_ptr<Worker>> workers_;

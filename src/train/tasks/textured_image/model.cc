@@ -13,24 +13,6 @@
 namespace tilegrad::train {
 namespace {
 
-Mesh MeshOf(const TextureNetwork& network, std::span<const float> p,
-            std::span<const float> texels) {
-  Mesh mesh;
-  mesh.faces = network.template_mesh().faces;
-  for (std::size_t i = 0; i < p.size(); i += 3)
-    mesh.positions.emplace_back(p[i], p[i + 1], p[i + 2]);
-  mesh.corner_uvs = network.corner_uvs();
-  const int side = network.texture_size();
-  ImageU8 image(side, side, 3);
-  std::ranges::transform(texels, image.pixels.begin(), ToByte);
-  mesh.textures = {{"predicted", std::move(image)}};
-  mesh.materials = {{.name = "predicted",
-                     .base_color = glm::vec4(1),
-                     .base_color_texture = 0,
-                     .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
-  return mesh;
-}
-
 class LoadedModel : public TexturedModel {
  public:
   LoadedModel(nn::Context& context, const TexturedImageConfig& config, int image_size)
@@ -74,6 +56,23 @@ Status LoadedModel::Predict(std::span<const std::uint8_t> images, std::vector<Me
 
 }  // namespace
 
+Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> p,
+                  std::span<const float> texels) {
+  Mesh mesh;
+  mesh.faces = sphere.mesh.faces;
+  for (std::size_t i = 0; i < p.size(); i += 3)
+    mesh.positions.emplace_back(p[i], p[i + 1], p[i + 2]);
+  mesh.corner_uvs = sphere.corner_uvs;
+  ImageU8 image(sphere.texture_size, sphere.texture_size, 3);
+  std::ranges::transform(texels, image.pixels.begin(), ToByte);
+  mesh.textures = {{"predicted", std::move(image)}};
+  mesh.materials = {{.name = "predicted",
+                     .base_color = glm::vec4(1),
+                     .base_color_texture = 0,
+                     .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
+  return mesh;
+}
+
 Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,
                                                     std::span<const std::uint8_t> images,
                                                     int image_size) {
@@ -92,7 +91,9 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
   };
   std::vector<PredictedObject> objects;
   for (std::size_t i = 0; i < count; ++i) {
-    Mesh mesh = MeshOf(network, row(predicted.positions, i), row(predicted.textures, i));
+    Mesh mesh =
+        DeformedMesh({network.template_mesh(), network.corner_uvs(), network.texture_size()},
+                     row(predicted.positions, i), row(predicted.textures, i));
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
     objects.push_back({std::move(mesh), LightOf(predicted, i), {}});

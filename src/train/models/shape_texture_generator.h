@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// The generator of section 5.5: normally distributed noise in, the vertices of a deformed sphere
+// and its texture map out. The paper names no sizes; these are ours.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "nn/layers.h"
+#include "scene/mesh.h"
+#include "train/models/offset_map.h"
+
+namespace tilegrad::train {
+
+struct GeneratorConfig {
+  std::int64_t noise = 64;          // numbers of a code; textures follow from all of them,
+  std::int64_t shape_noise = 32;    // shapes from the first ones: one shape has many liveries
+  std::int64_t hidden = 256;        // widths of the two layers before the vertices
+  std::int64_t template_level = 3;  // subdivisions of the icosahedron
+  double template_radius = 0.2;     // world units
+  std::int64_t smoothing = 4;       // OffsetRules
+  bool symmetric = true;            // shapes at x = 0
+  double output_deviation = 0.01;   // the head of vertices starts as N(0, this^2)
+  std::int64_t texture_size = 128;  // texels a side, 8 times a power of two
+  std::int64_t texture_base = 16;   // channels at full size, double with each halving up to
+  std::int64_t texture_most = 128;  // this many
+  bool symmetric_texture = true;    // a texture is its mirror image at x = 0
+};
+
+// InvalidArgument names the key whose value cannot be.
+Status CheckGenerator(const GeneratorConfig& config);
+
+class ShapeTextureGenerator {
+ public:
+  // CheckGenerator(config) is ok. The seed decides every weight.
+  ShapeTextureGenerator(nn::Context& context, const GeneratorConfig& config, std::uint64_t seed);
+
+  struct Shapes {
+    nn::Var movement, positions;  // [B, V, 3]: the offsets, and the sphere moved by them
+  };
+  // noise: [B, noise]
+  Shapes MakeShapes(const nn::Var& noise, nn::Mode mode);
+  // [B, 3, texture_size, map_width()] in [0, 1], by the sphere's longitude and latitude: what is
+  // learned of a map. With `symmetric_texture` the half of it around u = 1/2, where x > 0.
+  nn::Var MakeMaps(const nn::Var& noise, nn::Mode mode);
+  // Maps as textures [B, texture_size, texture_size, 3].
+  nn::Var Textures(const nn::Var& maps) const;
+
+  nn::Module& shape() { return shape_; }
+  nn::Module& texture() { return texture_; }
+  // The map that textures start as, [3, texture_size, map_width()] in [0, 1]; grey if none is set.
+  void SetMeanMap(std::span<const float> map);
+
+  const GeneratorConfig& config() const { return config_; }
+  std::int64_t map_width() const { return MapWidth(config_); }
+  static std::int64_t MapWidth(const GeneratorConfig& config) {
+    return config.symmetric_texture ? config.texture_size / 2 : config.texture_size;
+  }
+  // The first column of a texture that is in a map.
+  static std::int64_t FirstColumn(const GeneratorConfig& config) {
+    return config.symmetric_texture ? config.texture_size / 4 : 0;
+  }
+  const Mesh& template_mesh() const { return template_; }
+  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
+  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
+
+ private:
+  struct TextureNet : nn::Module {
+    nn::Sequential net;
+    nn::Tensor mean;  // logits, [1, 3, h, w]
+    nn::Var Forward(const nn::Var& noise, nn::Mode mode) override;
+    void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+    nn::Shape root;  // of one sample, behind the first layer
+    nn::Sequential first;
+  };
+  void BuildShape(Rng& rng);
+  void BuildTexture(Rng& rng);
+
+  nn::Context& context_;
+  GeneratorConfig config_;
+  Mesh template_;
+  std::vector<glm::vec2> uvs_;
+  nn::Tensor template_positions_;  // [V, 3]
+  OffsetMap offsets_;
+  nn::Tensor columns_;  // of a map for each column of a texture
+  nn::Sequential shape_;
+  TextureNet texture_;
+};
+
+}  // namespace tilegrad::train

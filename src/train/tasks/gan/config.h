@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys of `task.kind = "gan"`. What each does: config.cc and the parts' own tables, one line a
+// key.
+#pragma once
+
+#include "train/data/stream/textured_stream.h"
+#include "train/models/shape_texture_generator.h"
+#include "train/tasks/common_config.h"
+
+namespace tilegrad::train {
+
+// Of each critic; section 5.5 names the loss (WGAN-GP) only.
+struct GanCriticConfig {
+  std::int64_t base = 24, halvings = 4;  // nn::CriticShape
+  std::int64_t updates = 1;              // in each step
+  double penalty = 10;                   // lambda_gp, at interpolates
+  double learning_rate = 1e-3;
+  double texture_weight = 1;  // of D_t beside D_I; 0: no D_t
+};
+
+// Regularisers of generated shapes; nothing of the kind in the paper's section 5.5.
+struct GanShapeLoss {
+  double smoothness = 1e-3, laplacian = 1e-2;
+};
+
+struct GanTextureSource {
+  std::string run;            // of task.kind = "textured_image"
+  std::int64_t count = 2000;  // pictures that it extracts textures from
+};
+
+struct GanConfig {
+  GeneratorConfig network;
+  GanCriticConfig critic;
+  GanShapeLoss loss;
+  std::int64_t shape_steps = 3000;  // of the run; then shapes are frozen, and textures learn
+  std::string start;                // a run, or checkpoint, whose shapes this one starts with
+  GanTextureSource textures;
+  RenderConfig render;  // of it `sharpness` and `max_alpha_error`
+  OptimizerConfig optimizer;
+  std::int64_t batch = 16;
+  std::int64_t score_every = 250, score_count = 128;
+  TexturedStreamConfig stream;  // of it what is not a camera's
+  Schedule schedule;            // of the run; no keys of the task
+};
+
+ConfigFields FieldsOf(GanConfig* config);
+Status CheckConfig(const GanConfig& config);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// One of the critics of section 5.5 with its optimiser: of silhouettes, of pictures (D_I) or of
+// texture maps (D_t).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/networks/gan.h"
+#include "train/run/step_values.h"
+#include "train/tasks/gan/config.h"
+#include "train/tasks/learned_weights.h"
+
+namespace tilegrad::train {
+
+// What a critic compares, with the names of what is watched: they live as long as the program.
+struct CriticRole {
+  const char* prefix;                                       // of its tensors in checkpoints
+  const char *adversarial, *distance, *penalty, *gradient;  // terms of the log
+  std::int64_t channels;
+  std::uint64_t stream;  // of its weights and interpolates
+  nn::PadMode padding = nn::PadMode::kZero;
+};
+
+// Of the silhouettes in four views; of their colours; of maps, half of which go around.
+CriticRole SilhouetteRole();
+CriticRole PictureRole();
+CriticRole TextureRole(const GeneratorConfig& maps);
+
+class GanCritic {
+ public:
+  // `steps` of the stage that it learns in.
+  GanCritic(nn::Context& context, const GanConfig& config, const CriticRole& role,
+            std::int64_t steps);
+
+  // -E[D(fake)]
+  nn::Var GeneratorLoss(const nn::Var& fake);
+  struct Pair {
+    nn::Tensor real, fake;
+  };
+  // Of WganCriticLoss; `number` of the update, from which interpolates follow. Appends what is
+  // watched if `terms` is there. A loss or gradient that is not finite is an error.
+  Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, std::uint64_t number,
+                                                 std::vector<LossTerm>* terms);
+  // `step` of its stage.
+  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
+    return weights_.Update(gradients, step);
+  }
+  const CriticRole& role() const { return role_; }
+
+  std::vector<nn::NamedTensor> State();
+  // After so many updates.
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t updates);
+
+ private:
+  nn::Context& context_;
+  CriticRole role_;
+  double penalty_;
+  std::uint64_t seed_;
+  nn::Critic critic_;
+  LearnedWeights weights_;
+};
+
+// Tensors under prefix + name, and back: those that have the prefix, without it.
+std::vector<nn::NamedTensor> WithPrefix(const std::string& prefix,
+                                        std::vector<nn::NamedTensor> tensors);
+std::vector<nn::NamedTensor> OfPrefix(const std::string& prefix,
+                                      const std::vector<nn::NamedTensor>& tensors);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/learner.h"
+
+#include <cmath>
+#include <utility>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/tasks/gan/model.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::uint64_t kNoiseStream = 0x6e6f697365, kScoreStream = 0x73636f7265;
+constexpr std::uint64_t kScoreNumber = std::uint64_t{1} << 40;  // apart from those of steps
+constexpr float kNoScore = 1e30f;
+constexpr double kCollapsed = 0.3;  // of the true pictures' spread
+const std::string kShapePrefix = "shape.", kTexturePrefix = "texture.", kScoresName = "scores";
+
+std::uint64_t SeedOf(const GanConfig& config) {
+  return static_cast<std::uint64_t>(config.schedule.seed);
+}
+
+void CopyState(nn::Module& from, nn::Module& to) {
+  // Both are of one shape, so nothing can be missing.
+  (void)nn::LoadState(to, nn::State(from));
+}
+
+}  // namespace
+
+GanLearner::GanLearner(nn::Context& context, const Job& job, const Sources& sources)
+    : context_(context),
+      config_(job.config),
+      warn_(job.warn),
+      sources_(sources),
+      step_(context, config_, job.camera),
+      generator_(context, config_.network, SeedOf(config_)),
+      shown_(context, config_.network, SeedOf(config_)),
+      kept_(context, config_.network, SeedOf(config_)),
+      shape_(context, generator_.shape(), config_.optimizer,
+             std::max<std::int64_t>(1, config_.shape_steps)),
+      texture_(context, generator_.texture(), config_.optimizer,
+               std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)),
+      silhouettes_(context, config_, SilhouetteRole(),
+                   std::max<std::int64_t>(1, config_.shape_steps)),
+      pictures_(context, config_, PictureRole(),
+                std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)) {
+  if (config_.critic.texture_weight > 0) {
+    maps_.emplace(context, config_, TextureRole(config_.network),
+                  std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps));
+  }
+  scores_ = context.Zeros({kScores});
+  nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
+    scores_.data<T>()[kBestShape] = scores_.data<T>()[kBestTexture] = T(kNoScore);
+  });
+}
+
+Result<std::unique_ptr<GanLearner>> GanLearner::Make(nn::Context& context, const Job& job,
+                                                     const Sources& sources) {
+  std::unique_ptr<GanLearner> out(new GanLearner(context, job, sources));
+  TILEGRAD_ASSIGN(ObjectViews truth,
+                  sources.pictures->Draw(kScoreNumber, static_cast<int>(job.config.score_count)));
+  out->watch_.emplace(std::move(truth), context.workers());
+  if (sources.bank != nullptr) {
+    const std::vector<float> mean = sources.bank->Mean();
+    for (ShapeTextureGenerator* generator : {&out->generator_, &out->shown_, &out->kept_})
+      generator->SetMeanMap(mean);
+  }
+  return out;
+}
+
+std::vector<GanCritic*> GanLearner::Critics(GanStage stage) {
+  if (stage == GanStage::kShape) return {&silhouettes_};
+  if (!maps_) return {&pictures_};
+  return {&pictures_, &*maps_};
+}
+
+LearnedWeights& GanLearner::Weights(GanStage stage) {
+  return stage == GanStage::kShape ? shape_ : texture_;
+}
+
+std::int64_t GanLearner::StageStep(std::int64_t step) const {
+  return StageOf(step) == GanStage::kShape ? step : step - config_.shape_steps;
+}
+
+int GanLearner::Updates(std::int64_t step) {
+  return 1 +
+         static_cast<int>(config_.critic.updates) * static_cast<int>(Critics(StageOf(step)).size());
+}
+
+// Of what is drawn: each round of the critics sees other objects. The first sees the generator's.
+std::uint64_t GanLearner::NumberOf(const UpdateIndex& at, int round) const {
+  return static_cast<std::uint64_t>(at.step * config_.critic.updates + round);
+}
+
+Status GanLearner::DrawReal(GanStage stage, std::uint64_t number) {
+  const auto count = static_cast<int>(config_.batch);
+  TILEGRAD_ASSIGN(ObjectViews views, sources_.pictures->Draw(number, count));
+  real_ = {};
+  if (stage == GanStage::kShape) {
+    real_.cover = std::move(views.cover);
+    return {};
+  }
+  real_.colors = std::move(views.colors);
+  if (maps_) real_.maps = sources_.bank->Draw(context_, number, count);
+  return {};
+}
+
+Status GanLearner::DrawFake(const UpdateIndex& at, std::uint64_t number) {
+  const nn::NoGrad off(context_);
+  const GanStage stage = StageOf(at.step);
+  const GeneratedObjects objects = step_.Draw(
+      generator_, step_.Noise(kNoiseStream, number, config_.batch), stage, nn::Mode::kTrain);
+  fake_ = {objects.cover.value(), objects.colors.value(), objects.maps.value()};
+  return context_.TakeStatus();
+}
+
+GanCritic::Pair GanLearner::PairOf(const GanCritic& critic) const {
+  if (&critic == &silhouettes_) return {real_.cover, fake_.cover};
+  if (&critic == &pictures_) return {real_.colors, fake_.colors};
+  return {real_.maps, fake_.maps};
+}
+
+nn::Var GanLearner::AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects,
+                                    StepValues* out) {
+  const bool maps = maps_ && critic == &*maps_;
+  const nn::Var& seen =
+      critic == &silhouettes_ ? objects.cover : (maps ? objects.maps : objects.colors);
+  const nn::Var loss = critic->GeneratorLoss(seen);
+  const double weight = maps ? config_.critic.texture_weight : 1;
+  out->terms.push_back({critic->role().adversarial, weight, loss.item()});
+  return weight * loss;
+}
+
+Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const UpdateIndex& at,
+                                                                    StepValues* out) {
+  const GanStage stage = StageOf(at.step);
+  const std::uint64_t number = NumberOf(at, 0);
+  TILEGRAD_TRY(DrawReal(stage, number));
+  const GeneratedObjects objects = step_.Draw(
+      generator_, step_.Noise(kNoiseStream, number, config_.batch), stage, nn::Mode::kTrain);
+  fake_ = {objects.cover.value(), objects.colors.value(), objects.maps.value()};
+  nn::Var loss;
+  for (GanCritic* critic : Critics(stage)) {
+    const nn::Var term = AdversarialLoss(critic, objects, out);
+    loss = loss.has_context() ? loss + term : term;
+  }
+  if (stage == GanStage::kShape) loss = loss + step_.ShapeLoss(objects.shapes, &out->terms);
+  auto gradients = nn::Gradients(loss, Weights(stage).adam().parameters());
+  TILEGRAD_TRY(context_.TakeStatus());
+  out->loss = loss.item();
+  const double norm = nn::GlobalNorm(context_, gradients);
+  if (!std::isfinite(out->loss) || !std::isfinite(norm)) {
+    return InternalError(
+        "the generator's loss is {} ({}), its gradient's norm {}; a smaller "
+        "optimizer.learning_rate may help",
+        out->loss, out->DescribeTerms(), norm);
+  }
+  out->terms.push_back({"gradient_generator", 0, norm});
+  AddScores(out);
+  out->also.emplace_back("learning_rate", Weights(stage).RateAt(StageStep(at.step)));
+  out->images = config_.batch * static_cast<std::int64_t>(kPrimaryViews);
+  return gradients;
+}
+
+Result<nn::StepVector<nn::Gradient>> GanLearner::Backward(const UpdateIndex& at, StepValues* out) {
+  if (at.update == 0) return GeneratorGradients(at, out);
+  const GanStage stage = StageOf(at.step);
+  const auto critics = Critics(stage);
+  const int round = (at.update - 1) / static_cast<int>(critics.size());
+  const std::size_t which = static_cast<std::size_t>(at.update - 1) % critics.size();
+  const std::uint64_t number = NumberOf(at, round);
+  if (round > 0 && which == 0) {
+    TILEGRAD_TRY(DrawReal(stage, number));
+    TILEGRAD_TRY(DrawFake(at, number));
+  }
+  GanCritic& critic = *critics[which];
+  return critic.Gradients(PairOf(critic), number, round == 0 ? &out->terms : nullptr);
+}
+
+Status GanLearner::Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) {
+  const GanStage stage = StageOf(at.step);
+  const auto critics = Critics(stage);
+  if (at.update == 0) {
+    TILEGRAD_TRY(Weights(stage).Update(gradients, StageStep(at.step)));
+  } else {
+    const std::size_t which = static_cast<std::size_t>(at.update - 1) % critics.size();
+    TILEGRAD_TRY(critics[which]->Update(gradients, StageStep(at.step)));
+  }
+  if (at.update + 1 < Updates(at.step)) return {};
+  const std::int64_t done = at.step + 1;
+  const bool ends = done == config_.schedule.steps || done == config_.shape_steps;
+  if (done % config_.score_every == 0 || ends) TILEGRAD_TRY(Score(done));
+  return done == config_.shape_steps ? FreezeShapes() : Status();
+}
+
+Result<ShapeTextureGenerator*> GanLearner::Shown(std::int64_t steps) {
+  const bool shaping = steps <= config_.shape_steps;
+  if (shaping) {
+    TILEGRAD_TRY(LoadPredictingWeights(shown_.shape(), shape_.State()));
+  } else {
+    CopyState(kept_.shape(), shown_.shape());
+  }
+  TILEGRAD_TRY(LoadPredictingWeights(shown_.texture(), texture_.State()));
+  return &shown_;
+}
+
+Status GanLearner::Score(std::int64_t steps) {
+  TILEGRAD_ASSIGN(ShapeTextureGenerator * generator, Shown(steps));
+  const ObjectViews made =
+      step_.Show(*generator, step_.Noise(kScoreStream, 0, config_.score_count));
+  TILEGRAD_TRY(context_.TakeStatus());
+  const GanStage stage = StageOf(steps - 1);
+  TILEGRAD_ASSIGN(const Watched seen, watch_->Compare(made, stage));
+  nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
+    T* const scores = scores_.data<T>();
+    scores[kDistance] = T(seen.distance);
+    scores[kShapes] = T(seen.shapes), scores[kColors] = T(seen.colors);
+    T& best = scores[stage == GanStage::kShape ? kBestShape : kBestTexture];
+    if (scores[kDistance] >= best) return;
+    best = scores[kDistance];
+    CopyState(generator->shape(), kept_.shape());
+    CopyState(generator->texture(), kept_.texture());
+  });
+  const bool textures = stage == GanStage::kTexture;
+  const double spread = textures ? seen.colors : seen.shapes;
+  if (warn_ && 2 * StageStep(steps - 1) > Weights(stage).steps() && spread < kCollapsed) {
+    warn_(
+        fmt::format("step {}: the generator collapses: the spread of its {} is {:.0f} % of the "
+                    "data's; a smaller optimizer.learning_rate or more critic.updates may help",
+                    steps, textures ? "colours" : "shapes", 100 * spread));
+  }
+  return {};
+}
+
+Status GanLearner::FreezeShapes() {
+  CopyState(kept_.shape(), generator_.shape());
+  return {};
+}
+
+void GanLearner::AddScores(StepValues* out) const {
+  nn::WithFloatType(scores_.dtype(), [&]<class T>(T) {
+    const T* const scores = scores_.data<T>();
+    out->terms.push_back({"distance", 0, static_cast<double>(scores[kDistance])});
+    out->terms.push_back({"spread_shapes", 0, static_cast<double>(scores[kShapes])});
+    out->terms.push_back({"spread_colors", 0, static_cast<double>(scores[kColors])});
+  });
+}
+
+std::int64_t GanLearner::parameters() {
+  return nn::CountParameters(generator_.shape()) + nn::CountParameters(generator_.texture());
+}
+
+std::vector<nn::NamedTensor> GanLearner::State() {
+  std::vector<nn::NamedTensor> out = WithPrefix(kShapePrefix, shape_.State());
+  const auto add = [&](std::vector<nn::NamedTensor> more) {
+    for (nn::NamedTensor& tensor : more) out.push_back(std::move(tensor));
+  };
+  add(WithPrefix(kTexturePrefix, texture_.State()));
+  for (GanCritic* critic : {&silhouettes_, &pictures_}) add(critic->State());
+  if (maps_) add(maps_->State());
+  add(KeptState(kept_));
+  out.push_back({kScoresName, scores_});
+  return out;
+}
+
+Status GanLearner::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
+  const std::int64_t shape = std::min(steps, config_.shape_steps), texture = steps - shape;
+  const std::int64_t updates = config_.critic.updates;
+  TILEGRAD_TRY(shape_.LoadState(OfPrefix(kShapePrefix, state), shape));
+  TILEGRAD_TRY(texture_.LoadState(OfPrefix(kTexturePrefix, state), texture));
+  TILEGRAD_TRY(silhouettes_.LoadState(state, shape * updates));
+  TILEGRAD_TRY(pictures_.LoadState(state, texture * updates));
+  if (maps_) TILEGRAD_TRY(maps_->LoadState(state, texture * updates));
+  TILEGRAD_TRY(LoadKept(kept_, state));
+  return nn::CopyByName(state, {{kScoresName, scores_}});
+}
+
+Status GanLearner::StartAs(const std::vector<nn::NamedTensor>& state) {
+  TILEGRAD_TRY(LoadKeptShape(kept_, state));
+  CopyState(kept_.shape(), generator_.shape());
+  return {};
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// The game of section 5.5, update by update: a step is one of the generator and then some of each
+// critic of its stage. Also keeps the generator that scored best.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "train/tasks/gan/critic.h"
+#include "train/tasks/gan/step.h"
+#include "train/tasks/gan/texture_bank.h"
+#include "train/tasks/gan/watch.h"
+#include "train/tasks/task.h"
+
+namespace tilegrad::train {
+
+class GanLearner {
+ public:
+  struct Job {
+    const GanConfig& config;
+    const CameraRule& camera;
+    const WarningSink& warn;
+  };
+  // What it learns from; outlives the learner. `bank` is none where no textures are learned.
+  struct Sources {
+    RealPictures* pictures;
+    const TextureBank* bank;
+  };
+  static Result<std::unique_ptr<GanLearner>> Make(nn::Context& context, const Job& job,
+                                                  const Sources& sources);
+
+  GanStage StageOf(std::int64_t step) const {
+    return step < config_.shape_steps ? GanStage::kShape : GanStage::kTexture;
+  }
+  int Updates(std::int64_t step);
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out);
+  // The last update of a step also scores, keeps what is best, and freezes shapes where their stage
+  // ends.
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients);
+
+  std::vector<nn::NamedTensor> State();
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
+  // With the shapes that a run kept.
+  Status StartAs(const std::vector<nn::NamedTensor>& state);
+
+  // With the moving average of the weights.
+  Result<ShapeTextureGenerator*> Shown(std::int64_t steps);
+  std::int64_t parameters();
+  GanStep& step() { return step_; }
+  const GanWatch& watch() const { return *watch_; }
+
+ private:
+  GanLearner(nn::Context& context, const Job& job, const Sources& sources);
+  std::vector<GanCritic*> Critics(GanStage stage);
+  std::int64_t StageStep(std::int64_t step) const;
+  LearnedWeights& Weights(GanStage stage);
+  Status DrawReal(GanStage stage, std::uint64_t number);
+  Status DrawFake(const UpdateIndex& at, std::uint64_t number);
+  GanCritic::Pair PairOf(const GanCritic& critic) const;
+  Result<nn::StepVector<nn::Gradient>> GeneratorGradients(const UpdateIndex& at, StepValues* out);
+  nn::Var AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects, StepValues* out);
+  std::uint64_t NumberOf(const UpdateIndex& at, int round) const;
+  Status Score(std::int64_t steps);
+  Status FreezeShapes();
+  void AddScores(StepValues* out) const;
+
+  nn::Context& context_;
+  GanConfig config_;
+  WarningSink warn_;
+  Sources sources_;
+  GanStep step_;
+  ShapeTextureGenerator generator_, shown_, kept_;
+  LearnedWeights shape_, texture_;
+  GanCritic silhouettes_, pictures_;
+  std::optional<GanCritic> maps_;
+  std::optional<GanWatch> watch_;
+  // Of the last update of the generator, or of this round of the critics.
+  struct Batch {
+    nn::Tensor cover, colors, maps;
+  } real_, fake_;
+  // Best distance of each stage; distance, and spread of shapes and colours, when last looked at.
+  enum { kBestShape, kBestTexture, kDistance, kShapes, kColors, kScores };
+  nn::Tensor scores_;
+};
+
+}  // namespace tilegrad::train

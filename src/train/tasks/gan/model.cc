@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "scene/shapes.h"
+#include "train/tasks/gan/critic.h"
+#include "train/tasks/textured_image/model.h"
+
+namespace tilegrad::train {
+namespace {
+
+const std::string kShape = "best.shape.", kTexture = "best.texture.";
+constexpr std::uint64_t kCodeStream = 0x73616d706c65;
+
+std::span<const float> RowOf(const nn::Var& rows, std::size_t i) {
+  const std::span<const float> all = rows.value().span<float>();
+  const std::size_t size = all.size() / static_cast<std::size_t>(rows.shape()[0]);
+  return all.subspan(i * size, size);
+}
+
+void MakeGrey(Mesh* mesh) {
+  mesh->textures.clear(), mesh->corner_uvs.clear();
+  mesh->materials = {{.name = "shape", .base_color = {0.7f, 0.7f, 0.7f, 1.0f}}};
+}
+
+}  // namespace
+
+Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGenerator& generator,
+                                         const nn::Tensor& codes, bool textured) {
+  const nn::NoGrad off(context);
+  const nn::Var code = nn::Constant(context, codes);
+  const nn::Var positions = generator.MakeShapes(code, nn::Mode::kEval).positions;
+  const nn::Var textures = generator.Textures(generator.MakeMaps(code, nn::Mode::kEval));
+  TILEGRAD_TRY(context.TakeStatus());
+  const TexturedTemplate sphere{generator.template_mesh(), generator.corner_uvs(),
+                                static_cast<int>(generator.config().texture_size)};
+  std::vector<Mesh> meshes;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(codes.shape()[0]); ++i) {
+    Mesh mesh = DeformedMesh(sphere, RowOf(positions, i), RowOf(textures, i));
+    if (!textured) MakeGrey(&mesh);
+    if (const Status valid = Validate(mesh); !valid.ok())
+      return InternalError("the generated mesh is broken: {}", valid.message());
+    mesh.normals = SmoothNormals(mesh);
+    meshes.push_back(std::move(mesh));
+  }
+  return meshes;
+}
+
+GeneratorModel::GeneratorModel(nn::Context& context, const GanConfig& config, bool textured)
+    : context_(context),
+      config_(config),
+      textured_(textured),
+      generator_(context, config.network, /*seed=*/0),
+      parameters_(nn::CountParameters(generator_.shape()) +
+                  nn::CountParameters(generator_.texture())) {}
+
+Result<std::unique_ptr<GeneratorModel>> GeneratorModel::Load(nn::Context& context,
+                                                             const GanConfig& config,
+                                                             const Checkpoint& checkpoint) {
+  TILEGRAD_TRY(CheckGenerator(config.network));
+  const bool textured = checkpoint.info.step > config.shape_steps;
+  std::unique_ptr<GeneratorModel> model(new GeneratorModel(context, config, textured));
+  TILEGRAD_TRY(context.TakeStatus());
+  TILEGRAD_TRY(LoadKept(model->generator_, checkpoint.tensors));
+  return model;
+}
+
+std::vector<float> GeneratorModel::Code(std::uint64_t seed, std::uint64_t index) const {
+  Rng rng(seed ^ kCodeStream, index);
+  std::vector<float> code(static_cast<std::size_t>(noise()));
+  for (float& x : code) x = static_cast<float>(rng.Normal());
+  return code;
+}
+
+Result<std::vector<Mesh>> GeneratorModel::Generate(std::span<const float> codes) {
+  const std::int64_t count = static_cast<std::int64_t>(codes.size()) / noise();
+  return GenerateMeshes(context_, generator_, context_.From({count, noise()}, codes), textured_);
+}
+
+std::vector<float> BetweenCodes(std::span<const float> from, std::span<const float> to,
+                                double share) {
+  double dot = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    dot += double{from[i]} * to[i], aa += double{from[i]} * from[i], bb += double{to[i]} * to[i];
+  }
+  const double angle = std::acos(std::clamp(dot / std::sqrt(std::max(aa * bb, 1e-30)), -1.0, 1.0));
+  double a = 1 - share, b = share;
+  if (std::sin(angle) > 1e-6)
+    a = std::sin((1 - share) * angle) / std::sin(angle),
+    b = std::sin(share * angle) / std::sin(angle);
+  std::vector<float> out(from.size());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<float>(a * double{from[i]} + b * double{to[i]});
+  return out;
+}
+
+std::vector<nn::NamedTensor> KeptState(ShapeTextureGenerator& generator) {
+  auto out = WithPrefix(kShape, nn::State(generator.shape()));
+  for (nn::NamedTensor& tensor : WithPrefix(kTexture, nn::State(generator.texture())))
+    out.push_back(std::move(tensor));
+  return out;
+}
+
+Status LoadKept(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state) {
+  TILEGRAD_TRY(LoadKeptShape(generator, state));
+  return nn::LoadState(generator.texture(), OfPrefix(kTexture, state));
+}
+
+Status LoadKeptShape(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state) {
+  return nn::LoadState(generator.shape(), OfPrefix(kShape, state));
+}
+
+}  // namespace tilegrad::train

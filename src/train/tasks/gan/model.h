@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// A trained generator: latent codes in, textured meshes out.
+#pragma once
+
+#include "train/tasks/gan/config.h"
+#include "train/tasks/task.h"
+
+namespace tilegrad::train {
+
+// Meshes of codes [n, noise], by the weights that `generator` has. Without `textured`, of shapes
+// alone, they are grey. Normals are smooth.
+Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGenerator& generator,
+                                         const nn::Tensor& codes, bool textured);
+
+class GeneratorModel : public Model {
+ public:
+  static Result<std::unique_ptr<GeneratorModel>> Load(nn::Context& context, const GanConfig& config,
+                                                      const Checkpoint& checkpoint);
+
+  std::int64_t parameters() const override { return parameters_; }
+  const Mesh& template_mesh() const override { return generator_.template_mesh(); }
+
+  // Numbers of a code.
+  std::int64_t noise() const { return config_.network.noise; }
+  // Whether textures have learned: in the first stage only shapes do.
+  bool textured() const { return textured_; }
+  // Code `index` of those that `seed` stands for: standard normal, the same on every machine.
+  std::vector<float> Code(std::uint64_t seed, std::uint64_t index) const;
+  // codes: [n][noise()].
+  Result<std::vector<Mesh>> Generate(std::span<const float> codes);
+
+  ShapeTextureGenerator& generator() { return generator_; }
+  const GanConfig& config() const { return config_; }
+
+ private:
+  GeneratorModel(nn::Context& context, const GanConfig& config, bool textured);
+  nn::Context& context_;
+  GanConfig config_;
+  bool textured_;
+  ShapeTextureGenerator generator_;
+  std::int64_t parameters_;
+};
+
+// From one code to another along the great circle, as both lie far out on a sphere: `share` in
+// [0, 1].
+std::vector<float> BetweenCodes(std::span<const float> from, std::span<const float> to,
+                                double share);
+
+// What checkpoints keep of the generator that scored best, "best.shape..." and "best.texture...".
+std::vector<nn::NamedTensor> KeptState(ShapeTextureGenerator& generator);
+Status LoadKept(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
+Status LoadKeptShape(ShapeTextureGenerator& generator, const std::vector<nn::NamedTensor>& state);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/real_pictures.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/error.h"
+#include "base/processor_time.h"
+
+namespace tilegrad::train {
+namespace {
+
+LightConfig NoLight() {
+  LightConfig light;
+  light.model = "none";
+  return light;
+}
+
+}  // namespace
+
+std::array<Camera, kPrimaryViews> PrimaryCameras(const CameraRule& rule) {
+  // Azimuth and elevation, degrees: in true profile, and from above, since most of what people look
+  // at is seen from there.
+  constexpr double kDirections[kPrimaryViews][2] = {{0, 15}, {90, 10}, {180, 15}, {90, 80}};
+  std::array<Camera, kPrimaryViews> out;
+  for (std::size_t v = 0; v < kPrimaryViews; ++v)
+    out[v] = OrbitCamera(rule.lens, kDirections[v][0], kDirections[v][1], rule.distance);
+  return out;
+}
+
+RealPictures::RealPictures(nn::Context& context, const Job& job,
+                           std::span<const TexturedMesh> meshes)
+    : context_(context),
+      job_(job),
+      stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes, context.workers()),
+      order_(static_cast<int>(meshes.size()), 1, job.seed) {
+  for (const Camera& camera : PrimaryCameras(job.camera)) views_.push_back({camera, {}});
+}
+
+Result<ObjectViews> RealPictures::Draw(std::uint64_t number, int count) {
+  const auto models = order_.Batch(static_cast<std::int64_t>(number), count, 1);
+  const std::int64_t size = job_.size;
+  ObjectViews out{context_.Empty({count, 3 * std::int64_t{kPrimaryViews}, size, size}),
+                  context_.Empty({count, std::int64_t{kPrimaryViews}, size, size})};
+  TILEGRAD_TRY(Place(models, number * static_cast<std::uint64_t>(count), &out));
+  return out;
+}
+
+Result<std::span<const float>> RealPictures::DrawOne(int model, std::uint64_t position,
+                                                     std::size_t worker) {
+  TILEGRAD_TRY(stream_.SetUp(model, position, worker, views_));
+  return stream_.Again(worker, Appearance::kTexture);
+}
+
+double RealPictures::TakeSeconds() {
+  double sum = 0;
+  for (double& seconds : seconds_) sum += std::exchange(seconds, 0);
+  return sum;
+}
+
+Status RealPictures::Place(std::span<const Sample> models, std::uint64_t first, ObjectViews* out) {
+  failures_.assign(models.size(), {});
+  seconds_.resize(std::max(seconds_.size(), models.size()));
+  const auto plane = static_cast<std::size_t>(job_.size) * static_cast<std::size_t>(job_.size);
+  nn::WithFloatType(context_.dtype(), [&]<class T>(T) {
+    T* const colors = out->colors.data<T>();
+    T* const cover = out->cover.data<T>();
+    context_.workers().For(models.size(), [&](std::size_t b, std::size_t worker) {
+      const double start = ThreadSeconds();
+      const auto rgba = DrawOne(models[b].model, first + b, worker);
+      seconds_[b] += ThreadSeconds() - start;
+      failures_[b] = rgba.status();
+      if (!rgba.ok()) return;
+      for (std::size_t v = 0; v < kPrimaryViews; ++v) {
+        const auto view = rgba->subspan(4 * plane * v, 4 * plane);
+        const std::size_t at = b * kPrimaryViews + v;
+        std::copy_n(view.begin(), 3 * plane, colors + 3 * plane * at);
+        std::copy_n(view.begin() + static_cast<std::ptrdiff_t>(3 * plane), plane,
+                    cover + plane * at);
+      }
+    });
+  });
+  for (const Status& failure : failures_) TILEGRAD_TRY(failure);
+  return {};
+}
+
+}  // namespace tilegrad::train

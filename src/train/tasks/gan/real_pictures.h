@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What critics see of true objects: pictures from four views that never change, without light. So
+// whatever is generated has to stand as the training objects do. A pure function of (seed, place in
+// the run).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "nn/tape.h"
+#include "train/data/batches.h"
+#include "train/data/stream/textured_stream.h"
+
+namespace tilegrad::train {
+
+inline constexpr std::size_t kPrimaryViews = 4;
+// From the front, the side, the back and from above: OrbitCameras at the distance of `rule`.
+std::array<Camera, kPrimaryViews> PrimaryCameras(const CameraRule& rule);
+
+// Of B objects, averaged from `stream.samples` samples a side of each pixel.
+struct ObjectViews {
+  nn::Tensor colors;  // [B, 12, size, size]: RGB over black of each view
+  nn::Tensor cover;   // [B, 4, size, size]: the covered share
+};
+
+class RealPictures {
+ public:
+  struct Job {
+    TexturedStreamConfig config;
+    CameraRule camera;
+    int size = 64;
+    std::uint64_t seed = 0;
+  };
+  // `meshes` outlive it.
+  RealPictures(nn::Context& context, const Job& job, std::span<const TexturedMesh> meshes);
+
+  // Batch `number` of `count` objects, each drawn anew.
+  Result<ObjectViews> Draw(std::uint64_t number, int count);
+  // Of processor time, since the last call.
+  double TakeSeconds();
+  Result<ImageU8> Sheet(int objects, int views) { return stream_.Sheet(objects, views); }
+
+ private:
+  Result<std::span<const float>> DrawOne(int model, std::uint64_t position, std::size_t worker);
+  Status Place(std::span<const Sample> models, std::uint64_t first, ObjectViews* out);
+
+  nn::Context& context_;
+  Job job_;
+  TexturedStream stream_;
+  BatchOrder order_;
+  std::vector<TexturedView> views_;
+  std::vector<Status> failures_;
+  std::vector<double> seconds_;  // of each object of a batch
+};
+
+}  // namespace tilegrad::train

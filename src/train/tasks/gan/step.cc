@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/step.h"
+
+#include <algorithm>
+
+#include "nn/nn.h"
+#include "scene/camera_conventions.h"
+#include "scene/shapes.h"
+#include "scene/sphere_uv.h"
+#include "train/losses/laplacian.h"
+#include "train/losses/smoothness.h"
+
+namespace tilegrad::train {
+
+GanStep::GanStep(nn::Context& context, const GanConfig& config, const CameraRule& rule)
+    : context_(context),
+      config_(config),
+      size_(rule.lens.width),
+      cameras_(PrimaryCameras(rule)),
+      template_(Icosphere(static_cast<int>(config.network.template_level),
+                          static_cast<float>(config.network.template_radius))),
+      topology_(BuildTopology(template_.faces, template_.positions.size())),
+      uvs_(SphereUvs(template_)),
+      renderer_(context.workers()) {
+  for (Camera& camera : cameras_)
+    camera = ScaledCamera(camera, static_cast<float>(config.stream.draw.samples));
+}
+
+nn::Tensor GanStep::Noise(std::uint64_t stream, std::uint64_t number, std::int64_t count) const {
+  nn::Tensor noise = context_.Empty({count, config_.network.noise});
+  Rng rng(static_cast<std::uint64_t>(config_.schedule.seed) ^ stream, number);
+  nn::WithFloatType(noise.dtype(), [&]<class T>(T) {
+    for (T& x : noise.span<T>()) x = static_cast<T>(rng.Normal());
+  });
+  return noise;
+}
+
+RenderedImages GanStep::Render(const SceneVars& scenes) {
+  const auto meshes = static_cast<std::size_t>(scenes.positions.shape()[0]);
+  RenderJob job;
+  job.faces = {template_.faces[0].data(), 3 * template_.faces.size()};
+  job.views = static_cast<int>(kPrimaryViews);
+  job.cameras.reserve(meshes * kPrimaryViews);
+  for (std::size_t b = 0; b < meshes; ++b)
+    job.cameras.insert(job.cameras.end(), cameras_.begin(), cameras_.end());
+  job.options.width = job.options.height = size_ * static_cast<int>(config_.stream.draw.samples);
+  job.options.delta = 1 / config_.render.sharpness;
+  job.options.max_alpha_error = config_.render.max_alpha_error;
+  job.uvs = {&uvs_[0].x, 2 * uvs_.size()};
+  job.wrap = Wrap::kRepeatClamp;
+  return RenderScenes(renderer_, scenes, std::move(job));
+}
+
+// Each pixel the mean of its samples, the views of an object as channels.
+nn::Var GanStep::Averaged(const nn::Var& images, std::int64_t channels) const {
+  const auto samples = static_cast<int>(config_.stream.draw.samples);
+  const std::int64_t side = size_ * samples;
+  const nn::Var all = nn::Reshape(images, {-1, channels, side, side});
+  return samples == 1 ? all : nn::AvgPool2d(all, {.kernel = samples, .stride = samples});
+}
+
+GeneratedObjects GanStep::Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise,
+                               GanStage stage, nn::Mode mode) {
+  const nn::Var code = nn::Constant(context_, noise);
+  constexpr std::int64_t views = kPrimaryViews;
+  GeneratedObjects out;
+  out.shapes = generator.MakeShapes(code, mode);
+  if (!out.shapes.positions.valid()) return out;
+  if (stage == GanStage::kShape) {
+    out.cover = Averaged(Render({.positions = out.shapes.positions}).alpha, views);
+    return out;
+  }
+  out.maps = generator.MakeMaps(code, mode);
+  const SceneVars scenes{.positions = nn::Detach(out.shapes.positions),
+                         .textures = generator.Textures(out.maps)};
+  out.colors = Averaged(Render(scenes).colors, 3 * views);
+  return out;
+}
+
+ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& noise) {
+  const nn::NoGrad off(context_);
+  ObjectViews out;
+  out.cover = Draw(generator, noise, GanStage::kShape, nn::Mode::kEval).cover.value();
+  out.colors = Draw(generator, noise, GanStage::kTexture, nn::Mode::kEval).colors.value();
+  return out;
+}
+
+nn::Var GanStep::ShapeLoss(const ShapeTextureGenerator::Shapes& shapes,
+                           std::vector<LossTerm>* terms) {
+  const nn::Var smoothness = SmoothnessLoss(shapes.positions, template_.faces, topology_);
+  const nn::Var laplacian = LaplacianLoss(shapes.movement, topology_);
+  terms->push_back({"smoothness", config_.loss.smoothness, smoothness.item()});
+  terms->push_back({"laplacian", config_.loss.laplacian, laplacian.item()});
+  return config_.loss.smoothness * smoothness + config_.loss.laplacian * laplacian;
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the generator of section 5.5 goes down on: noise -> shape and texture -> four pictures of
+// each object -> critics. First shapes learn, through silhouettes; then they are frozen, and
+// textures learn.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "scene/topology.h"
+#include "train/ops/render_op.h"
+#include "train/tasks/gan/critic.h"
+#include "train/tasks/gan/real_pictures.h"
+
+namespace tilegrad::train {
+
+enum class GanStage { kShape, kTexture };
+
+// Of a batch of B objects, what critics look at.
+struct GeneratedObjects {
+  ShapeTextureGenerator::Shapes shapes;
+  nn::Var maps;    // of the second stage
+  nn::Var cover;   // [B, 4, size, size]; of the first stage
+  nn::Var colors;  // [B, 12, size, size], RGB over black; of the second one
+};
+
+class GanStep {
+ public:
+  // Cameras are PrimaryCameras of `rule`, whose images are square.
+  GanStep(nn::Context& context, const GanConfig& config, const CameraRule& rule);
+
+  // Standard normal [count, noise], by the seed, the stream and the number.
+  nn::Tensor Noise(std::uint64_t stream, std::uint64_t number, std::int64_t count) const;
+  // On the tape; one at a time, as images are of one renderer. Gradients reach what the stage
+  // trains.
+  GeneratedObjects Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise, GanStage stage,
+                        nn::Mode mode);
+  // Both stages' pictures as numbers, in the weights' evaluation.
+  ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise);
+
+  // Regularisers of shapes, weighted; appends them.
+  nn::Var ShapeLoss(const ShapeTextureGenerator::Shapes& shapes, std::vector<LossTerm>* terms);
+
+ private:
+  RenderedImages Render(const SceneVars& scenes);
+  nn::Var Averaged(const nn::Var& images, std::int64_t channels) const;
+
+  nn::Context& context_;
+  GanConfig config_;
+  int size_;
+  std::array<Camera, kPrimaryViews> cameras_;  // of `samples` pixels a side of each
+  Mesh template_;
+  Topology topology_;
+  std::vector<glm::vec2> uvs_;
+  SceneRenderer renderer_;
+};
+
+}  // namespace tilegrad::train

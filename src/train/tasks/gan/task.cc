@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/task.h"
+
+#include "base/error.h"
+#include "io/image_file.h"
+#include "nn/nn.h"
+#include "train/data/trained_models.h"
+#include "train/predictor.h"
+#include "train/tasks/gan/learner.h"
+#include "train/tasks/gan/model.h"
+#include "train/tasks/gan/sheet.h"
+#include "train/tasks/held_out.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::uint64_t kSampleStream = 0x7368656574;
+constexpr std::int64_t kSamples = 24;
+constexpr int kStreamRows = 8, kStreamViews = 6;
+
+class GanTask : public Task {
+ public:
+  ConfigFields Fields() override { return FieldsOf(&config_); }
+  std::vector<TermLabel> Labels() const override;
+
+  Status Start(const TaskStart& start) override;
+  int image_size() const override { return dataset_->info().image_size; }
+  RunHeader Header() override;
+  Status Begin(const Path& run, std::int64_t first_step) override;
+
+  int Updates(std::int64_t step) const override { return learner_->Updates(step); }
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
+    return learner_->Update(at, gradients);
+  }
+  std::vector<nn::NamedTensor> State() override { return learner_->State(); }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
+    return learner_->LoadState(state, steps);
+  }
+  Result<ImageU8> SamplePicture(std::int64_t steps) override;
+
+  Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                           const Checkpoint& checkpoint) override {
+    TILEGRAD_ASSIGN(auto model, GeneratorModel::Load(context, config_, checkpoint));
+    return std::unique_ptr<Model>(std::move(model));
+  }
+  Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                              const ProgressSink& progress, const StopFlag& stop) override;
+  Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
+                        const ProgressSink& progress, const StopFlag& stop) override;
+
+ private:
+  Status ExtractTextures(const TaskStart& start);
+
+  GanConfig config_;
+  nn::Context* context_ = nullptr;
+  std::optional<Dataset> dataset_;
+  std::vector<TexturedMesh> meshes_;  // of training, to which the pictures refer
+  std::optional<RealPictures> pictures_;
+  std::optional<TextureBank> bank_;
+  std::unique_ptr<GanLearner> learner_;
+};
+
+std::vector<TermLabel> GanTask::Labels() const {
+  return {{"adversarial_shape", "Adversarial loss of silhouettes (− mean score)"},
+          {"adversarial_picture", "Adversarial loss of pictures (− mean score)"},
+          {"adversarial_texture", "Adversarial loss of texture maps (− mean score)"},
+          {"smoothness", "Smoothness (normals of neighbouring faces)"},
+          {"laplacian", "Laplacian of the movement"},
+          {"gradient_generator", "Norm of the generator's gradient"},
+          {"distance_shape", "Wasserstein estimate of the critic of silhouettes"},
+          {"distance_picture", "Wasserstein estimate of the critic of pictures"},
+          {"distance_texture", "Wasserstein estimate of the critic of texture maps"},
+          {"penalty_shape", "Gradient penalty of the critic of silhouettes"},
+          {"penalty_picture", "Gradient penalty of the critic of pictures"},
+          {"penalty_texture", "Gradient penalty of the critic of texture maps"},
+          {"gradient_shape", "Norm of the gradient of the critic of silhouettes"},
+          {"gradient_picture", "Norm of the gradient of the critic of pictures"},
+          {"gradient_texture", "Norm of the gradient of the critic of texture maps"},
+          {"distance", "Kernel distance to true pictures, times 1000, by which the best is kept"},
+          {"spread_shapes", "Spread of shapes, as a share of the data's"},
+          {"spread_colors", "Spread of colours, as a share of the data's"}};
+}
+
+Status GanTask::ExtractTextures(const TaskStart& start) {
+  if (config_.schedule.steps <= config_.shape_steps) return {};
+  const TextureBank::Job job{config_.textures.run, static_cast<int>(config_.textures.count),
+                             static_cast<std::uint64_t>(config_.schedule.seed), config_.stream,
+                             config_.network};
+  TILEGRAD_ASSIGN(bank_, TextureBank::Extract(job, {*dataset_, meshes_}, start.context.workers(),
+                                              start.progress, start.stop));
+  return {};
+}
+
+Status GanTask::Start(const TaskStart& start) {
+  context_ = &start.context;
+  config_.schedule = start.schedule;
+  TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  const std::vector<int> train = dataset_->Select(Split::kTrain);
+  if (train.empty())
+    return InvalidArgument("{}: no training models in it", dataset_->folder().string());
+  TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes,
+                                              start.context.workers(), start.progress, start.stop));
+  const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
+  const CameraRule& camera = dataset_->info().camera;
+  pictures_.emplace(*context_, RealPictures::Job{config_.stream, camera, image_size(), seed},
+                    meshes_);
+  TILEGRAD_TRY(ExtractTextures(start));
+  TILEGRAD_ASSIGN(learner_, GanLearner::Make(*context_, {config_, camera, start.warn},
+                                             {&*pictures_, bank_ ? &*bank_ : nullptr}));
+  return {};
+}
+
+Status GanTask::Begin(const Path& run, std::int64_t first_step) {
+  TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
+                                     first_step == 0 ? RunStart::kNew : RunStart::kContinued));
+  if (first_step > 0) return {};
+  if (!config_.start.empty()) {
+    TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(*context_, config_.start));
+    const Status started = learner_->StartAs(found.checkpoint.tensors);
+    if (!started.ok()) return started.Within("start.run = \"" + config_.start + "\"");
+  }
+  TILEGRAD_ASSIGN(const ImageU8 sheet, pictures_->Sheet(kStreamRows, kStreamViews));
+  return io::SavePng(run / "stream.png", sheet);
+}
+
+RunHeader GanTask::Header() {
+  RunHeader header;
+  header.dataset_source = dataset_->info().source;
+  header.training_models = static_cast<int>(meshes_.size());
+  header.parameters = learner_->parameters();
+  return header;
+}
+
+Result<nn::StepVector<nn::Gradient>> GanTask::Backward(const UpdateIndex& at, StepValues* out) {
+  TILEGRAD_ASSIGN(auto gradients, learner_->Backward(at, out));
+  out->stream_seconds = pictures_->TakeSeconds() + (at.update > 0 ? out->stream_seconds : 0);
+  return gradients;
+}
+
+Result<ImageU8> GanTask::SamplePicture(std::int64_t steps) {
+  TILEGRAD_ASSIGN(ShapeTextureGenerator * generator, learner_->Shown(steps));
+  const nn::Tensor codes = learner_->step().Noise(kSampleStream, 0, kSamples);
+  TILEGRAD_ASSIGN(const auto meshes,
+                  GenerateMeshes(*context_, *generator, codes, steps > config_.shape_steps));
+  return DrawSheet(meshes, {}, context_->workers());
+}
+
+Result<Evaluation> GanTask::Evaluate(const TaskEvaluation& /*job*/, const Workers& /*workers*/,
+                                     const ProgressSink& /*progress*/, const StopFlag& /*stop*/) {
+  return InvalidArgument(
+      "a generator predicts nothing that could be compared object by object: "
+      "tilegrad sample --score compares what it makes with held-out objects as sets");
+}
+
+Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& workers,
+                               const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
+  Showcase out = AboutDataset(dataset, request.header);
+  out.purpose = "to make textured objects from noise";
+  out.data += " Critics saw only pictures of the training models, no 3D data.";
+  out.note = "Objects of the first latent codes, not picked by hand.";
+  auto& model = dynamic_cast<GeneratorModel&>(request.predictor.model());
+  for (int i = 0; i < request.examples; ++i) {
+    if (stop) return Cancelled("stopped while generating; nothing was written");
+    TILEGRAD_ASSIGN(auto meshes, model.Generate(model.Code(0, static_cast<std::uint64_t>(i))));
+    Example& example = out.examples.emplace_back();
+    example.name = fmt::format("sample {}", i + 1), example.id = fmt::format("{}", i + 1);
+    for (const double azimuth : {0.0, 180.0}) {
+      constexpr int kSize = 192;
+      TILEGRAD_ASSIGN(auto pictures,
+                      DrawObjects(meshes, SheetCamera(kSize, azimuth), kSize, workers));
+      const char* const where = azimuth == 0 ? "from the front" : "from behind";
+      example.pictures.push_back({std::move(pictures[0]), where, example.name + " " + where});
+    }
+    example.prediction = std::move(meshes[0]);
+    if (progress)
+      progress({"generating", static_cast<std::size_t>(i) + 1,
+                static_cast<std::size_t>(request.examples), ""});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Task> MakeGanTask() { return std::make_unique<GanTask>(); }
+
+}  // namespace tilegrad::train

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/gan/watch.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "train/metrics/frechet.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::int64_t kCells = 8;  // along each side of a plane
+
+// As floats, whatever the tensor's type is.
+std::vector<float> Numbers(const nn::Tensor& tensor) {
+  std::vector<float> out;
+  nn::WithFloatType(tensor.dtype(), [&]<class T>(T) {
+    for (const T x : tensor.span<T>()) out.push_back(static_cast<float>(x));
+  });
+  return out;
+}
+
+FeatureRows CellsOf(const nn::Tensor& planes) {
+  const nn::Shape& shape = planes.shape();
+  const std::int64_t side = shape[3], cells = std::min(kCells, side);
+  const std::vector<float> all = Numbers(planes);
+  FeatureRows out;
+  out.width = static_cast<std::size_t>(shape[1] * cells * cells);
+  out.values.assign(static_cast<std::size_t>(shape[0]) * out.width, 0.0f);
+  std::vector<int> counts(static_cast<std::size_t>(cells));
+  for (std::int64_t x = 0; x < side; ++x) ++counts[static_cast<std::size_t>(x * cells / side)];
+  for (std::int64_t p = 0; p < shape[0] * shape[1]; ++p) {
+    for (std::int64_t y = 0; y < side; ++y) {
+      for (std::int64_t x = 0; x < side; ++x) {
+        const std::int64_t row = y * cells / side, column = x * cells / side;
+        const auto count = static_cast<float>(counts[static_cast<std::size_t>(row)] *
+                                              counts[static_cast<std::size_t>(column)]);
+        out.values[static_cast<std::size_t>((p * cells + row) * cells + column)] +=
+            all[static_cast<std::size_t>((p * side + y) * side + x)] / count;
+      }
+    }
+  }
+  return out;
+}
+
+double SoftIou(std::span<const float> a, std::span<const float> b) {
+  double both = 0, either = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    both += static_cast<double>(std::min(a[i], b[i]));
+    either += static_cast<double>(std::max(a[i], b[i]));
+  }
+  return either > 0 ? both / either : 1;
+}
+
+// Of each object over the pixels that it covers, all views together.
+std::vector<std::array<double, 3>> MeanColors(std::span<const float> colors,
+                                              std::span<const float> cover, std::size_t objects) {
+  const std::size_t plane = cover.size() / objects / kPrimaryViews;
+  std::vector<std::array<double, 3>> out(objects);
+  for (std::size_t i = 0; i < objects; ++i) {
+    double area = 1e-9;
+    for (const float share : cover.subspan(i * kPrimaryViews * plane, kPrimaryViews * plane))
+      area += static_cast<double>(share);
+    for (std::size_t v = 0; v < kPrimaryViews; ++v) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        for (const float x : colors.subspan(((i * kPrimaryViews + v) * 3 + c) * plane, plane))
+          out[i][c] += static_cast<double>(x) / area;
+      }
+    }
+  }
+  return out;
+}
+
+double Distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+}  // namespace
+
+Spread SpreadOf(const ObjectViews& set, const Workers& workers) {
+  const std::vector<float> cover = Numbers(set.cover), colors = Numbers(set.colors);
+  const auto n = static_cast<std::size_t>(set.cover.shape()[0]);
+  const std::size_t object = cover.size() / n;
+  const auto means = MeanColors(colors, cover, n);
+  const auto of = [&](std::size_t i) { return std::span(cover).subspan(i * object, object); };
+  std::vector<Spread> rows(n);
+  workers.For(n, [&](std::size_t i, std::size_t) {
+    for (std::size_t j = 0; j < i; ++j) {
+      rows[i].shapes += 1 - SoftIou(of(i), of(j));
+      rows[i].colors += Distance(means[i], means[j]);
+    }
+  });
+  Spread out;
+  const double pairs = static_cast<double>(n) * static_cast<double>(n - 1) / 2;
+  for (const Spread& row : rows) out.shapes += row.shapes / pairs, out.colors += row.colors / pairs;
+  return out;
+}
+
+FeatureRows CoverFeatures(const ObjectViews& set) { return CellsOf(set.cover); }
+FeatureRows ColorFeatures(const ObjectViews& set) { return CellsOf(set.colors); }
+
+GanWatch::GanWatch(ObjectViews truth, const Workers& workers)
+    : workers_(workers),
+      cover_(CoverFeatures(truth)),
+      colors_(ColorFeatures(truth)),
+      spread_(SpreadOf(truth, workers)) {}
+
+Result<Watched> GanWatch::Compare(const ObjectViews& generated, GanStage stage) const {
+  const bool shape = stage == GanStage::kShape;
+  TILEGRAD_ASSIGN(
+      const double distance,
+      KernelDistance(shape ? cover_ : colors_,
+                     shape ? CoverFeatures(generated) : ColorFeatures(generated), workers_));
+  const Spread spread = SpreadOf(generated, workers_);
+  return Watched{1000 * distance, spread.shapes / std::max(spread_.shapes, 1e-9),
+                 spread.colors / std::max(spread_.colors, 1e-9)};
+}
+
+}  // namespace tilegrad::train
