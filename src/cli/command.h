@@ -28,6 +28,7 @@ void AddMan(CLI::App& app, Action* action);
 void AddPredict(CLI::App& app, Action* action);
 void AddRender(CLI::App& app, Action* action);
 void AddReport(CLI::App& app, Action* action);
+void AddSample(CLI::App& app, Action* action);
 void AddSelftest(CLI::App& app, Action* action);
 void AddTimelapse(CLI::App& app, Action* action);
 void AddTradeoff(CLI::App& app, Action* action);

@@ -86,8 +86,9 @@ Status CheckValues(const CLI::App& app) {
 }
 
 void AddCommands(CLI::App& app, Action* action) {
-  for (const auto add : {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender,
-                         AddReport, AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews}) {
+  for (const auto add :
+       {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender, AddReport, AddSample,
+        AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews}) {
     add(app, action);
   }
   for (CLI::App* reader : app.get_subcommands({})) AddReadLimitOption(reader);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "train/tasks/gan/real_pictures.h"
 
 namespace tilegrad::train {
 namespace {
@@ -43,7 +44,7 @@ ConfigFields FieldsOf(GanCriticConfig* c) {
   };
 }
 
-// Of cameras there are four that never change.
+// Cameras never change.
 ConfigFields StreamFields(TexturedStreamConfig* c) {
   const std::vector<std::string> cameras = {
       "stream.elevation_low", "stream.elevation_high", "stream.around_low", "stream.around_high",
@@ -79,6 +80,8 @@ ConfigFields FieldsOf(GanConfig* c) {
        "weight of the normal difference of neighbouring faces"},
       {"loss.laplacian", &c->loss.laplacian, 0, kNoLimit,
        "weight of the Laplacian of the movement"},
+      {"critic.views", &c->views, 1, kMostViews,
+       "that critics see side by side: front, side, back, above, and two between; 4 in the paper"},
       {"stages.shape", &c->shape_steps, 0, kNoLimit,
        "steps that shapes learn in; then they are frozen, and textures learn"},
       {"start.run", &c->start, 0, 0,

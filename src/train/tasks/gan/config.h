@@ -37,6 +37,7 @@ struct GanConfig {
   GanTextureSource textures;
   RenderConfig render;  // of it `sharpness` and `max_alpha_error`
   OptimizerConfig optimizer;
+  std::int64_t views = 4;  // kMostViews at most
   std::int64_t batch = 16;
   std::int64_t score_every = 250, score_count = 128;
   TexturedStreamConfig stream;  // of it what is not a camera's

@@ -30,14 +30,15 @@ OptimizerConfig OptimizerOf(const GanConfig& config) {
 
 }  // namespace
 
-CriticRole SilhouetteRole() {
-  return {"critic_shape.",  "adversarial_shape",         "distance_shape", "penalty_shape",
-          "gradient_shape", std::int64_t{kPrimaryViews}, 0x637368};
+CriticRole SilhouetteRole(std::int64_t views) {
+  return {"critic_shape.", "adversarial_shape", "distance_shape",
+          "penalty_shape", "gradient_shape",    views,
+          0x637368};
 }
 
-CriticRole PictureRole() {
+CriticRole PictureRole(std::int64_t views) {
   return {"critic_picture.", "adversarial_picture", "distance_picture",
-          "penalty_picture", "gradient_picture",    3 * std::int64_t{kPrimaryViews},
+          "penalty_picture", "gradient_picture",    3 * views,
           0x637063};
 }
 

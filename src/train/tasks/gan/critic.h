@@ -22,9 +22,9 @@ struct CriticRole {
   nn::PadMode padding = nn::PadMode::kZero;
 };
 
-// Of the silhouettes in four views; of their colours; of maps, half of which go around.
-CriticRole SilhouetteRole();
-CriticRole PictureRole();
+// Of the silhouettes in all views; of their colours; of maps, half of which go around.
+CriticRole SilhouetteRole(std::int64_t views);
+CriticRole PictureRole(std::int64_t views);
 CriticRole TextureRole(const GeneratorConfig& maps);
 
 class GanCritic {

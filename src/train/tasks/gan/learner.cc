@@ -41,9 +41,9 @@ GanLearner::GanLearner(nn::Context& context, const Job& job, const Sources& sour
              std::max<std::int64_t>(1, config_.shape_steps)),
       texture_(context, generator_.texture(), config_.optimizer,
                std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)),
-      silhouettes_(context, config_, SilhouetteRole(),
+      silhouettes_(context, config_, SilhouetteRole(config_.views),
                    std::max<std::int64_t>(1, config_.shape_steps)),
-      pictures_(context, config_, PictureRole(),
+      pictures_(context, config_, PictureRole(config_.views),
                 std::max<std::int64_t>(1, config_.schedule.steps - config_.shape_steps)) {
   if (config_.critic.texture_weight > 0) {
     maps_.emplace(context, config_, TextureRole(config_.network),
@@ -159,7 +159,7 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   out->terms.push_back({"gradient_generator", 0, norm});
   AddScores(out);
   out->also.emplace_back("learning_rate", Weights(stage).RateAt(StageStep(at.step)));
-  out->images = config_.batch * static_cast<std::int64_t>(kPrimaryViews);
+  out->images = config_.batch * config_.views;
   return gradients;
 }
 

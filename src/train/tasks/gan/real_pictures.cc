@@ -18,13 +18,14 @@ LightConfig NoLight() {
 
 }  // namespace
 
-std::array<Camera, kPrimaryViews> PrimaryCameras(const CameraRule& rule) {
+std::vector<Camera> PrimaryCameras(const CameraRule& rule, std::int64_t count) {
   // Azimuth and elevation, degrees: in true profile, and from above, since most of what people look
   // at is seen from there.
-  constexpr double kDirections[kPrimaryViews][2] = {{0, 15}, {90, 10}, {180, 15}, {90, 80}};
-  std::array<Camera, kPrimaryViews> out;
-  for (std::size_t v = 0; v < kPrimaryViews; ++v)
-    out[v] = OrbitCamera(rule.lens, kDirections[v][0], kDirections[v][1], rule.distance);
+  constexpr double kDirections[kMostViews][2] = {{0, 15},  {90, 10}, {180, 15},
+                                                 {90, 80}, {40, 25}, {140, 25}};
+  std::vector<Camera> out;
+  for (std::int64_t v = 0; v < count; ++v)
+    out.push_back(OrbitCamera(rule.lens, kDirections[v][0], kDirections[v][1], rule.distance));
   return out;
 }
 
@@ -34,14 +35,14 @@ RealPictures::RealPictures(nn::Context& context, const Job& job,
       job_(job),
       stream_({job.config, NoLight(), job.camera, job.size, job.seed}, meshes, context.workers()),
       order_(static_cast<int>(meshes.size()), 1, job.seed) {
-  for (const Camera& camera : PrimaryCameras(job.camera)) views_.push_back({camera, {}});
+  for (const Camera& camera : PrimaryCameras(job.camera, job.views)) views_.push_back({camera, {}});
 }
 
 Result<ObjectViews> RealPictures::Draw(std::uint64_t number, int count) {
   const auto models = order_.Batch(static_cast<std::int64_t>(number), count, 1);
   const std::int64_t size = job_.size;
-  ObjectViews out{context_.Empty({count, 3 * std::int64_t{kPrimaryViews}, size, size}),
-                  context_.Empty({count, std::int64_t{kPrimaryViews}, size, size})};
+  ObjectViews out{context_.Empty({count, 3 * job_.views, size, size}),
+                  context_.Empty({count, job_.views, size, size})};
   TILEGRAD_TRY(Place(models, number * static_cast<std::uint64_t>(count), &out));
   return out;
 }
@@ -71,9 +72,9 @@ Status RealPictures::Place(std::span<const Sample> models, std::uint64_t first, 
       seconds_[b] += ThreadSeconds() - start;
       failures_[b] = rgba.status();
       if (!rgba.ok()) return;
-      for (std::size_t v = 0; v < kPrimaryViews; ++v) {
+      for (std::size_t v = 0; v < views_.size(); ++v) {
         const auto view = rgba->subspan(4 * plane * v, 4 * plane);
-        const std::size_t at = b * kPrimaryViews + v;
+        const std::size_t at = b * views_.size() + v;
         std::copy_n(view.begin(), 3 * plane, colors + 3 * plane * at);
         std::copy_n(view.begin() + static_cast<std::ptrdiff_t>(3 * plane), plane,
                     cover + plane * at);

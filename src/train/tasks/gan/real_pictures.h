@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What critics see of true objects: pictures from four views that never change, without light. So
+// What critics see of true objects: pictures from a few views that never change, without light. So
 // whatever is generated has to stand as the training objects do. A pure function of (seed, place in
 // the run).
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -14,14 +13,15 @@
 
 namespace tilegrad::train {
 
-inline constexpr std::size_t kPrimaryViews = 4;
-// From the front, the side, the back and from above: OrbitCameras at the distance of `rule`.
-std::array<Camera, kPrimaryViews> PrimaryCameras(const CameraRule& rule);
+inline constexpr std::int64_t kMostViews = 6;
+// From the front, the side, the back and from above, then from between front and side and between
+// side and back: the first `count` of these, OrbitCameras at the distance of `rule`.
+std::vector<Camera> PrimaryCameras(const CameraRule& rule, std::int64_t count);
 
-// Of B objects, averaged from `stream.samples` samples a side of each pixel.
+// Of B objects in V views, averaged from `stream.samples` samples a side of each pixel.
 struct ObjectViews {
-  nn::Tensor colors;  // [B, 12, size, size]: RGB over black of each view
-  nn::Tensor cover;   // [B, 4, size, size]: the covered share
+  nn::Tensor colors;  // [B, 3 V, size, size]: RGB over black of each view
+  nn::Tensor cover;   // [B, V, size, size]: the covered share
 };
 
 class RealPictures {
@@ -29,6 +29,7 @@ class RealPictures {
   struct Job {
     TexturedStreamConfig config;
     CameraRule camera;
+    std::int64_t views = 4;
     int size = 64;
     std::uint64_t seed = 0;
   };

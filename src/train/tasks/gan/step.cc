@@ -16,7 +16,7 @@ GanStep::GanStep(nn::Context& context, const GanConfig& config, const CameraRule
     : context_(context),
       config_(config),
       size_(rule.lens.width),
-      cameras_(PrimaryCameras(rule)),
+      cameras_(PrimaryCameras(rule, config.views)),
       template_(Icosphere(static_cast<int>(config.network.template_level),
                           static_cast<float>(config.network.template_radius))),
       topology_(BuildTopology(template_.faces, template_.positions.size())),
@@ -39,8 +39,8 @@ RenderedImages GanStep::Render(const SceneVars& scenes) {
   const auto meshes = static_cast<std::size_t>(scenes.positions.shape()[0]);
   RenderJob job;
   job.faces = {template_.faces[0].data(), 3 * template_.faces.size()};
-  job.views = static_cast<int>(kPrimaryViews);
-  job.cameras.reserve(meshes * kPrimaryViews);
+  job.views = static_cast<int>(cameras_.size());
+  job.cameras.reserve(meshes * cameras_.size());
   for (std::size_t b = 0; b < meshes; ++b)
     job.cameras.insert(job.cameras.end(), cameras_.begin(), cameras_.end());
   job.options.width = job.options.height = size_ * static_cast<int>(config_.stream.draw.samples);
@@ -62,7 +62,7 @@ nn::Var GanStep::Averaged(const nn::Var& images, std::int64_t channels) const {
 GeneratedObjects GanStep::Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                                GanStage stage, nn::Mode mode) {
   const nn::Var code = nn::Constant(context_, noise);
-  constexpr std::int64_t views = kPrimaryViews;
+  const std::int64_t views = config_.views;
   GeneratedObjects out;
   out.shapes = generator.MakeShapes(code, mode);
   if (!out.shapes.positions.valid()) return out;

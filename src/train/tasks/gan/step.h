@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the generator of section 5.5 goes down on: noise -> shape and texture -> four pictures of
+// What the generator of section 5.5 goes down on: noise -> shape and texture -> pictures of
 // each object -> critics. First shapes learn, through silhouettes; then they are frozen, and
 // textures learn.
 #pragma once
@@ -20,8 +20,8 @@ enum class GanStage { kShape, kTexture };
 struct GeneratedObjects {
   ShapeTextureGenerator::Shapes shapes;
   nn::Var maps;    // of the second stage
-  nn::Var cover;   // [B, 4, size, size]; of the first stage
-  nn::Var colors;  // [B, 12, size, size], RGB over black; of the second one
+  nn::Var cover;   // [B, V, size, size]; of the first stage
+  nn::Var colors;  // [B, 3 V, size, size], RGB over black; of the second one
 };
 
 class GanStep {
@@ -48,7 +48,7 @@ class GanStep {
   nn::Context& context_;
   GanConfig config_;
   int size_;
-  std::array<Camera, kPrimaryViews> cameras_;  // of `samples` pixels a side of each
+  std::vector<Camera> cameras_;  // of `samples` pixels a side of each
   Mesh template_;
   Topology topology_;
   std::vector<glm::vec2> uvs_;

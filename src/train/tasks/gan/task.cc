@@ -104,7 +104,8 @@ Status GanTask::Start(const TaskStart& start) {
                                               start.context.workers(), start.progress, start.stop));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
   const CameraRule& camera = dataset_->info().camera;
-  pictures_.emplace(*context_, RealPictures::Job{config_.stream, camera, image_size(), seed},
+  pictures_.emplace(*context_,
+                    RealPictures::Job{config_.stream, camera, config_.views, image_size(), seed},
                     meshes_);
   TILEGRAD_TRY(ExtractTextures(start));
   TILEGRAD_ASSIGN(learner_, GanLearner::Make(*context_, {config_, camera, start.warn},

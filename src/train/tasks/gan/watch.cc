@@ -55,16 +55,17 @@ double SoftIou(std::span<const float> a, std::span<const float> b) {
 
 // Of each object over the pixels that it covers, all views together.
 std::vector<std::array<double, 3>> MeanColors(std::span<const float> colors,
-                                              std::span<const float> cover, std::size_t objects) {
-  const std::size_t plane = cover.size() / objects / kPrimaryViews;
+                                              std::span<const float> cover, std::size_t objects,
+                                              std::size_t views) {
+  const std::size_t plane = cover.size() / objects / views;
   std::vector<std::array<double, 3>> out(objects);
   for (std::size_t i = 0; i < objects; ++i) {
     double area = 1e-9;
-    for (const float share : cover.subspan(i * kPrimaryViews * plane, kPrimaryViews * plane))
+    for (const float share : cover.subspan(i * views * plane, views * plane))
       area += static_cast<double>(share);
-    for (std::size_t v = 0; v < kPrimaryViews; ++v) {
+    for (std::size_t v = 0; v < views; ++v) {
       for (std::size_t c = 0; c < 3; ++c) {
-        for (const float x : colors.subspan(((i * kPrimaryViews + v) * 3 + c) * plane, plane))
+        for (const float x : colors.subspan(((i * views + v) * 3 + c) * plane, plane))
           out[i][c] += static_cast<double>(x) / area;
       }
     }
@@ -82,7 +83,7 @@ Spread SpreadOf(const ObjectViews& set, const Workers& workers) {
   const std::vector<float> cover = Numbers(set.cover), colors = Numbers(set.colors);
   const auto n = static_cast<std::size_t>(set.cover.shape()[0]);
   const std::size_t object = cover.size() / n;
-  const auto means = MeanColors(colors, cover, n);
+  const auto means = MeanColors(colors, cover, n, static_cast<std::size_t>(set.cover.shape()[1]));
   const auto of = [&](std::size_t i) { return std::span(cover).subspan(i * object, object); };
   std::vector<Spread> rows(n);
   workers.For(n, [&](std::size_t i, std::size_t) {

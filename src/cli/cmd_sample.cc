@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// tilegrad sample: new textured objects from a trained generator.
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/output_guard.h"
+#include "cli/command.h"
+#include "cli/console.h"
+#include "cli/run_folder.h"
+#include "cli/sample_pictures.h"
+#include "io/glb_writer.h"
+#include "io/image_file.h"
+#include "train/tasks/gan/sheet.h"
+
+namespace tilegrad::cli {
+namespace {
+
+struct SampleOptions {
+  std::string run, out = "samples";
+  int count = 24, interpolate = 0, workers = 0;
+  std::uint64_t seed = 0;
+  bool force = false;
+};
+
+// Where everything goes.
+struct SampleFiles {
+  explicit SampleFiles(const SampleOptions& options)
+      : out(options.out),
+        sheet(out / "sheet.png"),
+        turntable(out / "turntable.webp"),
+        strip(out / "interpolation.png"),
+        animation(out / "interpolation.webp") {
+    for (int i = 1; i <= options.count; ++i)
+      meshes.push_back(out / fmt::format("sample_{:03}.glb", i));
+    all = meshes;
+    all.insert(all.end(), {sheet, turntable});
+    if (options.interpolate > 0) all.insert(all.end(), {strip, animation});
+  }
+  Path out, sheet, turntable, strip, animation;
+  std::vector<Path> meshes, all;
+};
+
+Result<train::GeneratorModel*> GeneratorOf(const train::Predictor& predictor, const Path& run) {
+  auto* const model = dynamic_cast<train::GeneratorModel*>(&predictor.model());
+  if (model != nullptr) return model;
+  return InvalidArgument(
+      "{}: this run makes nothing from noise; name one that was trained to, such as of "
+      "configs/gan_quick.toml",
+      run.string());
+}
+
+Result<std::vector<Mesh>> GenerateAll(train::GeneratorModel& model,
+                                      std::span<const std::vector<float>> codes) {
+  std::vector<Mesh> meshes;
+  for (std::size_t at = 0; at < codes.size(); at += train::Model::kImagesAtOnce) {
+    std::vector<float> some;
+    const std::size_t end = std::min(codes.size(), at + train::Model::kImagesAtOnce);
+    for (std::size_t i = at; i < end; ++i)
+      some.insert(some.end(), codes[i].begin(), codes[i].end());
+    TILEGRAD_ASSIGN(auto made, model.Generate(some));
+    for (Mesh& mesh : made) meshes.push_back(std::move(mesh));
+  }
+  return meshes;
+}
+
+Status Interpolate(const SampleOptions& options, const SampleFiles& files,
+                   std::span<const std::vector<float>> codes, train::GeneratorModel& model,
+                   const Workers& workers, nlohmann::ordered_json* json) {
+  TILEGRAD_ASSIGN(const InterpolationSteps steps,
+                  DrawInterpolation({codes, options.interpolate, files.strip, files.animation},
+                                    model, workers));
+  const double ratio = steps.mean > 0 ? steps.largest / steps.mean : 0;
+  Print("interpolation: {}, {}; the largest step is {:.1f} times the mean one\n",
+        files.strip.string(), files.animation.string(), ratio);
+  (*json)["interpolation"] = {{"strip", files.strip.string()},
+                              {"animation", files.animation.string()},
+                              {"mean_step", steps.mean},
+                              {"largest_step", steps.largest}};
+  return {};
+}
+
+Status RunSampling(const SampleOptions& options) {
+  if (options.interpolate > 0 && options.count < 2)
+    return InvalidArgument("--interpolate goes from one sample to the next: --count 2 or more");
+  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
+  const SampleFiles files(options);
+  const OutputGuard guard(options.force);
+  TILEGRAD_TRY(guard.CheckAll(files.all));
+  const Workers workers(options.workers);
+  TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
+  TILEGRAD_ASSIGN(train::GeneratorModel * model, GeneratorOf(predictor, run));
+  std::vector<std::vector<float>> codes;
+  for (int i = 0; i < options.count; ++i)
+    codes.push_back(model->Code(options.seed, static_cast<std::uint64_t>(i)));
+  TILEGRAD_ASSIGN(const auto meshes, GenerateAll(*model, codes));
+  nlohmann::ordered_json json = {{"seed", options.seed},
+                                 {"textured", model->textured()},
+                                 {"sheet", files.sheet.string()},
+                                 {"turntable", files.turntable.string()}};
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    TILEGRAD_TRY(io::SaveGlb(files.meshes[i], meshes[i]));
+    json["meshes"].push_back(files.meshes[i].string());
+  }
+  TILEGRAD_ASSIGN(const ImageU8 sheet, train::DrawSheet(meshes, {}, workers));
+  TILEGRAD_TRY(io::SavePng(files.sheet, sheet));
+  TILEGRAD_TRY(AnimateSamples(meshes, files.turntable, workers));
+  Print("{}: {} to {}\n{}, {}\n", predictor.description(), files.meshes.front().string(),
+        files.meshes.back().string(), files.sheet.string(), files.turntable.string());
+  if (options.interpolate > 0)
+    TILEGRAD_TRY(Interpolate(options, files, codes, *model, workers, &json));
+  guard.NoteAll(files.all);
+  PrintResult(json);
+  return {};
+}
+
+}  // namespace
+
+void AddSample(CLI::App& app, Action* action) {
+  auto options = std::make_shared<SampleOptions>();
+  auto* command =
+      app.add_subcommand("sample", "Make new textured 3D objects with a trained generator");
+  command->add_option("--run", options->run,
+                      "run folder or one checkpoint [the newest below runs/]");
+  command->add_option("--count", options->count, "objects")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 999));
+  command
+      ->add_option("--out", options->out,
+                   "folder for sample_001.glb and so on, sheet.png (each from the front and from "
+                   "behind) and turntable.webp")
+      ->capture_default_str();
+  command
+      ->add_option("--seed", options->seed,
+                   "of the latent codes: the same seed makes the same objects, to the bit")
+      ->capture_default_str();
+  command
+      ->add_option("--interpolate", options->interpolate,
+                   "steps from each object to the next, for interpolation.png (a row for each "
+                   "pair) and interpolation.webp; 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
+  AddForceOption(command, &options->force);
+  AddWorkersOption(command, &options->workers);
+  command->callback([options, action] { *action = [options] { return RunSampling(*options); }; });
+}
+
+}  // namespace tilegrad::cli
