@@ -65,6 +65,11 @@ Status CheckGenerator(const GeneratorConfig& config) {
                          config.texture_size, 2 * kRootRows);
 }
 
+void ShapeTextureGenerator::ShapeNet::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
+  net.Visit(prefix, visitor);
+  visitor.Buffer(prefix + "scale", scale);
+}
+
 nn::Var ShapeTextureGenerator::TextureNet::Forward(const nn::Var& noise, nn::Mode mode) {
   const nn::Var flat = first.Forward(noise, mode);
   if (!flat.valid()) return flat;
@@ -99,14 +104,16 @@ ShapeTextureGenerator::ShapeTextureGenerator(nn::Context& context, const Generat
 }
 
 void ShapeTextureGenerator::BuildShape(Rng& rng) {
-  AddLinear(shape_, "fc1", context_, config_.shape_noise, config_.hidden, rng);
-  shape_.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  AddLinear(shape_, "fc2", context_, config_.hidden, config_.hidden, rng);
-  shape_.Add<nn::Activation>("act2", &nn::LeakyRelu02);
+  nn::Sequential& net = shape_.net;
+  AddLinear(net, "fc1", context_, config_.shape_noise, config_.hidden, rng);
+  net.Add<nn::Activation>("act1", &nn::LeakyRelu02);
+  AddLinear(net, "fc2", context_, config_.hidden, config_.hidden, rng);
+  net.Add<nn::Activation>("act2", &nn::LeakyRelu02);
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = AddLinear(shape_, "fc3", context_, config_.hidden, numbers, rng);
+  auto& offsets = AddLinear(net, "fc3", context_, config_.hidden, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
+  shape_.scale = context_.Full({3}, 1);
 }
 
 void ShapeTextureGenerator::BuildTexture(Rng& rng) {
@@ -140,7 +147,9 @@ ShapeTextureGenerator::Shapes ShapeTextureGenerator::MakeShapes(const nn::Var& n
                                                                 nn::Mode mode) {
   const nn::Var own = nn::Slice(noise, 1, 0, config_.shape_noise);
   const nn::Var movement = offsets_.Apply(shape_.Forward(own, mode));
-  return {movement, movement + nn::Constant(context_, template_positions_)};
+  const nn::Var start =
+      nn::Constant(context_, shape_.scale) * nn::Constant(context_, template_positions_);
+  return {movement, movement + start};
 }
 
 nn::Var ShapeTextureGenerator::MakeMaps(const nn::Var& noise, nn::Mode mode) {
@@ -149,6 +158,14 @@ nn::Var ShapeTextureGenerator::MakeMaps(const nn::Var& noise, nn::Mode mode) {
 
 nn::Var ShapeTextureGenerator::Textures(const nn::Var& maps) const {
   return nn::Permute(nn::Gather(maps, 3, columns_), {0, 2, 3, 1});
+}
+
+void ShapeTextureGenerator::SetEllipsoid(const std::array<double, 3>& half_axes) {
+  nn::WithFloatType(shape_.scale.dtype(), [&]<class T>(T) {
+    std::ranges::transform(half_axes, shape_.scale.span<T>().begin(), [&](double half) {
+      return static_cast<T>(half / config_.template_radius);
+    });
+  });
 }
 
 void ShapeTextureGenerator::SetMeanMap(std::span<const float> map) {

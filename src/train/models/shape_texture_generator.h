@@ -3,6 +3,7 @@
 // and its texture map out. The paper names no sizes; these are ours.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -36,7 +37,7 @@ class ShapeTextureGenerator {
   ShapeTextureGenerator(nn::Context& context, const GeneratorConfig& config, std::uint64_t seed);
 
   struct Shapes {
-    nn::Var movement, positions;  // [B, V, 3]: the offsets, and the sphere moved by them
+    nn::Var movement, positions;  // [B, V, 3]: the offsets, and the ellipsoid moved by them
   };
   // noise: [B, noise]
   Shapes MakeShapes(const nn::Var& noise, nn::Mode mode);
@@ -48,6 +49,9 @@ class ShapeTextureGenerator {
 
   nn::Module& shape() { return shape_; }
   nn::Module& texture() { return texture_; }
+  // Shapes start as the ellipsoid with these half axes, world units, x y z; as the sphere if none
+  // are set. A start that fills true silhouettes needs no folds to become what they show.
+  void SetEllipsoid(const std::array<double, 3>& half_axes);
   // The map that textures start as, [3, texture_size, map_width()] in [0, 1]; grey if none is set.
   void SetMeanMap(std::span<const float> map);
 
@@ -65,6 +69,14 @@ class ShapeTextureGenerator {
   std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
 
  private:
+  struct ShapeNet : nn::Module {
+    nn::Sequential net;
+    nn::Tensor scale;  // [3], of the sphere
+    nn::Var Forward(const nn::Var& noise, nn::Mode mode) override {
+      return net.Forward(noise, mode);
+    }
+    void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+  };
   struct TextureNet : nn::Module {
     nn::Sequential net;
     nn::Tensor mean;  // logits, [1, 3, h, w]
@@ -83,7 +95,7 @@ class ShapeTextureGenerator {
   nn::Tensor template_positions_;  // [V, 3]
   OffsetMap offsets_;
   nn::Tensor columns_;  // of a map for each column of a texture
-  nn::Sequential shape_;
+  ShapeNet shape_;
   TextureNet texture_;
 };
 

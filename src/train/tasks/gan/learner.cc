@@ -60,6 +60,9 @@ Result<std::unique_ptr<GanLearner>> GanLearner::Make(nn::Context& context, const
   std::unique_ptr<GanLearner> out(new GanLearner(context, job, sources));
   TILEGRAD_ASSIGN(ObjectViews truth,
                   sources.pictures->Draw(kScoreNumber, static_cast<int>(job.config.score_count)));
+  const auto half_axes = MeanHalfAxes(truth, job.camera);
+  for (ShapeTextureGenerator* generator : {&out->generator_, &out->shown_, &out->kept_})
+    generator->SetEllipsoid(half_axes);
   out->watch_.emplace(std::move(truth), context.workers());
   if (sources.bank != nullptr) {
     const std::vector<float> mean = sources.bank->Mean();

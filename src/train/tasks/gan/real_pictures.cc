@@ -16,17 +16,52 @@ LightConfig NoLight() {
   return light;
 }
 
+// Width and height in pixels of what is covered by half and more.
+template <class T>
+std::array<double, 2> BoxOf(std::span<const T> plane, std::size_t side) {
+  std::size_t left = side, right = 0, top = side, bottom = 0;
+  for (std::size_t i = 0; i < plane.size(); ++i) {
+    if (plane[i] < T(0.5)) continue;
+    left = std::min(left, i % side), right = std::max(right, i % side + 1);
+    top = std::min(top, i / side), bottom = std::max(bottom, i / side + 1);
+  }
+  if (right == 0) return {1, 1};
+  return {static_cast<double>(right - left), static_cast<double>(bottom - top)};
+}
+
 }  // namespace
 
 std::vector<Camera> PrimaryCameras(const CameraRule& rule, std::int64_t count) {
-  // Azimuth and elevation, degrees: in true profile, and from above, since most of what people look
-  // at is seen from there.
-  constexpr double kDirections[kMostViews][2] = {{0, 15},  {90, 10}, {180, 15},
-                                                 {90, 80}, {40, 25}, {140, 25}};
+  // Azimuth and elevation, degrees: objects face +z, which is 90.
+  constexpr double kDirections[kMostViews][2] = {{90, 15}, {0, 10},  {270, 15},
+                                                 {90, 80}, {50, 25}, {310, 25}};
   std::vector<Camera> out;
   for (std::int64_t v = 0; v < count; ++v)
     out.push_back(OrbitCamera(rule.lens, kDirections[v][0], kDirections[v][1], rule.distance));
   return out;
+}
+
+std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& rule) {
+  constexpr double kInside = 0.9;  // of the box: shapes grow rather than shrink
+  const nn::Shape& shape = views.cover.shape();
+  std::array<double, 2> front = {}, side = {};
+  nn::WithFloatType(views.cover.dtype(), [&]<class T>(T) {
+    const auto plane = static_cast<std::size_t>(shape[2] * shape[3]);
+    const auto of = [&](std::int64_t object, std::int64_t view) {
+      const auto at = static_cast<std::size_t>(object * shape[1] + view) * plane;
+      return BoxOf(views.cover.span<T>().subspan(at, plane), static_cast<std::size_t>(shape[3]));
+    };
+    for (std::int64_t i = 0; i < shape[0]; ++i) {
+      const auto f = of(i, 0), s = of(i, std::min<std::int64_t>(1, shape[1] - 1));
+      for (std::size_t k = 0; k < 2; ++k) {
+        front[k] += f[k] / static_cast<double>(shape[0]);
+        side[k] += s[k] / static_cast<double>(shape[0]);
+      }
+    }
+  });
+  const double world =
+      kInside * rule.distance / static_cast<double>(PrimaryCameras(rule, 1)[0].fy) / 2;
+  return {world * front[0], world * side[1], world * side[0]};
 }
 
 RealPictures::RealPictures(nn::Context& context, const Job& job,

@@ -4,6 +4,7 @@
 // the run).
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,10 @@ struct ObjectViews {
   nn::Tensor colors;  // [B, 3 V, size, size]: RGB over black of each view
   nn::Tensor cover;   // [B, V, size, size]: the covered share
 };
+
+// Half axes of an ellipsoid about as large as these objects, x y z: of the boxes of their
+// silhouettes from the front, the side and above, as if each lay at the origin.
+std::array<double, 3> MeanHalfAxes(const ObjectViews& views, const CameraRule& rule);
 
 class RealPictures {
  public:

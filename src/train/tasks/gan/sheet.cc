@@ -9,7 +9,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kFront = 35, kBehind = 215, kElevation = 20;  // degrees
+constexpr double kFront = 50, kBehind = 230, kElevation = 20;  // degrees
 
 }  // namespace
 
