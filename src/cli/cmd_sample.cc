@@ -10,6 +10,7 @@
 #include "cli/sample_pictures.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
+#include "train/tasks/gan/scores.h"
 #include "train/tasks/gan/sheet.h"
 
 namespace tilegrad::cli {
@@ -19,7 +20,9 @@ struct SampleOptions {
   std::string run, out = "samples";
   int count = 24, interpolate = 0, workers = 0;
   std::uint64_t seed = 0;
-  bool force = false;
+  bool force = false, score = false;
+  std::string data, judge;
+  int score_count = 256;
 };
 
 // Where everything goes.
@@ -29,14 +32,18 @@ struct SampleFiles {
         sheet(out / "sheet.png"),
         turntable(out / "turntable.webp"),
         strip(out / "interpolation.png"),
-        animation(out / "interpolation.webp") {
+        animation(out / "interpolation.webp"),
+        scores(out / "scores.md"),
+        numbers(out / "scores.json"),
+        nearest(out / "nearest.png") {
     for (int i = 1; i <= options.count; ++i)
       meshes.push_back(out / fmt::format("sample_{:03}.glb", i));
     all = meshes;
     all.insert(all.end(), {sheet, turntable});
     if (options.interpolate > 0) all.insert(all.end(), {strip, animation});
+    if (options.score) all.insert(all.end(), {scores, numbers, nearest});
   }
-  Path out, sheet, turntable, strip, animation;
+  Path out, sheet, turntable, strip, animation, scores, numbers, nearest;
   std::vector<Path> meshes, all;
 };
 
@@ -79,9 +86,31 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
   return {};
 }
 
+Status Score(const SampleOptions& options, const SampleFiles& files, const Path& run,
+             train::GeneratorModel& model, const Workers& workers, nlohmann::ordered_json* json) {
+  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
+  nn::Context context(workers);
+  ProgressLine line;
+  const auto scores = train::ScoreGenerator(
+      context, model, {run, data, options.score_count, options.seed, options.judge}, line.Sink(),
+      StopOnSignals());
+  line.Finish();
+  if (!scores.ok()) return scores.status();
+  const std::string text = train::FormatScores(*scores);
+  TILEGRAD_TRY(WriteTextAtomic(files.scores, text));
+  (*json)["scores"] = train::ScoresJson(*scores);
+  TILEGRAD_TRY(WriteTextAtomic(files.numbers, (*json)["scores"].dump(2) + "\n"));
+  TILEGRAD_TRY(io::SavePng(files.nearest, scores->nearest));
+  Print("{}written to {} and {}; samples beside the nearest training objects: {}\n", text,
+        files.scores.string(), files.numbers.string(), files.nearest.string());
+  return {};
+}
+
 Status RunSampling(const SampleOptions& options) {
   if (options.interpolate > 0 && options.count < 2)
     return InvalidArgument("--interpolate goes from one sample to the next: --count 2 or more");
+  if (!options.score && !(options.data.empty() && options.judge.empty()))
+    return InvalidArgument("--data and --judge are of --score");
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const SampleFiles files(options);
   const OutputGuard guard(options.force);
@@ -108,6 +137,7 @@ Status RunSampling(const SampleOptions& options) {
         files.meshes.back().string(), files.sheet.string(), files.turntable.string());
   if (options.interpolate > 0)
     TILEGRAD_TRY(Interpolate(options, files, codes, *model, workers, &json));
+  if (options.score) TILEGRAD_TRY(Score(options, files, run, *model, workers, &json));
   guard.NoteAll(files.all);
   PrintResult(json);
   return {};
@@ -139,6 +169,16 @@ void AddSample(CLI::App& app, Action* action) {
                    "pair) and interpolation.webp; 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
+  command->add_flag("--score", options->score,
+                    "compare as many objects more with true ones, as sets: scores.md, scores.json, "
+                    "and nearest.png with the nearest training objects");
+  command->add_option("--data", options->data, "with --score: dataset [the run's own]");
+  command->add_option("--judge", options->judge,
+                      "with --score: run of configs/classify.toml whose features pictures are "
+                      "compared by [cells of the pictures]");
+  command->add_option("--score-count", options->score_count, "with --score: objects of each set")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 100000));
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
   command->callback([options, action] { *action = [options] { return RunSampling(*options); }; });

@@ -156,6 +156,12 @@ nn::Var ShapeTextureGenerator::MakeMaps(const nn::Var& noise, nn::Mode mode) {
   return texture_.Forward(noise, mode);
 }
 
+nn::Var ShapeTextureGenerator::MeanMaps(std::int64_t count) const {
+  const nn::Shape& one = texture_.mean.shape();
+  return nn::BroadcastTo(nn::Sigmoid(nn::Constant(context_, texture_.mean)),
+                         {count, one[1], one[2], one[3]});
+}
+
 nn::Var ShapeTextureGenerator::Textures(const nn::Var& maps) const {
   return nn::Permute(nn::Gather(maps, 3, columns_), {0, 2, 3, 1});
 }

@@ -44,6 +44,7 @@ class ShapeTextureGenerator {
   // [B, 3, texture_size, map_width()] in [0, 1], by the sphere's longitude and latitude: what is
   // learned of a map. With `symmetric_texture` the half of it around u = 1/2, where x > 0.
   nn::Var MakeMaps(const nn::Var& noise, nn::Mode mode);
+  nn::Var MeanMaps(std::int64_t count) const;  // that many of SetMeanMap's
   // Maps as textures [B, texture_size, texture_size, 3].
   nn::Var Textures(const nn::Var& maps) const;
 

@@ -59,30 +59,37 @@ nn::Var GanStep::Averaged(const nn::Var& images, std::int64_t channels) const {
   return samples == 1 ? all : nn::AvgPool2d(all, {.kernel = samples, .stride = samples});
 }
 
+nn::Var GanStep::Colors(const ShapeTextureGenerator& generator, const nn::Var& positions,
+                        const nn::Var& maps) {
+  const SceneVars scenes{.positions = positions, .textures = generator.Textures(maps)};
+  return Averaged(Render(scenes).colors, 3 * config_.views);
+}
+
 GeneratedObjects GanStep::Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise,
                                GanStage stage, nn::Mode mode) {
   const nn::Var code = nn::Constant(context_, noise);
-  const std::int64_t views = config_.views;
   GeneratedObjects out;
   out.shapes = generator.MakeShapes(code, mode);
   if (!out.shapes.positions.valid()) return out;
   if (stage == GanStage::kShape) {
-    out.cover = Averaged(Render({.positions = out.shapes.positions}).alpha, views);
+    out.cover = Averaged(Render({.positions = out.shapes.positions}).alpha, config_.views);
     return out;
   }
   out.maps = generator.MakeMaps(code, mode);
-  const SceneVars scenes{.positions = nn::Detach(out.shapes.positions),
-                         .textures = generator.Textures(out.maps)};
-  out.colors = Averaged(Render(scenes).colors, 3 * views);
+  out.colors = Colors(generator, nn::Detach(out.shapes.positions), out.maps);
   return out;
 }
 
-ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& noise) {
+ObjectViews GanStep::Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
+                          Texture texture) {
   const nn::NoGrad off(context_);
-  ObjectViews out;
-  out.cover = Draw(generator, noise, GanStage::kShape, nn::Mode::kEval).cover.value();
-  out.colors = Draw(generator, noise, GanStage::kTexture, nn::Mode::kEval).colors.value();
-  return out;
+  const nn::Var code = nn::Constant(context_, noise);
+  const nn::Var positions = generator.MakeShapes(code, nn::Mode::kEval).positions;
+  const nn::Var maps = texture == Texture::kMean ? generator.MeanMaps(noise.shape()[0])
+                                                 : generator.MakeMaps(code, nn::Mode::kEval);
+  if (!positions.valid() || !maps.valid()) return {};
+  return {Colors(generator, positions, maps).value(),
+          Averaged(Render({.positions = positions}).alpha, config_.views).value()};
 }
 
 nn::Var GanStep::ShapeLoss(const ShapeTextureGenerator::Shapes& shapes,

@@ -36,13 +36,17 @@ class GanStep {
   GeneratedObjects Draw(ShapeTextureGenerator& generator, const nn::Tensor& noise, GanStage stage,
                         nn::Mode mode);
   // Both stages' pictures as numbers, in the weights' evaluation.
-  ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise);
+  enum class Texture { kOwn, kMean };
+  ObjectViews Show(ShapeTextureGenerator& generator, const nn::Tensor& noise,
+                   Texture texture = Texture::kOwn);
 
   // Regularisers of shapes, weighted; appends them.
   nn::Var ShapeLoss(const ShapeTextureGenerator::Shapes& shapes, std::vector<LossTerm>* terms);
 
  private:
   RenderedImages Render(const SceneVars& scenes);
+  nn::Var Colors(const ShapeTextureGenerator& generator, const nn::Var& positions,
+                 const nn::Var& maps);
   nn::Var Averaged(const nn::Var& images, std::int64_t channels) const;
 
   nn::Context& context_;
