@@ -87,13 +87,12 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
 }
 
 Status Score(const SampleOptions& options, const SampleFiles& files, const Path& run,
-             train::GeneratorModel& model, const Workers& workers, nlohmann::ordered_json* json) {
+             train::GeneratorModel& model, nlohmann::ordered_json* json) {
   TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.data, run));
-  nn::Context context(workers);
   ProgressLine line;
-  const auto scores = train::ScoreGenerator(
-      context, model, {run, data, options.score_count, options.seed, options.judge}, line.Sink(),
-      StopOnSignals());
+  const auto scores =
+      train::ScoreGenerator(model, {run, data, options.score_count, options.seed, options.judge},
+                            line.Sink(), StopOnSignals());
   line.Finish();
   if (!scores.ok()) return scores.status();
   const std::string text = train::FormatScores(*scores);
@@ -137,7 +136,7 @@ Status RunSampling(const SampleOptions& options) {
         files.meshes.back().string(), files.sheet.string(), files.turntable.string());
   if (options.interpolate > 0)
     TILEGRAD_TRY(Interpolate(options, files, codes, *model, workers, &json));
-  if (options.score) TILEGRAD_TRY(Score(options, files, run, *model, workers, &json));
+  if (options.score) TILEGRAD_TRY(Score(options, files, run, *model, &json));
   guard.NoteAll(files.all);
   PrintResult(json);
   return {};

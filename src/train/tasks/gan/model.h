@@ -30,6 +30,7 @@ class GeneratorModel : public Model {
   Result<std::vector<Mesh>> Generate(std::span<const float> codes);
 
   ShapeTextureGenerator& generator() { return generator_; }
+  nn::Context& context() { return context_; }
   const GanConfig& config() const { return config_; }
 
  private:

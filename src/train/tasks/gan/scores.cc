@@ -65,8 +65,8 @@ class Judge {
 
 class Scorer {
  public:
-  Scorer(nn::Context& context, GeneratorModel& model, const GanScoreJob& job)
-      : context_(context), model_(model), job_(job) {}
+  Scorer(GeneratorModel& model, const GanScoreJob& job)
+      : context_(model.context()), model_(model), job_(job) {}
 
   Result<GanScores> Run(const ProgressSink& progress, const StopFlag& stop) {
     TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(job_.data));
@@ -228,10 +228,9 @@ nlohmann::ordered_json JsonOf(const std::vector<GanScoreRow>& rows) {
 
 }  // namespace
 
-Result<GanScores> ScoreGenerator(nn::Context& context, GeneratorModel& model,
-                                 const GanScoreJob& job, const ProgressSink& progress,
-                                 const StopFlag& stop) {
-  return Scorer(context, model, job).Run(progress, stop);
+Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
+                                 const ProgressSink& progress, const StopFlag& stop) {
+  return Scorer(model, job).Run(progress, stop);
 }
 
 std::string FormatScores(const GanScores& scores) {

@@ -39,9 +39,8 @@ struct GanScores {
 };
 
 // Errors: as CheckHeldOut; a judge that cannot be read; too few objects.
-Result<GanScores> ScoreGenerator(nn::Context& context, GeneratorModel& model,
-                                 const GanScoreJob& job, const ProgressSink& progress,
-                                 const StopFlag& stop);
+Result<GanScores> ScoreGenerator(GeneratorModel& model, const GanScoreJob& job,
+                                 const ProgressSink& progress, const StopFlag& stop);
 std::string FormatScores(const GanScores& scores);  // Markdown tables
 nlohmann::ordered_json ScoresJson(const GanScores& scores);
 

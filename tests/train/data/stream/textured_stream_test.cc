@@ -137,6 +137,23 @@ TEST(TexturedStream, ViewsCanBeChanged) {
             std::string::npos);
 }
 
+// An object that is set up in given views is the one that Render draws at that position.
+TEST(TexturedStream, SetsUpWhatRenderDraws) {
+  const Workers workers(1);
+  const std::vector<TexturedMesh> meshes = Balls(1);
+  TexturedStream::Job job = Still("lambert");
+  job.config = {};
+  TexturedStream one(job, meshes, workers), other(job, meshes, workers);
+  std::vector<TexturedView> views(2);
+  const auto drawn = one.Render(0, 9, 0, views);
+  ASSERT_TRUE(drawn.ok()) << drawn.status().message();
+  ASSERT_TRUE(other.SetUp(0, 9, 0, views).ok());
+  const auto again = other.Again(0, Appearance::kLit);
+  ASSERT_TRUE(again.ok());
+  ASSERT_EQ(again->size(), drawn->size());
+  EXPECT_EQ(std::memcmp(again->data(), drawn->data(), drawn->size_bytes()), 0);
+}
+
 // Of Lambert light without ambient, a picture is texture times light in every pixel that one face
 // covers wholly; at supersampled edges it is a mean of products.
 TEST(TexturedStream, LitIsTextureTimesLight) {
