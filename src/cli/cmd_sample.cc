@@ -76,13 +76,14 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
   TILEGRAD_ASSIGN(const InterpolationSteps steps,
                   DrawInterpolation({codes, options.interpolate, files.strip, files.animation},
                                     model, workers));
-  const double ratio = steps.mean > 0 ? steps.largest / steps.mean : 0;
-  Print("interpolation: {}, {}; the largest step is {:.1f} times the mean one\n",
-        files.strip.string(), files.animation.string(), ratio);
+  Print(
+      "interpolation: {}, {}; the largest step of a row is {:.1f} times its mean one, {:.1f} at "
+      "most\n",
+      files.strip.string(), files.animation.string(), steps.mean, steps.largest);
   (*json)["interpolation"] = {{"strip", files.strip.string()},
                               {"animation", files.animation.string()},
-                              {"mean_step", steps.mean},
-                              {"largest_step", steps.largest}};
+                              {"largest_by_mean_step", steps.mean},
+                              {"at_most", steps.largest}};
   return {};
 }
 

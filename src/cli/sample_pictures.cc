@@ -23,6 +23,15 @@ double Difference(const ImageU8& a, const ImageU8& b) {
   return sum / 255 / static_cast<double>(a.pixels.size());
 }
 
+double LargestStep(std::span<const ImageU8> row) {
+  double sum = 0, largest = 0;
+  for (std::size_t k = 1; k < row.size(); ++k) {
+    const double step = Difference(row[k - 1], row[k]);
+    sum += step, largest = std::max(largest, step);
+  }
+  return sum > 0 ? largest * static_cast<double>(row.size() - 1) / sum : 1;
+}
+
 // `steps` codes from `from`, which is the first of them, towards `to`, and that if `whole`.
 std::vector<float> CodesBetween(std::span<const float> from, std::span<const float> to, int steps,
                                 bool whole) {
@@ -52,17 +61,15 @@ Result<InterpolationSteps> DrawInterpolation(const InterpolationJob& job,
                                              train::GeneratorModel& model, const Workers& workers) {
   std::vector<ImageU8> cells, frames;
   InterpolationSteps out;
-  int count = 0;
   for (std::size_t i = 0; i < job.codes.size(); ++i) {
     const std::vector<float>& to = job.codes[(i + 1) % job.codes.size()];
     TILEGRAD_ASSIGN(const auto meshes,
                     model.Generate(CodesBetween(job.codes[i], to, job.steps, true)));
     TILEGRAD_ASSIGN(auto row, train::DrawObjects(meshes, train::SheetCamera(kStripSize, 0),
                                                  kStripSize, workers));
-    for (std::size_t k = 1; k < row.size(); ++k) {
-      const double step = Difference(row[k - 1], row[k]);
-      out.mean += step, out.largest = std::max(out.largest, step), ++count;
-    }
+    const double ratio = LargestStep(row);
+    out.mean += ratio / static_cast<double>(job.codes.size());
+    out.largest = std::max(out.largest, ratio);
     for (ImageU8& cell : row) cells.push_back(std::move(cell));
     if (i >= kAnimated) continue;
     TILEGRAD_ASSIGN(const auto between,
@@ -71,7 +78,6 @@ Result<InterpolationSteps> DrawInterpolation(const InterpolationJob& job,
                                                    kAnimationSize, workers));
     for (ImageU8& frame : large) frames.push_back(std::move(frame));
   }
-  out.mean /= count;
   TILEGRAD_TRY(io::SavePng(job.strip, TileImages(cells, job.steps + 1, 2)));
   TILEGRAD_TRY(io::SaveWebpAnimation(job.animation, frames,
                                      {.frame_ms = kFrameMilliseconds, .quality = kQuality}));

@@ -17,8 +17,8 @@ struct InterpolationJob {
   int steps = 8;                              // from each code to the next, the last to the first
   Path strip, animation;
 };
-// How far neighbouring pictures of an interpolation are from each other: means over pixels and
-// channels, in [0, 1].
+// How evenly an interpolation goes: the largest difference of neighbouring pictures of a row as a
+// multiple of the row's mean one. Of all rows.
 struct InterpolationSteps {
   double mean = 0, largest = 0;
 };

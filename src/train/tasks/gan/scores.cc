@@ -24,6 +24,30 @@ void Append(const nn::Tensor& from, std::int64_t at, nn::Tensor* to) {
                                                      static_cast<std::size_t>(from.shape()[0]));
 }
 
+// Columns that hardly differ within the truth are 0 in both sets: standardised, they would decide
+// alone. They are cells at the edge of what any object covers.
+constexpr double kLeastDeviation = 0.05;
+std::vector<std::uint8_t> VariedColumns(const FeatureRows& truth) {
+  std::vector<std::uint8_t> out(truth.width);
+  const auto n = static_cast<double>(truth.rows());
+  for (std::size_t c = 0; c < truth.width; ++c) {
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < truth.rows(); ++i) {
+      const double x = truth.Row(i)[c];
+      sum += x, squares += x * x;
+    }
+    out[c] = squares / n - (sum / n) * (sum / n) > kLeastDeviation * kLeastDeviation;
+  }
+  return out;
+}
+
+FeatureRows Only(FeatureRows rows, const std::vector<std::uint8_t>& columns) {
+  for (std::size_t i = 0; i < rows.values.size(); ++i) {
+    if (columns[i % rows.width] == 0) rows.values[i] = 0;
+  }
+  return rows;
+}
+
 // What is compared of pictures: cells, or what a classifier's levels say on average of each view.
 class Judge {
  public:
@@ -145,10 +169,13 @@ class Scorer {
              std::vector<GanScoreRow>* rows) {
     const Workers& workers = context_.workers();
     TILEGRAD_ASSIGN(const FeatureRows pictures, judge_->Pictures(made));
-    TILEGRAD_ASSIGN(const SetScores of_pictures,
-                    ScoreSets(truth.pictures, pictures, job_.seed, workers));
+    const auto varied = VariedColumns(truth.pictures), covered = VariedColumns(truth.shapes);
+    TILEGRAD_ASSIGN(
+        const SetScores of_pictures,
+        ScoreSets(Only(truth.pictures, varied), Only(pictures, varied), job_.seed, workers));
     TILEGRAD_ASSIGN(const SetScores of_shapes,
-                    ScoreSets(truth.shapes, CoverFeatures(made), job_.seed, workers));
+                    ScoreSets(Only(truth.shapes, covered), Only(CoverFeatures(made), covered),
+                              job_.seed, workers));
     Spread spread = SpreadOf(made, workers);
     spread.shapes /= out_.truth.shapes, spread.colors /= out_.truth.colors;
     if (rows->empty())
@@ -163,9 +190,12 @@ class Scorer {
     TILEGRAD_ASSIGN(const FeatureRows samples, judge_->Pictures(made));
     TILEGRAD_ASSIGN(const FeatureRows held_out, judge_->Pictures(test));
     TILEGRAD_ASSIGN(const FeatureRows known, judge_->Pictures(train));
-    TILEGRAD_ASSIGN(out_.memorisation,
-                    MeasureMemorisation(Standardised(samples, known), Standardised(held_out, known),
-                                        Standardised(known, known), context_.workers()));
+    const auto varied = VariedColumns(known);
+    const auto scaled = [&](const FeatureRows& rows) {
+      return Standardised(Only(rows, varied), Only(known, varied));
+    };
+    TILEGRAD_ASSIGN(out_.memorisation, MeasureMemorisation(scaled(samples), scaled(held_out),
+                                                           scaled(known), context_.workers()));
     std::vector<ImageU8> cells;
     for (std::size_t i = 0; i < std::min<std::size_t>(kShown, samples.rows()); ++i) {
       AddViews(made, i, &cells);
