@@ -21,25 +21,48 @@ std::vector<float> Numbers(const nn::Tensor& tensor) {
   return out;
 }
 
-FeatureRows CellsOf(const nn::Tensor& planes) {
-  const nn::Shape& shape = planes.shape();
-  const std::int64_t side = shape[3], cells = std::min(kCells, side);
-  const std::vector<float> all = Numbers(planes);
-  FeatureRows out;
-  out.width = static_cast<std::size_t>(shape[1] * cells * cells);
-  out.values.assign(static_cast<std::size_t>(shape[0]) * out.width, 0.0f);
-  std::vector<int> counts(static_cast<std::size_t>(cells));
-  for (std::int64_t x = 0; x < side; ++x) ++counts[static_cast<std::size_t>(x * cells / side)];
+// Which cell of [planes][cells][cells] each number of [planes][side][side] is in.
+std::vector<std::uint32_t> CellOfEach(const nn::Shape& shape, std::int64_t cells) {
+  const std::int64_t side = shape[3];
+  std::vector<std::uint32_t> out;
   for (std::int64_t p = 0; p < shape[0] * shape[1]; ++p) {
     for (std::int64_t y = 0; y < side; ++y) {
       for (std::int64_t x = 0; x < side; ++x) {
-        const std::int64_t row = y * cells / side, column = x * cells / side;
-        const auto count = static_cast<float>(counts[static_cast<std::size_t>(row)] *
-                                              counts[static_cast<std::size_t>(column)]);
-        out.values[static_cast<std::size_t>((p * cells + row) * cells + column)] +=
-            all[static_cast<std::size_t>((p * side + y) * side + x)] / count;
+        const std::int64_t row = p * cells + y * cells / side;
+        out.push_back(static_cast<std::uint32_t>(row * cells + x * cells / side));
       }
     }
+  }
+  return out;
+}
+
+struct Cell {
+  double count = 0, sum = 0, squares = 0;
+  double mean() const { return sum / count; }
+  double deviation() const { return std::sqrt(std::max(0.0, squares / count - mean() * mean())); }
+};
+
+// Of each object the means of its cells, and then their deviations.
+FeatureRows CellsOf(const nn::Tensor& planes, bool deviations) {
+  const nn::Shape& shape = planes.shape();
+  const std::int64_t side = std::min(kCells, shape[3]);
+  const auto objects = static_cast<std::size_t>(shape[0]);
+  const auto count = static_cast<std::size_t>(shape[1] * side * side);
+  const std::vector<float> numbers = Numbers(planes);
+  const std::vector<std::uint32_t> at = CellOfEach(shape, side);
+  std::vector<Cell> cells(objects * count);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto x = static_cast<double>(numbers[i]);
+    Cell& cell = cells[at[i]];
+    ++cell.count, cell.sum += x, cell.squares += x * x;
+  }
+  FeatureRows out;
+  out.width = deviations ? 2 * count : count;
+  for (std::size_t object = 0; object < objects; ++object) {
+    const std::span<const Cell> own = std::span(cells).subspan(object * count, count);
+    for (const Cell& cell : own) out.values.push_back(static_cast<float>(cell.mean()));
+    if (!deviations) continue;
+    for (const Cell& cell : own) out.values.push_back(static_cast<float>(cell.deviation()));
   }
   return out;
 }
@@ -98,8 +121,8 @@ Spread SpreadOf(const ObjectViews& set, const Workers& workers) {
   return out;
 }
 
-FeatureRows CoverFeatures(const ObjectViews& set) { return CellsOf(set.cover); }
-FeatureRows ColorFeatures(const ObjectViews& set) { return CellsOf(set.colors); }
+FeatureRows CoverFeatures(const ObjectViews& set) { return CellsOf(set.cover, false); }
+FeatureRows ColorFeatures(const ObjectViews& set) { return CellsOf(set.colors, true); }
 
 GanWatch::GanWatch(ObjectViews truth, const Workers& workers)
     : workers_(workers),

@@ -16,7 +16,8 @@ struct Spread {
 };
 Spread SpreadOf(const ObjectViews& set, const Workers& workers);
 
-// Each view's planes averaged over cells, 8 x 8 to a plane.
+// Each view's planes averaged over cells, 8 x 8 to a plane; of colours also their deviation within
+// each cell, or a blurred texture would be as good as a crisp one.
 FeatureRows CoverFeatures(const ObjectViews& set);
 FeatureRows ColorFeatures(const ObjectViews& set);
 

@@ -187,6 +187,26 @@ TEST(GanWatch, SpreadsAreThoseOfPairs) {
   EXPECT_NEAR(near.colors, 0, 1e-6);
 }
 
+// Pixels of a cell that differ from each other are told from their mean.
+TEST(GanWatch, BlurShowsInFeaturesOfColours) {
+  const Workers workers(1);
+  nn::Context context(workers);
+  const auto features = [&](double a, double b) {
+    std::vector<double> colors, cover(16 * 16, 1.0);
+    for (int i = 0; i < 3 * 16 * 16; ++i) colors.push_back(i % 2 == 0 ? a : b);
+    return ColorFeatures({context.From({1, 3, 16, 16}, std::span<const double>(colors)),
+                          context.From({1, 1, 16, 16}, std::span<const double>(cover))});
+  };
+  const FeatureRows crisp = features(0.2, 0.6), blurred = features(0.4, 0.4);
+  ASSERT_EQ(crisp.width, 2u * 3 * 64);
+  for (std::size_t i = 0; i < crisp.width / 2; ++i) {
+    EXPECT_NEAR(crisp.values[i], 0.4, 1e-6);
+    EXPECT_NEAR(blurred.values[i], 0.4, 1e-6);
+    EXPECT_NEAR(crisp.values[crisp.width / 2 + i], 0.2, 1e-6);
+    EXPECT_NEAR(blurred.values[crisp.width / 2 + i], 0, 1e-6);
+  }
+}
+
 TEST(GanWatch, OneObjectAgainAndAgainHasNoSpread) {
   SmallProblem p(TinyConfig());
   const auto views = [&](const nn::Tensor& noise) { return p.step.Show(p.generator, noise); };
