@@ -7,7 +7,7 @@ target_include_directories(tilegrad_flags INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
 # -ffp-contract=off: the reference means what it says, and gives the same bits under every compiler.
 target_compile_options(tilegrad_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -fno-math-errno -ffp-contract=off)
+  -Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -fno-math-errno -ffp-contract=off)
 # g++ 12 reports std::string code of its own library as overlapping (GCC bug 105651).
 target_compile_options(tilegrad_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 if(TILEGRAD_WERROR)
@@ -32,6 +32,8 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
   endif()
 elseif(TILEGRAD_SIMD STREQUAL "all")
   set(TILEGRAD_DISABLED_TARGETS 0)
+elseif(TILEGRAD_SIMD STREQUAL "few")
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL")
 else()
   set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL")
 endif()

@@ -39,7 +39,7 @@ py::object TablesToDict(io::MeshFileTables tables) {
   py::dict out;
   add(out, "uvs", std::move(tables.uvs), std::move(tables.corner_uvs));
   add(out, "normals", std::move(tables.normals), std::move(tables.corner_normals));
-  return std::move(out);
+  return out;
 }
 
 py::dict LoadMesh(const Path& path, std::size_t max_bytes) {

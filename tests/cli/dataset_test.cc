@@ -44,13 +44,13 @@ class DatasetTest : public TempFolderTest {
 using Point = std::array<int, 3>;
 
 TEST_F(DatasetTest, TheAxisThatIsUpTurnsTheModel) {
-  const auto y = PicturesOf(
+  const auto upright = PicturesOf(
       "y",
       [](int x, int y, int z) {
         return Point{x, y, z};
       },
       "");
-  const auto z = PicturesOf(
+  const auto turned = PicturesOf(
       "z",
       [](int x, int y, int z) {
         return Point{x, -z, y};
@@ -62,9 +62,9 @@ TEST_F(DatasetTest, TheAxisThatIsUpTurnsTheModel) {
         return Point{x, -z, y};
       },
       "");
-  ASSERT_EQ(y.size(), 3u * 4 * 16 * 16);
-  EXPECT_TRUE(z == y);
-  EXPECT_FALSE(lying == y);
+  ASSERT_EQ(upright.size(), 3u * 4 * 16 * 16);
+  EXPECT_TRUE(turned == upright);
+  EXPECT_FALSE(lying == upright);
 }
 
 TEST_F(DatasetTest, AnotherAxisIsAnotherDataset) {

@@ -20,7 +20,7 @@ ImportedScene Scene() {
   part.colors.resize(3, glm::vec4(1));
   part.triangles = {{0, 1, 2}};
   scene.parts = {part};
-  scene.materials = {{"m", glm::vec4(0.5f), "image.png", 0}};
+  scene.materials = {{"m", glm::vec4(0.5f), "image.png", 0, ""}};
   scene.images = {{"image.png", Bytes(20, 3)}};
   scene.instances = {{0, glm::dmat4x3(2)}};
   scene.warnings = {"left out"};

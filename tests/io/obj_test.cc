@@ -99,7 +99,7 @@ TEST_F(ObjTest, PolygonsConcaveAndLarge) {
 
 TEST_F(ObjTest, LinesAndIndicesOfEveryKind) {
   const std::vector<Face> want = {{0, 1, 2}, {0, 2, 3}};
-  for (const std::string text :
+  for (const std::string& text :
        {kSquare + "f 1 2 3 4\n", kSquare + "f 1 2 \\\n3 4",
         kSquare + "f 1 2 \\\r\n\\\r\n3 4 # end\n", "\xef\xbb\xbf" + kSquare + "f -4 -3 -2 -1\n",
         "f 1 2 3 4\n" + kSquare, "# C:\\models\\\n" + kSquare + "f 1// 2// 3// 4//\n",

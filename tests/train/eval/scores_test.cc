@@ -70,7 +70,9 @@ TEST(PredictionPictures, ShowUnlitColours) {
     EXPECT_EQ(image[768 + centre], 255);
     EXPECT_EQ(image[768], 0);
   }
-  EXPECT_FALSE(pictures.Draw(Mesh{.positions = {glm::vec3(0)}, .faces = {{0, 0, 9}}}).ok());
+  Mesh broken;
+  broken.positions = {glm::vec3(0)}, broken.faces = {{0, 0, 9}};
+  EXPECT_FALSE(pictures.Draw(broken).ok());
 }
 
 std::vector<std::uint8_t> Flat(std::uint8_t value, int size) {
