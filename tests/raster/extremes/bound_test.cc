@@ -4,158 +4,16 @@
 // (docs/numerics.md, "Rounding"); and in whatever order the faces stand.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "base/simd_target.h"
-#include "raster/extremes/soft_scene.h"
-#include "raster/project.h"
-#include "render/pipeline/frame_layout.h"
-#include "render/pipeline/pipeline.h"
-#include "render/pipeline/test_scenes.h"
+#include "raster/extremes/bound_check.h"
 
 namespace tilegrad::test {
 namespace {
-
-constexpr double kErrors[] = {0, 1e-6, 1e-4, 1e-2};
-
-struct BoundScene {
-  TestScene<float> scene;
-  RenderOptions options;
-};
-
-// 20 to 200,000 faces, delta over six decades. Small faces, points among them, around one or a few
-// places, so that background remains; images so small that all faces for all pixels stay feasible.
-BoundScene MakeBoundScene(std::uint64_t number) {
-  Rng rng(number, 1234);
-  BoundScene out;
-  out.scene.channels = 0;
-  out.scene.camera = {.fx = 1, .fy = 1, .cx = 0, .cy = 0, .near_plane = 0.5f};  // pixels are world
-  const auto faces = static_cast<std::size_t>(20 * std::pow(10.0, 4 * rng.Uniform()));
-  const int side = std::clamp(static_cast<int>(std::sqrt(2e6 / static_cast<double>(faces))), 3, 48);
-  out.options.width = 1 + static_cast<int>(rng.Below(static_cast<std::uint64_t>(side)));
-  out.options.height = 1 + static_cast<int>(rng.Below(static_cast<std::uint64_t>(side)));
-  out.options.delta = std::pow(10.0, rng.Uniform(-6, 0));
-  out.options.max_alpha_error = kErrors[rng.Below(4)];
-  const double w = out.options.width, h = out.options.height;
-  const double size = rng.Uniform() * std::min(w, h) / std::sqrt(static_cast<double>(faces));
-  const std::uint64_t places = 1 + rng.Below(4);
-  const double spread = rng.Uniform(0.02, 0.7);
-  double x[4], y[4];
-  for (std::size_t k = 0; k < 4; ++k) x[k] = rng.Uniform(-0.3, 1.3), y[k] = rng.Uniform(-0.3, 1.3);
-  for (std::size_t f = 0; f < faces; ++f) {
-    const std::uint64_t at = rng.Below(places);
-    const double cx = w * (x[at] + spread * rng.Uniform(-1, 1));
-    const double cy = h * (y[at] + spread * rng.Uniform(-1, 1));
-    const double reach = rng.Below(8) == 0 ? 0 : size;
-    for (int k = 0; k < 3; ++k) {
-      out.scene.faces.push_back(static_cast<std::int32_t>(3 * f) + k);
-      out.scene.positions.push_back(static_cast<float>(cx + reach * rng.Uniform(-1, 1)));
-      out.scene.positions.push_back(static_cast<float>(-cy - reach * rng.Uniform(-1, 1)));
-      out.scene.positions.push_back(-1);
-    }
-  }
-  return out;
-}
-
-void Permute(Rng* rng, std::vector<std::int32_t>* faces) {
-  for (std::size_t n = faces->size() / 3; n > 1; --n) {
-    const std::size_t other = rng->Below(n);
-    std::swap_ranges(faces->begin() + static_cast<std::ptrdiff_t>(3 * (n - 1)),
-                     faces->begin() + static_cast<std::ptrdiff_t>(3 * n),
-                     faces->begin() + static_cast<std::ptrdiff_t>(3 * other));
-  }
-}
-
-// Violations are beyond rounding, and 0 if the promise is kept.
-struct BoundSummary {
-  std::size_t scenes = 0, pixels = 0, faces = 0, between = 0;  // between: neither 0 nor 1
-  double over_budget = 0;                                      // largest error - E
-  double over_spent = 0;                                       // largest error - alpha_error_bound
-  double spent_over = 0;                                       // largest alpha_error_bound - E
-  double order = 0;  // how far permuting moved alpha beyond what both runs spent
-  double share = 0;  // largest error / E
-
-  void Add(const BoundSummary& o) {
-    scenes += o.scenes, pixels += o.pixels, faces += o.faces, between += o.between;
-    over_budget = std::max(over_budget, o.over_budget);
-    over_spent = std::max(over_spent, o.over_spent);
-    spent_over = std::max(spent_over, o.spent_over);
-    order = std::max(order, o.order), share = std::max(share, o.share);
-  }
-};
-
-class BoundCheck {
- public:
-  BoundCheck(std::uint64_t number, Pipeline* renderer)
-      : rng_(number, 5), scene_(MakeBoundScene(number)), renderer_(renderer) {}
-
-  BoundSummary Run() {
-    const RenderOptions& o = scene_.options;
-    const PipelineScene view = scene_.scene.View();
-    raster::ScreenMeshBuffers mesh;
-    raster::Project(FaceSourceOf(view, o), o.width, o.height, &mesh);
-    const SoftScene soft = SoftSceneOf(mesh, o);
-    const SoftTruth truth(soft);
-    out_.scenes = 1, out_.faces = soft.options.faces;
-    Draw(&first_), Permute(&rng_, &scene_.scene.faces), Draw(&permuted_);
-    for (const std::size_t i : SomeBackground()) Compare(truth.Bound(i), i);
-    return out_;
-  }
-
- private:
-  void Draw(PipelineFrame* frame) {
-    const PipelineScene views[] = {scene_.scene.View()};
-    EXPECT_TRUE(renderer_->Render(views, scene_.options, {.attributes = false}, frame).ok());
-    const double e = scene_.options.max_alpha_error;
-    // exp(-87) per face is what E = 0 means ("Budget").
-    const double allowed = e * (1 + 1e-12) + 1.7e-38 * static_cast<double>(out_.faces);
-    out_.spent_over = std::max(out_.spent_over, frame->alpha_error_bound - allowed);
-  }
-  // Background pixels, neither empty nor opaque if there are such: two, or more of fewer faces.
-  std::vector<std::size_t> SomeBackground() {
-    std::vector<std::size_t> all, between, out;
-    for (std::size_t i = 0; i < first_.face_ids.size(); ++i) {
-      if (first_.face_ids[i] >= 0) continue;
-      all.push_back(i);
-      if (first_.alpha[i] > 1e-6f && first_.alpha[i] < 1 - 1e-6f) between.push_back(i);
-    }
-    if (!between.empty()) all = between;
-    constexpr std::size_t kPairs = 20000;
-    const std::size_t most = std::clamp<std::size_t>(kPairs / (out_.faces + 1), 2, 40);
-    for (std::size_t k = 0; k < most && !all.empty(); ++k) {
-      out.push_back(all[rng_.Below(all.size())]);
-    }
-    return out;
-  }
-  void Compare(const SoftTruth::AlphaBound& truth, std::size_t i) {
-    const double e = scene_.options.max_alpha_error;
-    ++out_.pixels;
-    out_.between += truth.alpha > 1e-6 && truth.alpha < 1 - 1e-6;
-    for (const PipelineFrame* frame : {&first_, &permuted_}) {
-      const double error = std::abs(static_cast<double>(frame->alpha[i]) - truth.alpha);
-      const double beyond = error - truth.rounding;
-      out_.over_budget = std::max(out_.over_budget, beyond - e - 1e-37);
-      out_.over_spent = std::max(out_.over_spent, beyond - frame->alpha_error_bound);
-      if (e > 0) out_.share = std::max(out_.share, beyond / e);
-    }
-    const double moved =
-        std::abs(static_cast<double>(first_.alpha[i]) - static_cast<double>(permuted_.alpha[i]));
-    out_.order = std::max(out_.order, moved - first_.alpha_error_bound -
-                                          permuted_.alpha_error_bound - 2 * truth.rounding);
-  }
-
-  Rng rng_;
-  BoundScene scene_;
-  Pipeline* renderer_;
-  PipelineFrame first_, permuted_;
-  BoundSummary out_;
-};
 
 void CheckBound(std::uint64_t first, std::size_t count) {
   const Workers workers, one(1);
@@ -163,13 +21,12 @@ void CheckBound(std::uint64_t first, std::size_t count) {
   for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Pipeline>(one));
   std::vector<BoundSummary> scenes(count);
   workers.For(count, [&](std::size_t n, std::size_t w) {
-    scenes[n] = BoundCheck(first + n, renderers[w].get()).Run();
+    scenes[n] = CheckBoundScene({first + n}, renderers[w].get());
   });
   BoundSummary all;
   for (std::size_t n = 0; n < count; ++n) {
     const BoundSummary& s = scenes[n];
-    EXPECT_LE(std::max({s.over_budget, s.over_spent, s.spent_over, s.order}), 0.0)
-        << "scene " << first + n;
+    EXPECT_TRUE(s.Kept()) << "scene " << first + n << ": " << s.failed;
     all.Add(s);
   }
   std::printf(

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The checks of bound_test.cc and extremes_test.cc without an end: counts scenes, violations and
+// the largest errors into a file, and goes on from there (`./run prove`). A scene is a pure
+// function of its number; `prove --scene N` runs that one alone, on every target.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/simd_target.h"
+#include "raster/extremes/bound_check.h"
+#include "raster/extremes/prove_tally.h"
+#include "raster/extremes/truth.h"
+
+namespace tilegrad::test {
+namespace {
+
+constexpr std::uint64_t kFirst = 1000000000;  // scenes below are those of tests
+constexpr std::uint64_t kChunk = 500;         // on one target, then the tally is written
+constexpr std::size_t kHeapFaces = 300;
+
+struct Arguments {
+  double seconds = 60;
+  int threads = 1;
+  Path state = "out/prove/tally.txt";
+  std::uint64_t scene = 0;  // this one alone, if not 0
+};
+
+std::string Decades(double value, const char* name) {
+  const int decade = static_cast<int>(std::floor(std::log10(value)));
+  return fmt::format("{}:1e{}..1e{}", name, decade, decade + 1);
+}
+
+// One in five is of the extremes; of the others one in 200 is large.
+void CheckAlpha(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+  double delta = 1;
+  const double decades = number % 200 == 1 ? 4 : 1.3;
+  const BoundSummary found = CheckBoundScene({number, decades}, renderer, &delta);
+  const double faces = static_cast<double>(std::max<std::size_t>(found.faces, 1));
+  const std::string group = Decades(delta, "delta") + "," + Decades(faces, "faces");
+  tally->rows[{"alpha", group}].Add(
+      {1, found.pixels, found.Kept() ? 0u : 1u, found.of_reported, found.share});
+  if (found.Kept()) return;
+  tally->violations.push_back(fmt::format(
+      "scene {} on {}: beyond E {}, beyond what was reported {}, reported beyond E {}, order {} {}",
+      number, ActiveTarget(), found.over_budget, found.over_spent, found.spent_over, found.order,
+      found.failed));
+}
+
+void CheckExtremes(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+  CheckCounts counts;
+  const ExtremeScene scene = MakeExtremeScene(number, kHeapFaces);
+  const std::string wrong = CheckExtremeScene(scene, number, renderer, &counts);
+  std::string kind = scene.kind;
+  for (char& c : kind) c = c == ' ' ? '-' : c;
+  tally->rows[{"extremes", kind}].Add(
+      {1, counts.compared, wrong.empty() ? 0u : 1u, counts.worst, 0});
+  if (wrong.empty()) return;
+  tally->violations.push_back(
+      fmt::format("scene {} ({}) on {}: {}", number, scene.kind, ActiveTarget(), wrong));
+}
+
+void CheckScene(std::uint64_t number, Pipeline* renderer, ProofTally* tally) {
+  number % 5 == 0 ? CheckExtremes(number, renderer, tally) : CheckAlpha(number, renderer, tally);
+}
+
+// Chunks take the machine's targets in turn.
+Status CheckChunk(const Workers& workers, const std::vector<std::unique_ptr<Pipeline>>& renderers,
+                  ProofTally* tally) {
+  const std::vector<std::string> targets = RunnableTargets();
+  const TargetScope scope(targets[tally->next / kChunk % targets.size()]);
+  if (!scope.status().ok()) return scope.status();
+  std::vector<ProofTally> scenes(kChunk);
+  workers.For(kChunk, [&](std::size_t n, std::size_t w) {
+    CheckScene(kFirst + tally->next + n, renderers[w].get(), &scenes[n]);
+  });
+  for (const ProofTally& scene : scenes) tally->Add(scene);
+  tally->next += kChunk;
+  return {};
+}
+
+int Fail(const Status& status) {
+  fmt::print(stderr, "prove: {}\n", status.message());
+  return 1;
+}
+
+int End(const ProofTally& tally) {
+  fmt::print("{}", ProofTable(tally));
+  for (const std::string& line : tally.violations) fmt::print("VIOLATION {}\n", line);
+  return tally.Sum().violations == 0 ? 0 : 1;
+}
+
+int RunOne(std::uint64_t number) {
+  const Workers one(1);
+  Pipeline renderer(one);
+  ProofTally tally;
+  for (const std::string& target : RunnableTargets()) {
+    const TargetScope scope(target);
+    CheckScene(number, &renderer, &tally);
+  }
+  return End(tally);
+}
+
+int Run(const Arguments& arguments) {
+  auto read = ReadTally(arguments.state);
+  if (!read.ok()) return Fail(read.status());
+  ProofTally tally = *std::move(read);
+  const Workers workers(arguments.threads), one(1);
+  std::vector<std::unique_ptr<Pipeline>> renderers;
+  for (int w = 0; w < workers.count(); ++w) renderers.push_back(std::make_unique<Pipeline>(one));
+  const auto start = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> most(arguments.seconds);
+  while (std::chrono::steady_clock::now() - start < most) {
+    Status status = CheckChunk(workers, renderers, &tally);
+    if (status.ok()) status = WriteTally(arguments.state, tally);
+    if (!status.ok()) return Fail(status);
+  }
+  return End(tally);
+}
+
+int Main(int count, char** values) {
+  Arguments out;
+  for (int i = 1; i + 1 < count; i += 2) {
+    const std::string name = values[i], value = values[i + 1];
+    if (name == "--seconds") out.seconds = std::atof(value.c_str());
+    if (name == "--threads") out.threads = std::atoi(value.c_str());
+    if (name == "--state") out.state = value;
+    if (name == "--scene") out.scene = std::strtoull(value.c_str(), nullptr, 10);
+  }
+  if (count % 2 == 0 || !(out.seconds > 0)) {
+    fmt::print(stderr, "usage: prove [--seconds S] [--threads N] [--state FILE] [--scene N]\n");
+    return 2;
+  }
+  return out.scene != 0 ? RunOne(out.scene) : Run(out);
+}
+
+}  // namespace
+}  // namespace tilegrad::test
+
+int main(int count, char** values) { return tilegrad::test::Main(count, values); }
