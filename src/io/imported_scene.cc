@@ -168,7 +168,9 @@ Result<ImportedScene> DecodeScene(std::span<const std::uint8_t> bytes) {
   std::string message;
   reader(magic, code, message);
   if (!reader.good() || magic != kMagic) return broken;
-  if (code != static_cast<std::uint32_t>(StatusCode::kOk)) return DataLoss("{}", message);
+  if (code != static_cast<std::uint32_t>(StatusCode::kOk)) {
+    return message.empty() ? broken : DataLoss("{}", message);
+  }
   ImportedScene scene;
   reader(scene);
   if (!reader.whole()) return broken;

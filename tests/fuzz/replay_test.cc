@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every fuzz target without libFuzzer: over its seeds, which it accepts; over mutations of them;
+// over the inputs in found/, each of which once broke something; and over corpus/.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include "base/rng.h"
+#include "fuzz/target.h"
+#include "support/source_dir.h"
+
+namespace tilegrad::fuzz {
+namespace {
+
+Path Folder(const char* kind, const std::string& target) {
+  return Path(TILEGRAD_SOURCE_DIR) / "tests" / "fuzz" / kind / target;
+}
+
+std::vector<Path> FilesIn(const Path& folder) {
+  std::vector<Path> out;
+  if (!std::filesystem::exists(folder)) return out;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) out.push_back(entry.path());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Bytes that change, go, come twice, or come from another place.
+Bytes Mutated(Bytes bytes, Rng* rng) {
+  for (std::uint64_t n = 1 + rng->Below(4); n-- > 0 && !bytes.empty();) {
+    const auto at = static_cast<std::ptrdiff_t>(rng->Below(bytes.size()));
+    const auto left = static_cast<std::uint64_t>(bytes.size()) - static_cast<std::uint64_t>(at);
+    const auto length =
+        static_cast<std::ptrdiff_t>(1 + rng->Below(std::min<std::uint64_t>(left, 8)));
+    switch (rng->Below(4)) {
+      case 0:
+        bytes[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(rng->Next());
+        break;
+      case 1:
+        bytes[static_cast<std::size_t>(at)] ^= static_cast<std::uint8_t>(1u << rng->Below(8));
+        break;
+      case 2:
+        bytes.erase(bytes.begin() + at, bytes.begin() + at + length);
+        break;
+      default: {
+        const Bytes part(bytes.begin() + at, bytes.begin() + at + length);
+        const auto to = static_cast<std::ptrdiff_t>(rng->Below(bytes.size()));
+        bytes.insert(bytes.begin() + to, part.begin(), part.end());
+      }
+    }
+  }
+  return bytes;
+}
+
+// What a target is given now; written to a file if it ends the program.
+Input g_input;
+
+extern "C" void KeepInput(int signal) {
+  const std::string file = testing::TempDir() + "tilegrad_fuzz_broken";
+  if (std::FILE* out = std::fopen(file.c_str(), "wb")) {
+    std::fwrite(g_input.data(), 1, g_input.size(), out);
+    std::fclose(out);
+    std::fprintf(stderr, "the input that did it: %s\n", file.c_str());
+  }
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+void Feed(const Target& target, Input input) {
+  std::signal(SIGABRT, KeepInput), std::signal(SIGSEGV, KeepInput);
+  g_input = input;
+  target.run(input);
+}
+
+class Replay : public testing::TestWithParam<Target> {};
+
+TEST_P(Replay, SeedsAndMutationsOfThem) {
+  const Target& target = GetParam();
+  const std::vector<Bytes> seeds = target.seeds();
+  ASSERT_FALSE(seeds.empty());
+  Rng rng(20, 26);
+  for (const Bytes& seed : seeds) {
+    Feed(target, seed);
+    const char* more = std::getenv("TILEGRAD_FUZZ_MUTATIONS");
+    for (int n = more != nullptr ? std::atoi(more) : target.slow ? 2 : 200; n-- > 0;) {
+      Bytes bytes = Mutated(seed, &rng);
+      if (target.repair != nullptr) target.repair(bytes);
+      Feed(target, bytes);
+    }
+  }
+}
+
+TEST_P(Replay, WhatWasFound) {
+  for (const char* kind : {"found", "corpus"}) {
+    for (const Path& file : FilesIn(Folder(kind, GetParam().name))) {
+      SCOPED_TRACE(file.string());
+      const auto bytes = ReadFile(file);
+      ASSERT_TRUE(bytes.ok()) << bytes.status().message();
+      Feed(GetParam(), *bytes);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Fuzz, Replay, testing::ValuesIn(Targets()),
+                         [](const auto& p) { return p.param.name; });
+
+// A folder of another name would never be looked at.
+TEST(ReplayFolders, EachIsOfATarget) {
+  for (const char* kind : {"found", "corpus"}) {
+    for (const Path& folder : FilesIn(Folder(kind, ""))) {
+      EXPECT_TRUE(std::any_of(Targets().begin(), Targets().end(), [&](const Target& t) {
+        return t.name == folder.filename();
+      })) << folder;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::fuzz

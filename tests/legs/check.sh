@@ -1,0 +1,136 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The legs of `./run check`: other compilers, sanitizers, instruction sets, packagings. A leg's build lies in build/<leg>.
+#
+#   tests/legs/check.sh [--short] LEG...      all: every leg, one after the other, with a table of times at the end
+#
+# --short: a part of each leg that takes minutes, for CI. What each leg holds stands beside it below.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan tsan scalar clang clang-new tidy aarch64)
+# Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
+readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|renderer_bits|render_pipeline|nn_tape)'
+# Tests that hold kernels to their references.
+readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|shaded|nn_|compat_|rivals_)'
+readonly OUT=$PWD/out/check RELEASE=build/release
+
+say() { printf '\n== %s\n' "$*"; }
+die() { printf 'check: %s\n' "$*" >&2; exit 1; }
+want() {  # PACKAGE...
+  local missing=() name
+  for name; do dpkg-query -W -f='${db:Status-Status}' "$name" 2>/dev/null | grep -qx installed || missing+=("$name"); done
+  [ "${#missing[@]}" = 0 ] || die "missing; type:  sudo apt-get install --no-install-recommends ${missing[*]}"
+}
+
+SHORT=
+LAUNCHER=()
+! command -v ccache >/dev/null || LAUNCHER=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+
+# targets BUILD PATTERN: the programs behind tests whose names match, as targets of ninja.
+targets() {
+  ctest --test-dir "$1" -N -L short -R "$2" | sed -n 's/^ *Test *#[0-9]*: //p' | sort -u | while read -r name; do
+    ! ninja -C "$1" -t query "${name}_test" >/dev/null 2>&1 || echo "${name}_test"
+  done
+}
+
+# leg_build PRESET NAME [OPTION OF CMAKE]...: configures build/NAME.
+leg_configure() {
+  local preset=$1 name=$2
+  shift 2
+  [ -f "build/$name/build.ninja" ] || cmake --preset "$preset" -B "build/$name" "${LAUNCHER[@]}" "$@" >"$OUT/configure-$name.log" 2>&1 \
+    || { tail -n 30 "$OUT/configure-$name.log"; die "configuring $name failed"; }
+}
+
+# build_and_test NAME PATTERN: builds and runs the short tests that match, of build/NAME.
+build_and_test() {
+  local chosen
+  mapfile -t chosen < <(targets "build/$1" "$2")
+  [ "${#chosen[@]}" -gt 0 ] || die "no test of build/$1 matches $2"
+  cmake --build "build/$1" --target "${chosen[@]}"
+  ctest --test-dir "build/$1" -L short -R "$2" --output-on-failure --no-tests=error -j "$(nproc)"
+}
+
+# tree PRESET NAME SHORT_PATTERN [OPTION]...: a leg that is a build of its own with its tests.
+tree() {
+  local preset=$1 name=$2 pattern=$3
+  shift 3
+  leg_configure "$preset" "$name" "$@"
+  if [ -n "$SHORT" ]; then build_and_test "$name" "$pattern"; return; fi
+  cmake --build "build/$name"
+  ctest --test-dir "build/$name" -L short --output-on-failure --no-tests=error -j "$(nproc)"
+}
+
+# only TARGET: the release build's tests of kernels, where Highway finds this target and no other.
+only() {
+  local library=$OUT/only_$1.so
+  g++ -O1 -shared -fPIC -x c++ -o "$library" - -lhwy <<CODE
+#include <hwy/targets.h>
+__attribute__((constructor)) static void Only() { hwy::DisableTargets(~static_cast<int64_t>(HWY_$1)); }
+CODE
+  local chosen
+  mapfile -t chosen < <(targets "$RELEASE" "$KERNEL_TESTS")
+  cmake --build "$RELEASE" --target "${chosen[@]}"
+  LD_PRELOAD=$library ctest --test-dir "$RELEASE" -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
+}
+
+leg_format() { ./run lint; }
+
+# Every header compiles by itself: it includes what it uses, as far as a compiler can tell.
+leg_headers() {
+  local flags=(-std=c++20 -fsyntax-only -Iinclude -Isrc -DTOML_HEADER_ONLY=0 -DFMT_SHARED -DHWY_BROKEN_EMU128=0)
+  git ls-files 'include/*.h' 'src/*.h' | grep -v -e '-inl\.h$' | xargs -P "$(nproc)" -n 8 bash -c '
+    for f in "${@:'$((${#flags[@]} + 1))'}"; do g++ "${@:1:'${#flags[@]}'}" -x c++ "$f" || { echo "not by itself: $f"; bad=1; }; done
+    exit "${bad:-0}"' _ "${flags[@]}"
+}
+
+leg_docs() { ./run docs; python3 tests/structure/links.py; }
+leg_install() { cmake --build "$RELEASE"; ctest --test-dir "$RELEASE" -R '^install$' --output-on-failure --no-tests=error; }
+leg_wheel() {
+  ./run wheel
+  local environment
+  environment=$(mktemp -d)
+  python3 -m venv --system-site-packages "$environment"
+  "$environment/bin/pip" install -q --no-index --no-deps --force-reinstall out/wheel/*.whl
+  (cd / && "$environment/bin/python" -c 'import tilegrad; print(tilegrad.__file__)' && "$environment/bin/tilegrad" selftest --only files)
+  rm -rf "$environment"
+}
+leg_emu128() { only EMU128; }
+leg_avx2() { only AVX2; }
+leg_avx512() {
+  if grep -q -m 1 avx512dq /proc/cpuinfo; then only AVX3; else tests/cross/avx512.sh; fi
+}
+leg_werror() { tree dev dev '^(base_|scene_|structure)'; }
+leg_asan() { tree asan asan "$FILES_TESTS"; }
+leg_tsan() { tree tsan tsan "$THREADS_TESTS"; }
+leg_scalar() { tree scalar scalar "$KERNEL_TESTS"; }
+leg_clang() { want clang-14; tree dev clang "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DTILEGRAD_SIMD=few; }
+leg_clang-new() { want clang-19; tree dev clang-new "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DTILEGRAD_SIMD=few; }
+leg_tidy() {
+  if [ -n "$SHORT" ]; then ./run lint --tidy; else git ls-files -z 'src/*.cc' | xargs -0 ./run lint --tidy; fi
+}
+leg_aarch64() {
+  want g++-aarch64-linux-gnu qemu-user
+  if [ -n "$SHORT" ]; then tests/cross/aarch64.sh -R '^(base_|raster_project|raster_visibility|shade)'; else tests/cross/aarch64.sh; fi
+}
+
+# leg NAME: runs it, says how long it took, and goes on after a failure.
+RESULTS=()
+leg() {
+  local start=$SECONDS result=passed
+  say "leg $1${SHORT:+ (short)}"
+  bash tests/legs/check.sh ${SHORT:+--short} --one "$1" || result=FAILED  # in a shell of its own, which -e ends
+  RESULTS+=("$(printf '%-10s %s %5d s' "$1" "$result" $((SECONDS - start)))")
+  say "leg $1: $result after $((SECONDS - start)) s"
+}
+
+mkdir -p "$OUT"
+[ "${1:-}" != --short ] || { SHORT=1; shift; }
+[ $# -gt 0 ] || die "name legs, or all: ${LEGS[*]}"
+[ "$1" != --one ] || { "leg_$2"; exit; }
+[ "$*" != all ] || set -- "${LEGS[@]}"
+for name; do [[ " ${LEGS[*]} " == *" $name "* ]] || die "no leg $name; there are: ${LEGS[*]}"; done
+for name; do leg "$name"; done
+say "legs"
+printf '%s\n' "${RESULTS[@]}" | tee -a "$OUT/legs.txt"
+! printf '%s\n' "${RESULTS[@]}" | grep -q FAILED
