@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What random calls choose by: the same choices from the same seed.
+// What random calls choose by: the same choices from the same seed, or from the same bytes.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
+#include <span>
 
 namespace tilegrad {
 
@@ -12,10 +13,18 @@ namespace tilegrad {
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : state_(seed) {}
+  // Two bytes a choice; once they are used up, as by a seed that is their number.
+  explicit Dice(std::span<const std::uint8_t> bytes) : state_(bytes.size()), bytes_(bytes) {}
   std::uint32_t Next() {
+    if (bytes_.size() >= 2) {
+      const std::uint32_t value = bytes_[0] + 256u * bytes_[1];
+      bytes_ = bytes_.subspan(2);
+      return value;
+    }
     state_ = state_ * 6364136223846793005u + 1442695040888963407u;
     return static_cast<std::uint32_t>(state_ >> 33);
   }
+  bool used_up() const { return bytes_.size() < 2; }
   bool OneIn(std::uint32_t n) { return Next() % n == 0; }
   template <class T>
   T Of(std::initializer_list<T> values) {
@@ -28,6 +37,7 @@ class Dice {
 
  private:
   std::uint64_t state_;
+  std::span<const std::uint8_t> bytes_;
 };
 
 }  // namespace tilegrad

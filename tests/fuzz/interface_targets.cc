@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// The C interface: an input is a program of calls, two bytes a choice (api/c_caller.h).
+#include "api/c_caller.h"
+#include "fuzz/target.h"
+
+namespace tilegrad::fuzz {
+namespace {
+
+void Calls(Input input) {
+  const bool failed_before = testing::UnitTest::GetInstance()->ad_hoc_test_result().Failed();
+  Caller caller(Dice(input), {1, 2});
+  for (int i = 0; i < 24 && !caller.used_up(); ++i) caller.Call();
+  const bool failed = testing::UnitTest::GetInstance()->ad_hoc_test_result().Failed();
+  Require(failed_before || !failed, "each call is OK or an error with a message");
+}
+
+std::vector<Bytes> Seeds() {
+  std::vector<Bytes> out;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Dice dice(seed);
+    Bytes bytes(3000);
+    for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(dice.Next());
+    out.push_back(bytes);
+  }
+  return out;
+}
+
+const Registration kTarget({"c_interface", Calls, Seeds, nullptr, true});
+
+}  // namespace
+}  // namespace tilegrad::fuzz
