@@ -38,9 +38,11 @@ Utf8 FirstOf(std::string_view text) {
 
 bool IsControl(std::uint32_t code) {
   const bool layout = code == '\n' || code == '\t';
-  const bool marks = (code >= 0x200e && code <= 0x200f) || (code >= 0x202a && code <= 0x202e) ||
+  const bool marks = code == 0x061c || (code >= 0x200e && code <= 0x200f) ||
+                     (code >= 0x202a && code <= 0x202e) ||
                      (code >= 0x2066 && code <= 0x2069);  // of the direction of writing
-  return (code < 0x20 && !layout) || (code >= 0x7f && code < 0xa0) || marks;
+  const bool breaks = code == 0x2028 || code == 0x2029;   // of lines and paragraphs
+  return (code < 0x20 && !layout) || (code >= 0x7f && code < 0xa0) || marks || breaks;
 }
 
 }  // namespace
@@ -69,7 +71,8 @@ std::string EscapeMarkdown(std::string_view text) {
     } else if (kMarks.find(c) != std::string_view::npos) {
       out += {'\\', c};
     } else {
-      out += EscapeHtml({&c, 1});
+      const std::string_view entity = HtmlEntity(c);
+      entity.empty() ? out += c : out += entity;
     }
   }
   return out;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/escape_html.h"
+
 namespace tilegrad {
 namespace {
 
@@ -20,6 +22,7 @@ TEST(EscapeControls, ShowsWhatATerminalWouldObey) {
                            "31m"),
             "\\x7f\\x9b31m");  // a control of two bytes
   EXPECT_EQ(EscapeControls("a\u202egpj.exe"), "a\\u202egpj.exe");
+  EXPECT_EQ(EscapeControls("a\u061cb\u2028c\u2066d"), "a\\u061cb\\u2028c\\u2066d");
 }
 
 TEST(EscapeControls, ShowsBytesThatAreNotUtf8) {
@@ -41,6 +44,13 @@ TEST(EscapeMarkdown, IsTextAndNothingElse) {
             "\\[x\\](http://y) \\*z\\* \\_w\\_ \\`v\\`");
   EXPECT_EQ(EscapeMarkdown("a\n\n# b"), "a\\\\n\\\\n\\# b");
   EXPECT_EQ(EscapeMarkdown("&lt;\x1b"), "&amp;lt;\\\\x1b");
+}
+
+TEST(EscapeHtml, IsTextAndNothingElse) {
+  EXPECT_EQ(EscapeHtml("St\u00fchle, 3 < 4"), "St\u00fchle, 3 &lt; 4");
+  EXPECT_EQ(EscapeHtml("\"><script>'&"), "&quot;&gt;&lt;script&gt;&#39;&amp;");
+  EXPECT_EQ(EscapeHtml("\u202eevil\x1b\xff"), "\\u202eevil\\x1b\\xff");
+  EXPECT_EQ(EscapeHtml("a\nb"), "a\nb");
 }
 
 TEST(EscapeCsv, QuotesWhereItMust) {

@@ -55,6 +55,47 @@ TEST_F(HostileNames, AreTextInMarkdownAndOneFieldInCsv) {
   EXPECT_NE(csv.find("\n\"<img"), std::string::npos) << csv;
 }
 
+// A dataset of a stranger: its texts reach the pages and tables of every run that uses it.
+TEST_F(HostileNames, AreTextInReportsAndTables) {
+  const std::string data = Quoted("data"), run = Quoted("run");
+  const auto done = [](const std::string& arguments) {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    EXPECT_EQ(outcome.output.find('\x1b'), std::string::npos) << outcome.output;
+  };
+  done("dataset --source procedural --per-class 2 --size 16 --views 2 --out " + data);
+  const std::string hostile =
+      R"(</script><img src=x onerror=alert(1)>\"'|\n# \u202e\u001b[31m)";  // as JSON writes it
+  for (const auto& [file, key] : {std::pair{"data/models.jsonl", "\"name\":\""},
+                                  {"data/models.jsonl", "\"creator\":\""},
+                                  {"data/models.jsonl", "\"license\":\""},
+                                  {"data/dataset.json", "\"credits\": [\n    \""},
+                                  {"data/dataset.json", "\"source\": \""}}) {
+    std::string text = ReadText(folder_ / file).value();
+    ASSERT_NE(text.find(key), std::string::npos) << file << ": " << key << "\n" << text;
+    for (std::size_t at = 0; (at = text.find(key, at)) != std::string::npos;) {
+      at += std::string_view(key).size();
+      text.insert(at, hostile);
+    }
+    Write(file, text);
+  }
+  done("train --config " TILEGRAD_SOURCE_DIR "/configs/quick.toml --data " + data + " --out " +
+       run +
+       " --set schedule.steps=2 --set schedule.batch=4 --set network.channels=2 --set "
+       "network.code=8 --set network.hidden1=8 --set network.hidden2=8 --set "
+       "network.template_level=1");
+  done("eval --run " + run + " --views-per-model 1");
+  done("report --run " + run + " --models 2");
+  for (const char* file : {"run/report.html", "run/eval.md"}) {
+    const std::string text = ReadText(folder_ / file).value();
+    for (const char* raw : {"<img src=x", "\u202e", "\x1b"}) {
+      EXPECT_EQ(text.find(raw), std::string::npos) << file << " has " << raw;
+    }
+  }
+  const std::string page = ReadText(folder_ / "run/report.html").value();
+  EXPECT_NE(page.find("&lt;img src=x onerror=alert(1)&gt;"), std::string::npos);
+}
+
 // Half-written files of processes that are gone; those of others, and other files, stay.
 TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   const std::string data = Quoted("data"), run = Quoted("run");

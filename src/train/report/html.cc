@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/escape_text.h"
 #include "io/image_file.h"
 
 namespace tilegrad::train {
@@ -18,6 +19,15 @@ std::string ReplaceAll(std::string_view text, char from, std::string_view to) {
       out += c;
   }
   return out;
+}
+
+// Scripts put texts on the page as they are: marks of writing direction have to be visible by then.
+nlohmann::ordered_json Shown(nlohmann::ordered_json json) {
+  if (json.is_string()) return EscapeControls(json.get_ref<const std::string&>());
+  if (json.is_structured()) {
+    for (auto& part : json) part = Shown(std::move(part));
+  }
+  return json;
 }
 
 }  // namespace
@@ -38,8 +48,9 @@ std::string Base64(std::span<const std::uint8_t> bytes) {
 }
 
 std::string ScriptJson(const nlohmann::ordered_json& json) {
-  return ReplaceAll(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
-                    '<', "\\u003c");
+  return ReplaceAll(
+      Shown(json).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace), '<',
+      "\\u003c");
 }
 
 Result<std::string> PngAddress(const ImageU8& image) {
