@@ -18,6 +18,8 @@ if(TILEGRAD_PROGRAM)
   pkg_check_modules(WEBPDEMUX REQUIRED IMPORTED_TARGET libwebpdemux)    # likewise; for tests
   pkg_check_modules(HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)    # libcpp-httplib-dev
   find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
+  # libopenmpi-dev or libmpich-dev; without it processes train alone.
+  find_package(MPI COMPONENTS C)
 endif()
 if(TILEGRAD_TESTS)
   find_package(GTest REQUIRED)            # libgtest-dev

@@ -22,7 +22,7 @@ STAGE, SITE = ROOT / "build/docs", ROOT / "docs/site"
 LINK = re.compile(r"\]\(([^()\s#]+)")
 # In the order of the menu; pages that are not named here follow by name.
 MENU = {"Use it": ["fit", "live", "predict", "datasets", "rendering", "cameras", "python", "files",
-                   "torch", "textured", "cutouts", "tradeoff", "rivals"],
+                   "torch", "textured", "cutouts", "tradeoff", "rivals", "scaling"],
         "Figures": ["results", "benchmarks", "nn-speed"],
         "Embed it": ["embedding", "conventions", "numerics"],
         "Port to it": ["porting"],

@@ -143,4 +143,20 @@ void ProgressLine::Finish() {
   last_ = {};
 }
 
+int ExitCode(StatusCode code) {
+  switch (code) {
+    case StatusCode::kOk:
+      return 0;
+    case StatusCode::kInvalidArgument:
+      return 2;
+    case StatusCode::kNotFound:
+    case StatusCode::kDataLoss:
+      return 3;
+    case StatusCode::kCancelled:
+      return 128 + StopSignal();
+    default:
+      return 1;
+  }
+}
+
 }  // namespace tilegrad::cli

@@ -13,6 +13,7 @@
 
 #include "base/escape_text.h"
 #include "base/progress.h"
+#include "tilegrad/status.h"
 
 namespace tilegrad::cli {
 
@@ -101,5 +102,8 @@ std::string FormatDuration(double seconds);
 const StopFlag& StopOnSignals();
 // The last one that did; SIGINT if none has.
 int StopSignal();
+
+// Of the program, by how its work ended: see main.cc.
+int ExitCode(StatusCode code);
 
 }  // namespace tilegrad::cli

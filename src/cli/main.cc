@@ -22,25 +22,10 @@
 #include "cli/parse_errors.h"
 #include "cli/run_folder.h"
 #include "tilegrad/version.h"
+#include "train/ranks/launch.h"
 
 namespace tilegrad::cli {
 namespace {
-
-int ExitCode(StatusCode code) {
-  switch (code) {
-    case StatusCode::kOk:
-      return 0;
-    case StatusCode::kInvalidArgument:
-      return 2;
-    case StatusCode::kNotFound:
-    case StatusCode::kDataLoss:
-      return 3;
-    case StatusCode::kCancelled:
-      return 128 + StopSignal();
-    default:
-      return 1;
-  }
-}
 
 int Report(const Status& status) {
   if (!status.ok()) PrintNote("tilegrad: {}\n", status.message());
@@ -85,6 +70,15 @@ Status CheckValues(const CLI::App& app) {
   return {};
 }
 
+// Commands but training know nothing of other processes, which would write the same files.
+Status CheckRanks(const CLI::App& app) {
+  if (train::LaunchedRanks() == 1 || app.got_subcommand("train")) return {};
+  return InvalidArgument(
+      "started as one of {} processes, but among the commands train alone shares its work with "
+      "others: start this one without mpirun",
+      train::LaunchedRanks());
+}
+
 void AddCommands(CLI::App& app, Action* action) {
   for (const auto add :
        {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender, AddReport, AddSample,
@@ -125,7 +119,9 @@ int Run(int argc, char** argv) {
     PrintNote("{}", note.str());
     return code == 0 ? 0 : 2;
   }
-  if (const Status status = CheckValues(app); !status.ok()) return Report(status);
+  for (const auto check : {CheckValues, CheckRanks}) {
+    if (const Status status = check(app); !status.ok()) return Report(status);
+  }
   if (const auto threads = ThreadsFromEnvironment(); !threads.ok()) return Report(threads.status());
   if (const auto limit = ReadLimit(); !limit.ok()) return Report(limit.status());
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);

@@ -55,6 +55,16 @@ std::vector<NamedTensor> State(Module& module) {
   return result;
 }
 
+std::vector<NamedTensor> Buffers(Module& module) {
+  std::vector<NamedTensor> result;
+  VisitWith visitor([](const std::string&, Var&) {},
+                    [&](const std::string& name, Tensor& t) {
+                      result.push_back({name, t});
+                    });
+  module.Visit("", visitor);
+  return result;
+}
+
 std::int64_t CountParameters(Module& module) {
   std::int64_t count = 0;
   for (const NamedVar& p : Parameters(module)) count += p.value.shape().elements();

@@ -56,6 +56,8 @@ class Module {
 std::vector<NamedVar> Parameters(Module& module);
 // Parameters and buffers: what a checkpoint holds.
 std::vector<NamedTensor> State(Module& module);
+// What a pass in training mode changes: running statistics, vectors of spectral norms.
+std::vector<NamedTensor> Buffers(Module& module);
 std::int64_t CountParameters(Module& module);
 // CopyByName into parameters and buffers. Of new buffers (ModuleVisitor) that `state` does not have
 // none is an error: they are derived from the rest.

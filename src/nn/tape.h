@@ -96,9 +96,21 @@ class Gradient {
   Var first_, second_;
 };
 
+// Hears of each gradient as soon as it is final, while those of earlier layers are still to come:
+// sums over processes begin meanwhile.
+class GradientListener {
+ public:
+  virtual ~GradientListener() = default;
+  virtual void Begin(std::span<const Var> parameters) = 0;
+  // Of parameters[i]: each once unless the walk fails, in an order that the graph decides.
+  virtual void Ready(std::size_t i, const Gradient& gradient) = 0;
+};
+
 // Grad without options, for an optimiser. Products look at a and b when they are used: until then
-// nothing that the output was computed from may be overwritten but `parameters`.
-StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters);
+// nothing that the output was computed from may be overwritten but `parameters`. `listener`: or
+// null.
+StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters,
+                               GradientListener* listener = nullptr);
 
 // An operation that is computed elsewhere (a renderer, a loss) and has a first derivative only.
 // `backward` receives one adjoint for each output (empty Tensor: zero) and returns one for each

@@ -17,18 +17,21 @@ namespace {
 // One walk backwards over the graph of `output`.
 class Backward {
  public:
-  // `leave_products`: those that are the whole gradient of an input are left to the caller.
+  struct Consumer {
+    bool leave_products = false;  // that are the whole gradient of an input: left to the caller
+    GradientListener* listener = nullptr;
+  };
   Backward(const Var& output, std::span<const Var> inputs, const GradOptions& options,
-           bool leave_products)
+           const Consumer& consumer)
       : context_(output.context()),
         output_(output),
         options_(options),
-        leave_products_(leave_products),
+        consumer_(consumer),
         inputs_(inputs),
         order_(context_.allocator<Node*>()),
         visits_(context_.allocator<std::pair<Node* const, Visit>>()) {
     if (output.requires_grad()) Collect(output.node().get());
-    for (const Var& input : inputs) MarkUseful(input.node().get());
+    for (std::size_t i = 0; i < inputs.size(); ++i) MarkUseful(inputs[i].node().get(), i);
     std::sort(order_.begin(), order_.end(),
               [](const Node* a, const Node* b) { return a->order < b->order; });
     for (Node* node : order_) {
@@ -36,14 +39,19 @@ class Backward {
         if (edge.node && visits_[edge.node.get()].useful) visits_[node].useful = true;
       }
     }
+    if (consumer_.listener != nullptr) CountUses();
   }
 
   void Run(const Var& d_output) {
     const RecordingScope recording(context_, options_.create_graph);
     if (output_.requires_grad()) Deposit(output_.node().get(), output_.slot(), d_output);
+    if (consumer_.listener != nullptr) consumer_.listener->Begin(inputs_);
     for (auto it = order_.rbegin(); it != order_.rend() && context_.status().ok(); ++it) {
-      if (visits_[*it].useful && !(*it)->edges.empty()) Step(**it);
+      if (!visits_[*it].useful || (*it)->edges.empty()) continue;
+      Step(**it);
+      if (consumer_.listener != nullptr) Announce(**it);
     }
+    if (consumer_.listener != nullptr && context_.status().ok()) AnnounceUnused();
   }
 
   Gradient Result(const Var& input) {
@@ -64,6 +72,9 @@ class Backward {
     bool wanted = false;     // is a requested input: its adjoint must survive
     InlineVector<Var, 1> d;  // adjoint of each output, summed over the uses met so far
     Gradient product;        // or that of a leaf which met one use
+    // For a listener, of a requested input: its number, and the uses that have not been met.
+    std::size_t input = 0, uses = 0;
+    bool announced = false;
   };
 
   void Collect(Node* root) {
@@ -81,9 +92,40 @@ class Backward {
     }
   }
 
-  void MarkUseful(Node* node) {
+  void MarkUseful(Node* node, std::size_t input) {
     const auto it = visits_.find(node);
-    if (it != visits_.end()) it->second.useful = it->second.wanted = true;
+    if (it == visits_.end()) return;
+    it->second.useful = it->second.wanted = true;
+    it->second.input = input;
+  }
+
+  void CountUses() {
+    for (const Node* node : order_) {
+      if (!visits_[const_cast<Node*>(node)].useful) continue;
+      for (const auto& edge : node->edges) {
+        if (edge.node) ++visits_[edge.node.get()].uses;
+      }
+    }
+  }
+
+  // Tells of the inputs that `node` was the last to use.
+  void Announce(const Node& node) {
+    for (const auto& edge : node.edges) {
+      if (!edge.node || !context_.status().ok()) continue;
+      Visit& visit = visits_[edge.node.get()];
+      if (--visit.uses > 0 || !visit.wanted) continue;
+      visit.announced = true;
+      consumer_.listener->Ready(visit.input, Result(inputs_[visit.input]));
+    }
+  }
+
+  // And of the rest, which nothing uses.
+  void AnnounceUnused() {
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      const auto it = visits_.find(inputs_[i].node().get());
+      if (it == visits_.end() || !it->second.announced)
+        consumer_.listener->Ready(i, Result(inputs_[i]));
+    }
   }
 
   void Step(Node& node) {
@@ -102,7 +144,8 @@ class Backward {
     InlineVector<Var, 1> d = visit.wanted ? visit.d : std::move(visit.d);
     if (!visit.wanted) visit.d.clear();
     UncomputedAdjoint left;
-    const Vars d_inputs = node.rule(Adjoint(y, d, needs, leave_products_ ? &left : nullptr));
+    const Vars d_inputs =
+        node.rule(Adjoint(y, d, needs, consumer_.leave_products ? &left : nullptr));
     d.clear();
     for (std::size_t i = 0; i < d_inputs.size(); ++i) {
       if (needs[i] && d_inputs[i].valid()) {
@@ -159,7 +202,7 @@ class Backward {
   Context& context_;
   const Var& output_;
   const GradOptions& options_;
-  const bool leave_products_;
+  const Consumer consumer_;
   std::span<const Var> inputs_;
   StepVector<Node*> order_;
   std::unordered_map<Node*, Visit, std::hash<Node*>, std::equal_to<>,
@@ -192,7 +235,7 @@ Var Ones(const Var& like) {
 // The gradients as values or, where G is Gradient, also as products.
 template <class G>
 StepVector<G> Differentiate(const Var& output, std::span<const Var> inputs,
-                            const GradOptions& options) {
+                            const GradOptions& options, GradientListener* listener = nullptr) {
   constexpr bool kProducts = std::is_same_v<G, Gradient>;
   StepAllocator<G> allocator;
   if (output.has_context()) allocator = output.context().allocator<G>();
@@ -208,7 +251,7 @@ StepVector<G> Differentiate(const Var& output, std::span<const Var> inputs,
     context.Fail(InvalidArgument("Grad: an input is not part of a graph; make it by Parameter"));
     return result;
   }
-  Backward walk(output, inputs, options, kProducts);
+  Backward walk(output, inputs, options, {kProducts, listener});
   walk.Run(options.d_output.valid() ? options.d_output : Ones(output));
   if (!context.status().ok()) return result;
   std::transform(inputs.begin(), inputs.end(), result.begin(), [&](const Var& input) -> G {
@@ -227,8 +270,9 @@ StepVector<Var> Grad(const Var& output, std::span<const Var> inputs, const GradO
   return Differentiate<Var>(output, inputs, options);
 }
 
-StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters) {
-  return Differentiate<Gradient>(output, parameters, {});
+StepVector<Gradient> Gradients(const Var& output, std::span<const Var> parameters,
+                               GradientListener* listener) {
+  return Differentiate<Gradient>(output, parameters, {}, listener);
 }
 
 StepVector<Var> Grad(const Var& output, std::initializer_list<Var> inputs,

@@ -2,10 +2,14 @@
 #include "train/trainer.h"
 
 #include "base/error.h"
+#include "train/data/fingerprint.h"
+#include "train/portioned_update.h"
 #include "train/run/machine.h"
 
 namespace tilegrad::train {
 namespace {
+
+constexpr std::int64_t kEnd = -1;  // the order after the last step
 
 class Training : public RunWork {
  public:
@@ -25,16 +29,44 @@ class Training : public RunWork {
     header.dataset = job_.data.string();
     header.machine = DescribeMachine();
     TILEGRAD_TRY(WriteHeader(job_.run, header));
-    return WriteTextAtomic(job_.run / "config.toml", WriteConfig(config_));
+    TILEGRAD_TRY(WriteTextAtomic(job_.run / "config.toml", WriteConfig(config_)));
+    if (job_.crew) ShareState(first_step);
+    return {};
   }
 
   Status Step(std::int64_t step, StepValues* values) override {
-    for (int update = 0; update < task_.Updates(step); ++update) {
-      const UpdateIndex at{step, update};
-      TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, values));
-      TILEGRAD_TRY(task_.Update(at, gradients));
-    }
+    if (job_.crew) job_.crew->Order(step);
+    const Status status = Updates(step, values);
+    if (!status.ok() && job_.crew) job_.crew->Break();
+    return status;
+  }
+
+  // Data, networks and all else; on every rank.
+  Status Start(nn::Context& context, const ProgressSink& progress, const StopFlag& stop) {
+    TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
+    TILEGRAD_TRY(context.TakeStatus());
+    if (!job_.crew && config_.schedule.portions == 1) return {};
+    TILEGRAD_ASSIGN(portioned_,
+                    PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.crew));
     return {};
+  }
+
+  // What a rank that does not lead does instead of a run.
+  RunOutcome Follow(nn::Context& context) {
+    const std::int64_t first_step = job_.crew->AwaitOrder();
+    if (first_step == kEnd) return {};
+    if (const Status taken = TakeState(context, first_step); !taken.ok())
+      job_.crew->RaiseAlarm(taken);
+    RunOutcome outcome{first_step, first_step};
+    StepValues values;
+    for (std::int64_t step = job_.crew->AwaitOrder(); step != kEnd;
+         step = job_.crew->AwaitOrder()) {
+      values.terms.clear(), values.also.clear();
+      const Status done = Updates(step, &values);
+      if (!done.ok()) job_.crew->RaiseAlarm(done.Within(fmt::format("step {}", step)));
+      outcome.last_step = step + 1;
+    }
+    return outcome;
   }
 
   std::vector<nn::NamedTensor> State() override { return task_.State(); }
@@ -49,10 +81,53 @@ class Training : public RunWork {
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
  private:
+  Status Updates(std::int64_t step, StepValues* values) {
+    for (int update = 0; update < task_.Updates(step); ++update) {
+      const UpdateIndex at{step, update};
+      if (portioned_) {
+        TILEGRAD_TRY(portioned_->Run(at, values));
+        continue;
+      }
+      TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, values));
+      TILEGRAD_TRY(task_.Update(at, gradients));
+    }
+    return {};
+  }
+  void ShareState(std::int64_t first_step) {
+    job_.crew->Order(first_step);
+    std::vector<nn::NamedTensor> state = task_.State();
+    job_.crew->Share(&state);
+  }
+  Status TakeState(nn::Context& context, std::int64_t first_step) {
+    std::vector<nn::NamedTensor> state = task_.State();
+    for (nn::NamedTensor& t : state) t.value = context.Copy(t.value);
+    job_.crew->Share(&state);
+    return task_.LoadState(state, first_step);
+  }
+
   const TrainJob& job_;
   TrainConfig& config_;
   Task& task_;
+  std::unique_ptr<PortionedUpdate> portioned_;  // without: the batch is one portion, as it comes
 };
+
+// With other ranks that agree; an error is that of all.
+Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& workers,
+                     Training* training, const std::function<Status()>& start) {
+  TILEGRAD_ASSIGN(const std::string settings,
+                  training->ResultSettings(plan.settings, "configuration"));
+  const Status ready = job.crew->leads() ? CheckExistingRun(plan, *training) : Status();
+  TILEGRAD_TRY(job.crew->Agree(ready, CommonTraits(settings)));
+  Status started = start();
+  Trait data{"dataset", "",
+             fmt::format("{} must hold the same files everywhere", job.data.string())};
+  if (started.ok()) {
+    auto fingerprint = DatasetFingerprint(job.data, workers);
+    started = fingerprint.status();
+    if (started.ok()) data.value = *fingerprint;
+  }
+  return job.crew->Agree(started, {data});
+}
 
 }  // namespace
 
@@ -71,11 +146,25 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   // A task of its own: that of the job stays as it is, for the next call.
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(plan.settings, "configuration"));
   Training training(job, &config);
-  TILEGRAD_TRY(CheckExistingRun(plan, training));
-  TILEGRAD_TRY(config.task->Start({context, config.schedule, job.data, progress, stop, job.warn}));
-  TILEGRAD_TRY(context.TakeStatus());
+  const auto start = [&] { return training.Start(context, progress, stop); };
+  if (job.crew) {
+    TILEGRAD_TRY(StartTogether(plan, job, workers, &training, start));
+    if (!job.crew->leads()) {
+      const RunOutcome outcome = training.Follow(context);
+      job.crew->Disband();
+      return outcome;
+    }
+  } else {
+    TILEGRAD_TRY(CheckExistingRun(plan, training));
+    TILEGRAD_TRY(start());
+  }
   plan.image_size = config.task->image_size();
-  return ExecuteRun(plan, &training, context, progress, stop);
+  auto outcome = ExecuteRun(plan, &training, context, progress, stop);
+  if (job.crew && !job.crew->broken()) {
+    job.crew->Order(kEnd);
+    job.crew->Disband();
+  }
+  return outcome;
 }
 
 }  // namespace tilegrad::train

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "train/config.h"
+#include "train/ranks/crew.h"
 #include "train/run/run.h"
 
 namespace tilegrad::train {
@@ -22,11 +23,15 @@ struct TrainJob {
   bool extends = false;
   // > 0: save and stop after this long; a continued run ends in the same bits.
   double max_minutes = 0;
+  // The ranks that train together, each with this job and a dataset of the same contents; null:
+  // this process alone. Only rank 0 looks at `run`.
+  Crew* crew = nullptr;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
 };
 
-// As ExecuteRun. Two runs have the same configuration if all keys but these are equal: name,
-// schedule.log_every, sample_every, checkpoint_every, keep_checkpoints.
+// As ExecuteRun. With a crew, every rank calls it and rank 0's result tells; after an error with
+// Crew::broken() the ranks can only be aborted. Two runs have the same configuration if all keys
+// but these are equal: name, schedule.log_every, sample_every, checkpoint_every, keep_checkpoints.
 Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const ProgressSink& progress,
                          const StopFlag& stop);
 

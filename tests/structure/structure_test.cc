@@ -85,6 +85,7 @@ const std::map<std::string, std::set<std::string>> kMayIncludeInTrain = {
     {"losses", {}},
     {"ops", {}},
     {"metrics", {}},
+    {"ranks", {}},
     {"run", {}},  // knows no task, no loss and no data
     {"data", {"metrics", "run"}},
     {"models", {}},
@@ -194,6 +195,8 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^(zip|zlib)\\.h$"), {"src/io/"}},
       {std::regex("^Imf.*"), {"src/io/exr_"}},
       {std::regex("^webp/.*"), {"src/io/webp_"}},
+      {std::regex("^mpi\\.h$"), {"src/train/ranks/mpi_transport.cc"}},
+      {std::regex("^dlfcn\\.h$"), {"src/train/ranks/launch.cc"}},
       {std::regex("^Eigen/.*"), {"src/train/metrics/frechet.cc"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/", "src/fit/"}},
       {std::regex("^CLI/.*"), {"src/cli/"}},

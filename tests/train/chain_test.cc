@@ -165,7 +165,7 @@ struct SmallProblem {
 // A whole step.
 Result<LossValues> RunStep(TrainStep& step, const BatchTensors& batch, std::int64_t number) {
   LossValues values;
-  TILEGRAD_ASSIGN(const auto gradients, step.Backward(batch, number, &values));
+  TILEGRAD_ASSIGN(const auto gradients, step.Backward(batch, {number}, &values));
   TILEGRAD_TRY(step.weights().Update(gradients, number));
   return values;
 }

@@ -58,6 +58,21 @@ checkpoint_every = 3
 keep_checkpoints = 2
 )";
 
+inline constexpr const char* kTinyClassifier = R"(name = "tiny"
+[task]
+kind = "classify"
+[network]
+channels = 4
+most = 8
+levels = 3
+[schedule]
+batch = 8
+log_every = 1
+sample_every = 10
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
 // The value behind a key of a configuration.
 template <class T>
 T& ValueOf(TrainConfig& config, const std::string& key) {
@@ -69,13 +84,15 @@ T& ValueOf(TrainConfig& config, const std::string& key) {
 
 enum class Meshes { kNone, kBoxes };
 
-inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone) {
+inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNone,
+                                int classes = 1) {
   constexpr int kModels = 12, kSize = 32, kViews = 4;
   DatasetInfo info;
   info.source = meshes == Meshes::kNone ? "nmr" : "folder";
   info.image_size = info.camera.lens.width = info.camera.lens.height = kSize;
   info.views = kViews;
-  info.classes = {"noise"};
+  for (int c = 0; c < classes; ++c)
+    info.classes.push_back("noise" + (c > 0 ? std::to_string(c) : std::string()));
   info.recipe = "0000000000000000";
   ModelData data;
   data.images.resize(std::size_t{kViews} * 4 * kSize * kSize);
@@ -91,9 +108,11 @@ inline Status WriteNoiseDataset(const Path& folder, Meshes meshes = Meshes::kNon
   for (int m = 0; m < kModels; ++m) {
     ModelInfo model;
     model.id = model.name = "m" + std::to_string(m);
+    model.class_index = m % classes;
     model.split = m < 10 ? Split::kTrain : Split::kTest;
     for (std::uint8_t& byte : data.images) byte = static_cast<std::uint8_t>(rng.Below(256));
-    const Path file = ModelFilePath(folder, "noise", model.id);
+    const Path file =
+        ModelFilePath(folder, info.classes[static_cast<std::size_t>(model.class_index)], model.id);
     std::filesystem::create_directories(file.parent_path());
     if (Status status = SaveModelFile(file, info, data, {info.recipe, 0, 0}); !status.ok()) {
       return status;

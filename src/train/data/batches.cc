@@ -65,10 +65,10 @@ const std::vector<int>& BatchOrder::Permutation(std::int64_t epoch) {
   return permutation_;
 }
 
-std::vector<Sample> BatchOrder::Batch(std::int64_t step, int size, int views) {
+std::vector<Sample> BatchOrder::Batch(const Slots& slots, int views) {
   std::vector<Sample> batch;
-  for (int i = 0; i < size; ++i) {
-    const std::int64_t position = step * size + i;
+  for (std::int64_t i = 0; i < slots.count; ++i) {
+    const std::int64_t position = slots.first + i;
     Sample sample{Permutation(position / models_)[static_cast<std::size_t>(position % models_)],
                   {}};
     // The first `views` of a random permutation of all views.

@@ -11,6 +11,7 @@
 #include "base/progress.h"
 #include "scene/camera.h"
 #include "train/data/dataset.h"
+#include "train/run/portion.h"
 
 namespace tilegrad::train {
 
@@ -58,7 +59,11 @@ class BatchOrder {
   BatchOrder(int models, int views, std::uint64_t seed, double mirrored = 0)
       : models_(models), views_(views), seed_(seed), mirrored_(mirrored) {}
   // `views` is at most the number of views there are.
-  std::vector<Sample> Batch(std::int64_t step, int size, int views);
+  std::vector<Sample> Batch(const Slots& slots, int views);
+  // All of a step.
+  std::vector<Sample> Batch(std::int64_t step, int size, int views) {
+    return Batch(SlotsOf(step, size), views);
+  }
 
  private:
   const std::vector<int>& Permutation(std::int64_t epoch);

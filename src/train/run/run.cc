@@ -62,6 +62,7 @@ class Session {
   Status Draw();
   Status Log();
   void LogStream(LogEntry* entry);
+  void LogWait(double elapsed, LogEntry* entry);
   Status Save();
   double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
   bool OutOfTime() const {
@@ -81,6 +82,7 @@ class Session {
   // Since the last log.
   std::int64_t images_ = 0;
   double stream_seconds_ = 0, process_seconds_ = 0;  // the latter: of the process at that log
+  double wait_seconds_ = 0;
   std::string note_;
 };
 
@@ -144,6 +146,7 @@ Status Session::Log() {
   entry.values.emplace_back("images_per_second", rate);
   entry.values.emplace_back("seconds", Seconds());
   LogStream(&entry);
+  LogWait(elapsed, &entry);
   return log_->Append(entry);
 }
 
@@ -155,6 +158,14 @@ void Session::LogStream(LogEntry* entry) {
   const double share = streamed / (process_seconds_ - before);
   note_ += fmt::format("  streaming {:.0f} %", 100 * share);
   entry->values.emplace_back("stream_share", share);
+}
+
+// The share of the time that this rank, done with its portions, waited for the sums of all.
+void Session::LogWait(double elapsed, LogEntry* entry) {
+  const double waited = std::exchange(wait_seconds_, 0);
+  if (waited <= 0 || elapsed <= 0) return;
+  note_ += fmt::format("  waiting {:.1f} %", 100 * waited / elapsed);
+  entry->values.emplace_back("wait_share", waited / elapsed);
 }
 
 Status Session::Draw() {
@@ -170,10 +181,12 @@ Status Session::Draw() {
 Status Session::OneStep() {
   const Schedule& s = plan_.schedule;
   values_.terms.clear(), values_.also.clear();
+  values_.images = 0, values_.stream_seconds = values_.wait_seconds = 0;
   TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
   ++done_;
   images_ += values_.images;
   stream_seconds_ += values_.stream_seconds;
+  wait_seconds_ += values_.wait_seconds;
   const bool last = done_ == s.steps;
   if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
   TILEGRAD_TRY(Draw());

@@ -11,6 +11,7 @@ namespace tilegrad::train {
 struct Schedule {
   std::int64_t steps = 50000;
   std::int64_t seed = 1;        // of everything that is random
+  std::int64_t portions = 1;    // of a batch, run/portion.h
   std::int64_t log_every = 20;  // steps
   std::int64_t sample_every = 1000;
   std::int64_t checkpoint_every = 500;
@@ -22,6 +23,8 @@ inline ConfigFields FieldsOf(Schedule* s) {
   const auto reporting = Affects::kReporting;
   return {{"schedule.steps", &s->steps, 1, kNoLimit, "steps of the whole run"},
           {"schedule.seed", &s->seed, 0, kNoLimit, "of weights, order and views"},
+          {"schedule.portions", &s->portions, 1, 1 << 20,
+           "of a batch, each computed by itself, for as many processes; a power of two"},
           {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
           {"schedule.sample_every", &s->sample_every, 1, kNoLimit, "steps", reporting},
           {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},

@@ -10,6 +10,11 @@ const Mesh& Model::template_mesh() const {
   return none;
 }
 
+Result<std::vector<nn::NamedTensor>> Task::Statistics() {
+  return InvalidArgument(
+      "schedule.portions must be 1: this task knows nothing of portions of a batch");
+}
+
 Status Model::Predict(std::span<const std::uint8_t> /*images*/, std::vector<Mesh>* /*meshes*/) {
   return InvalidArgument(
       "this run predicts no meshes; name one that was trained to, such as of task.kind = "

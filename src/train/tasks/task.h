@@ -21,6 +21,7 @@
 #include "train/run/checkpoint.h"
 #include "train/run/config_fields.h"
 #include "train/run/header.h"
+#include "train/run/portion.h"
 #include "train/run/schedule.h"
 #include "train/run/step_values.h"
 
@@ -41,8 +42,10 @@ struct TaskStart {
 // A step is one or more updates, each of some parameters: a task with an adversary takes several of
 // its critic and one of its generator.
 struct UpdateIndex {
-  std::int64_t step = 0;  // from 0
-  int update = 0;         // of the step, from 0
+  std::int64_t step = 0;                     // from 0
+  int update = 0;                            // of the step, from 0
+  Portion portion{};                         // of the batch
+  nn::GradientListener* listener = nullptr;  // for nn::Gradients
 };
 
 // A trained network as commands use it. Of most tasks it predicts: images in, meshes out.
@@ -134,12 +137,17 @@ class Task {
   virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
 
   virtual int Updates(std::int64_t /*step*/) const { return 1; }
-  // The gradients of what an update moves. Sets values->loss and images, and appends terms. A loss
-  // or gradient that is not finite is an error. Changes nothing that a later step would notice, but
-  // running statistics of batch norm.
+  // The gradients of what an update moves, of the mean loss over `at.portion` of the batch. Sets
+  // values->loss and images, and appends terms. A loss or gradient that is not finite is an error.
+  // Changes nothing that a later step would notice, but Statistics(). What an update leaves for the
+  // next one of its step, it leaves for the same portion.
   virtual Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at,
                                                         StepValues* values) = 0;
-  // Steps along `gradients`, of which the caller may have made sums over processes.
+  // The tensors that Backward changes: nn::Buffers of its networks. Each portion starts with what
+  // the step started with, and the step ends with the mean of what they end with. The default is an
+  // error: a task has to say that it knows of portions.
+  virtual Result<std::vector<nn::NamedTensor>> Statistics();
+  // Steps along `gradients`, of which the caller may have made means over portions.
   virtual Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) = 0;
 
   // Everything that later steps depend on, under unique names: weights, statistics, moments of each

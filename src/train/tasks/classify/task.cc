@@ -58,6 +58,7 @@ class ClassifyTask : public Task {
   }
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override { return nn::Buffers(*network_); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
     adam_->options().learning_rate = RateAt(at.step);
     return adam_->Step(gradients);
@@ -93,7 +94,7 @@ class ClassifyTask : public Task {
   }
   Status CheckDataset() const;
   Status LoadPictures(const TaskStart& start);
-  LabelledBatch Batch(std::int64_t step);
+  LabelledBatch Batch(const Slots& slots);
 
   ClassifyConfig config_;
   nn::Context* context_ = nullptr;
@@ -136,6 +137,7 @@ Status ClassifyTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
+  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadPictures(start));
   order_.emplace(train_.images.models, train_.images.views, seed(), config_.mirrored);
@@ -155,11 +157,11 @@ RunHeader ClassifyTask::Header() {
   return header;
 }
 
-LabelledBatch ClassifyTask::Batch(std::int64_t step) {
-  const auto batch = order_->Batch(step, static_cast<int>(config_.batch), /*views=*/1);
+LabelledBatch ClassifyTask::Batch(const Slots& slots) {
+  const auto batch = order_->Batch(slots, /*views=*/1);
   std::vector<Shift> shifts;
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    const auto position = static_cast<std::uint64_t>(step) * batch.size() + i;
+    const auto position = static_cast<std::uint64_t>(slots.first) + i;
     shifts.push_back(RandomShift(seed(), position, static_cast<int>(config_.shift)));
   }
   return GatherLabelled(*context_, train_, batch, shifts);
@@ -167,10 +169,11 @@ LabelledBatch ClassifyTask::Batch(std::int64_t step) {
 
 Result<nn::StepVector<nn::Gradient>> ClassifyTask::Backward(const UpdateIndex& at,
                                                             StepValues* out) {
-  const LabelledBatch batch = Batch(at.step);
+  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+  const LabelledBatch batch = Batch(slots);
   const nn::Var scores = network_->Forward(nn::Constant(*context_, batch.images), nn::Mode::kTrain);
   const nn::Var loss = nn::CrossEntropy(scores, batch.labels);
-  auto gradients = nn::Gradients(loss, adam_->parameters());
+  auto gradients = nn::Gradients(loss, adam_->parameters(), at.listener);
   TILEGRAD_TRY(context_->TakeStatus());
   if (!std::isfinite(loss.item()) || !nn::IsFinite(*context_, gradients)) {
     return InternalError("the loss is {}; a smaller optimizer.learning_rate may help", loss.item());
@@ -181,7 +184,7 @@ Result<nn::StepVector<nn::Gradient>> ClassifyTask::Backward(const UpdateIndex& a
   out->also.emplace_back("epoch",
                          static_cast<double>((at.step + 1) * config_.batch) / train_.images.models);
   out->also.emplace_back("learning_rate", RateAt(at.step));
-  out->images = config_.batch;
+  out->images = slots.count;
   return gradients;
 }
 

@@ -81,7 +81,7 @@ BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
 
 Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
                                  const std::vector<Sample>& batch, SceneStream* stream,
-                                 std::int64_t step) {
+                                 std::int64_t first) {
   const auto objects = static_cast<std::int64_t>(batch.size()),
              size = static_cast<std::int64_t>(store.size);
   const auto views = batch[0].views.size();
@@ -97,7 +97,7 @@ Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
     context.workers().For(batch.size(), [&](std::size_t b, std::size_t worker) {
       const Sample& sample = batch[b];
       if (b >= streamed) return gathering.FromStore<T>(b, sample);
-      const auto position = static_cast<std::uint64_t>(step) * batch.size() + b;
+      const auto position = static_cast<std::uint64_t>(first) + b;
       const auto rgba = stream->Render(sample.model, position, worker, gathering.CamerasOf(b));
       failures[b] = rgba.status();
       if (rgba.ok()) gathering.FromStream<T>(b, sample, *rgba);

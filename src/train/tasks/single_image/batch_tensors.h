@@ -20,9 +20,10 @@ struct BatchTensors {
 };
 BatchTensors GatherBatch(nn::Context& context, const ImageStore& store,
                          const std::vector<Sample>& batch);
-// The first objects of the batch, which is that of `step`, are rendered instead; null: none are.
+// The first objects of the batch are rendered instead; null: none are. `first`: position in the run
+// of the first one.
 Result<BatchTensors> GatherBatch(nn::Context& context, const ImageStore& store,
                                  const std::vector<Sample>& batch, SceneStream* stream,
-                                 std::int64_t step);
+                                 std::int64_t first);
 
 }  // namespace tilegrad::train

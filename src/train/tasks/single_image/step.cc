@@ -27,9 +27,10 @@ nn::Var TrainStep::Loss(const BatchTensors& batch, std::int64_t step, LossValues
 }
 
 Result<nn::StepVector<nn::Gradient>> TrainStep::Backward(const BatchTensors& batch,
-                                                         std::int64_t step, LossValues* values) {
-  const nn::Var loss = Loss(batch, step, values);
-  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
+                                                         const UpdateIndex& at,
+                                                         LossValues* values) {
+  const nn::Var loss = Loss(batch, at.step, values);
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
   StepValues described;

@@ -5,6 +5,7 @@
 
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/single_image/image_losses.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::train {
 
@@ -20,7 +21,7 @@ class TrainStep {
   // Equation 14 of a batch, on the tape; `values` gets the parts.
   nn::Var Loss(const BatchTensors& batch, std::int64_t step, LossValues* values);
   // Gradients of the loss. A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, std::int64_t step,
+  Result<nn::StepVector<nn::Gradient>> Backward(const BatchTensors& batch, const UpdateIndex& at,
                                                 LossValues* values);
 
   MeshNetwork& network() { return network_; }

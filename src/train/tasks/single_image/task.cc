@@ -35,6 +35,9 @@ class SingleImageTask : public Task {
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override {
+    return nn::Buffers(step_->network().module());
+  }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
     return step_->weights().Update(gradients, at.step);
   }
@@ -84,6 +87,7 @@ Status SingleImageTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
   TILEGRAD_TRY(CheckDataset());
   TILEGRAD_TRY(LoadImages(start));
@@ -172,18 +176,19 @@ RunHeader SingleImageTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> SingleImageTask::Backward(const UpdateIndex& at,
                                                                StepValues* out) {
-  const auto batch =
-      order_->Batch(at.step, static_cast<int>(config_.batch), static_cast<int>(config_.views));
+  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+  const auto batch = order_->Batch(slots, static_cast<int>(config_.views));
   LossValues values;
-  TILEGRAD_ASSIGN(const BatchTensors tensors,
-                  GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, at.step));
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at.step, &values));
+  TILEGRAD_ASSIGN(
+      const BatchTensors tensors,
+      GatherBatch(*context_, train_, batch, stream_ ? &*stream_ : nullptr, slots.first));
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(tensors, at, &values));
   out->loss = values.total;
   step_->losses().AddTerms(values, &out->terms);
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_.models);
   out->also.emplace_back("learning_rate", LearningRateAt(config_, at.step));
-  out->images = config_.batch;
+  out->images = slots.count;
   out->stream_seconds = stream_ ? stream_->TakeSeconds() : 0;
   return gradients;
 }

@@ -68,13 +68,15 @@ Result<std::unique_ptr<Adversary>> Adversary::Make(nn::Context& context,
   return out;
 }
 
-nn::Var Adversary::GeneratorLoss(const nn::Var& rendered, const nn::Tensor& truth, Values* values) {
+nn::Var Adversary::GeneratorLoss(const Pictures& pictures, Values* values) {
+  const auto& [rendered, truth, portion] = pictures;
   nn::Var total;
   const auto add = [&](double weight, const nn::Var& term, double* value) {
     *value = term.item();
     total = total.has_context() ? total + weight * term : weight * term;
   };
-  rendered_ = rendered.value(), truth_ = truth;
+  kept_.resize(static_cast<std::size_t>(portion.count));
+  kept_[static_cast<std::size_t>(portion.index)] = {rendered.value(), truth};
   if (config_.weight > 0)
     add(config_.weight, WganGeneratorLoss(*critic_, rendered), &values->adversarial);
   if (config_.features > 0)
@@ -92,12 +94,13 @@ void Adversary::AddTerms(const Values& v, std::vector<LossTerm>* terms) const {
 
 Result<nn::StepVector<nn::Gradient>> Adversary::CriticGradients(const CriticStep& at,
                                                                 std::vector<LossTerm>* terms) {
-  Rng rng(seed_ ^ kPenaltyStream,
-          static_cast<std::uint64_t>(at.step * config_.updates + at.update));
+  const Slots draw = SlotsOf(at.step * config_.updates + at.update, at.portion.count, at.portion);
+  Rng rng(seed_ ^ kPenaltyStream, static_cast<std::uint64_t>(draw.first));
+  const auto& [rendered, truth] = kept_[static_cast<std::size_t>(at.portion.index)];
   const CriticLoss loss =
-      WganCriticLoss(*critic_, nn::Constant(context_, truth_), nn::Constant(context_, rendered_),
+      WganCriticLoss(*critic_, nn::Constant(context_, truth), nn::Constant(context_, rendered),
                      {.penalty = config_.penalty, .place = place_}, rng);
-  auto gradients = nn::Gradients(loss.total, adam_->parameters());
+  auto gradients = nn::Gradients(loss.total, adam_->parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   if (!std::isfinite(loss.total.item()) || !nn::IsFinite(context_, gradients)) {
     return InternalError(

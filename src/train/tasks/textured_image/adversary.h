@@ -14,6 +14,7 @@
 #include "train/losses/feature_l1.h"
 #include "train/losses/wgan_gp.h"
 #include "train/run/config_fields.h"
+#include "train/run/portion.h"
 #include "train/run/step_values.h"
 
 namespace tilegrad::train {
@@ -45,9 +46,14 @@ class Adversary {
   struct Values {
     double adversarial = 0, features = 0, perceptual = 0;  // unweighted
   };
-  // The three terms, weighted, of pictures [n, 3, size, size]; an invalid Var if none counts.
-  // Numbers of both are kept for the critic's updates, which come after this one.
-  nn::Var GeneratorLoss(const nn::Var& rendered, const nn::Tensor& truth, Values* values);
+  struct Pictures {
+    nn::Var rendered;      // [n, 3, size, size]
+    nn::Tensor truth;      // likewise
+    Portion portion = {};  // of the batch that they are
+  };
+  // The three terms, weighted; an invalid Var if none counts. Numbers of both pictures are kept for
+  // the critic's updates on this portion, which come after this one.
+  nn::Var GeneratorLoss(const Pictures& pictures, Values* values);
   void AddTerms(const Values& values, std::vector<LossTerm>* terms) const;
 
   // Updates of the critic in each step; 0 without one.
@@ -55,6 +61,8 @@ class Adversary {
   struct CriticStep {
     std::int64_t step = 0;
     int update = 0;  // of the critic, from 0
+    Portion portion = {};
+    nn::GradientListener* listener = nullptr;
   };
   // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at,
@@ -76,7 +84,10 @@ class Adversary {
   std::optional<nn::Critic> critic_;
   std::optional<nn::Adam> adam_;
   FeatureFunction perceptual_;
-  nn::Tensor rendered_, truth_;  // of the last step
+  struct Kept {
+    nn::Tensor rendered, truth;
+  };
+  std::vector<Kept> kept_;  // of the last step, by portion
 };
 
 }  // namespace tilegrad::train

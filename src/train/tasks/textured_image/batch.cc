@@ -28,7 +28,7 @@ void Place(std::span<const float> rgba, std::size_t m, TexturedBatch* batch) {
 }  // namespace
 
 Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
-                                  const std::vector<Sample>& models, std::int64_t step) {
+                                  const std::vector<Sample>& models, std::int64_t first) {
   const std::size_t inputs = kViewsOfObject * models.size(), images = 2 * inputs;
   const auto m = static_cast<std::int64_t>(inputs), n = static_cast<std::int64_t>(images);
   TexturedBatch batch{context.Empty({m, 4, size, size}), context.Empty({n, 3, size, size}),
@@ -37,7 +37,7 @@ Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, 
   std::vector<Status> failures(models.size());
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
     context.workers().For(models.size(), [&](std::size_t b, std::size_t worker) {
-      const std::uint64_t position = static_cast<std::uint64_t>(step) * models.size() + b;
+      const std::uint64_t position = static_cast<std::uint64_t>(first) + b;
       const auto rgba = stream.Render(models[b].model, position, worker,
                                       std::span(batch.views).subspan(2 * b, 2));
       failures[b] = rgba.status();

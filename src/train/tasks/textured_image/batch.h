@@ -20,13 +20,14 @@ struct TexturedBatch {
   nn::Tensor truth_alpha;           // [N, size, size]
   std::vector<Camera> cameras;      // [N]
   std::vector<TexturedView> views;  // [M]
+  Portion portion{};                // of the step's batch
 };
 
 // The input whose view image n shows.
 constexpr std::size_t InputOfImage(std::size_t n) { return n % 2 == 0 ? n / 2 : (n / 2) ^ 1; }
 
-// The objects of step `step`, one for each of `models`, rendered in parallel.
+// One object for each of `models`, rendered in parallel. `first`: position in the run of the first.
 Result<TexturedBatch> RenderBatch(nn::Context& context, TexturedStream& stream, int size,
-                                  const std::vector<Sample>& models, std::int64_t step);
+                                  const std::vector<Sample>& models, std::int64_t first);
 
 }  // namespace tilegrad::train

@@ -154,8 +154,8 @@ nn::Var TexturedStep::AdversaryLoss(const RenderedImages& images, const Textured
     others.push_back(static_cast<std::int32_t>(n));
   const nn::Tensor which = context_.Indices(others);
   const nn::Var truth = nn::Gather(nn::Constant(context_, batch.truth_colors), 0, which);
-  return adversary_->GeneratorLoss(nn::Gather(Covered(images.colors, batch), 0, which),
-                                   truth.value(), values);
+  return adversary_->GeneratorLoss(
+      {nn::Gather(Covered(images.colors, batch), 0, which), truth.value(), batch.portion}, values);
 }
 
 nn::Var TexturedStep::ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
@@ -232,14 +232,14 @@ void TexturedStep::AddTerms(const TexturedLossValues& v, std::int64_t step,
 }
 
 Result<nn::StepVector<nn::Gradient>> TexturedStep::Backward(const TexturedBatch& batch,
-                                                            std::int64_t step,
+                                                            const UpdateIndex& at,
                                                             TexturedLossValues* values) {
-  const nn::Var loss = Loss(Draw(batch, step), batch, step, values);
-  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
+  const nn::Var loss = Loss(Draw(batch, at.step), batch, at.step, values);
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   if (std::isfinite(values->total) && nn::IsFinite(context_, gradients)) return gradients;
   StepValues described;
-  AddTerms(*values, step, &described.terms);
+  AddTerms(*values, at.step, &described.terms);
   return InternalError(
       "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
       values->total, described.DescribeTerms(), nn::GlobalNorm(context_, gradients));

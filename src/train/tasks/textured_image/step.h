@@ -12,6 +12,7 @@
 #include "train/ops/rival_op.h"
 #include "train/run/step_values.h"
 #include "train/tasks/learned_weights.h"
+#include "train/tasks/task.h"
 #include "train/tasks/textured_image/batch.h"
 #include "train/tasks/textured_image/config.h"
 
@@ -40,7 +41,7 @@ class TexturedStep {
   nn::Var Loss(const TexturedRenders& renders, const TexturedBatch& batch, std::int64_t step,
                TexturedLossValues* values);
   // Gradients of the loss. A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, std::int64_t step,
+  Result<nn::StepVector<nn::Gradient>> Backward(const TexturedBatch& batch, const UpdateIndex& at,
                                                 TexturedLossValues* values);
   void AddTerms(const TexturedLossValues& values, std::int64_t step,
                 std::vector<LossTerm>* terms) const;

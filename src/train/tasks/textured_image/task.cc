@@ -41,6 +41,13 @@ class TexturedImageTask : public Task {
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override {
+    std::vector<nn::NamedTensor> out = nn::Buffers(step_->network().module());
+    if (nn::Critic* critic = adversary_->critic()) {
+      for (const nn::NamedTensor& tensor : nn::Buffers(*critic)) out.push_back(tensor);
+    }
+    return out;
+  }
   // The network's, then those of its critic, on the same pictures.
   int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
@@ -72,6 +79,10 @@ class TexturedImageTask : public Task {
 
  private:
   Status StartAs(const Path& run);
+  Result<nn::StepVector<nn::Gradient>> CriticGradients(const UpdateIndex& at, StepValues* out) {
+    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
+                                       &out->terms);
+  }
   ObjectPictures Pictures(int size) const {
     return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
   }
@@ -91,6 +102,7 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
   TILEGRAD_TRY(CheckImageSize(config_.network, image_size()));
   const std::vector<int> train = dataset_->Select(Split::kTrain);
@@ -140,19 +152,21 @@ RunHeader TexturedImageTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> TexturedImageTask::Backward(const UpdateIndex& at,
                                                                  StepValues* out) {
-  if (at.update > 0) return adversary_->CriticGradients({at.step, at.update - 1}, &out->terms);
-  const auto models = order_->Batch(at.step, static_cast<int>(config_.batch), 1);
-  TILEGRAD_ASSIGN(const TexturedBatch batch,
-                  RenderBatch(*context_, *stream_, image_size(), models, at.step));
+  if (at.update > 0) return CriticGradients(at, out);
+  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
+  const auto models = order_->Batch(slots, 1);
+  TILEGRAD_ASSIGN(TexturedBatch batch,
+                  RenderBatch(*context_, *stream_, image_size(), models, slots.first));
+  batch.portion = at.portion;
   TexturedLossValues values;
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at.step, &values));
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, &values));
   out->loss = values.total;
   step_->AddTerms(values, at.step, &out->terms);
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / static_cast<double>(meshes_.size()));
   out->also.emplace_back("learning_rate",
                          LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
-  out->images = kViewsOfObject * config_.batch;
+  out->images = kViewsOfObject * slots.count;
   out->stream_seconds = stream_->TakeSeconds();
   return gradients;
 }

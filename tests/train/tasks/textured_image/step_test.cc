@@ -54,7 +54,7 @@ struct SmallProblem {
 
   explicit SmallProblem(const TexturedImageConfig& c)
       : config(c), stream(JobOf(c), meshes, workers), step(context, c, kSize) {
-    auto drawn = RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 3);
+    auto drawn = RenderBatch(context, stream, kSize, {{0, {}}, {0, {}}}, 6);
     EXPECT_TRUE(drawn.ok()) << drawn.status().message();
     batch = std::move(*drawn);
     auto made = Adversary::Make(context, c.adversary, 5);

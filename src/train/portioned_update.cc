@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/portioned_update.h"
+
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+// Of an update that says nothing of the step's loss; one that is not finite would be an error.
+constexpr double kNoLoss = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kBeforeTerms = 3;  // numbers: loss, images, stream seconds
+
+Transport* RanksOf(Crew* crew) { return crew ? &crew->ranks() : nullptr; }
+
+}  // namespace
+
+PortionedUpdate::PortionedUpdate(Task& task, Crew* crew, std::int64_t portions,
+                                 std::unique_ptr<GradientSums> sums)
+    : task_(task),
+      crew_(crew),
+      portions_(portions),
+      sums_(std::move(sums)),
+      value_sums_(portions, RanksOf(crew)) {}
+
+Result<std::unique_ptr<PortionedUpdate>> PortionedUpdate::Make(nn::Context& context, Task& task,
+                                                               std::int64_t portions, Crew* crew) {
+  if (crew && crew->ranks().size() > portions) {
+    return InvalidArgument(
+        "{} ranks cannot share {} portion{} of a batch: set schedule.portions to a power of two "
+        "that is not smaller, or start fewer ranks",
+        crew->ranks().size(), portions, portions == 1 ? "" : "s");
+  }
+  if (context.dtype() != nn::DType::kF32) return InternalError("portions are summed in F32");
+  TILEGRAD_ASSIGN(auto statistics, task.Statistics());
+  auto sums = std::make_unique<GradientSums>(
+      context, GradientSums::Shape{.portions = portions, .ranks = RanksOf(crew)},
+      std::move(statistics));
+  return std::unique_ptr<PortionedUpdate>(
+      new PortionedUpdate(task, crew, portions, std::move(sums)));
+}
+
+Status PortionedUpdate::Run(const UpdateIndex& at, StepValues* values) {
+  sums_->BeginUpdate();
+  value_sums_.BeginUpdate();
+  Status status = Backward(at);
+  if (status.ok()) status = Finish(values);
+  if (!status.ok()) {
+    sums_->GiveUp();
+    return status;
+  }
+  return task_.Update(at, sums_->means());
+}
+
+Status PortionedUpdate::Backward(UpdateIndex at) {
+  at.listener = sums_.get();
+  for (std::size_t i = 0; i < sums_->portions().size(); ++i) {
+    at.portion = {sums_->portions()[i], portions_};
+    portion_.loss = kNoLoss, portion_.images = 0, portion_.stream_seconds = 0;
+    portion_.terms.clear(), portion_.also.clear();
+    sums_->BeginPortion(i);
+    TILEGRAD_ASSIGN(const auto gradients, task_.Backward(at, &portion_));
+    sums_->EndPortion(gradients);
+    AddValues();
+  }
+  return {};
+}
+
+void PortionedUpdate::AddValues() {
+  numbers_ = {portion_.loss, static_cast<double>(portion_.images), portion_.stream_seconds};
+  for (const LossTerm& term : portion_.terms) numbers_.push_back(term.value);
+  value_sums_.Add(numbers_);
+}
+
+Status PortionedUpdate::Finish(StepValues* values) {
+  Status alarm;
+  const auto all_is_well = [&] {
+    if (crew_ && crew_->leads()) alarm = crew_->Alarm();
+    return alarm.ok();
+  };
+  if (!sums_->Finish(all_is_well)) return alarm;
+  const std::span<const double> numbers = value_sums_.Finish(all_is_well);
+  TILEGRAD_TRY(alarm);
+  values->wait_seconds += crew_ ? sums_->seconds_waited() : 0;
+  if (!numbers.empty()) TakeValues(numbers, values);
+  return {};
+}
+
+void PortionedUpdate::TakeValues(std::span<const double> sums, StepValues* values) const {
+  const auto count = static_cast<double>(portions_);
+  if (std::isfinite(sums[0])) values->loss = sums[0] / count;
+  values->images += static_cast<std::int64_t>(sums[1]);
+  values->stream_seconds += sums[2];
+  for (std::size_t i = 0; i < portion_.terms.size(); ++i) {
+    values->terms.push_back(portion_.terms[i]);
+    values->terms.back().value = sums[kBeforeTerms + i] / count;
+  }
+  values->also.insert(values->also.end(), portion_.also.begin(), portion_.also.end());
+}
+
+}  // namespace tilegrad::train

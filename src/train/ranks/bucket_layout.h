@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where gradients lie in one long vector, and how it is cut into buckets, which travel by
+// themselves.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace tilegrad::train {
+
+struct Range {
+  std::size_t begin = 0, end = 0;
+  std::size_t size() const { return end - begin; }
+};
+
+class BucketLayout {
+ public:
+  // The last parameter comes first: a backward pass is done with it first. `tail` numbers stand
+  // behind all. A bucket ends once it has `bucket` numbers.
+  void Reset(std::span<const std::size_t> sizes, std::size_t tail, std::size_t bucket);
+
+  std::size_t total() const { return tail_.end; }
+  Range parameter(std::size_t i) const { return parameters_[i]; }
+  Range tail() const { return tail_; }
+  std::size_t buckets() const { return buckets_.size(); }
+  Range bucket(std::size_t b) const { return buckets_[b]; }
+  std::size_t BucketOf(std::size_t parameter) const { return bucket_of_[parameter]; }
+  // How many parameters a bucket has, the tail counted as one.
+  std::size_t parts(std::size_t b) const { return parts_[b]; }
+
+ private:
+  std::vector<Range> parameters_, buckets_;
+  std::vector<std::size_t> bucket_of_, parts_;
+  Range tail_;
+};
+
+// The share of a bucket that a rank finishes the sum of.
+inline Range PieceOf(const Range& bucket, int rank, int ranks) {
+  const auto r = static_cast<std::size_t>(rank), n = static_cast<std::size_t>(ranks);
+  return {bucket.begin + r * bucket.size() / n, bucket.begin + (r + 1) * bucket.size() / n};
+}
+
+}  // namespace tilegrad::train

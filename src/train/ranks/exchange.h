@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums of all ranks: bucket by bucket, while the backward pass goes on. Of each bucket every rank
+// gets a piece of all subtrees' sums, folds them in the order of the tree, and sends the total to
+// all others. So each rank sends and receives 2 (R - 1) / R of the numbers where each has one
+// subtree, and no sum depends on what arrives first.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "base/aligned.h"
+#include "train/ranks/bucket_layout.h"
+#include "train/ranks/portion_tree.h"
+#include "train/ranks/transport.h"
+
+namespace tilegrad::train {
+
+class Exchange {
+ public:
+  // `ranks` outlives it. A thread of its own moves the messages; it sleeps while there are none.
+  Exchange(Transport& ranks, std::vector<Subtree> subtrees);
+  ~Exchange();
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
+
+  struct Job {
+    const BucketLayout* layout = nullptr;
+    std::vector<float*> own;  // sums of this rank's subtrees, layout->total() numbers each
+    float* total = nullptr;   // of all, times `scale`
+    float scale = 1;
+  };
+  // The memory belongs to the exchange until Wait returns true.
+  void Begin(const Job& job);
+  // The own sums of a bucket are final. Each bucket once.
+  void Start(std::size_t bucket);
+  // Until the totals of all buckets are there; false if `meanwhile` says false first, which ends
+  // the exchange for good.
+  bool Wait(const std::function<bool()>& meanwhile);
+
+ private:
+  enum class Phase { kParts, kTotals, kDone };
+  struct Moving {
+    std::size_t bucket = 0;
+    Phase phase = Phase::kParts;
+    std::vector<Transport::Ticket> parts, rest;  // received parts; everything else
+  };
+
+  void Run();
+  bool Advance();
+  bool Drop(std::vector<Transport::Ticket>* tickets);
+  void Fold(std::size_t bucket, std::vector<Transport::Ticket>* sent);
+  float* SumOf(std::size_t subtree, std::size_t bucket);
+  Range Piece(std::size_t bucket, int rank) const {
+    return PieceOf(job_.layout->bucket(bucket), rank, ranks_.size());
+  }
+
+  Transport& ranks_;
+  const std::vector<Subtree> subtrees_;
+  std::vector<Subtree> scratch_;
+  std::vector<std::size_t> place_;  // of each subtree: which own sum, or which foreign one
+  Job job_;
+  std::size_t piece_numbers_ = 0;         // of this rank's pieces, all buckets
+  std::vector<std::size_t> piece_begin_;  // where those of a bucket begin
+  AlignedVector<float> foreign_;          // [foreign subtree][piece_numbers_]
+
+  std::mutex mutex_;  // of all below
+  std::condition_variable changed_;
+  std::vector<Moving> moving_;
+  std::size_t started_ = 0, done_ = 0;  // buckets
+  bool closing_ = false;
+  std::thread thread_;
+};
+
+}  // namespace tilegrad::train

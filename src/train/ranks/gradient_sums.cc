@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/ranks/gradient_sums.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::size_t kGrain = 32768;  // numbers to a task
+
+using Clock = std::chrono::steady_clock;
+
+void Resize(std::vector<AlignedVector<float>>* all, std::size_t numbers) {
+  for (auto& one : *all) one.resize(std::max(one.size(), numbers));
+}
+
+}  // namespace
+
+GradientSums::GradientSums(nn::Context& context, const Shape& shape,
+                           std::vector<nn::NamedTensor> statistics)
+    : context_(context), shape_(shape), statistics_(std::move(statistics)) {
+  for (const nn::NamedTensor& t : statistics_) statistics_numbers_ += t.value.elements();
+  before_.resize(statistics_numbers_), after_.resize(statistics_numbers_);
+  const int ranks = shape.ranks ? shape.ranks->size() : 1;
+  const int rank = shape.ranks ? shape.ranks->rank() : 0;
+  const std::vector<Subtree> all = SubtreesOf(ranks, shape.portions);
+  std::size_t levels = 0;
+  for (const Subtree& s : all) {
+    if (s.owner != rank) continue;
+    levels = std::max(levels, ClimbOf(s.count - 1));
+    for (std::int64_t p = s.first; p < s.first + s.count; ++p) {
+      portions_.push_back(p);
+      subtree_of_.push_back(own_.size());
+    }
+    own_.push_back(s);
+  }
+  levels_.resize(levels), sums_.resize(own_.size());
+  if (ranks > 1) exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
+}
+
+void GradientSums::CopyStatistics(float* to) {
+  for (const nn::NamedTensor& t : statistics_)
+    to = std::copy_n(t.value.data<float>(), t.value.elements(), to);
+}
+
+void GradientSums::SetStatistics(const float* from) {
+  for (nn::NamedTensor& t : statistics_) {
+    std::copy_n(from, t.value.elements(), t.value.data<float>());
+    from += t.value.elements();
+  }
+}
+
+void GradientSums::BeginUpdate() {
+  CopyStatistics(before_.data());
+  laid_out_ = false;
+}
+
+void GradientSums::GiveUp() { SetStatistics(before_.data()); }
+
+void GradientSums::BeginPortion(std::size_t i) {
+  at_ = i, told_ = false;
+  if (i > 0) SetStatistics(before_.data());
+}
+
+// Once an update, when it is known which parameters it moves.
+template <class Things>
+void GradientSums::LayOut(const Things& things) {
+  if (laid_out_) return;
+  means_ = nn::StepVector<nn::Gradient>(context_.allocator<nn::Gradient>());
+  sizes_.clear();
+  for (const auto& thing : things) {
+    means_.emplace_back(nn::Constant(context_, context_.Empty(thing.shape())));
+    sizes_.push_back(static_cast<std::size_t>(thing.shape().elements()));
+  }
+  layout_.Reset(sizes_, statistics_numbers_, shape_.bucket);
+  ready_.assign(layout_.buckets(), 0);
+  Resize(&levels_, layout_.total());
+  Resize(&sums_, layout_.total());
+  laid_out_ = true;
+  if (!exchange_) return;
+  total_.resize(std::max(total_.size(), layout_.total()));
+  Exchange::Job job{&layout_, {}, total_.data(), 1 / static_cast<float>(shape_.portions)};
+  for (auto& sum : sums_) job.own.push_back(sum.data());
+  exchange_->Begin(job);
+}
+
+void GradientSums::Begin(std::span<const nn::Var> parameters) {
+  told_ = true;
+  LayOut(parameters);
+}
+
+void GradientSums::Ready(std::size_t i, const nn::Gradient& gradient) {
+  const nn::Var value = gradient.Value();
+  if (!value.valid()) return;  // the context knows why
+  Add(value.value().data<float>(), layout_.parameter(i));
+  PartIsReady(layout_.BucketOf(i));
+}
+
+// The portion's numbers, and those of its left neighbours in the tree, to the place of their sum.
+void GradientSums::Add(const float* from, const Range& range) {
+  const Subtree& subtree = own_[subtree_of_[at_]];
+  const std::int64_t leaf = portions_[at_] - subtree.first;
+  const std::size_t climb = ClimbOf(leaf);
+  AlignedVector<float>& place =
+      leaf + 1 == subtree.count ? sums_[subtree_of_[at_]] : levels_[climb];
+  float* to = place.data() + range.begin;
+  context_.workers().ForRanges(range.size(), kGrain,
+                               [&](std::size_t begin, std::size_t end, std::size_t) {
+                                 std::copy(from + begin, from + end, to + begin);
+                                 for (std::size_t level = 0; level < climb; ++level) {
+                                   const float* left = levels_[level].data() + range.begin;
+                                   for (std::size_t i = begin; i < end; ++i)
+                                     to[i] = left[i] + to[i];
+                                 }
+                               });
+}
+
+void GradientSums::PartIsReady(std::size_t bucket) {
+  if (IsLastPortion() && ++ready_[bucket] == layout_.parts(bucket) && exchange_)
+    exchange_->Start(bucket);
+}
+
+void GradientSums::EndPortion(std::span<const nn::Gradient> gradients) {
+  if (!told_) {
+    LayOut(gradients);
+    for (std::size_t i = gradients.size(); i-- > 0;) Ready(i, gradients[i]);
+  }
+  CopyStatistics(after_.data());
+  Add(after_.data(), layout_.tail());
+  PartIsReady(layout_.buckets() - 1);
+}
+
+bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
+  const auto start = Clock::now();
+  if (exchange_ && !exchange_->Wait(meanwhile)) return false;
+  seconds_waited_ = std::chrono::duration<double>(Clock::now() - start).count();
+  TakeTotals();
+  return true;
+}
+
+void GradientSums::TakeTotals() {
+  const float scale = exchange_ ? 1 : 1 / static_cast<float>(shape_.portions);
+  const float* totals = exchange_ ? total_.data() : sums_[0].data();
+  for (std::size_t i = 0; i < means_.size(); ++i) {
+    const Range range = layout_.parameter(i);
+    nn::Tensor mean = means_[i].Value().value();
+    float* to = mean.data<float>();
+    context_.workers().ForRanges(range.size(), kGrain,
+                                 [&](std::size_t begin, std::size_t end, std::size_t) {
+                                   for (std::size_t k = begin; k < end; ++k)
+                                     to[k] = totals[range.begin + k] * scale;
+                                 });
+  }
+  const float* tail = totals + layout_.tail().begin;
+  std::transform(tail, tail + statistics_numbers_, after_.data(),
+                 [&](float x) { return x * scale; });
+  SetStatistics(after_.data());
+}
+
+}  // namespace tilegrad::train

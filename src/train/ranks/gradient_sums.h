@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Means over the portions of a batch, of gradients and running statistics: those of this process
+// are summed as they come, those of other ranks meanwhile, all in the order of one tree.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/aligned.h"
+#include "nn/named_tensors.h"
+#include "nn/tape.h"
+#include "train/ranks/bucket_layout.h"
+#include "train/ranks/exchange.h"
+#include "train/ranks/portion_tree.h"
+
+namespace tilegrad::train {
+
+class GradientSums : public nn::GradientListener {
+ public:
+  struct Shape {
+    std::int64_t portions = 1;
+    Transport* ranks = nullptr;                 // null: all portions are of this process
+    std::size_t bucket = std::size_t{1} << 20;  // numbers that travel together
+  };
+  // `statistics` are changed by each portion (nn::Buffers); all tensors are of kF32.
+  GradientSums(nn::Context& context, const Shape& shape, std::vector<nn::NamedTensor> statistics);
+
+  // Of this process, ascending. Every update takes all of them in this order: BeginPortion, a
+  // backward pass that this listens to, EndPortion; then Finish.
+  const std::vector<std::int64_t>& portions() const { return portions_; }
+
+  void BeginUpdate();
+  void BeginPortion(std::size_t i);  // of portions(): the statistics are as the update found them
+  void Begin(std::span<const nn::Var> parameters) override;
+  void Ready(std::size_t i, const nn::Gradient& gradient) override;
+  // Adds the statistics, and `gradients` if nobody told of them.
+  void EndPortion(std::span<const nn::Gradient> gradients);
+  // Waits for the other ranks; then means() are those of all portions, and so are the statistics.
+  // False if `meanwhile`, called now and then, says false first.
+  bool Finish(const std::function<bool()>& meanwhile);
+  // After an error: the statistics are as the update found them.
+  void GiveUp();
+
+  std::span<const nn::Gradient> means() const { return means_; }
+  double seconds_waited() const { return seconds_waited_; }  // in the last Finish
+
+ private:
+  template <class Things>
+  void LayOut(const Things& things);
+  void Add(const float* from, const Range& range);
+  void PartIsReady(std::size_t bucket);
+  void TakeTotals();
+  bool IsLastPortion() const { return at_ + 1 == portions_.size(); }
+  void CopyStatistics(float* to);
+  void SetStatistics(const float* from);
+
+  nn::Context& context_;
+  const Shape shape_;
+  std::vector<nn::NamedTensor> statistics_;
+  std::size_t statistics_numbers_ = 0;
+
+  std::vector<Subtree> own_;
+  std::vector<std::int64_t> portions_;
+  std::vector<std::size_t> subtree_of_;  // of each of portions_, in own_
+
+  BucketLayout layout_;
+  bool laid_out_ = false, told_ = false;             // in this update; in this portion
+  std::vector<std::size_t> sizes_, ready_;           // of parameters; ready parts of each bucket
+  std::vector<AlignedVector<float>> levels_, sums_;  // of subtrees in the making; of own_
+  AlignedVector<float> total_, before_, after_;      // of all; statistics
+  nn::StepVector<nn::Gradient> means_;
+  std::size_t at_ = 0;  // which of portions_
+  double seconds_waited_ = 0;
+  std::unique_ptr<Exchange> exchange_;  // with other ranks
+};
+
+}  // namespace tilegrad::train

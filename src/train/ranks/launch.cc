@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/ranks/launch.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
+#include <thread>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "base/parallel.h"
+#include "train/ranks/plugin_folder.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr const char* kPlugin = "libtilegrad_mpi.so";
+
+// The first of these variables that holds a number; 0 if none does.
+int NumberFrom(std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    const char* text = std::getenv(name);
+    int number = 0;
+    if (text == nullptr) continue;
+    const char* end = text + std::strlen(text);
+    const auto [at, error] = std::from_chars(text, end, number);
+    if (error == std::errc() && at == end && number > 0) return number;
+  }
+  return 0;
+}
+
+Result<Path> FindPlugin() {
+  std::error_code error;
+  const Path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  for (const Path& folder : {program.parent_path(), program.parent_path() / kPluginFolder}) {
+    if (std::filesystem::exists(folder / kPlugin, error)) return folder / kPlugin;
+  }
+  return NotFound(
+      "started as one of {} processes, but this tilegrad was built without MPI: install "
+      "libopenmpi-dev (or libmpich-dev), configure and build again, so that there is a {} beside "
+      "the "
+      "program; or start it without mpirun",
+      LaunchedRanks(), kPlugin);
+}
+
+}  // namespace
+
+int LaunchedRanks() {
+  // Slurm sets its variable for every step, also where no MPI is meant.
+  const int by_launcher = NumberFrom({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"});
+  const int by_slurm = std::getenv("PMIX_RANK") ? NumberFrom({"SLURM_STEP_NUM_TASKS"}) : 0;
+  return std::max({1, by_launcher, by_slurm});
+}
+
+Result<std::unique_ptr<Transport>> ConnectRanks() {
+  TILEGRAD_ASSIGN(const Path plugin, FindPlugin());
+  // Global: Open MPI loads plugins of its own, which look for its symbols.
+  void* library = ::dlopen(plugin.c_str(), RTLD_NOW | RTLD_GLOBAL);
+  void* connect = library ? ::dlsym(library, kConnectRanksName) : nullptr;
+  if (connect == nullptr) return IoError("{}: {}", plugin.string(), ::dlerror());
+  const char* error = "MPI did not start";
+  Transport* ranks = reinterpret_cast<ConnectRanksFunction>(connect)(&error);
+  if (ranks == nullptr) return InternalError("{}: {}", plugin.string(), error);
+  return std::unique_ptr<Transport>(ranks);
+}
+
+int WorkersOfRank() {
+  const int own = AvailableCores();
+  const int here = NumberFrom({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"});
+  if (here < 2 || own < static_cast<int>(std::thread::hardware_concurrency())) return own;
+  return std::max(1, own / here);
+}
+
+}  // namespace tilegrad::train

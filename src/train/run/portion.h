@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// A batch is cut into portions, a number of the configuration. Each is computed by itself, with
+// batch-norm statistics of its own, and what they give is summed in one binary tree. So the same
+// bits come out whoever computes them: one process one after the other, or many at once.
+#pragma once
+
+#include <cstdint>
+
+#include "tilegrad/status.h"
+
+namespace tilegrad::train {
+
+struct Portion {
+  std::int64_t index = 0, count = 1;
+};
+
+// The positions of objects in the run: step * batch + slot. All that is random about an object
+// follows from its position.
+struct Slots {
+  std::int64_t first = 0, count = 0;
+};
+
+// Those of a portion of a step's batch, which is a multiple of portion.count.
+inline Slots SlotsOf(std::int64_t step, std::int64_t batch, const Portion& portion = {}) {
+  const std::int64_t count = batch / portion.count;
+  return {step * batch + portion.index * count, count};
+}
+
+// InvalidArgument unless `portions` is a power of two that divides schedule.batch.
+Status CheckPortions(std::int64_t batch, std::int64_t portions);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real program under mpirun: the same bits on any number of ranks, a rank that is killed, and
+// ranks that must not work together.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <thread>
+
+#include "../tiny_run.h"
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "train/run/checkpoint.h"
+#include "train/run/log.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Words = std::vector<std::string>;
+
+struct Ended {
+  int code = -1;  // 128 + signal of a process that a signal ended
+  std::string output;
+};
+
+struct Kind {
+  const char* name;
+  std::string config;
+  Words settings;
+};
+
+const Kind kKinds[] = {
+    {"single", std::string(kTinyConfig) + "[stream]\nshare = 0.5\n", {}},
+    {"textured", kTinyTextured, {}},
+    {"critic",
+     kTinyTextured,
+     {"adversarial.weight=0.5", "adversarial.features=1", "adversarial.base=4",
+      "adversarial.halvings=2", "adversarial.updates=2", "adversarial.learning_rate=1e-3",
+      "adversarial.place=interpolates"}},
+    {"classify", kTinyClassifier, {}},
+};
+
+class Ranks : public TempFolderTest {
+ protected:
+  Ranks() : workers_(1), context_(workers_) {
+    // As root in a container without ssh, with more ranks than cores.
+    for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
+                             "OMPI_MCA_rmaps_base_oversubscribe"})
+      ::setenv(name, "1", 1);
+    ::setenv("OMPI_MCA_plm_rsh_agent", "", 1);
+    ::setenv("OMPI_MCA_btl_vader_single_copy_mechanism", "none", 0);
+  }
+
+  void SetUp() override {
+    if (std::string(TILEGRAD_MPIRUN).empty()) {
+      std::puts("SKIPPED: built without MPI (libopenmpi-dev or libmpich-dev)");
+      GTEST_SKIP();
+    }
+    for (const char* data : {"data", "other_data"}) {
+      std::filesystem::create_directories(folder_ / data);
+      const Status written = WriteNoiseDataset(folder_ / data, Meshes::kBoxes, 2);
+      ASSERT_TRUE(written.ok()) << written.message();
+    }
+    Use(kKinds[0]);
+  }
+
+  void Use(const Kind& kind) {
+    Write("tiny.toml", kind.config);
+    settings_ = kind.settings;
+  }
+
+  Words TrainWords(const std::string& run, int workers) const {
+    Words words = {TILEGRAD_PROGRAM, "train",
+                   "--config",       (folder_ / "tiny.toml").string(),
+                   "--data",         (folder_ / "data").string(),
+                   "--out",          (folder_ / run).string(),
+                   "--threads",      std::to_string(workers),
+                   "--set",          "schedule.portions=4",
+                   "--set",          "schedule.steps=" + std::to_string(steps_),
+                   "--resume"};
+    for (const std::string& setting : settings_) words.insert(words.end(), {"--set", setting});
+    return words;
+  }
+
+  static Words OnRanks(int ranks, Words words) {
+    words.insert(words.begin(), {TILEGRAD_MPIRUN, "-n", std::to_string(ranks)});
+    return words;
+  }
+
+  // What it prints goes to a file of its own.
+  pid_t Start(const Words& words, const std::string& log) const {
+    std::vector<char*> arguments;
+    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    const std::string file = (folder_ / log).string();
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    const int out = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    if (out < 0 || ::dup2(out, 1) < 0 || ::dup2(out, 2) < 0) ::_exit(126);
+    ::execv(arguments[0], arguments.data());
+    ::_exit(127);
+  }
+
+  Ended End(pid_t child, const std::string& log) const {
+    int status = 0;
+    EXPECT_EQ(::waitpid(child, &status, 0), child);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
+            ReadText(folder_ / log).value()};
+  }
+
+  Ended Do(const Words& words) const { return End(Start(words, "log.txt"), "log.txt"); }
+
+  // One rank: without mpirun.
+  Ended TrainOn(int ranks, int workers, const std::string& run) const {
+    const Words words = TrainWords(run, workers);
+    return Do(ranks == 1 ? words : OnRanks(ranks, words));
+  }
+
+  std::vector<nn::NamedTensor> Final(const std::string& run) {
+    auto found = LoadNewestCheckpoint(context_, folder_ / run);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    if (!found.ok()) return {};
+    EXPECT_EQ(found->checkpoint.info.step, steps_);
+    return std::move(found->checkpoint.tensors);
+  }
+
+  void ExpectSameBits(const std::string& a, const std::string& b) {
+    const auto left = Final(a), right = Final(b);
+    ASSERT_FALSE(left.empty());
+    ASSERT_EQ(left.size(), right.size());
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      ASSERT_EQ(left[i].name, right[i].name);
+      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
+      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
+          << b << ": " << left[i].name;
+    }
+  }
+
+  // Every step once, with the same losses. Rates and times are of the clock.
+  void ExpectSameCurves(const std::string& a, const std::string& b) {
+    const auto left = ReadLog(folder_ / a), right = ReadLog(folder_ / b);
+    ASSERT_TRUE(left.ok() && right.ok());
+    ASSERT_EQ(left->size(), static_cast<std::size_t>(steps_));
+    ASSERT_EQ(right->size(), left->size());
+    for (std::size_t i = 0; i < left->size(); ++i) {
+      EXPECT_EQ(ByName(left->at(i)), ByName(right->at(i))) << b << ", line " << i + 1;
+    }
+  }
+  static std::map<std::string, double> ByName(const LogEntry& entry) {
+    std::map<std::string, double> out = {{"step", static_cast<double>(entry.step)}};
+    for (const auto& [name, value] : entry.values) {
+      if (name != "images_per_second" && name != "seconds" && name != "stream_share" &&
+          name != "wait_share")
+        out[name] = value;
+    }
+    return out;
+  }
+
+  void CheckSameBits(const std::vector<std::pair<int, int>>& ranks_and_workers) {
+    for (const Kind& kind : kKinds) {
+      SCOPED_TRACE(kind.name);
+      Use(kind);
+      const std::string whole = std::string(kind.name) + "_whole";
+      const Ended alone = TrainOn(1, 1, whole);
+      ASSERT_EQ(alone.code, 0) << alone.output;
+      for (const auto& [ranks, workers] : ranks_and_workers) {
+        const std::string run = fmt::format("{}_{}_{}", kind.name, ranks, workers);
+        const Ended ended = TrainOn(ranks, workers, run);
+        ASSERT_EQ(ended.code, 0) << ended.output;
+        ExpectSameBits(whole, run);
+        ExpectSameCurves(whole, run);
+        std::filesystem::remove_all(folder_ / run);
+      }
+    }
+  }
+
+  // Of mpirun: its ranks, in the order it started them.
+  static std::vector<pid_t> ChildrenOf(pid_t parent) {
+    std::vector<pid_t> out;
+    std::error_code error;
+    for (const auto& task :
+         std::filesystem::directory_iterator(fmt::format("/proc/{}/task", parent), error)) {
+      std::ifstream list(task.path() / "children");
+      for (pid_t child; list >> child;) out.push_back(child);
+    }
+    return out;
+  }
+
+  // At once or soon. Where nobody reaps it, a process stays as a zombie.
+  static bool IsGone(pid_t process) {
+    for (int i = 0; i < 1000; ++i) {
+      std::ifstream file(fmt::format("/proc/{}/stat", process));
+      std::string number, name, state;
+      if (!(file >> number >> name >> state) || state == "Z") return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  }
+
+  void AwaitStep(const std::string& run, std::int64_t step) const {
+    for (int i = 0; i < 6000; ++i) {
+      const auto log = ReadLog(folder_ / run);
+      if (log.ok() && !log->empty() && log->back().step >= step) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+
+  // Starts `ranks`, and kills one of them once a step is done.
+  void KillOne(int ranks, std::size_t which, const std::string& run, std::int64_t step) const {
+    const pid_t mpirun = Start(OnRanks(ranks, TrainWords(run, 1)), "killed.txt");
+    AwaitStep(run, step);
+    const std::vector<pid_t> children = ChildrenOf(mpirun);
+    ASSERT_EQ(children.size(), static_cast<std::size_t>(ranks));
+    const auto start = Clock::now();
+    ::kill(children[which], SIGKILL);
+    const Ended ended = End(mpirun, "killed.txt");
+    EXPECT_LT(Clock::now() - start, std::chrono::seconds(10));
+    EXPECT_NE(ended.code, 0);
+    EXPECT_NE(ended.output.find("signal 9"), std::string::npos) << ended.output;
+    for (const pid_t child : children) EXPECT_TRUE(IsGone(child)) << "a rank lives on";
+  }
+
+  void CheckKills(const std::vector<std::int64_t>& steps) {
+    ASSERT_EQ(TrainOn(1, 2, "whole").code, 0);
+    int ranks = 2;
+    for (const std::int64_t step : steps) {
+      KillOne(ranks, static_cast<std::size_t>(step) % static_cast<std::size_t>(ranks), "killed",
+              step);
+      ranks = ranks % 4 + 1 == 1 ? 2 : ranks % 4 + 1;  // 2, 3, 4, 2, ..
+    }
+    const Ended ended = TrainOn(ranks, 1, "killed");
+    ASSERT_EQ(ended.code, 0) << ended.output;
+    ExpectSameBits("whole", "killed");
+    ExpectSameCurves("whole", "killed");
+  }
+
+  // That they end with this, said once.
+  void ExpectRefused(const Words& words, int code, const std::string& message) const {
+    const Ended ended = Do(words);
+    EXPECT_EQ(ended.code, code) << ended.output;
+    const std::size_t at = ended.output.find(message);
+    ASSERT_NE(at, std::string::npos) << ended.output;
+    EXPECT_EQ(ended.output.find(message, at + 1), std::string::npos) << ended.output;
+    EXPECT_TRUE(ListCheckpoints(folder_ / "run").empty());
+  }
+  // Two ranks of which the second has other words, or stands behind them.
+  Words Pair(const Words& first, const Words& second) const {
+    Words words = OnRanks(1, first);
+    words.insert(words.end(), {":", "-n", "1"});
+    words.insert(words.end(), second.begin(), second.end());
+    return words;
+  }
+
+  Workers workers_;
+  nn::Context context_;
+  int steps_ = 20;
+  Words settings_;  // --set
+};
+
+TEST_F(Ranks, EveryTaskHasTheSameBitsOnAnyNumberOfThem) {
+  CheckSameBits({{1, 2}, {2, 1}, {3, 1}, {4, 2}});
+}
+
+TEST_F(Ranks, LongSameBitsAfterTwoHundredSteps) {
+  steps_ = 200;
+  CheckSameBits({{1, 2}, {2, 1}, {2, 2}, {3, 1}, {3, 2}, {4, 1}, {4, 2}});
+}
+
+TEST_F(Ranks, AKilledOneEndsAllAndOthersGoOn) {
+  steps_ = 60;
+  CheckKills({1, 22});
+}
+
+TEST_F(Ranks, LongFiveKills) {
+  steps_ = 400;
+  CheckKills({1, 70, 137, 205, 298});
+}
+
+TEST_F(Ranks, OfAnotherDatasetAreRefused) {
+  Words other = TrainWords("run", 1);
+  *std::find(other.begin(), other.end(), (folder_ / "data").string()) =
+      (folder_ / "other_data").string();
+  const Path models = folder_ / "other_data" / "models" / "noise";
+  std::filesystem::copy_file(models / "m2.npz", models / "m0.npz",
+                             std::filesystem::copy_options::overwrite_existing);
+  ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another dataset (");
+}
+
+TEST_F(Ranks, OfAnotherConfigurationAreRefused) {
+  Words other = TrainWords("run", 1);
+  other.insert(other.end(), {"--set", "optimizer.warmup=7"});
+  ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another configuration (");
+}
+
+TEST_F(Ranks, OfAnotherInstructionSetAreRefused) {
+  Words other = TrainWords("run", 1);
+  other.insert(other.begin(), {"/usr/bin/env", "TILEGRAD_TARGET=EMU128"});
+  ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another instruction set (EMU128)");
+}
+
+TEST_F(Ranks, AreAtMostAsManyAsPortions) {
+  Words words = OnRanks(2, TrainWords("run", 1));
+  words.insert(words.end(), {"--set", "schedule.portions=1"});
+  ExpectRefused(words, 2, "2 ranks cannot share 1 portion of a batch");
+}
+
+TEST_F(Ranks, OfARunThatIsThereAreRefusedOnce) {
+  steps_ = 1;
+  ASSERT_EQ(TrainOn(1, 1, "there").code, 0);
+  Words words = OnRanks(3, TrainWords("there", 1));
+  words.erase(std::find(words.begin(), words.end(), "--resume"));
+  ExpectRefused(words, 2, "already holds a run");
+}
+
+// All ranks meet gradients that are not finite in the middle of a step.
+TEST_F(Ranks, AStepThatFailsIsSaidOnce) {
+  Words words = OnRanks(3, TrainWords("run", 1));
+  for (const char* setting :
+       {"network.fc_deviation=10", "network.output_deviation=10", "network.code=2048",
+        "network.hidden1=2048", "network.hidden2=2048", "loss.laplacian=1e12"})
+    words.insert(words.end(), {"--set", setting});
+  ExpectRefused(words, 1, "a smaller optimizer.learning_rate may help");
+}
+
+TEST_F(Ranks, OtherCommandsAreRefused) {
+  const Ended ended = Do(OnRanks(2, {TILEGRAD_PROGRAM, "configs"}));
+  EXPECT_EQ(ended.code, 2);
+  EXPECT_NE(ended.output.find("start this one without mpirun"), std::string::npos) << ended.output;
+}
+
+TEST_F(Ranks, WithoutThePluginSayHowToGetIt) {
+  const Path program = folder_ / "bin" / "tilegrad";
+  std::filesystem::create_directories(program.parent_path());
+  std::filesystem::copy_file(TILEGRAD_PROGRAM, program);
+  Words words = TrainWords("run", 1);
+  words[0] = program.string();
+  words.insert(words.begin(), {"/usr/bin/env", "OMPI_COMM_WORLD_SIZE=2"});
+  ExpectRefused(words, 3, "built without MPI: install libopenmpi-dev");
+}
+
+}  // namespace
+}  // namespace tilegrad::train

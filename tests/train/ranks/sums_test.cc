@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums over portions have the same bits, whoever holds the portions.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "base/rng.h"
+#include "nn/nn.h"
+#include "thread_ranks.h"
+#include "train/ranks/crew.h"
+#include "train/ranks/gradient_sums.h"
+#include "train/ranks/messages.h"
+#include "train/ranks/value_sums.h"
+
+namespace tilegrad::train {
+namespace {
+
+TEST(PortionTree, RanksShareAllPortionsAndSubtreesAreComplete) {
+  for (std::int64_t portions = 1; portions <= 64; portions *= 2) {
+    for (int ranks = 1; ranks <= portions; ++ranks) {
+      std::int64_t at = 0;
+      std::vector<std::int64_t> of_rank(static_cast<std::size_t>(ranks));
+      for (const Subtree& s : SubtreesOf(ranks, portions)) {
+        EXPECT_EQ(s.first, at);
+        EXPECT_EQ(s.first % s.count, 0);
+        of_rank[static_cast<std::size_t>(s.owner)] += s.count;
+        at += s.count;
+      }
+      EXPECT_EQ(at, portions);
+      const auto [least, most] = std::minmax_element(of_rank.begin(), of_rank.end());
+      EXPECT_GE(*least, 1);
+      EXPECT_LE(*most - *least, 1);  // nobody waits for more than one portion
+    }
+  }
+}
+
+// As ((a + b) + (c + d)) + ...: written down another way than the code does it.
+double TreeSum(std::span<const double> values) {
+  if (values.size() == 1) return values[0];
+  const std::size_t half = values.size() / 2;
+  return TreeSum(values.first(half)) + TreeSum(values.subspan(half));
+}
+
+std::vector<double> ValuesOf(std::int64_t portion) {
+  Rng rng(7, static_cast<std::uint64_t>(portion));
+  return {rng.Uniform(-1, 1), rng.Uniform(0, 1e6)};
+}
+
+TEST(ValueSums, AreThoseOfTheTree) {
+  for (const std::int64_t portions : {1, 2, 8, 16}) {
+    std::vector<std::vector<double>> want(2);
+    for (std::int64_t p = 0; p < portions; ++p) {
+      for (std::size_t k = 0; k < 2; ++k) want[k].push_back(ValuesOf(p)[k]);
+    }
+    for (int size = 1; size <= std::min<std::int64_t>(portions, 5); ++size) {
+      OnRanks(size, [&](Transport& ranks) {
+        ValueSums sums(portions, &ranks);
+        for (int update = 0; update < 2; ++update) {
+          sums.BeginUpdate();
+          for (const Subtree& s : SubtreesOf(size, portions)) {
+            for (std::int64_t p = s.first; s.owner == ranks.rank() && p < s.first + s.count; ++p)
+              sums.Add(ValuesOf(p));
+          }
+          const auto got = sums.Finish(nullptr);
+          if (ranks.rank() > 0) {
+            EXPECT_TRUE(got.empty());
+            continue;
+          }
+          ASSERT_EQ(got.size(), 2u);
+          EXPECT_EQ(got[0], TreeSum(want[0])) << portions << " on " << size;
+          EXPECT_EQ(got[1], TreeSum(want[1])) << portions << " on " << size;
+        }
+      });
+    }
+  }
+}
+
+// A network with a statistic, and a batch of random numbers for each portion.
+struct Problem {
+  Workers workers{1};
+  nn::Context context{workers};
+  nn::Sequential net;
+
+  Problem() {
+    Rng rng(3);
+    net.Add<nn::LinearLayer>("first", context, nn::LinearShape{.in = 5, .out = 7}, rng);
+    net.Add<nn::BatchNorm>("norm", context, 7, nn::BatchNormOptions{.relu = true});
+    net.Add<nn::LinearLayer>("second", context, nn::LinearShape{.in = 7, .out = 3}, rng);
+  }
+  nn::Var Loss(std::int64_t portion) {
+    Rng rng(11, static_cast<std::uint64_t>(portion));
+    nn::Tensor x = context.Empty({6, 5});
+    for (float& v : x.span<float>()) v = static_cast<float>(rng.Uniform(-1, 1));
+    return nn::Mean(nn::Square(net.Forward(nn::Constant(context, x), nn::Mode::kTrain)));
+  }
+  std::vector<nn::Var> Parameters() {
+    std::vector<nn::Var> out;
+    for (const nn::NamedVar& p : nn::Parameters(net)) out.push_back(p.value);
+    return out;
+  }
+};
+
+// Gradients and statistics after two updates, in one row.
+using Bits = std::vector<float>;
+
+void Append(const nn::Tensor& t, Bits* out) {
+  out->insert(out->end(), t.data<float>(), t.data<float>() + t.elements());
+}
+
+Bits MeansOn(std::int64_t portions, Transport* ranks, bool listening) {
+  Problem p;
+  GradientSums sums(p.context, {portions, ranks, /*bucket=*/10}, nn::Buffers(p.net));
+  const std::vector<nn::Var> parameters = p.Parameters();
+  Bits out;
+  for (int update = 0; update < 2; ++update) {
+    sums.BeginUpdate();
+    for (std::size_t i = 0; i < sums.portions().size(); ++i) {
+      sums.BeginPortion(i);
+      const nn::Var loss = p.Loss(sums.portions()[i]);
+      sums.EndPortion(nn::Gradients(loss, parameters, listening ? &sums : nullptr));
+    }
+    EXPECT_TRUE(sums.Finish(nullptr));
+    for (const nn::Gradient& g : sums.means()) Append(g.Value().value(), &out);
+  }
+  for (const nn::NamedTensor& t : nn::Buffers(p.net)) Append(t.value, &out);
+  EXPECT_TRUE(p.context.status().ok());
+  return out;
+}
+
+TEST(GradientSums, HaveTheSameBitsOnAnyNumberOfRanks) {
+  for (const std::int64_t portions : {1, 2, 4, 16}) {
+    const Bits want = MeansOn(portions, nullptr, true);
+    EXPECT_EQ(MeansOn(portions, nullptr, false), want);
+    for (int size = 2; size <= std::min<std::int64_t>(portions, 5); ++size) {
+      OnRanks(size, [&](Transport& ranks) {
+        EXPECT_EQ(MeansOn(portions, &ranks, true), want)
+            << portions << " on rank " << ranks.rank() << " of " << size;
+      });
+    }
+  }
+}
+
+// Against gradients of each portion, summed by the definition of the tree.
+TEST(GradientSums, AreMeansOverPortions) {
+  constexpr std::int64_t kPortions = 8;
+  Problem p;
+  std::vector<std::vector<double>> of_portion;
+  for (std::int64_t portion = 0; portion < kPortions; ++portion) {
+    std::vector<double> row;
+    for (const nn::Gradient& g : nn::Gradients(p.Loss(portion), p.Parameters())) {
+      for (const float x : g.Value().value().span<float>()) row.push_back(double{x});
+    }
+    of_portion.push_back(row);
+  }
+  const Bits got = MeansOn(kPortions, nullptr, true);
+  for (std::size_t i = 0; i < of_portion[0].size(); ++i) {
+    double mean = 0, size = 0;
+    for (const auto& row : of_portion) mean += row[i] / kPortions, size += std::abs(row[i]);
+    // Three additions in float, each to half a unit of the last place of at most `size`.
+    EXPECT_NEAR(got[i], mean, 3 * 0x1p-24 * size / kPortions + 1e-30) << i;
+  }
+}
+
+TEST(GradientSums, GivingUpLeavesTheStatisticsAsTheyWere) {
+  Problem p;
+  Bits before, after;
+  for (const nn::NamedTensor& t : nn::Buffers(p.net)) Append(t.value, &before);
+  GradientSums sums(p.context, {2, nullptr}, nn::Buffers(p.net));
+  sums.BeginUpdate();
+  sums.BeginPortion(0);
+  (void)p.Loss(0);
+  sums.GiveUp();
+  for (const nn::NamedTensor& t : nn::Buffers(p.net)) Append(t.value, &after);
+  EXPECT_EQ(after, before);
+}
+
+TEST(Messages, BroadcastReachesAllAndTextsComeInOrder) {
+  for (int size = 1; size <= 9; ++size) {
+    OnRanks(size, [&](Transport& ranks) {
+      std::vector<int> data(100, ranks.rank() == 0 ? 42 : 0);
+      Broadcast(ranks, std::as_writable_bytes(std::span(data)));
+      EXPECT_EQ(data, std::vector<int>(100, 42));
+      const auto texts =
+          GatherTexts(ranks, std::string(static_cast<std::size_t>(ranks.rank()), 'x'));
+      ASSERT_EQ(texts.size(), ranks.rank() == 0 ? static_cast<std::size_t>(size) : 0u);
+      for (std::size_t i = 0; i < texts.size(); ++i) EXPECT_EQ(texts[i].size(), i);
+    });
+  }
+}
+
+TEST(Crew, RefusesByNameAndTheLeaderSpeaksForAll) {
+  OnRanks(3, [](Transport& ranks) {
+    Crew crew(ranks);
+    EXPECT_TRUE(crew.Agree({}, {{"dataset", "a", "look"}}).ok());
+    const Status other = crew.Agree({}, {{"dataset", ranks.rank() == 2 ? "b" : "a", "look there"}});
+    EXPECT_FALSE(other.ok());
+    const Status failed = crew.Agree(
+        ranks.rank() == 1 ? Status(StatusCode::kNotFound, "no such file") : Status(), {});
+    EXPECT_FALSE(failed.ok());
+    crew.Disband();
+    if (!crew.leads()) {
+      EXPECT_EQ(other.code(), StatusCode::kCancelled);
+      return;
+    }
+    EXPECT_EQ(other.message(),
+              "rank 2 on here has another dataset (b) than rank 0 on here (a): all ranks must have "
+              "the same, or their results would differ; look there");
+    EXPECT_EQ(failed.message(), "rank 1 on here: no such file");
+    EXPECT_EQ(failed.code(), StatusCode::kNotFound);
+  });
+}
+
+}  // namespace
+}  // namespace tilegrad::train
