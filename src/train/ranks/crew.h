@@ -38,7 +38,9 @@ class Crew {
   void Order(std::int64_t order);
   std::int64_t AwaitOrder();
 
-  // Follower: tells the leader of an error in the middle of a step, and waits for the end.
+  // Follower: tells the leader of an error in the middle of a step.
+  void TellLeader(const Status& status);
+  // The same, then waits for the end of all ranks.
   [[noreturn]] void RaiseAlarm(const Status& status);
   // Leader: whether somebody did; the error names the rank.
   Status Alarm();
@@ -52,7 +54,6 @@ class Crew {
 
  private:
   using AlarmText = std::array<char, 1024>;  // empty: all is well
-  void TellLeader(const Status& status);
   Transport& ranks_;
   bool broken_ = false;
   std::vector<AlarmText> alarms_;  // leader: of each follower

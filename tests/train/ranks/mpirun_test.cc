@@ -323,8 +323,8 @@ TEST_F(Ranks, OfARunThatIsThereAreRefusedOnce) {
 TEST_F(Ranks, AStepThatFailsIsSaidOnce) {
   Words words = OnRanks(3, TrainWords("run", 1));
   for (const char* setting :
-       {"network.fc_deviation=10", "network.output_deviation=10", "network.code=2048",
-        "network.hidden1=2048", "network.hidden2=2048", "loss.laplacian=1e12"})
+       {"network.fc_norm=false", "network.fc_deviation=10", "network.output_deviation=10",
+        "network.code=256", "network.hidden1=256", "network.hidden2=256", "loss.laplacian=1e12"})
     words.insert(words.end(), {"--set", setting});
   ExpectRefused(words, 1, "a smaller optimizer.learning_rate may help");
 }

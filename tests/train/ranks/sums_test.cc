@@ -188,6 +188,17 @@ TEST(Messages, BroadcastReachesAllAndTextsComeInOrder) {
   }
 }
 
+TEST(Crew, TheLeaderHearsOfAnErrorElsewhere) {
+  OnRanks(3, [](Transport& ranks) {
+    Crew crew(ranks);
+    if (ranks.rank() == 2) crew.TellLeader({StatusCode::kInternal, "the loss is nan"});
+    if (!crew.leads()) return;
+    Status heard;
+    while ((heard = crew.Alarm()).ok()) std::this_thread::yield();
+    EXPECT_EQ(heard.message(), "rank 2: the loss is nan");
+  });
+}
+
 TEST(Crew, RefusesByNameAndTheLeaderSpeaksForAll) {
   OnRanks(3, [](Transport& ranks) {
     Crew crew(ranks);
