@@ -230,5 +230,39 @@ TEST(Memory, TensorsMayOutliveTheirContext) {
   EXPECT_EQ(survivor.data<float>()[2], 2.0f);
 }
 
+// What a listener hears, in order: the number of a parameter and its gradient.
+struct Heard : GradientListener {
+  std::size_t begun = 0;
+  std::vector<std::pair<std::size_t, double>> ready;
+  std::function<void()> at_ready = [] {};
+  void Begin(std::span<const Var> parameters) override { begun += parameters.size(); }
+  void Ready(std::size_t i, const Gradient& gradient) override {
+    at_ready();
+    ready.emplace_back(i, gradient.Value().item());
+  }
+};
+
+TEST_F(Tape, AListenerHearsOfEachGradientOnceAndBeforeEarlierLayersAreDone) {
+  const Var first = Vector({2}), twice = Vector({3}), last = Vector({5}), unused = Vector({7});
+  bool walked = false;  // through what comes before `first` is used
+  const Var x = External(context_, {.inputs = {first},
+                                    .outputs = {context_.From({1}, std::vector<double>{2.0})},
+                                    .backward = [&](std::span<const Tensor> d) {
+                                      walked = true;
+                                      return std::vector<Tensor>{d[0]};
+                                    }})[0];
+  const Var y = last * (twice * (twice * x));  // 90
+  Heard heard;
+  std::vector<bool> before;
+  heard.at_ready = [&] { before.push_back(!walked); };
+  const std::vector<Var> parameters = {first, twice, last, unused};
+  const auto d = Gradients(y, parameters, &heard);
+  EXPECT_EQ(heard.begun, 4u);
+  EXPECT_EQ(heard.ready,
+            (std::vector<std::pair<std::size_t, double>>{{2, 18}, {1, 60}, {0, 45}, {3, 0}}));
+  EXPECT_EQ(before, (std::vector<bool>{true, true, false, false}));
+  for (const auto& [i, value] : heard.ready) EXPECT_EQ(d[i].Value().item(), value);
+}
+
 }  // namespace
 }  // namespace tilegrad::nn
