@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <thread>
 
 #include "io/glb_writer.h"
@@ -85,6 +86,13 @@ TEST_F(Resources, LittleMemoryIsNoDamage) {
 // A mesh whose reader takes seconds.
 class Signals : public TempFolderTest {
  protected:
+  static std::size_t ResidentBytes(pid_t process) {
+    std::ifstream file("/proc/" + std::to_string(process) + "/statm");
+    std::size_t all = 0, resident = 0;
+    file >> all >> resident;
+    return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  }
+
   // The program's exit code after `signal`, sent once its reader works, and how long it took then.
   std::pair<int, double> Stop(int signal) {
     std::string stl = "solid x\n";
@@ -94,13 +102,18 @@ class Signals : public TempFolderTest {
     }
     const std::string file = Write("large.stl", stl + "endsolid x\n").string(),
                       out = (folder_ / "out.png").string();
+    const std::size_t bytes = stl.size();
+    std::string().swap(stl);  // a child has its parent's memory at first
     const pid_t child = ::fork();
     if (child == 0) {
       ::execl(TILEGRAD_PROGRAM, TILEGRAD_PROGRAM, "render", file.c_str(), "--out", out.c_str(),
               "--size", "4096", nullptr);
       ::_exit(127);
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    while (ResidentBytes(child) < bytes) {  // until it has the file
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (::waitpid(child, nullptr, WNOHANG) == child) return {-1, 0};
+    }
     const auto start = std::chrono::steady_clock::now();
     ::kill(child, signal);
     int status = 0;
