@@ -16,7 +16,10 @@ inline constexpr double kFScoreThreshold = 0.02;  // world units, longest side 0
 
 struct Score {
   // What methods are compared by, in [0, 1]; more is better.
-  double main() const { return accuracy.value_or(iou); }
+  double main() const {
+    if (mask_loss) return pck.value_or(1 - *mask_loss);
+    return accuracy.value_or(iou);
+  }
 
   double iou = 0;                 // 3D IoU at 32^3, in [0, 1]; voxels of Voxelize
   std::optional<double> f_score;  // at kFScoreThreshold, in [0, 1]; none: the truth has no mesh
@@ -34,6 +37,9 @@ struct Score {
   // directions in degrees.
   std::optional<double> texture_l1 = std::nullopt, lit_l1 = std::nullopt,
                         light_angle = std::nullopt;
+  // Table 3, of tasks that learn from photographs, with texture_l1: 1 - IoU of silhouettes, and the
+  // share of visible keypoints that are right (metrics/keypoint_score.h). `iou` means nothing then.
+  std::optional<double> mask_loss = std::nullopt, pck = std::nullopt;
 };
 
 struct EvaluationRow {
@@ -64,7 +70,9 @@ struct Evaluation {
 
 // Whether its scores are accuracies.
 bool Classifies(const Evaluation& evaluation);
-// Score::main in words: "3D IoU" or "accuracy".
+// Whether they are of photographs.
+bool IsOfPhotographs(const Evaluation& evaluation);
+// Score::main in words: "3D IoU", "accuracy", "keypoints within 0.1" or "2D IoU".
 const char* MainMeasure(const Evaluation& evaluation);
 // The table with methods as rows and classes as columns, each cell "IoU / F-score", or the
 // accuracy, in percent.

@@ -13,7 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string Cell(const Score& score) {
-  if (score.accuracy) return fmt::format("{:.1f}", 100 * *score.accuracy);
+  if (score.accuracy || score.mask_loss) return fmt::format("{:.1f}", 100 * score.main());
   return score.f_score ? fmt::format("{:.1f} / {:.1f}", 100 * score.iou, 100 * *score.f_score)
                        : fmt::format("{:.1f} / -", 100 * score.iou);
 }
@@ -34,7 +34,9 @@ constexpr Column kColumns[] = {{&Score::carved_iou, "carved IoU", 100, 1},
                                {&Score::color_l1, "colour L1", 1, 3},
                                {&Score::texture_l1, "texture L1", 1, 4},
                                {&Score::light_angle, "light, degrees", 1, 1},
-                               {&Score::lit_l1, "texture + light L1", 1, 4}};
+                               {&Score::lit_l1, "texture + light L1", 1, 4},
+                               {&Score::mask_loss, "2D IoU loss", 1, 3},
+                               {&Score::pck, "PCK@0.1", 1, 3}};
 
 // Heading, then a line a method: the cells of the table as text.
 std::vector<std::vector<std::string>> Cells(const Evaluation& evaluation) {
@@ -78,6 +80,9 @@ std::string Join(const std::vector<std::string>& line, const std::vector<std::si
 std::string Caption(const Evaluation& evaluation) {
   int models = 0;
   for (const int n : evaluation.class_models) models += n;
+  if (IsOfPhotographs(evaluation))
+    return fmt::format("{} (%) on {} photographs of the {} split", MainMeasure(evaluation), models,
+                       evaluation.split);
   const std::string measures =
       Classifies(evaluation)
           ? "Accuracy (%)"
@@ -98,8 +103,17 @@ std::string ClassifierNotes(const Evaluation& evaluation) {
   return notes;
 }
 
+constexpr const char* kPhotographNotes =
+    "Table 3: texture L1 is the mean difference of colour between prediction and object over all "
+    "pixels of the crop, black beyond them; 2D IoU loss is 1 - IoU of their silhouettes; PCK@0.1 "
+    "is "
+    "the share of visible keypoints within a tenth of the box's longer side, a mean over "
+    "keypoints. "
+    "All but \"predicted camera\" are seen through the annotated cameras.";
+
 std::string Notes(const Evaluation& evaluation) {
   if (Classifies(evaluation)) return ClassifierNotes(evaluation);
+  if (IsOfPhotographs(evaluation)) return kPhotographNotes;
   std::string notes;
   if (evaluation.shape_threshold > 0) {
     notes = fmt::format(
@@ -146,6 +160,8 @@ Json ToJson(const Score& score) {
   if (score.texture_l1) json["texture_l1"] = *score.texture_l1;
   if (score.lit_l1) json["lit_l1"] = *score.lit_l1;
   if (score.light_angle) json["light_angle"] = *score.light_angle;
+  if (score.mask_loss) json["mask_loss"] = *score.mask_loss;
+  if (score.pck) json["pck"] = *score.pck;
   return json;
 }
 
@@ -153,7 +169,11 @@ Json ToJson(const Score& score) {
 
 bool Classifies(const Evaluation& evaluation) { return HasAny(evaluation, &Score::accuracy); }
 
+bool IsOfPhotographs(const Evaluation& evaluation) { return HasAny(evaluation, &Score::mask_loss); }
+
 const char* MainMeasure(const Evaluation& evaluation) {
+  if (HasAny(evaluation, &Score::pck)) return "keypoints within 0.1";
+  if (IsOfPhotographs(evaluation)) return "2D IoU";
   return Classifies(evaluation) ? "accuracy" : "3D IoU";
 }
 

@@ -30,6 +30,8 @@ Result<Score> ReadScore(const Json& json, const std::string& place) {
   read("texture_l1", &score.texture_l1);
   read("lit_l1", &score.lit_l1);
   read("light_angle", &score.light_angle);
+  read("mask_loss", &score.mask_loss);
+  read("pck", &score.pck);
   if (!fields.status().ok()) return fields.status();
   return score;
 }

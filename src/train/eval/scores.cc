@@ -64,8 +64,8 @@ Score MeanScore(std::span<const Score> scores) {
   for (const Score& score : scores) mean.iou += score.iou / static_cast<double>(scores.size());
   mean.accuracy = MeanOf(scores, &Score::accuracy);
   mean.carved_iou = MeanOf(scores, &Score::carved_iou);
-  for (const auto measure :
-       {&Score::color_l1, &Score::texture_l1, &Score::lit_l1, &Score::light_angle})
+  for (const auto measure : {&Score::color_l1, &Score::texture_l1, &Score::lit_l1,
+                             &Score::light_angle, &Score::mask_loss, &Score::pck})
     mean.*measure = MeanOf(scores, measure);
   return mean;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PCK: the percentage of correct keypoints, as CMR counts it (benchmark/evaluate.py).
+// PCK: the percentage of correct keypoints, as CMR counts it.
 #pragma once
 
 #include <cstdint>

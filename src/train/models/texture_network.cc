@@ -8,6 +8,7 @@
 #include "scene/shapes.h"
 #include "scene/sphere_uv.h"
 #include "train/models/mesh_network.h"
+#include "train/models/mirror_columns.h"
 
 namespace tilegrad::train {
 namespace {
@@ -21,16 +22,6 @@ constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
 nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
                            std::int64_t in, std::int64_t out, Rng& rng) {
   return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
-}
-
-// Columns of a map of the sphere to the mean of themselves and their mirror image at x = 0, which
-// is at 1/2 - u (scene/sphere_uv.h): column i has W/2 - 1 - i.
-nn::AxisMap MirrorColumns(nn::Context& context, std::int64_t width) {
-  return nn::MakeAxisMap(nn::Constant(context, 0.0), {width, width},
-                         [&](std::int64_t i, nn::AxisTerms& terms) {
-                           terms.push_back({i, 0.5});
-                           terms.push_back({(width / 2 - 1 - i + width) % width, 0.5});
-                         });
 }
 
 std::int64_t LightNumbers(Lighting lighting) {

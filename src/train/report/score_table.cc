@@ -35,6 +35,11 @@ std::string CellsHtml(const Values& values) {
   return out;
 }
 
+// Whether there is an F-score beside the main measure.
+bool HasFScores(const Evaluation& evaluation) {
+  return !Classifies(evaluation) && !IsOfPhotographs(evaluation);
+}
+
 // `pick` gives the score of a method's row.
 template <class Pick>
 std::string LineHtml(const Evaluation& evaluation, const std::string& heading, Pick pick) {
@@ -44,7 +49,7 @@ std::string LineHtml(const Evaluation& evaluation, const std::string& heading, P
     f_score.push_back(pick(row).f_score);
   }
   return fmt::format("<tr><th scope=\"row\">{}</th>{}{}</tr>\n", heading, CellsHtml(main),
-                     Classifies(evaluation) ? "" : CellsHtml(f_score));
+                     HasFScores(evaluation) ? CellsHtml(f_score) : "");
 }
 
 std::string FScoreHead(const Evaluation& evaluation) {
@@ -54,8 +59,8 @@ std::string FScoreHead(const Evaluation& evaluation) {
 
 std::string HeadHtml(const Evaluation& evaluation) {
   std::string methods;
-  const bool classifies = Classifies(evaluation);
-  for (int group = 0; group < (classifies ? 1 : 2); ++group) {
+  const bool f_scores = HasFScores(evaluation);
+  for (int group = 0; group < (f_scores ? 2 : 1); ++group) {
     for (std::size_t i = 0; i < evaluation.rows.size(); ++i) {
       methods += fmt::format("<th scope=\"col\" class=\"number{}\">{}</th>", i == 0 ? " first" : "",
                              EscapeHtml(evaluation.rows[i].method));
@@ -65,8 +70,8 @@ std::string HeadHtml(const Evaluation& evaluation) {
       "<thead><tr><th rowspan=\"2\" scope=\"col\">class (models)</th>"
       "<th colspan=\"{0}\" scope=\"colgroup\" class=\"first\">{1}, %</th>{2}</tr>\n"
       "<tr>{3}</tr></thead>\n",
-      evaluation.rows.size(), classifies ? "accuracy" : "3D IoU at 32³",
-      classifies ? "" : FScoreHead(evaluation), methods);
+      evaluation.rows.size(), f_scores ? "3D IoU at 32³" : MainMeasure(evaluation),
+      f_scores ? FScoreHead(evaluation) : "", methods);
 }
 
 std::string NotesHtml(const ReportFacts& facts) {
@@ -94,6 +99,30 @@ std::string NotesHtml(const ReportFacts& facts) {
   return out;
 }
 
+// Table 3 of the paper: a line a method.
+std::string PhotographsHtml(const Evaluation& evaluation) {
+  if (!IsOfPhotographs(evaluation)) return "";
+  std::string lines;
+  for (const auto& row : evaluation.rows) {
+    const std::string pck = row.mean.pck ? fmt::format("{:.3f}", *row.mean.pck) : "–";
+    lines += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td class=\"number\">{:.4f}</td>"
+        "<td class=\"number\">{:.3f}</td><td class=\"number\">{}</td></tr>\n",
+        EscapeHtml(row.method), row.mean.texture_l1.value_or(0), row.mean.mask_loss.value_or(0),
+        pck);
+  }
+  return fmt::format(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Photographs\">"
+      "<table class=\"scores\">\n<thead><tr><th scope=\"col\">method</th>"
+      "<th scope=\"col\" class=\"number\">texture L1</th>"
+      "<th scope=\"col\" class=\"number\">2D IoU loss</th>"
+      "<th scope=\"col\" class=\"number\">PCK@0.1</th></tr></thead>\n"
+      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">Of the first two less is better, of "
+      "the "
+      "share of keypoints within a tenth of the box's longer side more.</p>\n",
+      lines);
+}
+
 // Texture and light, of tasks that predict them: a line a method.
 std::string LightHtml(const Evaluation& evaluation) {
   const auto cell = [](const std::optional<double>& value, int digits) {
@@ -107,7 +136,7 @@ std::string LightHtml(const Evaluation& evaluation) {
                          cell(row.mean.texture_l1, 4), cell(row.mean.light_angle, 1),
                          cell(row.mean.lit_l1, 4));
   }
-  if (lines.empty()) return "";
+  if (lines.empty() || IsOfPhotographs(evaluation)) return "";
   return fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Texture and light\">"
       "<table class=\"scores\">\n<thead><tr><th scope=\"col\">method</th>"
@@ -141,8 +170,9 @@ std::string ScoresHtml(const ReportFacts& facts) {
   return fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"Scores\"><table "
       "class=\"scores\">\n{}<tbody>\n{}</tbody>\n<tfoot>\n{}</tfoot>\n</table></div>\n"
-      "<p class=\"note\">{}</p>{}",
-      HeadHtml(evaluation), lines, mean, NotesHtml(facts), LightHtml(evaluation));
+      "<p class=\"note\">{}</p>{}{}",
+      HeadHtml(evaluation), lines, mean, NotesHtml(facts), LightHtml(evaluation),
+      PhotographsHtml(evaluation));
 }
 
 }  // namespace tilegrad::train

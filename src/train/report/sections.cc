@@ -82,7 +82,7 @@ std::string ComparisonHtml(const ReportFacts& facts) {
         own ? " class=\"own\"" : "", EscapeHtml(row.method),
         80 * std::clamp(row.mean.main(), 0.0, 1.0), 100 * row.mean.main());
   }
-  const bool voxels = !Classifies(*facts.evaluation);
+  const bool voxels = !Classifies(*facts.evaluation) && !IsOfPhotographs(*facts.evaluation);
   return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out models{}.</p>",
                            measure, voxels ? ", 32³ voxels" : "");
 }

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "train/tasks/classify/task.h"
 #include "train/tasks/gan/task.h"
+#include "train/tasks/photographs/task.h"
 #include "train/tasks/single_image/task.h"
 #include "train/tasks/textured_image/task.h"
 
@@ -15,8 +16,9 @@ namespace {
 std::map<std::string, TaskFactory>& Factories() {
   static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask},
                                                          {"textured_image", &MakeTexturedImageTask},
-                                                         {"classify", &MakeClassifyTask},
-                                                         {"gan", &MakeGanTask}};
+                                                          {"photographs", &MakePhotographsTask},
+                                                          {"classify", &MakeClassifyTask},
+                                                          {"gan", &MakeGanTask}};
   return factories;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far pixels are from a mask, as CMR's texture flow is kept on the object by it
-// (utils/image.py, compute_dt_barrier).
+// (compute_dt_barrier of its code).
 #pragma once
 
 #include <span>

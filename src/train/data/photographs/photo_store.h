@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs as a network sees them: square crops around the object, of one size, mirrored or not,
-// with keypoints and cameras that go with the crop. As CMR's loader cuts them (data/base.py and
-// utils/image.py of its code), without its rounding of boxes to whole pixels.
+// with keypoints and cameras that go with the crop. As CMR's loader cuts them, without
+// its rounding of boxes to whole pixels.
 #pragma once
 
 #include <span>

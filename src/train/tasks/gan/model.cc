@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
+#include "train/models/textured_mesh.h"
 #include "train/tasks/gan/critic.h"
-#include "train/tasks/textured_image/model.h"
 
 namespace tilegrad::train {
 namespace {

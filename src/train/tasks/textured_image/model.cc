@@ -5,8 +5,8 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
-#include "render/picture/composite.h"
 #include "train/models/mesh_network.h"
+#include "train/models/textured_mesh.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/textured_image/step.h"
 
@@ -55,23 +55,6 @@ Status LoadedModel::Predict(std::span<const std::uint8_t> images, std::vector<Me
 }
 
 }  // namespace
-
-Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> p,
-                  std::span<const float> texels) {
-  Mesh mesh;
-  mesh.faces = sphere.mesh.faces;
-  for (std::size_t i = 0; i < p.size(); i += 3)
-    mesh.positions.emplace_back(p[i], p[i + 1], p[i + 2]);
-  mesh.corner_uvs = sphere.corner_uvs;
-  ImageU8 image(sphere.texture_size, sphere.texture_size, 3);
-  std::ranges::transform(texels, image.pixels.begin(), ToByte);
-  mesh.textures = {{"predicted", std::move(image)}};
-  mesh.materials = {{.name = "predicted",
-                     .base_color = glm::vec4(1),
-                     .base_color_texture = 0,
-                     .wrap = {TextureWrap::kRepeat, TextureWrap::kClamp}}};
-  return mesh;
-}
 
 Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,
                                                     std::span<const std::uint8_t> images,

@@ -14,16 +14,6 @@ struct PredictedObject {
   std::optional<Camera> camera;  // of the image, in its pixels; of a network with `lookup`
 };
 
-// A sphere to be deformed, with its texture coordinates; textures are square.
-struct TexturedTemplate {
-  const Mesh& mesh;
-  const std::vector<glm::vec2>& corner_uvs;
-  int texture_size;
-};
-// With these positions [V, 3] and texels [size, size, 3] in [0, 1].
-Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> positions,
-                  std::span<const float> texels);
-
 // Of a network with the weights of now; batch statistics are those of training. images:
 // [N][4][size] [size] planar RGBA bytes, RGB over black.
 Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, TextureNetwork& network,

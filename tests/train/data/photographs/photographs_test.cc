@@ -111,8 +111,8 @@ TEST_F(PhotographsTest, ErrorsNameFileAndField) {
       {"scale", io::MatArray::Number(-1), {"sfm_anno(2).scale", "-1"}},
       {"trans", io::MatArray::Number(1), {"sfm_anno(2).trans", "expected 2 numbers"}}};
   for (const Change& change : changes) {
-    const bool camera = std::string(change.field) == "rot" ||
-                        change.field[0] == 's' || change.field[0] == 't';
+    const bool camera =
+        std::string(change.field) == "rot" || change.field[0] == 's' || change.field[0] == 't';
     const Path path = folder_ / (camera ? "cachedir/cub/sfm/anno_train.mat"
                                         : "cachedir/cub/data/train_cub_cleaned.mat");
     const Bytes before = ReadFile(path).value();

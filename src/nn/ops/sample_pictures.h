@@ -5,11 +5,11 @@
 
 #include "nn/tape.h"
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 
 // pictures [B, C, H, W], which get no gradient; flow [B, 2, h, w]: x and y in [-1, 1] across the
 // picture, x right, y down. Returns [B, C, h, w], bilinear between pixel centres; beyond the edges
 // the edge goes on, without a gradient that leads back.
-nn::Var SamplePictures(const nn::Tensor& pictures, const nn::Var& flow);
+Var SamplePictures(const Tensor& pictures, const Var& flow);
 
-}  // namespace tilegrad::train
+}  // namespace tilegrad::nn

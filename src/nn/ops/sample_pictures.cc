@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/ops/picture_samples.h"
+#include "nn/ops/sample_pictures.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "nn/nn.h"
 
-namespace tilegrad::train {
+namespace tilegrad::nn {
 namespace {
 
 // Along one axis: the first of two pixels, the share of the second, and d share / d place.
@@ -26,8 +27,8 @@ Place<T> PlaceOf(T at, std::size_t extent) {
 }
 
 struct Sampling {
-  nn::Tensor pictures, flow;
-  std::size_t Extent(const nn::Tensor& t, std::size_t axis) const {
+  Tensor pictures, flow;
+  std::size_t Extent(const Tensor& t, std::size_t axis) const {
     return static_cast<std::size_t>(t.shape()[static_cast<int>(axis)]);
   }
   std::size_t places() const { return Extent(flow, 2) * Extent(flow, 3); }
@@ -80,33 +81,33 @@ struct Sampling {
 
 }  // namespace
 
-nn::Var SamplePictures(const nn::Tensor& pictures, const nn::Var& flow) {
+Var SamplePictures(const Tensor& pictures, const Var& flow) {
   if (!flow.valid()) return flow;
-  const nn::Shape &p = pictures.shape(), &f = flow.shape();
+  const Shape &p = pictures.shape(), &f = flow.shape();
   if (p.rank() != 4 || f.rank() != 4 || f[1] != 2 || p[0] != f[0] ||
       pictures.dtype() != flow.dtype())
-    return nn::Fail(
-        flow, InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
-  nn::Context& context = flow.context();
+    return Fail(flow,
+                InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
+  Context& context = flow.context();
   const Sampling at{pictures, flow.value()};
   const auto batch = static_cast<std::size_t>(p[0]);
-  nn::Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
-  nn::WithFloatType(flow.dtype(), [&]<class T>(T) {
+  Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
+  WithFloatType(flow.dtype(), [&]<class T>(T) {
     context.workers().For(batch, [&](std::size_t b, std::size_t) { at.Forward(b, out.data<T>()); });
   });
-  auto backward = [at, batch, &context](std::span<const nn::Tensor> d) {
-    nn::Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
-    nn::WithFloatType(at.flow.dtype(), [&]<class T>(T) {
+  auto backward = [at, batch, &context](std::span<const Tensor> d) {
+    Tensor d_flow = context.Empty(at.flow.shape(), at.flow.dtype());
+    WithFloatType(at.flow.dtype(), [&]<class T>(T) {
       context.workers().For(batch, [&](std::size_t b, std::size_t) {
         at.Backward(b, d[0].span<T>().data(), d_flow.data<T>());
       });
     });
-    return std::vector<nn::Tensor>{d_flow};
+    return std::vector<Tensor>{d_flow};
   };
-  return nn::External(context, {.name = "sample pictures",
-                                .inputs = {flow},
-                                .outputs = {out},
-                                .backward = std::move(backward)})[0];
+  return External(context, {.name = "sample pictures",
+                            .inputs = {flow},
+                            .outputs = {out},
+                            .backward = std::move(backward)})[0];
 }
 
-}  // namespace tilegrad::train
+}  // namespace tilegrad::nn

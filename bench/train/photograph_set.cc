@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photographs of section 5.4 that anyone can make, in the layout of PASCAL3D+
+// (src/train/data/photographs/rendered_set.h):
+//
+//   photograph_set datasets/cars /usr/share/backgrounds photographs [train] [test]
+//
+// `datasets/cars`: of tilegrad dataset --source cars, whose training and test models are taken.
+// Backgrounds: every .jpg below the folder.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "base/error.h"
+#include "train/data/photographs/rendered_set.h"
+
+namespace tilegrad::train {
+namespace {
+
+std::vector<Path> PhotographsBelow(const Path& folder) {
+  std::vector<Path> out;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder, error)) {
+    if (entry.is_regular_file() && entry.path().extension() == ".jpg") out.push_back(entry.path());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+Status Run(int argc, char** argv) {
+  if (argc < 4) return InvalidArgument("photograph_set DATASET BACKGROUNDS OUT [TRAIN] [TEST]");
+  const Workers workers(0);
+  const StopFlag stop = false;
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(argv[1]));
+  std::vector<TexturedMesh> meshes[2];
+  for (const Split split : {Split::kTrain, Split::kTest}) {
+    TILEGRAD_ASSIGN(meshes[split == Split::kTest],
+                    LoadTexturedMeshes(dataset, dataset.Select(split), {}, workers, nullptr, stop));
+  }
+  RenderedSetJob job{meshes[0], meshes[1], PhotographsBelow(argv[2])};
+  if (argc > 4) job.train_count = std::atoi(argv[4]);
+  if (argc > 5) job.test_count = std::atoi(argv[5]);
+  fmt::print("{} training and {} test models, {} backgrounds\n", job.train.size(), job.test.size(),
+             job.backgrounds.size());
+  return MakeRenderedSet(job, {}, argv[3], workers, nullptr, stop);
+}
+
+}  // namespace
+}  // namespace tilegrad::train
+
+int main(int argc, char** argv) {
+  const tilegrad::Status status = tilegrad::train::Run(argc, argv);
+  if (!status.ok()) fmt::print(stderr, "photograph_set: {}\n", status.message());
+  return status.ok() ? 0 : 1;
+}

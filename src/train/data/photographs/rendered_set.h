@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photographs that anyone can make: models in front of real backgrounds, one view of each object,
+// annotated as badly as real ones are, in the layout of PASCAL3D+ (photographs.h). Nothing knows
+// the models afterwards but the annotations of the test part, which are exact.
+#pragma once
+
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "base/rng.h"
+#include "train/data/photographs/photographs.h"
+#include "train/data/stream/textured_meshes.h"
+
+namespace tilegrad::train {
+
+struct RenderedSetJob {
+  const std::vector<TexturedMesh>& train;  // models, from each of which many objects are made
+  const std::vector<TexturedMesh>& test;
+  std::vector<Path> backgrounds;  // photographs
+  int train_count = 600, test_count = 120;
+  std::uint64_t seed = 1;
+};
+
+// What is done to the training part's annotations.
+struct AnnotationNoise {
+  double mask = 2.0;       // pixels by which a mask's outline wanders, one standard deviation
+  double keypoint = 0.02;  // standard deviation of each coordinate, in parts of the box
+  double hidden = 0.1;     // share of visible keypoints that are not annotated
+};
+
+// Writes <folder>/Images and <folder>/{data,sfm}. An object is a model stretched by up to 15 %
+// along each axis, seen from all around at elevations from -5 to 30 degrees by a pinhole camera a
+// few lengths away, under the light of datasets. Keypoints: extreme_points.h, visible where nothing
+// hides them. Cameras: factorization.h, from the keypoints alone. The same for any number of
+// workers.
+Status MakeRenderedSet(const RenderedSetJob& job, const AnnotationNoise& noise, const Path& folder,
+                       const Workers& workers, const ProgressSink& progress, const StopFlag& stop);
+
+// The mask with its outline moved in and out by smooth noise of `deviation` pixels, and by as much
+// all along it. Never empty.
+PhotoMask DisturbedMask(const PhotoMask& mask, double deviation, Rng& rng);
+
+}  // namespace tilegrad::train

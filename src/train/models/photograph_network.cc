@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/models/photograph_network.h"
+
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "nn/ops/sample_pictures.h"
+#include "scene/shapes.h"
+#include "scene/sphere_uv.h"
+#include "train/models/mirror_columns.h"
+
+namespace tilegrad::train {
+namespace {
+
+using Point = std::array<double, 3>;
+
+constexpr double kStartRadius = 0.6;  // without keypoints; the object's longest is about 2
+constexpr double kStartScale = 0.9;   // of cameras, where an object fills its crop
+constexpr double kLeastReach = 0.12;  // a hull that is flat or thin is filled up to this
+constexpr double kNearness = 8;       // of a keypoint's weights: exp(-(this * distance)^2)
+constexpr std::int64_t kCameraNumbers = 7;
+
+nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
+                           std::int64_t in, std::int64_t out, Rng& rng) {
+  return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
+}
+
+double Determinant(const Point& a, const Point& b, const Point& c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+Point Minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+Point Middle(const std::vector<Point>& points) {
+  Point sum = {};
+  for (const Point& p : points)
+    for (std::size_t c = 1; c < 3; ++c) sum[c] += p[c] / static_cast<double>(points.size());
+  return sum;  // in the plane of symmetry
+}
+
+nn::Var Unit(const nn::Var& v) {
+  return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
+}
+
+// Scale, shift and quaternion of what the last layer says. Its bias is an upright camera.
+nn::Var CamerasOf(const nn::Var& raw) {
+  return nn::Concat({kStartScale * nn::Exp(nn::Tanh(nn::Slice(raw, 1, 0, 1))),
+                     nn::Slice(raw, 1, 1, 3), Unit(nn::Slice(raw, 1, 3, 7))},
+                    1);
+}
+
+}  // namespace
+
+// All triangles of the points lie within the hull, and its faces are among them.
+double HullReach(const std::vector<Point>& points, const Point& centre, const Point& direction) {
+  double reach = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = i + 1; j < points.size(); ++j) {
+      for (std::size_t k = j + 1; k < points.size(); ++k) {
+        const Point a = Minus(points[i], centre), u = Minus(points[j], points[i]),
+                    v = Minus(points[k], points[i]);
+        const Point back = {-direction[0], -direction[1], -direction[2]};
+        // a + s u + r v = t direction, by Cramer's rule
+        const double all = Determinant(u, v, back);
+        if (std::abs(all) < 1e-12) continue;
+        const Point to = {-a[0], -a[1], -a[2]};
+        const double s = Determinant(to, v, back) / all, r = Determinant(u, to, back) / all,
+                     t = Determinant(u, v, to) / all;
+        if (s >= -1e-9 && r >= -1e-9 && s + r <= 1 + 1e-9) reach = std::max(reach, t);
+      }
+    }
+  }
+  return reach;
+}
+
+Status CheckNetwork(const PhotographNetworkConfig& config, int image_size) {
+  if (config.texture != "direct" && config.texture != "flow")
+    return InvalidArgument("network.texture is \"{}\", but must be \"direct\" or \"flow\"",
+                           config.texture);
+  const std::int64_t step = std::int64_t{1} << config.levels;
+  if (image_size % step == 0 && image_size >= 2 * step) return {};
+  return InvalidArgument(
+      "pictures of {} pixels a side cannot be halved {} times to at least two "
+      "pixels: choose another network.levels or photographs.size",
+      image_size, config.levels);
+}
+
+void PhotographNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
+  unet->Visit(prefix + "unet.", visitor);
+  latent.Visit(prefix + "latent.", visitor);
+  map.Visit(prefix + "map.", visitor);
+  shape.Visit(prefix + "shape.", visitor);
+  camera.Visit(prefix + "camera.", visitor);
+  visitor.Parameter(prefix + "mean_shape", mean_shape);
+  if (keypoints.valid()) visitor.Parameter(prefix + "keypoints", keypoints);
+}
+
+PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetworkConfig& config,
+                                     const PhotographStart& start, int image_size,
+                                     std::uint64_t seed)
+    : context_(context),
+      config_(config),
+      texture_size_(image_size << config.enlarge),
+      template_(Icosphere(static_cast<int>(config.template_level), 1)),
+      uvs_(SphereUvs(template_)),
+      mean_(context, template_, {.symmetric = true}),
+      offsets_(context, template_, {.smoothing = config.smoothing, .symmetric = true}) {
+  Rng rng(seed, /*stream=*/0x70686f74);
+  const bool flow = config.texture == "flow";
+  const nn::UNetShape unet{.in = 3,
+                           .out = flow ? 2 : 3,
+                           .base = config.base,
+                           .most = config.most,
+                           .levels = static_cast<int>(config.levels),
+                           .norm = nn::Norm::kBatch,
+                           .resize = true,
+                           .skips = config.skips,
+                           .enlarge = static_cast<int>(config.enlarge),
+                           .wrap = true,
+                           .output = flow ? &nn::Tanh : &nn::Sigmoid};
+  all_.unet = std::make_unique<nn::UNet>(context, unet, rng);
+  const std::int64_t side = image_size >> config.levels;
+  code_shape_ = {std::min(config.most, config.base << (config.levels - 1)), side, side};
+  BuildHeads(rng);
+  StartShape(start);
+  if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
+}
+
+void PhotographNetwork::BuildHeads(Rng& rng) {
+  const std::int64_t code = code_shape_.elements(), latent = config_.latent;
+  all_.latent.Add<nn::Flatten>("flatten");
+  all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
+  AddLinear(all_.latent, "fc1", context_, code, latent, rng);
+  all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
+  AddLinear(all_.latent, "fc2", context_, latent, latent, rng);
+  all_.latent.Add<nn::Activation>("act3", &nn::LeakyRelu02);
+  AddLinear(all_.map, "fc", context_, latent, code, rng);
+  const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
+  auto& offsets = AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
+  nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
+  nn::FillConstant(offsets.bias.value(), 0);
+  auto& camera = AddLinear(all_.camera, "fc", context_, latent, kCameraNumbers, rng);
+  // Half a turn about x: the world's y, which is up, to the image's, which is down.
+  camera.bias.value() =
+      context_.From({kCameraNumbers}, std::span<const double>({0., 0., 0., 0., 1., 0., 0.}));
+}
+
+void PhotographNetwork::StartShape(const PhotographStart& start) {
+  const std::size_t vertices = template_.positions.size();
+  const Point centre = start.keypoints.empty() ? Point{} : Middle(start.keypoints);
+  std::vector<double> shape, logits(start.count * vertices);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const glm::vec3& p = template_.positions[v];
+    const Point direction = {p.x, p.y, p.z};
+    const double reach = start.keypoints.empty()
+                             ? kStartRadius
+                             : std::max(HullReach(start.keypoints, centre, direction), kLeastReach);
+    for (std::size_t c = 0; c < 3; ++c) shape.push_back(centre[c] + reach * direction[c]);
+    for (std::size_t k = 0; k < start.keypoints.size(); ++k) {
+      double squares = 0;
+      for (std::size_t c = 0; c < 3; ++c)
+        squares += std::pow(start.keypoints[k][c] - shape[3 * v + c], 2);
+      logits[k * vertices + v] = -kNearness * kNearness * squares;
+    }
+  }
+  const auto v = static_cast<std::int64_t>(vertices), k = static_cast<std::int64_t>(start.count);
+  all_.mean_shape =
+      nn::Parameter(context_, context_.From({1, 3 * v}, std::span<const double>(shape)));
+  if (k > 0)
+    all_.keypoints =
+        nn::Parameter(context_, context_.From({k, v}, std::span<const double>(logits)));
+}
+
+nn::Var PhotographNetwork::MeanShape() const { return mean_.Apply(all_.mean_shape); }
+
+nn::Var PhotographNetwork::KeypointWeights() const {
+  return all_.keypoints.valid() ? nn::Softmax(all_.keypoints, 1) : nn::Var();
+}
+
+nn::Var PhotographNetwork::Keypoints(const nn::Var& positions) const {
+  if (!all_.keypoints.valid()) return {};
+  const std::int64_t batch = positions.shape()[0], vertices = positions.shape()[1],
+                     count = all_.keypoints.shape()[0];
+  const nn::Var side_by_side =
+      nn::Reshape(nn::Permute(positions, {1, 0, 2}), {vertices, 3 * batch});
+  const nn::Var product = nn::Matmul(KeypointWeights(), side_by_side);
+  return nn::Permute(nn::Reshape(product, {count, batch, 3}), {1, 0, 2});
+}
+
+void PhotographNetwork::Texture(const nn::Var& pictures, const nn::Var& latent,
+                                const nn::StepVector<nn::Var>& levels, nn::Mode mode,
+                                PredictedPhotographs* out) {
+  const nn::Var code =
+      nn::Reshape(all_.map.Forward(latent, mode),
+                  {latent.shape()[0], code_shape_[0], code_shape_[1], code_shape_[2]});
+  nn::Var map = all_.unet->Decode(code, levels, mode);
+  if (config_.symmetric_texture) map = nn::MapAxis(map, 3, mirror_);
+  if (config_.texture == "flow") {
+    out->flow = map;
+    map = nn::SamplePictures(pictures.value(), map);
+  }
+  out->textures = nn::Permute(map, {0, 2, 3, 1});
+}
+
+PredictedPhotographs PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
+  PredictedPhotographs out;
+  const nn::StepVector<nn::Var> levels = all_.unet->Encode(pictures, mode);
+  const nn::Var latent = all_.latent.Forward(levels.back(), mode);
+  if (!latent.valid()) return out;
+  out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
+  out.positions = MeanShape() + out.movement;
+  out.keypoints = Keypoints(out.positions);
+  out.cameras = CamerasOf(all_.camera.Forward(latent, mode));
+  Texture(pictures, latent, levels, mode, &out);
+  return out;
+}
+
+}  // namespace tilegrad::train

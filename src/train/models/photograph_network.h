@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// The network of section 5.4: a photograph in; a deformed mean shape that is learned with it, its
+// texture, keypoints and the camera out. As CMR's (Kanazawa et al., ECCV 2018) but for encoder and
+// decoder, which are a U-Net; the texture is a map (DIB-R's), or where in the photograph each texel
+// is to be found (CMR's flow).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "nn/networks/unet.h"
+#include "nn/ops/axis_map.h"
+#include "scene/mesh.h"
+#include "train/models/offset_map.h"
+
+namespace tilegrad::train {
+
+struct PhotographNetworkConfig {
+  std::int64_t base = 24;           // U-Net: channels of the first level; they double to at most
+  std::int64_t most = 192;          // this many
+  std::int64_t levels = 4;          // halvings
+  std::int64_t enlarge = 1;         // the texture is 2^this times as large as the picture
+  bool skips = true;                // the U-Net's skip connections
+  std::int64_t latent = 200;        // all heads start from this code
+  std::string texture = "direct";   // or "flow"
+  bool symmetric_texture = true;    // the map is its mirror image at x = 0
+  std::int64_t template_level = 3;  // subdivisions of the icosahedron
+  std::int64_t smoothing = 2;       // OffsetRules, of movements
+  double output_deviation = 1e-4;   // the head of movements starts as N(0, this^2)
+};
+
+// What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
+// which its vertices go from the middle; a sphere without any. `count` keypoints are learned, each
+// from the vertices near to its place.
+struct PhotographStart {
+  std::vector<std::array<double, 3>> keypoints = {};
+  std::size_t count =
+      0;  // keypoints.size(), or, of a network that is to be loaded, as many as it has
+};
+
+// Of B photographs of V vertices and K keypoints; the world is that of the cameras.
+struct PredictedPhotographs {
+  nn::Var movement;   // [B, V, 3] from the mean shape, symmetric
+  nn::Var positions;  // [B, V, 3]
+  nn::Var textures;   // [B, h, w, 3] in [0, 1]
+  nn::Var flow;       // [B, 2, h, w] in [-1, 1] (nn/ops/sample_pictures.h), of "flow"
+  nn::Var keypoints;  // [B, K, 3]; none without keypoints
+  nn::Var cameras;    // [B, 7] (ops/weak_cameras.h), quaternions unit
+};
+
+class PhotographNetwork {
+ public:
+  // `image_size`: pixels, a multiple of 2^levels. The seed decides every weight.
+  PhotographNetwork(nn::Context& context, const PhotographNetworkConfig& config,
+                    const PhotographStart& start, int image_size, std::uint64_t seed);
+
+  // pictures: [B, 3, size, size] in [0, 1].
+  PredictedPhotographs Forward(const nn::Var& pictures, nn::Mode mode);
+  nn::Var MeanShape() const;        // [1, V, 3]
+  nn::Var KeypointWeights() const;  // [K, V], rows sum to 1; invalid without keypoints
+  nn::Var Keypoints(const nn::Var& positions) const;  // [B, V, 3] -> [B, K, 3]
+
+  nn::Module& module() { return all_; }
+  const Mesh& template_mesh() const { return template_; }                       // unit sphere
+  std::span<const float> uvs() const { return {&uvs_[0].x, 2 * uvs_.size()}; }  // [F, 3, 2]
+  const std::vector<glm::vec2>& corner_uvs() const { return uvs_; }             // [3F]
+  int texture_size() const { return texture_size_; }
+
+ private:
+  void BuildHeads(Rng& rng);
+  void StartShape(const PhotographStart& start);
+  void Texture(const nn::Var& pictures, const nn::Var& latent,
+               const nn::StepVector<nn::Var>& levels, nn::Mode mode, PredictedPhotographs* out);
+
+  nn::Context& context_;
+  PhotographNetworkConfig config_;
+  int texture_size_;
+  Mesh template_;
+  std::vector<glm::vec2> uvs_;
+  OffsetMap mean_, offsets_;
+  nn::AxisMap mirror_;    // of texel columns
+  nn::Shape code_shape_;  // of one picture
+  struct Parts : nn::Module {
+    std::unique_ptr<nn::UNet> unet;
+    nn::Sequential latent, map, shape, camera;
+    nn::Var mean_shape;  // [1, 3 V]
+    nn::Var keypoints;   // [K, V], logits
+    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return unet->Forward(x, mode); }
+    void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
+  } all_;
+};
+
+// InvalidArgument names the key that is wrong, or does not go with pictures of that size.
+Status CheckNetwork(const PhotographNetworkConfig& config, int image_size);
+
+// How far the convex hull of `points` reaches from `centre`, which is within it, in a direction of
+// length 1; 0 if the hull is flat there.
+double HullReach(const std::vector<std::array<double, 3>>& points,
+                 const std::array<double, 3>& centre, const std::array<double, 3>& direction);
+
+}  // namespace tilegrad::train

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// A deformed sphere with its map as a mesh for files and pictures.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "scene/mesh.h"
+
+namespace tilegrad::train {
+
+// A sphere to be deformed, with its texture coordinates; textures are square.
+struct TexturedTemplate {
+  const Mesh& mesh;
+  const std::vector<glm::vec2>& corner_uvs;
+  int texture_size;
+};
+// With these positions [V, 3] and texels [size, size, 3] in [0, 1].
+Mesh DeformedMesh(const TexturedTemplate& sphere, std::span<const float> positions,
+                  std::span<const float> texels);
+
+}  // namespace tilegrad::train

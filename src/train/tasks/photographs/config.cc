@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/photographs/config.h"
+
+#include "base/error.h"
+
+namespace tilegrad::train {
+namespace {
+
+ConfigFields FieldsOf(PhotographNetworkConfig* c) {
+  return {
+      {"network.base", &c->base, 1, 4096, "U-Net: channels of the first level; they double"},
+      {"network.most", &c->most, 1, 4096, "to at most this many"},
+      {"network.levels", &c->levels, 1, 10, "halvings"},
+      {"network.enlarge", &c->enlarge, 0, 4, "the texture is 2^this times as large as the picture"},
+      {"network.skips", &c->skips, 0, 1, "the U-Net's skip connections"},
+      {"network.latent", &c->latent, 1, 65536, "width of the code that all heads start from"},
+      {"network.texture", &c->texture, 0, 0,
+       "\"direct\": a map; \"flow\": where in the photograph each texel is (CMR)"},
+      {"network.symmetric_texture", &c->symmetric_texture, 0, 1,
+       "the texture is its mirror image at x = 0, as every shape is"},
+      {"network.template_level", &c->template_level, 0, 6,
+       "subdivisions of the icosahedron; 3: 642 vertices"},
+      {"network.smoothing", &c->smoothing, 0, 64,
+       "rounds of diffusion over the mean shape that movements go through"},
+      {"network.output_deviation", &c->output_deviation, 0, 10,
+       "the last weights of movements start as N(0, this^2)"},
+  };
+}
+
+ConfigFields FieldsOf(PhotographLosses* c) {
+  return {
+      {"loss.keypoint", &c->keypoint, 0, kNoLimit, "weight of the keypoints' mean square error"},
+      {"loss.mask", &c->mask, 0, kNoLimit, "weight of the silhouettes' mean square error"},
+      {"loss.iou", &c->iou, 0, kNoLimit, "weight of equation 12"},
+      {"loss.camera", &c->camera, 0, kNoLimit, "weight of the predicted camera's error"},
+      {"loss.deformation", &c->deformation, 0, kNoLimit, "weight of the mean length of movements"},
+      {"loss.laplacian", &c->laplacian, 0, kNoLimit, "weight of the cotangent Laplacian"},
+      {"loss.entropy", &c->entropy, 0, kNoLimit, "weight of the entropy of keypoints' weights"},
+      {"loss.color", &c->color, 0, kNoLimit, "weight of equation 13, where the object is"},
+      {"loss.flow_distance", &c->flow_distance, 0, kNoLimit,
+       "weight of how far the flow is from the object; network.texture = \"flow\""},
+      {"loss.color_moves", &c->color_moves, 0, 1, "colours move shape and camera, too"},
+  };
+}
+
+ConfigFields OwnFields(PhotographsConfig* c) {
+  return {
+      {"photographs.size", &c->size, 8, 1024, "pixels a side of what the network sees"},
+      {"photographs.padding", &c->crop.padding, 0, 1,
+       "of an object's box on each side, in parts of it"},
+      {"photographs.jitter", &c->crop.jitter, 0, CropRule::kMostJitter,
+       "of the box's edges in training, in parts of it"},
+      {"photographs.cutouts", &c->cutouts, 0, 1,
+       "share of the inputs whose background is black, as that of cut-outs"},
+      {"photographs.camera", &c->camera, 0, 0,
+       "through which predictions are seen in training: \"given\" or \"predicted\""},
+      {"schedule.batch", &c->batch, 1, 65536, "photographs a step"},
+  };
+}
+
+}  // namespace
+
+ConfigFields FieldsOf(PhotographsConfig* c) {
+  ConfigFields fields;
+  for (const ConfigFields& more : {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render),
+                                   FieldsOf(&c->optimizer), OwnFields(c)}) {
+    for (const ConfigField& field : more) {
+      if (field.key != "render.rule") fields.push_back(field);
+    }
+  }
+  return fields;
+}
+
+Status CheckConfig(const PhotographsConfig& config) {
+  TILEGRAD_TRY(CheckNetwork(config.network, static_cast<int>(config.size)));
+  if (config.camera == "given" || config.camera == "predicted") return {};
+  return InvalidArgument("photographs.camera is \"{}\", but must be \"given\" or \"predicted\"",
+                         config.camera);
+}
+
+}  // namespace tilegrad::train

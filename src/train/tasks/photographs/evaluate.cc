@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/photographs/evaluate.h"
+
+#include <array>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "scene/weak_perspective_ref.h"
+#include "train/data/dataset_files.h"
+#include "train/eval/scores.h"
+#include "train/metrics/keypoint_score.h"
+#include "train/predictor.h"
+#include "train/run/first_difference.h"
+#include "train/tasks/photographs/batch.h"
+#include "train/tasks/photographs/pictures.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr double kPckThreshold = 0.1;
+enum Method { kMean, kOwnCamera, kOurs, kMethods };
+constexpr const char* kNames[kMethods] = {"mean shape", "predicted camera", "tilegrad"};
+
+Path ListOf(const Path& run) { return run / "training_photographs.txt"; }
+
+std::string TextOf(const PhotographSet& set) {
+  std::string text;
+  for (const int i : set.Select(Split::kTrain))
+    text += set.photographs[static_cast<std::size_t>(i)].id + "\n";
+  return text;
+}
+
+// Of a picture [4][size][size] and the object in a photograph, both over black.
+struct ImageScore {
+  double color = 0, iou_loss = 0;
+  ImageScore(std::span<const float> drawn, std::span<const float> colors,
+             std::span<const float> mask) {
+    const std::size_t plane = mask.size();
+    for (std::size_t i = 0; i < 3 * plane; ++i)
+      color += std::abs(static_cast<double>(drawn[i]) - static_cast<double>(colors[i]));
+    color /= static_cast<double>(3 * plane);
+    double both = 0, either = 0;
+    for (std::size_t i = 0; i < plane; ++i) {
+      const double a = drawn[3 * plane + i], b = mask[i];
+      both += a * b, either += a + b - a * b;
+    }
+    iou_loss = 1 - both / std::max(either, 1e-10);
+  }
+};
+
+// One method's sums.
+struct Tally {
+  explicit Tally(std::size_t keypoints) : pck(keypoints, kPckThreshold) {}
+  std::vector<Score> scores;  // of photographs
+  KeypointScore pck;
+
+  Score Mean() const {
+    Score mean = MeanScore(scores);
+    mean.pck = pck.Mean();
+    return mean;
+  }
+};
+
+class PhotographJudge {
+ public:
+  PhotographJudge(const TaskEvaluation& job, const PhotographSet& set)
+      : job_(job),
+        set_(set),
+        model_(dynamic_cast<PhotographModel&>(job.predictor.model())),
+        pictures_(static_cast<int>(model_.config().size)),
+        tallies_(kMethods, Tally(set.keypoint_names.size())) {
+    const nn::NoGrad off(model_.context());
+    const nn::Var mean = model_.network().MeanShape();
+    const std::span<const float> p = mean.value().span<float>();
+    mean_shape_.assign(p.begin(), p.end());
+    const nn::Var keypoints = model_.network().Keypoints(mean);
+    if (!keypoints.valid()) return;
+    const std::span<const float> k = keypoints.value().span<float>();
+    for (std::size_t i = 0; i < k.size(); i += 3)
+      mean_keypoints_.push_back({k[i], k[i + 1], k[i + 2]});
+  }
+
+  Result<Evaluation> Run(const Workers& workers, const ProgressSink& progress,
+                         const StopFlag& stop) {
+    const std::vector<int> chosen = set_.Select(job_.split);
+    if (chosen.empty())
+      return InvalidArgument("{}: no photographs in its {} split", set_.folder.string(),
+                             SplitName(job_.split));
+    const PhotographsConfig& config = model_.config();
+    TILEGRAD_ASSIGN(const PhotoStore store,
+                    PhotoStore::Load(set_, chosen, config.crop, static_cast<int>(config.size),
+                                     workers, progress, stop));
+    for (int at = 0; at < store.count(); at += static_cast<int>(Model::kImagesAtOnce)) {
+      if (stop) return Cancelled("stopped while evaluating; nothing was written");
+      if (progress)
+        progress({"evaluating", static_cast<std::uint64_t>(at),
+                  static_cast<std::uint64_t>(store.count()), ""});
+      TILEGRAD_TRY(ScoreSome(store, at));
+    }
+    return Fill(chosen);
+  }
+
+ private:
+  Status ScoreSome(const PhotoStore& store, int first) {
+    std::vector<int> some;
+    const int end = std::min(store.count(), first + static_cast<int>(Model::kImagesAtOnce));
+    for (int i = first; i < end; ++i) some.push_back(i);
+    const PhotographBatch batch =
+        GatherPhotographs(model_.context(), model_.config(), store, some, -1);
+    TILEGRAD_ASSIGN(const auto predicted,
+                    PredictPhotographs(model_.context(), model_.network(), batch.input));
+    for (std::size_t i = 0; i < predicted.size(); ++i)
+      TILEGRAD_TRY(ScoreOne(batch, i, predicted[i]));
+    return {};
+  }
+
+  Status ScoreOne(const PhotographBatch& batch, std::size_t i, const PredictedPhotograph& photo) {
+    PredictedPhotograph mean = photo;
+    for (std::size_t v = 0; v < mean.mesh.positions.size(); ++v)
+      mean.mesh.positions[v] = {mean_shape_[3 * v], mean_shape_[3 * v + 1], mean_shape_[3 * v + 2]};
+    mean.keypoints = mean_keypoints_;
+    TILEGRAD_TRY(Compare(batch, i, {mean, batch.cameras[i]}, &tallies_[kMean]));
+    TILEGRAD_TRY(Compare(batch, i, {photo, photo.camera}, &tallies_[kOwnCamera]));
+    return Compare(batch, i, {photo, batch.cameras[i]}, &tallies_[kOurs]);
+  }
+
+  struct SeenThrough {
+    const PredictedPhotograph& photo;
+    const WeakPerspective& camera;
+  };
+  Status Compare(const PhotographBatch& batch, std::size_t i, const SeenThrough& seen,
+                 Tally* tally) {
+    TILEGRAD_ASSIGN(const auto drawn, pictures_.Draw(seen.photo.mesh, seen.camera));
+    const std::size_t plane = drawn.size() / 4;
+    const ImageScore image(drawn, batch.colors.span<float>().subspan(3 * plane * i, 3 * plane),
+                           batch.mask.span<float>().subspan(plane * i, plane));
+    Score score;
+    score.texture_l1 = image.color, score.mask_loss = image.iou_loss;
+    const CroppedPhoto& crop = batch.crops[i];
+    KeypointScore own(1, kPckThreshold);
+    for (std::size_t k = 0; k < crop.keypoints.size(); ++k) {
+      if (!crop.keypoints[k].visible) continue;
+      const auto at = ProjectWeakly(seen.camera, seen.photo.keypoints[k]);
+      const double error =
+          crop.to_box * std::hypot(at[0] - crop.keypoints[k].x, at[1] - crop.keypoints[k].y);
+      tally->pck.Add(k, error), own.Add(0, error);
+    }
+    score.pck = own.Mean();
+    tally->scores.push_back(score);
+    return {};
+  }
+
+  Evaluation Fill(const std::vector<int>& chosen) {
+    Evaluation out;
+    out.split = SplitName(job_.split);
+    out.predictor = job_.predictor.description();
+    out.dataset_source = set_.source, out.views_per_model = 1;
+    out.classes = {set_.source}, out.class_models = {static_cast<int>(chosen.size())};
+    for (int m = 0; m < kMethods; ++m) {
+      const Score mean = tallies_[static_cast<std::size_t>(m)].Mean();
+      out.rows.push_back({kNames[m], {mean}, mean});
+    }
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      out.models.push_back({set_.source, set_.photographs[static_cast<std::size_t>(chosen[i])].id,
+                            tallies_[kOurs].scores[i]});
+    return out;
+  }
+
+  const TaskEvaluation& job_;
+  const PhotographSet& set_;
+  PhotographModel& model_;
+  PhotographPictures pictures_;
+  std::vector<Tally> tallies_;
+  std::vector<float> mean_shape_;
+  std::vector<std::array<double, 3>> mean_keypoints_;
+};
+
+}  // namespace
+
+Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
+  const std::string now = TextOf(set);
+  if (is_new) return WriteTextAtomic(ListOf(run), now);
+  TILEGRAD_ASSIGN(const std::string then, ReadText(ListOf(run)));
+  if (then == now) return {};
+  return InvalidArgument("{}: this run was started with other photographs than those of {}: {}",
+                         run.string(), set.folder.string(), FirstDifference(then, now));
+}
+
+Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
+  std::error_code error;
+  if (!std::filesystem::exists(ListOf(run), error)) return {};
+  TILEGRAD_ASSIGN(const std::string text, ReadText(ListOf(run)));
+  std::set<std::string> trained;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) trained.insert(line);
+  for (const int i : set.Select(split)) {
+    const std::string& id = set.photographs[static_cast<std::size_t>(i)].id;
+    if (trained.count(id) > 0)
+      return InvalidArgument("{}: {} of {} was trained on", run.string(), id, set.folder.string());
+  }
+  return {};
+}
+
+std::vector<int> ChoosePhotographs(const PhotographSet& set, Split split, int count) {
+  const std::vector<int> all = set.Select(split);
+  std::vector<int> out;
+  const auto shown = std::min<std::size_t>(static_cast<std::size_t>(count), all.size());
+  for (std::size_t i = 0; i < shown; ++i) out.push_back(all[i * all.size() / shown]);
+  return out;
+}
+
+Result<Evaluation> EvaluatePhotographs(const TaskEvaluation& job, const Workers& workers,
+                                       const ProgressSink& progress, const StopFlag& stop) {
+  if (job.change)
+    return InvalidArgument("predictions of photographs are scored as they are: no --refine");
+  if (job.oracle_steps > 0) return InvalidArgument("photographs have no oracle");
+  TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(job.data));
+  if (!set.photographs[0].camera)
+    return InvalidArgument("{}: no cameras, so nothing to score by", job.data.string());
+  if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOutPhotographs(job.run, set, job.split));
+  auto& model = dynamic_cast<PhotographModel&>(job.predictor.model());
+  const nn::Var weights = model.network().KeypointWeights();
+  const std::size_t learned = weights.valid() ? static_cast<std::size_t>(weights.shape()[0]) : 0;
+  if (learned != set.keypoint_names.size())
+    return InvalidArgument("{}: {} keypoints, but the network has learned {}", job.data.string(),
+                           set.keypoint_names.size(), learned);
+  return PhotographJudge(job, set).Run(workers, progress, stop);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/photographs/step.h"
+
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "nn/ops/sample_pictures.h"
+#include "train/losses/color_l1.h"
+#include "train/losses/iou.h"
+#include "train/ops/weak_cameras.h"
+
+namespace tilegrad::train {
+
+PhotographStep::PhotographStep(nn::Context& context, const PhotographsConfig& config,
+                               const PhotographStart& start)
+    : context_(context),
+      config_(config),
+      network_(context, config.network, start, static_cast<int>(config.size),
+               static_cast<std::uint64_t>(config.schedule.seed)),
+      weights_(context, network_.module(), config.optimizer, config.schedule.steps),
+      renderer_(context.workers()),
+      color_renderer_(context.workers()) {
+  const nn::NoGrad off(context);
+  const nn::Var mean = network_.MeanShape();
+  std::vector<double> positions;
+  nn::WithFloatType(mean.dtype(), [&]<class T>(T) {
+    for (const T x : mean.value().span<T>()) positions.push_back(static_cast<double>(x));
+  });
+  edges_ = CotangentWeights(network_.template_mesh().faces, positions);
+}
+
+RenderJob PhotographStep::JobAt(const PhotographBatch& batch, std::int64_t step) const {
+  const auto& faces = network_.template_mesh().faces;
+  RenderJob job{.faces = {faces[0].data(), 3 * faces.size()}, .cameras = {}};
+  for (const WeakPerspective& camera : batch.cameras)
+    job.cameras.push_back(PinholeIn(camera, static_cast<int>(config_.size)));
+  job.options.width = job.options.height = static_cast<int>(config_.size);
+  job.options.delta = 1 / SharpnessAt(config_.render, config_.schedule.steps, step);
+  job.options.max_alpha_error = config_.render.max_alpha_error;
+  job.uvs = network_.uvs();
+  job.wrap = Wrap::kRepeatClamp;
+  return job;
+}
+
+nn::Var PhotographStep::CamerasOf(const PredictedPhotographs& predicted,
+                                  const PhotographBatch& batch) const {
+  return config_.camera == "predicted"
+             ? predicted.cameras
+             : nn::Constant(context_, CameraRows(context_, batch.cameras));
+}
+
+// Where colours are not to move shapes, they are drawn a second time, of a shape that is fixed.
+RenderedImages PhotographStep::Draw(const PredictedPhotographs& predicted,
+                                    const PhotographBatch& batch, std::int64_t step) {
+  SceneVars scenes{.positions = predicted.positions, .textures = predicted.textures};
+  if (config_.camera == "predicted")
+    scenes.cameras = PinholeCameras(predicted.cameras, static_cast<int>(config_.size));
+  RenderedImages images = RenderScenes(renderer_, scenes, JobAt(batch, step));
+  if (config_.loss.color_moves) return images;
+  scenes.positions = nn::Detach(scenes.positions);
+  if (scenes.cameras.valid()) scenes.cameras = nn::Detach(scenes.cameras);
+  images.colors = RenderScenes(color_renderer_, scenes, JobAt(batch, step)).colors;
+  return images;
+}
+
+// CMR's: over all keypoints, those that are not visible with an error of 0.
+nn::Var PhotographStep::KeypointLoss(const PredictedPhotographs& predicted,
+                                     const PhotographBatch& batch) const {
+  const nn::Var seen = ProjectPoints(predicted.keypoints, CamerasOf(predicted, batch));
+  const nn::Var visible = nn::Constant(context_, batch.visible);
+  return nn::Mean(nn::Square(visible * (seen - nn::Constant(context_, batch.keypoints))));
+}
+
+nn::Var PhotographStep::ColorLoss(const nn::Var& colors, const PhotographBatch& batch) const {
+  const nn::Shape& shape = batch.mask.shape();
+  const nn::Var mask =
+      nn::Reshape(nn::Constant(context_, batch.mask), {shape[0], 1, shape[1], shape[2]});
+  return ColorL1Loss(mask * colors, batch.colors);
+}
+
+nn::Var PhotographStep::FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const {
+  return nn::Mean(nn::SamplePictures(batch.barrier, flow));
+}
+
+// 1 - |q q'|, and the mean square of the three other numbers.
+nn::Var PhotographStep::CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const {
+  std::vector<WeakPerspective> unit = batch.cameras;
+  for (WeakPerspective& camera : unit) {
+    double squares = 0;
+    for (const double c : camera.quaternion) squares += c * c;
+    for (double& c : camera.quaternion) c /= std::sqrt(squares);
+  }
+  const nn::Var truth = nn::Constant(context_, CameraRows(context_, unit));
+  const nn::Var agree =
+      nn::Abs(nn::Sum(nn::Slice(cameras, 1, 3, 7) * nn::Slice(truth, 1, 3, 7), {1}));
+  const nn::Var rest =
+      nn::Mean(nn::Square(nn::Slice(cameras, 1, 0, 3) - nn::Slice(truth, 1, 0, 3)));
+  return rest + (1.0 - nn::Mean(agree));
+}
+
+nn::Var PhotographStep::Entropy() const {
+  const nn::Var weights = network_.KeypointWeights();
+  return -nn::Mean(nn::Sum(weights * nn::Log(weights + 1e-12), {1}));
+}
+
+nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step,
+                             std::vector<LossTerm>* terms) {
+  const PredictedPhotographs predicted =
+      network_.Forward(nn::Constant(context_, batch.input), nn::Mode::kTrain);
+  if (!predicted.positions.valid()) return predicted.positions;
+  const RenderedImages images = Draw(predicted, batch, step);
+  nn::Var total = nn::Constant(context_, 0.0);
+  const auto add = [&](const char* name, double weight, const nn::Var& term) {
+    total = total + weight * term;
+    terms->push_back({name, weight, term.item()});
+  };
+  const PhotographLosses& w = config_.loss;
+  if (predicted.keypoints.valid()) {
+    add("keypoint", w.keypoint, KeypointLoss(predicted, batch));
+    add("entropy", w.entropy, Entropy());
+  }
+  add("mask", w.mask, nn::Mean(nn::Square(images.alpha - nn::Constant(context_, batch.mask))));
+  add("iou", w.iou, IouLoss(images.alpha, batch.mask));
+  add("color", w.color, ColorLoss(images.colors, batch));
+  if (predicted.flow.valid())
+    add("flow_distance", w.flow_distance, FlowLoss(predicted.flow, batch));
+  if (config_.camera == "given") add("camera", w.camera, CameraLoss(predicted.cameras, batch));
+  add("deformation", w.deformation,
+      nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
+  add("laplacian", w.laplacian, CotangentLaplacianLoss(predicted.positions, edges_));
+  return total;
+}
+
+Result<nn::StepVector<nn::Gradient>> PhotographStep::Backward(const PhotographBatch& batch,
+                                                              std::int64_t step,
+                                                              StepValues* values) {
+  const nn::Var loss = Loss(batch, step, &values->terms);
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
+  TILEGRAD_TRY(context_.TakeStatus());
+  values->loss = loss.item();
+  if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;
+  return InternalError(
+      "the loss is {} ({}), the gradient's norm {}; a smaller optimizer.learning_rate may help",
+      values->loss, values->DescribeTerms(), nn::GlobalNorm(context_, gradients));
+}
+
+}  // namespace tilegrad::train

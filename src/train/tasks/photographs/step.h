@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// One training step of section 5.4: photographs -> network -> renderer under weak perspective ->
+// losses of CMR and DIB-R -> gradients.
+#pragma once
+
+#include "scene/topology.h"
+#include "train/losses/cotangent_laplacian.h"
+#include "train/ops/render_op.h"
+#include "train/run/step_values.h"
+#include "train/tasks/learned_weights.h"
+#include "train/tasks/photographs/batch.h"
+
+namespace tilegrad::train {
+
+class PhotographStep {
+ public:
+  PhotographStep(nn::Context& context, const PhotographsConfig& config,
+                 const PhotographStart& start);
+
+  // The total; appends each part, unweighted, with its weight to `terms`.
+  nn::Var Loss(const PhotographBatch& batch, std::int64_t step, std::vector<LossTerm>* terms);
+  // A loss or gradient that is not finite is an error.
+  Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, std::int64_t step,
+                                                StepValues* values);
+
+  PhotographNetwork& network() { return network_; }
+  LearnedWeights& weights() { return weights_; }
+
+ private:
+  RenderedImages Draw(const PredictedPhotographs& predicted, const PhotographBatch& batch,
+                      std::int64_t step);
+  RenderJob JobAt(const PhotographBatch& batch, std::int64_t step) const;
+  nn::Var CamerasOf(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
+  nn::Var KeypointLoss(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
+  nn::Var ColorLoss(const nn::Var& colors, const PhotographBatch& batch) const;
+  nn::Var FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const;
+  nn::Var CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const;
+  nn::Var Entropy() const;
+
+  nn::Context& context_;
+  PhotographsConfig config_;
+  PhotographNetwork network_;
+  LearnedWeights weights_;
+  std::vector<WeighedEdge> edges_;  // of the mean shape as it starts
+  SceneRenderer renderer_, color_renderer_;
+};
+
+}  // namespace tilegrad::train

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/tasks/photographs/task.h"
+
+#include "base/error.h"
+#include "nn/nn.h"
+#include "train/data/batches.h"
+#include "train/predictor.h"
+#include "train/tasks/example_sheet.h"
+#include "train/tasks/photographs/evaluate.h"
+#include "train/tasks/photographs/pictures.h"
+#include "train/tasks/photographs/step.h"
+#include "train/tasks/textured_image/pictures.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr int kSampleRows = 8;
+
+class PhotographsTask : public Task {
+ public:
+  ConfigFields Fields() override { return FieldsOf(&config_); }
+  std::vector<TermLabel> Labels() const override {
+    return {{"keypoint", "Keypoints (mean square in the crop)"},
+            {"entropy", "Entropy of the keypoints' weights"},
+            {"mask", "Silhouette (mean square)"},
+            {"iou", "IoU loss (1 − soft IoU of silhouettes)"},
+            {"color", "Colour loss (mean L1)"},
+            {"flow_distance", "Distance of the texture flow from the object"},
+            {"camera", "Camera (rotation, scale and shift)"},
+            {"deformation", "Mean length of movements"},
+            {"laplacian", "Cotangent Laplacian"}};
+  }
+
+  Status Start(const TaskStart& start) override;
+  int image_size() const override { return static_cast<int>(config_.size); }
+  RunHeader Header() override;
+  Status Begin(const Path& run, std::int64_t first_step) override {
+    return RememberPhotographs(run, set_, first_step == 0);
+  }
+
+  Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
+    return step_->weights().Update(gradients, at.step);
+  }
+  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
+    return step_->weights().LoadState(state, steps);
+  }
+  Result<ImageU8> SamplePicture(std::int64_t steps) override;
+
+  Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
+                                           const Checkpoint& checkpoint) override {
+    return LoadPhotographModel(context, config_, checkpoint);
+  }
+  Result<Evaluation> Evaluate(const TaskEvaluation& job, const Workers& workers,
+                              const ProgressSink& progress, const StopFlag& stop) override {
+    return EvaluatePhotographs(job, workers, progress, stop);
+  }
+  Result<Showcase> Show(const ShowcaseRequest& request, const Workers& workers,
+                        const ProgressSink& progress, const StopFlag& stop) override;
+
+ private:
+  Status CheckCameras() const;
+
+  PhotographsConfig config_;
+  nn::Context* context_ = nullptr;
+  PhotographSet set_;
+  std::optional<PhotoStore> train_, held_out_;
+  std::optional<BatchOrder> order_;
+  std::optional<PhotographStep> step_;
+};
+
+Status PhotographsTask::CheckCameras() const {
+  if (config_.camera == "predicted") return {};
+  for (const Photograph& photo : set_.photographs) {
+    if (photo.camera) continue;
+    return InvalidArgument(
+        "{}: no camera for {}: give cameras or keypoints (docs/photographs.md), or let the network "
+        "find them with photographs.camera = \"predicted\"",
+        set_.folder.string(), photo.id);
+  }
+  return {};
+}
+
+Status PhotographsTask::Start(const TaskStart& start) {
+  context_ = &start.context;
+  config_.schedule = start.schedule;
+  TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_ASSIGN(set_, OpenPhotographs(start.data));
+  TILEGRAD_TRY(CheckCameras());
+  const Workers& workers = start.context.workers();
+  const std::vector<int> train = set_.Select(Split::kTrain);
+  TILEGRAD_ASSIGN(train_, PhotoStore::Load(set_, train, config_.crop, image_size(), workers,
+                                           start.progress, start.stop));
+  TILEGRAD_ASSIGN(
+      held_out_, PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kSampleRows),
+                                  config_.crop, image_size(), workers, start.progress, start.stop));
+  order_.emplace(static_cast<int>(train.size()), 1,
+                 static_cast<std::uint64_t>(start.schedule.seed));
+  step_.emplace(*context_, config_,
+                PhotographStart{set_.mean_keypoints, set_.keypoint_names.size()});
+  return context_->TakeStatus();
+}
+
+RunHeader PhotographsTask::Header() {
+  RunHeader header;
+  header.dataset_source = set_.source;
+  header.training_models = train_->count();
+  header.parameters = nn::CountParameters(step_->network().module());
+  return header;
+}
+
+Result<nn::StepVector<nn::Gradient>> PhotographsTask::Backward(const UpdateIndex& at,
+                                                               StepValues* out) {
+  std::vector<int> photographs;
+  for (const Sample& sample : order_->Batch(at.step, static_cast<int>(config_.batch), 1))
+    photographs.push_back(sample.model);
+  const PhotographBatch batch =
+      GatherPhotographs(*context_, config_, *train_, photographs, at.step);
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at.step, out));
+  const auto seen = static_cast<double>((at.step + 1) * config_.batch);
+  out->also.emplace_back("epoch", seen / train_->count());
+  out->also.emplace_back("learning_rate",
+                         LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
+  out->images = config_.batch;
+  return gradients;
+}
+
+// Rows of pictures of the photographs of a store.
+Result<std::vector<std::vector<ShownPicture>>> RowsOf(nn::Context& context,
+                                                      const PhotographsConfig& config,
+                                                      PhotographNetwork& network,
+                                                      const PhotoStore& store) {
+  std::vector<std::vector<ShownPicture>> rows;
+  PhotographPictures pictures(store.size());
+  for (int i = 0; i < store.count(); ++i) {
+    const PhotographBatch batch = GatherPhotographs(context, config, store, {i}, -1);
+    TILEGRAD_ASSIGN(const auto predicted, PredictPhotographs(context, network, batch.input));
+    CroppedPhoto crop = batch.crops[0];
+    if (!store.photograph(i).camera) crop.camera = predicted[0].camera;
+    TILEGRAD_ASSIGN(auto row, pictures.Row(store.photograph(i).id, predicted[0], crop,
+                                           batch.input.span<float>()));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Result<ImageU8> PhotographsTask::SamplePicture(std::int64_t /*steps*/) {
+  TILEGRAD_ASSIGN(const auto rows, RowsOf(*context_, config_, step_->network(), *held_out_));
+  return rows.empty() ? ImageU8() : SheetOf(rows, image_size());
+}
+
+Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Workers& workers,
+                                       const ProgressSink& progress, const StopFlag& stop) {
+  TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(request.data));
+  TILEGRAD_TRY(CheckHeldOutPhotographs(request.run, set, Split::kTest));
+  auto& model = dynamic_cast<PhotographModel&>(request.predictor.model());
+  Showcase out;
+  out.purpose = "to predict shape, texture and camera of an object from one photograph";
+  out.data = fmt::format(
+      "It learned from {} photographs, one of each object, with masks{}. It saw no 3D data.",
+      request.header.training_models, set.keypoint_names.empty() ? "" : " and keypoints");
+  out.note =
+      "The network saw none of these in training. Dots are annotated keypoints, rings predicted "
+      "ones. Photographs are spread evenly over the held-out ones, not picked by hand.";
+  TILEGRAD_ASSIGN(const PhotoStore store,
+                  PhotoStore::Load(set, ChoosePhotographs(set, Split::kTest, request.examples),
+                                   model.config().crop, static_cast<int>(model.config().size),
+                                   workers, progress, stop));
+  TILEGRAD_ASSIGN(auto rows, RowsOf(model.context(), model.config(), model.network(), store));
+  for (int i = 0; i < store.count(); ++i) {
+    const PhotographBatch batch =
+        GatherPhotographs(model.context(), model.config(), store, {i}, -1);
+    TILEGRAD_ASSIGN(auto predicted,
+                    PredictPhotographs(model.context(), model.network(), batch.input));
+    Example& example = out.examples.emplace_back();
+    example.name = example.id = store.photograph(i).id, example.class_name = set.source;
+    example.pictures = std::move(rows[static_cast<std::size_t>(i)]);
+    example.prediction = std::move(predicted[0].mesh);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Task> MakePhotographsTask() { return std::make_unique<PhotographsTask>(); }
+
+}  // namespace tilegrad::train

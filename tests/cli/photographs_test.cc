@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The three commands of docs/photographs.md for owners of CUB-200 and PASCAL3D+, on miniatures of
+// their layout.
+#include <gtest/gtest.h>
+
+#include "support/run_program.h"
+#include "support/temp_folder.h"
+#include "train/data/photographs/miniature.h"
+
+namespace tilegrad {
+namespace {
+
+class Photographs : public TempFolderTest {
+ protected:
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  std::string ExpectDone(const std::string& arguments) const {
+    const Outcome outcome = RunProgram(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    return outcome.output;
+  }
+};
+
+constexpr const char* kSmall =
+    " --set schedule.steps=3 --set schedule.batch=2 --set network.base=4 --set network.most=8"
+    " --set network.levels=2 --set network.latent=8 --set network.template_level=1"
+    " --set photographs.size=16";
+
+TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
+  for (const auto& [source, config] : {std::pair("cub", "birds"), {"pascal3d", "cars_photos"}}) {
+    train::WriteMiniature(folder_ / source, source);
+    const std::string run = In(std::string(source) + "_run");
+    ExpectDone(std::string("train --config ") + config + " --data " + In(source) + " --out " + run +
+               kSmall);
+    const std::string table = ExpectDone("eval --run " + run);
+    EXPECT_NE(table.find("PCK@0.1"), std::string::npos) << table;
+    ExpectDone("report --run " + run);
+    EXPECT_TRUE(std::filesystem::exists(Path(run) / "report.html"));
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photographs that anyone can make: a few of boxes.
+#include "train/data/photographs/rendered_set.h"
+
+#include <gtest/gtest.h>
+
+#include "io/image_file.h"
+#include "scene/shapes.h"
+#include "support/temp_folder.h"
+#include "train/data/photographs/extreme_points.h"
+
+namespace tilegrad::train {
+namespace {
+
+class RenderedSet : public TempFolderTest {
+ protected:
+  RenderedSet() {
+    Mesh box = Box(glm::vec3(0), {0.4f, 0.3f, 0.9f});
+    SetColor(box, {0.8f, 0.3f, 0.2f, 1});
+    models_.emplace_back(std::move(box));
+    ImageU8 sky(300, 200, 3, 90);
+    EXPECT_TRUE(io::SavePng(folder_ / "sky.png", sky).ok());
+  }
+  Status Make(const std::string& out, int workers, const AnnotationNoise& noise = {}) {
+    const RenderedSetJob job{models_, models_, {folder_ / "sky.png"}, 18, 4};
+    return MakeRenderedSet(job, noise, folder_ / out, Workers(workers), nullptr, stop_);
+  }
+  std::vector<TexturedMesh> models_;
+  StopFlag stop_ = false;
+};
+
+TEST_F(RenderedSet, IsInTheLayoutOfPascal3d) {
+  ASSERT_TRUE(Make("a", 2, {.mask = 0, .keypoint = 0, .hidden = 0}).ok());
+  const auto set = OpenPhotographs(folder_ / "a");
+  ASSERT_TRUE(set.ok()) << set.status().message();
+  EXPECT_EQ(set->source, "pascal3d");
+  EXPECT_GT(set->Select(Split::kTrain).size(), 10u);
+  EXPECT_GT(set->Select(Split::kTest).size(), 1u);
+  for (const Photograph& photo : set->photographs) {
+    EXPECT_TRUE(std::filesystem::exists(photo.image));
+    for (const Keypoint& k : photo.keypoints) {
+      if (!k.visible) continue;
+      EXPECT_GT(k.x, photo.box.left - 2);
+      EXPECT_LT(k.x, photo.box.right + 2);
+    }
+  }
+}
+
+TEST_F(RenderedSet, IsTheSameForAnyWorkers) {
+  ASSERT_TRUE(Make("one", 1).ok());
+  ASSERT_TRUE(Make("two", 2).ok());
+  for (const char* file :
+       {"data/car_train.mat", "sfm/car_val.mat", "Images/car_rendered/train_00003.png"})
+    EXPECT_EQ(ReadFile(folder_ / "one" / file).value(), ReadFile(folder_ / "two" / file).value())
+        << file;
+}
+
+TEST_F(RenderedSet, NeedsModelsAndBackgrounds) {
+  const std::vector<TexturedMesh> none;
+  const RenderedSetJob job{none, models_, {folder_ / "sky.png"}};
+  ExpectMessage(MakeRenderedSet(job, {}, folder_ / "b", Workers(1), nullptr, stop_), "models");
+  const RenderedSetJob bare{models_, models_, {}};
+  ExpectMessage(MakeRenderedSet(bare, {}, folder_ / "c", Workers(1), nullptr, stop_), "background");
+}
+
+TEST(ExtremePoints, OfABoxAreItsCorners) {
+  const auto points = FindExtremePoints(Box({1, 2, 3}, {2, 4, 6}));
+  const std::vector<int> mirror = ExtremeMirror();
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const glm::vec3 p = points[k] - glm::vec3(1, 2, 3);
+    EXPECT_NEAR(std::abs(p.x), 1, 1e-5);
+    EXPECT_GT(p.x * kExtremePoints[k].direction[0], 0);
+    const glm::vec3 m = points[static_cast<std::size_t>(mirror[k])] - glm::vec3(1, 2, 3);
+    EXPECT_NEAR(p.x, -m.x, 1e-5);
+    EXPECT_NEAR(p.z, m.z, 1e-5);
+  }
+  EXPECT_EQ(points[0], glm::vec3(2, 0, 6));  // left, low, in front
+}
+
+TEST(MaskNoise, MovesTheOutlineAndNothingElse) {
+  PhotoMask mask{60, 40, std::vector<bool>(2400)};
+  for (int y = 8; y < 32; ++y)
+    for (int x = 10; x < 50; ++x) mask.inside[static_cast<std::size_t>(y * 60 + x)] = true;
+  Rng rng(5);
+  int changed = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const PhotoMask other = DisturbedMask(mask, 1.5, rng);
+    EXPECT_TRUE(other.at(30, 20));
+    EXPECT_FALSE(other.at(0, 0));
+    for (std::size_t i = 0; i < 2400; ++i) changed += other.inside[i] != mask.inside[i];
+  }
+  EXPECT_GT(changed, 20 * 60);
+  EXPECT_LT(changed, 20 * 500);
+  EXPECT_EQ(DisturbedMask(mask, 0, rng).inside, mask.inside);
+}
+
+}  // namespace
+}  // namespace tilegrad::train

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+// The task goes the whole way on miniatures of CUB-200 and PASCAL3D+: it trains, is stopped and
+// goes on to the same bits, predicts, is evaluated by Table 3 and reported.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "train/config.h"
+#include "train/data/photographs/miniature.h"
+#include "train/models/photograph_network.h"
+#include "train/predictor.h"
+#include "train/report/report.h"
+#include "train/run/log.h"
+#include "train/tasks/photographs/step.h"
+#include "train/tiny_run.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train {
+namespace {
+
+const ProgressSink kSilent = [](const Progress&) {};
+
+constexpr const char* kTiny = R"(name = "tiny"
+[task]
+kind = "photographs"
+[network]
+base = 4
+most = 8
+levels = 2
+latent = 12
+template_level = 1
+[photographs]
+size = 16
+[render]
+sharpness = 500
+sharpness_start = 100
+[optimizer]
+learning_rate = 2e-3
+average = 0.5
+[schedule]
+steps = 12
+batch = 4
+log_every = 1
+sample_every = 10
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
+class PhotographsTask : public TempFolderTest {
+ protected:
+  PhotographsTask() { WriteMiniature(folder_ / "cub", "cub"); }
+
+  struct Changes {
+    std::string more = {};
+    int workers = 2;
+    std::int64_t steps = 12;
+    std::string data = "cub";
+  };
+  Result<RunOutcome> Train(const std::string& run, const Changes& changes) {
+    TrainJob job;
+    TILEGRAD_ASSIGN(job.config, ParseConfig(kTiny + changes.more, "tiny.toml"));
+    job.config.schedule.steps = changes.steps;
+    job.extends = true;
+    job.data = folder_ / changes.data, job.run = folder_ / run;
+    job.existing = ExistingRun::kContinue;
+    return train::Train(job, Workers(changes.workers), kSilent, stop_);
+  }
+  std::vector<nn::NamedTensor> Final(const std::string& run) {
+    auto found = LoadNewestCheckpoint(context_, folder_ / run);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
+  }
+  void ExpectSameBits(const std::string& a, const std::string& b) {
+    const auto left = Final(a), right = Final(b);
+    ASSERT_EQ(left.size(), right.size());
+    ASSERT_GT(left.size(), 20u);
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
+      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
+          << left[i].name;
+    }
+  }
+
+  Workers workers_{2};
+  nn::Context context_{workers_};
+  StopFlag stop_ = false;
+};
+
+TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
+  for (const char* texture : {"direct", "flow"}) {
+    const Path run = folder_ / texture;
+    const auto trained = Train(texture, {.more = std::string("[loss]\nmask = 2\n") +
+                                                 (texture[0] == 'f' ? "color_moves = false\n" : ""),
+                                         .steps = 60});
+    ASSERT_TRUE(trained.ok()) << trained.status().message();
+    const auto log = ReadLog(run);
+    ASSERT_TRUE(log.ok());
+    EXPECT_LT(log->back().values[0].second, log->front().values[0].second);
+    const auto predictor = Predictor::Load(run, workers_);
+    ASSERT_TRUE(predictor.ok()) << predictor.status().message();
+    const auto meshes = predictor->Predict(std::vector<std::uint8_t>(4 * 16 * 16, 128));
+    ASSERT_TRUE(meshes.ok()) << meshes.status().message();
+    EXPECT_EQ((*meshes)[0].textures[0].image.width, 32);
+
+    const TaskEvaluation job{.run = run, .data = folder_ / "cub", .predictor = *predictor};
+    const auto evaluation = predictor->task().Evaluate(job, workers_, kSilent, stop_);
+    ASSERT_TRUE(evaluation.ok()) << evaluation.status().message();
+    ASSERT_EQ(evaluation->rows.size(), 3u);
+    const Score& ours = evaluation->rows[2].mean;
+    EXPECT_GT(*ours.pck, 0.1);
+    EXPECT_LT(*ours.texture_l1, 0.5);
+    // The mean shape starts as the hull of the keypoints, which is in the picture.
+    EXPECT_LT(*evaluation->rows[0].mean.mask_loss, 0.9) << FormatTable(*evaluation);
+    EXPECT_GT(*evaluation->rows[0].mean.pck, 0.5);
+    const std::string table = FormatTable(*evaluation);
+    for (const char* part : {"texture L1", "2D IoU loss", "PCK@0.1", "keypoints within 0.1"})
+      EXPECT_NE(table.find(part), std::string::npos) << part << "\n" << table;
+    ASSERT_TRUE(WriteEvaluation(run, *evaluation).ok());
+    const auto read = ReadEvaluation(run);
+    ASSERT_TRUE(read.ok() && read->has_value());
+    EXPECT_EQ((*read)->rows[2].mean.pck, ours.pck);
+
+    const ReportJob page{run, folder_ / "cub", folder_ / "page.html", 2};
+    const auto report = WriteReport(page, workers_, kSilent, stop_);
+    ASSERT_TRUE(report.ok()) << report.status().message();
+    const std::string text = ReadText(page.out).value();
+    for (const char* part : {"from one photograph", "10 photographs, one of each object",
+                             "2D IoU loss", "Cotangent Laplacian"})
+      EXPECT_NE(text.find(part), std::string::npos) << part;
+  }
+}
+
+TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
+  ASSERT_TRUE(Train("one", {.workers = 1}).ok());
+  ASSERT_TRUE(Train("two", {.workers = 2}).ok());
+  ExpectSameBits("one", "two");
+}
+
+TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
+  ASSERT_TRUE(Train("whole", {}).ok());
+  TrainJob job;
+  job.config = ParseConfig(kTiny, "tiny.toml").value();
+  job.data = folder_ / "cub", job.run = folder_ / "stopped";
+  job.existing = ExistingRun::kContinue;
+  int steps = 0;
+  StopFlag stop = false;
+  const ProgressSink after_five = [&](const Progress& progress) {
+    if (progress.stage == "training" && ++steps == 5) stop = true;
+  };
+  const auto stopped = train::Train(job, workers_, after_five, stop);
+  EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
+  ASSERT_TRUE(Train("stopped", {.workers = 1}).ok());
+  ExpectSameBits("whole", "stopped");
+}
+
+TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
+  WriteMiniature(folder_ / "p3d", "pascal3d");
+  const auto trained = Train("p3d_run", {.data = "p3d"});
+  ASSERT_TRUE(trained.ok()) << trained.status().message();
+  std::string config(kTiny);
+  config.replace(config.find("size = 16"), 9, "size = 16\ncamera = \"predicted\"");
+  TrainJob job;
+  job.config = ParseConfig(config, "tiny.toml").value();
+  job.data = folder_ / "p3d", job.run = folder_ / "camera";
+  const auto outcome = train::Train(job, workers_, kSilent, stop_);
+  ASSERT_TRUE(outcome.ok()) << outcome.status().message();
+}
+
+TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
+  ExpectMessage(Train("a", {.data = "none"}).status(), "no such folder");
+  ExpectMessage(Train("b", {.more = "[loss]\nnone = 1\n"}).status(), "loss.none");
+  std::string config(kTiny);
+  config.replace(config.find("levels = 2"), 10, "levels = 2\ntexture = \"paint\"");
+  TrainJob job;
+  job.config = ParseConfig(config, "tiny.toml").value();
+  job.data = folder_ / "cub", job.run = folder_ / "c";
+  ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "network.texture", "paint");
+  ASSERT_TRUE(Train("d", {}).ok());
+  WriteMiniature(folder_ / "cub", "cub", {.train = 8, .test = 5});
+  ExpectMessage(Train("d", {.steps = 20}).status(), "other photographs");
+  const auto predictor = Predictor::Load(folder_ / "d", workers_);
+  ASSERT_TRUE(predictor.ok());
+  const TaskEvaluation evaluation{
+      .run = folder_ / "d", .data = folder_ / "cub", .predictor = *predictor};
+  ExpectMessage(predictor->task().Evaluate(evaluation, workers_, kSilent, stop_).status(),
+                "was trained on");
+}
+
+// Gradients of the whole step in float64, by central differences along random directions of all
+// weights: through network, projection, renderer and losses.
+TEST_F(PhotographsTask, GradientsOfAStep) {
+  for (const char* texture : {"direct", "flow"}) {
+    PhotographsConfig config;
+    config.network = {
+        .base = 4, .most = 8, .levels = 2, .latent = 8, .texture = texture, .template_level = 1};
+    config.size = 16, config.render.sharpness = config.render.sharpness_start = 50;
+    config.loss.iou = 1, config.camera = "predicted", config.schedule.steps = 10;
+    const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
+    const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop_);
+    nn::Context context(workers_, nn::DType::kF64);
+    PhotographStep step(context, config, {set.mean_keypoints, 15});
+    const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 1);
+    std::vector<LossTerm> terms;
+    auto parameters = nn::Parameters(step.network().module());
+    std::vector<nn::Var> vars;
+    for (const auto& p : parameters) vars.push_back(p.value);
+    const nn::Var loss = step.Loss(batch, 1, &terms);
+    const auto gradients = nn::Grad(loss, vars);
+    ASSERT_TRUE(context.status().ok()) << context.status().message();
+    for (std::size_t which :
+         {parameters.size() - 1, parameters.size() - 2, parameters.size() - 4}) {
+      nn::Tensor value = parameters[which].value.value();
+      const std::vector<double> before(value.span<double>().begin(), value.span<double>().end());
+      Rng rng(which);
+      std::vector<double> direction(before.size());
+      double slope = 0;
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        direction[i] = rng.Normal();
+        slope += direction[i] * gradients[which].value().span<double>()[i];
+      }
+      const auto at = [&](double h) {
+        for (std::size_t i = 0; i < before.size(); ++i)
+          value.data<double>()[i] = before[i] + h * direction[i];
+        std::vector<LossTerm> ignored;
+        return step.Loss(batch, 1, &ignored).item();
+      };
+      // Colours jump where an edge crosses a pixel's centre, so the step is small.
+      const double h = 1e-7, difference = (at(h) - at(-h)) / (2 * h);
+      at(0);
+      EXPECT_NEAR(slope, difference, 2e-3 * (1 + std::abs(difference))) << parameters[which].name;
+    }
+  }
+}
+
+// By hand: a regular octahedron reaches 1 along its axes, 1 / sqrt(3) along its diagonals.
+TEST(HullReaches, OfAnOctahedron) {
+  const std::vector<std::array<double, 3>> points = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                                     {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
+  EXPECT_NEAR(HullReach(points, {0, 0, 0}, {0, 1, 0}), 1, 1e-9);
+  const double d = 1 / std::sqrt(3.0);
+  EXPECT_NEAR(HullReach(points, {0, 0, 0}, {d, d, -d}), d, 1e-9);
+  EXPECT_EQ(HullReach({{1, 0, 0}, {0, 0, 1}, {-1, 0, -1}}, {0, 0, 0}, {0, 1, 0}), 0);
+}
+
+// Shapes are mirror images of themselves, and the mean shape starts as the hull of the keypoints.
+TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
+  const Workers workers(1);
+  nn::Context context(workers, nn::DType::kF64);
+  const auto shape = MiniatureShape(CubMirror());
+  PhotographNetwork network(context,
+                            {.base = 4,
+                             .most = 8,
+                             .levels = 2,
+                             .latent = 8,
+                             .template_level = 2,
+                             .output_deviation = 0.5},
+                            {shape, 15}, 16, 1);
+  const auto p = network.MeanShape().value().span<double>();
+  double longest = 0;
+  for (std::size_t i = 0; i < p.size(); i += 3)
+    longest = std::max(longest, std::hypot(p[i], p[i + 1], p[i + 2]));
+  EXPECT_GT(longest, 0.5);
+  const nn::Var input = nn::Constant(context, context.Full({2, 3, 16, 16}, 0.3));
+  const auto out = network.Forward(input, nn::Mode::kTrain);
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  double sum = 0, largest = 0;
+  const auto q = out.positions.value().span<double>();
+  for (std::size_t i = 0; i < q.size(); i += 3) sum += q[i], largest = std::max(largest, q[i]);
+  EXPECT_NEAR(sum, 0, 1e-9);
+  EXPECT_GT(largest, 0.1);
+  EXPECT_EQ(out.keypoints.shape(), (nn::Shape{2, 15, 3}));
+  EXPECT_EQ(out.cameras.shape(), (nn::Shape{2, 7}));
+  // Each keypoint's weights sum to 1.
+  const auto w = network.KeypointWeights().value().span<double>();
+  double first = 0;
+  for (std::size_t v = 0; v < w.size() / 15; ++v) first += w[v];
+  EXPECT_NEAR(first, 1, 1e-12);
+}
+
+TEST(PhotographConfigs, AreRead) {
+  for (const char* file : {"birds", "cars_photos", "photographs_cmr"}) {
+    const Path path = Path(TILEGRAD_SOURCE_DIR) / "configs" / (std::string(file) + ".toml");
+    const auto config = ParseConfig(ReadText(path).value(), path.string());
+    ASSERT_TRUE(config.ok()) << config.status().message();
+    EXPECT_EQ(config->name, file);
+    auto copy = ParseConfig(WriteConfig(*config), "its own text");
+    EXPECT_TRUE(copy.ok()) << copy.status().message();
+  }
+}
+
+}  // namespace
+}  // namespace tilegrad::train
