@@ -29,7 +29,8 @@ struct TrainOptions {
   LiveOption live;
 };
 
-void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options) {
+void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
+                  const char* score_command) {
   if (outcome.first_step == outcome.last_step) {
     Print("{}: the run is complete at step {}; nothing to do\n", options.out, outcome.last_step);
     return;
@@ -38,7 +39,7 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options)
         outcome.finished ? "finished" : "stopped", outcome.last_step,
         FormatDuration(outcome.seconds));
   if (!outcome.finished) Print("continue with: tilegrad train --resume {}\n", options.out);
-  if (outcome.finished) Print("scores: tilegrad eval --run {}\n", options.out);
+  if (outcome.finished) Print("scores: tilegrad {} --run {}\n", score_command, options.out);
   Print("curves: tensorboard --logdir {}\n", options.out);
 }
 
@@ -142,7 +143,7 @@ Status RunTraining(TrainOptions options) {
     EndBrokenCrew(outcome.status(), &ranks);
     return outcome.status();
   }
-  PrintOutcome(*outcome, options);
+  PrintOutcome(*outcome, options, job.config.task->ScoreCommand());
   PrintJson(*outcome, options);
   return {};
 }

@@ -134,6 +134,7 @@ Json PageData(const ReportFacts& facts) {
                    {"azimuth", show.azimuth},
                    {"elevation", show.elevation},
                    {"distance", show.distance}};
+  out["generated"] = show.generated;
   out["models"] = Json::array();
   for (const Example& example : show.examples) out["models"].push_back(ModelJson(example));
   return out;

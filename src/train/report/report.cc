@@ -17,18 +17,23 @@ namespace {
 
 Result<std::string> Page(const ReportFacts& facts) {
   TILEGRAD_ASSIGN(const std::string models, ModelsHtml(facts));
-  return FillTemplate(kReportHtml, {{"name", EscapeHtml(facts.run.config.name)},
-                                    {"summary", SummaryHtml(facts)},
-                                    {"comparison", ComparisonHtml(facts)},
-                                    {"models", models},
-                                    {"scores", ScoresHtml(facts)},
-                                    {"commands", CommandsHtml(facts)},
-                                    {"config", EscapeHtml(facts.run.config_text)},
-                                    {"machine", MachineHtml(facts)},
-                                    {"credits", CreditsHtml(facts)},
-                                    {"data", ScriptJson(PageData(facts))},
-                                    {"style", std::string(kReportCss)},
-                                    {"script", std::string(kPartsJs) + std::string(kReportJs)}});
+  const bool made = facts.showcase.generated;
+  return FillTemplate(
+      kReportHtml,
+      {{"name", EscapeHtml(facts.run.config.name)},
+       {"summary", SummaryHtml(facts)},
+       {"comparison", ComparisonHtml(facts)},
+       {"meshes_title", made ? "Generated meshes to turn" : "Predicted meshes to turn"},
+       {"models_title", made ? "Generated objects" : "Held-out models"},
+       {"models", models},
+       {"scores", ScoresHtml(facts)},
+       {"commands", CommandsHtml(facts)},
+       {"config", EscapeHtml(facts.run.config_text)},
+       {"machine", MachineHtml(facts)},
+       {"credits", CreditsHtml(facts)},
+       {"data", ScriptJson(PageData(facts))},
+       {"style", std::string(kReportCss)},
+       {"script", std::string(kPartsJs) + std::string(kReportJs)}});
 }
 
 }  // namespace
@@ -47,7 +52,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   ReportSummary summary;
   summary.bytes = page.size();
   summary.models = static_cast<int>(facts.showcase.examples.size());
-  summary.evaluated = facts.evaluation.has_value();
+  summary.evaluated = facts.evaluation.has_value() || facts.showcase.generated;
   summary.warnings = predictor.warnings();
   RemoveTemporariesOf(job.out);  // of killed calls
   TILEGRAD_TRY(WriteTextAtomic(job.out, page));

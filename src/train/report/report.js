@@ -12,6 +12,11 @@ function startViewer() {
     return;
   }
   byId('stage').hidden = false;
+  if (data.generated) {
+    byId('viewer-input-caption').textContent = 'from the front';
+    byId('viewer-prediction-caption').textContent = 'generated';
+    byId('viewer-truth').parentElement.hidden = true;
+  }
   const viewer = new Viewer(views, data.camera, byId('stage'));
   const buttons = data.models.map((model, index) => pickerButton(model, index, () => choose(index)));
   byId('picker').append(...buttons);
@@ -23,12 +28,13 @@ function startViewer() {
   choose(0);
 }
 
+const titleOf = (model) => model.class ? `${model.name} (${model.class})` : model.name;
 const inputOf = (index) => document.querySelector(`[data-model="${index}"] img`).src;
 
 function pickerButton(model, index, choose) {
   const button = document.createElement('button'), image = document.createElement('img');
   button.type = 'button';
-  button.title = image.alt = `${model.name} (${model.class})`;
+  button.title = image.alt = titleOf(model);
   image.src = inputOf(index);
   button.append(image);
   button.addEventListener('click', choose);
@@ -43,8 +49,8 @@ function showModel([prediction, truth], index) {
   truth.canvas.setAttribute('aria-label', `True mesh of ${model.name}; turn it with the arrow keys`);
   byId('viewer-truth-caption').textContent = model.truth ? 'truth' : 'the dataset has no mesh of this model';
   byId('viewer-input').src = inputOf(index);
-  byId('viewer-input').alt = `${model.name}: the image that the network sees`;
-  byId('viewer-name').textContent = `${model.name} (${model.class})`;
+  byId('viewer-input').alt = data.generated ? model.name : `${model.name}: the image that the network sees`;
+  byId('viewer-name').textContent = titleOf(model);
 }
 
 function startCurves() {

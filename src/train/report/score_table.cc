@@ -152,6 +152,11 @@ std::string LightHtml(const Evaluation& evaluation) {
 }  // namespace
 
 std::string ScoresHtml(const ReportFacts& facts) {
+  if (facts.showcase.generated) {
+    return fmt::format("<p>As a set, beside true objects: <code>tilegrad {} --run {}</code>.</p>",
+                       facts.run.config.task->ScoreCommand(),
+                       EscapeHtml(facts.run.folder.string()));
+  }
   if (!facts.evaluation) {
     return fmt::format(
         "<p>There is no evaluation yet: <code>tilegrad eval --run {}</code>, then make this report "

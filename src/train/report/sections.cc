@@ -35,6 +35,7 @@ std::string Comparison(const Evaluation& evaluation) {
 }
 
 std::string EvaluationSentence(const ReportFacts& facts) {
+  if (facts.showcase.generated) return "";
   if (!facts.evaluation) return "There is no evaluation of it yet.";
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
@@ -92,11 +93,11 @@ std::string CommandsHtml(const ReportFacts& facts) {
   const std::string config = Quoted((facts.run.folder / "config.toml").string());
   return EscapeHtml(
       fmt::format("tilegrad train --config {} --data {} --out runs/again\n"
-                  "tilegrad eval --run runs/again\n"
+                  "tilegrad {} --run runs/again\n"
                   "tilegrad report --run runs/again\n"
                   "\n"
                   "tilegrad report --run {} --data {}   # this page",
-                  config, data, run, data));
+                  config, data, facts.run.config.task->ScoreCommand(), run, data));
 }
 
 std::string MachineHtml(const ReportFacts& facts) {
@@ -115,6 +116,7 @@ std::string CreditsHtml(const ReportFacts& facts) {
   std::string out = "<ul>\n";
   for (const auto& credit : facts.showcase.credits) out += "<li>" + EscapeHtml(credit) + "</li>\n";
   for (const Example& shown : facts.showcase.examples) {
+    if (facts.showcase.generated) break;
     out += fmt::format("<li><b>{}</b>, by {}, licence: {}</li>\n", EscapeHtml(shown.name),
                        shown.creator.empty() ? "an unnamed creator" : EscapeHtml(shown.creator),
                        shown.license.empty() ? "not stated" : EscapeHtml(shown.license));

@@ -107,6 +107,7 @@ struct Showcase {
   std::string note;     // sentences: what the pictures are
   std::vector<std::string> credits;
   std::vector<Example> examples;
+  bool generated = false;     // the examples are made from noise: none has an input or a truth
   ImageU8 sheet;              // the examples in one picture, a row each; empty: there is none
   std::string sheet_columns;  // what its columns are
   double fov_y = 40, azimuth = 0, elevation = 20, distance = 2;  // of the view on meshes; degrees
@@ -125,6 +126,8 @@ class Task {
   virtual ConfigFields Fields() = 0;
   // What people read for the names in its log; other names stand for themselves.
   virtual std::vector<TermLabel> Labels() const = 0;
+  // What scores a run of it, as words after "tilegrad" and before "--run".
+  virtual const char* ScoreCommand() const { return "eval"; }
 
   // ---- Training. Start comes first, once, when the fields have their values.
 

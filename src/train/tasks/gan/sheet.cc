@@ -10,6 +10,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kFront = 50, kBehind = 230, kElevation = 20;  // degrees
+constexpr double kNearer = 0.8;                                // than cameras of datasets
 
 }  // namespace
 
@@ -17,7 +18,7 @@ Camera SheetCamera(int size, double azimuth) {
   const CameraRule rule;
   Lens lens = rule.lens;
   lens.width = lens.height = size;
-  return OrbitCamera(lens, kFront + azimuth, kElevation, rule.distance);
+  return OrbitCamera(lens, kFront + azimuth, kElevation, kNearer * rule.distance);
 }
 
 Result<std::vector<ImageU8>> DrawObjects(std::span<const Mesh> meshes, const Camera& camera,

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
+#include "train/data/build/truth_mesh.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
 #include "train/tasks/gan/learner.h"
@@ -22,6 +23,7 @@ class GanTask : public Task {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
   std::vector<TermLabel> Labels() const override;
+  const char* ScoreCommand() const override { return "sample --score"; }
 
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
@@ -160,6 +162,7 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(request.data));
   Showcase out = AboutDataset(dataset, request.header);
   out.purpose = "to make textured objects from noise";
+  out.generated = true;
   out.data += " Critics saw only pictures of the training models, no 3D data.";
   out.note = "Objects of the first latent codes, not picked by hand.";
   auto& model = dynamic_cast<GeneratorModel&>(request.predictor.model());
@@ -175,7 +178,7 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
       const char* const where = azimuth == 0 ? "from the front" : "from behind";
       example.pictures.push_back({std::move(pictures[0]), where, example.name + " " + where});
     }
-    example.prediction = std::move(meshes[0]);
+    example.prediction = MakeTruthMesh(meshes[0], meshes[0].faces.size());
     if (progress)
       progress({"generating", static_cast<std::size_t>(i) + 1,
                 static_cast<std::size_t>(request.examples), ""});

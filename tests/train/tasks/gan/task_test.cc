@@ -208,8 +208,11 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
   ASSERT_TRUE(report.ok()) << report.status().message();
   const std::string text = ReadText(page.out).value();
   for (const char* part :
-       {"to make textured objects from noise", "Wasserstein estimate", "sample 1 from behind"})
+       {"to make textured objects from noise", "Wasserstein estimate", "sample 1 from behind",
+        "Generated meshes to turn", "tilegrad sample --score --run"})
     EXPECT_NE(text.find(part), std::string::npos) << part;
+  for (const char* part : {"Held-out models", "There is no evaluation", "unnamed creator"})
+    EXPECT_EQ(text.find(part), std::string::npos) << part;
 }
 
 TEST_F(GanTaskTest, WhatCannotBeIsAnError) {
