@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/simd_target.h"
+#include "fuzz/numbers.h"
 #include "fuzz/target.h"
 #include "proof/owned_rendering.h"
 #include "raster/extremes/truth.h"
@@ -13,25 +14,6 @@
 
 namespace tilegrad::fuzz {
 namespace {
-
-// Numbers off the front of an input; zeros after its end.
-class Numbers {
- public:
-  explicit Numbers(Input input) : rest_(input) {}
-  template <class T>
-  T Take() {
-    T out{};
-    const std::size_t n = std::min(sizeof(T), rest_.size());
-    std::memcpy(&out, rest_.data(), n);
-    rest_ = rest_.subspan(n);
-    return out;
-  }
-  std::uint32_t Below(std::uint32_t n) { return Take<std::uint8_t>() % n; }
-  bool empty() const { return rest_.empty(); }
-
- private:
-  Input rest_;
-};
 
 // A coordinate: mostly of the image, at steps of 1/256 pixel; else any float.
 float Coordinate(Numbers* in, int size) {

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "fuzz/target.h"
+
+namespace tilegrad::fuzz {
+
+// Numbers off the front of an input; zeros after its end.
+class Numbers {
+ public:
+  explicit Numbers(Input input) : rest_(input) {}
+  template <class T>
+  T Take() {
+    T out{};
+    const std::size_t n = std::min(sizeof(T), rest_.size());
+    std::memcpy(&out, rest_.data(), n);
+    rest_ = rest_.subspan(n);
+    return out;
+  }
+  std::uint32_t Below(std::uint32_t n) { return Take<std::uint8_t>() % n; }
+  bool empty() const { return rest_.empty(); }
+
+ private:
+  Input rest_;
+};
+
+}  // namespace tilegrad::fuzz
