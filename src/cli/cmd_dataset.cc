@@ -14,6 +14,7 @@
 #include "cli/dataset_source.h"
 #include "cli/mesh_options.h"
 #include "cli/option_checks.h"
+#include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/data/build/build.h"
 #include "train/data/few_models.h"
@@ -141,18 +142,30 @@ void PrintJson(const train::BuildSummary& summary, const Path& folder) {
                {"bytes", summary.bytes}});
 }
 
+Result<std::unique_ptr<train::ModelSource>> Open(const DatasetOptions& options, const Path& folder,
+                                                 const Ranks& ranks) {
+  if (!ranks.follows()) TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
+  TILEGRAD_TRY(CheckEffects(options));
+  return OpenDatasetSource(RequestOf(options));
+}
+
 Status Make(const DatasetOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const Path folder = options.out.empty() ? Path("datasets") / options.Name() : Path(options.out);
-  TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
-  TILEGRAD_TRY(CheckEffects(options));
-  TILEGRAD_ASSIGN(const auto source, OpenDatasetSource(RequestOf(options)));
-  const Workers workers(options.workers);
+  Ranks ranks;
+  TILEGRAD_TRY(ranks.Join());
+  auto source = Open(options, folder, ranks);
+  const Status ready = ranks.Agree(source.status());
+  if (!ready.ok()) return ranks.Told(ready);
+  train::BuildOptions build = options.build;
+  build.crew = ranks.crew();
+  const Workers workers(ranks.Workers(options.workers));
   ProgressLine line;
-  TILEGRAD_ASSIGN(
-      const train::BuildSummary summary,
-      train::BuildDataset(*source, options.build, folder, workers, line.Sink(), StopOnSignals()));
+  auto made = train::BuildDataset(**source, build, folder, workers,
+                                  ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
   line.Finish();
+  if (!made.ok() || ranks.follows()) return ranks.Told(made.status());
+  const train::BuildSummary summary = std::move(*made);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   PrintTable(summary);
   PrintRejected(summary, folder);

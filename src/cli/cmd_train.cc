@@ -8,9 +8,9 @@
 #include "cli/console.h"
 #include "cli/live_server.h"
 #include "cli/option_checks.h"
+#include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/named_configs.h"
-#include "train/ranks/launch.h"
 #include "train/trainer.h"
 
 namespace tilegrad::cli {
@@ -78,20 +78,6 @@ Status Complete(TrainOptions* options) {
   return {};
 }
 
-// The ranks that mpirun started; neither without it.
-struct Ranks {
-  std::unique_ptr<train::Transport> transport;
-  std::optional<train::Crew> crew;
-  bool follows() const { return crew && !crew->leads(); }
-};
-
-Status JoinRanks(Ranks* out) {
-  if (train::LaunchedRanks() == 1) return {};
-  TILEGRAD_ASSIGN(out->transport, train::ConnectRanks());
-  if (out->transport->size() > 1) out->crew.emplace(*out->transport);
-  return {};
-}
-
 Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   TILEGRAD_TRY(Complete(options));
   TILEGRAD_ASSIGN(job->config, train::FindConfig(options->config));
@@ -108,41 +94,27 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   return {};
 }
 
-// Followers wait for a step that will not come: the message, then the end of all.
-void EndBrokenCrew(const Status& status, Ranks* ranks) {
-  if (!ranks->crew || !ranks->crew->broken()) return;
-  PrintNote("tilegrad: {}\n", status.message());
-  std::fflush(nullptr);
-  ranks->transport->Abort(ExitCode(status.code()));
-}
-
 Status RunTraining(TrainOptions options) {
   Ranks ranks;
-  TILEGRAD_TRY(JoinRanks(&ranks));
+  TILEGRAD_TRY(ranks.Join());
   train::TrainJob job;
   Status ready = MakeJob(&options, &job);
   if (ready.ok() && !ranks.follows())
     ready = CheckRunFolder(options.out, OutputGuard(options.force));
-  if (ranks.crew) ready = ranks.crew->Agree(ready, {});
-  // Rank 0 has said why.
-  if (!ready.ok()) return ranks.follows() ? Status() : ready;
-  job.crew = ranks.crew ? &*ranks.crew : nullptr;
-  const Workers workers(options.workers == 0 && ranks.crew ? train::WorkersOfRank()
-                                                           : options.workers);
-  if (ranks.follows()) {
-    (void)train::Train(job, workers, nullptr, StopOnSignals());
-    return {};
-  }
+  ready = ranks.Agree(ready);
+  if (!ready.ok()) return ranks.Told(ready);
+  job.crew = ranks.crew();
+  const Workers workers(ranks.Workers(options.workers));
+  if (ranks.follows())
+    return ranks.Told(train::Train(job, workers, nullptr, StopOnSignals()).status());
   TILEGRAD_ASSIGN(const auto live,
                   StartLive(options.live, {options.out, options.data, job.config.schedule.steps}));
   ProgressLine line;
   job.warn = line.Warnings();
   auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
-  if (!outcome.ok()) {
-    EndBrokenCrew(outcome.status(), &ranks);
-    return outcome.status();
-  }
+  ranks.EndIfBroken(outcome.status());
+  if (!outcome.ok()) return outcome.status();
   PrintOutcome(*outcome, options, job.config.task->ScoreCommand());
   PrintJson(*outcome, options);
   return {};

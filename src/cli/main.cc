@@ -70,12 +70,13 @@ Status CheckValues(const CLI::App& app) {
   return {};
 }
 
-// Commands but training know nothing of other processes, which would write the same files.
+// Other commands know nothing of other processes, which would write the same files.
 Status CheckRanks(const CLI::App& app) {
-  if (train::LaunchedRanks() == 1 || app.got_subcommand("train")) return {};
+  if (train::LaunchedRanks() == 1) return {};
+  if (app.got_subcommand("train") || app.got_subcommand("dataset")) return {};
   return InvalidArgument(
-      "started as one of {} processes, but among the commands train alone shares its work with "
-      "others: start this one without mpirun",
+      "started as one of {} processes, but among the commands only train and dataset share their "
+      "work with others: start this one without mpirun",
       train::LaunchedRanks());
 }
 

@@ -149,21 +149,14 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
   const auto start = [&] { return training.Start(context, progress, stop); };
   if (job.crew) {
     TILEGRAD_TRY(StartTogether(plan, job, workers, &training, start));
-    if (!job.crew->leads()) {
-      const RunOutcome outcome = training.Follow(context);
-      job.crew->Disband();
-      return outcome;
-    }
+    if (!job.crew->leads()) return training.Follow(context);
   } else {
     TILEGRAD_TRY(CheckExistingRun(plan, training));
     TILEGRAD_TRY(start());
   }
   plan.image_size = config.task->image_size();
   auto outcome = ExecuteRun(plan, &training, context, progress, stop);
-  if (job.crew && !job.crew->broken()) {
-    job.crew->Order(kEnd);
-    job.crew->Disband();
-  }
+  if (job.crew && !job.crew->broken()) job.crew->Order(kEnd);
   return outcome;
 }
 

@@ -87,7 +87,7 @@ const std::map<std::string, std::set<std::string>> kMayIncludeInTrain = {
     {"metrics", {}},
     {"ranks", {}},
     {"run", {}},  // knows no task, no loss and no data
-    {"data", {"metrics", "run"}},
+    {"data", {"metrics", "ranks", "run"}},
     {"models", {}},
     {"eval", {"metrics", "data", "run"}},
     {"tasks", {"eval", "models", "losses", "ops", "metrics", "data", "run"}},

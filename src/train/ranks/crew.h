@@ -49,7 +49,7 @@ class Crew {
   void Break() { broken_ = true; }
   bool broken() const { return broken_; }
 
-  // Every rank calls it at the end of a run that ended without an alarm.
+  // Every rank calls it at the end, unless it is broken.
   void Disband();
 
  private:

@@ -329,6 +329,29 @@ TEST_F(Ranks, AStepThatFailsIsSaidOnce) {
   ExpectRefused(words, 1, "a smaller optimizer.learning_rate may help");
 }
 
+TEST_F(Ranks, MakeADatasetOfTheSameBytes) {
+  const auto words = [&](const char* out) {
+    return Words{TILEGRAD_PROGRAM, "dataset", "--source", "procedural",
+                 "--limit",        "7",       "--size",   "32",
+                 "--threads",      "1",       "--out",    (folder_ / out).string()};
+  };
+  ASSERT_EQ(Do(words("one")).code, 0);
+  const Ended ended = Do(OnRanks(3, words("three")));
+  ASSERT_EQ(ended.code, 0) << ended.output;
+  EXPECT_NE(ended.output.find("(0 model files kept from earlier)"), std::string::npos)
+      << ended.output;
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "one")) {
+    if (!entry.is_regular_file()) continue;
+    ++files;
+    const Path other = folder_ / "three" / std::filesystem::relative(entry.path(), folder_ / "one");
+    const auto want = ReadFile(entry.path()), got = ReadFile(other);
+    ASSERT_TRUE(want.ok() && got.ok()) << other;
+    EXPECT_EQ(*want, *got) << other;
+  }
+  EXPECT_GT(files, 9u);
+}
+
 TEST_F(Ranks, OtherCommandsAreRefused) {
   const Ended ended = Do(OnRanks(2, {TILEGRAD_PROGRAM, "configs"}));
   EXPECT_EQ(ended.code, 2);

@@ -9,10 +9,12 @@
 
 #include "base/error.h"
 #include "base/folder_lock.h"
+#include "base/hash.h"
 #include "base/temporary_file.h"
 #include "train/data/build/choose.h"
 #include "train/data/build/contact_sheet.h"
 #include "train/data/build/make_model.h"
+#include "train/ranks/messages.h"
 
 namespace tilegrad::train {
 namespace {
@@ -60,12 +62,11 @@ class Builder {
 
   Result<BuildSummary> Run() {
     if (chosen_.empty()) return NotFound("the source \"{}\" holds no models", source_.name());
-    TILEGRAD_TRY(Prepare());
-    TILEGRAD_TRY(ForEachModel("checking", [&](std::size_t i, std::size_t) { Reuse(i); }));
-    const auto reused = std::count_if(outcomes_.begin(), outcomes_.end(),
-                                      [](const Outcome& o) { return o.stamp.has_value(); });
-    if (reused < static_cast<std::ptrdiff_t>(chosen_.size())) TILEGRAD_TRY(MakeMissing());
-    summary_.reused = static_cast<int>(reused);
+    Crew* const crew = options_.crew;
+    TILEGRAD_TRY(crew ? MakeTogether(*crew) : Prepare());
+    if (crew && !crew->leads()) return std::move(summary_);
+    // What other ranks made is there as if an earlier run had made it.
+    TILEGRAD_TRY(MakeShare({0, 1}));
     return Finish();
   }
 
@@ -73,6 +74,46 @@ class Builder {
   const SourceEntry& entry(std::size_t i) const { return source_.entries()[chosen_[i]]; }
   Path FileOf(std::size_t i) const {
     return ModelFilePath(folder_, entry(i).class_name, entry(i).id);
+  }
+
+  // The models that this process makes: every `of`th, beginning with `first`.
+  struct Share {
+    std::size_t first, of;
+    bool Has(std::size_t i) const { return i % of == first; }
+  };
+
+  Status MakeShare(const Share& share) {
+    std::atomic<int> reused = 0;
+    std::atomic<bool> missing = false;
+    TILEGRAD_TRY(ForEachModel("checking", [&](std::size_t i, std::size_t) {
+      if (!share.Has(i) || outcomes_[i].stamp) return;
+      Reuse(i);
+      if (outcomes_[i].stamp)
+        ++reused;
+      else
+        missing = true;
+    }));
+    if (missing) TILEGRAD_TRY(MakeMissing(share));
+    if (!options_.crew || share.of > 1) summary_.reused = reused;
+    return {};
+  }
+
+  Status MakeTogether(Crew& crew) {
+    const auto rank = static_cast<std::size_t>(crew.ranks().rank()),
+               ranks = static_cast<std::size_t>(crew.ranks().size());
+    Hash models;
+    for (const std::size_t i : chosen_) models.Add(source_.entries()[i].id);
+    const Status ready = crew.leads() ? Prepare() : Status();
+    TILEGRAD_TRY(crew.Agree(ready, {{"recipe", info_.recipe, "give all the same options"},
+                                    {"list of models", models.Text(),
+                                     "the source must hold the same files everywhere"}}));
+    const Status made = MakeShare({rank, ranks});
+    TILEGRAD_TRY(crew.Agree(made, {}));
+    int reused = 0;
+    for (const std::string& count : GatherTexts(crew.ranks(), std::to_string(summary_.reused)))
+      reused += std::stoi(count);
+    summary_.reused = reused;
+    return {};
   }
 
   Status Prepare() {
@@ -107,13 +148,14 @@ class Builder {
     failed_ = true;
   }
 
-  Status MakeMissing() {
+  Status MakeMissing(const Share& share) {
     // The list stands for a complete set, which this no longer is.
     std::error_code error;
     std::filesystem::remove(ModelsPath(folder_), error);
     std::vector<LitRenderer> renderers(static_cast<std::size_t>(workers_.count()));
     TILEGRAD_TRY(ForEachModel("rendering", [&](std::size_t i, std::size_t worker) {
-      if (!outcomes_[i].stamp) Make(i, renderers[worker]);
+      const bool done = outcomes_[i].stamp || !outcomes_[i].failure.ok();
+      if (share.Has(i) && !done) Make(i, renderers[worker]);
     }));
     return {};
   }

@@ -12,6 +12,7 @@
 #include "train/data/dataset_files.h"
 #include "train/data/sources/model_source.h"
 #include "train/data/split.h"
+#include "train/ranks/crew.h"
 
 namespace tilegrad::train {
 
@@ -24,6 +25,9 @@ struct BuildOptions {
   int liveries = 0;   // at most that many models of a shape, chosen in the same way; 0: all
   int limit = 0;      // at most that many in all; 0: all
   UpAxis up = UpAxis::kY;  // of the source's meshes
+  // Ranks that make the dataset together, in one folder that all of them see; null: this process
+  // alone.
+  Crew* crew = nullptr;
 };
 
 // What was left out of a model that is used all the same.
@@ -43,9 +47,11 @@ struct BuildSummary {
 
 // Fills `folder` (dataset.h says with what). Model files that are there, readable and of the same
 // recipe are kept, so an interrupted run goes on where it stopped and gives the same bytes as one
-// that was not interrupted; so does any number of workers. Models that fail are listed in
+// that was not interrupted; so does any number of workers and ranks. Models that fail are listed in
 // rejected.jsonl and left out. `stop` ends the run between models with kCancelled. Errors: a folder
-// that holds a dataset of another recipe, options out of range, no usable model, a full disk.
+// that holds a dataset of another recipe, options out of range, no usable model, a full disk. With
+// a crew every rank calls it and rank 0 gets the summary, but for warnings of models that others
+// read.
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,
                                   const Path& folder, const Workers& workers,
                                   const ProgressSink& progress, const StopFlag& stop);

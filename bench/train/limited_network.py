@@ -1,0 +1,120 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Training over a slow network, on one machine: each rank in a network namespace of its own, behind a link of limited
+bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md says it should. As root, with Open MPI:
+
+    bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4]
+
+The model is given nothing of these runs but what one rank needs for a step alone, the gradients' number and the bandwidth.
+"""
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import tempfile
+
+from scaling_model import step_time
+
+
+def sh(*words):
+    subprocess.run(words, check=True, capture_output=True)
+
+
+def address(rank):
+    return f"10.97.0.{rank + 1}"
+
+
+class Network:
+    """Namespaces tg0, tg1, .. on one bridge; all that a rank sends goes through a filter of `gbits`, None: none."""
+
+    def __init__(self, ranks, gbits):
+        self.ranks, self.gbits = ranks, gbits
+
+    def __enter__(self):
+        self.__exit__()
+        sh("ip", "link", "add", "tgbridge", "type", "bridge")
+        sh("ip", "link", "set", "tgbridge", "up")
+        for rank in range(self.ranks):
+            self.add(rank)
+        return self
+
+    def add(self, rank):
+        space, outer, inner = f"tg{rank}", f"tgo{rank}", f"tgi{rank}"
+        sh("ip", "netns", "add", space)
+        sh("ip", "link", "add", outer, "type", "veth", "peer", "name", inner, "netns", space)
+        sh("ip", "link", "set", outer, "master", "tgbridge", "up")
+        sh("ip", "-n", space, "addr", "add", f"{address(rank)}/24", "dev", inner)
+        for link in (inner, "lo"):
+            sh("ip", "-n", space, "link", "set", link, "up")
+        if self.gbits:
+            sh("ip", "netns", "exec", space, "tc", "qdisc", "add", "dev", inner, "root", "tbf", "rate",
+               f"{self.gbits}gbit", "burst", "256kb", "latency", "200ms")
+
+    def __exit__(self, *_):
+        for rank in range(self.ranks):
+            subprocess.run(["ip", "netns", "del", f"tg{rank}"], capture_output=True, check=False)
+        subprocess.run(["ip", "link", "del", "tgbridge"], capture_output=True, check=False)
+
+
+def agent(folder):
+    """What mpirun calls instead of ssh: the namespace of an address."""
+    path = pathlib.Path(folder) / "agent"
+    path.write_text('#!/bin/sh\nhost=$1; shift; exec ip netns exec tg$((${host##*.} - 1)) sh -c "$*"\n')
+    path.chmod(0o755)
+    return str(path)
+
+
+def launcher(ranks, folder):
+    if ranks == 1:
+        return []
+    options = {"plm_rsh_agent": agent(folder), "plm_rsh_no_tree_spawn": "1", "btl": "tcp,self",
+               "oob_tcp_if_include": "10.97.0.0/24", "btl_tcp_if_include": "10.97.0.0/24"}
+    words = ["ip", "netns", "exec", "tg0", "mpirun", "--allow-run-as-root", "--bind-to", "none", "-n", str(ranks), "--host",
+             ",".join(f"{address(rank)}:1" for rank in range(ranks))]
+    for name, value in options.items():
+        words += ["--mca", name, value]
+    return words
+
+
+def median_step(args, ranks, folder):
+    """Seconds of a step, the share of waiting, and how many numbers are trained."""
+    run = pathlib.Path(folder) / "run"
+    subprocess.run(["rm", "-rf", str(run)], check=True)
+    words = launcher(ranks, folder) + [args.program, "train", "--config", args.config, "--data", args.data, "--out", str(run),
+                                       "--threads", "1", "--quiet", "--steps", str(args.steps)]
+    for setting in [f"portions={args.portions}", "log_every=1", "sample_every=1000000", "checkpoint_every=1000000"]:
+        words += ["--set", f"schedule.{setting}"]
+    done = subprocess.run(words, capture_output=True, text=True, env=dict(os.environ), check=False)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    steps = [b["seconds"] - a["seconds"] for a, b in zip(lines[2:], lines[3:])]
+    waits = [line.get("wait_share", 0) for line in lines[3:]]
+    numbers = json.loads((run / "run.json").read_text())["parameters"]
+    return statistics.median(steps), statistics.median(waits), numbers
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("program", "config", "data"):
+        parser.add_argument(name)
+    parser.add_argument("--ranks", type=int, default=2)
+    parser.add_argument("--portions", type=int, default=4)
+    parser.add_argument("--steps", type=int, default=20)
+    parser.add_argument("--gbits", type=float, nargs="+", default=[0.5, 1, 4])
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        alone, _, numbers = median_step(args, 1, folder)
+        print(f"one rank: {alone * 1e3:.1f} ms a step, {numbers} numbers")
+        for gbits in args.gbits:
+            with Network(args.ranks, gbits):
+                step, wait, _ = median_step(args, args.ranks, folder)
+            model = step_time(args.ranks, alone, 0, numbers, gbits, args.portions)
+            print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, waiting {wait * 100:.0f} %; "
+                  f"the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/ranks.h"
+
+#include "base/error.h"
+#include "cli/console.h"
+
+namespace tilegrad::cli {
+
+Status Ranks::Join() {
+  if (train::LaunchedRanks() == 1) return {};
+  TILEGRAD_ASSIGN(transport_, train::ConnectRanks());
+  if (transport_->size() > 1) crew_.emplace(*transport_);
+  return {};
+}
+
+Ranks::~Ranks() {
+  if (crew_ && !crew_->broken()) crew_->Disband();
+}
+
+void Ranks::EndIfBroken(const Status& status) {
+  if (status.ok() || !crew_ || !crew_->broken()) return;
+  PrintNote("tilegrad: {}\n", status.message());
+  std::fflush(nullptr);
+  transport_->Abort(ExitCode(status.code()));
+}
+
+}  // namespace tilegrad::cli
