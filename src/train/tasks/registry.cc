@@ -16,9 +16,9 @@ namespace {
 std::map<std::string, TaskFactory>& Factories() {
   static std::map<std::string, TaskFactory> factories = {{kDefaultTask, &MakeSingleImageTask},
                                                          {"textured_image", &MakeTexturedImageTask},
-                                                          {"photographs", &MakePhotographsTask},
-                                                          {"classify", &MakeClassifyTask},
-                                                          {"gan", &MakeGanTask}};
+                                                         {"photographs", &MakePhotographsTask},
+                                                         {"classify", &MakeClassifyTask},
+                                                         {"gan", &MakeGanTask}};
   return factories;
 }
 
