@@ -5,7 +5,8 @@ bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md 
 
     bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4]
 
-The model is given nothing of these runs but what one rank needs for a step alone, the gradients' number and the bandwidth.
+The model is given what a step takes without a limit, on as many ranks (so that what else the machine does, and its number of
+cores, count on both sides), the gradients' number and the bandwidth.
 """
 import argparse
 import json
@@ -50,10 +51,12 @@ class Network:
             sh("ip", "-n", space, "link", "set", link, "up")
         if self.gbits:
             sh("ip", "netns", "exec", space, "tc", "qdisc", "add", "dev", inner, "root", "tbf", "rate",
-               f"{self.gbits}gbit", "burst", "256kb", "latency", "200ms")
+               f"{self.gbits}gbit", "burst", "256kb", "latency", "15ms")
 
     def __exit__(self, *_):
         for rank in range(self.ranks):
+            # The link first: a namespace may live on for a moment, and would keep it.
+            subprocess.run(["ip", "link", "del", f"tgo{rank}"], capture_output=True, check=False)
             subprocess.run(["ip", "netns", "del", f"tg{rank}"], capture_output=True, check=False)
         subprocess.run(["ip", "link", "del", "tgbridge"], capture_output=True, check=False)
 
@@ -71,7 +74,7 @@ def launcher(ranks, folder):
         return []
     options = {"plm_rsh_agent": agent(folder), "plm_rsh_no_tree_spawn": "1", "btl": "tcp,self",
                "oob_tcp_if_include": "10.97.0.0/24", "btl_tcp_if_include": "10.97.0.0/24"}
-    words = ["ip", "netns", "exec", "tg0", "mpirun", "--allow-run-as-root", "--bind-to", "none", "-n", str(ranks), "--host",
+    words = ["ip", "netns", "exec", "tg0", "mpirun", "--allow-run-as-root", "--leave-session-attached", "--bind-to", "none", "-n", str(ranks), "--host",
              ",".join(f"{address(rank)}:1" for rank in range(ranks))]
     for name, value in options.items():
         words += ["--mca", name, value]
@@ -106,12 +109,15 @@ def main():
     parser.add_argument("--gbits", type=float, nargs="+", default=[0.5, 1, 4])
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        alone, _, numbers = median_step(args, 1, folder)
-        print(f"one rank: {alone * 1e3:.1f} ms a step, {numbers} numbers")
+        with Network(args.ranks, None):
+            free, wait, numbers = median_step(args, args.ranks, folder)
+        print(f"{args.ranks} ranks, no limit: {free * 1e3:.1f} ms a step, waiting {wait * 100:.0f} %, {numbers} numbers")
         for gbits in args.gbits:
             with Network(args.ranks, gbits):
                 step, wait, _ = median_step(args, args.ranks, folder)
-            model = step_time(args.ranks, alone, 0, numbers, gbits, args.portions)
+            # All computing of the batch, as if by one rank as slow as these are.
+            compute = free * args.ranks
+            model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions)
             print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, waiting {wait * 100:.0f} %; "
                   f"the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})")
 

@@ -10,7 +10,7 @@ of the batch that COMPUTE is of.
 """
 import argparse
 
-BUCKET = 1 << 20  # numbers, as in src/train/ranks/gradient_sums.h
+BUCKET = 1 << 18  # numbers, as in src/train/ranks/gradient_sums.h
 BACKWARD = 0.6  # share of a portion's time in which sums may travel
 
 

@@ -3,6 +3,7 @@
 // themselves.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -17,22 +18,28 @@ struct Range {
 class BucketLayout {
  public:
   // The last parameter comes first: a backward pass is done with it first. `tail` numbers stand
-  // behind all. A bucket ends once it has `bucket` numbers.
+  // behind all. Buckets have `bucket` numbers, the last one what is left: a large parameter lies in
+  // several, so that its sum need not wait for all of it.
   void Reset(std::span<const std::size_t> sizes, std::size_t tail, std::size_t bucket);
 
   std::size_t total() const { return tail_.end; }
   Range parameter(std::size_t i) const { return parameters_[i]; }
   Range tail() const { return tail_; }
-  std::size_t buckets() const { return buckets_.size(); }
-  Range bucket(std::size_t b) const { return buckets_[b]; }
-  std::size_t BucketOf(std::size_t parameter) const { return bucket_of_[parameter]; }
-  // How many parameters a bucket has, the tail counted as one.
+  std::size_t buckets() const { return parts_.size(); }
+  Range bucket(std::size_t b) const { return {b * bucket_, std::min((b + 1) * bucket_, total())}; }
+  // Those that hold some of a parameter, or of the tail.
+  Range BucketsOf(const Range& part) const {
+    if (part.size() == 0) return {};
+    return {part.begin / bucket_, (part.end - 1) / bucket_ + 1};
+  }
+  // How many of these a bucket holds.
   std::size_t parts(std::size_t b) const { return parts_[b]; }
 
  private:
-  std::vector<Range> parameters_, buckets_;
-  std::vector<std::size_t> bucket_of_, parts_;
+  std::vector<Range> parameters_;
+  std::vector<std::size_t> parts_;
   Range tail_;
+  std::size_t bucket_ = 1;
 };
 
 // The share of a bucket that a rank finishes the sum of.

@@ -95,7 +95,7 @@ void GradientSums::Ready(std::size_t i, const nn::Gradient& gradient) {
   const nn::Var value = gradient.Value();
   if (!value.valid()) return;  // the context knows why
   Add(value.value().data<float>(), layout_.parameter(i));
-  PartIsReady(layout_.BucketOf(i));
+  PartIsReady(layout_.parameter(i));
 }
 
 // The portion's numbers, and those of its left neighbours in the tree, to the place of their sum.
@@ -117,9 +117,12 @@ void GradientSums::Add(const float* from, const Range& range) {
                                });
 }
 
-void GradientSums::PartIsReady(std::size_t bucket) {
-  if (IsLastPortion() && ++ready_[bucket] == layout_.parts(bucket) && exchange_)
-    exchange_->Start(bucket);
+void GradientSums::PartIsReady(const Range& part) {
+  if (!IsLastPortion() || !exchange_) return;
+  const Range held = layout_.BucketsOf(part);
+  for (std::size_t b = held.begin; b < held.end; ++b) {
+    if (++ready_[b] == layout_.parts(b)) exchange_->Start(b);
+  }
 }
 
 void GradientSums::EndPortion(std::span<const nn::Gradient> gradients) {
@@ -129,7 +132,7 @@ void GradientSums::EndPortion(std::span<const nn::Gradient> gradients) {
   }
   CopyStatistics(after_.data());
   Add(after_.data(), layout_.tail());
-  PartIsReady(layout_.buckets() - 1);
+  PartIsReady(layout_.tail());
 }
 
 bool GradientSums::Finish(const std::function<bool()>& meanwhile) {

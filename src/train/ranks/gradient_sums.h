@@ -22,7 +22,7 @@ class GradientSums : public nn::GradientListener {
   struct Shape {
     std::int64_t portions = 1;
     Transport* ranks = nullptr;                 // null: all portions are of this process
-    std::size_t bucket = std::size_t{1} << 20;  // numbers that travel together
+    std::size_t bucket = std::size_t{1} << 18;  // numbers that travel together
   };
   // `statistics` are changed by each portion (nn::Buffers); all tensors are of kF32.
   GradientSums(nn::Context& context, const Shape& shape, std::vector<nn::NamedTensor> statistics);
@@ -50,7 +50,7 @@ class GradientSums : public nn::GradientListener {
   template <class Things>
   void LayOut(const Things& things);
   void Add(const float* from, const Range& range);
-  void PartIsReady(std::size_t bucket);
+  void PartIsReady(const Range& part);
   void TakeTotals();
   bool IsLastPortion() const { return at_ + 1 == portions_.size(); }
   void CopyStatistics(float* to);
