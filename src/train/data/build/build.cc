@@ -282,23 +282,6 @@ class Builder {
   BuildSummary summary_;
 };
 
-Status CheckRange(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return {};
-  return InvalidArgument("{} must be in [{}, {}], got {}", name, low, high, value);
-}
-
-Status CheckOptions(const BuildOptions& options) {
-  TILEGRAD_TRY(CheckRange("the image size", options.image_size, 8, 1024));
-  TILEGRAD_TRY(CheckRange("the number of views", options.views, 1, 1024));
-  TILEGRAD_TRY(CheckRange("the number per class", options.per_class, 0, INT32_MAX));
-  TILEGRAD_TRY(CheckRange("the number of liveries", options.liveries, 0, INT32_MAX));
-  TILEGRAD_TRY(CheckRange("the limit", options.limit, 0, INT32_MAX));
-  TILEGRAD_TRY(CheckRange("the test share", options.split.test_share, 0, 0.9));
-  TILEGRAD_TRY(CheckRange("the validation share", options.split.validation_share, 0, 0.9));
-  return CheckRange("the sum of the test and validation shares",
-                    options.split.test_share + options.split.validation_share, 0, 0.95);
-}
-
 }  // namespace
 
 Result<BuildSummary> BuildDataset(const ModelSource& source, const BuildOptions& options,

@@ -14,4 +14,7 @@ namespace tilegrad::train {
 std::vector<std::size_t> ChooseEntries(const std::vector<SourceEntry>& entries,
                                        const BuildOptions& options);
 
+// InvalidArgument names an option out of its range.
+Status CheckOptions(const BuildOptions& options);
+
 }  // namespace tilegrad::train
