@@ -15,7 +15,7 @@ struct GanCriticConfig {
   std::int64_t updates = 1;              // in each step
   double penalty = 10;                   // lambda_gp, at interpolates
   double learning_rate = 1e-3;
-  double texture_weight = 1;  // of D_t beside D_I; 0: no D_t
+  double texture_weight = 0.25;  // of D_t beside D_I; 0: no D_t
 };
 
 // Regularisers of generated shapes; nothing of the kind in the paper's section 5.5.
@@ -32,7 +32,7 @@ struct GanConfig {
   GeneratorConfig network;
   GanCriticConfig critic;
   GanShapeLoss loss;
-  std::int64_t shape_steps = 3000;  // of the run; then shapes are frozen, and textures learn
+  std::int64_t shape_steps = 3500;  // of the run; then shapes are frozen, and textures learn
   std::string start;                // a run, or checkpoint, whose shapes this one starts with
   GanTextureSource textures;
   RenderConfig render;  // of it `sharpness` and `max_alpha_error`

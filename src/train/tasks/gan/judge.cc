@@ -10,7 +10,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::int64_t kAtOnce = 16;  // objects
+constexpr std::int64_t kAtOnce = 16;     // objects
+constexpr std::int64_t kColorCells = 4;  // to a plane: Frechet distances of wide rows take long
 constexpr double kLeastDeviation = 0.05;
 constexpr int kFirstLevel = 3;  // of the classifier: what lies before compares little but pixels
 
@@ -46,12 +47,12 @@ Result<Judge> Judge::Make(nn::Context& context, const Path& run) {
 
 std::string Judge::name() const {
   return network_ ? "the levels of a classifier"
-                  : "mean and deviation of colours in 8 x 8 cells of each view";
+                  : "mean and deviation of colours in 4 x 4 cells of each view";
 }
 
 Result<FeatureRows> Judge::Pictures(const ObjectViews& set) const {
   if (network_) return Levels(set);
-  return ColorFeatures(set);
+  return ColorFeatures(set, kColorCells);
 }
 
 Result<FeatureRows> Judge::Levels(const ObjectViews& set) const {

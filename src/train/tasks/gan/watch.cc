@@ -10,8 +10,6 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::int64_t kCells = 8;  // along each side of a plane
-
 // As floats, whatever the tensor's type is.
 std::vector<float> Numbers(const nn::Tensor& tensor) {
   std::vector<float> out;
@@ -43,9 +41,9 @@ struct Cell {
 };
 
 // Of each object the means of its cells, and then their deviations.
-FeatureRows CellsOf(const nn::Tensor& planes, bool deviations) {
+FeatureRows CellsOf(const nn::Tensor& planes, std::int64_t cells_a_side, bool deviations) {
   const nn::Shape& shape = planes.shape();
-  const std::int64_t side = std::min(kCells, shape[3]);
+  const std::int64_t side = std::min(cells_a_side, shape[3]);
   const auto objects = static_cast<std::size_t>(shape[0]);
   const auto count = static_cast<std::size_t>(shape[1] * side * side);
   const std::vector<float> numbers = Numbers(planes);
@@ -121,8 +119,10 @@ Spread SpreadOf(const ObjectViews& set, const Workers& workers) {
   return out;
 }
 
-FeatureRows CoverFeatures(const ObjectViews& set) { return CellsOf(set.cover, false); }
-FeatureRows ColorFeatures(const ObjectViews& set) { return CellsOf(set.colors, true); }
+FeatureRows CoverFeatures(const ObjectViews& set) { return CellsOf(set.cover, kCells, false); }
+FeatureRows ColorFeatures(const ObjectViews& set, std::int64_t cells) {
+  return CellsOf(set.colors, cells, true);
+}
 
 GanWatch::GanWatch(ObjectViews truth, const Workers& workers)
     : workers_(workers),

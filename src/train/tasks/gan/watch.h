@@ -16,10 +16,11 @@ struct Spread {
 };
 Spread SpreadOf(const ObjectViews& set, const Workers& workers);
 
-// Each view's planes averaged over cells, 8 x 8 to a plane; of colours also their deviation within
-// each cell, or a blurred texture would be as good as a crisp one.
+inline constexpr std::int64_t kCells = 8;
+// Each view's planes averaged over cells, cells x cells to a plane; of colours also their deviation
+// within each cell, or a blurred texture would be as good as a crisp one.
 FeatureRows CoverFeatures(const ObjectViews& set);
-FeatureRows ColorFeatures(const ObjectViews& set);
+FeatureRows ColorFeatures(const ObjectViews& set, std::int64_t cells = kCells);
 
 // What is watched. `distance`: the kernel distance of the features, times 1000, where less is
 // better; 0 of sets that are alike. The others as shares of the true pictures' spread.
