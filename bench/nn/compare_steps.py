@@ -22,7 +22,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # network: (counted steps, goal of ours / PyTorch on one core, on two)
 NETWORKS = {"reconstruction": (9, 0.70, 0.62), "unet": (3, 0.77, None), "critic": (9, 0.62, None),
-            "adversarial": (21, 0.60, None)}
+            "adversarial": (21, 0.60, None), "gan": (21, 0.60, None)}
 WARM_UP = 2
 
 

@@ -74,14 +74,15 @@ class Painter(nn.Module):
 
 
 class Judge(nn.Module):
-    def __init__(self, batch=32, base=64):
+    def __init__(self, batch=32, base=64, channels=3, size=(64, 64), border="zeros"):
         super().__init__()
-        c = [3] + [base << i for i in range(4)]
+        c = [channels] + [base << i for i in range(4)]
         layers = []
         for i in range(4):
-            layers += [nn.Conv2d(c[i], c[i + 1], 4, stride=2, padding=1), nn.LeakyReLU(0.2)]
-        self.net = nn.Sequential(*layers, nn.Conv2d(c[-1], 1, 3, padding=1))
-        self.real, self.fake = torch.rand(batch, 3, 64, 64), torch.rand(batch, 3, 64, 64)
+            layers += [nn.Conv2d(c[i], c[i + 1], 4, stride=2, padding=1, padding_mode=border),
+                       nn.LeakyReLU(0.2)]
+        self.net = nn.Sequential(*layers, nn.Conv2d(c[-1], 1, 3, padding=1, padding_mode=border))
+        self.real, self.fake = (torch.rand(batch, channels, *size) for _ in range(2))
 
     def penalty(self, x):
         x = x.detach().requires_grad_()
@@ -95,8 +96,28 @@ class Judge(nn.Module):
                 10 * self.penalty(0.5 * self.real + 0.5 * self.fake))
 
 
+class Forger(nn.Module):
+    def __init__(self):
+        super().__init__()
+        self.pictures = Judge(16, 24, channels=18)
+        self.maps = Judge(16, 24, size=(128, 64), border="replicate")
+        self.fc = nn.Linear(64, 128 * 8 * 4)
+        layers = []
+        for level in range(4):
+            c, last = 128 >> level, level == 3
+            layers += [nn.Upsample(scale_factor=2),
+                       nn.Conv2d(c, 3 if last else c // 2, 3, padding=1, bias=last)]
+            layers += [nn.Sigmoid()] if last else [nn.BatchNorm2d(c // 2), nn.LeakyReLU(0.2)]
+        self.up = nn.Sequential(*layers)
+        self.noise = torch.rand(16, 64)
+
+    def loss(self):
+        made = self.up(self.fc(self.noise).reshape(16, 128, 8, 4))
+        return self.pictures.loss() + self.maps.loss() - self.maps.net(made).mean()
+
+
 NETWORKS = {"reconstruction": Reconstruction, "unet": Painter, "critic": Judge,
-            "adversarial": lambda: Judge(batch=24, base=32)}
+            "adversarial": lambda: Judge(batch=24, base=32), "gan": Forger}
 
 
 def main():

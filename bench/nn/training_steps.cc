@@ -100,18 +100,18 @@ class Painter {
   ConvUNet net_;
 };
 
-template <std::int64_t batch, std::int64_t base>
 class Judge {
  public:
-  explicit Judge(Context& context)
-      : real_(RandomImages(context, {batch, 3, 64, 64}, 2)),
-        fake_(RandomImages(context, {batch, 3, 64, 64}, 3)),
-        net_(context, {.base = base}, rng_) {}
+  Judge(Context& context, const Shape& images, const CriticShape& critic)
+      : real_(RandomImages(context, images, 2)),
+        fake_(RandomImages(context, images, 3)),
+        net_(context, critic, rng_) {}
   std::vector<NamedVar> All() { return Parameters(net_); }
   Var Loss() {
     return Mean(net_.Forward(fake_, Mode::kTrain)) - Mean(net_.Forward(real_, Mode::kTrain)) +
            10.0 * GradientPenalty(net_, 0.5 * real_ + 0.5 * fake_);
   }
+  Critic& net() { return net_; }
 
  private:
   Var real_, fake_;
@@ -119,13 +119,65 @@ class Judge {
   Critic net_;
 };
 
+struct LargeJudge : Judge {
+  explicit LargeJudge(Context& context) : Judge(context, {32, 3, 64, 64}, {}) {}
+};
+struct SmallJudge : Judge {
+  explicit SmallJudge(Context& context) : Judge(context, {24, 3, 64, 64}, {.base = 32}) {}
+};
+
+// Both critics and the generator of maps.
+class Forger {
+ public:
+  explicit Forger(Context& context)
+      : noise_(RandomImages(context, {kBatch, 64}, 4)),
+        pictures_(context, {kBatch, 18, 64, 64}, {.in = 18, .base = 24}),
+        maps_(context, {kBatch, 3, 128, 64}, {.base = 24, .padding_mode = PadMode::kReplicate}) {
+    net_.Add<LinearLayer>("fc", context, LinearShape{64, kRoot * 8 * 4}, rng_);
+    for (std::int64_t level = 0, in = kRoot; level < 4; ++level, in /= 2) {
+      const std::string name = "up" + std::to_string(level);
+      const bool last = level == 3;
+      up_.Add<Upsample>(name + ".resize", ResizeMode::kNearest);
+      AddConvBlock(up_, name, context,
+                   {.conv = {.in = in, .out = last ? 3 : in / 2, .options = {.padding = 1}},
+                    .norm = last ? Norm::kNone : Norm::kBatch,
+                    .activation = last ? &Sigmoid : &LeakyRelu02},
+                   rng_);
+    }
+  }
+
+  std::vector<NamedVar> All() {
+    std::vector<NamedVar> all;
+    for (Module* module : std::initializer_list<Module*>{&net_, &up_}) {
+      for (NamedVar& p : Parameters(*module)) all.push_back(std::move(p));
+    }
+    for (Judge* judge : {&pictures_, &maps_}) {
+      for (NamedVar& p : judge->All()) all.push_back(std::move(p));
+    }
+    return all;
+  }
+  Var Loss() {
+    const Var root = Reshape(net_.Forward(noise_, Mode::kTrain), {kBatch, kRoot, 8, 4});
+    const Var made = up_.Forward(root, Mode::kTrain);
+    return pictures_.Loss() + maps_.Loss() - Mean(maps_.net().Forward(made, Mode::kTrain));
+  }
+
+ private:
+  static constexpr std::int64_t kBatch = 16, kRoot = 128;
+  Var noise_;
+  Rng rng_{1};
+  Sequential net_, up_;
+  Judge pictures_, maps_;
+};
+
 }  // namespace
 
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context) {
   if (name == "reconstruction") return std::make_unique<StepOf<Reconstruction>>(context);
   if (name == "unet") return std::make_unique<StepOf<Painter>>(context);
-  if (name == "critic") return std::make_unique<StepOf<Judge<32, 64>>>(context);
-  if (name == "adversarial") return std::make_unique<StepOf<Judge<24, 32>>>(context);
+  if (name == "critic") return std::make_unique<StepOf<LargeJudge>>(context);
+  if (name == "adversarial") return std::make_unique<StepOf<SmallJudge>>(context);
+  if (name == "gan") return std::make_unique<StepOf<Forger>>(context);
   return nullptr;
 }
 

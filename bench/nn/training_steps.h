@@ -23,8 +23,12 @@ class TrainingStep {
 // "critic": the critic of a WGAN with gradient penalty, channels 64 to 512, 32 images of 64 x 64:
 //   three forward passes, one inner gradient, the backward pass through both. 66 GFLOP.
 // "adversarial": the critic of configs/texture_adversarial.toml: channels 32 to 256, 24 images.
-inline constexpr std::array<std::string_view, 4> kTrainingSteps = {"reconstruction", "unet",
-                                                                   "critic", "adversarial"};
+// "gan": the networks of a texture step of configs/gan_quick.toml, batch 16: the critic of six
+// views
+//   (18 channels), the critic of maps (half of 128 x 128), each with gradient penalty, and the
+//   generator of maps, which learns from the second critic.
+inline constexpr std::array<std::string_view, 5> kTrainingSteps = {"reconstruction", "unet",
+                                                                   "critic", "adversarial", "gan"};
 
 // One of the above; null for another name.
 std::unique_ptr<TrainingStep> MakeTrainingStep(std::string_view name, Context& context);
