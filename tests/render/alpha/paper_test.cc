@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "raster/project.h"
 #include "render/pipeline/frame_layout.h"
@@ -84,6 +85,14 @@ std::vector<float> AlphaOf(const PipelineScene& scene, const RenderOptions& opti
   return out;
 }
 
+// Of alpha in float. Coordinates are below 1, and a distance is the difference of two of them, each
+// rounded and projected: d is off by 4 half units of 1, and exp(-s d^2) by at most
+// max_z 2 sqrt(z) exp(-z) sqrt(s) = sqrt(2 s / e) of that. Sums and the exponential add 1e-6.
+double FloatTolerance(double sharpness) {
+  const double distance = 4 * std::ldexp(1.0, -24);
+  return std::sqrt(2 * sharpness / std::numbers::e) * distance + 1e-6;
+}
+
 TEST(PaperAlpha, GoldenNumbers) {
   const auto path = SharedFile("vectors/01_dibr_soft_mask_simple.json");
   if (!path) GTEST_SKIP() << "test vectors 01 not found; set TILEGRAD_SHARED to their folder";
@@ -103,7 +112,7 @@ TEST(PaperAlpha, GoldenNumbers) {
       const auto scene = SceneOf<float>(vectors, image);
       const std::vector<float> alpha = AlphaOf(scene.View(), options, ids);
       CheckMask(std::vector<double>(alpha.begin(), alpha.end()), c["soft_mask_golden"][image],
-                1e-5);
+                FloatTolerance(c["sigmainv"].get<double>()));
     }
   }
 }
