@@ -80,7 +80,7 @@ leg_format() { ./run lint; }
 leg_headers() {
   local flags=(-std=c++20 -fsyntax-only -Iinclude -Isrc -DTOML_HEADER_ONLY=0 -DFMT_SHARED -DHWY_BROKEN_EMU128=0)
   git ls-files 'include/*.h' 'src/*.h' | grep -v -e '-inl\.h$' | xargs -P "$(nproc)" -n 8 bash -c '
-    for f in "${@:'$((${#flags[@]} + 1))'}"; do g++ "${@:1:'${#flags[@]}'}" -x c++ "$f" || { echo "not by itself: $f"; bad=1; }; done
+    for f in "${@:'$((${#flags[@]} + 1))'}"; do g++ "${@:1:'${#flags[@]}'}" -x c++ -include "$f" /dev/null || { echo "not by itself: $f"; bad=1; }; done
     exit "${bad:-0}"' _ "${flags[@]}"
 }
 
