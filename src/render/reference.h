@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "render/frame_images.h"
 #include "render/pipeline/pipeline_ref.h"
 #include "render/shading/direction_scale.h"
 #include "render/shading/pixel_ref.h"
