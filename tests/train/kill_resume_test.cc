@@ -15,10 +15,10 @@
 
 #include "base/rng.h"
 #include "nn/nn.h"
+#include "same_run.h"
 #include "support/temp_folder.h"
 #include "tiny_run.h"
 #include "train/run/checkpoint.h"
-#include "train/run/log.h"
 
 namespace tilegrad::train {
 namespace {
@@ -102,42 +102,9 @@ class KillResume : public TempFolderTest {
     return killed;
   }
 
-  std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    EXPECT_TRUE(found.ok()) << found.status().message();
-    if (!found.ok()) return {};
-    EXPECT_EQ(found->checkpoint.info.step, steps_);
-    return std::move(found->checkpoint.tensors);
-  }
-
-  void ExpectSameBits(const std::string& a, const std::string& b) {
-    const auto left = Final(a), right = Final(b);
-    ASSERT_FALSE(left.empty());
-    ASSERT_EQ(left.size(), right.size());
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      ASSERT_EQ(left[i].name, right[i].name);
-      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
-      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
-          << left[i].name;
-    }
-  }
-
-  // Every step once, in order, with the same losses. Rates and times are of the clock.
-  void ExpectSameCurves(const std::string& a, const std::string& b) {
-    const auto left = ReadLog(folder_ / a), right = ReadLog(folder_ / b);
-    ASSERT_TRUE(left.ok() && right.ok());
-    ASSERT_EQ(left->size(), static_cast<std::size_t>(steps_));
-    ASSERT_EQ(right->size(), left->size());
-    for (std::size_t i = 0; i < left->size(); ++i) {
-      EXPECT_EQ(left->at(i).step, static_cast<std::int64_t>(i) + 1);
-      EXPECT_EQ(right->at(i).step, left->at(i).step);
-      for (std::size_t k = 0; k < left->at(i).values.size(); ++k) {
-        const auto& [name, value] = left->at(i).values[k];
-        if (name == "images_per_second" || name == "seconds" || name == "stream_share") continue;
-        EXPECT_EQ(right->at(i).values[k].first, name);
-        EXPECT_EQ(right->at(i).values[k].second, value) << name << " of step " << i + 1;
-      }
-    }
+  void ExpectSame(const std::string& a, const std::string& b) {
+    ExpectSameBits(context_, folder_ / a, folder_ / b, steps_);
+    ExpectSameCurves(folder_ / a, folder_ / b, steps_);
   }
 
   void CheckKills(int kills) {
@@ -145,8 +112,7 @@ class KillResume : public TempFolderTest {
     EXPECT_GT(KillAtRandom("killed", kills, seconds), 0);
     EXPECT_FALSE(ListCheckpoints(folder_ / "killed").empty());  // some came after the first steps
     Finish("killed", 1);
-    ExpectSameBits("whole", "killed");
-    ExpectSameCurves("whole", "killed");
+    ExpectSame("whole", "killed");
   }
 
   Workers workers_;

@@ -4,10 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <nlohmann/json.hpp>
 
-#include "base/rng.h"
+#include "gradient_check.h"
 #include "nn/nn.h"
 #include "scene/shapes.h"
 #include "support/shared_data.h"
@@ -19,45 +18,7 @@
 namespace tilegrad::train {
 namespace {
 
-using Loss = std::function<nn::Var(const nn::Var&)>;
-
-std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
-  Rng rng(seed);
-  std::vector<double> out(n);
-  for (double& x : out) x = rng.Uniform(low, high);
-  return out;
-}
-
-class Losses : public testing::Test {
- protected:
-  Losses() : workers_(2), context_(workers_, nn::DType::kF64) {}
-
-  double Value(const Loss& loss, const nn::Shape& shape, const std::vector<double>& x) {
-    return loss(nn::Constant(context_, context_.From(shape, std::span<const double>(x)))).item();
-  }
-  // Central differences with h = 1e-6: the truncation is h^2 f'''/6 ~ 1e-12, the rounding eps f / h
-  // ~ 2e-10 for f ~ 1; 1e-7 relative to the largest entry leaves room for sums of thousands.
-  void ExpectGradient(const Loss& loss, const nn::Shape& shape, std::vector<double> x) {
-    const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(x)));
-    const nn::Tensor gradient = nn::Grad(3.0 * loss(input), {input})[0].value();
-    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
-    double largest = 0;
-    for (const double g : gradient.span<double>()) largest = std::max(largest, std::abs(g));
-    ASSERT_GT(largest, 0);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const double h = 1e-6, at = x[i];
-      x[i] = at + h;
-      const double up = Value(loss, shape, x);
-      x[i] = at - h;
-      const double down = Value(loss, shape, x);
-      x[i] = at;
-      EXPECT_NEAR(gradient.data<double>()[i], 3 * (up - down) / (2 * h), 1e-7 * (1 + largest)) << i;
-    }
-  }
-
-  Workers workers_;
-  nn::Context context_;
-};
+using Losses = GradientCheck;
 
 TEST_F(Losses, IouGradient) {
   const nn::Shape shape = {3, 5, 4};
@@ -192,7 +153,7 @@ class LossVectors : public Losses {
       if (!node.is_number()) Collect(child, out);
     }
   }
-  void ExpectMatches(const Loss& loss, const nn::Shape& shape, const std::string& input,
+  void ExpectMatches(const Function& loss, const nn::Shape& shape, const std::string& input,
                      const std::string& value, const std::string& gradient) {
     const nn::Var x =
         nn::Parameter(context_, context_.From(shape, std::span<const double>(Numbers(input))));

@@ -4,9 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 
-#include "base/rng.h"
+#include "gradient_check.h"
 #include "nn/nn.h"
 #include "nn/ops/sample_pictures.h"
 #include "scene/shapes.h"
@@ -19,49 +18,7 @@
 namespace tilegrad::train {
 namespace {
 
-using Function = std::function<nn::Var(const nn::Var&)>;
-
-std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
-  Rng rng(seed);
-  std::vector<double> out(n);
-  for (double& x : out) x = rng.Uniform(low, high);
-  return out;
-}
-
-class PhotographParts : public testing::Test {
- protected:
-  PhotographParts() : workers_(2), context_(workers_, nn::DType::kF64) {}
-
-  nn::Var Const(const nn::Shape& shape, const std::vector<double>& x) {
-    return nn::Constant(context_, context_.From(shape, std::span<const double>(x)));
-  }
-  // Of a fixed weighted sum of f. As tests/train/losses_test.cc: h = 1e-6.
-  void ExpectGradient(const Function& f, const nn::Shape& shape, std::vector<double> x) {
-    const auto weighed = [&](const nn::Var& at) {
-      const nn::Var y = f(at);
-      if (y.shape().elements() == 1) return y;
-      return nn::Sum(y * Const(y.shape(), Uniform(y.value().elements(), -1, 1, 99)));
-    };
-    const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(x)));
-    const nn::Tensor gradient = nn::Grad(weighed(input), {input})[0].value();
-    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
-    double largest = 0;
-    for (const double g : gradient.span<double>()) largest = std::max(largest, std::abs(g));
-    ASSERT_GT(largest, 0);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const double h = 1e-6, at = x[i];
-      x[i] = at + h;
-      const double up = weighed(Const(shape, x)).item();
-      x[i] = at - h;
-      const double down = weighed(Const(shape, x)).item();
-      x[i] = at;
-      EXPECT_NEAR(gradient.data<double>()[i], (up - down) / (2 * h), 1e-7 * (1 + largest)) << i;
-    }
-  }
-
-  Workers workers_;
-  nn::Context context_;
-};
+using PhotographParts = GradientCheck;
 
 TEST_F(PhotographParts, ProjectionsAndTheirGradients) {
   const nn::Shape points = {2, 5, 3}, cameras = {2, 7};

@@ -13,17 +13,19 @@
 #include <fstream>
 #include <thread>
 
+#include "../same_run.h"
 #include "../tiny_run.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
-#include "train/run/log.h"
 
 namespace tilegrad::train {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using Words = std::vector<std::string>;
+
+constexpr const char* kWithoutMpi = "SKIPPED: built without MPI (libopenmpi-dev or libmpich-dev)";
 
 struct Ended {
   int code = -1;  // 128 + signal of a process that a signal ended
@@ -60,8 +62,8 @@ class Ranks : public TempFolderTest {
 
   void SetUp() override {
     if (std::string(TILEGRAD_MPIRUN).empty()) {
-      std::puts("SKIPPED: built without MPI (libopenmpi-dev or libmpich-dev)");
-      GTEST_SKIP();
+      std::puts(kWithoutMpi);  // CTest looks for it; --gtest_brief keeps reasons to itself
+      GTEST_SKIP() << kWithoutMpi;
     }
     for (const char* data : {"data", "other_data"}) {
       std::filesystem::create_directories(folder_ / data);
@@ -123,44 +125,9 @@ class Ranks : public TempFolderTest {
     return Do(ranks == 1 ? words : OnRanks(ranks, words));
   }
 
-  std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    EXPECT_TRUE(found.ok()) << found.status().message();
-    if (!found.ok()) return {};
-    EXPECT_EQ(found->checkpoint.info.step, steps_);
-    return std::move(found->checkpoint.tensors);
-  }
-
-  void ExpectSameBits(const std::string& a, const std::string& b) {
-    const auto left = Final(a), right = Final(b);
-    ASSERT_FALSE(left.empty());
-    ASSERT_EQ(left.size(), right.size());
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      ASSERT_EQ(left[i].name, right[i].name);
-      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
-      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
-          << b << ": " << left[i].name;
-    }
-  }
-
-  // Every step once, with the same losses. Rates and times are of the clock.
-  void ExpectSameCurves(const std::string& a, const std::string& b) {
-    const auto left = ReadLog(folder_ / a), right = ReadLog(folder_ / b);
-    ASSERT_TRUE(left.ok() && right.ok());
-    ASSERT_EQ(left->size(), static_cast<std::size_t>(steps_));
-    ASSERT_EQ(right->size(), left->size());
-    for (std::size_t i = 0; i < left->size(); ++i) {
-      EXPECT_EQ(ByName(left->at(i)), ByName(right->at(i))) << b << ", line " << i + 1;
-    }
-  }
-  static std::map<std::string, double> ByName(const LogEntry& entry) {
-    std::map<std::string, double> out = {{"step", static_cast<double>(entry.step)}};
-    for (const auto& [name, value] : entry.values) {
-      if (name != "images_per_second" && name != "seconds" && name != "stream_share" &&
-          name != "wait_share")
-        out[name] = value;
-    }
-    return out;
+  void ExpectSame(const std::string& a, const std::string& b) {
+    ExpectSameBits(context_, folder_ / a, folder_ / b, steps_);
+    ExpectSameCurves(folder_ / a, folder_ / b, steps_);
   }
 
   void CheckSameBits(const std::vector<std::pair<int, int>>& ranks_and_workers) {
@@ -174,8 +141,7 @@ class Ranks : public TempFolderTest {
         const std::string run = fmt::format("{}_{}_{}", kind.name, ranks, workers);
         const Ended ended = TrainOn(ranks, workers, run);
         ASSERT_EQ(ended.code, 0) << ended.output;
-        ExpectSameBits(whole, run);
-        ExpectSameCurves(whole, run);
+        ExpectSame(whole, run);
         std::filesystem::remove_all(folder_ / run);
       }
     }
@@ -237,8 +203,7 @@ class Ranks : public TempFolderTest {
     }
     const Ended ended = TrainOn(ranks, 1, "killed");
     ASSERT_EQ(ended.code, 0) << ended.output;
-    ExpectSameBits("whole", "killed");
-    ExpectSameCurves("whole", "killed");
+    ExpectSame("whole", "killed");
   }
 
   // That they end with this, said once.

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradients of functions on the tape against central differences in float64.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "base/rng.h"
+#include "nn/nn.h"
+
+namespace tilegrad::train {
+
+inline std::vector<double> Uniform(std::size_t n, double low, double high, std::uint64_t seed) {
+  Rng rng(seed);
+  std::vector<double> out(n);
+  for (double& x : out) x = rng.Uniform(low, high);
+  return out;
+}
+
+class GradientCheck : public testing::Test {
+ protected:
+  using Function = std::function<nn::Var(const nn::Var&)>;
+
+  GradientCheck() : workers_(2), context_(workers_, nn::DType::kF64) {}
+
+  nn::Var Const(const nn::Shape& shape, const std::vector<double>& x) {
+    return nn::Constant(context_, context_.From(shape, std::span<const double>(x)));
+  }
+  double Value(const Function& f, const nn::Shape& shape, const std::vector<double>& x) {
+    return f(Const(shape, x)).item();
+  }
+  // Of 3 f where f is a number, which shows a gradient that forgets what comes from above, else of
+  // a fixed weighted sum of its elements. Central differences with h = 1e-6: the truncation is
+  // h^2 f'''/6 ~ 1e-12, the rounding eps f / h ~ 2e-10 for f ~ 1; 1e-7 relative to the largest
+  // entry leaves room for sums of thousands.
+  void ExpectGradient(const Function& f, const nn::Shape& shape, std::vector<double> x) {
+    const Function weighed = [&](const nn::Var& at) {
+      const nn::Var y = f(at);
+      if (y.shape().elements() == 1) return 3.0 * y;
+      return nn::Sum(y * Const(y.shape(), Uniform(y.value().elements(), -1, 1, 99)));
+    };
+    const nn::Var input = nn::Parameter(context_, context_.From(shape, std::span<const double>(x)));
+    const nn::Tensor gradient = nn::Grad(weighed(input), {input})[0].value();
+    ASSERT_TRUE(context_.status().ok()) << context_.status().message();
+    double largest = 0;
+    for (const double g : gradient.span<double>()) largest = std::max(largest, std::abs(g));
+    ASSERT_GT(largest, 0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double h = 1e-6, at = x[i];
+      x[i] = at + h;
+      const double up = Value(weighed, shape, x);
+      x[i] = at - h;
+      const double down = Value(weighed, shape, x);
+      x[i] = at;
+      EXPECT_NEAR(gradient.data<double>()[i], (up - down) / (2 * h), 1e-7 * (1 + largest)) << i;
+    }
+  }
+
+  Workers workers_;
+  nn::Context context_;
+};
+
+}  // namespace tilegrad::train
