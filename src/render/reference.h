@@ -11,7 +11,6 @@
 
 #include "render/frame_images.h"
 #include "render/pipeline/pipeline_ref.h"
-#include "render/shading/direction_scale.h"
 #include "render/shading/pixel_ref.h"
 #include "render/shading/plan.h"
 #include "render/shading/scene_ref.h"
