@@ -8,6 +8,49 @@
 
 namespace tilegrad::train {
 
+ConfigFields Joined(std::initializer_list<ConfigFields> parts) {
+  ConfigFields all;
+  for (const ConfigFields& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view> keys) {
+  std::erase_if(fields, [&](const ConfigField& field) {
+    return std::ranges::find(keys, field.key) != keys.end();
+  });
+  return fields;
+}
+
+ConfigFields FieldsOf(const SphereKeys& keys) {
+  ConfigFields fields = {{"network.template_level", keys.template_level, 0, 6,
+                          "subdivisions of the icosahedron; 3: 642 vertices"}};
+  if (keys.template_radius)
+    fields.push_back({"network.template_radius", keys.template_radius, 1e-3, 10, "world units"});
+  fields.push_back({"network.smoothing", keys.smoothing, 0, 64,
+                    "rounds of diffusion over the template that offsets go through"});
+  if (keys.symmetric) {
+    fields.push_back(
+        {"network.symmetric", keys.symmetric, 0, 1, "every shape is symmetric at x = 0"});
+  }
+  return fields;
+}
+
+ConfigFields FieldsOf(const UNetKeys& keys) {
+  return {
+      {"network.base", keys.base, 1, 4096, "U-Net: channels of the first level; they double"},
+      {"network.most", keys.most, 1, 4096, "to at most this many"},
+      {"network.levels", keys.levels, 1, 10, "halvings"},
+      {"network.enlarge", keys.enlarge, 0, 4, "the texture is 2^this times as large as the image"},
+      {"network.skips", keys.skips, 0, 1, "the U-Net's skip connections"},
+      {"network.latent", keys.latent, 1, 65536, "width of the code that all heads start from"},
+  };
+}
+
+ConfigField OutputDeviation(double* value) {
+  return {"network.output_deviation", value, 0, 10,
+          "the last weights of vertices start as N(0, this^2)"};
+}
+
 ConfigFields FieldsOf(LossConfig* c) {
   return {
       {"loss.iou", &c->iou, 0, kNoLimit, "weight of equation 12"},

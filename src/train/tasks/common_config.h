@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 #include "train/run/config_fields.h"
 #include "train/run/schedule.h"
@@ -38,6 +40,31 @@ struct OptimizerConfig {
   double beta2 = 0.999;
   double average = 0;  // decay of a moving average of the weights, which is what predicts; 0: none
 };
+
+// One after the other.
+ConfigFields Joined(std::initializer_list<ConfigFields> parts);
+// What a task does not have of a table that it shares.
+ConfigFields Without(ConfigFields fields, std::initializer_list<std::string_view> keys);
+
+// [network] of what deforms a sphere; null: the network has no such key.
+struct SphereKeys {
+  std::int64_t* template_level;
+  std::int64_t* smoothing;  // OffsetRules
+  double* template_radius = nullptr;
+  bool* symmetric = nullptr;
+};
+ConfigFields FieldsOf(const SphereKeys& keys);
+
+// [network] of a U-Net whose output is a texture map.
+struct UNetKeys {
+  std::int64_t *base, *most, *levels, *enlarge;
+  bool* skips;
+  std::int64_t* latent;
+};
+ConfigFields FieldsOf(const UNetKeys& keys);
+
+// The head of vertices starts as N(0, this^2).
+ConfigField OutputDeviation(double* value);
 
 ConfigFields FieldsOf(LossConfig* config);
 ConfigFields FieldsOf(RenderConfig* config);

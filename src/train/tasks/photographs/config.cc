@@ -7,24 +7,14 @@ namespace tilegrad::train {
 namespace {
 
 ConfigFields FieldsOf(PhotographNetworkConfig* c) {
-  return {
-      {"network.base", &c->base, 1, 4096, "U-Net: channels of the first level; they double"},
-      {"network.most", &c->most, 1, 4096, "to at most this many"},
-      {"network.levels", &c->levels, 1, 10, "halvings"},
-      {"network.enlarge", &c->enlarge, 0, 4, "the texture is 2^this times as large as the picture"},
-      {"network.skips", &c->skips, 0, 1, "the U-Net's skip connections"},
-      {"network.latent", &c->latent, 1, 65536, "width of the code that all heads start from"},
-      {"network.texture", &c->texture, 0, 0,
-       "\"direct\": a map; \"flow\": where in the photograph each texel is (CMR)"},
-      {"network.symmetric_texture", &c->symmetric_texture, 0, 1,
-       "the texture is its mirror image at x = 0, as every shape is"},
-      {"network.template_level", &c->template_level, 0, 6,
-       "subdivisions of the icosahedron; 3: 642 vertices"},
-      {"network.smoothing", &c->smoothing, 0, 64,
-       "rounds of diffusion over the mean shape that movements go through"},
-      {"network.output_deviation", &c->output_deviation, 0, 10,
-       "the last weights of movements start as N(0, this^2)"},
-  };
+  return Joined(
+      {FieldsOf(UNetKeys{&c->base, &c->most, &c->levels, &c->enlarge, &c->skips, &c->latent}),
+       {{"network.texture", &c->texture, 0, 0,
+         "\"direct\": a map; \"flow\": where in the photograph each texel is (CMR)"},
+        {"network.symmetric_texture", &c->symmetric_texture, 0, 1,
+         "the texture is its mirror image at x = 0, as every shape is"}},
+       FieldsOf(SphereKeys{&c->template_level, &c->smoothing}),
+       {OutputDeviation(&c->output_deviation)}});
 }
 
 ConfigFields FieldsOf(PhotographLosses* c) {
@@ -61,14 +51,9 @@ ConfigFields OwnFields(PhotographsConfig* c) {
 }  // namespace
 
 ConfigFields FieldsOf(PhotographsConfig* c) {
-  ConfigFields fields;
-  for (const ConfigFields& more : {FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->render),
-                                   FieldsOf(&c->optimizer), OwnFields(c)}) {
-    for (const ConfigField& field : more) {
-      if (field.key != "render.rule") fields.push_back(field);
-    }
-  }
-  return fields;
+  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss),
+                 Without(FieldsOf(&c->render), {"render.rule"}), FieldsOf(&c->optimizer),
+                 OwnFields(c)});
 }
 
 Status CheckConfig(const PhotographsConfig& config) {
