@@ -11,6 +11,7 @@
 
 #include "render/frame_images.h"
 #include "render/pipeline/pipeline_ref.h"
+#include "render/shading/direction_scale.h"
 #include "render/shading/pixel_ref.h"
 #include "render/shading/plan.h"
 #include "render/shading/scene_ref.h"
@@ -53,9 +54,8 @@ void ForEachPixelPart(const VaryingSet& set, ShadePixel<T>* p, const Visit& visi
   if (set[Varying::kUv]) visit(set.first(Varying::kUv), std::span<T>(p->uv));
   visit(set.first(Varying::kNormal), std::span<T>(p->normal));
   visit(set.first(Varying::kPosition), std::span<T>(p->position));
-  if (set[Varying::kLightDirection]) {
+  if (set[Varying::kLightDirection])
     visit(set.first(Varying::kLightDirection), std::span<T>(p->light_direction));
-  }
 }
 
 template <class T>
