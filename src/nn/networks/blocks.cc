@@ -41,6 +41,11 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
   if (block.activation != nullptr) net.Add<Activation>(name + ".act", block.activation);
 }
 
+LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
+                       std::int64_t out, Rng& rng) {
+  return net.Add<LinearLayer>(name, context, LinearShape{.in = in, .out = out}, rng);
+}
+
 void AddResidualBlock(Sequential& net, const std::string& name, Context& context,
                       const ResidualShape& shape, Rng& rng) {
   auto& block = net.Add<Residual>(name);

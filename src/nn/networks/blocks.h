@@ -24,6 +24,9 @@ void AddConvBlock(Sequential& net, const std::string& name, Context& context,
 void AddNorm(Sequential& net, const std::string& name, Context& context, Norm norm,
              std::int64_t channels);
 
+LinearLayer& AddLinear(Sequential& net, const std::string& name, Context& context, std::int64_t in,
+                       std::int64_t out, Rng& rng);
+
 // "name": x + two 3x3 convolutions of x, the first followed by norm and ReLU, the second by norm;
 // where in and out differ, x goes through a 1x1 convolution.
 struct ResidualShape {

@@ -25,6 +25,12 @@ struct UNetShape {
   Activation::Function output = nullptr;  // e.g. &Sigmoid
 };
 
+// Whether images of this side can be halved that often, to at least two pixels.
+inline bool CanHalve(std::int64_t side, std::int64_t levels) {
+  const std::int64_t step = std::int64_t{1} << levels;
+  return side % step == 0 && side >= 2 * step;
+}
+
 class UNet : public Module {
  public:
   UNet(Context& context, const UNetShape& shape, Rng& rng);

@@ -21,11 +21,6 @@ constexpr double kLeastReach = 0.12;  // a hull that is flat or thin is filled u
 constexpr double kNearness = 8;       // of a keypoint's weights: exp(-(this * distance)^2)
 constexpr std::int64_t kCameraNumbers = 7;
 
-nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
-                           std::int64_t in, std::int64_t out, Rng& rng) {
-  return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
-}
-
 double Determinant(const Point& a, const Point& b, const Point& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
          a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -79,8 +74,7 @@ Status CheckNetwork(const PhotographNetworkConfig& config, int image_size) {
   if (config.texture != "direct" && config.texture != "flow")
     return InvalidArgument("network.texture is \"{}\", but must be \"direct\" or \"flow\"",
                            config.texture);
-  const std::int64_t step = std::int64_t{1} << config.levels;
-  if (image_size % step == 0 && image_size >= 2 * step) return {};
+  if (nn::CanHalve(image_size, config.levels)) return {};
   return InvalidArgument(
       "pictures of {} pixels a side cannot be halved {} times to at least two "
       "pixels: choose another network.levels or photographs.size",
@@ -132,16 +126,16 @@ void PhotographNetwork::BuildHeads(Rng& rng) {
   const std::int64_t code = code_shape_.elements(), latent = config_.latent;
   all_.latent.Add<nn::Flatten>("flatten");
   all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  AddLinear(all_.latent, "fc1", context_, code, latent, rng);
+  nn::AddLinear(all_.latent, "fc1", context_, code, latent, rng);
   all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  AddLinear(all_.latent, "fc2", context_, latent, latent, rng);
+  nn::AddLinear(all_.latent, "fc2", context_, latent, latent, rng);
   all_.latent.Add<nn::Activation>("act3", &nn::LeakyRelu02);
-  AddLinear(all_.map, "fc", context_, latent, code, rng);
+  nn::AddLinear(all_.map, "fc", context_, latent, code, rng);
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
+  auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
-  auto& camera = AddLinear(all_.camera, "fc", context_, latent, kCameraNumbers, rng);
+  auto& camera = nn::AddLinear(all_.camera, "fc", context_, latent, kCameraNumbers, rng);
   // Half a turn about x: the world's y, which is up, to the image's, which is down.
   camera.bias.value() =
       context_.From({kCameraNumbers}, std::span<const double>({0., 0., 0., 0., 1., 0., 0.}));

@@ -17,11 +17,6 @@ namespace {
 constexpr std::int64_t kRootRows = 8;  // of the smallest map
 constexpr double kLeastShare = 0.02;   // of a channel of the mean map: logits stay finite
 
-nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
-                           std::int64_t in, std::int64_t out, Rng& rng) {
-  return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
-}
-
 nn::Var Twice(const nn::Var& x) {
   if (!x.valid()) return x;
   return nn::Resize(x, {2 * x.shape()[2], 2 * x.shape()[3]}, nn::ResizeMode::kNearest);
@@ -105,12 +100,12 @@ ShapeTextureGenerator::ShapeTextureGenerator(nn::Context& context, const Generat
 
 void ShapeTextureGenerator::BuildShape(Rng& rng) {
   nn::Sequential& net = shape_.net;
-  AddLinear(net, "fc1", context_, config_.shape_noise, config_.hidden, rng);
+  nn::AddLinear(net, "fc1", context_, config_.shape_noise, config_.hidden, rng);
   net.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  AddLinear(net, "fc2", context_, config_.hidden, config_.hidden, rng);
+  nn::AddLinear(net, "fc2", context_, config_.hidden, config_.hidden, rng);
   net.Add<nn::Activation>("act2", &nn::LeakyRelu02);
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = AddLinear(net, "fc3", context_, config_.hidden, numbers, rng);
+  auto& offsets = nn::AddLinear(net, "fc3", context_, config_.hidden, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
   shape_.scale = context_.Full({3}, 1);
@@ -123,7 +118,7 @@ void ShapeTextureGenerator::BuildTexture(Rng& rng) {
     return std::min(config_.texture_most, config_.texture_base << std::min(halvings, 30));
   };
   texture_.root = {channels(doublings), kRootRows, map_width() >> doublings};
-  AddLinear(texture_.first, "fc", context_, config_.noise, texture_.root.elements(), rng);
+  nn::AddLinear(texture_.first, "fc", context_, config_.noise, texture_.root.elements(), rng);
   const auto frame = config_.symmetric_texture ? &FrameOfHalf : &FrameOfWhole;
   nn::Sequential& net = texture_.net;
   nn::AddNorm(net, "norm", context_, nn::Norm::kBatch, channels(doublings));

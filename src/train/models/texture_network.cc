@@ -19,11 +19,6 @@ constexpr std::int64_t kPaintNumbers = 8;  // of a texel: three shares, two gain
 constexpr double kTooBright = 0.9;
 constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
 
-nn::LinearLayer& AddLinear(nn::Sequential& net, const std::string& name, nn::Context& context,
-                           std::int64_t in, std::int64_t out, Rng& rng) {
-  return net.Add<nn::LinearLayer>(name, context, nn::LinearShape{.in = in, .out = out}, rng);
-}
-
 std::int64_t LightNumbers(Lighting lighting) {
   switch (lighting) {
     case Lighting::kLambert:
@@ -68,8 +63,7 @@ nn::Var Facing(const nn::Var& raw) {
 }  // namespace
 
 Status CheckImageSize(const TextureNetworkConfig& config, int image_size) {
-  const std::int64_t step = std::int64_t{1} << config.levels;
-  if (image_size % step == 0 && image_size >= 2 * step) return {};
+  if (nn::CanHalve(image_size, config.levels)) return {};
   return InvalidArgument(
       "images of {} pixels a side cannot be halved {} times to at least two pixels: choose a "
       "smaller "
@@ -127,37 +121,37 @@ void TextureNetwork::BuildHeads(Rng& rng) {
   const std::int64_t code = code_shape_.elements(), latent = config_.latent;
   all_.latent.Add<nn::Flatten>("flatten");
   all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  AddLinear(all_.latent, "fc", context_, code, latent, rng);
+  nn::AddLinear(all_.latent, "fc", context_, code, latent, rng);
   all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  AddLinear(all_.map, "fc", context_, latent, code, rng);
-  AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
+  nn::AddLinear(all_.map, "fc", context_, latent, code, rng);
+  nn::AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
   all_.shape.Add<nn::Activation>("act", &nn::Relu);
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
-  auto& offsets = AddLinear(all_.shape, "fc2", context_, config_.hidden, numbers, rng);
+  auto& offsets = nn::AddLinear(all_.shape, "fc2", context_, config_.hidden, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
   const std::int64_t light = LightNumbers(light_.lighting), width = config_.light_width;
   if (light == 0) return;
-  AddLinear(all_.light, "in", context_, latent + (config_.lookup ? PictureLookup::kCues : 0), width,
-            rng);
+  nn::AddLinear(all_.light, "in", context_, latent + (config_.lookup ? PictureLookup::kCues : 0),
+                width, rng);
   for (int i = 1; i <= kResidualPairs; ++i) {
     auto& block = all_.light.Add<nn::Residual>("block" + std::to_string(i));
     block.body.Add<nn::Activation>("act1", &nn::Relu);
-    AddLinear(block.body, "fc1", context_, width, width, rng);
+    nn::AddLinear(block.body, "fc1", context_, width, width, rng);
     block.body.Add<nn::Activation>("act2", &nn::Relu);
-    AddLinear(block.body, "fc2", context_, width, width, rng);
+    nn::AddLinear(block.body, "fc2", context_, width, width, rng);
   }
   all_.light.Add<nn::Activation>("act", &nn::Relu);
   SetStartLight(light_.lighting,
-                AddLinear(all_.light, "out", context_, width, light, rng).bias.value());
+                nn::AddLinear(all_.light, "out", context_, width, light, rng).bias.value());
 }
 
 void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
   coarse_.emplace(template_, image_size);
   fine_.emplace(template_, texture_size_);
-  AddLinear(all_.pose, "fc1", context_, config_.latent, config_.light_width, rng);
+  nn::AddLinear(all_.pose, "fc1", context_, config_.latent, config_.light_width, rng);
   all_.pose.Add<nn::Activation>("act", &nn::Relu);
-  AddLinear(all_.pose, "fc2", context_, config_.light_width, kPoseNumbers, rng);
+  nn::AddLinear(all_.pose, "fc2", context_, config_.light_width, kPoseNumbers, rng);
   const std::int64_t width = config_.lookup_width;
   const auto add = [&](const std::string& name, std::int64_t in, std::int64_t out) {
     all_.paint.Add<nn::Activation>("wrap" + name, &WrapAround);

@@ -16,12 +16,6 @@ namespace {
 const std::string kShape = "best.shape.", kTexture = "best.texture.";
 constexpr std::uint64_t kCodeStream = 0x73616d706c65;
 
-std::span<const float> RowOf(const nn::Var& rows, std::size_t i) {
-  const std::span<const float> all = rows.value().span<float>();
-  const std::size_t size = all.size() / static_cast<std::size_t>(rows.shape()[0]);
-  return all.subspan(i * size, size);
-}
-
 void MakeGrey(Mesh* mesh) {
   mesh->textures.clear(), mesh->corner_uvs.clear();
   mesh->materials = {{.name = "shape", .base_color = {0.7f, 0.7f, 0.7f, 1.0f}}};
@@ -40,7 +34,7 @@ Result<std::vector<Mesh>> GenerateMeshes(nn::Context& context, ShapeTextureGener
                                 static_cast<int>(generator.config().texture_size)};
   std::vector<Mesh> meshes;
   for (std::size_t i = 0; i < static_cast<std::size_t>(codes.shape()[0]); ++i) {
-    Mesh mesh = DeformedMesh(sphere, RowOf(positions, i), RowOf(textures, i));
+    Mesh mesh = DeformedMesh(sphere, ItemOf(positions, i), ItemOf(textures, i));
     if (!textured) MakeGrey(&mesh);
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the generated mesh is broken: {}", valid.message());

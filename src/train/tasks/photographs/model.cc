@@ -131,21 +131,17 @@ Result<std::vector<PredictedPhotograph>> PredictPhotographs(nn::Context& context
       network.Forward(nn::Constant(context, pictures), nn::Mode::kEval);
   TILEGRAD_TRY(context.TakeStatus());
   const auto count = static_cast<std::size_t>(pictures.shape()[0]);
-  const auto row = [&](const nn::Var& rows, std::size_t i) {
-    const std::span<const float> numbers = rows.value().span<float>();
-    return numbers.subspan(i * (numbers.size() / count), numbers.size() / count);
-  };
   std::vector<PredictedPhotograph> out(count);
   for (std::size_t i = 0; i < count; ++i) {
     out[i].mesh =
         DeformedMesh({network.template_mesh(), network.corner_uvs(), network.texture_size()},
-                     row(all.positions, i), row(all.textures, i));
+                     ItemOf(all.positions, i), ItemOf(all.textures, i));
     if (const Status valid = Validate(out[i].mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
-    const auto c = row(all.cameras, i);
+    const auto c = ItemOf(all.cameras, i);
     out[i].camera = {c[0], {c[1], c[2]}, {c[3], c[4], c[5], c[6]}};
     if (!all.keypoints.valid()) continue;
-    const auto k = row(all.keypoints, i);
+    const auto k = ItemOf(all.keypoints, i);
     for (std::size_t at = 0; at < k.size(); at += 3)
       out[i].keypoints.push_back({k[at], k[at + 1], k[at + 2]});
   }

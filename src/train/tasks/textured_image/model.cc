@@ -68,21 +68,17 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
   const PredictedObjects predicted =
       network.Forward(nn::Constant(context, std::move(input)), nn::Mode::kEval);
   TILEGRAD_TRY(context.TakeStatus());
-  const auto row = [&](const nn::Var& rows, std::size_t i) {
-    const std::span<const float> all = rows.value().span<float>();
-    return all.subspan(i * (all.size() / count), all.size() / count);
-  };
   std::vector<PredictedObject> objects;
   for (std::size_t i = 0; i < count; ++i) {
     Mesh mesh =
         DeformedMesh({network.template_mesh(), network.corner_uvs(), network.texture_size()},
-                     row(predicted.positions, i), row(predicted.textures, i));
+                     ItemOf(predicted.positions, i), ItemOf(predicted.textures, i));
     if (const Status valid = Validate(mesh); !valid.ok())
       return InternalError("the prediction is broken: {}", valid.message());
     objects.push_back({std::move(mesh), LightOf(predicted, i), {}});
     if (!predicted.pose.valid()) continue;
     Pose pose;
-    std::ranges::copy(row(predicted.pose, i), pose.begin());
+    std::ranges::copy(ItemOf(predicted.pose, i), pose.begin());
     objects.back().camera = CameraOf(pose, image_size);
   }
   return objects;
