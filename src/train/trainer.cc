@@ -2,7 +2,6 @@
 #include "train/trainer.h"
 
 #include "base/error.h"
-#include "train/data/fingerprint.h"
 #include "train/portioned_update.h"
 #include "train/run/machine.h"
 
@@ -49,6 +48,10 @@ class Training : public RunWork {
     TILEGRAD_ASSIGN(portioned_,
                     PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.crew));
     return {};
+  }
+
+  Result<std::string> Fingerprint(const Workers& workers) const {
+    return task_.Fingerprint(job_.data, workers);
   }
 
   // What a rank that does not lead does instead of a run.
@@ -120,9 +123,11 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
   TILEGRAD_TRY(job.crew->Agree(ready, CommonTraits(settings)));
   Status started = start();
   Trait data{"dataset", "",
-             fmt::format("{} must hold the same files everywhere", job.data.string())};
+             fmt::format("{}, and runs that the configuration names, must hold the same files "
+                         "everywhere",
+                         job.data.string())};
   if (started.ok()) {
-    auto fingerprint = DatasetFingerprint(job.data, workers);
+    auto fingerprint = training->Fingerprint(workers);
     started = fingerprint.status();
     if (started.ok()) data.value = *fingerprint;
   }

@@ -73,6 +73,68 @@ checkpoint_every = 3
 keep_checkpoints = 2
 )";
 
+inline constexpr const char* kTinyGan = R"(name = "tiny"
+[task]
+kind = "gan"
+[network]
+noise = 6
+shape_noise = 4
+hidden = 8
+template_level = 1
+texture_size = 32
+texture_base = 2
+texture_most = 4
+[critic]
+base = 2
+halvings = 2
+updates = 2
+[stages]
+shape = 6
+[textures]
+count = 40
+[render]
+sharpness = 500
+[optimizer]
+average = 0.5
+[score]
+every = 4
+count = 8
+[schedule]
+steps = 12
+batch = 4
+log_every = 1
+sample_every = 12
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
+// Of a miniature of photographs.
+inline constexpr const char* kTinyPhotographs = R"(name = "tiny"
+[task]
+kind = "photographs"
+[network]
+base = 4
+most = 8
+levels = 2
+latent = 12
+template_level = 1
+[photographs]
+size = 16
+[render]
+sharpness = 500
+sharpness_start = 100
+[optimizer]
+learning_rate = 2e-3
+average = 0.5
+[schedule]
+steps = 12
+batch = 4
+log_every = 1
+sample_every = 10
+checkpoint_every = 3
+keep_checkpoints = 2
+)";
+
 // The value behind a key of a configuration.
 template <class T>
 T& ValueOf(TrainConfig& config, const std::string& key) {

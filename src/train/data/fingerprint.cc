@@ -14,13 +14,7 @@ Result<std::string> HashOfFile(const Path& path) {
   return hash.Text();
 }
 
-}  // namespace
-
-Result<std::string> DatasetFingerprint(const Path& folder, const Workers& workers) {
-  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
-  std::vector<Path> files = {DatasetInfoPath(folder), ModelsPath(folder)};
-  for (std::size_t m = 0; m < dataset.models().size(); ++m)
-    files.push_back(dataset.ModelPath(static_cast<int>(m)));
+Status AddFiles(const std::vector<Path>& files, const Workers& workers, Hash* all) {
   std::vector<std::string> hashes(files.size());
   std::vector<Status> failures(files.size());
   workers.For(files.size(), [&](std::size_t i, std::size_t) {
@@ -28,12 +22,61 @@ Result<std::string> DatasetFingerprint(const Path& folder, const Workers& worker
     failures[i] = hash.status();
     if (hash.ok()) hashes[i] = *hash;
   });
-  Hash all;
   for (std::size_t i = 0; i < files.size(); ++i) {
     TILEGRAD_TRY(failures[i]);
-    all.Add(hashes[i]);
+    all->Add(hashes[i]);
   }
+  return {};
+}
+
+void AddPhotograph(const Photograph& photo, Hash* all) {
+  const WeakPerspective camera = photo.camera.value_or(WeakPerspective{.scale = 0});
+  std::vector<double> numbers = {static_cast<double>(photo.split),
+                                 photo.box.left,
+                                 photo.box.top,
+                                 photo.box.right,
+                                 photo.box.bottom,
+                                 camera.scale};
+  numbers.insert(numbers.end(), camera.translation.begin(), camera.translation.end());
+  numbers.insert(numbers.end(), camera.quaternion.begin(), camera.quaternion.end());
+  for (const Keypoint& k : photo.keypoints)
+    if (k.visible) numbers.insert(numbers.end(), {k.x, k.y});
+  const std::vector<std::uint8_t> mask(photo.mask.inside.begin(), photo.mask.inside.end());
+  all->Add(photo.id);
+  all->AddAll(numbers);
+  all->AddBytes(mask.data(), mask.size());
+}
+
+}  // namespace
+
+Result<std::string> DatasetFingerprint(const Path& folder, const Workers& workers) {
+  TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
+  std::vector<Path> files = {DatasetInfoPath(folder), ModelsPath(folder)};
+  for (std::size_t m = 0; m < dataset.models().size(); ++m)
+    files.push_back(dataset.ModelPath(static_cast<int>(m)));
+  Hash all;
+  TILEGRAD_TRY(AddFiles(files, workers, &all));
   return all.Text();
+}
+
+Result<std::string> PhotographsFingerprint(const PhotographSet& set, const Workers& workers) {
+  Hash all;
+  std::vector<Path> files;
+  for (const Photograph& photo : set.photographs) {
+    files.push_back(photo.image);
+    AddPhotograph(photo, &all);
+  }
+  for (const auto& point : set.mean_keypoints) all.AddAll(point);
+  TILEGRAD_TRY(AddFiles(files, workers, &all));
+  return all.Text();
+}
+
+Result<std::string> WithFile(const std::string& fingerprint, const Path& file) {
+  Hash both;
+  both.Add(fingerprint);
+  TILEGRAD_ASSIGN(const std::string own, HashOfFile(file));
+  both.Add(own);
+  return both.Text();
 }
 
 }  // namespace tilegrad::train

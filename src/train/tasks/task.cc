@@ -2,12 +2,17 @@
 #include "train/tasks/task.h"
 
 #include "base/error.h"
+#include "train/data/fingerprint.h"
 
 namespace tilegrad::train {
 
 const Mesh& Model::template_mesh() const {
   static const Mesh none;
   return none;
+}
+
+Result<std::string> Task::Fingerprint(const Path& data, const Workers& workers) const {
+  return DatasetFingerprint(data, workers);
 }
 
 Result<std::vector<nn::NamedTensor>> Task::Statistics() {

@@ -136,6 +136,8 @@ class Task {
   // Side of its images in pixels; a run continues with the same.
   virtual int image_size() const = 0;
   virtual RunHeader Header() = 0;  // without name, dataset folder and machine
+  // What it learns from, train/data/fingerprint.h: ranks compare them. After Start.
+  virtual Result<std::string> Fingerprint(const Path& data, const Workers& workers) const;
   // Files of its own in the run's folder; an error if a run cannot continue with what is there now.
   virtual Status Begin(const Path& run, std::int64_t first_step) = 0;
 

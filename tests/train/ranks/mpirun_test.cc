@@ -13,6 +13,7 @@
 #include <fstream>
 #include <thread>
 
+#include "../data/photographs/miniature.h"
 #include "../same_run.h"
 #include "../tiny_run.h"
 #include "nn/nn.h"
@@ -35,18 +36,25 @@ struct Ended {
 struct Kind {
   const char* name;
   std::string config;
-  Words settings;
+  Words settings = {};
+  const char* data = "data";
 };
+
+// Its textures come from the run "textures", and its second stage begins at a step that no
+// checkpoint of the first 200 but one falls on.
+const Kind kGan = {"gan", kTinyGan, {"schedule.batch=8", "stages.shape=9"}};
 
 const Kind kKinds[] = {
     {"single", std::string(kTinyConfig) + "[stream]\nshare = 0.5\n", {}},
-    {"textured", kTinyTextured, {}},
+    {"textured", kTinyTextured},
     {"critic",
      kTinyTextured,
      {"adversarial.weight=0.5", "adversarial.features=1", "adversarial.base=4",
       "adversarial.halvings=2", "adversarial.updates=2", "adversarial.learning_rate=1e-3",
       "adversarial.place=interpolates"}},
-    {"classify", kTinyClassifier, {}},
+    {"classify", kTinyClassifier},
+    kGan,
+    {"photographs", kTinyPhotographs, {}, "cub"},
 };
 
 class Ranks : public TempFolderTest {
@@ -70,18 +78,30 @@ class Ranks : public TempFolderTest {
       const Status written = WriteNoiseDataset(folder_ / data, Meshes::kBoxes, 2);
       ASSERT_TRUE(written.ok()) << written.message();
     }
+    WriteMiniature(folder_ / "cub", "cub");
     Use(kKinds[0]);
   }
 
   void Use(const Kind& kind) {
     Write("tiny.toml", kind.config);
-    settings_ = kind.settings;
+    settings_ = kind.settings, data_ = kind.data;
+    if (std::string_view(kind.name) != kGan.name) return;
+    if (!std::filesystem::exists(folder_ / "textures")) MakeTextures("textures", "schedule.seed=1");
+    settings_.push_back("textures.run=" + (folder_ / "textures").string());
+  }
+  void MakeTextures(const std::string& run, const std::string& setting) const {
+    Write("textures.toml", kTinyTextured);
+    const Ended ended =
+        Do({TILEGRAD_PROGRAM, "train", "--config", (folder_ / "textures.toml").string(), "--data",
+            (folder_ / "data").string(), "--out", (folder_ / run).string(), "--set",
+            "schedule.steps=2", "--set", setting, "--threads", "1"});
+    ASSERT_EQ(ended.code, 0) << ended.output;
   }
 
   Words TrainWords(const std::string& run, int workers) const {
     Words words = {TILEGRAD_PROGRAM, "train",
                    "--config",       (folder_ / "tiny.toml").string(),
-                   "--data",         (folder_ / "data").string(),
+                   "--data",         (folder_ / data_).string(),
                    "--out",          (folder_ / run).string(),
                    "--threads",      std::to_string(workers),
                    "--set",          "schedule.portions=4",
@@ -226,7 +246,8 @@ class Ranks : public TempFolderTest {
   Workers workers_;
   nn::Context context_;
   int steps_ = 20;
-  Words settings_;  // --set
+  Words settings_;             // --set
+  std::string data_ = "data";  // folder
 };
 
 TEST_F(Ranks, EveryTaskHasTheSameBitsOnAnyNumberOfThem) {
@@ -248,6 +269,13 @@ TEST_F(Ranks, LongFiveKills) {
   CheckKills({1, 70, 137, 205, 298});
 }
 
+TEST_F(Ranks, LongFiveKillsInBothStagesOfAGame) {
+  Use(kGan);
+  settings_.push_back("stages.shape=100");
+  steps_ = 200;
+  CheckKills({1, 60, 99, 101, 160});
+}
+
 TEST_F(Ranks, OfAnotherDatasetAreRefused) {
   Words other = TrainWords("run", 1);
   *std::find(other.begin(), other.end(), (folder_ / "data").string()) =
@@ -256,6 +284,18 @@ TEST_F(Ranks, OfAnotherDatasetAreRefused) {
   std::filesystem::copy_file(models / "m2.npz", models / "m0.npz",
                              std::filesystem::copy_options::overwrite_existing);
   ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another dataset (");
+}
+
+// One name of a run, but another run: each rank has a working folder of its own.
+TEST_F(Ranks, ThatExtractOtherTexturesAreRefused) {
+  MakeTextures("textures", "schedule.seed=1");
+  MakeTextures("elsewhere/textures", "schedule.seed=2");
+  Use(kGan);
+  settings_.back() = "textures.run=textures";
+  Words first = TrainWords("run", 1), other = first;
+  first.insert(first.begin(), {"/usr/bin/env", "-C", folder_.string()});
+  other.insert(other.begin(), {"/usr/bin/env", "-C", (folder_ / "elsewhere").string()});
+  ExpectRefused(Pair(first, other), 2, "has another dataset (");
 }
 
 TEST_F(Ranks, OfAnotherConfigurationAreRefused) {

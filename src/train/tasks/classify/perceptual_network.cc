@@ -43,6 +43,12 @@ Result<FeatureFunction> LoadClassifier(nn::Context& context, const PerceptualSou
 
 }  // namespace
 
+Result<Path> PerceptualWeights(nn::Context& context, const PerceptualSource& source) {
+  if (source.kind != "classify") return source.file;
+  TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(context, source.file));
+  return found.file;
+}
+
 Result<FeatureFunction> LoadPerceptualNetwork(nn::Context& context,
                                               const PerceptualSource& source) {
   if (source.kind == "classify") return LoadClassifier(context, source);

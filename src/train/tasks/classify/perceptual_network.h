@@ -21,5 +21,7 @@ struct PerceptualSource {
 // Its features in the context's dtype; its weights stay as they are. Errors name the file and what
 // is wrong with it.
 Result<FeatureFunction> LoadPerceptualNetwork(nn::Context& context, const PerceptualSource& source);
+// The file that its weights are in.
+Result<Path> PerceptualWeights(nn::Context& context, const PerceptualSource& source);
 
 }  // namespace tilegrad::train

@@ -64,13 +64,12 @@ GanCritic::GanCritic(nn::Context& context, const GanConfig& config, const Critic
 
 nn::Var GanCritic::GeneratorLoss(const nn::Var& fake) { return WganGeneratorLoss(critic_, fake); }
 
-Result<nn::StepVector<nn::Gradient>> GanCritic::Gradients(const Pair& pair, std::uint64_t number,
-                                                          std::vector<LossTerm>* terms) {
-  Rng rng(seed_, number);
+Result<nn::StepVector<nn::Gradient>> GanCritic::Gradients(const Pair& pair, const Backward& how) {
+  Rng rng(seed_, how.number);
   const CriticLoss loss =
       WganCriticLoss(critic_, nn::Constant(context_, pair.real), nn::Constant(context_, pair.fake),
                      {.penalty = penalty_, .place = PenaltyPlace::kInterpolates}, rng);
-  auto gradients = nn::Gradients(loss.total, weights_.adam().parameters());
+  auto gradients = nn::Gradients(loss.total, weights_.adam().parameters(), how.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   const double norm = nn::GlobalNorm(context_, gradients);
   if (!std::isfinite(loss.total.item()) || !std::isfinite(norm)) {
@@ -79,10 +78,10 @@ Result<nn::StepVector<nn::Gradient>> GanCritic::Gradients(const Pair& pair, std:
         "larger critic.penalty may help",
         role_.distance, loss.total.item(), norm);
   }
-  if (terms == nullptr) return gradients;
-  terms->push_back({role_.distance, 0, loss.wasserstein.item()});
-  if (penalty_ > 0) terms->push_back({role_.penalty, 0, loss.penalty.item()});
-  terms->push_back({role_.gradient, 0, norm});
+  if (how.terms == nullptr) return gradients;
+  how.terms->push_back({role_.distance, 0, loss.wasserstein.item()});
+  if (penalty_ > 0) how.terms->push_back({role_.penalty, 0, loss.penalty.item()});
+  how.terms->push_back({role_.gradient, 0, norm});
   return gradients;
 }
 

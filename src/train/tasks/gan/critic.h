@@ -38,10 +38,13 @@ class GanCritic {
   struct Pair {
     nn::Tensor real, fake;
   };
-  // Of WganCriticLoss; `number` of the update, from which interpolates follow. Appends what is
-  // watched if `terms` is there. A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, std::uint64_t number,
-                                                 std::vector<LossTerm>* terms);
+  struct Backward {
+    std::uint64_t number = 0;  // of the batch, from which interpolates follow
+    nn::GradientListener* listener = nullptr;
+    std::vector<LossTerm>* terms = nullptr;  // what is watched is appended, if it is there
+  };
+  // Of WganCriticLoss. A loss or gradient that is not finite is an error.
+  Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, const Backward& how);
   // `step` of its stage.
   Status Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
     return weights_.Update(gradients, step);
@@ -51,6 +54,7 @@ class GanCritic {
   std::vector<nn::NamedTensor> State();
   // After so many updates.
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t updates);
+  nn::Critic& network() { return critic_; }
 
  private:
   nn::Context& context_;

@@ -93,35 +93,47 @@ int GanLearner::Updates(std::int64_t step) {
 
 // Of what is drawn: each round of the critics sees other objects. The first sees the generator's.
 std::uint64_t GanLearner::NumberOf(const UpdateIndex& at, int round) const {
-  return static_cast<std::uint64_t>(at.step * config_.critic.updates + round);
+  const std::int64_t batch = at.step * config_.critic.updates + round;
+  return static_cast<std::uint64_t>(batch * at.portion.count + at.portion.index);
 }
 
-Status GanLearner::DrawReal(GanStage stage, std::uint64_t number) {
-  const auto count = static_cast<int>(config_.batch);
+Status GanLearner::DrawReal(const UpdateIndex& at, int round) {
+  const auto count = static_cast<int>(CountOf(at));
+  const std::uint64_t number = NumberOf(at, round);
   TILEGRAD_ASSIGN(ObjectViews views, sources_.pictures->Draw(number, count));
-  real_ = {};
-  if (stage == GanStage::kShape) {
-    real_.cover = std::move(views.cover);
+  real_.resize(static_cast<std::size_t>(at.portion.count));
+  Seen& real = real_[static_cast<std::size_t>(at.portion.index)];
+  real = {};
+  if (StageOf(at.step) == GanStage::kShape) {
+    real.cover = std::move(views.cover);
     return {};
   }
-  real_.colors = std::move(views.colors);
-  if (maps_) real_.maps = sources_.bank->Draw(context_, number, count);
+  real.colors = std::move(views.colors);
+  if (maps_) real.maps = sources_.bank->Draw(context_, number, count);
   return {};
 }
 
-Status GanLearner::DrawFake(const UpdateIndex& at, std::uint64_t number) {
+GeneratedObjects GanLearner::Draw(const UpdateIndex& at, int round) {
+  const nn::Tensor noise = step_.Noise(kNoiseStream, NumberOf(at, round), CountOf(at));
+  GeneratedObjects out = step_.Draw(generator_, noise, StageOf(at.step), nn::Mode::kTrain);
+  fake_.resize(static_cast<std::size_t>(at.portion.count));
+  fake_[static_cast<std::size_t>(at.portion.index)] = {out.cover.value(), out.colors.value(),
+                                                       out.maps.value()};
+  return out;
+}
+
+Status GanLearner::DrawFake(const UpdateIndex& at, int round) {
   const nn::NoGrad off(context_);
-  const GanStage stage = StageOf(at.step);
-  const GeneratedObjects objects = step_.Draw(
-      generator_, step_.Noise(kNoiseStream, number, config_.batch), stage, nn::Mode::kTrain);
-  fake_ = {objects.cover.value(), objects.colors.value(), objects.maps.value()};
+  Draw(at, round);
   return context_.TakeStatus();
 }
 
-GanCritic::Pair GanLearner::PairOf(const GanCritic& critic) const {
-  if (&critic == &silhouettes_) return {real_.cover, fake_.cover};
-  if (&critic == &pictures_) return {real_.colors, fake_.colors};
-  return {real_.maps, fake_.maps};
+GanCritic::Pair GanLearner::PairOf(const GanCritic& critic, const Portion& portion) const {
+  const Seen& real = real_[static_cast<std::size_t>(portion.index)];
+  const Seen& fake = fake_[static_cast<std::size_t>(portion.index)];
+  if (&critic == &silhouettes_) return {real.cover, fake.cover};
+  if (&critic == &pictures_) return {real.colors, fake.colors};
+  return {real.maps, fake.maps};
 }
 
 nn::Var GanLearner::AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects,
@@ -138,18 +150,15 @@ nn::Var GanLearner::AdversarialLoss(GanCritic* critic, const GeneratedObjects& o
 Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const UpdateIndex& at,
                                                                     StepValues* out) {
   const GanStage stage = StageOf(at.step);
-  const std::uint64_t number = NumberOf(at, 0);
-  TILEGRAD_TRY(DrawReal(stage, number));
-  const GeneratedObjects objects = step_.Draw(
-      generator_, step_.Noise(kNoiseStream, number, config_.batch), stage, nn::Mode::kTrain);
-  fake_ = {objects.cover.value(), objects.colors.value(), objects.maps.value()};
+  TILEGRAD_TRY(DrawReal(at, 0));
+  const GeneratedObjects objects = Draw(at, 0);
   nn::Var loss;
   for (GanCritic* critic : Critics(stage)) {
     const nn::Var term = AdversarialLoss(critic, objects, out);
     loss = loss.has_context() ? loss + term : term;
   }
   if (stage == GanStage::kShape) loss = loss + step_.ShapeLoss(objects.shapes, &out->terms);
-  auto gradients = nn::Gradients(loss, Weights(stage).adam().parameters());
+  auto gradients = nn::Gradients(loss, Weights(stage).adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   out->loss = loss.item();
   const double norm = nn::GlobalNorm(context_, gradients);
@@ -162,23 +171,24 @@ Result<nn::StepVector<nn::Gradient>> GanLearner::GeneratorGradients(const Update
   out->terms.push_back({"gradient_generator", 0, norm});
   AddScores(out);
   out->also.emplace_back("learning_rate", Weights(stage).RateAt(StageStep(at.step)));
-  out->images = config_.batch * config_.views;
+  out->images = CountOf(at) * config_.views;
   return gradients;
 }
 
 Result<nn::StepVector<nn::Gradient>> GanLearner::Backward(const UpdateIndex& at, StepValues* out) {
   if (at.update == 0) return GeneratorGradients(at, out);
-  const GanStage stage = StageOf(at.step);
-  const auto critics = Critics(stage);
+  const auto critics = Critics(StageOf(at.step));
   const int round = (at.update - 1) / static_cast<int>(critics.size());
   const std::size_t which = static_cast<std::size_t>(at.update - 1) % critics.size();
-  const std::uint64_t number = NumberOf(at, round);
   if (round > 0 && which == 0) {
-    TILEGRAD_TRY(DrawReal(stage, number));
-    TILEGRAD_TRY(DrawFake(at, number));
+    TILEGRAD_TRY(DrawReal(at, round));
+    TILEGRAD_TRY(DrawFake(at, round));
   }
   GanCritic& critic = *critics[which];
-  return critic.Gradients(PairOf(critic), number, round == 0 ? &out->terms : nullptr);
+  return critic.Gradients(PairOf(critic, at.portion),
+                          {.number = NumberOf(at, round),
+                           .listener = at.listener,
+                           .terms = round == 0 ? &out->terms : nullptr});
 }
 
 Status GanLearner::Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) {
@@ -277,6 +287,17 @@ Status GanLearner::LoadState(const std::vector<nn::NamedTensor>& state, std::int
   if (maps_) TILEGRAD_TRY(maps_->LoadState(state, texture * updates));
   TILEGRAD_TRY(LoadKept(kept_, state));
   return nn::CopyByName(state, {{kScoresName, scores_}});
+}
+
+std::vector<nn::NamedTensor> GanLearner::Statistics() {
+  std::vector<nn::NamedTensor> out;
+  std::vector<nn::Module*> networks = {&generator_.shape(), &generator_.texture()};
+  for (GanCritic* critic : {&silhouettes_, &pictures_}) networks.push_back(&critic->network());
+  if (maps_) networks.push_back(&maps_->network());
+  for (nn::Module* network : networks) {
+    for (nn::NamedTensor& tensor : nn::Buffers(*network)) out.push_back(std::move(tensor));
+  }
+  return out;
 }
 
 Status GanLearner::StartAs(const std::vector<nn::NamedTensor>& state) {

@@ -42,6 +42,8 @@ class GanLearner {
 
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps);
+  // What Backward changes beside its gradients.
+  std::vector<nn::NamedTensor> Statistics();
   // With the shapes that a run kept.
   Status StartAs(const std::vector<nn::NamedTensor>& state);
 
@@ -56,12 +58,14 @@ class GanLearner {
   std::vector<GanCritic*> Critics(GanStage stage);
   std::int64_t StageStep(std::int64_t step) const;
   LearnedWeights& Weights(GanStage stage);
-  Status DrawReal(GanStage stage, std::uint64_t number);
-  Status DrawFake(const UpdateIndex& at, std::uint64_t number);
-  GanCritic::Pair PairOf(const GanCritic& critic) const;
+  Status DrawReal(const UpdateIndex& at, int round);
+  Status DrawFake(const UpdateIndex& at, int round);
+  GeneratedObjects Draw(const UpdateIndex& at, int round);
+  GanCritic::Pair PairOf(const GanCritic& critic, const Portion& portion) const;
   Result<nn::StepVector<nn::Gradient>> GeneratorGradients(const UpdateIndex& at, StepValues* out);
   nn::Var AdversarialLoss(GanCritic* critic, const GeneratedObjects& objects, StepValues* out);
   std::uint64_t NumberOf(const UpdateIndex& at, int round) const;
+  std::int64_t CountOf(const UpdateIndex& at) const { return config_.batch / at.portion.count; }
   Status Score(std::int64_t steps);
   Status FreezeShapes();
   void AddScores(StepValues* out) const;
@@ -76,10 +80,11 @@ class GanLearner {
   GanCritic silhouettes_, pictures_;
   std::optional<GanCritic> maps_;
   std::optional<GanWatch> watch_;
-  // Of the last update of the generator, or of this round of the critics.
-  struct Batch {
+  // Of the last update of the generator, or of this round of the critics, by portion.
+  struct Seen {
     nn::Tensor cover, colors, maps;
-  } real_, fake_;
+  };
+  std::vector<Seen> real_, fake_;
   // Best distance of each stage; distance, and spread of shapes and colours, when last looked at.
   enum { kBestShape, kBestTexture, kDistance, kShapes, kColors, kScores };
   nn::Tensor scores_;

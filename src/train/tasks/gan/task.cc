@@ -5,6 +5,7 @@
 #include "io/image_file.h"
 #include "nn/nn.h"
 #include "train/data/build/truth_mesh.h"
+#include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
 #include "train/tasks/gan/learner.h"
@@ -28,10 +29,15 @@ class GanTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
   RunHeader Header() override;
+  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
+    TILEGRAD_ASSIGN(const std::string own, DatasetFingerprint(data, workers));
+    return bank_ ? bank_->Fingerprint(own) : own;
+  }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   int Updates(std::int64_t step) const override { return learner_->Updates(step); }
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override { return learner_->Statistics(); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
     return learner_->Update(at, gradients);
   }
@@ -98,6 +104,7 @@ Status GanTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_ASSIGN(dataset_, Dataset::Open(start.data));
   const std::vector<int> train = dataset_->Select(Split::kTrain);
   if (train.empty())

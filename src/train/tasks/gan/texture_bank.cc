@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/rng.h"
 #include "train/predictor.h"
 #include "train/tasks/textured_image/model.h"
@@ -123,6 +124,13 @@ nn::Tensor TextureBank::Draw(nn::Context& context, std::uint64_t number, int cou
     }
   });
   return maps;
+}
+
+std::string TextureBank::Fingerprint(const std::string& with) const {
+  Hash both;
+  both.Add(with);
+  both.AddAll(bytes_);
+  return both.Text();
 }
 
 std::vector<float> TextureBank::Mean() const {

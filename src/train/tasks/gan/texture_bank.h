@@ -33,6 +33,8 @@ class TextureBank {
 
   // Maps of `count`, drawn by `number`: [count, 3, texture_size, map_width] in [0, 1].
   nn::Tensor Draw(nn::Context& context, std::uint64_t number, int count) const;
+  // Of the textures, and of a fingerprint that they belong to.
+  std::string Fingerprint(const std::string& with) const;
   std::vector<float> Mean() const;  // [3, texture_size, map_width]
   std::size_t size() const { return bytes_.size() / map_bytes_; }
 

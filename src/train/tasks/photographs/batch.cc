@@ -52,7 +52,7 @@ void AddKeypoints(nn::Context& context, PhotographBatch* batch) {
 
 PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
                                   const PhotoStore& store, const std::vector<int>& photographs,
-                                  std::int64_t step) {
+                                  std::int64_t first) {
   const auto b = static_cast<std::int64_t>(photographs.size());
   const std::int64_t s = store.size();
   const bool flow = config.network.texture == "flow";
@@ -67,15 +67,15 @@ PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig&
       const auto plane = static_cast<std::size_t>(s * s);
       Pixels pixels{std::vector<float>(3 * plane), std::vector<float>(plane), {}};
       const std::uint64_t position =
-          static_cast<std::uint64_t>(std::max<std::int64_t>(step, 0)) * photographs.size() + i;
+          static_cast<std::uint64_t>(std::max<std::int64_t>(first, 0)) + i;
       batch.crops[i] =
-          store.Cut(photographs[i], {seed, position, step >= 0, 0.5}, pixels.rgb, pixels.mask);
+          store.Cut(photographs[i], {seed, position, first >= 0, 0.5}, pixels.rgb, pixels.mask);
       if (flow) {
         pixels.barrier.resize(plane);
         DistanceBarrier(pixels.mask, static_cast<int>(s), pixels.barrier);
       }
       const bool cutout =
-          step >= 0 && Rng(seed ^ kCutoutStream, position).Uniform() < config.cutouts;
+          first >= 0 && Rng(seed ^ kCutoutStream, position).Uniform() < config.cutouts;
       Place<T>(std::move(pixels), cutout, i, &batch);
     });
   });

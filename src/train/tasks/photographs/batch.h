@@ -21,9 +21,10 @@ struct PhotographBatch {
   std::vector<CroppedPhoto> crops;       // [B]
 };
 
-// A random crop of each of `photographs` for step `step`, or with `step` < 0 the crop as it is.
+// A random crop of each of `photographs`, which follows from their places in the run: `first`,
+// first + 1, ..; or with `first` < 0 the crop as it is.
 PhotographBatch GatherPhotographs(nn::Context& context, const PhotographsConfig& config,
                                   const PhotoStore& store, const std::vector<int>& photographs,
-                                  std::int64_t step);
+                                  std::int64_t first);
 
 }  // namespace tilegrad::train

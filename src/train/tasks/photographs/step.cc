@@ -133,10 +133,10 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step,
 }
 
 Result<nn::StepVector<nn::Gradient>> PhotographStep::Backward(const PhotographBatch& batch,
-                                                              std::int64_t step,
+                                                              const UpdateIndex& at,
                                                               StepValues* values) {
-  const nn::Var loss = Loss(batch, step, &values->terms);
-  auto gradients = nn::Gradients(loss, weights_.adam().parameters());
+  const nn::Var loss = Loss(batch, at.step, &values->terms);
+  auto gradients = nn::Gradients(loss, weights_.adam().parameters(), at.listener);
   TILEGRAD_TRY(context_.TakeStatus());
   values->loss = loss.item();
   if (std::isfinite(values->loss) && nn::IsFinite(context_, gradients)) return gradients;

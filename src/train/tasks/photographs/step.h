@@ -9,6 +9,7 @@
 #include "train/run/step_values.h"
 #include "train/tasks/learned_weights.h"
 #include "train/tasks/photographs/batch.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::train {
 
@@ -20,7 +21,7 @@ class PhotographStep {
   // The total; appends each part, unweighted, with its weight to `terms`.
   nn::Var Loss(const PhotographBatch& batch, std::int64_t step, std::vector<LossTerm>* terms);
   // A loss or gradient that is not finite is an error.
-  Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, std::int64_t step,
+  Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, const UpdateIndex& at,
                                                 StepValues* values);
 
   PhotographNetwork& network() { return network_; }

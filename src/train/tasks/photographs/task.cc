@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
+#include "train/data/fingerprint.h"
 #include "train/predictor.h"
 #include "train/tasks/example_sheet.h"
 #include "train/tasks/photographs/evaluate.h"
@@ -34,11 +35,17 @@ class PhotographsTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }
   RunHeader Header() override;
+  Result<std::string> Fingerprint(const Path& /*data*/, const Workers& workers) const override {
+    return PhotographsFingerprint(set_, workers);
+  }
   Status Begin(const Path& run, std::int64_t first_step) override {
     return RememberPhotographs(run, set_, first_step == 0);
   }
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
+  Result<std::vector<nn::NamedTensor>> Statistics() override {
+    return nn::Buffers(step_->network().module());
+  }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
     return step_->weights().Update(gradients, at.step);
   }
@@ -86,6 +93,7 @@ Status PhotographsTask::Start(const TaskStart& start) {
   context_ = &start.context;
   config_.schedule = start.schedule;
   TILEGRAD_TRY(CheckConfig(config_));
+  TILEGRAD_TRY(CheckPortions(config_.batch, start.schedule.portions));
   TILEGRAD_ASSIGN(set_, OpenPhotographs(start.data));
   TILEGRAD_TRY(CheckCameras());
   const Workers& workers = start.context.workers();
@@ -112,17 +120,17 @@ RunHeader PhotographsTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> PhotographsTask::Backward(const UpdateIndex& at,
                                                                StepValues* out) {
+  const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
   std::vector<int> photographs;
-  for (const Sample& sample : order_->Batch(at.step, static_cast<int>(config_.batch), 1))
-    photographs.push_back(sample.model);
+  for (const Sample& sample : order_->Batch(slots, 1)) photographs.push_back(sample.model);
   const PhotographBatch batch =
-      GatherPhotographs(*context_, config_, *train_, photographs, at.step);
-  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at.step, out));
+      GatherPhotographs(*context_, config_, *train_, photographs, slots.first);
+  TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, out));
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_->count());
   out->also.emplace_back("learning_rate",
                          LearningRateAt(config_.optimizer, config_.schedule.steps, at.step));
-  out->images = config_.batch;
+  out->images = slots.count;
   return gradients;
 }
 

@@ -5,8 +5,10 @@
 #include "io/image_file.h"
 #include "nn/nn.h"
 #include "train/data/build/truth_mesh.h"
+#include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
+#include "train/tasks/classify/perceptual_network.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/textured_image/evaluate.h"
 #include "train/tasks/textured_image/held_out_views.h"
@@ -38,6 +40,14 @@ class TexturedImageTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return dataset_->info().image_size; }
   RunHeader Header() override;
+  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
+    TILEGRAD_ASSIGN(const std::string own, DatasetFingerprint(data, workers));
+    if (config_.adversary.perceptual == 0) return own;
+    TILEGRAD_ASSIGN(
+        const Path weights,
+        PerceptualWeights(*context_, {config_.adversary.network, config_.adversary.network_file}));
+    return WithFile(own, weights);
+  }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;

@@ -18,41 +18,6 @@ namespace {
 
 const ProgressSink kSilent = [](const Progress&) {};
 
-constexpr const char* kTinyGan = R"(name = "tiny"
-[task]
-kind = "gan"
-[network]
-noise = 6
-shape_noise = 4
-hidden = 8
-template_level = 1
-texture_size = 32
-texture_base = 2
-texture_most = 4
-[critic]
-base = 2
-halvings = 2
-updates = 2
-[stages]
-shape = 6
-[textures]
-count = 40
-[render]
-sharpness = 500
-[optimizer]
-average = 0.5
-[score]
-every = 4
-count = 8
-[schedule]
-steps = 12
-batch = 4
-log_every = 1
-sample_every = 12
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
-
 class GanTaskTest : public TempFolderTest {
  protected:
   GanTaskTest() : context_(workers_) {

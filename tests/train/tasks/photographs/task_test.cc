@@ -22,32 +22,6 @@ namespace {
 
 const ProgressSink kSilent = [](const Progress&) {};
 
-constexpr const char* kTiny = R"(name = "tiny"
-[task]
-kind = "photographs"
-[network]
-base = 4
-most = 8
-levels = 2
-latent = 12
-template_level = 1
-[photographs]
-size = 16
-[render]
-sharpness = 500
-sharpness_start = 100
-[optimizer]
-learning_rate = 2e-3
-average = 0.5
-[schedule]
-steps = 12
-batch = 4
-log_every = 1
-sample_every = 10
-checkpoint_every = 3
-keep_checkpoints = 2
-)";
-
 class PhotographsTask : public TempFolderTest {
  protected:
   PhotographsTask() { WriteMiniature(folder_ / "cub", "cub"); }
@@ -60,7 +34,7 @@ class PhotographsTask : public TempFolderTest {
   };
   Result<RunOutcome> Train(const std::string& run, const Changes& changes) {
     TrainJob job;
-    TILEGRAD_ASSIGN(job.config, ParseConfig(kTiny + changes.more, "tiny.toml"));
+    TILEGRAD_ASSIGN(job.config, ParseConfig(kTinyPhotographs + changes.more, "tiny.toml"));
     job.config.schedule.steps = changes.steps;
     job.extends = true;
     job.data = folder_ / changes.data, job.run = folder_ / run;
@@ -141,7 +115,7 @@ TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
 TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
   ASSERT_TRUE(Train("whole", {}).ok());
   TrainJob job;
-  job.config = ParseConfig(kTiny, "tiny.toml").value();
+  job.config = ParseConfig(kTinyPhotographs, "tiny.toml").value();
   job.data = folder_ / "cub", job.run = folder_ / "stopped";
   job.existing = ExistingRun::kContinue;
   int steps = 0;
@@ -159,7 +133,7 @@ TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
   WriteMiniature(folder_ / "p3d", "pascal3d");
   const auto trained = Train("p3d_run", {.data = "p3d"});
   ASSERT_TRUE(trained.ok()) << trained.status().message();
-  std::string config(kTiny);
+  std::string config(kTinyPhotographs);
   config.replace(config.find("size = 16"), 9, "size = 16\ncamera = \"predicted\"");
   TrainJob job;
   job.config = ParseConfig(config, "tiny.toml").value();
@@ -171,7 +145,7 @@ TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
 TEST_F(PhotographsTask, WhatDoesNotFitIsAnError) {
   ExpectMessage(Train("a", {.data = "none"}).status(), "no such folder");
   ExpectMessage(Train("b", {.more = "[loss]\nnone = 1\n"}).status(), "loss.none");
-  std::string config(kTiny);
+  std::string config(kTinyPhotographs);
   config.replace(config.find("levels = 2"), 10, "levels = 2\ntexture = \"paint\"");
   TrainJob job;
   job.config = ParseConfig(config, "tiny.toml").value();
@@ -201,7 +175,7 @@ TEST_F(PhotographsTask, GradientsOfAStep) {
     const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop_);
     nn::Context context(workers_, nn::DType::kF64);
     PhotographStep step(context, config, {set.mean_keypoints, 15});
-    const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 1);
+    const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
     std::vector<LossTerm> terms;
     auto parameters = nn::Parameters(step.network().module());
     std::vector<nn::Var> vars;
