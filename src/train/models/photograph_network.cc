@@ -99,7 +99,7 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
       texture_size_(image_size << config.enlarge),
       template_(Icosphere(static_cast<int>(config.template_level), 1)),
       uvs_(SphereUvs(template_)),
-      mean_(context, template_, {.symmetric = true}),
+      mean_(context, template_, {.smoothing = config.smoothing, .symmetric = true}),
       offsets_(context, template_, {.smoothing = config.smoothing, .symmetric = true}) {
   Rng rng(seed, /*stream=*/0x70686f74);
   const bool flow = config.texture == "flow";
