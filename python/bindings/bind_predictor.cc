@@ -11,6 +11,7 @@
 #include "fit/refine.h"
 #include "train/data/cutout.h"
 #include "train/predictor.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::python {
 
@@ -74,6 +75,7 @@ class Model {
     const auto side = static_cast<int>(py::reinterpret_borrow<py::array>(picture).shape(1));
     const auto refine = [&]() -> Result<train::RefinedMesh> {
       const std::scoped_lock lock(mutex_);
+      if (const Status status = predictor_.model().CheckRefinable(); !status.ok()) return status;
       auto meshes = predictor_.Predict(seen);
       if (!meshes.ok()) return meshes.status();
       return train::RefineMesh(meshes->front(), train::TargetsOfPlanar(planes, side),

@@ -138,6 +138,7 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
   if (network.pictures) TILEGRAD_TRY(WarnOfUnlike(*network.pictures, cutout, file));
   TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
   if (options.refine > 0) {
+    TILEGRAD_TRY(predictor.model().CheckRefinable());
     const Status refined = Refine(options, cutout, match, &meshes[0], workers);
     if (!refined.ok()) return refined.Within(file);
   }

@@ -38,7 +38,7 @@ constexpr double kFinalRate = 0.1;       // of the first, by a half cosine
 // World units and colours a step. Positions and colours go through diffusion, so that what the
 // picture does not show follows its neighbours; the movement's Laplacian holds it in shape.
 constexpr double kPositionRate = 0.02 * static_cast<double>(kPredictionHalfExtent);
-constexpr double kColorRate = 0.06, kSmoothing = 8, kColorSmoothing = 0.5;
+constexpr double kColorRate = 0.06, kTexelRate = 0.02, kSmoothing = 8, kColorSmoothing = 0.5;
 // The outline beside colours, whose loss counts pixels without the object as well: at 1 the shape
 // follows highlights and patterns at the outline's cost.
 constexpr double kSilhouetteWeight = 10;
@@ -70,11 +70,13 @@ std::pair<TargetImages, int> AtMost(const TargetImages& picture, int side) {
   return {factor == 1 ? picture : Reduce(picture, factor), factor};
 }
 
-FitterOptions Options() {
+FitterOptions OptionsFor(const FitScene& scene) {
   FitterOptions out;
-  for (const Parameter p : {Parameter::kPositions, Parameter::kColors, Parameter::kCamera})
+  const Parameter paint = scene.texture.empty() ? Parameter::kColors : Parameter::kTexture;
+  for (const Parameter p : {Parameter::kPositions, paint, Parameter::kCamera})
     out.parameters[p] = true;
-  out.rates[Parameter::kPositions] = kPositionRate, out.rates[Parameter::kColors] = kColorRate;
+  out.rates[Parameter::kPositions] = kPositionRate;
+  out.rates[Parameter::kColors] = kColorRate, out.rates[Parameter::kTexture] = kTexelRate;
   out.loss.silhouette_weight = kSilhouetteWeight;
   out.regularizers = kRegularizers;
   out.smoothing = kSmoothing, out.color_smoothing = kColorSmoothing;
@@ -87,7 +89,8 @@ class Descent {
   static Result<Descent> Make(FitScene scene, const Camera& camera, const TargetImages& picture,
                               const Workers& workers) {
     scene.cameras = {camera, MirroredCamera(camera, picture.width)};
-    TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(scene), Options(), workers));
+    const FitterOptions options = OptionsFor(scene);
+    TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(scene), options, workers));
     return Descent(std::move(fitter), picture);
   }
 
@@ -203,10 +206,9 @@ Status Normalize(Mesh* mesh, Camera* camera) {
 
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers) {
-  if (!prediction.textures.empty())
-    return InvalidArgument("predictions with a texture map are not refined: use --refine 0");
   const bool coarse = prediction.positions.size() < kCoarse;
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(coarse ? Subdivided(prediction) : prediction));
+  scene.wrap = Wrap::kRepeatClamp;  // maps in longitude and latitude
   const auto [small, factor] = AtMost(picture, kSearchSide);
   TILEGRAD_ASSIGN(const auto found, FindCameras(scene, small, options.camera, workers));
   const std::vector<FoundCamera> cameras = Candidates(found, factor);

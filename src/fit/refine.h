@@ -29,17 +29,16 @@ struct PictureMatch {
 };
 
 struct RefinedMesh {
-  Mesh mesh;             // normalised as predictions are; vertex colours in [0, 1]
+  Mesh mesh;             // normalised as predictions are; with the prediction's kind of colours
   Camera camera;         // sees it as the picture shows it; of pixels of the picture
   Camera camera_before;  // the best that was found for the prediction
   PictureMatch before, after;
 };
 
-// `picture`: one square image. `prediction`: a mesh with vertex colours, normalised as predictions
-// are, y up. Faces of a coarse mesh are divided once, so that the result may have more
-// vertices than the prediction. A pure function of its arguments; any number of workers gives the
-// same bits. Errors: a picture without an object; a prediction with a texture map; those of the
-// renderer.
+// `picture`: one square image. `prediction`: a mesh with vertex colours or one texture map,
+// normalised as predictions are, y up. Faces of a coarse mesh are divided once, so that the result
+// may have more vertices than the prediction. A pure function of its arguments; any number of
+// workers gives the same bits. Errors: a picture without an object; those of the renderer.
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers);
 

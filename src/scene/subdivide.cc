@@ -25,9 +25,29 @@ std::vector<Face> SplitFaces(const std::vector<Face>& faces,
   return out;
 }
 
+namespace {
+
+// In the order of SplitFaces.
+std::vector<glm::vec2> SplitCorners(const std::vector<glm::vec2>& uvs) {
+  std::vector<glm::vec2> out;
+  out.reserve(uvs.size() * 4);
+  for (std::size_t i = 0; i < uvs.size(); i += 3) {
+    const glm::vec2 a = uvs[i], b = uvs[i + 1], c = uvs[i + 2];
+    const glm::vec2 ab = 0.5f * (a + b), bc = 0.5f * (b + c), ca = 0.5f * (c + a);
+    out.insert(out.end(), {a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca});
+  }
+  return out;
+}
+
+}  // namespace
+
 Mesh Subdivided(const Mesh& mesh) {
   Mesh out;
   out.positions = mesh.positions, out.colors = mesh.colors;
+  if (mesh.materials.size() == 1) {
+    out.corner_uvs = SplitCorners(mesh.corner_uvs);
+    out.materials = mesh.materials, out.textures = mesh.textures;
+  }
   out.faces = SplitFaces(mesh.faces, [&](std::int32_t a, std::int32_t b) {
     const auto i = static_cast<std::size_t>(a), j = static_cast<std::size_t>(b);
     out.positions.push_back(0.5f * (out.positions[i] + out.positions[j]));

@@ -12,8 +12,8 @@ namespace tilegrad {
 std::vector<Face> SplitFaces(const std::vector<Face>& faces,
                              FunctionRef<std::int32_t(std::int32_t a, std::int32_t b)> middle);
 
-// `mesh` with every face divided; new positions and vertex colours are the means of their edge's
-// ends. Positions, faces and vertex colours only: other arrays are left out.
+// `mesh` with every face divided; new positions, vertex colours and texture coordinates are the
+// means of their edge's ends. A single material and its textures stay; other arrays are left out.
 Mesh Subdivided(const Mesh& mesh);
 
 }  // namespace tilegrad

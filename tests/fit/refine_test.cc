@@ -10,6 +10,7 @@
 #include "fit/input.h"
 #include "render/picture/mesh_pictures.h"
 #include "scene/shapes.h"
+#include "scene/sphere_uv.h"
 
 namespace tilegrad::train {
 namespace {
@@ -149,13 +150,28 @@ TEST(RefineMesh, APictureWithoutAnObjectIsAnError) {
   EXPECT_NE(refined.status().message().find("no object"), std::string::npos);
 }
 
-TEST(RefineMesh, ATextureMapIsAnError) {
+// A grey map in longitude and latitude takes the picture's colours, on both sides.
+TEST(RefineMesh, PaintsATextureMap) {
+  const Workers workers(2);
   Mesh mesh = Figure({0.4f, 0.35f, 0.4f});
-  mesh.textures = {{"map", ImageU8(2, 2, 3)}};
+  mesh.colors.clear();
+  mesh.corner_uvs = SphereUvs(Icosphere(3, 1));
+  ImageU8 grey(32, 32, 3);
+  std::ranges::fill(grey.pixels, std::uint8_t{128});
+  mesh.textures = {{"map", grey}};
+  mesh.materials = {{.name = "map", .base_color_texture = 0}};
   const TargetImages picture = PictureOf(Figure({0.3f, 0.2f, 0.4f}), CameraAt(30));
-  const auto refined = RefineMesh(mesh, picture, {.steps = 5}, Workers(1));
-  ASSERT_FALSE(refined.ok());
-  EXPECT_NE(refined.status().message().find("--refine 0"), std::string::npos);
+  const auto refined = RefineMesh(mesh, picture, {.steps = 200}, workers);
+  ASSERT_TRUE(refined.ok()) << refined.status().message();
+  EXPECT_GT(refined->after.silhouette_iou, 0.95);
+  EXPECT_GT(refined->before.color_l1, 0.15);
+  EXPECT_LT(refined->after.color_l1, 0.06);
+  EXPECT_TRUE(Validate(refined->mesh).ok());
+  EXPECT_EQ(refined->mesh.positions.size(), 2562u);
+  EXPECT_TRUE(refined->mesh.colors.empty());
+  // Blue above: the first rows of the map, from u = 0 to u = 1.
+  const ImageU8& map = refined->mesh.textures[0].image;
+  for (int x = 0; x < 32; x += 4) EXPECT_GT(map.at(x, 10)[2], map.at(x, 10)[0]) << x;
 }
 
 }  // namespace

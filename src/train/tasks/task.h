@@ -59,6 +59,8 @@ class Model {
   // images: [N][4][size][size] planar RGBA bytes, RGB over black, of the size it was trained on;
   // N at most kImagesAtOnce. Appends N valid meshes. InvalidArgument of a task that predicts none.
   virtual Status Predict(std::span<const std::uint8_t> images, std::vector<Mesh>* meshes);
+  // Why a prediction cannot be refined on its picture (fit/refine.h), if so.
+  virtual Status CheckRefinable() const { return {}; }
 
   static constexpr std::size_t kImagesAtOnce = 32;  // bounds the memory of activations
 };

@@ -84,6 +84,10 @@ Result<std::vector<PredictedObject>> PredictObjects(nn::Context& context, Textur
   return objects;
 }
 
+Status TexturedModel::CheckRefinable() const {
+  return InvalidArgument("predictions of texture and light are not refined: use --refine 0");
+}
+
 Result<std::unique_ptr<Model>> LoadTexturedModel(nn::Context& context,
                                                  const TexturedImageConfig& config,
                                                  const Checkpoint& checkpoint) {

@@ -26,6 +26,8 @@ class TexturedModel : public Model {
   virtual Result<std::vector<PredictedObject>> PredictObjects(
       std::span<const std::uint8_t> images) = 0;
   virtual const TexturedImageConfig& config() const = 0;
+  // Refined colours would be those of the picture, its light included.
+  Status CheckRefinable() const override;
 };
 
 // Meshes have the template's faces, positions with largest half-extent 0.45, centred, and one
