@@ -27,13 +27,13 @@ struct PhotographNetworkConfig {
   std::string texture = "direct";   // or "flow"
   bool symmetric_texture = true;    // the map is its mirror image at x = 0
   std::int64_t template_level = 3;  // subdivisions of the icosahedron
-  std::int64_t smoothing = 2;       // OffsetRules, of movements
+  std::int64_t smoothing = 2;       // OffsetRules, of movements and mean shape
   double output_deviation = 1e-4;   // the head of movements starts as N(0, this^2)
 };
 
 // What the mean shape starts as: the convex hull of `keypoints` (PhotographSet::mean_keypoints), to
-// which its vertices go from the middle; a sphere without any. `count` keypoints are learned, each
-// from the vertices near to its place.
+// which its vertices go from the middle; a sphere without any. It is smoothed as movements are.
+// `count` keypoints are learned, each from the vertices near to its place.
 struct PhotographStart {
   std::vector<std::array<double, 3>> keypoints = {};
   std::size_t count =

@@ -28,8 +28,14 @@ inline std::vector<std::array<double, 3>> MiniatureShape(const std::vector<int>&
   return out;
 }
 
-// A random view of the shape, the whole of it within a picture of width x height.
-inline Photograph MiniaturePhoto(const PhotographSet& set, int index, int width, int height) {
+struct MiniatureSize {
+  int train = 10, test = 3, width = 60, height = 48;
+  double stretch = 0;  // lengths differ by up to this either way, as the green of the bars tells
+};
+
+// A random view of the shape, the whole of it within the picture.
+inline Photograph MiniaturePhoto(const PhotographSet& set, int index, const MiniatureSize& size) {
+  const auto [width, height] = std::pair(size.width, size.height);
   Rng rng(7, static_cast<std::uint64_t>(index));
   Photograph photo;
   photo.id = "001.Bar/bar_" + std::to_string(index) + ".png";
@@ -39,7 +45,9 @@ inline Photograph MiniaturePhoto(const PhotographSet& set, int index, int width,
   photo.mask = {width, height, std::vector<bool>(static_cast<std::size_t>(width * height))};
   photo.box = {1e9, 1e9, -1e9, -1e9};
   for (std::size_t k = 0; k < set.mean_keypoints.size(); ++k) {
-    const auto seen = ProjectWeakly(*photo.camera, set.mean_keypoints[k]);
+    auto p = set.mean_keypoints[k];
+    p[2] *= 1 + size.stretch * (index % 10 - 4.5) / 4.5;
+    const auto seen = ProjectWeakly(*photo.camera, p);
     photo.keypoints.push_back({seen[0], seen[1], rng.Uniform() < 0.8});
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
@@ -67,10 +75,6 @@ inline ImageU8 MiniaturePicture(const Photograph& photo, int index) {
   return image;
 }
 
-struct MiniatureSize {
-  int train = 10, test = 3, width = 60, height = 48;
-};
-
 // source: "cub" or "pascal3d". Writes pictures and annotations to `folder` as its owners have them.
 inline PhotographSet WriteMiniature(const Path& folder, const std::string& source,
                                     const MiniatureSize& size = {}) {
@@ -83,7 +87,7 @@ inline PhotographSet WriteMiniature(const Path& folder, const std::string& sourc
   set.mean_keypoints = MiniatureShape(set.mirror);
   const Path pictures = folder / (cub ? "CUB_200_2011/images" : "PASCAL3D+_release1.1/Images");
   for (int i = 0; i < size.train + size.test; ++i) {
-    Photograph photo = MiniaturePhoto(set, i, size.width, size.height);
+    Photograph photo = MiniaturePhoto(set, i, size);
     photo.split = i < size.train ? Split::kTrain : Split::kTest;
     photo.image = pictures / photo.id;
     std::filesystem::create_directories(photo.image.parent_path());

@@ -207,7 +207,7 @@ class PhotoFolderTest : public PhotographsTest {
     set_.mean_keypoints = MiniatureShape(set_.mirror);
     std::string places;
     for (int i = 0; i < count; ++i) {
-      const Photograph photo = MiniaturePhoto(set_, i, 60, 48);
+      const Photograph photo = MiniaturePhoto(set_, i, {});
       const ImageU8 rgb = MiniaturePicture(photo, i);
       ImageU8 rgba(60, 48, 4);
       for (int y = 0; y < 48; ++y) {
