@@ -38,7 +38,7 @@ constexpr double kFinalRate = 0.1;       // of the first, by a half cosine
 // World units and colours a step. Positions and colours go through diffusion, so that what the
 // picture does not show follows its neighbours; the movement's Laplacian holds it in shape.
 constexpr double kPositionRate = 0.02 * static_cast<double>(kPredictionHalfExtent);
-constexpr double kColorRate = 0.06, kTexelRate = 0.02, kSmoothing = 8, kColorSmoothing = 0.5;
+constexpr double kColorRate = 0.06, kTexelRate = 0.005, kSmoothing = 8, kColorSmoothing = 0.5;
 // The outline beside colours, whose loss counts pixels without the object as well: at 1 the shape
 // follows highlights and patterns at the outline's cost.
 constexpr double kSilhouetteWeight = 10;
