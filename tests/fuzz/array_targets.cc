@@ -2,6 +2,7 @@
 // Readers of arrays and archives.
 #include "base/read_budget.h"
 #include "fuzz/target.h"
+#include "io/mat/mat_file.h"
 #include "io/npz.h"
 #include "io/sh3f.h"
 #include "nn/serialize.h"
@@ -122,7 +123,53 @@ std::vector<Bytes> SafetensorsSeeds() {
           *nn::EncodeSafetensors({})};
 }
 
+// An array as the reader makes it: its elements and numbers fit its dims.
+void CheckMat(const io::MatArray& array) {
+  const bool structs = array.kind == io::MatKind::kStruct;
+  const std::size_t each = structs ? array.fields.size() : array.kind == io::MatKind::kCell;
+  Require(array.elements.size() == each * array.places(), "an array has its elements");
+  if (array.kind == io::MatKind::kNumbers) {
+    Require(array.numbers.size() == array.places(), "an array has its numbers");
+  }
+  for (const io::MatArray& element : array.elements) CheckMat(element);
+}
+
+// Every variable as annotations are read: fields by their names, numbers and text.
+void WalkMat(const io::MatFile& file) {
+  for (const auto& [name, array] : file.variables) {
+    const auto place = io::MatPlace::Variable(file, name);
+    if (!place.ok()) return Require(!place.status().message().empty(), "an error has a message");
+    for (const std::string& field : place->array().fields) {
+      const auto inner = place->Field(0, field);
+      if (!inner.ok()) continue;
+      (void)inner->Number(), (void)inner->Text(), (void)inner->Numbers(4);
+    }
+  }
+}
+
+void Mat(Input input) {
+  const ReadBudget budget(kBudget);
+  const auto file = io::ReadMat(input, "a.mat");
+  if (!file.ok()) return Require(!file.status().message().empty(), "an error has a message");
+  for (const auto& [name, array] : file->variables) CheckMat(array);
+  WalkMat(*file);
+  const auto again = io::ReadMat(io::EncodeMat(file->variables, io::MatPacking::kPlain), "again");
+  Require(again.ok() && again->variables.size() == file->variables.size(),
+          "what was written comes back");
+}
+
+std::vector<Bytes> MatSeeds() {
+  using io::MatArray;
+  const io::MatVariables birds = {
+      {"images", MatArray::Structs({"rel_path", "mask", "bbox"},
+                                   {MatArray::Text("a.jpg"), MatArray::Mask(2, 2, {1, 0, 1, 1}),
+                                    MatArray::Structs({"x1"}, {MatArray::Number(0.25)})})},
+      {"S", MatArray::Numbers({3, 1}, std::vector<double>{0.5, -1, 1e-300})}};
+  return {io::EncodeMat(birds, io::MatPacking::kPlain), io::EncodeMat(birds)};
+}
+
 const Registration kTargets[] = {
+    Registration({"mat", Mat, MatSeeds}),
     Registration({"npy", Npy, NpySeeds}),
     Registration({"npz", Npz, NpzSeeds}),
     Registration({"zip", Zip, ZipSeeds}),

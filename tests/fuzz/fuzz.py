@@ -116,7 +116,7 @@ def main():
     parser.add_argument("seconds", type=int, nargs="?", default=20)
     parser.add_argument("targets", nargs="*")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     known = programs(arguments.build)
     unknown = [t for t in arguments.targets if t not in known]
     if unknown:

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers of what a run, a dataset or a fit is made of.
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/read_budget.h"
 #include "fit/transforms.h"
 #include "fuzz/target.h"
+#include "io/image_file.h"
 #include "train/config.h"
 #include "train/data/dataset_files.h"
+#include "train/data/photographs/photographs.h"
 #include "train/eval/evaluation.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
@@ -14,7 +17,10 @@
 namespace tilegrad::fuzz {
 namespace {
 
+using Json = nlohmann::json;
+
 constexpr std::size_t kBudget = std::size_t{64} << 20;
+constexpr int kPictures = 9;
 
 template <class T>
 void CheckMessage(const Result<T>& result) {
@@ -161,7 +167,65 @@ std::vector<Bytes> EvaluationSeeds() {
   return {ToBytes(train::EvaluationJson(e).dump())};
 }
 
+// keypoints.json beside nine pictures, and behind it, where there is more, transforms.json.
+const Path& PhotoFolder() {
+  static const Path folder = [] {
+    const Path path = ScratchFolder() / "photographs";
+    std::filesystem::create_directories(path);
+    for (int i = 0; i < kPictures; ++i) {
+      const ImageU8 picture(8, 8, 4, 255);
+      Require(io::SavePng(path / (std::to_string(i) + ".png"), picture).ok(), "a picture");
+    }
+    return path;
+  }();
+  return folder;
+}
+
+void Photographs(Input input) {
+  const auto files = SplitFiles(input);
+  const Path& folder = PhotoFolder();
+  PutFile("photographs/keypoints.json", files[0]);
+  std::filesystem::remove(folder / "transforms.json");
+  if (files.size() > 1) PutFile("photographs/transforms.json", files[1]);
+  const auto set = train::OpenPhotoFolder(folder);
+  CheckMessage(set);
+  if (!set.ok()) return;
+  for (const train::Photograph& photo : (**set).photographs) {
+    Require(photo.keypoints.size() == (**set).keypoint_names.size(), "every keypoint has a place");
+    Require(photo.camera.has_value(), "keypoints give cameras");
+    Require(std::isfinite(photo.camera->scale), "a camera is finite");
+    for (const double x : photo.camera->translation) Require(std::isfinite(x), "a finite shift");
+  }
+  for (const auto& place : (**set).mean_keypoints) {
+    for (const double x : place) Require(std::isfinite(x), "a mean keypoint is finite");
+  }
+}
+
+// Five points that turn around the middle of the pictures.
+std::vector<Bytes> PhotographsSeeds() {
+  Json places, frames;
+  for (int i = 0; i < kPictures; ++i) {
+    const double a = 0.6 * i, c = std::cos(a), s = std::sin(a);
+    const std::string name = std::to_string(i) + ".png";
+    for (int k = 0; k < 5; ++k) {
+      const double x = std::cos(2.1 * k), y = std::sin(2.7 * k), z = std::cos(1.3 * k);
+      places[name].push_back({4 + 2 * (c * x + s * z), 4 + y});
+    }
+    if (i == 2) places[name][4] = nullptr;
+    frames.push_back(
+        {{"file_path", name},
+         {"transform_matrix", {{c, 0, s, 4 * s}, {0, 1, 0, 0}, {-s, 0, c, 4 * c}, {0, 0, 0, 1}}}});
+  }
+  const Json keypoints = {{"names", {"a", "b", "c", "d", "e"}},
+                          {"mirror", {{"a", "b"}}},
+                          {"up", {{"c", "d"}}},
+                          {"photographs", places}};
+  const Json cameras = {{"camera_angle_x", 0.7}, {"w", 8}, {"h", 8}, {"frames", frames}};
+  return {ToBytes(keypoints.dump()), JoinFiles({keypoints.dump(), cameras.dump()})};
+}
+
 const Registration kTargets[] = {
+    Registration({"photographs", Photographs, PhotographsSeeds}),
     Registration({"config", Config, ConfigSeeds}),
     Registration({"transforms", Transforms, TransformsSeeds}),
     Registration({"checkpoint", Checkpoint, CheckpointSeeds}),
