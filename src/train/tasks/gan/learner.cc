@@ -15,7 +15,6 @@ constexpr std::uint64_t kNoiseStream = 0x6e6f697365, kScoreStream = 0x73636f7265
 constexpr std::uint64_t kScoreNumber = std::uint64_t{1} << 40;  // apart from those of steps
 constexpr float kNoScore = 1e30f;
 constexpr double kCollapsed = 0.3;  // of the true pictures' spread
-const std::string kShapePrefix = "shape.", kTexturePrefix = "texture.", kScoresName = "scores";
 
 std::uint64_t SeedOf(const GanConfig& config) {
   return static_cast<std::uint64_t>(config.schedule.seed);
@@ -262,42 +261,6 @@ void GanLearner::AddScores(StepValues* out) const {
 
 std::int64_t GanLearner::parameters() {
   return nn::CountParameters(generator_.shape()) + nn::CountParameters(generator_.texture());
-}
-
-std::vector<nn::NamedTensor> GanLearner::State() {
-  std::vector<nn::NamedTensor> out = WithPrefix(kShapePrefix, shape_.State());
-  const auto add = [&](std::vector<nn::NamedTensor> more) {
-    for (nn::NamedTensor& tensor : more) out.push_back(std::move(tensor));
-  };
-  add(WithPrefix(kTexturePrefix, texture_.State()));
-  for (GanCritic* critic : {&silhouettes_, &pictures_}) add(critic->State());
-  if (maps_) add(maps_->State());
-  add(KeptState(kept_));
-  out.push_back({kScoresName, scores_});
-  return out;
-}
-
-Status GanLearner::LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) {
-  const std::int64_t shape = std::min(steps, config_.shape_steps), texture = steps - shape;
-  const std::int64_t updates = config_.critic.updates;
-  TILEGRAD_TRY(shape_.LoadState(OfPrefix(kShapePrefix, state), shape));
-  TILEGRAD_TRY(texture_.LoadState(OfPrefix(kTexturePrefix, state), texture));
-  TILEGRAD_TRY(silhouettes_.LoadState(state, shape * updates));
-  TILEGRAD_TRY(pictures_.LoadState(state, texture * updates));
-  if (maps_) TILEGRAD_TRY(maps_->LoadState(state, texture * updates));
-  TILEGRAD_TRY(LoadKept(kept_, state));
-  return nn::CopyByName(state, {{kScoresName, scores_}});
-}
-
-std::vector<nn::NamedTensor> GanLearner::Statistics() {
-  std::vector<nn::NamedTensor> out;
-  std::vector<nn::Module*> networks = {&generator_.shape(), &generator_.texture()};
-  for (GanCritic* critic : {&silhouettes_, &pictures_}) networks.push_back(&critic->network());
-  if (maps_) networks.push_back(&maps_->network());
-  for (nn::Module* network : networks) {
-    for (nn::NamedTensor& tensor : nn::Buffers(*network)) out.push_back(std::move(tensor));
-  }
-  return out;
 }
 
 Status GanLearner::StartAs(const std::vector<nn::NamedTensor>& state) {
