@@ -9,6 +9,7 @@
 #include "scene/sphere_uv.h"
 #include "train/models/mesh_network.h"
 #include "train/models/mirror_columns.h"
+#include "train/models/palette.h"
 
 namespace tilegrad::train {
 namespace {
@@ -162,11 +163,12 @@ void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
   all_.paint.Add<nn::Activation>("act1", &nn::LeakyRelu02);
   add("2", width, width);
   all_.paint.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  add("3", width, kPaintNumbers);
+  add("3", width, kPaintNumbers + (config_.palette > 0 ? 1 + config_.palette : 0));
 }
 
-// A mixture of three colours: what the picture shows at the texel and at its mirror image, without
-// the predicted light and then brighter or darker, and what the network makes up. Were the light
+// A mixture of colours: what the picture shows at the texel and at its mirror image, without
+// the predicted light and then brighter or darker, what the network makes up, and that
+// of the texel's paint (palette.h). Were the light
 // left in it, textures would explain their own pictures best under no light at all.
 nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
                                 const PredictedObjects& objects, nn::Mode mode) {
@@ -174,11 +176,20 @@ nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
   const PictureLookup::Job job{images, objects.positions.value(), objects.pose.value(), light};
   const nn::Var seen = nn::Constant(context_, coarse_->Look(context_, job));
   const nn::Var raw = all_.paint.Forward(nn::Concat({map, seen}, 1), mode);
-  const nn::Var shares = nn::Softmax(nn::Slice(raw, 1, 0, 3), 1);
+  const std::int64_t paints = config_.palette;
+  const nn::Var shares =
+      nn::Softmax(paints == 0 ? nn::Slice(raw, 1, 0, 3)
+                              : nn::Concat({nn::Slice(raw, 1, 0, 3), nn::Slice(raw, 1, 8, 9)}, 1),
+                  1);
   const nn::Var unlit =
       nn::Concat({nn::Slice(seen, 1, 5, 6), nn::Slice(seen, 1, 11, 12)}, 1);  // ln 1 / light
   const nn::Var looked = nn::Slice(shares, 1, 0, 2) * nn::Exp(nn::Slice(raw, 1, 3, 5) + unlit);
-  const nn::Var made = nn::Slice(shares, 1, 2, 3) * nn::Sigmoid(nn::Slice(raw, 1, 5, 8));
+  const nn::Var guess = nn::Sigmoid(nn::Slice(raw, 1, 5, 8));
+  nn::Var made = nn::Slice(shares, 1, 2, 3) * guess;
+  if (paints > 0) {
+    const nn::Var kinds = nn::Softmax(nn::Slice(raw, 1, 9, 9 + paints), 1);
+    made = made + nn::Slice(shares, 1, 3, 4) * PaletteColors(kinds, seen.value(), guess);
+  }
   const nn::Var all = nn::Resize(nn::Concat({looked, made}, 1), {texture_size_, texture_size_},
                                  nn::ResizeMode::kBilinear);
   const nn::Var colors = nn::Constant(context_, fine_->Colors(context_, job));

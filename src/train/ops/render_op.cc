@@ -14,8 +14,6 @@ constexpr std::size_t kCameraNumbers = 16;
 
 Renderer& RendererOf(SceneRenderer& r, float) { return r.renderer; }
 RendererT<double>& RendererOf(SceneRenderer& r, double) { return r.renderer64; }
-Frame& FrameOf(SceneRenderer& r, float) { return r.frame; }
-FrameT<double>& FrameOf(SceneRenderer& r, double) { return r.frame64; }
 
 // The inputs in the order of SceneVars.
 enum Slot { kPositions, kColors, kTextures, kLights, kShininess, kSh, kCameras, kSlots };
@@ -160,7 +158,8 @@ Status BatchRender<T>::Forward() {
   textures_.resize(images), surfaces_.resize(images), lights_.resize(images);
   std::vector<SceneT<T>> scenes;
   for (std::size_t n = 0; n < images; ++n) scenes.push_back(SceneOf(n));
-  return renderer_.Render(scenes, job_.options, {.attributes = false}, &frame_);
+  return renderer_.Render(scenes, job_.options, {.attributes = false, .normals = job_.normals},
+                          &frame_);
 }
 
 // Views of one mesh are given the same arrays, which get their sum in view order.

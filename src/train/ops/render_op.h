@@ -31,6 +31,7 @@ struct RenderJob {
   std::vector<Camera> cameras;            // [N]: mesh b has cameras [b * views, (b + 1) * views)
   int views = 1;
   RenderOptions options{};
+  bool normals = false;  // draw them, too, into the renderer's frame (FrameOf)
   // [F,3,2] of corners, with SceneVars::textures; must outlive the tape.
   std::span<const float> uvs{};
   Wrap wrap = Wrap::kRepeat;
@@ -55,6 +56,9 @@ struct SceneRenderer {
   Frame frame;
   FrameT<double> frame64;
 };
+
+inline Frame& FrameOf(SceneRenderer& r, float) { return r.frame; }
+inline FrameT<double>& FrameOf(SceneRenderer& r, double) { return r.frame64; }
 
 // All tensors are of one type; f64 renders with the scalar reference (for proofs). Errors of shapes
 // and of the renderer reach the context's status. One call of `renderer` at a time, backward

@@ -21,6 +21,8 @@ ConfigFields FieldsOf(TextureNetworkConfig* c) {
         {"network.lookup", &c->lookup, 0, 1,
          "texels are looked up in the picture, too, by a camera that the network learns to say"},
         {"network.lookup_width", &c->lookup_width, 1, 4096, "channels of the layers that mix them"},
+        {"network.palette", &c->palette, 0, 64,
+         "paints that texels are shared out among, whose colours are read from the picture"},
         OutputDeviation(&c->output_deviation)}});
 }
 
@@ -34,6 +36,8 @@ ConfigFields FieldsOf(ColorRule* c) {
       {"loss.color_soft_until", &c->soft_until, 0, 1, "share of the run after which none do"},
       {"loss.color_own", &c->own, 0, 1,
        "weight of colours in a picture's own view, beside those in the other one"},
+      {"loss.light", &c->light, 0, kNoLimit,
+       "weight of the distance to the light that explains a picture best; light.model lambert"},
       {"loss.pose", &c->pose, 0, kNoLimit, "weight of the camera's error; network.lookup"},
   };
 }

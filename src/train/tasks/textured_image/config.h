@@ -19,7 +19,8 @@ struct ColorRule {
   // Of the view that a texture was predicted from, beside the other one. There a texture that has
   // the picture's shading in it is no worse than one without.
   double own = 1;
-  double pose = 1;  // of the mean square error of Pose, which is learned from the known cameras
+  double light = 0;  // of the mean square distance to the light that LightSearch finds
+  double pose = 1;   // of the mean square error of Pose, which is learned from the known cameras
 };
 
 struct TexturedImageConfig {

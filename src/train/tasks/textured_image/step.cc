@@ -73,6 +73,7 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
       renderer_(context.workers()),
+      light_targets_(context, config.light.spread, config.light.ambient),
       rival_renderer_(context.workers()) {}
 
 RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
@@ -130,6 +131,10 @@ double TexturedStep::ShareOfRun(std::int64_t step) const {
   return static_cast<double>(step) / static_cast<double>(config_.schedule.steps);
 }
 
+bool TexturedStep::LearnsLights() const {
+  return config_.color.light > 0 && LightingOf(config_.light) == Lighting::kLambert;
+}
+
 LossConfig TexturedStep::WeightsAt(std::int64_t step) const {
   LossConfig weights = config_.loss;
   if (ShareOfRun(step) < config_.color.from) weights.color = 0;
@@ -185,6 +190,12 @@ nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) 
   return nn::Mean(nn::Square(pose - nn::Constant(context_, std::move(truth))));
 }
 
+nn::Var TexturedStep::LightLoss(const PredictedObjects& objects, const TexturedBatch& batch) {
+  nn::Tensor targets = light_targets_.Find(objects, batch, JobAt(batch, config_.schedule.steps));
+  if (targets.empty()) return {};
+  return nn::Mean(nn::Square(objects.directions - nn::Constant(context_, std::move(targets))));
+}
+
 nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,
                            std::int64_t step, TexturedLossValues* values) {
   const PredictedObjects& objects = renders.objects;
@@ -203,6 +214,12 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
     const nn::Var pose = PoseLoss(objects.pose, batch);
     total = total + config_.color.pose * pose;
     values->pose = pose.item(), values->total = total.item();
+  }
+  if (LearnsLights() && ShareOfRun(step) >= config_.color.from) {
+    const nn::Var light = LightLoss(objects, batch);
+    if (!light.valid()) return light;
+    total = total + config_.color.light * light;
+    values->light = light.item(), values->total = total.item();
   }
   if (adversary_ != nullptr) {
     const nn::Var more = AdversaryLoss(renders.images, batch, &values->adversary);
@@ -226,6 +243,7 @@ void TexturedStep::AddTerms(const TexturedLossValues& v, std::int64_t step,
   terms->push_back({"smoothness", w.smoothness, v.smoothness});
   terms->push_back({"laplacian", w.laplacian, v.laplacian});
   if (config_.network.lookup) terms->push_back({"pose", config_.color.pose, v.pose});
+  if (LearnsLights()) terms->push_back({"light", config_.color.light, v.light});
   if (adversary_ != nullptr) adversary_->AddTerms(v.adversary, terms);
   if (LightingOf(config_.light) != Lighting::kNone)
     terms->push_back({"light_angle", 0, v.light_angle});

@@ -15,12 +15,13 @@
 #include "train/tasks/task.h"
 #include "train/tasks/textured_image/batch.h"
 #include "train/tasks/textured_image/config.h"
+#include "train/tasks/textured_image/light_targets.h"
 
 namespace tilegrad::train {
 
 struct TexturedLossValues {
-  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0,
-         pose = 0;  // the parts are unweighted
+  double total = 0, iou = 0, color = 0, smoothness = 0, laplacian = 0, pose = 0,
+         light = 0;  // the parts are unweighted
   Adversary::Values adversary;
   double light_angle = 0;  // degrees, mean over the inputs; watched, not learned from
 };
@@ -57,10 +58,12 @@ class TexturedStep {
                           const TexturedBatch& batch);
   RenderJob JobAt(const TexturedBatch& batch, std::int64_t step) const;
   double ShareOfRun(std::int64_t step) const;
+  bool LearnsLights() const;  // from LightTargets
   LossConfig WeightsAt(std::int64_t step) const;
   nn::Var Covered(const nn::Var& colors, const TexturedBatch& batch) const;
   nn::Var AdversaryLoss(const RenderedImages& images, const TexturedBatch& batch,
                         Adversary::Values* values) const;
+  nn::Var LightLoss(const PredictedObjects& objects, const TexturedBatch& batch);
   nn::Var PoseLoss(const nn::Var& pose, const TexturedBatch& batch) const;
   nn::Var ColorLoss(const RenderedImages& images, const TexturedBatch& batch,
                     std::int64_t step) const;
@@ -72,6 +75,7 @@ class TexturedStep {
   LearnedWeights weights_;
   Topology topology_;
   SceneRenderer renderer_;
+  LightTargets light_targets_;
   RivalRenderer rival_renderer_;  // if the rule is N3MR's
   Adversary* adversary_ = nullptr;
 };

@@ -150,6 +150,19 @@ TEST(TexturedStep, GradientsOfWhatMixesLookedUpColors) {
   ExpectGradientsAgreeWithDifferences(LookupConfig(), {"paint.", "map.", ".up."});
 }
 
+TEST(TexturedStep, GradientsOfAPalette) {
+  TexturedImageConfig config = LookupConfig();
+  config.network.palette = 3;
+  ExpectGradientsAgreeWithDifferences(config, {"paint.", "map."});
+}
+
+// Targets are of a lattice and do not move with the weights, but for the few that jump.
+TEST(TexturedStep, GradientsOfTheDistanceToLightsThatWereFound) {
+  TexturedImageConfig config = TinyConfig("lambert");
+  config.color.light = 5;
+  ExpectGradientsAgreeWithDifferences(config, {"light."});
+}
+
 TEST(TexturedStep, GradientsOfTheCamera) {
   TexturedImageConfig config = LookupConfig();
   config.loss.color = 0;
