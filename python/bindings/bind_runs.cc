@@ -222,6 +222,7 @@ py::dict Train(const py::dict& request, const py::object& listener) {
   ThrowIfError(train::ApplyOverrides(request["overrides"].cast<Words>(), &job.config));
   job.data = request["data"].cast<Path>(), job.run = request["out"].cast<Path>();
   job.existing = ExistingOf(request);
+  job.extends = request["resume"].cast<bool>();
   job.max_minutes = request["max_minutes"].cast<double>();
   Listener listening(listener);
   const Workers workers(request["threads"].cast<int>());

@@ -94,7 +94,8 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
         and texture, or the colours that `start` has. lighting: as of `Scene`.
-    out: the run's folder; None: one that goes away. resume: goes on in it.
+    out: the run's folder; None: one that goes away. resume: goes on in it; with more steps in a
+        finished fit, too.
     callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
         the fit and goes on.
     options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
@@ -129,7 +130,7 @@ def train(config: Path = "quick", *, data: Path, out: Path,
 
     config: a name (`config_names`) or a TOML file. data: a dataset's folder. out: the run's.
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
-    resume, callback, threads, errors: as of `fit`.
+    resume, callback, threads, errors: as of `fit`; more steps: set={"schedule.steps": ...}.
     """
     request = {"config": os.fspath(config), "data": os.fspath(data), "out": os.fspath(out),
                "overrides": _words(set or {}), "resume": bool(resume),

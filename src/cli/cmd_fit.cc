@@ -133,8 +133,9 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
 }
 
 void PrintOutcome(const Options& options, const train::FitOutcome& o) {
-  Print("{} in {}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
-        FormatDuration(o.seconds));
+  const bool early = o.last_step < options.config.steps;
+  Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
+        FormatDuration(o.seconds), early ? ", for more gained nothing (--stop-gain)" : "");
   PrintScores("fitted views", o.training);
   PrintScores("held-out views", o.held_out);
   if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
@@ -277,7 +278,8 @@ void AddFit(CLI::App& app, Action* action) {
   command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")
       ->delimiter(',');
   command->add_flag("--resume", options->resume,
-                    "go on with the fit in --out, which has saved something");
+                    "go on with the fit in --out, which has saved something; "
+                    "a finished one with more --steps");
   command->add_flag("--doctor", options->doctor,
                     "only say what gets a gradient at the start, and why not");
   AddLiveOption(command, &options->live);

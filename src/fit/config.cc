@@ -19,7 +19,8 @@ constexpr int kSphereLevels = 3;
 // What a hull has too much of, tents on flat sides, has more area than what is right; masks hold
 // the rest. At 1 thin things vanish.
 constexpr double kHullArea = 0.3;
-constexpr double kRemeshShare = 0.6;                   // of the run
+constexpr double kRemeshShare = 0.6;  // of the run
+constexpr double kRounding = 1e-9;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 constexpr std::size_t kFirstRates = 8;
@@ -58,7 +59,10 @@ int LevelsOf(const FitConfig& config, ImageSize size) {
 ConfigFields FieldsOf(FitConfig* c) {
   const auto reporting = Affects::kReporting;
   return {
-      {"steps", &c->steps, 1, 1e7, "gradient steps"},
+      {"steps", &c->steps, 1, 1e7, "gradient steps, at most"},
+      {"stop_gain", &c->stop_gain, 0, 1,
+       "share of the loss by which 100 steps must lower it, else the fit hurries to its end; 0: it "
+       "takes all steps"},
       {"views_per_step", &c->views_per_step, 1, 1e6, "images a step looks at"},
       {"levels", &c->levels, 0, 8,
        "resolutions, coarse to fine, each twice the one before; 0: as it suits the start"},
@@ -123,18 +127,20 @@ FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
   return config;
 }
 
-bool RemeshesAt(const FitConfig& config, std::int64_t step) {
-  if (config.remeshes <= 0 || step == 0) return false;
-  const double each = kRemeshShare * static_cast<double>(config.steps) / config.remeshes;
-  const auto done = [&](std::int64_t s) {
-    return std::min<std::int64_t>(config.remeshes,
-                                  static_cast<std::int64_t>(static_cast<double>(s) / each));
-  };
-  return done(step) != done(step - 1);
+int RemeshesUntil(const FitConfig& config, double time) {
+  if (config.remeshes <= 0) return 0;
+  return std::min(config.remeshes,
+                  static_cast<int>(time * config.remeshes / kRemeshShare + kRounding));
 }
 
-FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size) {
-  const double t = static_cast<double>(step) / static_cast<double>(config.steps);
+double EarliestHurry(const FitConfig& config) {
+  double time = config.cameras_rest;
+  if (config.levels > 1) time = std::max(time, 1 - kFullShare);
+  if (config.remeshes > 0) time = std::max(time, kRemeshShare);
+  return time;
+}
+
+FitSchedule ScheduleAt(const FitConfig& config, double t, ImageSize size) {
   FitSchedule out;
   const int levels = LevelsOf(config, size);
   if (levels > 1 && t < 1 - kFullShare) out.factor = 2;

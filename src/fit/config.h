@@ -29,7 +29,10 @@ struct FitConfig {
   bool vertex_colors = false;  // instead of a texture
   int texture_size = 512;  // texels a side; of a sphere: around, and half of it from pole to pole
 
-  std::int64_t steps = 1000;
+  std::int64_t steps = 1000;  // the most
+  // Where FitClock::kWindow steps at full resolution lower the images' loss by less than this share
+  // of it, the fit goes to its end three times as fast (fit/clock.h). 0: never.
+  double stop_gain = 0.03;
   int views_per_step = 4;
   std::int64_t seed = 1;
   // Of resolution, each half of the next; the last is the images' own. 0: one from a hull, which is
@@ -70,17 +73,21 @@ std::string DescribeConfig(const FitConfig& config);
 // What is 0 for "as it suits the start" gets its value. Later functions want that.
 FitConfig Settled(FitConfig config, bool from_hull, ImageSize size);
 
-// Whether edges are remade before this step.
-bool RemeshesAt(const FitConfig& config, std::int64_t step);
+// How many times edges have been remade at that time, 0 to 1, of the run.
+int RemeshesUntil(const FitConfig& config, double time);
 
-// The state of the schedules at a step.
+// The time of the run until which its loss says nothing about its end: resolutions are coarse,
+// cameras rest, edges are remade.
+double EarliestHurry(const FitConfig& config);
+
+// The state of the schedules at a time of the run.
 struct FitSchedule {
   int factor = 1;  // pixels of the images for a pixel of this step
   double delta = 0, rate = 1;
   double camera_rate = 1;  // of cameras, times `rate`: they rest until there is a shape to go by
 };
 // Levels that the sizes do not divide by are left out.
-FitSchedule ScheduleAt(const FitConfig& config, std::int64_t step, ImageSize size);
+FitSchedule ScheduleAt(const FitConfig& config, double time, ImageSize size);
 
 // The views of a step: different ones, a pure function of seed and step.
 std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from);

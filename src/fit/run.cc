@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "fit/camera_score.h"
+#include "fit/clock.h"
 #include "fit/shown_mesh.h"
 #include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
@@ -51,6 +52,7 @@ RunPlan PlanOf(const FitJob& job) {
                .pictures = "timelapse/",
                .image_size = job.input.images.width,
                .existing = job.existing,
+               .may_differ = "steps",  // only more of them: FitClock::LoadState
                .warn = job.warn};
   plan.schedule = {.steps = job.config.steps,
                    .seed = job.config.seed,
@@ -75,27 +77,38 @@ class FitWork : public RunWork {
         config_(start.config),
         remesh_(start.remesh),
         context_(context),
-        fitter_(std::move(fitter)) {}
+        fitter_(std::move(fitter)),
+        clock_(config_) {}
 
-  // All lines count; earlier versions wrote them in another order.
+  // All lines count; earlier versions wrote them in another order, and took all steps.
   Result<std::string> ResultSettings(const std::string& settings,
                                      const std::string& /*place*/) const override {
     std::istringstream text(settings);
     std::set<std::string> lines;
-    for (std::string line; std::getline(text, line);) lines.insert(line);
+    for (std::string line; std::getline(text, line);)
+      if (line != "stop_gain = 0") lines.insert(line);
     return fmt::format("{}\n", fmt::join(lines, "\n"));
   }
   Status Begin(std::int64_t /*first_step*/) override { return {}; }
   Status Step(std::int64_t step, StepValues* values) override;
-  std::vector<nn::NamedTensor> State() override { return fitter_.State(context_); }
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t /*steps*/) override {
+  std::vector<nn::NamedTensor> State() override {
+    std::vector<nn::NamedTensor> state = fitter_.State(context_);
+    for (auto& tensor : clock_.State(context_)) state.push_back(std::move(tensor));
+    return state;
+  }
+  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
+    TILEGRAD_TRY(clock_.LoadState(state, steps));
     return fitter_.LoadState(state);
   }
-  bool HasPicture(std::int64_t steps) const override { return ShowsAt(job_.config, steps); }
+  std::int64_t End(std::int64_t /*scheduled*/) const override { return clock_.End(); }
+  bool HasPicture(std::int64_t steps) const override {
+    return ShowsAt(job_.config, steps) || (config_.timelapse > 0 && steps == clock_.End());
+  }
   Result<ImageU8> Picture(std::int64_t steps) override;
   Mesh PictureMesh() const override { return ShownMesh(fitter_.scene()); }
 
   const FitScene& scene() const { return fitter_.scene(); }
+  const FitClock& clock() const { return clock_; }
 
  private:
   // What views are held to at a schedule's resolution and softness.
@@ -106,6 +119,7 @@ class FitWork : public RunWork {
   const RemeshLimits remesh_;
   nn::Context& context_;
   Fitter fitter_;
+  FitClock clock_;
   std::map<int, SoftTargets> targets_;  // by factor
 };
 
@@ -122,11 +136,14 @@ const TargetImages& FitWork::Targets(const FitSchedule& schedule, std::span<cons
 
 Status FitWork::Step(std::int64_t step, StepValues* values) {
   const FitConfig& config = config_;
-  if (RemeshesAt(config, step)) TILEGRAD_TRY(fitter_.Remesh(remesh_).status());
-  const FitSchedule schedule = ScheduleAt(config, step, SizeOf(job_.input));
+  const double time = clock_.At(step);
+  if (step > 0 && RemeshesUntil(config, time) > RemeshesUntil(config, clock_.At(step - 1)))
+    TILEGRAD_TRY(fitter_.Remesh(remesh_).status());
+  const FitSchedule schedule = ScheduleAt(config, time, SizeOf(job_.input));
   const std::vector<int> views = ViewsAt(config, step, job_.input.training);
   TILEGRAD_ASSIGN(const FitValues v,
                   fitter_.Step(StepOf(config, schedule, Targets(schedule, views), views)));
+  clock_.Note(step, v.image.total);
   const RegularizerTerms& weights = config.regularizers;
   values->loss = v.total;
   values->terms = {{"color", config.loss.color_weight, v.image.color},
@@ -153,8 +170,8 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
 // The scene at the end, its scores and what is written of both.
 class FitResult {
  public:
-  FitResult(const FitJob& job, const FitScene& scene, const Workers& workers)
-      : job_(job), scene_(scene), workers_(workers) {}
+  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers)
+      : job_(job), scene_(scene), clock_(clock), workers_(workers) {}
   Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
 
  private:
@@ -165,17 +182,21 @@ class FitResult {
 
   const FitJob& job_;
   const FitScene& scene_;
+  const FitClock& clock_;
   const Workers& workers_;
 };
 
 // All of this fit in one picture. There may be others in the folder: of a fit that was killed
-// before its first checkpoint, so that another could begin here.
+// before its first checkpoint, so that another could begin here. Those of before it got more steps
+// are its own.
 Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
   std::vector<ImageU8> pictures;
   std::error_code error;
-  for (std::int64_t step = 0; step <= job_.config.steps; ++step) {
+  for (std::int64_t step = 0; step <= clock_.End(); ++step) {
+    const bool own =
+        ShowsAt(job_.config, step) || step <= clock_.extended_at() || step == clock_.End();
     const Path file = PictureFile(plan, step);
-    if (!ShowsAt(job_.config, step) || !std::filesystem::exists(file, error)) continue;
+    if (!own || !std::filesystem::exists(file, error)) continue;
     TILEGRAD_ASSIGN(ImageU8 picture, io::LoadImage(file));
     if (picture.width != job_.input.images.width || picture.channels != 3) continue;
     pictures.push_back(std::move(picture));
@@ -281,7 +302,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
                   ExecuteRun(plan, &work, context, progress, stop));
   FitScene scene = work.scene();
   TILEGRAD_TRY(FillTexture(job, workers, &scene));
-  TILEGRAD_TRY(FitResult(job, scene, workers).Finish(plan, &outcome));
+  TILEGRAD_TRY(FitResult(job, scene, work.clock(), workers).Finish(plan, &outcome));
   return outcome;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "fit/clock.h"
 #include "fit/fitter.h"
 #include "fit/make_views.h"
 #include "fit/remesh_scene.h"
@@ -113,15 +114,17 @@ TEST(RemeshScene, SaysWhatItCannotCarry) {
   EXPECT_EQ(RemeshScene(open, {}, {}, Workers(1)).status().code(), StatusCode::kInvalidArgument);
 }
 
-TEST(RemeshesAt, AsOftenAsAskedForInTheFirstPart) {
+TEST(RemeshesUntil, AsOftenAsAskedForInTheFirstPart) {
   FitConfig config;
   config.steps = 100, config.remeshes = 3;
+  const FitClock clock(config);
   std::vector<std::int64_t> steps;
-  for (std::int64_t s = 0; s < config.steps; ++s)
-    if (RemeshesAt(config, s)) steps.push_back(s);
+  for (std::int64_t s = 1; s < config.steps; ++s)
+    if (RemeshesUntil(config, clock.At(s)) > RemeshesUntil(config, clock.At(s - 1)))
+      steps.push_back(s);
   EXPECT_EQ(steps, (std::vector<std::int64_t>{20, 40, 60}));
   config.remeshes = 0;
-  EXPECT_FALSE(RemeshesAt(config, 20));
+  EXPECT_EQ(RemeshesUntil(config, 1), 0);
 }
 
 class RemeshedFit : public TempFolderTest {

@@ -57,6 +57,13 @@ class Fit(unittest.TestCase):
         np.testing.assert_array_equal(rest.mesh.positions, whole.mesh.positions)
         self.assertTrue((rest.folder / "report.html").exists())
 
+    def test_a_finished_fit_goes_on_with_more_steps(self):
+        tilegrad.fit(IMAGES, CAMERAS, out=self.out, **SMALL)
+        more = tilegrad.fit(IMAGES, CAMERAS, out=self.out, resume=True, **{**SMALL, "steps": 90})
+        self.assertEqual(more.steps, 90)
+        with self.assertRaisesRegex(ValueError, "90 steps already"):
+            tilegrad.fit(IMAGES, CAMERAS, out=self.out, resume=True, **SMALL)
+
     def test_a_plain_background_makes_masks(self):
         straight = IMAGES / 255
         before_white = straight[..., :3] * straight[..., 3:] + (1 - straight[..., 3:])
@@ -117,6 +124,9 @@ class Train(unittest.TestCase):
             done = tilegrad.train("quick", data=dataset(), out=out, set=changes, resume=True)
             self.assertTrue(done.finished)
             self.assertEqual(done.steps, 4)
+            changes["schedule.steps"] = 6
+            more = tilegrad.train("quick", data=dataset(), out=out, set=changes, resume=True)
+            self.assertEqual(more.steps, 6)
             self.assertIn("loss", told[0].values)
             self.assertEqual(done.predictor().image_size, IMAGES.shape[1])
 

@@ -101,7 +101,7 @@ Result<std::string> LiveRun::State() {
   Json json = {{"name", known.name},
                {"running", running},
                {"step", step},
-               {"steps", known.steps == 0 && fitted ? step : known.steps},
+               {"steps", fitted ? step : known.steps},
                {"pictures", StepsOf(Pictures(source_.run))},
                {"meshes", StepsOf(Meshes(source_.run))}};
   const std::int64_t saved = CheckpointStep(source_.run);

@@ -64,6 +64,7 @@ class Session {
   void LogStream(LogEntry* entry);
   void LogWait(double elapsed, LogEntry* entry);
   Status Save();
+  std::int64_t End() const { return work_.End(plan_.schedule.steps); }
   double Seconds() const { return seconds_before_ + SecondsSince(loop_start_); }
   bool OutOfTime() const {
     return plan_.max_minutes > 0 && SecondsSince(loop_start_) > 60 * plan_.max_minutes;
@@ -187,7 +188,7 @@ Status Session::OneStep() {
   images_ += values_.images;
   stream_seconds_ += values_.stream_seconds;
   wait_seconds_ += values_.wait_seconds;
-  const bool last = done_ == s.steps;
+  const bool last = done_ >= End();
   if (done_ % s.log_every == 0 || done_ == 1 || last) TILEGRAD_TRY(Log());
   TILEGRAD_TRY(Draw());
   if (done_ % s.checkpoint_every == 0 || last) TILEGRAD_TRY(Save());
@@ -197,23 +198,20 @@ Status Session::OneStep() {
 Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
   loop_start_ = last_log_ = Clock::now();
   process_seconds_ = ProcessSeconds();
-  const std::int64_t steps = plan_.schedule.steps;
   if (done_ == 0) TILEGRAD_TRY(Draw());
-  while (done_ < steps && !stop && !OutOfTime()) {
+  while (done_ < End() && !stop && !OutOfTime()) {
     TILEGRAD_TRY(OneStep());
     if (!progress) continue;
     progress(
-        {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(steps), note_});
+        {plan_.stage, static_cast<std::uint64_t>(done_), static_cast<std::uint64_t>(End()), note_});
   }
   TILEGRAD_TRY(Save());
-  if (!stop || done_ == steps) return {};
+  if (!stop || done_ >= End()) return {};
   return Cancelled("stopped at step {} of {}; everything is saved, continue with --resume", done_,
-                   steps);
+                   End());
 }
 
-RunOutcome Session::outcome() const {
-  return {first_step_, done_, Seconds(), done_ == plan_.schedule.steps};
-}
+RunOutcome Session::outcome() const { return {first_step_, done_, Seconds(), done_ >= End()}; }
 
 }  // namespace
 

@@ -63,6 +63,9 @@ class RunWork {
   virtual std::vector<nn::NamedTensor> State() = 0;
   virtual Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) = 0;
 
+  // The steps of the whole run, as it looks now: those of its schedule, or fewer.
+  virtual std::int64_t End(std::int64_t scheduled) const { return scheduled; }
+
   // Whether there is a picture after `steps` steps (0: before the first), and the picture. An empty
   // one is not written.
   virtual bool HasPicture(std::int64_t steps) const = 0;
@@ -75,7 +78,7 @@ class RunWork {
 struct RunOutcome {
   std::int64_t first_step = 0, last_step = 0;  // steps done before and after
   double seconds = 0;                          // of all sessions of this run
-  bool finished = false;                       // last_step is the schedule's
+  bool finished = false;                       // last_step is the end
 };
 
 // Refuses or accepts what is in the folder, before anything expensive: ExecuteRun does it again.
