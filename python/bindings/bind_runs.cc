@@ -156,6 +156,15 @@ Lighting LightingNamed(const std::string& name) {
   return static_cast<Lighting>(at - kNames.begin());
 }
 
+train::MaterialKind MaterialNamed(const std::string& name) {
+  constexpr std::array kNames = {"unlit", "lambert", "phong"};
+  const auto at = std::find(kNames.begin(), kNames.end(), name);
+  if (at == kNames.end())
+    throw py::value_error(
+        fmt::format("fit: material is '{}', expected one of {}", name, fmt::join(kNames, ", ")));
+  return static_cast<train::MaterialKind>(at - kNames.begin());
+}
+
 train::ExistingRun ExistingOf(const py::dict& request) {
   return request["resume"].cast<bool>() ? train::ExistingRun::kContinue
                                         : train::ExistingRun::kRefuse;
@@ -168,6 +177,7 @@ train::FitJob JobOf(const py::dict& views, const py::dict& request) {
   job.input = InputOf(views);
   job.config.parameters = ParametersNamed(request["optimize"].cast<Words>());
   job.config.vertex_colors = job.config.parameters[train::Parameter::kColors];
+  job.config.material = MaterialNamed(request["material"].cast<std::string>());
   job.config.lighting = LightingNamed(request["lighting"].cast<std::string>());
   ThrowIfError(train::OverrideFields(request["options"].cast<Words>(), train::FieldsOf(&job.config))
                    .Within("fit"));

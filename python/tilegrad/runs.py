@@ -77,7 +77,7 @@ class TrainResult:
 def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
         background: str = "auto", fov: float = 65, find_cameras: bool = False,
         hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
-        lighting: str = "none", out: Optional[Path] = None, resume: bool = False,
+        material: str = "unlit", lighting: str = "none", out: Optional[Path] = None, resume: bool = False,
         callback: Optional[Callback] = None, threads: int = 0, **options: Any) -> FitResult:
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
@@ -94,6 +94,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     start: a mesh to begin with, truth: one to compare with; what `as_mesh` takes.
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
         and texture, or the colours that `start` has. lighting: as of `Scene`.
+    material: "unlit"; "lambert" and "phong" learn the light beside the colours.
     out: the run's folder; None: one that goes away. resume: goes on in it; with more steps in a
         finished fit, too.
     callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
@@ -114,6 +115,7 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     else:
         views.update(_views(images, cameras, masks))
     request = {"options": _words(options), "optimize": list(optimize), "lighting": lighting,
+               "material": material,
                "start": _mesh_dict(start), "truth": _mesh_dict(truth), "resume": bool(resume),
                "threads": thread_count("fit", threads)}
     if out is not None:

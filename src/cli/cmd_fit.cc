@@ -29,7 +29,7 @@ using train::Parameter;
 
 struct Options {
   std::string input, dataset_model, out, start = "auto", truth, optimize, quality = "normal";
-  std::string lighting = "none", filter = "bilinear";
+  std::string material = "unlit", lighting = "none", filter = "bilinear";
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
@@ -60,6 +60,11 @@ Status SetConfig(const Options& options, FitConfig* config) {
                                                             {"lambert", Lighting::kLambert},
                                                             {"phong", Lighting::kPhong},
                                                             {"sh", Lighting::kSphericalHarmonics}};
+  static const std::map<std::string, train::MaterialKind> materials = {
+      {"unlit", train::MaterialKind::kUnlit},
+      {"lambert", train::MaterialKind::kLambert},
+      {"phong", train::MaterialKind::kPhong}};
+  config->material = materials.at(options.material);
   config->lighting = lightings.at(options.lighting);  // CLI11 has checked it
   config->filter = options.filter == "trilinear" ? Filter::kTrilinear : Filter::kBilinear;
   if (!options.light_direction.empty()) {
@@ -222,6 +227,12 @@ void AddWhat(CLI::App* command, Options* o) {
                       "any of positions, colors, texture, uv, camera, light, sh, material, "
                       "exposure, focal; "
                       "separated by commas [positions and texture, or the colors that --mesh has]");
+  command
+      ->add_option("--material", o->material,
+                   "unlit: colors hold the light of the images; lambert, phong: light is learned "
+                   "beside them, and where it comes from")
+      ->check(CLI::IsMember({"unlit", "lambert", "phong"}))
+      ->capture_default_str();
   command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
       ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))
       ->capture_default_str();

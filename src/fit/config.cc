@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "fit/material.h"
 
 namespace tilegrad::train {
 namespace {
@@ -20,12 +21,14 @@ constexpr int kSphereLevels = 3;
 // the rest. At 1 thin things vanish.
 constexpr double kHullArea = 0.3;
 constexpr double kRemeshShare = 0.6;  // of the run
+constexpr double kLateLight = 0.1;    // rate of light once colours move
 constexpr double kRounding = 1e-9;
 constexpr double kFullShare = 0.45, kHalfShare = 0.3;  // of the run at each of the finest levels
 
 constexpr std::size_t kFirstRates = 8;
 
 // By value, as the options of tilegrad fit call them.
+constexpr std::array kMaterials = {"unlit", "lambert", "phong"};
 constexpr std::array kLightings = {"none", "lambert", "phong", "sh"};
 constexpr std::array kStarts = {"auto", "hull", "sphere"};
 constexpr std::array kFilters = {"nearest", "bilinear", "trilinear"};
@@ -101,6 +104,7 @@ std::string DescribeConfig(const FitConfig& config) {
     out += fmt::format("{} = {}\n", key, value);
   };
   line("parameters", names);
+  if (c.material != MaterialKind::kUnlit) line("material", NameIn(kMaterials, c.material));
   line("lighting", NameIn(kLightings, c.lighting));
   line("light_direction", fmt::format("{}", fmt::join(c.light_direction, ",")));
   line("start", NameIn(kStarts, c.start));
@@ -124,6 +128,7 @@ FitConfig Settled(FitConfig config, bool from_hull, ImageSize size) {
     config.delta_start = from_hull ? DeltaOf(kHullPixels, size) : kWideDelta;
   if (config.regularizers.area < 0) config.regularizers.area = from_hull ? kHullArea : 0;
   if (config.parameters[Parameter::kUv]) config.remeshes = 0;
+  SetMaterial(from_hull, &config);
   return config;
 }
 
@@ -134,7 +139,7 @@ int RemeshesUntil(const FitConfig& config, double time) {
 }
 
 double EarliestHurry(const FitConfig& config) {
-  double time = config.cameras_rest;
+  double time = std::max(config.cameras_rest, config.texture_rest);
   if (config.levels > 1) time = std::max(time, 1 - kFullShare);
   if (config.remeshes > 0) time = std::max(time, kRemeshShare);
   return time;
@@ -152,6 +157,10 @@ FitSchedule ScheduleAt(const FitConfig& config, double t, ImageSize size) {
   }
   const double end = FinalDelta(config, size), start = std::max(config.delta_start, end);
   out.delta = start * std::pow(end / start, std::min(1.0, t / kDeltaShare));
+  const bool resting = t < config.texture_rest;
+  out.texture_rate = resting ? 0 : 1;
+  out.light_rate = config.texture_rest == 0 || resting ? 1 : kLateLight;
+  out.position_rate = resting && config.levels == 1 ? 0 : 1;
   out.camera_rate = t < config.cameras_rest ? 0 : 1;
   out.rate =
       config.final_rate + (1 - config.final_rate) * 0.5 * (1 + std::cos(std::numbers::pi * t));

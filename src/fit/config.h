@@ -16,8 +16,14 @@ namespace tilegrad::train {
 enum class StartShape { kAuto, kHull, kSphere };
 inline constexpr int kLeastHullViews = 4;
 
+// What a surface does with light (fit/material.h). kUnlit: colours hold the light of the images,
+// or FitConfig::lighting says all; kLambert: light of harmonics; kPhong: one direction, light from
+// everywhere, and highlights.
+enum class MaterialKind { kUnlit, kLambert, kPhong };
+
 struct FitConfig {
   ParameterSet parameters;  // none: positions, and the texture or colours that the start has
+  MaterialKind material = MaterialKind::kUnlit;
   Lighting lighting = Lighting::kNone;
   std::array<float, 3> light_direction = {0.3f, 1.0f, 0.5f};  // towards it, world
   Filter filter = Filter::kBilinear;
@@ -56,6 +62,9 @@ struct FitConfig {
   // Share of the steps until cameras move: those that are nearly right wait for shape and texture.
   // 0 where the start is the object's own shape.
   double cameras_rest = 0;
+  // Share of the steps until colours move, where light is learned with them; and from a hull the
+  // shape.
+  double texture_rest = 0;
   double perturb_cameras = 0;  // degrees, each by a random turn about the object: for experiments
 
   std::int64_t checkpoint_every = 100;
@@ -85,6 +94,7 @@ struct FitSchedule {
   int factor = 1;  // pixels of the images for a pixel of this step
   double delta = 0, rate = 1;
   double camera_rate = 1;  // of cameras, times `rate`: they rest until there is a shape to go by
+  double texture_rate = 1, light_rate = 1, position_rate = 1;  // of those, times `rate`
 };
 // Levels that the sizes do not divide by are left out.
 FitSchedule ScheduleAt(const FitConfig& config, double time, ImageSize size);

@@ -27,6 +27,25 @@ auto StateArrays(Block& block) {
 constexpr const char *kFaces = "mesh.faces", *kUvs = "mesh.uvs", *kUvIndices = "mesh.uv_indices",
                      *kStart = "mesh.start", *kColors = "mesh.colors";
 
+double FactorOf(const FitStep& step, Parameter what) {
+  switch (what) {
+    case Parameter::kCamera:
+    case Parameter::kFocal:
+      return step.camera_factor;
+    case Parameter::kColors:
+    case Parameter::kTexture:
+      return step.texture_factor;
+    case Parameter::kLight:
+    case Parameter::kSh:
+    case Parameter::kMaterial:
+      return step.light_factor;
+    case Parameter::kPositions:
+      return step.position_factor;
+    default:
+      return 1;
+  }
+}
+
 nn::Tensor Numbers(nn::Context& context, std::span<const float> values) {
   nn::Tensor tensor = context.Empty({static_cast<std::int64_t>(values.size())}, nn::DType::kF32);
   std::copy(values.begin(), values.end(), tensor.data<float>());
@@ -157,10 +176,9 @@ Diffusion* Fitter::SmoothingOf(Parameter what) {
 }
 
 Status Fitter::Move(ParameterBlock* block, const FitStep& step) {
-  const bool camera = block->what == Parameter::kCamera || block->what == Parameter::kFocal;
-  if (camera && step.camera_factor == 0) return {};
-  const double factor = step.rate_factor * (camera ? step.camera_factor : 1);
-  const double rate = factor * block->learning_rate;
+  const double of_kind = FactorOf(step, block->what);
+  if (of_kind == 0) return {};
+  const double rate = step.rate_factor * of_kind * block->learning_rate;
   const auto t = static_cast<double>(++block->steps);
   if (Diffusion* const smooth = SmoothingOf(block->what); smooth != nullptr) {
     UniformAdamStep({rate, kBeta1, kBeta2, block->steps}, smooth, block->gradient, block->m,

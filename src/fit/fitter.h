@@ -48,7 +48,10 @@ struct FitStep {
   const TargetImages* targets = nullptr;
   FitRenderer::Job job;  // `views` is set from above
   double rate_factor = 1;
-  double area_factor = 1;    // of the weight of the surface's area
+  double area_factor = 1;     // of the weight of the surface's area
+  double texture_factor = 1;  // of texels and vertex colours, beside that; 0: they rest
+  double light_factor = 1;    // of lights, harmonics and materials, beside that
+  double position_factor = 1;
   double camera_factor = 1;  // of cameras and focal lengths, beside that; 0: they rest
 };
 

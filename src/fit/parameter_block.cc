@@ -63,6 +63,15 @@ void PutMaterial(const Surface& s, float* to) {
   to[9] = std::log(s.shininess + 1);
 }
 
+// Writing this twice changes nothing: the second sum is 1, to the bit.
+void FixMean(float* ambient, float* diffuse) {
+  for (int c = 0; c < 3; ++c) {
+    const float sum = ambient[c] + diffuse[c] / kDirectionsPerMean;
+    ambient[c] = sum > 0 ? ambient[c] / sum : 1;
+    diffuse[c] = kDirectionsPerMean * (1 - ambient[c]);
+  }
+}
+
 template <class Numbers>
 void Put(const Numbers& from, AlignedVector<float>* to) {
   to->assign(from.begin(), from.end());
@@ -161,6 +170,7 @@ Status WriteBlock(ParameterBlock* block, FitScene* scene) {
       break;
     case Parameter::kMaterial:
       Clamp(0, std::log(kMostShininess), &x, x.size());
+      if (scene->light_mean_fixed) FixMean(x.data(), x.data() + 3);
       TakeSurface(x.data(), &scene->surface);
       break;
     case Parameter::kExposure:
@@ -193,7 +203,9 @@ void PullBlock(const FitScene& scene, const FitGradients& gradients, std::size_t
     case Parameter::kUv:
       return Put(gradients.uvs, &d);
     case Parameter::kSh:
-      return Put(gradients.sh, &d);
+      Put(gradients.sh, &d);
+      if (scene.light_mean_fixed) d[0] = 0;
+      return;
     case Parameter::kLight:
       for (std::size_t i = 0; i < d.size(); ++i) d[i] = gradients.lights[i / 3].direction[i % 3];
       return;

@@ -11,11 +11,11 @@
 #include "base/error.h"
 #include "fit/camera_score.h"
 #include "fit/clock.h"
+#include "fit/material.h"
 #include "fit/shown_mesh.h"
 #include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
 #include "fit/transforms.h"
-#include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
@@ -41,7 +41,8 @@ FitStep StepOf(const FitConfig& config, const FitSchedule& schedule, const Targe
   step.job.options.delta = schedule.delta;
   step.job.options.max_alpha_error = config.max_alpha_error;
   step.rate_factor = step.area_factor = schedule.rate;
-  step.camera_factor = schedule.camera_rate;
+  step.camera_factor = schedule.camera_rate, step.position_factor = schedule.position_rate;
+  step.texture_factor = schedule.texture_rate, step.light_factor = schedule.light_rate;
   return step;
 }
 
@@ -250,7 +251,7 @@ Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
 }
 
 Status FitResult::Write(const RunPlan& plan, FitOutcome* outcome) const {
-  TILEGRAD_TRY(io::SaveGlb(job_.out / "mesh.glb", MeshOfScene(scene_)));
+  TILEGRAD_TRY(SaveFittedGlb(job_.out / "mesh.glb", scene_));
   TILEGRAD_TRY(WriteCameras());
   TILEGRAD_TRY(ScoreCameras(job_, scene_, workers_, outcome));
   TILEGRAD_TRY(Score(outcome));

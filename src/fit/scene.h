@@ -17,6 +17,9 @@
 
 namespace tilegrad::train {
 
+// The mean of max(0, cos) over all directions is a quarter.
+inline constexpr float kDirectionsPerMean = 4;
+
 // V vertices, F faces, U texture coordinates. What is empty is not there.
 struct FitScene {
   std::vector<float> positions;          // [V,3] world
@@ -31,6 +34,10 @@ struct FitScene {
   std::vector<Light> lights;
   std::array<float, 9> sh = {};
   ShadingModel shading;
+  // The mean over all directions of the light, of each channel, stays 1: the first harmonic stays
+  // what it is, and ambient + diffuse / kDirectionsPerMean is 1. Else colours and light could share
+  // any factor.
+  bool light_mean_fixed = false;
   std::vector<Camera> cameras;  // one for each view
   // Cameras turn about `pivot` and move in steps of `unit`: the object's middle and size.
   std::array<float, 3> pivot = {};

@@ -10,6 +10,7 @@
 #include "base/hash.h"
 #include "base/rng.h"
 #include "fit/hull/hull_mesh.h"
+#include "fit/material.h"
 #include "fit/run.h"
 #include "scene/shapes.h"
 #include "scene/unwrap.h"
@@ -119,6 +120,10 @@ Result<FitScene> MeshScene(const FitJob& job) {
   }
   SetBlankTexture(job.config.texture_size, job.config.texture_size / 2, &scene);
   return scene;
+}
+
+bool HasColors(const Mesh& mesh) {
+  return !mesh.textures.empty() || !mesh.colors.empty() || !mesh.corner_colors.empty();
 }
 
 struct Bounds {
@@ -248,6 +253,7 @@ std::string DescribeJob(const FitJob& job) {
 
 Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   TILEGRAD_TRY(CheckConfig(job.config));
+  TILEGRAD_TRY(CheckMaterial(job.config));
   TILEGRAD_TRY(CheckMasks(job));
   if (!job.input.posed && !job.input.found) {
     return InvalidArgument("the images have no cameras, which `tilegrad fit` would look for first");
@@ -260,7 +266,9 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
   start.remesh = LimitsOf(PixelOf(job, start.scene));
   SetCameras(job, &start.scene);
-  SetLight(job.config, &start.scene);
+  SetLight(start.config, &start.scene);
+  const bool blank = !job.start.has_value() || !HasColors(*job.start);
+  if (job.config.material != MaterialKind::kUnlit) StartMaterial(job.input, blank, &start.scene);
   FitterOptions& options = start.options;
   options.parameters = job.config.parameters;
   if (options.parameters.empty()) {
@@ -269,6 +277,8 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
         true;
     options.parameters[Parameter::kCamera] = job.input.found;  // to a few degrees so far
   }
+  for (const Parameter p : kParameters)
+    options.parameters[p] |= LightParameters(job.config.material)[p];
   // Texels that are not fitted would have to be kept in every checkpoint.
   if (!start.scene.texture.empty() && !options.parameters[Parameter::kTexture])
     start.config.remeshes = 0;
