@@ -3,6 +3,7 @@
 // their layout.
 #include <gtest/gtest.h>
 
+#include "io/image_file.h"
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 #include "train/data/photographs/miniature.h"
@@ -26,6 +27,10 @@ constexpr const char* kSmall =
     " --set photographs.size=16";
 
 TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
+  ImageU8 cutout(32, 32, 4);
+  for (int y = 8; y < 24; ++y)
+    for (int x = 4; x < 28; ++x) std::fill_n(cutout.at(x, y), 4, std::uint8_t{255});
+  ASSERT_TRUE(io::SavePng(folder_ / "cutout.png", cutout).ok());
   for (const auto& [source, config] : {std::pair("cub", "birds"), {"pascal3d", "cars_photos"}}) {
     train::WriteMiniature(folder_ / source, source);
     const std::string run = In(std::string(source) + "_run");
@@ -34,6 +39,10 @@ TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
     const std::string table = ExpectDone("eval --run " + run);
     EXPECT_NE(table.find("PCK@0.1"), std::string::npos) << table;
     ExpectDone("report --run " + run);
+    ExpectDone("predict --refine 20 --run " + run + " --out " + In("out_" + std::string(source)) +
+               " " + In("cutout.png"));
+    EXPECT_TRUE(
+        std::filesystem::exists(folder_ / ("out_" + std::string(source)) / "cutout_predicted.glb"));
     EXPECT_TRUE(std::filesystem::exists(Path(run) / "report.html"));
   }
 }

@@ -119,6 +119,11 @@ TEST_F(Predict, WritesTheLightAndMovesIt) {
   EXPECT_EQ(json["scenes"][0]["nodes"].size(), 2u);
   const Bytes relit = ReadFile(folder_ / "out/known_relit.webp").value();
   EXPECT_EQ(std::string(relit.begin(), relit.begin() + 4), "RIFF");
+  // Refined colours would hold the picture's light.
+  const Outcome refined = RunProgram("predict --refine 5 --force --run " + In("lit") + " --out " +
+                                     In("out") + " " + In("known.png"));
+  EXPECT_NE(refined.exit_code, 0);
+  EXPECT_NE(refined.output.find("use --refine 0"), std::string::npos) << refined.output;
   // A run without light says so.
   const Outcome plain = RunProgram("predict --refine 0 --relight --force --run " + In("r") +
                                    " --out " + In("out") + " " + In("known.png"));

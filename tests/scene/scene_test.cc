@@ -257,5 +257,24 @@ TEST(Subdivide, DividesEachEdgeOnceAndStaysClosed) {
   EXPECT_TRUE(Validate(out).ok());
 }
 
+// Each corner has the texture coordinates of its place: here those of the vertex.
+TEST(SubdividedMeshes, KeepTheirTextureMap) {
+  Mesh mesh = Icosphere(0, 1);
+  for (const Face& face : mesh.faces)
+    for (const std::int32_t v : face)
+      mesh.corner_uvs.emplace_back(mesh.positions[v].x, mesh.positions[v].y);
+  mesh.textures = {{"map", ImageU8(2, 2, 3)}};
+  mesh.materials = {{.name = "map", .base_color_texture = 0}};
+  const Mesh out = Subdivided(mesh);
+  ASSERT_EQ(out.corner_uvs.size(), 3 * out.faces.size());
+  for (std::size_t i = 0; i < out.corner_uvs.size(); ++i) {
+    const glm::vec3 p = out.positions[static_cast<std::size_t>(out.faces[i / 3][i % 3])];
+    EXPECT_NEAR(out.corner_uvs[i].x, p.x, 1e-6f);
+    EXPECT_NEAR(out.corner_uvs[i].y, p.y, 1e-6f);
+  }
+  EXPECT_EQ(out.textures.size(), 1u);
+  EXPECT_TRUE(Validate(out).ok());
+}
+
 }  // namespace
 }  // namespace tilegrad
