@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/output_notes.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
 #include "base/temporary_file.h"
@@ -144,6 +145,7 @@ Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> b
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   const Path temporary = TemporaryOf(path);
   Status status = WriteTemporary(temporary, path, bytes);
+  if (status.ok()) NoteIfExpected(path, bytes);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(path, "cannot be replaced");
   }

@@ -1,24 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/output_guard.h"
 
-#include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <optional>
-#include <sstream>
 
 #include "base/error.h"
-#include "base/hash.h"
+#include "base/output_notes.h"
 
 namespace tilegrad {
 namespace {
 
-constexpr const char* kNotes = ".tilegrad-made";
-constexpr const char* kHead =
-    "# Checksums of files that tilegrad wrote into this folder; it replaces these without asking.\n"
-    "# Without this file, it asks for --force.\n";
 constexpr const char* kLock = ".lock";  // base/folder_lock.h
 
 std::optional<struct stat> Stat(const Path& path) {
@@ -35,24 +28,8 @@ Path Target(const Path& path) {
 
 // Empty where the file cannot be read.
 std::string Checksum(const Path& file) {
-  const auto text = ReadText(file, std::size_t{8} << 30);
-  if (!text.ok()) return "";
-  Hash hash;
-  hash.Add(file.filename().string());
-  hash.Add(*text);
-  return hash.Text();
-}
-
-// One write, so that several processes may do this at once. A link under that name, which others
-// can make in a folder that is open to all, is not followed.
-void Append(const Path& notes, const std::string& line) {
-  const bool fresh = !Stat(notes);
-  const int fd =
-      ::open(notes.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0644);
-  if (fd < 0) return;
-  const std::string text = (fresh ? kHead : "") + line + "\n";
-  [[maybe_unused]] const ssize_t written = ::write(fd, text.data(), text.size());
-  ::close(fd);
+  const auto content = ReadFile(file, std::size_t{8} << 30);
+  return content.ok() ? OutputChecksum(file, *content) : "";
 }
 
 }  // namespace
@@ -76,13 +53,7 @@ void OutputGuard::AddInputs(std::span<const Path> paths) {
 
 OutputGuard::Notes& OutputGuard::NotesOf(const Path& folder) const {
   const auto [at, added] = notes_.try_emplace(folder);
-  if (!added) return at->second;
-  const auto text = ReadText(folder / kNotes);
-  if (!text.ok()) return at->second;
-  std::istringstream lines(*text);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.starts_with('#')) at->second.insert(line);
-  }
+  if (added) at->second = ReadOutputNotes(folder);
   return at->second;
 }
 
@@ -98,12 +69,16 @@ bool OutputGuard::IsOurs(const Path& file) const {
 
 Status OutputGuard::Check(const Path& file) const {
   const auto info = Stat(file);
+  if (!info) ExpectOutput(file);
   if (!info || !S_ISREG(info->st_mode)) return {};  // writing to a folder is an error of its own
   if (inputs_.contains({info->st_dev, info->st_ino})) {
     return InvalidArgument("{}: is read here, so it is not written; choose another --out",
                            file.string());
   }
-  if (force_ || IsOurs(file)) return {};
+  if (force_ || IsOurs(file)) {
+    ExpectOutput(file);
+    return {};
+  }
   return InvalidArgument(
       "{}: is there already and is not, as it stands, what tilegrad wrote; --force replaces it, or "
       "choose another --out",
@@ -119,7 +94,7 @@ std::optional<Path> OutputGuard::ForeignFile(const Path& folder) const {
   std::error_code error;
   if (std::filesystem::exists(folder / kLock, error)) return std::nullopt;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.path().filename() == kNotes) continue;
+    if (entry.path().filename() == kOutputNotes) continue;
     if (entry.is_directory(error) && !entry.is_symlink(error)) {
       if (auto below = ForeignFile(entry.path())) return below;
     } else if (!IsOurs(entry.path())) {
@@ -147,7 +122,7 @@ void OutputGuard::Note(const Path& file) const {
   LeftIn(target.parent_path()).RemoveOf(target.filename().string());
   const std::string checksum = Checksum(target);
   if (checksum.empty() || !NotesOf(target.parent_path()).insert(checksum).second) return;
-  Append(target.parent_path() / kNotes, checksum);
+  AddOutputNote(target.parent_path(), checksum);
 }
 
 void OutputGuard::NoteAll(std::span<const Path> files) const {

@@ -31,7 +31,8 @@ class OutputGuard {
   void AddInputs(std::span<const Path> paths);
 
   // Whether `file` may be written: it is not there, it is a device or a pipe, it is ours, or
-  // `force`. kInvalidArgument names it and what to do.
+  // `force`. kInvalidArgument names it and what to do. It is noted before it takes its name, so
+  // that what a killed process has just written is ours, too.
   Status Check(const Path& file) const;
   Status CheckAll(std::span<const Path> files) const;
 

@@ -59,6 +59,20 @@ TEST_F(Guard, WhatKilledCallsLeftOfAFileGoes) {
   EXPECT_EQ(left, std::vector<Path>{"c.png" + gone});
 }
 
+// A process that was killed before it could say that it had written the file.
+TEST_F(Guard, WhatAKilledCallHasJustWrittenIsOurs) {
+  const Path file = folder_ / "a.png";
+  ASSERT_TRUE(OutputGuard().Check(file).ok());
+  ASSERT_TRUE(WriteTextAtomic(file, "first").ok());
+  EXPECT_TRUE(OutputGuard().Check(file).ok());
+  ASSERT_TRUE(WriteTextAtomic(file, "second").ok());
+  EXPECT_TRUE(OutputGuard().Check(file).ok());
+  OutputGuard().Note(file);
+  EXPECT_EQ(std::filesystem::file_size(folder_ / ".tilegrad-made"), 135 + 2 * 17);
+  ASSERT_TRUE(WriteTextAtomic(folder_ / "b.png", "not asked for").ok());
+  ExpectMessage(OutputGuard().Check(folder_ / "b.png"), "--force");
+}
+
 // What is written twice is noted once.
 TEST_F(Guard, NotesDoNotGrowWithRepetition) {
   Made("a.png", "ours");
