@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The third form of photographs.h: a folder of pictures with alpha or masks.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -19,6 +20,7 @@ using Json = nlohmann::json;
 
 constexpr int kTestEvery = 6;  // the last of each six pictures is held out
 constexpr std::size_t kMostNames = 256;
+constexpr double kFarthest = 1 << 20;  // pixels from the picture's corner that a keypoint may be
 
 std::error_code ignored;
 
@@ -146,13 +148,19 @@ class FolderReader {
       return InvalidArgument("{}: \"names\" has to be a list of 1 to {} names", file_, kMostNames);
     for (const Json& name : *names) {
       if (!name.is_string()) return InvalidArgument("{}: {} is no name", file_, name.dump());
+      if (IndexOf(name).ok())
+        return InvalidArgument("{}: \"names\" has {} twice", file_, name.dump());
       set_.keypoint_names.push_back(name.get<std::string>());
     }
     TILEGRAD_ASSIGN(const auto sides, Pairs(json, "mirror"));
     for (std::size_t k = 0; k < names->size(); ++k) set_.mirror.push_back(static_cast<int>(k));
     for (const auto& [left, right] : sides) {
-      std::swap(set_.mirror[static_cast<std::size_t>(left)],
-                set_.mirror[static_cast<std::size_t>(right)]);
+      int &of_left = set_.mirror[static_cast<std::size_t>(left)],
+          &of_right = set_.mirror[static_cast<std::size_t>(right)];
+      if (left == right || of_left != left || of_right != right)
+        return InvalidArgument("{}: \"mirror\" has {} or {} twice", file_, (*names)[left].dump(),
+                               (*names)[right].dump());
+      std::swap(of_left, of_right);
       views_.left.emplace_back(right, left);
     }
     TILEGRAD_ASSIGN(views_.up, Pairs(json, "up"));
@@ -162,9 +170,13 @@ class FolderReader {
 
   Result<Keypoint> ReadKeypoint(const Json& json, const std::string& where) const {
     if (json.is_null()) return Keypoint{};
-    if (json.is_array() && json.size() == 2 && json[0].is_number() && json[1].is_number())
-      return Keypoint{json[0].get<double>(), json[1].get<double>(), true};
-    return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, json.dump());
+    if (!json.is_array() || json.size() != 2 || !json[0].is_number() || !json[1].is_number())
+      return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, json.dump());
+    const Keypoint keypoint{json[0].get<double>(), json[1].get<double>(), true};
+    if (!(std::max(std::abs(keypoint.x), std::abs(keypoint.y)) <= kFarthest))
+      return InvalidArgument("{}: {}: {} is more than {} pixels away", file_, where, json.dump(),
+                             kFarthest);
+    return keypoint;
   }
 
   Status ReadPlaces(const Json& json) {

@@ -294,7 +294,16 @@ TEST_F(PhotoFolderTest, BrokenKeypointsAreErrors) {
   ExpectMessage(OpenPhotographs(folder_).status(), "\"p100.png\" needs 8 keypoints");
   Write("keypoints.json", R"({"names": ["a"], "mirror": [["a", "z"]]})");
   ExpectMessage(OpenPhotographs(folder_).status(), "\"z\" is none of");
+  Write("keypoints.json", R"({"names": ["a", "b", "a"]})");
+  ExpectMessage(OpenPhotographs(folder_).status(), "\"names\" has \"a\" twice");
+  // No mirror images: their pairs would be a ring.
+  Write("keypoints.json", R"({"names": ["a", "b", "c"], "mirror": [["a", "b"], ["b", "c"]]})");
+  ExpectMessage(OpenPhotographs(folder_).status(), "\"mirror\" has \"b\" or \"c\" twice");
   std::string wrong = good;
+  wrong.replace(wrong.find("null"), 4, "[1e300, 5]");
+  Write("keypoints.json", wrong);
+  ExpectMessage(OpenPhotographs(folder_).status(), "keypoints.json", "1e+300", "pixels away");
+  wrong = good;
   wrong.replace(wrong.find("null"), 4, "\"hm\"");
   Write("keypoints.json", wrong);
   ExpectMessage(OpenPhotographs(folder_).status(), "\"hm\" is neither");
