@@ -165,6 +165,8 @@ Result<ImageU8> DecodeText(const std::string& text) {
 TEST_F(FormatsTest, PnmSamplesAreScaledAndAllThere) {
   EXPECT_EQ(DecodeText("P5 4 1 15\n" + std::string("\0\1\17\20", 4))->pixels,
             (std::vector<std::uint8_t>{0, 17, 255, 255}));
+  EXPECT_EQ(DecodeText("P5 3 1 2\n" + std::string("\0\1\2", 3))->pixels,
+            (std::vector<std::uint8_t>{0, 128, 255}));  // 127.5 is rounded
   EXPECT_EQ(DecodeText("P5 2 1 65535 " + std::string("\x12\x34\xff\xff", 4))->pixels,
             (std::vector<std::uint8_t>{0x12, 255}));
   EXPECT_EQ(DecodeText("P6#c\r1 #\n 1 255\nabc")->pixels,
