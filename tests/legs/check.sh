@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan tsan scalar clang clang-new tidy aarch64)
+readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|renderer_bits|render_pipeline|nn_tape)'
 # Tests that hold kernels to their references.
@@ -108,6 +108,16 @@ leg_clang() { want clang-14; tree dev clang "$FILES_TESTS" -DCMAKE_C_COMPILER=cl
 leg_clang-new() { want clang-19; tree dev clang-new "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DTILEGRAD_SIMD=few; }
 leg_tidy() {
   if [ -n "$SHORT" ]; then ./run lint --tidy; else git ls-files -z 'src/*.cc' | xargs -0 ./run lint --tidy; fi
+}
+# Which lines of the readers their tests and the fuzz targets' seeds reach; --short: their tests alone.
+leg_coverage() {
+  want clang-14 llvm-14
+  leg_configure dev coverage -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DTILEGRAD_SIMD=few -DCMAKE_BUILD_TYPE=None \
+    -DTILEGRAD_WERROR=OFF -DTILEGRAD_BENCH=OFF -DTILEGRAD_PYTHON=OFF -DCMAKE_CXX_FLAGS='-O0 -fprofile-instr-generate -fcoverage-mapping'
+  local chosen
+  mapfile -t chosen < <(targets build/coverage "$( [ -n "$SHORT" ] && echo "^io_" || echo "^(io_|fuzz_replay)")")
+  cmake --build build/coverage --target "${chosen[@]}"
+  tests/legs/coverage.py build/coverage "$OUT/coverage" "${chosen[@]}"
 }
 leg_aarch64() {
   want g++-aarch64-linux-gnu qemu-user
