@@ -7,9 +7,11 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "fit/input.h"
 #include "fit/refine.h"
+#include "train/data/fingerprint.h"
 #include "train/predictor.h"
 #include "train/tasks/task.h"
 
@@ -40,35 +42,81 @@ train::PredictionChange RefineWith(int steps, int image_size) {
       };
 }
 
-Status RunEvaluation(const EvalOptions& options) {
-  TILEGRAD_ASSIGN(const Path run, ChooseRun(options.on.run));
-  TILEGRAD_ASSIGN(const Path data, ChooseDataset(options.on.data, run));
-  const OutputGuard guard(options.force);
-  const Path files[] = {run / "eval.md", run / "eval.json"};
-  const train::Split split = kSplits.at(options.split);
-  const bool writes = split == train::Split::kTest && options.refine == 0;
-  if (writes) TILEGRAD_TRY(guard.CheckAll(files));
-  const Workers workers(options.on.workers);
-  TILEGRAD_ASSIGN(const train::Predictor predictor, LoadPredictor(run, workers));
-  const train::TaskEvaluation job{run,
-                                  data,
-                                  predictor,
-                                  split,
-                                  options.views_per_model,
-                                  RefineWith(options.refine, predictor.image_size()),
-                                  options.oracle};
-  ProgressLine line;
-  auto evaluation = predictor.task().Evaluate(job, workers, line.Sink(), StopOnSignals());
-  line.Finish();
-  if (!evaluation.ok()) return evaluation.status();
-  // Files first: printing may fail. They keep the figures of the network alone on held-out models.
-  if (writes) TILEGRAD_TRY(train::WriteEvaluation(run, *evaluation));
-  Print("{}\n{}", evaluation->predictor, train::FormatTable(*evaluation));
-  PrintResult(train::EvaluationJson(*evaluation));
-  if (!writes) return {};
-  guard.NoteAll(files);
-  Print("written to {} and {}\n", files[0].string(), files[1].string());
+// What is evaluated, and where that is written.
+struct Subject {
+  Path run, data;
+  std::vector<Path> files;  // that keep the figures; of the network alone on held-out models
+  std::optional<train::Predictor> predictor;
+};
+
+Status Prepare(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
+  TILEGRAD_ASSIGN(out->run, ChooseRun(options.on.run));
+  TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
+  if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0)
+    out->files = {out->run / "eval.md", out->run / "eval.json"};
+  if (!ranks.follows()) TILEGRAD_TRY(OutputGuard(options.force).CheckAll(out->files));
+  TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
   return {};
+}
+
+// What ranks must have in common.
+Result<std::vector<train::Trait>> TraitsOf(const EvalOptions& options, const Subject& subject,
+                                           const Workers& workers) {
+  std::vector<train::Trait> out = train::CommonTraits(fmt::format(
+      "{} {} {} {}", options.views_per_model, options.split, options.refine, options.oracle));
+  TILEGRAD_ASSIGN(std::string run, train::WithFile("", subject.predictor->checkpoint()));
+  TILEGRAD_ASSIGN(std::string data, train::DataFingerprint(subject.data, workers));
+  out.push_back({"checkpoint", std::move(run), "all must see the same run"});
+  out.push_back({"dataset", std::move(data), "all must see the same files"});
+  return out;
+}
+
+Status Meet(const EvalOptions& options, const Workers& workers, Ranks& ranks, Subject* out) {
+  Status ready = Prepare(options, workers, ranks, out);
+  if (!ranks.crew()) return ready;
+  std::vector<train::Trait> traits;
+  if (ready.ok()) {
+    auto all = TraitsOf(options, *out, workers);
+    ready = all.status();
+    if (all.ok()) traits = std::move(*all);
+  }
+  return ranks.crew()->Agree(ready, traits);
+}
+
+Status Tell(const train::Evaluation& evaluation, const EvalOptions& options,
+            const Subject& subject) {
+  // Files first: printing may fail.
+  if (!subject.files.empty()) TILEGRAD_TRY(train::WriteEvaluation(subject.run, evaluation));
+  Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
+  PrintResult(train::EvaluationJson(evaluation));
+  if (subject.files.empty()) return {};
+  OutputGuard(options.force).NoteAll(subject.files);
+  Print("written to {} and {}\n", subject.files[0].string(), subject.files[1].string());
+  return {};
+}
+
+Status RunEvaluation(const EvalOptions& options) {
+  Ranks ranks;
+  TILEGRAD_TRY(ranks.Join());
+  const Workers workers(ranks.Workers(options.on.workers));
+  Subject subject;
+  const Status ready = Meet(options, workers, ranks, &subject);
+  if (!ready.ok()) return ranks.Told(ready);
+  const train::TaskEvaluation job{subject.run,
+                                  subject.data,
+                                  *subject.predictor,
+                                  kSplits.at(options.split),
+                                  options.views_per_model,
+                                  RefineWith(options.refine, subject.predictor->image_size()),
+                                  options.oracle,
+                                  ranks.crew()};
+  ProgressLine line;
+  auto evaluation = subject.predictor->task().Evaluate(
+      job, workers, ranks.follows() ? nullptr : line.Sink(), StopOnSignals());
+  line.Finish();
+  ranks.EndIfFailed(evaluation.status());
+  if (!evaluation.ok()) return evaluation.status();
+  return ranks.follows() ? Status() : Tell(*evaluation, options, subject);
 }
 
 }  // namespace

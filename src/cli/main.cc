@@ -73,10 +73,11 @@ Status CheckValues(const CLI::App& app) {
 // Other commands know nothing of other processes, which would write the same files.
 Status CheckRanks(const CLI::App& app) {
   if (train::LaunchedRanks() == 1) return {};
-  if (app.got_subcommand("train") || app.got_subcommand("dataset")) return {};
+  for (const char* command : {"train", "dataset", "eval"})
+    if (app.got_subcommand(command)) return {};
   return InvalidArgument(
-      "started as one of {} processes, but among the commands only train and dataset share their "
-      "work with others: start this one without mpirun",
+      "started as one of {} processes, but among the commands only train, dataset and eval share "
+      "their work with others: start this one without mpirun",
       train::LaunchedRanks());
 }
 

@@ -24,4 +24,11 @@ void Ranks::EndIfBroken(const Status& status) {
   transport_->Abort(ExitCode(status.code()));
 }
 
+void Ranks::EndIfFailed(const Status& status) {
+  if (status.ok() || !crew_) return;
+  if (!crew_->leads()) crew_->RaiseAlarm(status);
+  crew_->Break();
+  EndIfBroken(status);
+}
+
 }  // namespace tilegrad::cli

@@ -31,6 +31,8 @@ class Ranks {
   }
   // After an error that leaves the others waiting: the message, then the end of all.
   void EndIfBroken(const Status& status);
+  // The same of work that each rank does by itself: `status` of its own.
+  void EndIfFailed(const Status& status);
   int Workers(int asked) const { return asked == 0 && crew_ ? train::WorkersOfRank() : asked; }
 
  private:

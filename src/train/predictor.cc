@@ -14,6 +14,7 @@ struct Predictor::Impl {
   explicit Impl(const Workers& workers) : context(workers) {}
   nn::Context context;
   CheckpointInfo info;
+  Path checkpoint;
   TrainConfig config;
   std::vector<std::string> warnings;
   std::unique_ptr<Model> model;
@@ -30,7 +31,7 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   Impl& impl = *out.impl_;
   TILEGRAD_ASSIGN(FoundCheckpoint found, FindCheckpoint(impl.context, path));
   impl.warnings = std::move(found.warnings);
-  impl.info = found.checkpoint.info;
+  impl.info = found.checkpoint.info, impl.checkpoint = found.file;
   if (impl.info.image_size < 1 || impl.info.image_size > 4096)
     return DataLoss("{}: image size {} is not possible", path.string(), impl.info.image_size);
   TILEGRAD_ASSIGN(impl.config,
@@ -42,6 +43,8 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
 }
 
 const std::vector<std::string>& Predictor::warnings() const { return impl_->warnings; }
+
+const Path& Predictor::checkpoint() const { return impl_->checkpoint; }
 
 int Predictor::image_size() const { return static_cast<int>(impl_->info.image_size); }
 

@@ -31,7 +31,8 @@ class Predictor {
 
   // Newer checkpoints of the run folder that could not be read.
   const std::vector<std::string>& warnings() const;
-  int image_size() const;  // pixels
+  const Path& checkpoint() const;  // the file
+  int image_size() const;          // pixels
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"

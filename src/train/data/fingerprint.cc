@@ -3,6 +3,7 @@
 
 #include "base/hash.h"
 #include "train/data/dataset_files.h"
+#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 namespace {
@@ -47,8 +48,6 @@ void AddPhotograph(const Photograph& photo, Hash* all) {
   all->AddBytes(mask.data(), mask.size());
 }
 
-}  // namespace
-
 Result<std::string> DatasetFingerprint(const Path& folder, const Workers& workers) {
   TILEGRAD_ASSIGN(const Dataset dataset, Dataset::Open(folder));
   std::vector<Path> files = {DatasetInfoPath(folder), ModelsPath(folder)};
@@ -59,7 +58,8 @@ Result<std::string> DatasetFingerprint(const Path& folder, const Workers& worker
   return all.Text();
 }
 
-Result<std::string> PhotographsFingerprint(const PhotographSet& set, const Workers& workers) {
+Result<std::string> PhotographsFingerprint(const Path& folder, const Workers& workers) {
+  TILEGRAD_ASSIGN(const PhotographSet set, OpenPhotographs(folder));
   Hash all;
   std::vector<Path> files;
   for (const Photograph& photo : set.photographs) {
@@ -69,6 +69,15 @@ Result<std::string> PhotographsFingerprint(const PhotographSet& set, const Worke
   for (const auto& point : set.mean_keypoints) all.AddAll(point);
   TILEGRAD_TRY(AddFiles(files, workers, &all));
   return all.Text();
+}
+
+}  // namespace
+
+Result<std::string> DataFingerprint(const Path& folder, const Workers& workers) {
+  std::error_code error;
+  return std::filesystem::exists(DatasetInfoPath(folder), error)
+             ? DatasetFingerprint(folder, workers)
+             : PhotographsFingerprint(folder, workers);
 }
 
 Result<std::string> WithFile(const std::string& fingerprint, const Path& file) {

@@ -7,14 +7,12 @@
 
 #include "base/file.h"
 #include "base/parallel.h"
-#include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
 
-// Of the index and every model file of a dataset.
-Result<std::string> DatasetFingerprint(const Path& folder, const Workers& workers);
-// Of every picture, and of what is known of it.
-Result<std::string> PhotographsFingerprint(const PhotographSet& set, const Workers& workers);
+// Of the index and every model file of a dataset or, if the folder holds photographs, of every
+// picture and of what is known of it.
+Result<std::string> DataFingerprint(const Path& folder, const Workers& workers);
 // Of one file, and of a fingerprint that it belongs to.
 Result<std::string> WithFile(const std::string& fingerprint, const Path& file);
 

@@ -11,6 +11,7 @@
 #include "train/eval/retrieval.h"
 #include "train/eval/scores.h"
 #include "train/eval/single_shape.h"
+#include "train/ranks/share.h"
 
 namespace tilegrad::train {
 namespace {
@@ -36,7 +37,12 @@ class Evaluator {
  public:
   Evaluator(const EvaluationJob& job, const Workers& workers, const ProgressSink& progress,
             const StopFlag& stop)
-      : job_(job), data_(*job.dataset), workers_(workers), progress_(progress), stop_(stop) {}
+      : job_(job),
+        data_(*job.dataset),
+        workers_(workers),
+        progress_(progress),
+        stop_(stop),
+        share_(job.crew) {}
 
   Result<Evaluation> Run() {
     const auto held_out = data_.Select(job_.split);
@@ -52,19 +58,14 @@ class Evaluator {
     TILEGRAD_ASSIGN(const Shape undeformed, ShapeOf(job_.template_mesh, /*seed=*/1));
     TILEGRAD_TRY(LoadTrainingShapes());
     TILEGRAD_ASSIGN(const Shape single, MakeSingleShape());
+    for (auto* scores : AllScores()) scores->resize(held_out.size());
+    unusable_.resize(held_out.size());
     for (std::size_t i = 0; i < held_out.size(); ++i) {
       TILEGRAD_TRY(Tick("evaluating", i, held_out.size()));
-      TILEGRAD_ASSIGN(const ModelData data, data_.Load(held_out[i]));
-      TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
-      template_scores_.push_back(Compare(undeformed, truth));
-      single_scores_.push_back(Compare(single, truth));
-      TILEGRAD_TRY(ScoreOracle(held_out[i], data, truth));
-      if (Retrieves()) retrieval_scores_.push_back(ScoreRetrieval(data, truth));
-      TILEGRAD_ASSIGN(const Score score, ScorePredictions(held_out[i], data, truth));
-      predicted_scores_.push_back(score);
-      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
-      out_.models.push_back({ClassOf(info), info.id, score});
+      if (share_.Has(i)) TILEGRAD_TRY(ScoreModel(i, held_out[i], {undeformed, single}));
     }
+    for (auto* scores : AllScores()) TILEGRAD_TRY(share_.Gather(scores));
+    TILEGRAD_TRY(share_.Gather(&unusable_));
     Fill(held_out);
     return std::move(out_);
   }
@@ -73,6 +74,27 @@ class Evaluator {
   Status Tick(const char* stage, std::size_t done, std::size_t total) const {
     if (stop_.load()) return Cancelled("stopped while {}; nothing was written", stage);
     if (progress_) progress_({.stage = stage, .done = done, .total = total, .note = ""});
+    return {};
+  }
+
+  std::vector<std::vector<Score>*> AllScores() {
+    return {&template_scores_, &single_scores_, &retrieval_scores_, &oracle_scores_,
+            &predicted_scores_};
+  }
+
+  struct Constant {  // the same for every picture
+    const Shape &undeformed, &single;
+  };
+  Status ScoreModel(std::size_t i, int model, const Constant& shapes) {
+    TILEGRAD_ASSIGN(const ModelData data, data_.Load(model));
+    TILEGRAD_ASSIGN(const Shape truth, TruthShape(data));
+    template_scores_[i] = Compare(shapes.undeformed, truth);
+    single_scores_[i] = Compare(shapes.single, truth);
+    if (job_.oracle) {
+      TILEGRAD_ASSIGN(oracle_scores_[i], ScoreOracle(model, data, truth));
+    }
+    if (Retrieves()) retrieval_scores_[i] = ScoreRetrieval(data, truth);
+    TILEGRAD_ASSIGN(predicted_scores_[i], ScorePredictions(model, data, truth, &unusable_[i]));
     return {};
   }
 
@@ -162,16 +184,15 @@ class Evaluator {
     return score;
   }
 
-  Status ScoreOracle(int model, const ModelData& data, const Shape& truth) {
-    if (!job_.oracle) return {};
+  Result<Score> ScoreOracle(int model, const ModelData& data, const Shape& truth) {
     TILEGRAD_ASSIGN(Mesh mesh, job_.oracle(data));
     std::uint8_t unusable = 0;
-    oracle_scores_.push_back(ScorePrediction(std::move(mesh), static_cast<std::uint64_t>(model), 0,
-                                             data, truth, &unusable));
-    return {};
+    return ScorePrediction(std::move(mesh), static_cast<std::uint64_t>(model), 0, data, truth,
+                           &unusable);
   }
 
-  Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth) {
+  Result<Score> ScorePredictions(int model, const ModelData& data, const Shape& truth,
+                                 int* unusable_predictions) {
     TILEGRAD_ASSIGN(auto meshes, job_.predict(Images(data, views_)));
     if (meshes.size() != views_.size()) {
       return InternalError("{} predictions for {} images", meshes.size(), views_.size());
@@ -182,7 +203,7 @@ class Evaluator {
       const auto seed = static_cast<std::uint64_t>(model) * 4096 + i;
       scores[i] = ScorePrediction(std::move(meshes[i]), seed, worker, data, truth, &unusable[i]);
     });
-    for (const auto flag : unusable) out_.unusable_predictions += flag;
+    for (const auto flag : unusable) *unusable_predictions += flag;
     return MeanScore(scores);
   }
 
@@ -191,6 +212,11 @@ class Evaluator {
   }
 
   void Fill(std::span<const int> held_out) {
+    for (std::size_t i = 0; i < held_out.size(); ++i) {
+      const ModelInfo& info = data_.models()[static_cast<std::size_t>(held_out[i])];
+      out_.models.push_back({ClassOf(info), info.id, predicted_scores_[i]});
+      out_.unusable_predictions += unusable_[i];
+    }
     const ClassMeans means(data_, held_out);
     out_.classes = means.classes(), out_.class_models = means.class_models();
     out_.rows = {means.Row("undeformed template", template_scores_),
@@ -209,11 +235,13 @@ class Evaluator {
   const Workers& workers_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
+  const Share share_;  // of held-out models
   std::vector<int> views_, color_views_;
   std::vector<std::unique_ptr<PredictionPictures>> pictures_;  // by worker
   TrainingShapes train_;
   std::vector<Score> template_scores_, single_scores_, retrieval_scores_, oracle_scores_,
       predicted_scores_;
+  std::vector<int> unusable_;  // predictions of each model
   Evaluation out_;
 };
 

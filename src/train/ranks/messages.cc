@@ -35,8 +35,13 @@ void SendAndWait(Transport& ranks, const Address& to, std::span<const std::byte>
   InPieces(data, [&](std::span<const std::byte> piece) { Await(ranks, ranks.Send(to, piece)); });
 }
 
-void ReceiveAndWait(Transport& ranks, const Address& from, std::span<std::byte> data) {
-  InPieces(data, [&](std::span<std::byte> piece) { Await(ranks, ranks.Receive(from, piece)); });
+bool ReceiveAndWait(Transport& ranks, const Address& from, std::span<std::byte> data,
+                    const std::function<bool()>& meanwhile) {
+  bool all = true;
+  InPieces(data, [&](std::span<std::byte> piece) {
+    all = all && Await(ranks, ranks.Receive(from, piece), meanwhile);
+  });
+  return all;
 }
 
 void SendText(Transport& ranks, int peer, const std::string& text) {

@@ -17,7 +17,8 @@ bool Await(Transport& ranks, Transport::Ticket ticket,
            const std::function<bool()>& meanwhile = nullptr);
 
 void SendAndWait(Transport& ranks, const Address& to, std::span<const std::byte> data);
-void ReceiveAndWait(Transport& ranks, const Address& from, std::span<std::byte> data);
+bool ReceiveAndWait(Transport& ranks, const Address& from, std::span<std::byte> data,
+                    const std::function<bool()>& meanwhile = nullptr);  // false as of Await
 
 // A trivially copyable value.
 template <class T>

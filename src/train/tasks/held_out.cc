@@ -203,6 +203,7 @@ Result<Evaluation> EvaluateOnDataset(const TaskEvaluation& job, const Workers& w
   evaluation.template_mesh = job.predictor.template_mesh();
   evaluation.views_per_model = job.views_per_model;
   evaluation.predictor = job.predictor.description();
+  evaluation.crew = job.crew;
   return train::Evaluate(evaluation, workers, progress, stop);
 }
 

@@ -12,7 +12,7 @@ const Mesh& Model::template_mesh() const {
 }
 
 Result<std::string> Task::Fingerprint(const Path& data, const Workers& workers) const {
-  return DatasetFingerprint(data, workers);
+  return DataFingerprint(data, workers);
 }
 
 Result<std::vector<nn::NamedTensor>> Task::Statistics() {

@@ -27,6 +27,7 @@
 
 namespace tilegrad::train {
 
+class Crew;
 class Predictor;
 
 // What a task starts training with.
@@ -79,6 +80,7 @@ struct TaskEvaluation {
   // Of fitting what is predicted to all views of each scored model, for a row that says how good
   // predictions can be; 0: none. An error where a task has no such row.
   int oracle_steps = 0;
+  Crew* crew = nullptr;  // of ranks that score models together; only on rank 0 are scores whole
 };
 
 // A picture of a report.

@@ -10,6 +10,7 @@
 #include "train/ranks/crew.h"
 #include "train/ranks/gradient_sums.h"
 #include "train/ranks/messages.h"
+#include "train/ranks/share.h"
 #include "train/ranks/value_sums.h"
 
 namespace tilegrad::train {
@@ -196,6 +197,37 @@ TEST(Crew, TheLeaderHearsOfAnErrorElsewhere) {
     Status heard;
     while ((heard = crew.Alarm()).ok()) std::this_thread::yield();
     EXPECT_EQ(heard.message(), "rank 2: the loss is nan");
+  });
+}
+
+TEST(Share, RankZeroGetsWhatAllMade) {
+  for (const std::size_t block : {1, 3}) {
+    OnRanks(3, [&](Transport& ranks) {
+      Crew crew(ranks);
+      const Share share(&crew, block);
+      constexpr std::size_t kItems = 11, kWidth = 2;
+      std::vector<int> results(kItems * kWidth, -1);
+      for (std::size_t i = 0; i < kItems; ++i) {
+        if (!share.Has(i)) continue;
+        for (std::size_t k = 0; k < kWidth; ++k)
+          results[i * kWidth + k] = static_cast<int>(10 * i + k);
+      }
+      EXPECT_EQ(std::count(results.begin(), results.end(), -1) == 0, false);
+      EXPECT_TRUE(share.Gather(&results, kWidth).ok());
+      crew.Disband();
+      if (!crew.leads()) return;
+      for (std::size_t i = 0; i < results.size(); ++i)
+        EXPECT_EQ(results[i], static_cast<int>(10 * (i / kWidth) + i % kWidth));
+    });
+  }
+}
+
+TEST(Share, RankZeroHearsOfAnErrorInsteadOfResults) {
+  OnRanks(2, [](Transport& ranks) {
+    Crew crew(ranks);
+    if (!crew.leads()) return crew.TellLeader({StatusCode::kInternal, "a broken file"});
+    std::vector<int> results(4);
+    EXPECT_EQ(Share(&crew).Gather(&results).message(), "rank 1: a broken file");
   });
 }
 

@@ -11,6 +11,7 @@
 #include "train/eval/class_means.h"
 #include "train/eval/retrieval.h"
 #include "train/predictor.h"
+#include "train/ranks/share.h"
 #include "train/tasks/held_out.h"
 
 namespace tilegrad::train {
@@ -60,6 +61,7 @@ class Examiner {
         workers_(workers),
         progress_(progress),
         stop_(stop),
+        share_(job.crew),
         views_(SpreadViews(dataset.info().views,
                            std::clamp(job.views_per_model, 1, dataset.info().views))) {}
 
@@ -71,10 +73,12 @@ class Examiner {
                              data_.folder().string(), SplitName(split));
     }
     TILEGRAD_TRY(LearnBaselines());
+    for (auto* scores : {&frequent_, &retrieved_, &said_}) scores->resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
       TILEGRAD_TRY(Tick("evaluating", i, models.size()));
-      TILEGRAD_TRY(Examine(models[i]));
+      if (share_.Has(i)) TILEGRAD_TRY(Examine(i, models[i]));
     }
+    for (auto* scores : {&frequent_, &retrieved_, &said_}) TILEGRAD_TRY(share_.Gather(scores));
     out_.split = SplitName(split);
     Fill(models);
     return std::move(out_);
@@ -107,7 +111,7 @@ class Examiner {
     return {};
   }
 
-  Status Examine(int model) {
+  Status Examine(std::size_t i, int model) {
     const int truth = Info(model).class_index;
     TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
     const std::vector<std::uint8_t> images = Views(all, data_.info().views, views_);
@@ -119,15 +123,15 @@ class Examiner {
                       model_.Classify(std::span(images).subspan(v * bytes, count * bytes)));
       said.insert(said.end(), some.begin(), some.end());
     }
-    said_.push_back(Accuracy(said, truth));
-    frequent_.push_back(Accuracy(std::vector<int>{most_frequent_}, truth));
+    said_[i] = Accuracy(said, truth);
+    frequent_[i] = Accuracy(std::vector<int>{most_frequent_}, truth);
     if (!Retrieves()) return {};
     workers_.For(views_.size(), [&](std::size_t v, std::size_t) {
       const auto match =
           index_.Nearest(std::span(images).subspan(v * bytes, bytes), data_.info().image_size);
       found[v] = searched_[static_cast<std::size_t>(match.model)];
     });
-    retrieved_.push_back(Accuracy(found, truth));
+    retrieved_[i] = Accuracy(found, truth);
     return {};
   }
 
@@ -153,6 +157,7 @@ class Examiner {
   const Workers& workers_;
   const ProgressSink& progress_;
   const StopFlag& stop_;
+  const Share share_;  // of models
   std::vector<int> views_;
   int most_frequent_ = 0;
   ImageIndex index_;

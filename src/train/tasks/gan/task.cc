@@ -30,7 +30,7 @@ class GanTask : public Task {
   int image_size() const override { return dataset_->info().image_size; }
   RunHeader Header() override;
   Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
-    TILEGRAD_ASSIGN(const std::string own, DatasetFingerprint(data, workers));
+    TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
     return bank_ ? bank_->Fingerprint(own) : own;
   }
   Status Begin(const Path& run, std::int64_t first_step) override;

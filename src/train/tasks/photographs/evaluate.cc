@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <sstream>
 
@@ -13,6 +14,7 @@
 #include "train/eval/scores.h"
 #include "train/metrics/keypoint_score.h"
 #include "train/predictor.h"
+#include "train/ranks/share.h"
 #include "train/run/first_difference.h"
 #include "train/tasks/photographs/batch.h"
 #include "train/tasks/photographs/pictures.h"
@@ -51,13 +53,15 @@ struct ImageScore {
   }
 };
 
-// One method's sums.
+// One method's, of each photograph.
 struct Tally {
-  explicit Tally(std::size_t keypoints) : pck(keypoints, kPckThreshold) {}
-  std::vector<Score> scores;  // of photographs
-  KeypointScore pck;
+  std::vector<Score> scores;
+  std::vector<double> errors;  // [photograph][keypoint]; NaN where it is not visible
 
-  Score Mean() const {
+  Score Mean(std::size_t keypoints) const {
+    KeypointScore pck(keypoints, kPckThreshold);
+    for (std::size_t i = 0; i < errors.size(); ++i)
+      if (!std::isnan(errors[i])) pck.Add(i % keypoints, errors[i]);
     Score mean = MeanScore(scores);
     mean.pck = pck.Mean();
     return mean;
@@ -71,7 +75,8 @@ class PhotographJudge {
         set_(set),
         model_(dynamic_cast<PhotographModel&>(job.predictor.model())),
         pictures_(static_cast<int>(model_.config().size)),
-        tallies_(kMethods, Tally(set.keypoint_names.size())) {
+        share_(job.crew, Model::kImagesAtOnce),
+        tallies_(kMethods) {
     const nn::NoGrad off(model_.context());
     const nn::Var mean = model_.network().MeanShape();
     const std::span<const float> p = mean.value().span<float>();
@@ -93,12 +98,21 @@ class PhotographJudge {
     TILEGRAD_ASSIGN(const PhotoStore store,
                     PhotoStore::Load(set_, chosen, config.crop, static_cast<int>(config.size),
                                      workers, progress, stop));
+    const std::size_t keypoints = set_.keypoint_names.size();
+    for (Tally& tally : tallies_) {
+      tally.scores.resize(chosen.size());
+      tally.errors.resize(chosen.size() * keypoints, std::numeric_limits<double>::quiet_NaN());
+    }
     for (int at = 0; at < store.count(); at += static_cast<int>(Model::kImagesAtOnce)) {
       if (stop) return Cancelled("stopped while evaluating; nothing was written");
       if (progress)
         progress({"evaluating", static_cast<std::uint64_t>(at),
                   static_cast<std::uint64_t>(store.count()), ""});
-      TILEGRAD_TRY(ScoreSome(store, at));
+      if (share_.Has(static_cast<std::size_t>(at))) TILEGRAD_TRY(ScoreSome(store, at));
+    }
+    for (Tally& tally : tallies_) {
+      TILEGRAD_TRY(share_.Gather(&tally.scores));
+      TILEGRAD_TRY(share_.Gather(&tally.errors, keypoints));
     }
     return Fill(chosen);
   }
@@ -112,6 +126,7 @@ class PhotographJudge {
         GatherPhotographs(model_.context(), model_.config(), store, some, -1);
     TILEGRAD_ASSIGN(const auto predicted,
                     PredictPhotographs(model_.context(), model_.network(), batch.input));
+    first_ = static_cast<std::size_t>(first);
     for (std::size_t i = 0; i < predicted.size(); ++i)
       TILEGRAD_TRY(ScoreOne(batch, i, predicted[i]));
     return {};
@@ -146,10 +161,11 @@ class PhotographJudge {
       const auto at = ProjectWeakly(seen.camera, seen.photo.keypoints[k]);
       const double error =
           crop.to_box * std::hypot(at[0] - crop.keypoints[k].x, at[1] - crop.keypoints[k].y);
-      tally->pck.Add(k, error), own.Add(0, error);
+      tally->errors[(first_ + i) * crop.keypoints.size() + k] = error;
+      own.Add(0, error);
     }
     score.pck = own.Mean();
-    tally->scores.push_back(score);
+    tally->scores[first_ + i] = score;
     return {};
   }
 
@@ -160,7 +176,7 @@ class PhotographJudge {
     out.dataset_source = set_.source, out.views_per_model = 1;
     out.classes = {set_.source}, out.class_models = {static_cast<int>(chosen.size())};
     for (int m = 0; m < kMethods; ++m) {
-      const Score mean = tallies_[static_cast<std::size_t>(m)].Mean();
+      const Score mean = tallies_[static_cast<std::size_t>(m)].Mean(set_.keypoint_names.size());
       out.rows.push_back({kNames[m], {mean}, mean});
     }
     for (std::size_t i = 0; i < chosen.size(); ++i)
@@ -173,7 +189,9 @@ class PhotographJudge {
   const PhotographSet& set_;
   PhotographModel& model_;
   PhotographPictures pictures_;
+  const Share share_;  // of photographs
   std::vector<Tally> tallies_;
+  std::size_t first_ = 0;  // photograph of the batch
   std::vector<float> mean_shape_;
   std::vector<std::array<double, 3>> mean_keypoints_;
 };

@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
-#include "train/data/fingerprint.h"
 #include "train/predictor.h"
 #include "train/tasks/example_sheet.h"
 #include "train/tasks/photographs/evaluate.h"
@@ -35,9 +34,6 @@ class PhotographsTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }
   RunHeader Header() override;
-  Result<std::string> Fingerprint(const Path& /*data*/, const Workers& workers) const override {
-    return PhotographsFingerprint(set_, workers);
-  }
   Status Begin(const Path& run, std::int64_t first_step) override {
     return RememberPhotographs(run, set_, first_step == 0);
   }

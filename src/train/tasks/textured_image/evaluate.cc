@@ -10,6 +10,7 @@
 #include "train/eval/class_means.h"
 #include "train/eval/scores.h"
 #include "train/predictor.h"
+#include "train/ranks/share.h"
 #include "train/tasks/textured_image/held_out_views.h"
 #include "train/tasks/textured_image/model.h"
 #include "train/tasks/textured_image/object_pictures.h"
@@ -79,7 +80,8 @@ class Evaluator {
         job_(job),
         dataset_(dataset),
         workers_(workers),
-        model_(dynamic_cast<TexturedModel&>(job.predictor.model())) {
+        model_(dynamic_cast<TexturedModel&>(job.predictor.model())),
+        share_(job.crew) {
     for (int w = 0; w < workers.count(); ++w)
       judges_.push_back(std::make_unique<Judge>(config, dataset.info().image_size));
   }
@@ -93,11 +95,14 @@ class Evaluator {
     }
     TILEGRAD_ASSIGN(HeldOutViews views,
                     HeldOutViews::Load({config_, dataset_, models}, workers_, progress, stop));
+    scores_.resize(models.size()), unusable_.resize(models.size());
     for (std::size_t i = 0; i < models.size(); ++i) {
       if (stop) return Cancelled("stopped while evaluating; nothing was written");
       if (progress) progress({"evaluating", i, models.size(), ""});
-      TILEGRAD_TRY(Score(views, i));
+      if (share_.Has(i)) TILEGRAD_TRY(Score(views, i));
     }
+    TILEGRAD_TRY(share_.Gather(&scores_));
+    TILEGRAD_TRY(share_.Gather(&unusable_));
     Fill(models);
     return std::move(out_);
   }
@@ -133,11 +138,11 @@ class Evaluator {
       AddShape(predicted.ok() ? Compare(*predicted, shape) : WorstScore(shape), &scores[v]);
     });
     for (const Status& failure : failures) TILEGRAD_TRY(failure);
-    for (const auto flag : unusable) out_.unusable_predictions += flag;
+    for (const auto flag : unusable) unusable_[i] += flag;
     for (int m = 0; m < kMethods; ++m) {
       std::vector<train::Score> of_method;
       for (const MethodScores& view : scores) of_method.push_back(view[m]);
-      scores_[m].push_back(MeanScore(of_method));
+      scores_[i][m] = MeanScore(of_method);
     }
     return {};
   }
@@ -153,12 +158,16 @@ class Evaluator {
     const ClassMeans means(dataset_, models);
     out_.classes = means.classes(), out_.class_models = means.class_models();
     const bool lit = LightingOf(config_.light) != Lighting::kNone;
-    for (int m = lit ? kWithoutLight : kOurs; m < kMethods; ++m)
-      out_.rows.push_back(means.Row(kNames[m], scores_[m]));
+    for (int m = lit ? kWithoutLight : kOurs; m < kMethods; ++m) {
+      std::vector<train::Score> of_method;
+      for (const MethodScores& model : scores_) of_method.push_back(model[m]);
+      out_.rows.push_back(means.Row(kNames[m], of_method));
+    }
     for (std::size_t i = 0; i < models.size(); ++i) {
       const ModelInfo& info = dataset_.models()[static_cast<std::size_t>(models[i])];
       out_.models.push_back({dataset_.info().classes[static_cast<std::size_t>(info.class_index)],
-                             info.id, scores_[kOurs][i]});
+                             info.id, scores_[i][kOurs]});
+      out_.unusable_predictions += unusable_[i];
     }
     out_.predictor = job_.predictor.description();
     out_.dataset_source = dataset_.info().source;
@@ -171,7 +180,9 @@ class Evaluator {
   const Workers& workers_;
   TexturedModel& model_;
   std::vector<std::unique_ptr<Judge>> judges_;  // by worker
-  std::array<std::vector<train::Score>, kMethods> scores_;
+  const Share share_;                           // of models
+  std::vector<MethodScores> scores_;            // by model
+  std::vector<int> unusable_;                   // predictions of each
   Evaluation out_;
 };
 

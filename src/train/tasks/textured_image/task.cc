@@ -41,7 +41,7 @@ class TexturedImageTask : public Task {
   int image_size() const override { return dataset_->info().image_size; }
   RunHeader Header() override;
   Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
-    TILEGRAD_ASSIGN(const std::string own, DatasetFingerprint(data, workers));
+    TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
     if (config_.adversary.perceptual == 0) return own;
     TILEGRAD_ASSIGN(
         const Path weights,
