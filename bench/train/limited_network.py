@@ -3,7 +3,7 @@
 """Training over a slow network, on one machine: each rank in a network namespace of its own, behind a link of limited
 bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md says it should. As root, with Open MPI:
 
-    bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4]
+    bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4] [--set KEY=VALUE ...]
 
 The model is given what a step takes without a limit, on as many ranks (so that what else the machine does, and its number of
 cores, count on both sides), the gradients' number and the bandwidth.
@@ -89,6 +89,8 @@ def median_step(args, ranks, folder):
                                        "--threads", "1", "--quiet", "--steps", str(args.steps)]
     for setting in [f"portions={args.portions}", "log_every=1", "sample_every=1000000", "checkpoint_every=1000000"]:
         words += ["--set", f"schedule.{setting}"]
+    for setting in args.set:
+        words += ["--set", setting]
     done = subprocess.run(words, capture_output=True, text=True, env=dict(os.environ), check=False)
     if done.returncode:
         raise SystemExit(done.stderr)
@@ -107,7 +109,9 @@ def main():
     parser.add_argument("--portions", type=int, default=4)
     parser.add_argument("--steps", type=int, default=20)
     parser.add_argument("--gbits", type=float, nargs="+", default=[0.5, 1, 4])
+    parser.add_argument("--set", nargs="+", default=[])
     args = parser.parse_args()
+    sharded = "schedule.shard_optimizer=false" not in args.set
     with tempfile.TemporaryDirectory() as folder:
         with Network(args.ranks, None):
             free, wait, numbers = median_step(args, args.ranks, folder)
@@ -117,7 +121,7 @@ def main():
                 step, wait, _ = median_step(args, args.ranks, folder)
             # All computing of the batch, as if by one rank as slow as these are.
             compute = free * args.ranks
-            model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions)
+            model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions, sharded)
             print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, waiting {wait * 100:.0f} %; "
                   f"the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})")
 

@@ -12,15 +12,20 @@ import argparse
 
 BUCKET = 1 << 18  # numbers, as in src/train/ranks/gradient_sums.h
 BACKWARD = 0.6  # share of a portion's time in which sums may travel
+TCP = 0.93  # share of a network's bandwidth that TCP carries
 
 
-def step_time(ranks, compute, update, numbers, gbits, portions):
-    computing = compute * -(-portions // ranks) / portions + update
+def step_time(ranks, compute, update, numbers, gbits, portions, sharded=True):
+    computing = compute * -(-portions // ranks) / portions
     if ranks == 1:
-        return computing
-    travel = 2 * (ranks - 1) / ranks * 4 * numbers / (gbits * 1e9 / 8)
+        return computing + update
+    travel = (ranks - 1) / ranks * 4 * numbers / (TCP * gbits * 1e9 / 8)  # of sums, and of what comes back
     buckets = max(1, -(-numbers // BUCKET))
-    return computing + max(travel - BACKWARD * compute / portions, travel / buckets)
+    overlap = BACKWARD * compute / portions
+    if not sharded:
+        return computing + max(2 * travel - overlap, 2 * travel / buckets) + update
+    moved = update / ranks  # weights, whose buckets leave one by one
+    return computing + max(travel - overlap, travel / buckets) + max(moved + travel / buckets, travel + moved / buckets)
 
 
 def batch_for(ranks, args, gbits):

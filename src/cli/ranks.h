@@ -33,7 +33,7 @@ class Ranks {
   void EndIfBroken(const Status& status);
   // The same of work that each rank does by itself: `status` of its own.
   void EndIfFailed(const Status& status);
-  int Workers(int asked) const { return asked == 0 && crew_ ? train::WorkersOfRank() : asked; }
+  int Workers(int asked) const { return crew_ ? train::PlaceRank(asked) : asked; }
 
  private:
   std::unique_ptr<train::Transport> transport_;

@@ -52,7 +52,7 @@ Status Optimizer::Step(std::span<const Var> gradients, double gradient_scale) {
   return Step(as_they_are, gradient_scale);
 }
 
-Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scale) {
+Status Optimizer::Check(std::span<const Gradient> gradients) const {
   TILEGRAD_TRY(context_.status());
   if (gradients.size() != slots_.size()) {
     return InvalidArgument("{}: {} gradients for {} parameters", name_, gradients.size(),
@@ -61,13 +61,34 @@ Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scal
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     TILEGRAD_TRY(CheckGradient(name_, slots_[i].parameter, gradients[i]));
   }
+  return {};
+}
+
+Status Optimizer::Step(std::span<const Gradient> gradients, UpdateShare* share) {
+  if (share == nullptr) return Step(gradients);
+  TILEGRAD_TRY(Check(gradients));
+  ++steps_;
+  BeginStep(/*gradient_scale=*/1);
+  share->Begin(*this);
+  workers().For(share->pieces(), [&](std::size_t k, std::size_t) {
+    const UpdateShare::Piece piece = share->piece(k);
+    Update(slots_[piece.parameter], gradients[piece.parameter].a().value(),
+           {piece.begin, piece.end});
+    share->Updated(k);
+  });
+  return share->Finish();
+}
+
+Status Optimizer::Step(std::span<const Gradient> gradients, double gradient_scale) {
+  TILEGRAD_TRY(Check(gradients));
   ++steps_;
   BeginStep(gradient_scale);
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     if (gradients[i].is_product()) {
       UpdateByProduct(slots_[i], gradients[i]);
     } else {
-      Update(slots_[i], gradients[i].Value().value());
+      const Tensor& gradient = gradients[i].a().value();
+      Update(slots_[i], gradient, {0, gradient.elements()});
     }
   }
   return {};
@@ -112,20 +133,21 @@ void Adam::BeginStep(double gradient_scale) {
 }
 
 template <class T>
-AdamProblem<T> Adam::Problem(Slot& slot) {
+AdamProblem<T> Adam::Problem(Slot& slot, Numbers numbers) const {
   Tensor& p = slot.parameter.value.value();
-  coefficients_.keep = 1.0 - options_.learning_rate * DecayOf(p, options_.weight_decay);
-  return {.n = p.elements(),
-          .parameter = p.data<T>(),
-          .m = slot.moments[0].data<T>(),
-          .v = slot.moments[1].data<T>(),
-          .coefficients = coefficients_};
+  AdamCoefficients coefficients = coefficients_;
+  coefficients.keep = 1.0 - options_.learning_rate * DecayOf(p, options_.weight_decay);
+  return {.n = numbers.end - numbers.begin,
+          .parameter = p.data<T>() + numbers.begin,
+          .m = slot.moments[0].data<T>() + numbers.begin,
+          .v = slot.moments[1].data<T>() + numbers.begin,
+          .coefficients = coefficients};
 }
 
-void Adam::Update(Slot& slot, const Tensor& gradient) {
+void Adam::Update(Slot& slot, const Tensor& gradient, Numbers numbers) {
   WithFloatType(gradient.dtype(), [&]<class T>(T) {
-    AdamProblem<T> problem = Problem<T>(slot);
-    problem.gradient = gradient.data<T>();
+    AdamProblem<T> problem = Problem<T>(slot, numbers);
+    problem.gradient = gradient.data<T>() + numbers.begin;
     AdamStep(problem, workers());
   });
 }
@@ -141,17 +163,19 @@ void Adam::UpdateByProduct(Slot& slot, const Gradient& product) {
   gradient.n = static_cast<std::size_t>(b.shape()[1]);
   gradient.a = a.data<float>(), gradient.lda = gradient.m, gradient.transpose_a = true;
   gradient.b = b.data<float>(), gradient.ldb = gradient.n;
-  ProductAdamStep(gradient, Problem<float>(slot), context().kernels());
+  const Numbers all{0, slot.parameter.value.value().elements()};
+  ProductAdamStep(gradient, Problem<float>(slot, all), context().kernels());
 }
 
-void Sgd::Update(Slot& slot, const Tensor& gradient) {
+void Sgd::Update(Slot& slot, const Tensor& gradient, Numbers numbers) {
   Tensor& p = slot.parameter.value.value();
   const SgdCoefficients c{options_.learning_rate, options_.momentum, gradient_scale_,
                           DecayOf(p, options_.weight_decay), options_.nesterov};
   WithFloatType(p.dtype(), [&]<class T>(T) {
-    SgdStep(
-        SgdProblem<T>{p.elements(), p.data<T>(), gradient.data<T>(), slot.moments[0].data<T>(), c},
-        workers());
+    SgdStep(SgdProblem<T>{numbers.end - numbers.begin, p.data<T>() + numbers.begin,
+                          gradient.data<T>() + numbers.begin,
+                          slot.moments[0].data<T>() + numbers.begin, c},
+            workers());
   });
 }
 

@@ -13,6 +13,23 @@
 
 namespace tilegrad::nn {
 
+class Optimizer;
+
+// Who takes part in a step that several processes share out: each moves some of the numbers and
+// gets the others from elsewhere.
+class UpdateShare {
+ public:
+  struct Piece {
+    std::size_t parameter = 0, begin = 0, end = 0;  // numbers [begin, end) of it
+  };
+  virtual ~UpdateShare() = default;
+  virtual void Begin(const Optimizer& optimizer) = 0;
+  virtual std::size_t pieces() const = 0;  // that are to be moved here
+  virtual Piece piece(std::size_t k) const = 0;
+  virtual void Updated(std::size_t k) = 0;  // its numbers are final; called by several threads
+  virtual Status Finish() = 0;              // returns when all numbers are there
+};
+
 class Optimizer {
  public:
   virtual ~Optimizer() = default;
@@ -25,7 +42,12 @@ class Optimizer {
   Status Step(std::span<const Gradient> gradients, double gradient_scale = 1.0);
   Status Step(std::span<const Var> gradients, double gradient_scale = 1.0);
 
+  // The same where `share` is not null, of whose pieces alone gradients are read: values, no
+  // products. Moments of other numbers stay behind.
+  Status Step(std::span<const Gradient> gradients, UpdateShare* share);
+
   std::span<const Var> parameters() const { return parameters_; }  // in the order given
+  std::span<const Tensor> moments(std::size_t i) const { return slots_[i].moments; }
   std::int64_t steps() const { return steps_; }
 
   // "<name>.<moment>.<parameter>" for each moment, and "<name>.steps" ([1] of kI64); name: "adam"
@@ -42,10 +64,14 @@ class Optimizer {
             std::vector<NamedVar> parameters);
   // What all parameters of step steps() (1, 2, ..) share, then each of them.
   virtual void BeginStep(double gradient_scale) = 0;
-  virtual void Update(Slot& slot, const Tensor& gradient) = 0;
+  // Numbers [begin, end); called by several threads, each with other numbers.
+  struct Numbers {
+    std::size_t begin, end;
+  };
+  virtual void Update(Slot& slot, const Tensor& gradient, Numbers numbers) = 0;
   // Where the gradient is a product; as it stands it computes that first.
   virtual void UpdateByProduct(Slot& slot, const Gradient& product) {
-    Update(slot, product.Value().value());
+    Update(slot, product.Value().value(), {0, slot.parameter.value.value().elements()});
   }
   Context& context() const { return context_; }
   const Workers& workers() const { return context_.workers(); }
@@ -54,6 +80,7 @@ class Optimizer {
   Context& context_;
   std::string name_;
   std::vector<std::string> moments_;
+  Status Check(std::span<const Gradient> gradients) const;
   std::vector<Slot> slots_;
   std::vector<Var> parameters_;  // of the slots
   std::int64_t steps_ = 0;
@@ -79,10 +106,10 @@ class Adam : public Optimizer {
 
  private:
   void BeginStep(double gradient_scale) override;
-  void Update(Slot& slot, const Tensor& gradient) override;
+  void Update(Slot& slot, const Tensor& gradient, Numbers numbers) override;
   void UpdateByProduct(Slot& slot, const Gradient& product) override;
   template <class T>
-  AdamProblem<T> Problem(Slot& slot);
+  AdamProblem<T> Problem(Slot& slot, Numbers numbers) const;
   AdamOptions options_;
   AdamCoefficients coefficients_;
 };
@@ -104,7 +131,7 @@ class Sgd : public Optimizer {
 
  private:
   void BeginStep(double gradient_scale) override { gradient_scale_ = gradient_scale; }
-  void Update(Slot& slot, const Tensor& gradient) override;
+  void Update(Slot& slot, const Tensor& gradient, Numbers numbers) override;
   SgdOptions options_;
   double gradient_scale_ = 1;
 };

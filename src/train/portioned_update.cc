@@ -26,7 +26,9 @@ PortionedUpdate::PortionedUpdate(Task& task, Crew* crew, std::int64_t portions,
       value_sums_(portions, RanksOf(crew)) {}
 
 Result<std::unique_ptr<PortionedUpdate>> PortionedUpdate::Make(nn::Context& context, Task& task,
-                                                               std::int64_t portions, Crew* crew) {
+                                                               const Schedule& schedule,
+                                                               Crew* crew) {
+  const std::int64_t portions = schedule.portions;
   if (crew && crew->ranks().size() > portions) {
     return InvalidArgument(
         "{} ranks cannot share {} portion{} of a batch: set schedule.portions to a power of two "
@@ -36,7 +38,9 @@ Result<std::unique_ptr<PortionedUpdate>> PortionedUpdate::Make(nn::Context& cont
   if (context.dtype() != nn::DType::kF32) return InternalError("portions are summed in F32");
   TILEGRAD_ASSIGN(auto statistics, task.Statistics());
   auto sums = std::make_unique<GradientSums>(
-      context, GradientSums::Shape{.portions = portions, .ranks = RanksOf(crew)},
+      context,
+      GradientSums::Shape{
+          .portions = portions, .ranks = RanksOf(crew), .shares_update = schedule.shard_optimizer},
       std::move(statistics));
   return std::unique_ptr<PortionedUpdate>(
       new PortionedUpdate(task, crew, portions, std::move(sums)));
@@ -51,7 +55,19 @@ Status PortionedUpdate::Run(const UpdateIndex& at, StepValues* values) {
     sums_->GiveUp();
     return status;
   }
-  return task_.Update(at, sums_->means());
+  return Update(at, values);
+}
+
+Status PortionedUpdate::Update(UpdateIndex at, StepValues* values) {
+  WeightShare* const share = sums_->share();
+  at.share = share;
+  const Status status = task_.Update(at, sums_->means());
+  TILEGRAD_TRY(alarm_);
+  TILEGRAD_TRY(status);
+  if (!share) return {};
+  if (!share->finished()) return InternalError("Task::Update gave no share to its optimizer");
+  values->wait_seconds += share->seconds_waited();
+  return {};
 }
 
 Status PortionedUpdate::Backward(UpdateIndex at) {
@@ -75,14 +91,13 @@ void PortionedUpdate::AddValues() {
 }
 
 Status PortionedUpdate::Finish(StepValues* values) {
-  Status alarm;
-  const auto all_is_well = [&] {
-    if (crew_ && crew_->leads()) alarm = crew_->Alarm();
-    return alarm.ok();
+  const auto all_is_well = [this] {
+    if (crew_ && crew_->leads()) alarm_ = crew_->Alarm();
+    return alarm_.ok();
   };
-  if (!sums_->Finish(all_is_well)) return alarm;
+  if (!sums_->Finish(all_is_well)) return alarm_;
   const std::span<const double> numbers = value_sums_.Finish(all_is_well);
-  TILEGRAD_TRY(alarm);
+  TILEGRAD_TRY(alarm_);
   values->wait_seconds += crew_ ? sums_->seconds_waited() : 0;
   if (!numbers.empty()) TakeValues(numbers, values);
   return {};

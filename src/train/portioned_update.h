@@ -7,6 +7,7 @@
 #include "train/ranks/crew.h"
 #include "train/ranks/gradient_sums.h"
 #include "train/ranks/value_sums.h"
+#include "train/run/schedule.h"
 #include "train/tasks/task.h"
 
 namespace tilegrad::train {
@@ -16,17 +17,23 @@ class PortionedUpdate {
   // `crew`: of all ranks, or null. InvalidArgument where the task or the number of ranks do not
   // allow so many portions.
   static Result<std::unique_ptr<PortionedUpdate>> Make(nn::Context& context, Task& task,
-                                                       std::int64_t portions, Crew* crew);
+                                                       const Schedule& schedule, Crew* crew);
 
   // Task::Backward of this rank's portions, the means of all, Task::Update. `values` are those of
   // the whole batch on rank 0; elsewhere they mean nothing.
   Status Run(const UpdateIndex& at, StepValues* values);
+
+  // Moments of optimisers that are spread over ranks come to rank 0. Every rank calls it where
+  // HasMoments, which is the same on all.
+  bool HasMoments() const { return sums_->share() && sums_->share()->HasMoments(); }
+  void GatherMoments() { sums_->share()->GatherMoments(); }
 
  private:
   PortionedUpdate(Task& task, Crew* crew, std::int64_t portions,
                   std::unique_ptr<GradientSums> sums);
   Status Backward(UpdateIndex at);
   Status Finish(StepValues* values);
+  Status Update(UpdateIndex at, StepValues* values);
   void AddValues();
   void TakeValues(std::span<const double> sums, StepValues* values) const;
 
@@ -35,6 +42,7 @@ class PortionedUpdate {
   std::int64_t portions_;
   std::unique_ptr<GradientSums> sums_;
   ValueSums value_sums_;
+  Status alarm_;                 // of another rank, in the middle of an update
   StepValues portion_;           // of the last portion
   std::vector<double> numbers_;  // of it: loss, images, stream seconds, terms
 };

@@ -8,7 +8,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::int64_t kEnd = -1;  // the order after the last step
+constexpr std::int64_t kEnd = -1;     // the order after the last step
+constexpr std::int64_t kGather = -2;  // the order to bring moments to rank 0
 
 class Training : public RunWork {
  public:
@@ -45,8 +46,7 @@ class Training : public RunWork {
     TILEGRAD_TRY(task_.Start({context, config_.schedule, job_.data, progress, stop, job_.warn}));
     TILEGRAD_TRY(context.TakeStatus());
     if (!job_.crew && config_.schedule.portions == 1) return {};
-    TILEGRAD_ASSIGN(portioned_,
-                    PortionedUpdate::Make(context, task_, config_.schedule.portions, job_.crew));
+    TILEGRAD_ASSIGN(portioned_, PortionedUpdate::Make(context, task_, config_.schedule, job_.crew));
     return {};
   }
 
@@ -64,6 +64,10 @@ class Training : public RunWork {
     StepValues values;
     for (std::int64_t step = job_.crew->AwaitOrder(); step != kEnd;
          step = job_.crew->AwaitOrder()) {
+      if (step == kGather) {
+        portioned_->GatherMoments();
+        continue;
+      }
       values.terms.clear(), values.also.clear();
       const Status done = Updates(step, &values);
       if (!done.ok()) job_.crew->RaiseAlarm(done.Within(fmt::format("step {}", step)));
@@ -72,7 +76,13 @@ class Training : public RunWork {
     return outcome;
   }
 
-  std::vector<nn::NamedTensor> State() override { return task_.State(); }
+  std::vector<nn::NamedTensor> State() override {
+    if (job_.crew && portioned_->HasMoments()) {
+      job_.crew->Order(kGather);
+      portioned_->GatherMoments();
+    }
+    return task_.State();
+  }
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
     return task_.LoadState(state, steps);
   }
@@ -120,7 +130,8 @@ Status StartTogether(const RunPlan& plan, const TrainJob& job, const Workers& wo
   TILEGRAD_ASSIGN(const std::string settings,
                   training->ResultSettings(plan.settings, "configuration"));
   const Status ready = job.crew->leads() ? CheckExistingRun(plan, *training) : Status();
-  TILEGRAD_TRY(job.crew->Agree(ready, CommonTraits(settings)));
+  TILEGRAD_TRY(job.crew->Agree(
+      ready, CommonTraits(settings + (job.config.schedule.shard_optimizer ? "sharded" : ""))));
   Status started = start();
   Trait data{"dataset", "",
              fmt::format("{}, and runs that the configuration names, must hold the same files "

@@ -23,6 +23,7 @@ class BucketLayout {
   void Reset(std::span<const std::size_t> sizes, std::size_t tail, std::size_t bucket);
 
   std::size_t total() const { return tail_.end; }
+  std::size_t parameters() const { return parameters_.size(); }
   Range parameter(std::size_t i) const { return parameters_[i]; }
   Range tail() const { return tail_; }
   std::size_t buckets() const { return parts_.size(); }

@@ -47,7 +47,8 @@ void Exchange::Begin(const Job& job) {
   const auto foreign = static_cast<std::size_t>(std::count_if(
       subtrees_.begin(), subtrees_.end(), [&](auto& s) { return s.owner != ranks_.rank(); }));
   foreign_.resize(std::max(foreign_.size(), foreign * piece_numbers_));
-  moving_.resize(std::max(moving_.size(), job_.layout->buckets()));
+  const std::size_t rounds = job_.sends_totals ? 1 : 2;
+  moving_.resize(std::max(moving_.size(), rounds * job_.layout->buckets()));
   started_ = done_ = 0;
 }
 
@@ -77,17 +78,40 @@ void Exchange::Start(std::size_t bucket) {
                                    BytesOf(job_.own[place_[i]] + piece.begin, piece.size())));
     }
   }
-  for (int peer = 0; peer < ranks_.size(); ++peer) {
-    const Range piece = Piece(bucket, peer);
-    if (peer == me || piece.size() == 0) continue;
-    m.rest.push_back(ranks_.Receive({peer, MessageKind::kTotal, number},
-                                    WritableBytesOf(job_.total + piece.begin, piece.size())));
-  }
+  if (job_.sends_totals) ReceiveTotals(&m);
   changed_.notify_all();
 }
 
-// Sums this rank's piece and sends it to all others.
-void Exchange::Fold(std::size_t bucket, std::vector<Transport::Ticket>* sent) {
+void Exchange::Spread(std::size_t bucket) {
+  const std::scoped_lock lock(mutex_);
+  Moving& m = moving_[started_++];
+  m.bucket = bucket, m.phase = Phase::kTotals;
+  ReceiveTotals(&m);
+  SendTotals(&m);
+  changed_.notify_all();
+}
+
+void Exchange::ReceiveTotals(Moving* m) {
+  for (int peer = 0; peer < ranks_.size(); ++peer) {
+    const Range piece = Piece(m->bucket, peer);
+    if (peer == ranks_.rank() || piece.size() == 0) continue;
+    m->rest.push_back(ranks_.Receive({peer, MessageKind::kTotal, static_cast<int>(m->bucket)},
+                                     WritableBytesOf(job_.total + piece.begin, piece.size())));
+  }
+}
+
+void Exchange::SendTotals(Moving* m) {
+  const Range piece = Piece(m->bucket, ranks_.rank());
+  if (piece.size() == 0) return;
+  for (int peer = 0; peer < ranks_.size(); ++peer) {
+    if (peer == ranks_.rank()) continue;
+    m->rest.push_back(ranks_.Send({peer, MessageKind::kTotal, static_cast<int>(m->bucket)},
+                                  BytesOf(job_.total + piece.begin, piece.size())));
+  }
+}
+
+// Sums this rank's piece.
+void Exchange::Fold(std::size_t bucket) {
   const Range piece = Piece(bucket, ranks_.rank());
   const std::size_t n = piece.size();
   if (n == 0) return;
@@ -99,11 +123,6 @@ void Exchange::Fold(std::size_t bucket, std::vector<Transport::Ticket>* sent) {
   const float* sum = SumOf(0, bucket);
   float* total = job_.total + piece.begin;
   for (std::size_t i = 0; i < n; ++i) total[i] = sum[i] * job_.scale;
-  for (int peer = 0; peer < ranks_.size(); ++peer) {
-    if (peer == ranks_.rank()) continue;
-    sent->push_back(
-        ranks_.Send({peer, MessageKind::kTotal, static_cast<int>(bucket)}, BytesOf(total, n)));
-  }
 }
 
 // Forgets tickets that are done; whether there were some.
@@ -119,7 +138,8 @@ bool Exchange::Advance() {
     moved |= Drop(&m.parts);
     moved |= Drop(&m.rest);
     if (m.phase == Phase::kParts && m.parts.empty()) {
-      Fold(m.bucket, &m.rest);
+      Fold(m.bucket);
+      if (job_.sends_totals) SendTotals(&m);
       m.phase = Phase::kTotals, moved = true;
     }
     if (m.phase == Phase::kTotals && m.rest.empty()) m.phase = Phase::kDone, ++done_, moved = true;
@@ -149,9 +169,9 @@ void Exchange::Run() {
   }
 }
 
-bool Exchange::Wait(const std::function<bool()>& meanwhile) {
+bool Exchange::Wait(const std::function<bool()>& meanwhile, std::size_t rounds) {
   std::unique_lock lock(mutex_);
-  while (done_ < job_.layout->buckets()) {
+  while (done_ < rounds * job_.layout->buckets()) {
     if (changed_.wait_for(lock, std::chrono::milliseconds(5)) == std::cv_status::timeout &&
         meanwhile && !meanwhile()) {
       return false;

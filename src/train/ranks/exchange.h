@@ -32,14 +32,20 @@ class Exchange {
     std::vector<float*> own;  // sums of this rank's subtrees, layout->total() numbers each
     float* total = nullptr;   // of all, times `scale`
     float scale = 1;
+    bool sends_totals = true;  // each as soon as it is there; else Spread does
   };
   // The memory belongs to the exchange until Wait returns true.
   void Begin(const Job& job);
   // The own sums of a bucket are final. Each bucket once.
   void Start(std::size_t bucket);
-  // Until the totals of all buckets are there; false if `meanwhile` says false first, which ends
-  // the exchange for good.
-  bool Wait(const std::function<bool()>& meanwhile);
+  // Sends this rank's piece of a bucket in `total`, whatever it holds by now, and receives the
+  // others. Each bucket once, after Wait; from any thread.
+  void Spread(std::size_t bucket);
+  // Until the totals of all buckets are there, without sends_totals this rank's pieces of them;
+  // false if `meanwhile` says false first, which ends the exchange for good.
+  bool Wait(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 1); }
+  // The same for what Spread brings.
+  bool WaitForSpread(const std::function<bool()>& meanwhile) { return Wait(meanwhile, 2); }
 
  private:
   enum class Phase { kParts, kTotals, kDone };
@@ -49,10 +55,13 @@ class Exchange {
     std::vector<Transport::Ticket> parts, rest;  // received parts; everything else
   };
 
+  bool Wait(const std::function<bool()>& meanwhile, std::size_t rounds);
+  void ReceiveTotals(Moving* m);
+  void SendTotals(Moving* m);
   void Run();
   bool Advance();
   bool Drop(std::vector<Transport::Ticket>* tickets);
-  void Fold(std::size_t bucket, std::vector<Transport::Ticket>* sent);
+  void Fold(std::size_t bucket);
   float* SumOf(std::size_t subtree, std::size_t bucket);
   Range Piece(std::size_t bucket, int rank) const {
     return PieceOf(job_.layout->bucket(bucket), rank, ranks_.size());
@@ -70,7 +79,7 @@ class Exchange {
   std::mutex mutex_;  // of all below
   std::condition_variable changed_;
   std::vector<Moving> moving_;
-  std::size_t started_ = 0, done_ = 0;  // buckets
+  std::size_t started_ = 0, done_ = 0;  // moves of buckets
   bool closing_ = false;
   std::thread thread_;
 };

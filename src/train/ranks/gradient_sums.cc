@@ -38,6 +38,8 @@ GradientSums::GradientSums(nn::Context& context, const Shape& shape,
   }
   levels_.resize(levels), sums_.resize(own_.size());
   if (ranks > 1) exchange_ = std::make_unique<Exchange>(*shape.ranks, all);
+  if (exchange_ && shape.shares_update)
+    share_ = std::make_unique<WeightShare>(*shape.ranks, context.workers(), *exchange_);
 }
 
 void GradientSums::CopyStatistics(float* to) {
@@ -82,6 +84,7 @@ void GradientSums::LayOut(const Things& things) {
   if (!exchange_) return;
   total_.resize(std::max(total_.size(), layout_.total()));
   Exchange::Job job{&layout_, {}, total_.data(), 1 / static_cast<float>(shape_.portions)};
+  job.sends_totals = !share_;
   for (auto& sum : sums_) job.own.push_back(sum.data());
   exchange_->Begin(job);
 }
@@ -139,8 +142,21 @@ bool GradientSums::Finish(const std::function<bool()>& meanwhile) {
   const auto start = Clock::now();
   if (exchange_ && !exchange_->Wait(meanwhile)) return false;
   seconds_waited_ = std::chrono::duration<double>(Clock::now() - start).count();
-  TakeTotals();
+  if (share_) {
+    TakeOwn(meanwhile);
+  } else {
+    TakeTotals();
+  }
   return true;
+}
+
+void GradientSums::TakeOwn(const std::function<bool()>& meanwhile) {
+  share_->Prepare(
+      {&layout_, total_.data(), meanwhile, [this] { TakeStatistics(total_.data(), 1); }});
+  share_->ForOwn([&](const nn::UpdateShare::Piece& piece, std::size_t flat) {
+    nn::Tensor mean = means_[piece.parameter].Value().value();
+    std::copy_n(total_.data() + flat, piece.end - piece.begin, mean.data<float>() + piece.begin);
+  });
 }
 
 void GradientSums::TakeTotals() {
@@ -156,6 +172,10 @@ void GradientSums::TakeTotals() {
                                      to[k] = totals[range.begin + k] * scale;
                                  });
   }
+  TakeStatistics(totals, scale);
+}
+
+void GradientSums::TakeStatistics(const float* totals, float scale) {
   const float* tail = totals + layout_.tail().begin;
   std::transform(tail, tail + statistics_numbers_, after_.data(),
                  [&](float x) { return x * scale; });

@@ -14,6 +14,7 @@
 #include "train/ranks/bucket_layout.h"
 #include "train/ranks/exchange.h"
 #include "train/ranks/portion_tree.h"
+#include "train/ranks/weight_share.h"
 
 namespace tilegrad::train {
 
@@ -23,6 +24,7 @@ class GradientSums : public nn::GradientListener {
     std::int64_t portions = 1;
     Transport* ranks = nullptr;                 // null: all portions are of this process
     std::size_t bucket = std::size_t{1} << 18;  // numbers that travel together
+    bool shares_update = false;                 // with other ranks: share() is for the optimiser
   };
   // `statistics` are changed by each portion (nn::Buffers); all tensors are of kF32.
   GradientSums(nn::Context& context, const Shape& shape, std::vector<nn::NamedTensor> statistics);
@@ -40,6 +42,9 @@ class GradientSums : public nn::GradientListener {
   // Waits for the other ranks; then means() are those of all portions, and so are the statistics.
   // False if `meanwhile`, called now and then, says false first.
   bool Finish(const std::function<bool()>& meanwhile);
+  // Null, or what an optimiser's step has to be given after each Finish. Then the means are those
+  // of its pieces alone, and the statistics come when it has finished.
+  WeightShare* share() { return share_.get(); }
   // After an error: the statistics are as the update found them.
   void GiveUp();
 
@@ -52,6 +57,8 @@ class GradientSums : public nn::GradientListener {
   void Add(const float* from, const Range& range);
   void PartIsReady(const Range& part);
   void TakeTotals();
+  void TakeOwn(const std::function<bool()>& meanwhile);
+  void TakeStatistics(const float* totals, float scale);
   bool IsLastPortion() const { return at_ + 1 == portions_.size(); }
   void CopyStatistics(float* to);
   void SetStatistics(const float* from);
@@ -74,6 +81,7 @@ class GradientSums : public nn::GradientListener {
   std::size_t at_ = 0;  // which of portions_
   double seconds_waited_ = 0;
   std::unique_ptr<Exchange> exchange_;  // with other ranks
+  std::unique_ptr<WeightShare> share_;
 };
 
 }  // namespace tilegrad::train

@@ -2,17 +2,18 @@
 #include "train/ranks/launch.h"
 
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
-#include <thread>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "base/parallel.h"
+#include "train/ranks/placement.h"
 #include "train/ranks/plugin_folder.h"
 
 namespace tilegrad::train {
@@ -68,11 +69,17 @@ Result<std::unique_ptr<Transport>> ConnectRanks() {
   return std::unique_ptr<Transport>(ranks);
 }
 
-int WorkersOfRank() {
+int PlaceRank(int asked) {
   const int own = AvailableCores();
+  const auto or_own = [&](int workers) { return asked > 0 ? asked : workers; };
   const int here = NumberFrom({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"});
-  if (here < 2 || own < static_cast<int>(std::thread::hardware_concurrency())) return own;
-  return std::max(1, own / here);
+  const int local = NumberFrom({"OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID"});
+  if (here < 2 || local >= here || own < sysconf(_SC_NPROCESSORS_ONLN)) return or_own(own);
+  const std::vector<Cores> nodes = NumaNodes();
+  if (nodes.size() < 2) return or_own(std::max(1, own / here));
+  const RankPlace place = PlaceOf(nodes, local, here);
+  if (asked <= place.workers) KeepTo(place.cores);
+  return or_own(place.workers);
 }
 
 }  // namespace tilegrad::train

@@ -16,8 +16,10 @@ int LaunchedRanks();
 // joins the other ranks. Once in a process. NotFound says how to get the plugin.
 Result<std::unique_ptr<Transport>> ConnectRanks();
 
-// Workers of a rank that was not told how many: the cores that it may use or, where it may use all
-// of the machine, its share of them.
-int WorkersOfRank();
+// Workers of a rank that was asked for so many, 0: as many as it has cores. A rank that mpirun has
+// bound has those cores. Others have their share of the machine; where that has several NUMA nodes,
+// the rank is kept to its own, unless more workers were asked for than those have cores for. To be
+// called before there are threads and data.
+int PlaceRank(int asked);
 
 }  // namespace tilegrad::train

@@ -16,9 +16,10 @@ LearnedWeights::LearnedWeights(nn::Context& context, nn::Module& network,
       average_(context, config.average > 0 ? nn::State(network) : std::vector<nn::NamedTensor>(),
                config.average) {}
 
-Status LearnedWeights::Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
+Status LearnedWeights::Update(std::span<const nn::Gradient> gradients, std::int64_t step,
+                              nn::UpdateShare* share) {
   adam_.options().learning_rate = LearningRateAt(config_, steps_, step);
-  TILEGRAD_TRY(adam_.Step(gradients));
+  TILEGRAD_TRY(adam_.Step(gradients, share));
   average_.Update();
   return {};
 }

@@ -18,8 +18,9 @@ class LearnedWeights {
   LearnedWeights(nn::Context& context, nn::Module& network, const OptimizerConfig& config,
                  std::int64_t steps);
 
-  // One step of Adam, and of the moving average if there is one.
-  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step);
+  // One step of Adam, and of the moving average if there is one. `share`: of Optimizer::Step.
+  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step,
+                nn::UpdateShare* share = nullptr);
 
   // Weights and statistics, moments, averages. An error if the state is not that of `steps` steps.
   std::vector<nn::NamedTensor> State();

@@ -13,6 +13,7 @@
 
 #include "base/parallel.h"
 #include "base/progress.h"
+#include "nn/optim.h"
 #include "nn/tape.h"
 #include "scene/image.h"
 #include "scene/mesh.h"
@@ -47,6 +48,7 @@ struct UpdateIndex {
   int update = 0;                            // of the step, from 0
   Portion portion{};                         // of the batch
   nn::GradientListener* listener = nullptr;  // for nn::Gradients
+  nn::UpdateShare* share = nullptr;          // for nn::Optimizer::Step
 };
 
 // A trained network as commands use it. Of most tasks it predicts: images in, meshes out.

@@ -53,6 +53,7 @@ const Kind kKinds[] = {
       "adversarial.halvings=2", "adversarial.updates=2", "adversarial.learning_rate=1e-3",
       "adversarial.place=interpolates"}},
     {"classify", kTinyClassifier},
+    {"unsharded", kTinyClassifier, {"schedule.shard_optimizer=false"}},
     kGan,
     {"photographs", kTinyPhotographs, {}, "cub"},
 };
@@ -300,8 +301,11 @@ TEST_F(Ranks, ThatExtractOtherTexturesAreRefused) {
 
 TEST_F(Ranks, OfAnotherConfigurationAreRefused) {
   Words other = TrainWords("run", 1);
-  other.insert(other.end(), {"--set", "optimizer.warmup=7"});
-  ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another configuration (");
+  for (const char* setting : {"optimizer.warmup=7", "schedule.shard_optimizer=false"}) {
+    other.insert(other.end(), {"--set", setting});
+    ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another configuration (");
+    other.resize(other.size() - 2);
+  }
 }
 
 TEST_F(Ranks, OfAnotherInstructionSetAreRefused) {
@@ -355,6 +359,36 @@ TEST_F(Ranks, MakeADatasetOfTheSameBytes) {
     EXPECT_EQ(*want, *got) << other;
   }
   EXPECT_GT(files, 9u);
+}
+
+// Of each kind of evaluation, with more ranks than some have models.
+TEST_F(Ranks, EvaluateToTheSameBytes) {
+  steps_ = 2;
+  const Ended made = Do({TILEGRAD_PROGRAM, "dataset", "--source", "procedural", "--limit", "12",
+                         "--size", "32", "--threads", "1", "--out", (folder_ / "made").string()});
+  ASSERT_EQ(made.code, 0) << made.output;
+  for (const Kind& kind : kKinds) {
+    const std::string name = kind.name;
+    if (name == kGan.name || name == "critic" || name == "unsharded") continue;
+    SCOPED_TRACE(kind.name);
+    Use(kind);
+    if (data_ == "data") data_ = "made";
+    ASSERT_EQ(TrainOn(1, 1, kind.name).code, 0);
+    const Path run = folder_ / kind.name;
+    const Words words = {TILEGRAD_PROGRAM,    "eval", "--run",  run.string(),
+                         "--views-per-model", "2",    "--data", (folder_ / data_).string(),
+                         "--threads",         "1"};
+    const Ended alone = Do(words);
+    ASSERT_EQ(alone.code, 0) << alone.output;
+    const auto table = ReadText(run / "eval.md"), figures = ReadText(run / "eval.json");
+    for (const int ranks : {2, 3}) {
+      for (const char* file : {"eval.md", "eval.json"}) std::filesystem::remove(run / file);
+      const Ended ended = Do(OnRanks(ranks, words));
+      ASSERT_EQ(ended.code, 0) << ended.output;
+      EXPECT_EQ(ReadText(run / "eval.md").value(), table.value());
+      EXPECT_EQ(ReadText(run / "eval.json").value(), figures.value());
+    }
+  }
 }
 
 TEST_F(Ranks, OtherCommandsAreRefused) {

@@ -12,6 +12,7 @@
 #include "train/ranks/messages.h"
 #include "train/ranks/share.h"
 #include "train/ranks/value_sums.h"
+#include "train/ranks/weight_share.h"
 
 namespace tilegrad::train {
 namespace {
@@ -139,6 +140,53 @@ TEST(GradientSums, HaveTheSameBitsOnAnyNumberOfRanks) {
       });
     }
   }
+}
+
+// Weights and statistics of every rank, and the moments that rank 0 gathers, after three updates.
+template <class Optimizer, class Options>
+Bits TrainedOn(Transport* ranks, const Options& options) {
+  Problem p;
+  Optimizer optimizer(p.context, nn::Parameters(p.net), options);
+  GradientSums sums(p.context, {8, ranks, /*bucket=*/10, ranks != nullptr}, nn::Buffers(p.net));
+  for (int update = 0; update < 3; ++update) {
+    sums.BeginUpdate();
+    for (std::size_t i = 0; i < sums.portions().size(); ++i) {
+      sums.BeginPortion(i);
+      sums.EndPortion(nn::Gradients(p.Loss(sums.portions()[i]), optimizer.parameters(), &sums));
+    }
+    EXPECT_TRUE(sums.Finish(nullptr));
+    EXPECT_TRUE(optimizer.Step(sums.means(), sums.share()).ok());
+  }
+  Bits out;
+  for (const nn::NamedTensor& t : nn::State(p.net)) Append(t.value, &out);
+  if (sums.share()) sums.share()->GatherMoments();
+  if (ranks && ranks->rank() > 0) return out;
+  for (std::size_t i = 0; i < optimizer.parameters().size(); ++i) {
+    for (const nn::Tensor& moment : optimizer.moments(i)) Append(moment, &out);
+  }
+  return out;
+}
+
+// What followers have is the beginning of what rank 0 has.
+template <class Optimizer, class Options>
+void ExpectSharedUpdatesToBeWhole(const Options& options) {
+  const Bits want = TrainedOn<Optimizer>(nullptr, options);
+  for (const int size : {2, 3, 5, 8}) {
+    OnRanks(size, [&](Transport& ranks) {
+      const Bits got = TrainedOn<Optimizer>(&ranks, options);
+      EXPECT_EQ(got.size() == want.size(), ranks.rank() == 0);
+      EXPECT_TRUE(std::equal(got.begin(), got.end(), want.begin()))
+          << "rank " << ranks.rank() << " of " << size;
+    });
+  }
+}
+
+TEST(WeightShare, EndsInTheSameBitsOfAdam) {
+  ExpectSharedUpdatesToBeWhole<nn::Adam>(nn::AdamOptions{.weight_decay = 0.01});
+}
+
+TEST(WeightShare, EndsInTheSameBitsOfSgd) {
+  ExpectSharedUpdatesToBeWhole<nn::Sgd>(nn::SgdOptions{.momentum = 0.9, .nesterov = true});
 }
 
 // Against gradients of each portion, summed by the definition of the tree.

@@ -61,7 +61,7 @@ class ClassifyTask : public Task {
   Result<std::vector<nn::NamedTensor>> Statistics() override { return nn::Buffers(*network_); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
     adam_->options().learning_rate = RateAt(at.step);
-    return adam_->Step(gradients);
+    return adam_->Step(gradients, at.share);
   }
 
   std::vector<nn::NamedTensor> State() override;

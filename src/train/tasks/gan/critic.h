@@ -46,8 +46,9 @@ class GanCritic {
   // Of WganCriticLoss. A loss or gradient that is not finite is an error.
   Result<nn::StepVector<nn::Gradient>> Gradients(const Pair& pair, const Backward& how);
   // `step` of its stage.
-  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step) {
-    return weights_.Update(gradients, step);
+  Status Update(std::span<const nn::Gradient> gradients, std::int64_t step,
+                nn::UpdateShare* share) {
+    return weights_.Update(gradients, step, share);
   }
   const CriticRole& role() const { return role_; }
 

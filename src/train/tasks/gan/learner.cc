@@ -194,10 +194,10 @@ Status GanLearner::Update(const UpdateIndex& at, std::span<const nn::Gradient> g
   const GanStage stage = StageOf(at.step);
   const auto critics = Critics(stage);
   if (at.update == 0) {
-    TILEGRAD_TRY(Weights(stage).Update(gradients, StageStep(at.step)));
+    TILEGRAD_TRY(Weights(stage).Update(gradients, StageStep(at.step), at.share));
   } else {
     const std::size_t which = static_cast<std::size_t>(at.update - 1) % critics.size();
-    TILEGRAD_TRY(critics[which]->Update(gradients, StageStep(at.step)));
+    TILEGRAD_TRY(critics[which]->Update(gradients, StageStep(at.step), at.share));
   }
   if (at.update + 1 < Updates(at.step)) return {};
   const std::int64_t done = at.step + 1;

@@ -43,7 +43,7 @@ class PhotographsTask : public Task {
     return nn::Buffers(step_->network().module());
   }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->weights().Update(gradients, at.step);
+    return step_->weights().Update(gradients, at.step, at.share);
   }
   std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {

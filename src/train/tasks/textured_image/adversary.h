@@ -67,7 +67,9 @@ class Adversary {
   // Of WganCriticLoss on the last step's pictures. Appends what is watched, of the first update.
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const CriticStep& at,
                                                        std::vector<LossTerm>* terms);
-  Status UpdateCritic(std::span<const nn::Gradient> gradients) { return adam_->Step(gradients); }
+  Status UpdateCritic(std::span<const nn::Gradient> gradients, nn::UpdateShare* share) {
+    return adam_->Step(gradients, share);
+  }
 
   // Of the critic: weights and moments, as "critic...".
   std::vector<nn::NamedTensor> State();

@@ -61,8 +61,8 @@ class TexturedImageTask : public Task {
   // The network's, then those of its critic, on the same pictures.
   int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return at.update == 0 ? step_->weights().Update(gradients, at.step)
-                          : adversary_->UpdateCritic(gradients);
+    return at.update == 0 ? step_->weights().Update(gradients, at.step, at.share)
+                          : adversary_->UpdateCritic(gradients, at.share);
   }
 
   std::vector<nn::NamedTensor> State() override {
