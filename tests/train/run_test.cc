@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <map>
 #include <set>
 
 #include "nn/nn.h"
@@ -291,6 +292,18 @@ TEST(BatchOrder, EveryEpochShowsEachModelOnceAndViewsAreDistinct) {
   EXPECT_EQ(again.Batch(4, 4, 3)[2].views, order.Batch(4, 4, 3)[2].views);
 }
 
+TEST(BatchOrder, EveryOrderComesAsOftenAsAnyOther) {
+  BatchOrder order(3, 1, 3);
+  std::map<std::vector<int>, int> seen;
+  for (std::int64_t epoch = 0; epoch < 600; ++epoch) {
+    const auto batch = order.Batch(epoch, 3, 1);
+    ++seen[{batch[0].model, batch[1].model, batch[2].model}];
+  }
+  // 600 throws of 1/6: five standard deviations are 46.
+  EXPECT_EQ(seen.size(), 6u);
+  for (const auto& [_, count] : seen) EXPECT_NEAR(count, 100, 46);
+}
+
 TEST(BatchOrder, MirrorsTheShareThatIsAskedForAndNothingElseChanges) {
   BatchOrder plain(10, 6, 3), some(10, 6, 3, 0.25), all(10, 6, 3, 1.0);
   int mirrored = 0;
@@ -313,7 +326,7 @@ TEST(MirroredCamera, SeesTheMirroredWorldFlipped) {
   Lens lens;
   lens.width = lens.height = size;
   Camera camera = OrbitCamera(lens, 37, 21, 1.7);
-  camera.cx += 3;  // off the middle
+  camera.cx += 3, camera.translation[0] = 0.25f;  // off the middle, and not towards it
   const Camera mirrored = MirroredCamera(camera, size);
   const auto project = [](const Camera& c, std::array<float, 3> p) {
     std::array<float, 3> q;
