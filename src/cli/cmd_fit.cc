@@ -56,16 +56,7 @@ Status SetConfig(const Options& options, FitConfig* config) {
   for (const auto& rate : options.rates) {
     TILEGRAD_TRY(ParseRate(rate, config->parameters, &config->rates));
   }
-  static const std::map<std::string, Lighting> lightings = {{"none", Lighting::kNone},
-                                                            {"lambert", Lighting::kLambert},
-                                                            {"phong", Lighting::kPhong},
-                                                            {"sh", Lighting::kSphericalHarmonics}};
-  static const std::map<std::string, train::MaterialKind> materials = {
-      {"unlit", train::MaterialKind::kUnlit},
-      {"lambert", train::MaterialKind::kLambert},
-      {"phong", train::MaterialKind::kPhong}};
-  config->material = materials.at(options.material);
-  config->lighting = lightings.at(options.lighting);  // CLI11 has checked it
+  SetMaterialAndLighting(options.material, options.lighting, config);
   config->filter = options.filter == "trilinear" ? Filter::kTrilinear : Filter::kBilinear;
   if (!options.light_direction.empty()) {
     if (options.lighting != "lambert" && options.lighting != "phong") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/fit_parameters.h"
 
+#include <map>
 #include <sstream>
 
 #include "base/error.h"
@@ -56,6 +57,20 @@ Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
   }
   (*rates)[p] = rate;
   return {};
+}
+
+void SetMaterialAndLighting(const std::string& material, const std::string& lighting,
+                            train::FitConfig* config) {
+  static const std::map<std::string, train::MaterialKind> materials = {
+      {"unlit", train::MaterialKind::kUnlit},
+      {"lambert", train::MaterialKind::kLambert},
+      {"phong", train::MaterialKind::kPhong}};
+  static const std::map<std::string, Lighting> lightings = {{"none", Lighting::kNone},
+                                                            {"lambert", Lighting::kLambert},
+                                                            {"phong", Lighting::kPhong},
+                                                            {"sh", Lighting::kSphericalHarmonics}};
+  config->material = materials.at(material);
+  config->lighting = lightings.at(lighting);
 }
 
 }  // namespace tilegrad::cli

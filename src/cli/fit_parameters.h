@@ -16,4 +16,8 @@ Status ParseParameters(const std::string& text, train::ParameterSet* out);
 Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
                  train::LearningRates* rates);
 
+// Of --material and --lighting, words that were checked.
+void SetMaterialAndLighting(const std::string& material, const std::string& lighting,
+                            train::FitConfig* config);
+
 }  // namespace tilegrad::cli

@@ -167,6 +167,13 @@ FitSchedule ScheduleAt(const FitConfig& config, double t, ImageSize size) {
   return out;
 }
 
+bool ShowsAt(const FitConfig& config, std::int64_t step) {
+  const std::int64_t count = config.timelapse - 1, steps = config.steps;
+  if (config.timelapse <= 0) return false;
+  if (step == 0 || step == steps || count <= 0) return step == 0 || step == steps;
+  return step * count / steps != (step - 1) * count / steps;
+}
+
 std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from) {
   std::vector<int> views(from.begin(), from.end());
   const std::size_t count = std::min(static_cast<std::size_t>(config.views_per_step), views.size());

@@ -99,6 +99,9 @@ struct FitSchedule {
 // Levels that the sizes do not divide by are left out.
 FitSchedule ScheduleAt(const FitConfig& config, double time, ImageSize size);
 
+// Whether there is a picture after so many steps: spread evenly, the start and the end included.
+bool ShowsAt(const FitConfig& config, std::int64_t step);
+
 // The views of a step: different ones, a pure function of seed and step.
 std::vector<int> ViewsAt(const FitConfig& config, std::int64_t step, std::span<const int> from);
 

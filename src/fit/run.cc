@@ -9,25 +9,19 @@
 #include <utility>
 
 #include "base/error.h"
-#include "fit/camera_score.h"
 #include "fit/clock.h"
-#include "fit/material.h"
+#include "fit/result.h"
 #include "fit/shown_mesh.h"
 #include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
-#include "fit/transforms.h"
-#include "io/image_file.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
-#include "train/data/dataset.h"
-#include "train/metrics/metrics.h"
 
 namespace tilegrad::train {
 namespace {
 
 constexpr std::int64_t kLogEvery = 10;
 constexpr std::int64_t kKeptCheckpoints = 2;
-constexpr int kSheetColumns = 6;
 
 ImageSize SizeOf(const FitInput& input) { return {input.images.width, input.images.height}; }
 
@@ -61,14 +55,6 @@ RunPlan PlanOf(const FitJob& job) {
                    .checkpoint_every = job.config.checkpoint_every,
                    .keep_checkpoints = kKeptCheckpoints};
   return plan;
-}
-
-// Pictures are spread evenly over the run, the start and the end included.
-bool ShowsAt(const FitConfig& config, std::int64_t step) {
-  const std::int64_t count = config.timelapse - 1, steps = config.steps;
-  if (config.timelapse <= 0) return false;
-  if (step == 0 || step == steps || count <= 0) return step == 0 || step == steps;
-  return step * count / steps != (step - 1) * count / steps;
 }
 
 class FitWork : public RunWork {
@@ -166,99 +152,6 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
   return OverGrey(renderer.images(), 0, kWhite);
-}
-
-// The scene at the end, its scores and what is written of both.
-class FitResult {
- public:
-  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers)
-      : job_(job), scene_(scene), clock_(clock), workers_(workers) {}
-  Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
-
- private:
-  Status Write(const RunPlan& plan, FitOutcome* outcome) const;
-  Result<ImageU8> Sheet(const RunPlan& plan) const;
-  Status Score(FitOutcome* outcome) const;
-  Status WriteCameras() const;
-
-  const FitJob& job_;
-  const FitScene& scene_;
-  const FitClock& clock_;
-  const Workers& workers_;
-};
-
-// All of this fit in one picture. There may be others in the folder: of a fit that was killed
-// before its first checkpoint, so that another could begin here. Those of before it got more steps
-// are its own.
-Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
-  std::vector<ImageU8> pictures;
-  std::error_code error;
-  for (std::int64_t step = 0; step <= clock_.End(); ++step) {
-    const bool own =
-        ShowsAt(job_.config, step) || step <= clock_.extended_at() || step == clock_.End();
-    const Path file = PictureFile(plan, step);
-    if (!own || !std::filesystem::exists(file, error)) continue;
-    TILEGRAD_ASSIGN(ImageU8 picture, io::LoadImage(file));
-    if (picture.width != job_.input.images.width || picture.channels != 3) continue;
-    pictures.push_back(std::move(picture));
-  }
-  return pictures.empty() ? ImageU8() : TileImages(pictures, kSheetColumns);
-}
-
-Status FitResult::WriteCameras() const {
-  std::vector<TransformsView> views;
-  for (std::size_t i = 0; i < job_.input.names.size(); ++i) {
-    const double gain = scene_.gains.empty() ? 1.0 : static_cast<double>(scene_.gains[i]);
-    views.push_back({job_.input.names[i], scene_.cameras[i], gain});
-  }
-  return WriteTextAtomic(job_.out / "transforms_fitted.json",
-                         WriteTransforms(views, SizeOf(job_.input)));
-}
-
-Status FitResult::Score(FitOutcome* outcome) const {
-  const FitInput& input = job_.input;
-  const std::vector<Camera> fitted = Choose(scene_.cameras, input.training);
-  TILEGRAD_ASSIGN(outcome->training, ScoreViews(scene_, input, input.training, fitted, workers_));
-  // Cameras that moved fix the scene only up to a similarity; held-out ones did not move.
-  FitScene scene = scene_;
-  const std::vector<Camera>& given = GivenCameras(input);
-  if (job_.config.parameters[Parameter::kCamera] || input.found) {
-    Move(AlignCameras(fitted, Choose(given, input.training)), &scene.positions);
-  }
-  TILEGRAD_ASSIGN(outcome->held_out, ScoreViews(scene, input, input.held_out,
-                                                Choose(given, input.held_out), workers_));
-  std::vector<std::uint8_t> truth = input.occupancy;
-  if (job_.truth.has_value()) {
-    TILEGRAD_ASSIGN(truth, Voxelize(*job_.truth, kOccupancyResolution));
-  }
-  if (truth.empty()) return {};
-  TILEGRAD_ASSIGN(const auto voxels, Voxelize(MeshOfScene(scene), kOccupancyResolution));
-  outcome->voxel_iou = VoxelIou(voxels, truth);
-  return {};
-}
-
-std::vector<Path> ResultFiles(const Path& out) {
-  return {out / "mesh.glb", out / "transforms_fitted.json", out / "timelapse.png",
-          out / "report.html"};
-}
-
-Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
-  const std::vector<Path> files = ResultFiles(job_.out);
-  TILEGRAD_TRY(job_.guard.CheckAll(files));
-  TILEGRAD_TRY(Write(plan, outcome));
-  job_.guard.NoteAll(files);
-  return {};
-}
-
-Status FitResult::Write(const RunPlan& plan, FitOutcome* outcome) const {
-  TILEGRAD_TRY(SaveFittedGlb(job_.out / "mesh.glb", scene_));
-  TILEGRAD_TRY(WriteCameras());
-  TILEGRAD_TRY(ScoreCameras(job_, scene_, workers_, outcome));
-  TILEGRAD_TRY(Score(outcome));
-  TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet(plan));
-  if (!sheet.empty()) TILEGRAD_TRY(io::SavePng(job_.out / "timelapse.png", sheet));
-  TILEGRAD_ASSIGN(const std::string page, FitReport(job_, *outcome, sheet));
-  return WriteTextAtomic(job_.out / "report.html", page);
 }
 
 // A texture that began blank has no colour where no view looked. One of the user's keeps his there.

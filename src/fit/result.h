@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a fit leaves behind when it is over.
+#pragma once
+
+#include <vector>
+
+#include "fit/clock.h"
+#include "fit/run.h"
+#include "train/run/run.h"
+
+namespace tilegrad::train {
+
+// The files that stand for it, in its folder.
+std::vector<Path> ResultFiles(const Path& out);
+
+// The scene at the end, its scores and what is written of both.
+class FitResult {
+ public:
+  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers)
+      : job_(job), scene_(scene), clock_(clock), workers_(workers) {}
+  Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
+
+ private:
+  Status Write(const RunPlan& plan, FitOutcome* outcome) const;
+  Result<ImageU8> Sheet(const RunPlan& plan) const;
+  Status Score(FitOutcome* outcome) const;
+  Status WriteCameras() const;
+
+  const FitJob& job_;
+  const FitScene& scene_;
+  const FitClock& clock_;
+  const Workers& workers_;
+};
+
+}  // namespace tilegrad::train
