@@ -5,7 +5,7 @@ bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md 
 
     bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4] [--set KEY=VALUE ...]
 
-The model is given what a step takes without a limit, on as many ranks (so that what else the machine does, and its number of
+The model is given what a step takes without a limit, just before and after, on as many ranks (so that what else the machine does, and its number of
 cores, count on both sides), the gradients' number and the bandwidth.
 """
 import argparse
@@ -113,17 +113,21 @@ def main():
     args = parser.parse_args()
     sharded = "schedule.shard_optimizer=false" not in args.set
     with tempfile.TemporaryDirectory() as folder:
-        with Network(args.ranks, None):
-            free, wait, numbers = median_step(args, args.ranks, folder)
-        print(f"{args.ranks} ranks, no limit: {free * 1e3:.1f} ms a step, waiting {wait * 100:.0f} %, {numbers} numbers")
-        for gbits in args.gbits:
+        def measure(gbits):
             with Network(args.ranks, gbits):
-                step, wait, _ = median_step(args, args.ranks, folder)
+                return median_step(args, args.ranks, folder)
+
+        before, wait, numbers = measure(None)
+        print(f"{args.ranks} ranks, no limit: {before * 1e3:.1f} ms a step, waiting {wait * 100:.0f} %, {numbers} numbers", flush=True)
+        for gbits in args.gbits:
+            step, wait, _ = measure(gbits)
+            after = measure(None)[0]
+            free, before = (before + after) / 2, after  # other programs come and go
             # All computing of the batch, as if by one rank as slow as these are.
             compute = free * args.ranks
             model = step_time(args.ranks, compute, 0, numbers, gbits, args.portions, sharded)
-            print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, waiting {wait * 100:.0f} %; "
-                  f"the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})")
+            print(f"{args.ranks} ranks, {gbits} Gb/s: {step * 1e3:.1f} ms, {free * 1e3:.1f} without a limit before and after, waiting "
+                  f"{wait * 100:.0f} %; the model says {model * 1e3:.1f} ms ({model / step - 1:+.0%})", flush=True)
 
 
 if __name__ == "__main__":

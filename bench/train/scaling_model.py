@@ -13,6 +13,7 @@ import argparse
 BUCKET = 1 << 18  # numbers, as in src/train/ranks/gradient_sums.h
 BACKWARD = 0.6  # share of a portion's time in which sums may travel
 TCP = 0.93  # share of a network's bandwidth that TCP carries
+PLACING = 8 / 36  # bytes moved to put a weight that came in its place, over those that updating it moves
 
 
 def step_time(ranks, compute, update, numbers, gbits, portions, sharded=True):
@@ -25,7 +26,9 @@ def step_time(ranks, compute, update, numbers, gbits, portions, sharded=True):
     if not sharded:
         return computing + max(2 * travel - overlap, 2 * travel / buckets) + update
     moved = update / ranks  # weights, whose buckets leave one by one
-    return computing + max(travel - overlap, travel / buckets) + max(moved + travel / buckets, travel + moved / buckets)
+    placing = PLACING * update * (ranks - 1) / ranks
+    exposed = max(travel - overlap, travel / buckets)
+    return computing + exposed + max(moved + travel / buckets, travel + moved / buckets) + placing
 
 
 def batch_for(ranks, args, gbits):
