@@ -89,11 +89,13 @@ class Soak:
         Refusals(self).all(job, reference)
         shutil.rmtree(job.out, ignore_errors=True)
 
-    def record(self, code):
+    def record(self, before, state):
+        """Counts of one job, as soon as it is through."""
         with open(self.folder.parent / "soak.tsv", "a", encoding="utf-8") as stream:
             for name, count in self.counts.items():
-                stream.write("%s\t%s\t%d\t%s\n" % (time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), name, count,
-                                                   "lost" if code else "whole"))
+                if count > before.get(name, 0):
+                    stream.write("%s\t%s\t%d\t%s\n" % (time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), name,
+                                                       count - before.get(name, 0), state))
 
 
 def main():
@@ -112,12 +114,14 @@ def main():
     lost = 0
     for index, job in enumerate(chosen):
         share = (arguments.kills * (index + 1)) // len(chosen) - (arguments.kills * index) // len(chosen)
+        before = dict(soak.counts)
         try:
             soak.one(job, share)
+            soak.record(before, "whole")
         except Lost as error:
             print("LOST: %s: %s" % (job.name, error), flush=True)
+            soak.record(before, "lost")
             lost += 1
-    soak.record(lost)
     for name in sorted(soak.counts):
         print("%-24s %5d" % (name, soak.counts[name]))
     return 1 if lost else 0
