@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "io/glb_writer.h"
-#include "shade/spherical_harmonics_ref.h"
 
 namespace tilegrad::train {
 namespace {
@@ -34,17 +33,28 @@ std::array<double, 3> MeanColor(const FitInput& input) {
   return sum;
 }
 
+// Of the orthonormal basis (tilegrad/scene.h has its order).
+constexpr double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792;
+double HarmonicLight(const std::array<float, 9>& sh, const glm::dvec3& d) {
+  const std::array<double, 9> basis = {k0,
+                                       -k1 * d.y,
+                                       k1 * d.z,
+                                       -k1 * d.x,
+                                       k2 * d.x * d.y,
+                                       -k2 * d.y * d.z,
+                                       k2 / std::sqrt(12.0) * (3 * d.z * d.z - 1),
+                                       -k2 * d.x * d.z,
+                                       k2 / 2 * (d.x * d.x - d.y * d.y)};
+  double sum = 0;
+  for (std::size_t i = 0; i < 9; ++i) sum += basis[i] * static_cast<double>(sh[i]);
+  return sum;
+}
+
 std::optional<MainLight> MainOfHarmonics(const FitScene& scene) {
-  std::array<double, 9> sh;
-  std::copy(scene.sh.begin(), scene.sh.end(), sh.begin());
-  const auto p = shade::ShPolynomialOf<double>(shade::ShBasis::kOrthonormal, sh);
-  const glm::dvec3 slope(p[1], p[2], p[3]);
+  const glm::dvec3 slope(-scene.sh[3], -scene.sh[1], scene.sh[2]);
   const double length = glm::length(slope);
-  if (!(length > kLeastMain)) return std::nullopt;
-  const glm::dvec3 d = slope / length;
-  const double light = p[0] + length + p[4] * d.x * d.y + p[5] * d.y * d.z + p[6] * d.z * d.z +
-                       p[7] * d.x * d.z + p[8] * (d.x * d.x - d.y * d.y);
-  return MainLight{d, glm::dvec3(light)};
+  if (!(k1 * length > kLeastMain)) return std::nullopt;
+  return MainLight{slope / length, glm::dvec3(HarmonicLight(scene.sh, slope / length))};
 }
 
 std::optional<MainLight> MainOfDirection(const FitScene& scene) {
