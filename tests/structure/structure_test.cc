@@ -89,8 +89,8 @@ const std::map<std::string, std::set<std::string>> kMayIncludeInTrain = {
     {"run", {}},  // knows no task, no loss and no data
     {"data", {"metrics", "ranks", "run"}},
     {"models", {}},
-    {"eval", {"metrics", "data", "run"}},
-    {"tasks", {"eval", "models", "losses", "ops", "metrics", "data", "run"}},
+    {"eval", {"metrics", "data", "ranks", "run"}},
+    {"tasks", {"eval", "models", "losses", "ops", "metrics", "data", "ranks", "run"}},
     {"report", {"tasks", "eval", "metrics", "data", "run"}},
 };
 
