@@ -2,7 +2,6 @@
 #include "train/ranks/launch.h"
 
 #include <dlfcn.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -10,6 +9,7 @@
 #include <cstring>
 #include <initializer_list>
 
+#include "base/cores.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "base/parallel.h"
@@ -74,11 +74,11 @@ int PlaceRank(int asked) {
   const auto or_own = [&](int workers) { return asked > 0 ? asked : workers; };
   const int here = NumberFrom({"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"});
   const int local = NumberFrom({"OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID"});
-  if (here < 2 || local >= here || own < sysconf(_SC_NPROCESSORS_ONLN)) return or_own(own);
+  if (here < 2 || local >= here || own < MachineCores()) return or_own(own);
   const std::vector<Cores> nodes = NumaNodes();
   if (nodes.size() < 2) return or_own(std::max(1, own / here));
   const RankPlace place = PlaceOf(nodes, local, here);
-  if (asked <= place.workers) KeepTo(place.cores);
+  if (asked <= place.workers) KeepToCores(place.cores);
   return or_own(place.workers);
 }
 

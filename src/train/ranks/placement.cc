@@ -2,10 +2,11 @@
 #include "train/ranks/placement.h"
 
 #include <fmt/format.h>
-#include <sched.h>
 
 #include <algorithm>
 #include <charconv>
+
+#include "base/cores.h"
 
 namespace tilegrad::train {
 namespace {
@@ -23,7 +24,7 @@ Cores CoresIn(std::string_view list) {
       number = std::from_chars(number.ptr + 1, end, last);
       if (number.ec != std::errc()) return {};
     }
-    if (first < 0 || last < first || last >= CPU_SETSIZE) return {};
+    if (first < 0 || last < first || last >= kMostCores) return {};
     for (int core = first; core <= last; ++core) out.push_back(core);
     at = number.ptr < end && *number.ptr == ',' ? number.ptr + 1 : number.ptr;
     if (at == number.ptr && at < end && *at != '\n') return {};
@@ -56,13 +57,6 @@ RankPlace PlaceOf(std::span<const Cores> nodes, int local, int ranks) {
   for (int rank = 0; rank < ranks; ++rank) sharing += first_node(rank) == first ? 1 : 0;
   out.workers = std::max(1, static_cast<int>(out.cores.size()) / sharing);
   return out;
-}
-
-void KeepTo(const Cores& cores) {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  for (const int core : cores) CPU_SET(core, &set);
-  sched_setaffinity(0, sizeof(set), &set);
 }
 
 }  // namespace tilegrad::train

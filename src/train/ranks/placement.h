@@ -23,8 +23,4 @@ struct RankPlace {
 // than nodes, and have several where there are fewer.
 RankPlace PlaceOf(std::span<const Cores> nodes, int local, int ranks);
 
-// Keeps the calling thread, and those it starts, to these cores. Where the system refuses, it stays
-// where it may run: only speed is at stake.
-void KeepTo(const Cores& cores);
-
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 
 #include <thread>
 
+#include "base/cores.h"
 #include "base/parallel.h"
 #include "support/temp_folder.h"
 
@@ -60,13 +61,13 @@ TEST(PlaceOfRanks, NoNodeIsIdleAndRanksOnOneAreAtMostOneMoreThanOnAnother) {
   }
 }
 
-TEST(KeepTo, ThreadsThatStartLaterStayThere) {
+TEST(KeepToCores, ThreadsThatStartLaterStayThere) {
   std::thread([] {
     cpu_set_t may;
     ASSERT_EQ(sched_getaffinity(0, sizeof(may), &may), 0);
     int first = 0;
     while (!CPU_ISSET(first, &may)) ++first;
-    KeepTo({first});
+    KeepToCores(Cores{first});
     std::thread([] { EXPECT_EQ(AvailableCores(), 1); }).join();
   }).join();
 }
