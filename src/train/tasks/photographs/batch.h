@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nn/context.h"
+#include "train/run/portion.h"
 #include "train/tasks/photographs/config.h"
 
 namespace tilegrad::train {
@@ -19,6 +20,7 @@ struct PhotographBatch {
   nn::Tensor visible;                    // [B, K, 1] 1 or 0
   std::vector<WeakPerspective> cameras;  // [B]
   std::vector<CroppedPhoto> crops;       // [B]
+  Portion portion{};                     // of the step's batch
 };
 
 // A random crop of each of `photographs`, which follows from their places in the run: `first`,

@@ -44,6 +44,8 @@ ConfigFields OwnFields(PhotographsConfig* c) {
        "share of the inputs whose background is black, as that of cut-outs"},
       {"photographs.camera", &c->camera, 0, 0,
        "through which predictions are seen in training: \"given\" or \"predicted\""},
+      {"start.run", &c->start, 0, 0,
+       "folder of a run whose network this one starts as; \"\": a new one"},
       {"schedule.batch", &c->batch, 1, 65536, "photographs a step"},
   };
 }
@@ -51,7 +53,7 @@ ConfigFields OwnFields(PhotographsConfig* c) {
 }  // namespace
 
 ConfigFields FieldsOf(PhotographsConfig* c) {
-  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss),
+  return Joined({FieldsOf(&c->network), FieldsOf(&c->loss), FieldsOf(&c->adversary),
                  Without(FieldsOf(&c->render), {"render.rule"}), FieldsOf(&c->optimizer),
                  OwnFields(c)});
 }

@@ -4,6 +4,7 @@
 
 #include "train/data/photographs/photo_store.h"
 #include "train/models/photograph_network.h"
+#include "train/tasks/adversary.h"
 #include "train/tasks/common_config.h"
 
 namespace tilegrad::train {
@@ -25,6 +26,8 @@ struct PhotographLosses {
 struct PhotographsConfig {
   PhotographNetworkConfig network;
   PhotographLosses loss;
+  AdversaryConfig adversary;
+  std::string start;  // a run, or checkpoint, whose network this one starts as; empty: as new
   RenderConfig render;
   OptimizerConfig optimizer;
   CropRule crop;

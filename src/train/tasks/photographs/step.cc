@@ -72,11 +72,21 @@ nn::Var PhotographStep::KeypointLoss(const PredictedPhotographs& predicted,
   return nn::Mean(nn::Square(visible * (seen - nn::Constant(context_, batch.keypoints))));
 }
 
-nn::Var PhotographStep::ColorLoss(const nn::Var& colors, const PhotographBatch& batch) const {
+nn::Var PhotographStep::Masked(const nn::Var& colors, const PhotographBatch& batch) const {
   const nn::Shape& shape = batch.mask.shape();
   const nn::Var mask =
       nn::Reshape(nn::Constant(context_, batch.mask), {shape[0], 1, shape[1], shape[2]});
-  return ColorL1Loss(mask * colors, batch.colors);
+  return mask * colors;
+}
+
+// The terms of section 5.3, where the object is: outlines are equation 12's.
+nn::Var PhotographStep::AdversaryLoss(const nn::Var& colors, const PhotographBatch& batch,
+                                      std::vector<LossTerm>* terms) const {
+  Adversary::Values values;
+  const nn::Var loss =
+      adversary_->GeneratorLoss({Masked(colors, batch), batch.colors, batch.portion}, &values);
+  adversary_->AddTerms(values, terms);
+  return loss;
 }
 
 nn::Var PhotographStep::FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const {
@@ -122,14 +132,16 @@ nn::Var PhotographStep::Loss(const PhotographBatch& batch, std::int64_t step,
   }
   add("mask", w.mask, nn::Mean(nn::Square(images.alpha - nn::Constant(context_, batch.mask))));
   add("iou", w.iou, IouLoss(images.alpha, batch.mask));
-  add("color", w.color, ColorLoss(images.colors, batch));
+  add("color", w.color, ColorL1Loss(Masked(images.colors, batch), batch.colors));
   if (predicted.flow.valid())
     add("flow_distance", w.flow_distance, FlowLoss(predicted.flow, batch));
   if (config_.camera == "given") add("camera", w.camera, CameraLoss(predicted.cameras, batch));
   add("deformation", w.deformation,
       nn::Mean(nn::Sqrt(nn::Sum(nn::Square(predicted.movement), {2}) + 1e-12)));
   add("laplacian", w.laplacian, CotangentLaplacianLoss(predicted.positions, edges_));
-  return total;
+  if (adversary_ == nullptr) return total;
+  const nn::Var more = AdversaryLoss(images.colors, batch, terms);
+  return more.has_context() ? total + more : total;
 }
 
 Result<nn::StepVector<nn::Gradient>> PhotographStep::Backward(const PhotographBatch& batch,

@@ -24,6 +24,9 @@ class PhotographStep {
   Result<nn::StepVector<nn::Gradient>> Backward(const PhotographBatch& batch, const UpdateIndex& at,
                                                 StepValues* values);
 
+  // Its terms join Loss; without one there are none. `adversary` outlives the steps.
+  void SetAdversary(Adversary* adversary) { adversary_ = adversary; }
+
   PhotographNetwork& network() { return network_; }
   LearnedWeights& weights() { return weights_; }
 
@@ -33,7 +36,9 @@ class PhotographStep {
   RenderJob JobAt(const PhotographBatch& batch, std::int64_t step) const;
   nn::Var CamerasOf(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
   nn::Var KeypointLoss(const PredictedPhotographs& predicted, const PhotographBatch& batch) const;
-  nn::Var ColorLoss(const nn::Var& colors, const PhotographBatch& batch) const;
+  nn::Var Masked(const nn::Var& colors, const PhotographBatch& batch) const;
+  nn::Var AdversaryLoss(const nn::Var& colors, const PhotographBatch& batch,
+                        std::vector<LossTerm>* terms) const;
   nn::Var FlowLoss(const nn::Var& flow, const PhotographBatch& batch) const;
   nn::Var CameraLoss(const nn::Var& cameras, const PhotographBatch& batch) const;
   nn::Var Entropy() const;
@@ -44,6 +49,7 @@ class PhotographStep {
   LearnedWeights weights_;
   std::vector<WeighedEdge> edges_;  // of the mean shape as it starts
   SceneRenderer renderer_, color_renderer_;
+  Adversary* adversary_ = nullptr;
 };
 
 }  // namespace tilegrad::train

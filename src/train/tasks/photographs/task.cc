@@ -4,11 +4,13 @@
 #include "base/error.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
+#include "train/data/fingerprint.h"
 #include "train/predictor.h"
 #include "train/tasks/example_sheet.h"
 #include "train/tasks/photographs/evaluate.h"
 #include "train/tasks/photographs/pictures.h"
 #include "train/tasks/photographs/step.h"
+#include "train/tasks/start_as.h"
 #include "train/tasks/textured_image/pictures.h"
 
 namespace tilegrad::train {
@@ -27,6 +29,11 @@ class PhotographsTask : public Task {
             {"color", "Colour loss (mean L1)"},
             {"flow_distance", "Distance of the texture flow from the object"},
             {"camera", "Camera (rotation, scale and shift)"},
+            {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
+            {"critic_features", "Features of the critic (L1)"},
+            {"perceptual", "Features of a trained network (L1)"},
+            {"critic_distance", "How far the critic tells true from rendered pictures"},
+            {"critic_penalty", "Gradient penalty of the critic"},
             {"deformation", "Mean length of movements"},
             {"laplacian", "Cotangent Laplacian"}};
   }
@@ -34,20 +41,32 @@ class PhotographsTask : public Task {
   Status Start(const TaskStart& start) override;
   int image_size() const override { return static_cast<int>(config_.size); }
   RunHeader Header() override;
-  Status Begin(const Path& run, std::int64_t first_step) override {
-    return RememberPhotographs(run, set_, first_step == 0);
+  Status Begin(const Path& run, std::int64_t first_step) override;
+  Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
+    TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
+    return WithPerceptualNetwork(*context_, config_.adversary, own);
   }
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Result<std::vector<nn::NamedTensor>> Statistics() override {
-    return nn::Buffers(step_->network().module());
+    std::vector<nn::NamedTensor> out = nn::Buffers(step_->network().module());
+    for (nn::NamedTensor& tensor : adversary_->Buffers()) out.push_back(std::move(tensor));
+    return out;
   }
+  // The network's, then those of its critic, on the same pictures.
+  int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
   Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return step_->weights().Update(gradients, at.step, at.share);
+    return at.update == 0 ? step_->weights().Update(gradients, at.step, at.share)
+                          : adversary_->UpdateCritic(gradients, at.share);
   }
-  std::vector<nn::NamedTensor> State() override { return step_->weights().State(); }
+  std::vector<nn::NamedTensor> State() override {
+    std::vector<nn::NamedTensor> state = step_->weights().State();
+    for (const nn::NamedTensor& tensor : adversary_->State()) state.push_back(tensor);
+    return state;
+  }
   Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
-    return step_->weights().LoadState(state, steps);
+    TILEGRAD_TRY(step_->weights().LoadState(state, steps));
+    return adversary_->LoadState(state);
   }
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
@@ -70,6 +89,7 @@ class PhotographsTask : public Task {
   PhotographSet set_;
   std::optional<PhotoStore> train_, held_out_;
   std::optional<BatchOrder> order_;
+  std::unique_ptr<Adversary> adversary_;
   std::optional<PhotographStep> step_;
 };
 
@@ -103,7 +123,17 @@ Status PhotographsTask::Start(const TaskStart& start) {
                  static_cast<std::uint64_t>(start.schedule.seed));
   step_.emplace(*context_, config_,
                 PhotographStart{set_.mean_keypoints, set_.keypoint_names.size()});
-  return context_->TakeStatus();
+  TILEGRAD_TRY(context_->TakeStatus());
+  TILEGRAD_ASSIGN(adversary_, Adversary::Make(*context_, config_.adversary,
+                                              static_cast<std::uint64_t>(start.schedule.seed)));
+  step_->SetAdversary(adversary_.get());
+  return {};
+}
+
+Status PhotographsTask::Begin(const Path& run, std::int64_t first_step) {
+  TILEGRAD_TRY(RememberPhotographs(run, set_, first_step == 0));
+  if (first_step > 0 || config_.start.empty()) return {};
+  return StartAs(*context_, step_->network().module(), config_.start);
 }
 
 RunHeader PhotographsTask::Header() {
@@ -116,11 +146,15 @@ RunHeader PhotographsTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> PhotographsTask::Backward(const UpdateIndex& at,
                                                                StepValues* out) {
+  if (at.update > 0) {
+    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
+                                       &out->terms);
+  }
   const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
   std::vector<int> photographs;
   for (const Sample& sample : order_->Batch(slots, 1)) photographs.push_back(sample.model);
-  const PhotographBatch batch =
-      GatherPhotographs(*context_, config_, *train_, photographs, slots.first);
+  PhotographBatch batch = GatherPhotographs(*context_, config_, *train_, photographs, slots.first);
+  batch.portion = at.portion;
   TILEGRAD_ASSIGN(auto gradients, step_->Backward(batch, at, out));
   const auto seen = static_cast<double>((at.step + 1) * config_.batch);
   out->also.emplace_back("epoch", seen / train_->count());

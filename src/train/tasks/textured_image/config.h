@@ -5,8 +5,8 @@
 
 #include "train/data/stream/textured_stream.h"
 #include "train/models/texture_network.h"
+#include "train/tasks/adversary.h"
 #include "train/tasks/common_config.h"
-#include "train/tasks/textured_image/adversary.h"
 
 namespace tilegrad::train {
 

@@ -8,8 +8,8 @@
 #include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
-#include "train/tasks/classify/perceptual_network.h"
 #include "train/tasks/held_out.h"
+#include "train/tasks/start_as.h"
 #include "train/tasks/textured_image/evaluate.h"
 #include "train/tasks/textured_image/held_out_views.h"
 #include "train/tasks/textured_image/pictures.h"
@@ -42,20 +42,14 @@ class TexturedImageTask : public Task {
   RunHeader Header() override;
   Result<std::string> Fingerprint(const Path& data, const Workers& workers) const override {
     TILEGRAD_ASSIGN(const std::string own, DataFingerprint(data, workers));
-    if (config_.adversary.perceptual == 0) return own;
-    TILEGRAD_ASSIGN(
-        const Path weights,
-        PerceptualWeights(*context_, {config_.adversary.network, config_.adversary.network_file}));
-    return WithFile(own, weights);
+    return WithPerceptualNetwork(*context_, config_.adversary, own);
   }
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
   Result<std::vector<nn::NamedTensor>> Statistics() override {
     std::vector<nn::NamedTensor> out = nn::Buffers(step_->network().module());
-    if (nn::Critic* critic = adversary_->critic()) {
-      for (const nn::NamedTensor& tensor : nn::Buffers(*critic)) out.push_back(tensor);
-    }
+    for (nn::NamedTensor& tensor : adversary_->Buffers()) out.push_back(std::move(tensor));
     return out;
   }
   // The network's, then those of its critic, on the same pictures.
@@ -88,7 +82,6 @@ class TexturedImageTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
-  Status StartAs(const Path& run);
   Result<nn::StepVector<nn::Gradient>> CriticGradients(const UpdateIndex& at, StepValues* out) {
     return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
                                        &out->terms);
@@ -136,18 +129,12 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   return {};
 }
 
-// With the weights that predict there, and an optimiser that has taken no step.
-Status TexturedImageTask::StartAs(const Path& run) {
-  TILEGRAD_ASSIGN(const FoundCheckpoint found, FindCheckpoint(*context_, run));
-  return LoadPredictingWeights(step_->network().module(), found.checkpoint.tensors)
-      .Within(run.string());
-}
-
 Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
   TILEGRAD_TRY(RememberTrainedModels(run, *dataset_,
                                      first_step == 0 ? RunStart::kNew : RunStart::kContinued));
   if (first_step > 0) return {};
-  if (!config_.start.empty()) TILEGRAD_TRY(StartAs(config_.start));
+  if (!config_.start.empty())
+    TILEGRAD_TRY(StartAs(*context_, step_->network().module(), config_.start));
   TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
   return io::SavePng(run / "stream.png", sheet);
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/tasks/textured_image/adversary.h"
+#include "train/tasks/adversary.h"
 
 #include <cmath>
 
 #include "base/error.h"
 #include "nn/nn.h"
+#include "train/data/fingerprint.h"
 #include "train/tasks/classify/perceptual_network.h"
 
 namespace tilegrad::train {
@@ -131,6 +132,18 @@ Status Adversary::LoadState(const std::vector<nn::NamedTensor>& state) {
   }
   TILEGRAD_TRY(nn::LoadState(*critic_, own));
   return adam_->LoadState(own);
+}
+
+std::vector<nn::NamedTensor> Adversary::Buffers() {
+  return critic_ ? nn::Buffers(*critic_) : std::vector<nn::NamedTensor>();
+}
+
+Result<std::string> WithPerceptualNetwork(nn::Context& context, const AdversaryConfig& config,
+                                          const std::string& fingerprint) {
+  if (config.perceptual == 0) return fingerprint;
+  TILEGRAD_ASSIGN(const Path weights,
+                  PerceptualWeights(context, {config.network, config.network_file}));
+  return WithFile(fingerprint, weights);
 }
 
 }  // namespace tilegrad::train

@@ -75,6 +75,7 @@ class Adversary {
   std::vector<nn::NamedTensor> State();
   Status LoadState(const std::vector<nn::NamedTensor>& state);
   nn::Critic* critic() { return critic_ ? &*critic_ : nullptr; }
+  std::vector<nn::NamedTensor> Buffers();  // statistics of the critic's layers
 
  private:
   Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed);
@@ -91,5 +92,9 @@ class Adversary {
   };
   std::vector<Kept> kept_;  // of the last step, by portion
 };
+
+// What tells runs' data apart, with the perceptual network that they learn from, if there is one.
+Result<std::string> WithPerceptualNetwork(nn::Context& context, const AdversaryConfig& config,
+                                          const std::string& fingerprint);
 
 }  // namespace tilegrad::train

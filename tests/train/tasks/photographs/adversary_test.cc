@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// Section 5.4 with the terms of section 5.3: a second stage that starts as another run and has a
+// critic ends in the same bits for any workers and after a stop, and its gradients are right.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "nn/nn.h"
+#include "support/temp_folder.h"
+#include "train/config.h"
+#include "train/data/photographs/miniature.h"
+#include "train/run/checkpoint.h"
+#include "train/run/log.h"
+#include "train/tasks/photographs/step.h"
+#include "train/tiny_run.h"
+#include "train/trainer.h"
+
+namespace tilegrad::train {
+namespace {
+
+class PhotographsWithACritic : public TempFolderTest {
+ protected:
+  PhotographsWithACritic() { WriteMiniature(folder_ / "cub", "cub"); }
+
+  // After `most` steps it is stopped, as by Ctrl-C.
+  Status Train(const std::string& run, const std::string& more, int workers, int most = 100) {
+    TrainJob job;
+    TILEGRAD_ASSIGN(job.config, ParseConfig(std::string(kTinyPhotographs) + more, "tiny"));
+    job.data = folder_ / "cub", job.run = folder_ / run;
+    job.existing = ExistingRun::kContinue;
+    StopFlag stop = false;
+    int steps = 0;
+    const ProgressSink count = [&](const Progress& progress) {
+      if (progress.stage == "training" && ++steps == most) stop = true;
+    };
+    return train::Train(job, Workers(workers), count, stop).status();
+  }
+  std::string Critic() const {
+    return "[start]\nrun = \"" + (folder_ / "first").string() +
+           "\"\n[adversarial]\nweight = 0.5\nfeatures = 1\nbase = 2\nhalvings = 2\n"
+           "learning_rate = 1e-3\n";
+  }
+  std::vector<nn::NamedTensor> Final(const std::string& run) {
+    auto found = LoadNewestCheckpoint(context_, folder_ / run);
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
+  }
+  void ExpectSameBits(const std::string& a, const std::string& b) {
+    const auto left = Final(a), right = Final(b);
+    ASSERT_EQ(left.size(), right.size());
+    bool critic = false;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      critic |= left[i].name.rfind("critic.", 0) == 0;
+      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
+      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
+          << left[i].name;
+    }
+    EXPECT_TRUE(critic);
+  }
+
+  Workers workers_{1};
+  nn::Context context_{workers_};
+};
+
+TEST_F(PhotographsWithACritic, SameBitsForAnyWorkersAndAfterAStop) {
+  ASSERT_TRUE(Train("first", "", 2).ok());
+  const Status whole = Train("whole", Critic(), 2);
+  ASSERT_TRUE(whole.ok()) << whole.message();
+  ASSERT_TRUE(Train("one_worker", Critic(), 1).ok());
+  ExpectSameBits("whole", "one_worker");
+  EXPECT_EQ(Train("stopped", Critic(), 2, 5).code(), StatusCode::kCancelled);
+  ASSERT_TRUE(Train("stopped", Critic(), 1).ok());
+  ExpectSameBits("whole", "stopped");
+  const auto log = ReadLog(folder_ / "whole");
+  ASSERT_TRUE(log.ok());
+  for (const char* name : {"adversarial", "critic_features", "critic_distance", "critic_penalty"}) {
+    const auto& values = log->back().values;
+    EXPECT_TRUE(std::any_of(values.begin(), values.end(), [&](const auto& value) {
+      return value.first == name;
+    })) << name;
+  }
+}
+
+TEST_F(PhotographsWithACritic, StartsAsARunThatIsThere) {
+  ExpectMessage(Train("second", Critic(), 1), "first");
+}
+
+// In float64, by a central difference along a random direction of the texture's last layer: h as in
+// task_test.cc.
+TEST_F(PhotographsWithACritic, GradientsOfAStep) {
+  PhotographsConfig config;
+  config.network = {.base = 4, .most = 8, .levels = 2, .latent = 8, .template_level = 1};
+  config.adversary = {.weight = 0.5, .features = 1, .base = 2, .halvings = 2};
+  config.loss = {.keypoint = 0,
+                 .mask = 0,
+                 .camera = 0,
+                 .deformation = 0,
+                 .laplacian = 0,
+                 .entropy = 0,
+                 .color = 0};
+  config.size = 16, config.render.sharpness = config.render.sharpness_start = 50;
+  config.schedule.steps = 10;
+  const PhotographSet set = OpenPhotographs(folder_ / "cub").value();
+  const StopFlag stop = false;
+  const auto store = PhotoStore::Load(set, {0, 1, 2}, {}, 16, workers_, nullptr, stop);
+  nn::Context context(workers_, nn::DType::kF64);
+  PhotographStep step(context, config, {set.mean_keypoints, 15});
+  const auto adversary = Adversary::Make(context, config.adversary, 5).value();
+  step.SetAdversary(adversary.get());
+  const PhotographBatch batch = GatherPhotographs(context, config, *store, {0, 1, 2}, 3);
+  std::vector<nn::Var> vars;
+  for (const auto& p : nn::Parameters(step.network().module())) vars.push_back(p.value);
+  std::vector<LossTerm> terms;
+  const auto gradients = nn::Grad(step.Loss(batch, 1, &terms), vars);
+  ASSERT_TRUE(context.status().ok()) << context.status().message();
+  double largest = 0;
+  for (std::size_t which = 0; which < vars.size(); ++which) {
+    if (!gradients[which].valid()) continue;
+    const std::span<double> value = vars[which].value().span<double>();
+    const double slope = gradients[which].value().span<double>()[0], before = value[0];
+    const auto at = [&](double h) {
+      value[0] = before + h;
+      std::vector<LossTerm> ignored;
+      return step.Loss(batch, 1, &ignored).item();
+    };
+    const double h = 1e-7, difference = (at(h) - at(-h)) / (2 * h);
+    at(0);
+    EXPECT_NEAR(slope, difference, 2e-3 * (1 + std::abs(difference))) << which;
+    largest = std::max(largest, std::abs(slope));
+  }
+  EXPECT_GT(largest, 1e-3);  // something depends on the critic
+}
+
+}  // namespace
+}  // namespace tilegrad::train
