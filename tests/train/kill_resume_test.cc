@@ -109,10 +109,15 @@ class KillResume : public TempFolderTest {
 
   void CheckKills(int kills) {
     const double seconds = Finish("whole", 2);
-    EXPECT_GT(KillAtRandom("killed", kills, seconds), 0);
-    EXPECT_FALSE(ListCheckpoints(folder_ / "killed").empty());  // some came after the first steps
-    Finish("killed", 1);
-    ExpectSame("whole", "killed");
+    // On a machine whose load has fallen since, a run may be over before the first of them.
+    std::string run = "killed";
+    int killed = KillAtRandom(run, kills, seconds);
+    for (double less = seconds / 2; killed == 0 && less > 0.1; less /= 2)
+      killed = KillAtRandom(run += "_again", kills, less);
+    EXPECT_GT(killed, 0);
+    EXPECT_FALSE(ListCheckpoints(folder_ / run).empty());  // some came after the first steps
+    Finish(run, 1);
+    ExpectSame("whole", run);
   }
 
   Workers workers_;
