@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "io/glb_writer.h"
+#include "scene/harmonics.h"
 
 namespace tilegrad::train {
 namespace {
@@ -33,18 +34,8 @@ std::array<double, 3> MeanColor(const FitInput& input) {
   return sum;
 }
 
-// Of the orthonormal basis (tilegrad/scene.h has its order).
-constexpr double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792;
 double HarmonicLight(const std::array<float, 9>& sh, const glm::dvec3& d) {
-  const std::array<double, 9> basis = {k0,
-                                       -k1 * d.y,
-                                       k1 * d.z,
-                                       -k1 * d.x,
-                                       k2 * d.x * d.y,
-                                       -k2 * d.y * d.z,
-                                       k2 / std::sqrt(12.0) * (3 * d.z * d.z - 1),
-                                       -k2 * d.x * d.z,
-                                       k2 / 2 * (d.x * d.x - d.y * d.y)};
+  const std::array<double, 9> basis = HarmonicBasis({d.x, d.y, d.z});
   double sum = 0;
   for (std::size_t i = 0; i < 9; ++i) sum += basis[i] * static_cast<double>(sh[i]);
   return sum;
@@ -53,7 +44,7 @@ double HarmonicLight(const std::array<float, 9>& sh, const glm::dvec3& d) {
 std::optional<MainLight> MainOfHarmonics(const FitScene& scene) {
   const glm::dvec3 slope(-scene.sh[3], -scene.sh[1], scene.sh[2]);
   const double length = glm::length(slope);
-  if (!(k1 * length > kLeastMain)) return std::nullopt;
+  if (!(kHarmonic1 * length > kLeastMain)) return std::nullopt;
   return MainLight{slope / length, glm::dvec3(HarmonicLight(scene.sh, slope / length))};
 }
 

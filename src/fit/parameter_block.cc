@@ -64,7 +64,7 @@ void PutMaterial(const Surface& s, float* to) {
 }
 
 // Writing this twice changes nothing: the second sum is 1, to the bit.
-void FixMean(float* ambient, float* diffuse) {
+void HoldMean(float* ambient, float* diffuse) {
   for (int c = 0; c < 3; ++c) {
     const float sum = ambient[c] + diffuse[c] / kDirectionsPerMean;
     ambient[c] = sum > 0 ? ambient[c] / sum : 1;
@@ -170,7 +170,7 @@ Status WriteBlock(ParameterBlock* block, FitScene* scene) {
       break;
     case Parameter::kMaterial:
       Clamp(0, std::log(kMostShininess), &x, x.size());
-      if (scene->light_mean_fixed) FixMean(x.data(), x.data() + 3);
+      if (scene->light_mean_fixed) HoldMean(x.data(), x.data() + 3);
       TakeSurface(x.data(), &scene->surface);
       break;
     case Parameter::kExposure:

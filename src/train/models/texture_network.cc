@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "nn/nn.h"
+#include "scene/harmonics.h"
 #include "scene/shapes.h"
 #include "scene/sphere_uv.h"
 #include "train/models/mesh_network.h"
@@ -40,7 +41,7 @@ void SetStartLight(Lighting lighting, nn::Tensor& bias) {
     const std::span<T> b = bias.span<T>();
     std::fill(b.begin(), b.end(), T(0));
     if (lighting == Lighting::kSphericalHarmonics) {
-      b[0] = static_cast<T>(kStartLight / 0.28209479177387814);
+      b[0] = static_cast<T>(kStartLight / kHarmonic0);
     } else {
       b[2] = T(1);
     }

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "scene/harmonics.h"
 
 namespace tilegrad::train {
 namespace {
@@ -44,26 +45,10 @@ std::array<float, 3> DrawDirection(double spread, Rng& rng) {
   return Unit(side * std::cos(turn), side * std::sin(turn), z);
 }
 
-// The orthonormal basis of SceneT::sh at a unit direction.
-std::array<double, 9> Basis(const std::array<float, 3>& d) {
-  constexpr double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792,
-                   k3 = 0.31539156525252005;
-  const double x = d[0], y = d[1], z = d[2];
-  return {k0,
-          -k1 * y,
-          k1 * z,
-          -k1 * x,
-          k2 * x * y,
-          -k2 * y * z,
-          k3 * (3 * z * z - 1),
-          -k2 * x * z,
-          k2 / 2 * (x * x - y * y)};
-}
-
 // sky + (1 - sky) max(0, n . direction), by its first three bands: a cosine that is cut at 0 has
 // the factors pi, 2 pi / 3 and pi / 4 there (Ramamoorthi, Hanrahan 2001).
 std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& direction) {
-  const std::array<double, 9> basis = Basis(direction);
+  const std::array<double, 9> basis = HarmonicBasis({direction[0], direction[1], direction[2]});
   std::array<float, 9> out;
   for (std::size_t i = 0; i < 9; ++i) {
     const double band = i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4;

@@ -6,6 +6,7 @@
 #include "train/data/batches.h"
 #include "train/data/fingerprint.h"
 #include "train/predictor.h"
+#include "train/tasks/adversarial_task.h"
 #include "train/tasks/example_sheet.h"
 #include "train/tasks/photographs/evaluate.h"
 #include "train/tasks/photographs/pictures.h"
@@ -18,24 +19,19 @@ namespace {
 
 constexpr int kSampleRows = 8;
 
-class PhotographsTask : public Task {
+class PhotographsTask : public AdversarialTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
   std::vector<TermLabel> Labels() const override {
-    return {{"keypoint", "Keypoints (mean square in the crop)"},
-            {"entropy", "Entropy of the keypoints' weights"},
-            {"mask", "Silhouette (mean square)"},
-            {"iou", "IoU loss (1 − soft IoU of silhouettes)"},
-            {"color", "Colour loss (mean L1)"},
-            {"flow_distance", "Distance of the texture flow from the object"},
-            {"camera", "Camera (rotation, scale and shift)"},
-            {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
-            {"critic_features", "Features of the critic (L1)"},
-            {"perceptual", "Features of a trained network (L1)"},
-            {"critic_distance", "How far the critic tells true from rendered pictures"},
-            {"critic_penalty", "Gradient penalty of the critic"},
-            {"deformation", "Mean length of movements"},
-            {"laplacian", "Cotangent Laplacian"}};
+    return WithCritic({{"keypoint", "Keypoints (mean square in the crop)"},
+                       {"entropy", "Entropy of the keypoints' weights"},
+                       {"mask", "Silhouette (mean square)"},
+                       {"iou", "IoU loss (1 − soft IoU of silhouettes)"},
+                       {"color", "Colour loss (mean L1)"},
+                       {"flow_distance", "Distance of the texture flow from the object"},
+                       {"camera", "Camera (rotation, scale and shift)"},
+                       {"deformation", "Mean length of movements"},
+                       {"laplacian", "Cotangent Laplacian"}});
   }
 
   Status Start(const TaskStart& start) override;
@@ -48,26 +44,6 @@ class PhotographsTask : public Task {
   }
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
-  Result<std::vector<nn::NamedTensor>> Statistics() override {
-    std::vector<nn::NamedTensor> out = nn::Buffers(step_->network().module());
-    for (nn::NamedTensor& tensor : adversary_->Buffers()) out.push_back(std::move(tensor));
-    return out;
-  }
-  // The network's, then those of its critic, on the same pictures.
-  int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
-  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return at.update == 0 ? step_->weights().Update(gradients, at.step, at.share)
-                          : adversary_->UpdateCritic(gradients, at.share);
-  }
-  std::vector<nn::NamedTensor> State() override {
-    std::vector<nn::NamedTensor> state = step_->weights().State();
-    for (const nn::NamedTensor& tensor : adversary_->State()) state.push_back(tensor);
-    return state;
-  }
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
-    TILEGRAD_TRY(step_->weights().LoadState(state, steps));
-    return adversary_->LoadState(state);
-  }
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
   Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
@@ -82,6 +58,8 @@ class PhotographsTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
+  nn::Module& network() override { return step_->network().module(); }
+  LearnedWeights& weights() override { return step_->weights(); }
   Status CheckCameras() const;
 
   PhotographsConfig config_;
@@ -89,7 +67,6 @@ class PhotographsTask : public Task {
   PhotographSet set_;
   std::optional<PhotoStore> train_, held_out_;
   std::optional<BatchOrder> order_;
-  std::unique_ptr<Adversary> adversary_;
   std::optional<PhotographStep> step_;
 };
 
@@ -146,10 +123,7 @@ RunHeader PhotographsTask::Header() {
 
 Result<nn::StepVector<nn::Gradient>> PhotographsTask::Backward(const UpdateIndex& at,
                                                                StepValues* out) {
-  if (at.update > 0) {
-    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
-                                       &out->terms);
-  }
+  if (at.update > 0) return CriticGradients(at, out);
   const Slots slots = SlotsOf(at.step, config_.batch, at.portion);
   std::vector<int> photographs;
   for (const Sample& sample : order_->Batch(slots, 1)) photographs.push_back(sample.model);

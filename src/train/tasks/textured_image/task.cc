@@ -8,6 +8,7 @@
 #include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
+#include "train/tasks/adversarial_task.h"
 #include "train/tasks/held_out.h"
 #include "train/tasks/start_as.h"
 #include "train/tasks/textured_image/evaluate.h"
@@ -20,21 +21,16 @@ namespace {
 
 constexpr int kSampleRows = 8, kRowViews = 3;
 
-class TexturedImageTask : public Task {
+class TexturedImageTask : public AdversarialTask {
  public:
   ConfigFields Fields() override { return FieldsOf(&config_); }
   std::vector<TermLabel> Labels() const override {
-    return {{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
-            {"color", "Colour loss (mean L1)"},
-            {"smoothness", "Smoothness (normals of neighbouring faces)"},
-            {"laplacian", "Laplacian of the movement"},
-            {"pose", "Camera (mean square error of its numbers)"},
-            {"adversarial", "Adversarial loss (− mean score of rendered pictures)"},
-            {"critic_features", "Features of the critic (L1)"},
-            {"perceptual", "Features of a trained network (L1)"},
-            {"critic_distance", "How far the critic tells true from rendered pictures"},
-            {"critic_penalty", "Gradient penalty of the critic"},
-            {"light_angle", "Angle of the light (degrees, not learned from)"}};
+    return WithCritic({{"iou", "IoU loss (1 − soft IoU of silhouettes)"},
+                       {"color", "Colour loss (mean L1)"},
+                       {"smoothness", "Smoothness (normals of neighbouring faces)"},
+                       {"laplacian", "Laplacian of the movement"},
+                       {"pose", "Camera (mean square error of its numbers)"},
+                       {"light_angle", "Angle of the light (degrees, not learned from)"}});
   }
 
   Status Start(const TaskStart& start) override;
@@ -47,27 +43,6 @@ class TexturedImageTask : public Task {
   Status Begin(const Path& run, std::int64_t first_step) override;
 
   Result<nn::StepVector<nn::Gradient>> Backward(const UpdateIndex& at, StepValues* out) override;
-  Result<std::vector<nn::NamedTensor>> Statistics() override {
-    std::vector<nn::NamedTensor> out = nn::Buffers(step_->network().module());
-    for (nn::NamedTensor& tensor : adversary_->Buffers()) out.push_back(std::move(tensor));
-    return out;
-  }
-  // The network's, then those of its critic, on the same pictures.
-  int Updates(std::int64_t /*step*/) const override { return 1 + adversary_->updates(); }
-  Status Update(const UpdateIndex& at, std::span<const nn::Gradient> gradients) override {
-    return at.update == 0 ? step_->weights().Update(gradients, at.step, at.share)
-                          : adversary_->UpdateCritic(gradients, at.share);
-  }
-
-  std::vector<nn::NamedTensor> State() override {
-    std::vector<nn::NamedTensor> state = step_->weights().State();
-    for (const nn::NamedTensor& tensor : adversary_->State()) state.push_back(tensor);
-    return state;
-  }
-  Status LoadState(const std::vector<nn::NamedTensor>& state, std::int64_t steps) override {
-    TILEGRAD_TRY(step_->weights().LoadState(state, steps));
-    return adversary_->LoadState(state);
-  }
   Result<ImageU8> SamplePicture(std::int64_t steps) override;
 
   Result<std::unique_ptr<Model>> LoadModel(nn::Context& context,
@@ -82,10 +57,8 @@ class TexturedImageTask : public Task {
                         const ProgressSink& progress, const StopFlag& stop) override;
 
  private:
-  Result<nn::StepVector<nn::Gradient>> CriticGradients(const UpdateIndex& at, StepValues* out) {
-    return adversary_->CriticGradients({at.step, at.update - 1, at.portion, at.listener},
-                                       &out->terms);
-  }
+  nn::Module& network() override { return step_->network().module(); }
+  LearnedWeights& weights() override { return step_->weights(); }
   ObjectPictures Pictures(int size) const {
     return {config_.light, size, static_cast<int>(config_.stream.draw.samples)};
   }
@@ -97,7 +70,6 @@ class TexturedImageTask : public Task {
   std::optional<TexturedStream> stream_;
   std::optional<HeldOutViews> held_out_;  // for sample pictures
   std::optional<BatchOrder> order_;
-  std::unique_ptr<Adversary> adversary_;
   std::optional<TexturedStep> step_;
 };
 

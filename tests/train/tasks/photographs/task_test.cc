@@ -4,8 +4,6 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "train/config.h"
@@ -14,6 +12,7 @@
 #include "train/predictor.h"
 #include "train/report/report.h"
 #include "train/run/log.h"
+#include "train/same_run.h"
 #include "train/tasks/photographs/step.h"
 #include "train/tiny_run.h"
 #include "train/trainer.h"
@@ -21,6 +20,7 @@
 namespace tilegrad::train {
 namespace {
 
+constexpr int kSteps = 12;  // of kTinyPhotographs
 const ProgressSink kSilent = [](const Progress&) {};
 
 // The mean shape of 42 vertices loses much of its hull to smoothing.
@@ -36,7 +36,7 @@ class PhotographsTask : public TempFolderTest {
   struct Changes {
     std::string more = {};
     int workers = 2;
-    std::int64_t steps = 12;
+    std::int64_t steps = kSteps;
     std::string data = "cub";
     int smoothing = 0;
   };
@@ -49,20 +49,9 @@ class PhotographsTask : public TempFolderTest {
     job.existing = ExistingRun::kContinue;
     return train::Train(job, Workers(changes.workers), kSilent, stop_);
   }
-  std::vector<nn::NamedTensor> Final(const std::string& run) {
-    auto found = LoadNewestCheckpoint(context_, folder_ / run);
-    EXPECT_TRUE(found.ok()) << found.status().message();
-    return found.ok() ? std::move(found->checkpoint.tensors) : std::vector<nn::NamedTensor>();
-  }
-  void ExpectSameBits(const std::string& a, const std::string& b) {
-    const auto left = Final(a), right = Final(b);
-    ASSERT_EQ(left.size(), right.size());
-    ASSERT_GT(left.size(), 20u);
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      ASSERT_EQ(left[i].value.bytes(), right[i].value.bytes());
-      EXPECT_EQ(std::memcmp(left[i].value.raw(), right[i].value.raw(), left[i].value.bytes()), 0)
-          << left[i].name;
-    }
+  void ExpectSame(const std::string& a, const std::string& b) {
+    ExpectSameBits(context_, folder_ / a, folder_ / b, kSteps);
+    EXPECT_GT(FinalTensors(context_, folder_ / a, kSteps).size(), 20u);
   }
 
   Workers workers_{2};
@@ -145,7 +134,7 @@ TEST_F(PhotographsTask, TrainsPredictsIsEvaluatedAndReported) {
 TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
   ASSERT_TRUE(Train("one", {.workers = 1}).ok());
   ASSERT_TRUE(Train("two", {.workers = 2}).ok());
-  ExpectSameBits("one", "two");
+  ExpectSame("one", "two");
 }
 
 TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
@@ -162,7 +151,7 @@ TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
   const auto stopped = train::Train(job, workers_, after_five, stop);
   EXPECT_EQ(stopped.status().code(), StatusCode::kCancelled);
   ASSERT_TRUE(Train("stopped", {.workers = 1}).ok());
-  ExpectSameBits("whole", "stopped");
+  ExpectSame("whole", "stopped");
 }
 
 TEST_F(PhotographsTask, LearnsFromPascal3dAndWithPredictedCameras) {
