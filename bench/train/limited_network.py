@@ -6,7 +6,7 @@ bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md 
     bench/train/limited_network.py PROGRAM CONFIG DATA [--ranks 2] [--portions 4] [--steps 20] [--gbits 0.5 1 4] [--set KEY=VALUE ...]
 
 The model is given what a step takes without a limit, just before and after, on as many ranks (so that what else the machine does, and its number of
-cores, count on both sides), the gradients' number and the bandwidth.
+cores, count on both sides), the number of gradients that the log says (summed_numbers) and the bandwidth.
 """
 import argparse
 import json
@@ -82,7 +82,7 @@ def launcher(ranks, folder):
 
 
 def median_step(args, ranks, folder):
-    """Seconds of a step, the share of waiting, and how many numbers are trained."""
+    """Seconds of a step, the share of waiting, and how many numbers ranks sum in it."""
     run = pathlib.Path(folder) / "run"
     subprocess.run(["rm", "-rf", str(run)], check=True)
     words = launcher(ranks, folder) + [args.program, "train", "--config", args.config, "--data", args.data, "--out", str(run),
@@ -97,8 +97,7 @@ def median_step(args, ranks, folder):
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     steps = [b["seconds"] - a["seconds"] for a, b in zip(lines[2:], lines[3:])]
     waits = [line.get("wait_share", 0) for line in lines[3:]]
-    numbers = json.loads((run / "run.json").read_text())["parameters"]
-    return statistics.median(steps), statistics.median(waits), numbers
+    return statistics.median(steps), statistics.median(waits), int(lines[-1]["summed_numbers"])
 
 
 def main():

@@ -98,7 +98,10 @@ Status PortionedUpdate::Finish(StepValues* values) {
   if (!sums_->Finish(all_is_well)) return alarm_;
   const std::span<const double> numbers = value_sums_.Finish(all_is_well);
   TILEGRAD_TRY(alarm_);
-  values->wait_seconds += crew_ ? sums_->seconds_waited() : 0;
+  if (crew_) {
+    values->wait_seconds += sums_->seconds_waited();
+    values->summed_numbers += static_cast<double>(sums_->numbers());
+  }
   if (!numbers.empty()) TakeValues(numbers, values);
   return {};
 }

@@ -41,7 +41,7 @@ inline std::map<std::string, double> ByName(const LogEntry& entry) {
   std::map<std::string, double> out;
   for (const auto& [name, value] : entry.values) {
     if (name != "images_per_second" && name != "seconds" && name != "stream_share" &&
-        name != "wait_share")
+        name != "wait_share" && name != "summed_numbers")
       out[name] = value;
   }
   return out;

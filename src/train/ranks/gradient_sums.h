@@ -50,6 +50,7 @@ class GradientSums : public nn::GradientListener {
 
   std::span<const nn::Gradient> means() const { return means_; }
   double seconds_waited() const { return seconds_waited_; }  // in the last Finish
+  std::size_t numbers() const { return layout_.total(); }    // that each portion has
 
  private:
   template <class Things>

@@ -161,12 +161,14 @@ void Session::LogStream(LogEntry* entry) {
   entry->values.emplace_back("stream_share", share);
 }
 
-// The share of the time that this rank, done with its portions, waited for the sums of all.
+// The share of the time that this rank, done with its portions, waited for the sums of all, and how
+// many these are in a step.
 void Session::LogWait(double elapsed, LogEntry* entry) {
   const double waited = std::exchange(wait_seconds_, 0);
   if (waited <= 0 || elapsed <= 0) return;
   note_ += fmt::format("  waiting {:.1f} %", 100 * waited / elapsed);
   entry->values.emplace_back("wait_share", waited / elapsed);
+  entry->values.emplace_back("summed_numbers", values_.summed_numbers);
 }
 
 Status Session::Draw() {
@@ -182,7 +184,7 @@ Status Session::Draw() {
 Status Session::OneStep() {
   const Schedule& s = plan_.schedule;
   values_.terms.clear(), values_.also.clear();
-  values_.images = 0, values_.stream_seconds = values_.wait_seconds = 0;
+  values_.images = 0, values_.stream_seconds = values_.wait_seconds = values_.summed_numbers = 0;
   TILEGRAD_TRY(work_.Step(done_, &values_).Within(fmt::format("step {}", done_)));
   ++done_;
   images_ += values_.images;

@@ -12,7 +12,7 @@ namespace tilegrad::train {
 
 struct LossTerm {
   const char* name;  // its key in metrics.jsonl; not "step", "loss", "images_per_second",
-                     // "seconds", "stream_share", "wait_share"
+                     // "seconds", "stream_share", "wait_share", "summed_numbers"
   double weight;     // in the loss; 0: only watched
   double value;      // before the weight
 };
@@ -25,6 +25,7 @@ struct StepValues {
   std::int64_t images = 0;                           // that the step worked on
   double stream_seconds = 0;  // of processor time, for pictures that it rendered to learn from
   double wait_seconds = 0;    // for gradients of other ranks, after its own were there
+  double summed_numbers = 0;  // with other ranks, in all updates of the step
 
   // The loss and each term's share of it: "loss 0.6320  iou 0.521  color 0.111".
   std::string ForConsole() const;
