@@ -45,19 +45,6 @@ std::array<float, 3> DrawDirection(double spread, Rng& rng) {
   return Unit(side * std::cos(turn), side * std::sin(turn), z);
 }
 
-// sky + (1 - sky) max(0, n . direction), by its first three bands: a cosine that is cut at 0 has
-// the factors pi, 2 pi / 3 and pi / 4 there (Ramamoorthi, Hanrahan 2001).
-std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& direction) {
-  const std::array<double, 9> basis = HarmonicBasis({direction[0], direction[1], direction[2]});
-  std::array<float, 9> out;
-  for (std::size_t i = 0; i < 9; ++i) {
-    const double band = i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4;
-    out[i] = static_cast<float>((1 - sky) * band * basis[i]);
-  }
-  out[0] += static_cast<float>(sky / basis[0]);
-  return out;
-}
-
 }  // namespace
 
 ConfigFields FieldsOf(LightConfig* c) {
@@ -93,6 +80,19 @@ Surface SurfaceUnder(const LightConfig& config) {
   surface.ambient.fill(static_cast<float>(config.ambient));
   surface.diffuse.fill(1), surface.specular.fill(0.4f);
   return surface;
+}
+
+// A cosine that is cut at 0 has the factors pi, 2 pi / 3 and pi / 4 in its first three bands
+// (Ramamoorthi, Hanrahan 2001).
+std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& direction) {
+  const std::array<double, 9> basis = HarmonicBasis({direction[0], direction[1], direction[2]});
+  std::array<float, 9> out;
+  for (std::size_t i = 0; i < 9; ++i) {
+    const double band = i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4;
+    out[i] = static_cast<float>((1 - sky) * band * basis[i]);
+  }
+  out[0] += static_cast<float>(sky / basis[0]);
+  return out;
 }
 
 DrawnLight DrawLight(const LightConfig& config, Rng& rng) {

@@ -41,6 +41,9 @@ DrawnLight DrawLight(const LightConfig& config, Rng& rng);
 // The mean of many that are drawn; its direction is unit, too.
 DrawnLight MeanLight(const LightConfig& config);
 
+// sky + (1 - sky) max(0, n . direction), by its first three bands.
+std::array<float, 9> SkyAndLight(double sky, const std::array<float, 3>& direction);
+
 // The direction from which harmonics are brightest, by their linear part; unit, (0, 0, 1) where
 // that is 0.
 std::array<float, 3> DirectionOf(const std::array<float, 9>& sh);

@@ -37,7 +37,7 @@ ConfigFields FieldsOf(ColorRule* c) {
       {"loss.color_own", &c->own, 0, 1,
        "weight of colours in a picture's own view, beside those in the other one"},
       {"loss.light", &c->light, 0, kNoLimit,
-       "weight of the distance to the light that explains a picture best; light.model lambert"},
+       "weight of the distance to the light that explains a picture best"},
       {"loss.pose", &c->pose, 0, kNoLimit, "weight of the camera's error; network.lookup"},
   };
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace tilegrad::train {
 namespace {
@@ -52,44 +53,25 @@ std::vector<Sample> Samples(const LightEvidence<T>& e, std::span<const float, 9>
   return out;
 }
 
-double Error(const std::vector<Sample>& samples, const Direction& light, double ambient) {
-  double sum = 0;
-  for (const Sample& s : samples) {
-    const double lit = ambient + std::max(0.0, Dot(s.normal, light));
-    for (std::size_t c = 0; c < 3; ++c)
-      sum += std::abs(std::min(1.0, lit * s.texture[c]) - s.picture[c]);
-  }
-  return sum;
-}
+// SkyAndLight without a sky, of a surface with the cosine `t` to the direction, by its bands.
+double FromDirection(double t) { return 0.25 + 0.5 * t + 5.0 / 32 * (3 * t * t - 1); }
 
 }  // namespace
 
-// Fibonacci's lattice: equal areas, turned by the golden angle.
-LightSearch::LightSearch(double spread, double ambient)
-    : cosine_(std::cos(spread * std::numbers::pi / 180)), ambient_(ambient) {
-  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
-  for (int k = 0; k < kDirections; ++k) {
-    const double z = 1 - (1 - cosine_) * (k + 0.5) / kDirections;
-    const double side = std::sqrt(std::max(0.0, 1 - z * z));
-    directions_.push_back({side * std::cos(golden * k), side * std::sin(golden * k), z});
-  }
-}
+// The best light so far of one picture.
+class LightSearch::Attempts {
+ public:
+  Attempts(const LightSearch& search, std::vector<Sample> samples)
+      : search_(search), samples_(std::move(samples)) {}
 
-template <class T>
-std::array<double, 3> LightSearch::Find(const LightEvidence<T>& evidence,
-                                        std::span<const float, 9> rotation) const {
-  const std::vector<Sample> samples = Samples(evidence, rotation);
-  if (samples.size() < kFewest) return {};
-  Direction best = {};
-  double least = std::numeric_limits<double>::infinity();
-  const auto attempt = [&](const Direction& d) {
-    const double error = Error(samples, d, ambient_);
-    if (error < least) least = error, best = d;
-  };
-  for (const Direction& d : directions_) attempt(d);
-  double radius = kFirstRing;
-  for (int ring = 0; ring < kRings; ++ring, radius /= 2) {
-    const Direction center = best;
+  void Try(const Direction& direction) {
+    const FoundLight light{direction, search_.has_sky_ ? BestSky(direction) : 0};
+    const double error = Error(light);
+    if (error < least_) least_ = error, best_ = light;
+  }
+  // Those around the best one.
+  void TryRing(double radius) {
+    const Direction center = best_.direction;
     const Direction a = Unit(std::abs(center[2]) < 0.9 ? Direction{center[1], -center[0], 0}
                                                        : Direction{0, center[2], -center[1]});
     const Direction b = {center[1] * a[2] - center[2] * a[1], center[2] * a[0] - center[0] * a[2],
@@ -99,15 +81,72 @@ std::array<double, 3> LightSearch::Find(const LightEvidence<T>& evidence,
       const double y = radius * std::sin(2 * std::numbers::pi * k / kAround);
       const Direction d = Unit({center[0] + x * a[0] + y * b[0], center[1] + x * a[1] + y * b[1],
                                 center[2] + x * a[2] + y * b[2]});
-      if (d[2] >= cosine_ - 1e-9) attempt(d);
+      if (d[2] >= search_.cosine_ - 1e-9) Try(d);
     }
   }
-  return best;
+  const FoundLight& best() const { return best_; }
+
+ private:
+  // By least squares: the picture is linear in it.
+  double BestSky(const Direction& direction) const {
+    double above = 0, below = 0;
+    for (const Sample& s : samples_) {
+      const double lit = FromDirection(Dot(s.normal, direction));
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double slope = (1 - lit) * s.texture[c];
+        above += slope * (s.picture[c] - lit * s.texture[c]);
+        below += slope * slope;
+      }
+    }
+    const double low = search_.config_.sky_low, high = search_.config_.sky_high;
+    return below > 0 ? std::clamp(above / below, low, high) : low;
+  }
+
+  double Error(const FoundLight& light) const {
+    double sum = 0;
+    for (const Sample& s : samples_) {
+      const double t = Dot(s.normal, light.direction);
+      const double lit = search_.has_sky_ ? light.sky + (1 - light.sky) * FromDirection(t)
+                                          : search_.config_.ambient + std::max(0.0, t);
+      for (std::size_t c = 0; c < 3; ++c)
+        sum += std::abs(std::min(1.0, lit * s.texture[c]) - s.picture[c]);
+    }
+    return sum;
+  }
+
+  const LightSearch& search_;
+  const std::vector<Sample> samples_;
+  FoundLight best_;
+  double least_ = std::numeric_limits<double>::infinity();
+};
+
+// Fibonacci's lattice: equal areas, turned by the golden angle.
+LightSearch::LightSearch(const LightConfig& config)
+    : config_(config),
+      has_sky_(LightingOf(config) == Lighting::kSphericalHarmonics),
+      cosine_(std::cos(config.spread * std::numbers::pi / 180)) {
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  for (int k = 0; k < kDirections; ++k) {
+    const double z = 1 - (1 - cosine_) * (k + 0.5) / kDirections;
+    const double side = std::sqrt(std::max(0.0, 1 - z * z));
+    directions_.push_back({side * std::cos(golden * k), side * std::sin(golden * k), z});
+  }
 }
 
-template std::array<double, 3> LightSearch::Find(const LightEvidence<float>&,
-                                                 std::span<const float, 9>) const;
-template std::array<double, 3> LightSearch::Find(const LightEvidence<double>&,
-                                                 std::span<const float, 9>) const;
+template <class T>
+FoundLight LightSearch::Find(const LightEvidence<T>& evidence,
+                             std::span<const float, 9> rotation) const {
+  std::vector<Sample> samples = Samples(evidence, rotation);
+  if (samples.size() < kFewest) return {};
+  Attempts attempts(*this, std::move(samples));
+  for (const Direction& d : directions_) attempts.Try(d);
+  double radius = kFirstRing;
+  for (int ring = 0; ring < kRings; ++ring, radius /= 2) attempts.TryRing(radius);
+  return attempts.best();
+}
+
+template FoundLight LightSearch::Find(const LightEvidence<float>&, std::span<const float, 9>) const;
+template FoundLight LightSearch::Find(const LightEvidence<double>&,
+                                      std::span<const float, 9>) const;
 
 }  // namespace tilegrad::train

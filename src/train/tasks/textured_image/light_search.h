@@ -3,12 +3,15 @@
 // the picture best, by trying many. The error of colours says little about a light that is far from
 // the right one (what it does not reach is black, and stays so when it moves a little), so a
 // network that follows its gradient learns lights slowly; the direction found here is a target for
-// it.
+// it. Light from a direction is compared by Lambert's law (highlights of Phong surfaces are left
+// over), light of a sky and a direction as SkyAndLight has it.
 #pragma once
 
 #include <array>
 #include <span>
 #include <vector>
+
+#include "train/data/stream/light_draw.h"
 
 namespace tilegrad::train {
 
@@ -21,20 +24,27 @@ struct LightEvidence {
   std::span<const T> cover;    // [pixels]: how much of each is the object, in [0, 1]
 };
 
-// Directions spread evenly over a spherical cap, finer around the best one: Lambert's law with a
-// constant `ambient`, compared by L1.
+struct FoundLight {
+  std::array<double, 3> direction = {};  // unit, in the camera's axes; 0: the picture shows nothing
+  double sky = 0;                        // share of the light that comes from everywhere; harmonics
+};
+
+// Directions spread evenly over a spherical cap, finer around the best one, and of harmonics
+// the best sky for each; compared by L1.
 class LightSearch {
  public:
-  // `spread`: half angle of the cap around the camera's axis, degrees.
-  LightSearch(double spread, double ambient);
+  explicit LightSearch(const LightConfig& config);
 
-  // Unit, in the axes of the camera with `rotation`, row-major; 0 where the picture shows nothing.
+  // `rotation` of the camera, row-major.
   template <class T>
-  std::array<double, 3> Find(const LightEvidence<T>& evidence,
-                             std::span<const float, 9> rotation) const;
+  FoundLight Find(const LightEvidence<T>& evidence, std::span<const float, 9> rotation) const;
 
  private:
-  double cosine_, ambient_;
+  class Attempts;
+
+  LightConfig config_;
+  bool has_sky_;
+  double cosine_;  // of the cap
   std::vector<std::array<double, 3>> directions_;
 };
 

@@ -10,10 +10,31 @@ namespace {
 constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
 static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
 
+template <class T>
+struct Row {
+  const T* said;
+  T* out;
+  std::size_t numbers;  // 3: a direction, 9: harmonics
+};
+
+template <class T>
+void Write(const FoundLight& found, const Row<T>& row) {
+  const auto& d = found.direction;
+  if (d == std::array<double, 3>{}) {
+    std::copy_n(row.said, row.numbers, row.out);
+  } else if (row.numbers == 3) {
+    std::ranges::transform(d, row.out, [](double x) { return static_cast<T>(x); });
+  } else {
+    const auto sh = SkyAndLight(
+        found.sky, {static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])});
+    std::ranges::transform(sh, row.out, [](float x) { return static_cast<T>(x); });
+  }
+}
+
 }  // namespace
 
-LightTargets::LightTargets(nn::Context& context, double spread, double ambient)
-    : context_(context), search_(spread, ambient), renderer_(context.workers()) {}
+LightTargets::LightTargets(nn::Context& context, const LightConfig& config)
+    : context_(context), search_(config), renderer_(context.workers()) {}
 
 nn::Tensor LightTargets::Find(const PredictedObjects& objects, const TexturedBatch& batch,
                               RenderJob job) {
@@ -23,7 +44,8 @@ nn::Tensor LightTargets::Find(const PredictedObjects& objects, const TexturedBat
   const SceneVars scenes{.positions = nn::Constant(context_, objects.positions.value()),
                          .textures = nn::Constant(context_, objects.textures.value())};
   if (!RenderScenes(renderer_, scenes, std::move(job)).colors.valid()) return {};
-  nn::Tensor out = context_.Empty(objects.directions.shape(), objects.directions.dtype());
+  const nn::Tensor said = SaidOf(objects).value();
+  nn::Tensor out = context_.Empty(said.shape(), said.dtype());
   nn::WithFloatType(out.dtype(), [&]<class T>(T) {
     const ImagesT<T>& drawn = FrameOf(renderer_, T{}).images();
     const std::span<const T> picture = batch.truth_colors.template span<T>();
@@ -33,11 +55,11 @@ nn::Tensor LightTargets::Find(const PredictedObjects& objects, const TexturedBat
       const auto planes = [&](std::span<const T> images) {
         return images.subspan(3 * n * pixels, 3 * pixels);
       };
-      const auto found = search_.Find<T>({planes(drawn.color), planes(drawn.normals),
-                                          planes(picture), cover.subspan(n * pixels, pixels)},
-                                         batch.cameras[n].rotation);
-      std::ranges::transform(found, out.data<T>() + 3 * m,
-                             [](double x) { return static_cast<T>(x); });
+      const FoundLight found = search_.Find<T>({planes(drawn.color), planes(drawn.normals),
+                                                planes(picture), cover.subspan(n * pixels, pixels)},
+                                               batch.cameras[n].rotation);
+      const auto numbers = static_cast<std::size_t>(said.shape()[1]);
+      Write<T>(found, {said.data<T>() + numbers * m, out.data<T>() + numbers * m, numbers});
     });
   });
   return out;

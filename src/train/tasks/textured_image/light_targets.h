@@ -12,14 +12,19 @@
 
 namespace tilegrad::train {
 
+// What `objects` says of light that LightTargets has targets for: directions or harmonics.
+inline const nn::Var& SaidOf(const PredictedObjects& objects) {
+  return objects.sh.valid() ? objects.sh : objects.directions;
+}
+
 class LightTargets {
  public:
-  // Directions are within `spread` degrees of the camera's axis; `ambient` as LightConfig's.
-  LightTargets(nn::Context& context, double spread, double ambient);
+  LightTargets(nn::Context& context, const LightConfig& config);
 
-  // [M, 3] unit, in the axes of the inputs' cameras, without gradient; 0 of inputs in which too
-  // little is seen. `job` draws the batch; its shading is replaced. An empty tensor where drawing
-  // failed, which the context's status then says.
+  // In the axes of the inputs' cameras, without gradient: [M, 3] unit directions, of harmonics
+  // [M, 9]; what `objects` says itself of inputs in which too little is seen. `job` draws the
+  // batch; its shading is replaced. An empty tensor where drawing failed, which the context's
+  // status then says.
   nn::Tensor Find(const PredictedObjects& objects, const TexturedBatch& batch, RenderJob job);
 
  private:

@@ -73,7 +73,7 @@ TexturedStep::TexturedStep(nn::Context& context, const TexturedImageConfig& conf
       topology_(
           BuildTopology(network_.template_mesh().faces, network_.template_mesh().positions.size())),
       renderer_(context.workers()),
-      light_targets_(context, config.light.spread, config.light.ambient),
+      light_targets_(context, config.light),
       rival_renderer_(context.workers()) {}
 
 RenderJob TexturedStep::JobAt(const TexturedBatch& batch, std::int64_t step) const {
@@ -132,7 +132,7 @@ double TexturedStep::ShareOfRun(std::int64_t step) const {
 }
 
 bool TexturedStep::LearnsLights() const {
-  return config_.color.light > 0 && LightingOf(config_.light) == Lighting::kLambert;
+  return config_.color.light > 0 && LightingOf(config_.light) != Lighting::kNone;
 }
 
 LossConfig TexturedStep::WeightsAt(std::int64_t step) const {
@@ -193,7 +193,7 @@ nn::Var TexturedStep::PoseLoss(const nn::Var& pose, const TexturedBatch& batch) 
 nn::Var TexturedStep::LightLoss(const PredictedObjects& objects, const TexturedBatch& batch) {
   nn::Tensor targets = light_targets_.Find(objects, batch, JobAt(batch, config_.schedule.steps));
   if (targets.empty()) return {};
-  return nn::Mean(nn::Square(objects.directions - nn::Constant(context_, std::move(targets))));
+  return nn::Mean(nn::Square(SaidOf(objects) - nn::Constant(context_, std::move(targets))));
 }
 
 nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& batch,

@@ -158,9 +158,12 @@ TEST(TexturedStep, GradientsOfAPalette) {
 
 // Targets are of a lattice and do not move with the weights, but for the few that jump.
 TEST(TexturedStep, GradientsOfTheDistanceToLightsThatWereFound) {
-  TexturedImageConfig config = TinyConfig("lambert");
-  config.color.light = 5;
-  ExpectGradientsAgreeWithDifferences(config, {"light."});
+  for (const char* model : {"lambert", "phong", "harmonics"}) {
+    SCOPED_TRACE(model);
+    TexturedImageConfig config = TinyConfig(model);
+    config.color.light = 5;
+    ExpectGradientsAgreeWithDifferences(config, {"light."});
+  }
 }
 
 TEST(TexturedStep, GradientsOfTheCamera) {
