@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is killed: commands on tiny data, the folders they write, and what of these must be the same in the end."""
-import json
-import pathlib
 import shutil
 
 from whole import bytes_of, newest_weights
@@ -69,20 +67,7 @@ def write_config(f, kind, steps):
 
 
 def data_of(f, kind):
-    return f / ("photographs" if kind == "photographs" else "data")
-
-
-def make_photographs(f):
-    """Pictures and cameras in one folder, none held out yet."""
-    shutil.copytree(f / "views", f / "photographs")
-    (f / "photographs" / "transforms_test.json").unlink()
-    cameras = f / "photographs" / "transforms_train.json"
-    cameras.rename(f / "photographs" / "transforms.json")
-    frames = json.loads((f / "photographs" / "transforms.json").read_text())["frames"]
-    seen = {pathlib.Path(frame["file_path"]).stem for frame in frames}
-    for picture in (f / "photographs" / "images").iterdir():
-        if picture.stem not in seen:
-            picture.unlink()
+    return f / ("views" if kind == "photographs" else "data")
 
 
 def prepare(soak):
@@ -92,7 +77,6 @@ def prepare(soak):
     soak.must(["dataset", "--source", "procedural", "--per-class", "3", "--size", "16", "--views", "2", "--out", f / "data"])
     (f / "ball.obj").write_text(BALL)
     soak.must(["views", f / "ball.obj", "--views", "12", "--size", "24", "--out", f / "views"])
-    make_photographs(f)
     for kind, name in (("textured_image", "textured"), ("single_image", "trained"), ("gan", "generator")):
         soak.must(["train", "--config", write_config(f, kind, 2), "--data", f / "data", "--out", f / name])
     soak.must(["dataset-view", "--data", f / "data", "--split", "test", "--out", f / "view.png"])

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/error.h"
 #include "base/json_nesting.h"
@@ -18,6 +19,8 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr const char* kTrain = "transforms_train.json";
+constexpr const char* kTest = "transforms_test.json";
 constexpr int kTestEvery = 6;  // the last of each six pictures is held out
 constexpr std::size_t kMostNames = 256;
 constexpr double kFarthest = 1 << 20;  // pixels from the picture's corner that a keypoint may be
@@ -90,17 +93,36 @@ class FolderReader {
       set_.photographs.push_back(std::move(photo));
     }
     TILEGRAD_TRY(ReadCameras());
-    if (std::filesystem::exists(folder_ / "keypoints.json", ignored)) TILEGRAD_TRY(ReadKeypoints());
+    if (Has("keypoints.json")) TILEGRAD_TRY(ReadKeypoints());
     return std::move(set_);
   }
 
  private:
+  bool Has(const char* name) const { return std::filesystem::exists(folder_ / name, ignored); }
+
+  // As `tilegrad views` and NeRF's datasets have them, which say what is held out.
+  Result<std::vector<io::CameraView>> ReadSplitCameras() {
+    TILEGRAD_ASSIGN(std::vector<io::CameraView> all, io::LoadCameras(folder_ / kTrain, {}));
+    if (!Has(kTest)) return all;
+    TILEGRAD_ASSIGN(const auto held_out, io::LoadCameras(folder_ / kTest, {}));
+    std::set<std::string> stems;
+    for (const io::CameraView& view : held_out) stems.insert(Path(view.name).stem().string());
+    for (Photograph& photo : set_.photographs)
+      photo.split = stems.contains(photo.image.stem().string()) ? Split::kTest : Split::kTrain;
+    all.insert(all.end(), held_out.begin(), held_out.end());
+    return all;
+  }
+
   Status ReadCameras() {
-    const Path file = folder_ / "transforms.json";
-    const bool colmap = io::FindColmapModel(folder_).has_value();
-    if (!colmap && !std::filesystem::exists(file, ignored)) return {};
-    auto cameras = colmap ? io::LoadColmapCameras(folder_) : io::LoadCameras(file, {});
+    Result<std::vector<io::CameraView>> cameras = std::vector<io::CameraView>();
+    if (io::FindColmapModel(folder_).has_value())
+      cameras = io::LoadColmapCameras(folder_);
+    else if (Has("transforms.json"))
+      cameras = io::LoadCameras(folder_ / "transforms.json", {});
+    else if (Has(kTrain))
+      cameras = ReadSplitCameras();
     TILEGRAD_TRY(cameras.status());
+    if (cameras->empty()) return {};
     std::map<std::string, const io::CameraView*> by_stem;
     for (const io::CameraView& view : *cameras) by_stem[Path(view.name).stem().string()] = &view;
     for (Photograph& photo : set_.photographs) {

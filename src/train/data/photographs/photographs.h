@@ -8,8 +8,9 @@
 //   PASCAL3D+   as CMR's code lays it out: data/<class>_kps.mat, data/<class>_{train,val}.mat and
 //               sfm/<class>_{train,val}.mat, in the folder, p3d/ or cachedir/p3d/; pictures in
 //               Images/ or PASCAL3D+_release1.1/Images/. Its val is what we test on.
-//   a folder    of pictures with alpha, or with masks/<name>.png; cameras of COLMAP or
-//               transforms.json; keypoints.json (docs/photographs.md)
+//   a folder    of pictures with alpha, or with masks/<name>.png; cameras of COLMAP,
+//               transforms.json, or transforms_train.json and transforms_test.json, which say what
+//               is held out; keypoints.json (docs/photographs.md)
 //
 // Coordinates are pixels of the whole photograph, x right, y down, the first pixel's centre at
 // (0.5, 0.5): MATLAB's, which count from (1, 1), less a half.

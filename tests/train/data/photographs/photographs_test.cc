@@ -254,15 +254,19 @@ TEST_F(PhotoFolderTest, FindsCamerasFromKeypoints) {
   EXPECT_LT(worst, 1);  // pixel
 }
 
+// Cameras of pictures first, ..., last - 1 that look along -z from (0, 0, 4).
+std::string Transforms(int first, int last) {
+  std::string frames;
+  for (int i = first; i < last; ++i)
+    frames += std::string(i == first ? "" : ",") + R"({"file_path": "p)" + std::to_string(100 + i) +
+              R"(.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
+  return R"({"fl_x": 80, "fl_y": 80, "cx": 30, "cy": 24, "w": 60, "h": 48, "frames": [)" + frames +
+         "]}";
+}
+
 TEST_F(PhotoFolderTest, TakesCamerasOfTransforms) {
   WritePictures(12);
-  std::string frames;
-  for (int i = 0; i < 12; ++i)
-    frames += std::string(i == 0 ? "" : ",") + R"({"file_path": "p)" + std::to_string(100 + i) +
-              R"(.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
-  Write("transforms.json", R"({"fl_x": 80, "fl_y": 80, "cx": 30, "cy": 24, "w": 60, "h": 48,
-                               "frames": [)" +
-                               frames + "]}");
+  Write("transforms.json", Transforms(0, 12));
   const auto got = OpenPhotographs(folder_);
   ASSERT_TRUE(got.ok()) << got.status().message();
   EXPECT_NEAR(got->photographs[3].camera->scale, 20, 1e-9);
@@ -271,6 +275,17 @@ TEST_F(PhotoFolderTest, TakesCamerasOfTransforms) {
   double mean = 0;
   for (const Photograph& photo : got->photographs) mean += photo.keypoints[0].x / 12;
   EXPECT_NEAR(20 * got->mean_keypoints[0][0] + 30, mean, 1e-3);
+}
+
+TEST_F(PhotoFolderTest, TransformsOfTwoSplitsSayWhatIsHeldOut) {
+  WritePictures(12);
+  Write("transforms_train.json", Transforms(0, 9));
+  ExpectMessage(OpenPhotographs(folder_).status(), "p109.png", "no camera for it among the 9");
+  Write("transforms_test.json", Transforms(9, 12));
+  const auto got = OpenPhotographs(folder_);
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  EXPECT_EQ(got->Select(Split::kTest), (std::vector<int>{9, 10, 11}));
+  EXPECT_TRUE(got->photographs[11].camera);
 }
 
 TEST_F(PhotoFolderTest, WithoutKeypointsThereAreNoCameras) {
