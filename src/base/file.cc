@@ -145,7 +145,7 @@ Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> b
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   const Path temporary = TemporaryOf(path);
   Status status = WriteTemporary(temporary, path, bytes);
-  if (status.ok()) NoteIfExpected(path, bytes);
+  if (status.ok()) status = NoteIfExpected(path, bytes);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(path, "cannot be replaced");
   }

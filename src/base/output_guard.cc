@@ -122,7 +122,9 @@ void OutputGuard::Note(const Path& file) const {
   LeftIn(target.parent_path()).RemoveOf(target.filename().string());
   const std::string checksum = Checksum(target);
   if (checksum.empty() || !NotesOf(target.parent_path()).insert(checksum).second) return;
-  AddOutputNote(target.parent_path(), checksum);
+  // What WriteFileAtomic wrote has its note already, and an error where the disk had no room for
+  // it.
+  static_cast<void>(AddOutputNote(target.parent_path(), checksum));
 }
 
 void OutputGuard::NoteAll(std::span<const Path> files) const {

@@ -18,11 +18,12 @@ inline constexpr const char* kOutputNotes = ".tilegrad-made";
 // Of the name without its folder and the content.
 std::string OutputChecksum(const Path& file, std::span<const std::uint8_t> content);
 std::set<std::string> ReadOutputNotes(const Path& folder);
-// Unless it is there. Where no note can be made (somebody else's folder), there is none.
-void AddOutputNote(const Path& folder, const std::string& checksum);
+// Unless it is there. Where no note may be made (somebody else's folder), there is none; an error
+// is one that the disk has no room for.
+Status AddOutputNote(const Path& folder, const std::string& checksum);
 
 // Files that this process may write for a user: WriteFileAtomic() notes them. Any thread.
 void ExpectOutput(const Path& file);
-void NoteIfExpected(const Path& file, std::span<const std::uint8_t> content);
+Status NoteIfExpected(const Path& file, std::span<const std::uint8_t> content);
 
 }  // namespace tilegrad

@@ -2,6 +2,9 @@
 #include "base/output_guard.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
 
 #include "support/temp_folder.h"
 
@@ -71,6 +74,28 @@ TEST_F(Guard, WhatAKilledCallHasJustWrittenIsOurs) {
   EXPECT_EQ(std::filesystem::file_size(folder_ / ".tilegrad-made"), 135 + 2 * 17);
   ASSERT_TRUE(WriteTextAtomic(folder_ / "b.png", "not asked for").ok());
   ExpectMessage(OutputGuard().Check(folder_ / "b.png"), "--force");
+}
+
+// A file without its note would be taken for somebody else's by the next call.
+TEST_F(Guard, AFileWhoseNoteHasNoRoomIsNotWritten) {
+  const Path notes = folder_ / ".tilegrad-made", file = folder_ / "a.png";
+  Made("b.png", "ours");
+  ASSERT_TRUE(AppendText(notes, "0123456789", false).ok());  // of a line that had no room
+  rlimit before;
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit full = before;
+  full.rlim_cur = std::filesystem::file_size(notes) + 5;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  EXPECT_TRUE(OutputGuard().Check(file).ok());
+  const Status status = WriteTextAtomic(file, "small");
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  ExpectMessage(status, ".tilegrad-made", "cannot append");
+  EXPECT_FALSE(std::filesystem::exists(file));
+  ASSERT_TRUE(WriteTextAtomic(file, "small").ok());
+  EXPECT_TRUE(OutputGuard().Check(file).ok());
+  EXPECT_TRUE(OutputGuard().Check(folder_ / "b.png").ok());
 }
 
 // What is written twice is noted once.
