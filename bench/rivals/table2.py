@@ -3,7 +3,7 @@
 """Table 2 of the paper: texture and light from one image, by our renderer and by N3MR's texture cubes.
 
     tilegrad dataset --source cars --out datasets/cars
-    python3 bench/rivals/table2.py --data datasets/cars --out runs/table2 [--steps 6000] [--seeds 1 2]
+    python3 bench/rivals/table2.py --data datasets/cars --out runs/table2 [--steps 4000] [--seeds 1 2]
 
 One network, the same data, steps and losses (configs/texture_quick.toml); only the renderer differs.
 Trains and scores one run after the other and prints the table as Markdown. Errors are means over all
@@ -64,7 +64,7 @@ def table(results: dict[str, list[dict[str, Any]]]) -> str:
 
 def main() -> int:
     parser = runs.parser(__doc__, METHODS)
-    parser.set_defaults(config="configs/texture_quick.toml", steps=6000, seeds=[1])
+    parser.set_defaults(config="configs/texture_quick.toml", steps=4000, seeds=[1])
     options = parser.parse_args()
     try:
         results = {method: [scores(options, method, seed) for seed in options.seeds]
