@@ -314,9 +314,10 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
                            HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
       // When peeling, a face that covers a tile may lie in front of the layer that is drawn.
-      const bool covered = DrawTile<kLayer>(
-          shape, face, tile,
-          {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, out.behind + first});
+      const bool covered =
+          DrawTile<kLayer>(shape, face, tile,
+                           {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first,
+                            kLayer == Layer::kPeel ? out.behind + first : nullptr});
       if (covered && kLayer == Layer::kFirst) floor = HWY_MAX(floor, face.depth.low);
     }
   }

@@ -106,8 +106,10 @@ void RunStageBackward(const BackwardInput& input, const ImageScratch& image, con
         &worker->interpolate);
   }
   clock.Lap(&worker->times.interpolate);
-  input.stage->Backward(strip, {worker->d_varyings.data() + place.x0,
-                                static_cast<std::ptrdiff_t>(place.band.count), place.width});
+  float* const d_varyings =
+      image.attributes.channels > 0 ? worker->d_varyings.data() + place.x0 : nullptr;
+  input.stage->Backward(strip,
+                        {d_varyings, static_cast<std::ptrdiff_t>(place.band.count), place.width});
   clock.Lap(&worker->times.stage);
 }
 

@@ -66,6 +66,7 @@ void PackVaryings(const Scene& scene, const VaryingSet& set, const SceneNormals&
                   AlignedVector<float>* out) {
   const auto channels = static_cast<std::size_t>(set.channels());
   out->resize(PackedRows(scene, set) * channels);
+  if (out->empty()) return;
   for (std::size_t i = 0; i < kVaryings; ++i) {
     const auto what = static_cast<Varying>(i);
     if (!set[what]) continue;
@@ -83,6 +84,7 @@ void PackVaryings(const Scene& scene, const VaryingSet& set, const SceneNormals&
 
 void AddStream(const Scene& scene, const VaryingSet& set, Varying what,
                std::span<const float> packed, std::span<float> stream) {
+  if (packed.empty()) return;
   const auto channels = static_cast<std::size_t>(set.channels());
   const auto width = static_cast<std::size_t>(set.width(what));
   const float scale = StreamScale(scene, what);
