@@ -263,8 +263,7 @@ HWY_INLINE void DrawUnguarded(const SnappedFace& shape, const DrawnFace& face,
   }
 }
 
-// A large face in one tile of a bin, whose arrays `rows` begins. Returns whether it covers all of
-// it.
+// A large face in one tile of a bin, whose arrays `rows` begins. Whether it covers all of it.
 template <Layer kLayer>
 HWY_INLINE bool DrawTile(const SnappedFace& shape, const DrawnFace& face, const PixelRect& tile,
                          DrawnRows rows) {
@@ -313,11 +312,11 @@ HWY_INLINE void DrawLarge(const ScreenMesh& mesh, const DrawnFace& face, const P
       const PixelRect tile{x0, y0, HWY_MIN(x0 + kTileSize, rect.x1),
                            HWY_MIN(y0 + kTileSize, rect.y1)};
       const int first = ((y << kTileBits) << kBinBits) + (x << kTileBits);
+      const float* behind = kLayer == Layer::kPeel ? out.behind + first : nullptr;
       // When peeling, a face that covers a tile may lie in front of the layer that is drawn.
       const bool covered =
           DrawTile<kLayer>(shape, face, tile,
-                           {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first,
-                            kLayer == Layer::kPeel ? out.behind + first : nullptr});
+                           {0, 0, 0, x0, y0, out.face + first, out.inverse_depth + first, behind});
       if (covered && kLayer == Layer::kFirst) floor = HWY_MAX(floor, face.depth.low);
     }
   }
