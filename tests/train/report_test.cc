@@ -70,7 +70,8 @@ class ReportTest : public TempFolderTest {
     EXPECT_TRUE(summary.ok()) << summary.status().message();
     return summary.ok() ? ReadText(job_.out).value() : "";
   }
-  void Evaluate(double own) {
+  void Evaluate(double own) { ASSERT_TRUE(WriteEvaluation(job_.run, Scores(own)).ok()); }
+  Evaluation Scores(double own) const {
     const Dataset dataset = Dataset::Open(job_.data).value();
     Evaluation e;
     e.predictor = "elder network";
@@ -84,7 +85,7 @@ class ReportTest : public TempFolderTest {
     e.rows = {row("undeformed template", 0.25), row(kEvil, 0.5), row("tilegrad", own)};
     const int first = dataset.Select(Split::kTest)[0];
     e.models = {{"noise", dataset.models()[static_cast<std::size_t>(first)].id, {0.123, 0.456}}};
-    ASSERT_TRUE(WriteEvaluation(job_.run, e).ok());
+    return e;
   }
 
   Workers workers_;
@@ -180,6 +181,22 @@ TEST_F(ReportTest, MarksTheBestAndComparesWithBaselines) {
   page = Page();
   EXPECT_EQ(Count(page, "not above the baselines"), 1);
   EXPECT_EQ(Count(page, "<strong>50.0</strong>"), 2);
+}
+
+// One shape under several lights: its 3D IoU tells nothing apart.
+TEST_F(ReportTest, ComparesPicturesUnderTheirLights) {
+  Evaluation e = Scores(0.5);
+  double error = 0.04;
+  for (EvaluationRow& row : e.rows) row.mean.lit_l1 = error /= 2;
+  e.rows.back().mean.light_angle = 12.34;
+  ASSERT_TRUE(WriteEvaluation(job_.run, e).ok());
+  const std::string page = Page();
+  EXPECT_EQ(
+      Count(page, "its pictures are off by <b>0.0050</b> of 1, undeformed template by 0.0200"), 1);
+  EXPECT_EQ(Count(page, "its lights are 12.3 degrees off."), 1);
+  EXPECT_EQ(Count(page, "width:80.0%\"></span><span class=\"value\">0.0200</span>"), 1);
+  EXPECT_EQ(Count(page, "width:20.0%\"></span><span class=\"value\">0.0050</span>"), 1);
+  EXPECT_EQ(Count(page, "baselines"), 0);
 }
 
 TEST_F(ReportTest, SameRunSameBytes) {

@@ -34,15 +34,35 @@ std::string Comparison(const Evaluation& evaluation) {
   return fmt::format(", {}: {}.", verdict, baselines);
 }
 
+// Whether the methods draw one shape under lights of their own: then pictures tell them apart.
+bool IsOfLight(const Evaluation& evaluation) {
+  return std::ranges::all_of(evaluation.rows,
+                             [](const auto& row) { return row.mean.lit_l1.has_value(); });
+}
+
+std::string ComparisonOfLight(const Evaluation& evaluation) {
+  const Score& own = evaluation.rows.back().mean;
+  std::string out = fmt::format(
+      ". Under the light that it predicts its pictures are off by <b>{:.4f}</b> of 1", *own.lit_l1);
+  for (std::size_t i = 0; i + 1 < evaluation.rows.size(); ++i) {
+    const auto& [method, classes, mean] = evaluation.rows[i];
+    out += fmt::format(", {} by {:.4f}", EscapeHtml(method), *mean.lit_l1);
+  }
+  if (own.light_angle) out += fmt::format("; its lights are {:.1f} degrees off", *own.light_angle);
+  return out + ".";
+}
+
 std::string EvaluationSentence(const ReportFacts& facts) {
   if (facts.showcase.generated) return "";
   if (!facts.evaluation) return "There is no evaluation of it yet.";
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
-  return fmt::format("On {} models of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}",
-                     WithCommas(models), EscapeHtml(evaluation.split), MainMeasure(evaluation),
-                     100 * evaluation.rows.back().mean.main(), Comparison(evaluation));
+  return fmt::format(
+      "On {} models of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}", WithCommas(models),
+      EscapeHtml(evaluation.split), MainMeasure(evaluation),
+      100 * evaluation.rows.back().mean.main(),
+      IsOfLight(evaluation) ? ComparisonOfLight(evaluation) : Comparison(evaluation));
 }
 
 // A word as a shell reads it back.
@@ -72,20 +92,28 @@ std::string SummaryHtml(const ReportFacts& facts) {
 
 std::string ComparisonHtml(const ReportFacts& facts) {
   if (!facts.evaluation) return "";
-  const char* measure = MainMeasure(*facts.evaluation);
+  const auto& rows = facts.evaluation->rows;
+  const bool light = IsOfLight(*facts.evaluation);
+  double most = 1e-9;  // the longest bar's, of errors
+  for (const auto& row : rows) most = std::max(most, row.mean.lit_l1.value_or(0));
+  const std::string measure = light ? "error of texture + light" : MainMeasure(*facts.evaluation);
   std::string out =
       fmt::format("<dl class=\"bars\" aria-label=\"Mean {} of each method\">\n", measure);
-  for (const auto& row : facts.evaluation->rows) {
-    const bool own = &row == &facts.evaluation->rows.back();
+  for (const auto& row : rows) {
+    const double share = light ? *row.mean.lit_l1 / most : std::clamp(row.mean.main(), 0.0, 1.0);
+    const std::string value = light ? fmt::format("{:.4f}", *row.mean.lit_l1)
+                                    : fmt::format("{:.1f} %", 100 * row.mean.main());
     out += fmt::format(
         "<div{}><dt>{}</dt><dd><span class=\"bar\" style=\"width:{:.1f}%\"></span>"
-        "<span class=\"value\">{:.1f} %</span></dd></div>\n",
-        own ? " class=\"own\"" : "", EscapeHtml(row.method),
-        80 * std::clamp(row.mean.main(), 0.0, 1.0), 100 * row.mean.main());
+        "<span class=\"value\">{}</span></dd></div>\n",
+        &row == &rows.back() ? " class=\"own\"" : "", EscapeHtml(row.method), 80 * share, value);
   }
   const bool voxels = !Classifies(*facts.evaluation) && !IsOfPhotographs(*facts.evaluation);
+  const char* note = light ? ", mean difference of colour in the input's view, of 1; less is better"
+                     : voxels ? ", 32³ voxels"
+                              : "";
   return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out models{}.</p>",
-                           measure, voxels ? ", 32³ voxels" : "");
+                           measure, note);
 }
 
 std::string CommandsHtml(const ReportFacts& facts) {
