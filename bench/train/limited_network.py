@@ -8,14 +8,11 @@ bandwidth (tc's tbf). Prints what a step takes, measured and as docs/scaling.md 
 The model is given what a step takes without a limit, just before and after, on as many ranks (so that what else the machine does, and its number of
 cores, count on both sides), the number of gradients that the log says (summed_numbers) and the bandwidth.
 """
-import argparse
-import json
-import os
 import pathlib
-import statistics
 import subprocess
 import tempfile
 
+import step_times
 from scaling_model import step_time
 
 
@@ -81,40 +78,15 @@ def launcher(ranks, folder):
     return words
 
 
-def median_step(args, ranks, folder):
-    """Seconds of a step, the share of waiting, and how many numbers ranks sum in it."""
-    run = pathlib.Path(folder) / "run"
-    subprocess.run(["rm", "-rf", str(run)], check=True)
-    words = launcher(ranks, folder) + [args.program, "train", "--config", args.config, "--data", args.data, "--out", str(run),
-                                       "--threads", "1", "--quiet", "--steps", str(args.steps)]
-    for setting in [f"portions={args.portions}", "log_every=1", "sample_every=1000000", "checkpoint_every=1000000"]:
-        words += ["--set", f"schedule.{setting}"]
-    for setting in args.set:
-        words += ["--set", setting]
-    done = subprocess.run(words, capture_output=True, text=True, env=dict(os.environ), check=False)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    steps = [b["seconds"] - a["seconds"] for a, b in zip(lines[2:], lines[3:])]
-    waits = [line.get("wait_share", 0) for line in lines[3:]]
-    return statistics.median(steps), statistics.median(waits), int(lines[-1]["summed_numbers"])
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("program", "config", "data"):
-        parser.add_argument(name)
-    parser.add_argument("--ranks", type=int, default=2)
-    parser.add_argument("--portions", type=int, default=4)
-    parser.add_argument("--steps", type=int, default=20)
+    parser = step_times.parser(__doc__, {"ranks": 2, "portions": 4, "steps": 20})
     parser.add_argument("--gbits", type=float, nargs="+", default=[0.5, 1, 4])
-    parser.add_argument("--set", nargs="+", default=[])
     args = parser.parse_args()
     sharded = "schedule.shard_optimizer=false" not in args.set
     with tempfile.TemporaryDirectory() as folder:
         def measure(gbits):
             with Network(args.ranks, gbits):
-                return median_step(args, args.ranks, folder)
+                return step_times.measure(args, launcher(args.ranks, folder), 1, folder)
 
         before, wait, numbers = measure(None)
         print(f"{args.ranks} ranks, no limit: {before * 1e3:.1f} ms a step, waiting {wait * 100:.0f} %, {numbers} numbers", flush=True)
