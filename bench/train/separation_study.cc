@@ -31,12 +31,13 @@ constexpr int kModels = 8, kChanges = 8, kZoom = 2;
 enum class Change { kLights, kViews, kShininess };
 
 // Lights on a ring, 50 degrees from the camera's axis.
-DrawnLight RingLight(const DrawnLight& like, int k) {
+DrawnLight RingLight(const DrawnLight& like, const LightConfig& config, int k) {
   const double turn = 2 * std::numbers::pi * k / kChanges, tilt = 50 * std::numbers::pi / 180;
   DrawnLight light = like;
   light.direction = {static_cast<float>(std::sin(tilt) * std::cos(turn)),
                      static_cast<float>(std::sin(tilt) * std::sin(turn)),
                      static_cast<float>(std::cos(tilt))};
+  light.sh = SkyAndLight((config.sky_low + config.sky_high) / 2, light.direction);
   return light;
 }
 
@@ -47,7 +48,7 @@ std::vector<TexturedView> Changed(const std::vector<TexturedView>& drawn, Change
   for (int k = 0; k < kChanges; ++k) {
     TexturedView& view = out[static_cast<std::size_t>(k)];
     if (change != Change::kViews) view.camera = drawn[0].camera;
-    view.light = RingLight(drawn[0].light, change == Change::kLights ? k : 1);
+    view.light = RingLight(drawn[0].light, light, change == Change::kLights ? k : 1);
     if (change != Change::kShininess) continue;
     view.light.shininess = static_cast<float>(light.shininess_low *
                                               std::pow(light.shininess_high / light.shininess_low,
@@ -80,7 +81,10 @@ class Study {
       TILEGRAD_ASSIGN(auto same,
                       pictures_.Draw(objects[k].mesh, truth.views[0], Appearance::kTexture));
       textures.push_back(std::move(same));
-      tally_.angle += AngleBetween(objects[k].light.direction, view.light.direction) / kChanges;
+      const Lighting lighting = LightingOf(config_.light);
+      tally_.angle +=
+          AngleBetween(DirectionOf(objects[k].light, lighting), DirectionOf(view.light, lighting)) /
+          kChanges;
       tally_.shininess +=
           std::abs(std::log(objects[k].light.shininess / view.light.shininess)) / kChanges;
       view.light = objects[k].light;
