@@ -53,7 +53,8 @@ std::vector<Sample> Samples(const LightEvidence<T>& e, std::span<const float, 9>
   return out;
 }
 
-// SkyAndLight without a sky, of a surface with the cosine `t` to the direction, by its bands.
+// SkyAndLight without a sky, of a surface with the cosine `t` to the direction: pi, 2 pi / 3 and
+// pi / 4 times 1 / 4 pi, 3 t / 4 pi and 5 (3 t^2 - 1) / 8 pi.
 double FromDirection(double t) { return 0.25 + 0.5 * t + 5.0 / 32 * (3 * t * t - 1); }
 
 }  // namespace

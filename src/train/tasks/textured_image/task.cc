@@ -30,6 +30,7 @@ class TexturedImageTask : public AdversarialTask {
                        {"smoothness", "Smoothness (normals of neighbouring faces)"},
                        {"laplacian", "Laplacian of the movement"},
                        {"pose", "Camera (mean square error of its numbers)"},
+                       {"light", "Light (mean square distance to the one that explains a picture)"},
                        {"light_angle", "Angle of the light (degrees, not learned from)"}});
   }
 
