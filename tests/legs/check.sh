@@ -100,12 +100,18 @@ leg_avx2() { only AVX2; }
 leg_avx512() {
   if grep -q -m 1 avx512dq /proc/cpuinfo; then only AVX3; else tests/cross/avx512.sh; fi
 }
-leg_werror() { tree dev dev '^(base_|scene_|structure)'; }
+leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON; }
 leg_asan() { tree asan asan "$FILES_TESTS"; }
 leg_tsan() { tree tsan tsan "$THREADS_TESTS"; }
 leg_scalar() { tree scalar scalar "$KERNEL_TESTS"; }
-leg_clang() { want clang-14; tree dev clang "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DTILEGRAD_SIMD=few; }
-leg_clang-new() { want clang-19; tree dev clang-new "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DTILEGRAD_SIMD=few; }
+# by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
+by_clang() {
+  want "clang-$2"
+  tree dev "$1" "$FILES_TESTS" -DCMAKE_C_COMPILER="clang-$2" -DCMAKE_CXX_COMPILER="clang++-$2" -DTILEGRAD_SIMD=few -DCMAKE_BUILD_TYPE=None \
+    -DCMAKE_CXX_FLAGS=-O1 -DCMAKE_C_FLAGS=-O1
+}
+leg_clang() { by_clang clang 14; }
+leg_clang-new() { by_clang clang-new 19; }
 leg_tidy() {
   if [ -n "$SHORT" ]; then ./run lint --tidy; else git ls-files -z 'src/*.cc' | xargs -0 ./run lint --tidy; fi
 }
