@@ -29,15 +29,16 @@ void FillCells(std::span<const T> image, std::size_t size, ColorCells<T>* cells)
 template <class T>
 class Sampling {
  public:
-  Sampling(const Tensor& images, Tensor flow)
+  Sampling(const Workers& workers, const Tensor& images, Tensor flow)
       : flow_(std::move(flow)),
         batch_(static_cast<std::size_t>(images.shape()[0])),
         cells_(batch_) {
     const auto size = static_cast<std::size_t>(images.shape()[3]);
     const std::span<const T> all = images.span<T>();
     const std::size_t bytes = all.size() / batch_;
-    for (std::size_t b = 0; b < batch_; ++b)
+    workers.For(batch_, [&](std::size_t b, std::size_t) {
       FillCells<T>(all.subspan(b * bytes, bytes), size, &cells_[b]);
+    });
   }
 
   std::size_t vertices() const { return flow_.elements() / (4 * batch_); }
@@ -69,7 +70,7 @@ class Sampling {
 template <class T>
 ExternalOp MakeOp(Context& context, const Tensor& images, const Var& flow) {
   const Shape& shape = flow.shape();
-  const auto sampling = std::make_shared<Sampling<T>>(images, flow.value());
+  const auto sampling = std::make_shared<Sampling<T>>(context.workers(), images, flow.value());
   Tensor colors = context.Empty({shape[0], shape[1], 3}, flow.dtype());
   sampling->Forward(context.workers(), colors.span<T>().data());
   const auto backward = [&context, sampling, shape](std::span<const Tensor> d_outputs) {

@@ -2,6 +2,7 @@
 // How a loss that is written by hand joins the tape.
 #pragma once
 
+#include "nn/kernels/pointwise.h"
 #include "nn/tape.h"
 
 namespace tilegrad::train {
@@ -19,8 +20,9 @@ inline nn::Var ScalarLoss(const char* name, const nn::Var& input, double value,
       const T factor = *d_outputs[0].data<T>();
       if (factor == T(1)) return std::vector<nn::Tensor>{gradient};
       nn::Tensor scaled = context.Empty(gradient.shape(), gradient.dtype());
-      for (std::size_t i = 0; i < scaled.elements(); ++i)
-        scaled.data<T>()[i] = factor * gradient.data<T>()[i];
+      nn::Unary(nn::UnaryProblem<T>{nn::UnaryOp::kScale, gradient.data<T>(), scaled.data<T>(),
+                                    gradient.elements(), static_cast<double>(factor)},
+                context.workers());
       return std::vector<nn::Tensor>{scaled};
     });
   };
