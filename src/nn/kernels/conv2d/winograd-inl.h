@@ -122,11 +122,12 @@ void WinogradWeightGradTarget(const Conv2dShape& s, const float* x, const float*
     const SlotLayout in = RowLayout(portions.input, rows);
     const WinogradCorrelation product{portions.input, in,   inputs, outputs,
                                       memory.weights, rows, panels, portion > 0};
-    context.workers.For(panels + s.in_channels, [&](std::size_t index, std::size_t worker) {
-      if (index < panels) {
-        TransformOutputPanel(product, d_y, index, memory.places(worker));
+    const std::size_t items = OutputItems(product);
+    context.workers.For(items + s.in_channels, [&](std::size_t index, std::size_t worker) {
+      if (index < items) {
+        TransformOutputRows(product, d_y, index, memory.places(worker));
       } else {
-        TransformInput(plan, rows, in, x, index - panels, memory.places(worker), inputs);
+        TransformInput(plan, rows, in, x, index - items, memory.places(worker), inputs);
       }
     });
     product.Multiply(context.workers);

@@ -148,12 +148,20 @@ struct WinogradCorrelation {
   }
 };
 
-// The values of one panel of output channels. memory: of one row of tiles, all channels.
-inline void TransformOutputPanel(const WinogradCorrelation& product, const float* d_y,
-                                 std::size_t panel, float* memory) {
+// Items: kOutputRows rows of tiles of one panel of output channels.
+constexpr std::size_t kOutputRows = 8;
+
+inline std::size_t OutputItems(const WinogradCorrelation& product) {
+  return product.panels * DivideUp(product.rows.count, kOutputRows);
+}
+
+// The values of one item. memory: of one row of tiles, all channels.
+inline void TransformOutputRows(const WinogradCorrelation& product, const float* d_y,
+                                std::size_t item, float* memory) {
   const WinogradPlan& plan = product.input.plan;
   const std::size_t slot_stride = product.OutputAt(1, 0);
-  for (std::size_t r = 0; r < product.rows.count; ++r) {
+  const std::size_t panel = item % product.panels, first = item / product.panels * kOutputRows;
+  for (std::size_t r = first; r < std::min(first + kOutputRows, product.rows.count); ++r) {
     GatherChannels(plan, TileRow(plan, product.rows.first + r), d_y, panel * kTileColumns, memory);
     float* values =
         product.outputs + product.OutputAt(0, panel) + r * plan.tiles_across * kTileColumns;
