@@ -126,7 +126,8 @@ inline HWY_NOINLINE void StorePartialVector(Vec sum, const TileTarget& t, std::s
 HWY_INLINE void StoreVector(Vec sum, const TileTarget& t, std::size_t row, std::size_t v) {
   if (HWY_UNLIKELY(t.count[v] != kLanes)) return StorePartialVector(sum, t, row, v);
   float* c = t.c + row * t.ldc + t.offset[v];
-  hn::StoreU(WithBiasAndOld(sum, t, row, t.column_bias + t.offset[v], c), Tag(), c);
+  const float* bias = t.column_bias == nullptr ? nullptr : t.column_bias + t.offset[v];
+  hn::StoreU(WithBiasAndOld(sum, t, row, bias, c), Tag(), c);
 }
 
 // The sums of a tile of R rows and V vectors. Loops over both are fold expressions over
