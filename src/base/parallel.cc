@@ -18,6 +18,10 @@
 
 #include "base/tbb_threads.h"
 
+#ifndef __has_feature
+#define __has_feature(feature) 0
+#endif
+
 namespace tilegrad {
 namespace {
 
@@ -67,7 +71,7 @@ class PinningObserver : public tbb::task_scheduler_observer {
 std::atomic<pid_t> tbb_process{0};
 
 bool ThisProcessOwnsTbb() {
-#ifdef __SANITIZE_THREAD__
+#if defined(__SANITIZE_THREAD__) || __has_feature(thread_sanitizer)
   // oneTBB is not built with ThreadSanitizer, which therefore cannot see its synchronisation.
   return false;
 #else

@@ -23,7 +23,7 @@
 #include "base/simd_target.h"
 #include "base/temporary_file.h"
 #include "support/forked.h"
-#include "support/thread_sanitizer.h"
+#include "support/sanitizers.h"
 
 namespace tilegrad {
 namespace {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "support/run_program.h"
+#include "support/sanitizers.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -16,9 +17,8 @@ namespace {
 class FewThreads : public TempFolderTest {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "the sanitizer must be loaded before what is preloaded";
-#endif
+    if (test::kAddressSanitizer || test::kThreadSanitizer)
+      GTEST_SKIP() << "the sanitizer must be loaded before what is preloaded";
     Write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n");
   }
   void TearDown() override { unsetenv("LD_PRELOAD"); }

@@ -5,7 +5,7 @@
 
 #include "nn/game.h"
 #include "support/allocation_count.h"
-#include "support/thread_sanitizer.h"
+#include "support/sanitizers.h"
 
 namespace tilegrad::nn {
 namespace {

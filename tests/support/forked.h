@@ -7,7 +7,7 @@
 
 #include <cstdlib>
 
-#include "support/thread_sanitizer.h"
+#include "support/sanitizers.h"
 
 namespace tilegrad::test {
 

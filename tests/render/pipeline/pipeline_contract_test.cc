@@ -13,7 +13,7 @@
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/test_batch.h"
 #include "support/allocation_count.h"
-#include "support/thread_sanitizer.h"
+#include "support/sanitizers.h"
 
 namespace tilegrad {
 namespace {
