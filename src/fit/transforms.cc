@@ -60,7 +60,8 @@ Status ReadPose(const Json& frame, NerfCamera* out) {
 
 // As it is written, with slashes, or with the ending that it leaves out: what is there of these.
 Path FindFile(const Path& folder, const std::string& name) {
-  const Path path = folder / name, portable = folder / io::PortablePath(name);
+  const Path path = folder / name;
+  Path portable = folder / io::PortablePath(name);
   std::error_code error;
   for (const Path& candidate : {path, portable, Path(portable.string() + ".png")}) {
     if (std::filesystem::exists(candidate, error)) return candidate;

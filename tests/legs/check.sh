@@ -116,7 +116,7 @@ by_clang() {
 leg_clang() { by_clang clang 14; }
 leg_clang-new() { by_clang clang-new 19; }
 leg_tidy() {
-  git ls-files 'src/*.cc' | awk -v every="${SHORT:+30}" 'NR % (every ? every : 1) == 0' | xargs ./run lint --tidy  # --short: every thirtieth
+  git ls-files 'src/*.cc' | awk -v every="${SHORT:+60}" 'NR % (every ? every : 1) == 0' | xargs ./run lint --tidy  # --short: every sixtieth
 }
 # Which lines of the readers their tests and the fuzz targets' seeds reach; --short: their tests alone.
 leg_coverage() {
