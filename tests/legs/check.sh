@@ -90,7 +90,7 @@ leg_wheel() {
   ./run wheel
   local environment
   environment=$(mktemp -d)
-  python3 -m venv --system-site-packages "$environment"
+  /usr/bin/python3 -m venv --system-site-packages "$environment"  # whose packages has NumPy
   "$environment/bin/pip" install -q --no-index --no-deps --force-reinstall out/wheel/*.whl
   (cd / && "$environment/bin/python" -c 'import tilegrad; print(tilegrad.__file__)' && "$environment/bin/tilegrad" selftest --only files)
   rm -rf "$environment"
