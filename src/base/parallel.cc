@@ -16,11 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/sanitizers.h"
 #include "base/tbb_threads.h"
-
-#ifndef __has_feature
-#define __has_feature(feature) 0
-#endif
 
 namespace tilegrad {
 namespace {
@@ -71,14 +68,11 @@ class PinningObserver : public tbb::task_scheduler_observer {
 std::atomic<pid_t> tbb_process{0};
 
 bool ThisProcessOwnsTbb() {
-#if defined(__SANITIZE_THREAD__) || __has_feature(thread_sanitizer)
   // oneTBB is not built with ThreadSanitizer, which therefore cannot see its synchronisation.
-  return false;
-#else
+  if constexpr (kThreadSanitizer) return false;
   const pid_t mine = getpid();
   pid_t owner = 0;
   return tbb_process.compare_exchange_strong(owner, mine) || owner == mine;
-#endif
 }
 
 // Whether the system has refused threads: told once.

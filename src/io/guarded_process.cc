@@ -18,12 +18,9 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/sanitizers.h"
 #include "base/shortage.h"
 #include "io/guarded_channel.h"
-
-#ifndef __has_feature
-#define __has_feature(x) 0
-#endif
 
 namespace tilegrad::io {
 namespace {
@@ -37,15 +34,10 @@ std::atomic<const StopFlag*> g_stop = nullptr;
 // What the child may map in all: what this process has mapped, which it inherits, and the limit.
 // 0, no limit, under sanitizers: they map terabytes.
 std::size_t AddressSpace(const GuardLimits& limits) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
-    __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-  (void)limits;
-  return 0;
-#else
+  if constexpr (kSanitizer) return 0;
   std::size_t pages = 0;
   if (!(std::ifstream("/proc/self/statm") >> pages)) return 0;
   return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + limits.memory_bytes;
-#endif
 }
 
 class BlockedSignals {

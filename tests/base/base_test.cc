@@ -20,10 +20,10 @@
 #include "base/inline_vector.h"
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "base/sanitizers.h"
 #include "base/simd_target.h"
 #include "base/temporary_file.h"
 #include "support/forked.h"
-#include "support/sanitizers.h"
 
 namespace tilegrad {
 namespace {
@@ -54,7 +54,7 @@ TEST(Workers, PinnedOnesStayOnACoreWhileTheyWork) {
   const Workers workers(2, Pinning::kOn);
   std::atomic<int> done = 0;
   workers.For(50, [&](std::size_t, std::size_t) {
-    EXPECT_EQ(CoresOfThisThread(), test::kThreadSanitizer ? before : 1);
+    EXPECT_EQ(CoresOfThisThread(), kThreadSanitizer ? before : 1);
     ++done;
   });
   EXPECT_EQ(done, 50);
@@ -121,7 +121,7 @@ TEST(Workers, PartsShareTheirLoops) {
 // busy machine threads may arrive late: the part continues until one has.
 TEST(Workers, WithoutAPartTheyTakeThoseOfOthers) {
   const Workers workers(3);
-  const bool sharing = !test::kThreadSanitizer;  // loops on threads of their own do not share
+  const bool sharing = !kThreadSanitizer;  // loops on threads of their own do not share
   std::vector<std::atomic<int>> tasks(3);
   const auto at_work = [&] {
     return std::count_if(tasks.begin(), tasks.end(), [](const auto& n) { return n > 0; });

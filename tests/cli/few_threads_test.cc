@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <string>
 
+#include "base/sanitizers.h"
 #include "support/run_program.h"
-#include "support/sanitizers.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -17,8 +17,7 @@ namespace {
 class FewThreads : public TempFolderTest {
  protected:
   void SetUp() override {
-    if (test::kAddressSanitizer || test::kThreadSanitizer)
-      GTEST_SKIP() << "the sanitizer must be loaded before what is preloaded";
+    if (kSanitizer) GTEST_SKIP() << "LD_PRELOAD comes before the sanitizer";
     Write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n");
   }
   void TearDown() override { unsetenv("LD_PRELOAD"); }

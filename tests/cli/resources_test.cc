@@ -10,11 +10,11 @@
 #include <fstream>
 #include <thread>
 
+#include "base/sanitizers.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "scene/shapes.h"
 #include "support/run_program.h"
-#include "support/sanitizers.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad {
@@ -74,7 +74,7 @@ TEST_F(Resources, FewFileHandlesAreNoDamage) {
 }
 
 TEST_F(Resources, LittleMemoryIsNoDamage) {
-  if (test::kAddressSanitizer || test::kThreadSanitizer) GTEST_SKIP() << "sanitizers reserve more";
+  if (kSanitizer) GTEST_SKIP() << "sanitizers reserve terabytes";
   WriteModels();
   int made = 0;
   for (int megabytes = 200; megabytes <= 600; megabytes += 50) {

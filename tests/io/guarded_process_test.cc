@@ -18,9 +18,9 @@
 #include <thread>
 
 #include "base/parallel.h"
+#include "base/sanitizers.h"
 #include "base/shortage.h"
 #include "support/forked.h"
-#include "support/sanitizers.h"
 #include "support/temp_folder.h"
 
 namespace tilegrad::io {
@@ -113,7 +113,7 @@ TEST_F(GuardedProcessTest, WhatWaitsIsStoppedByTheClock) {
 }
 
 TEST_F(GuardedProcessTest, MemoryHasALimit) {
-  if (test::kAddressSanitizer || test::kThreadSanitizer) GTEST_SKIP() << "sanitizers reserve more";
+  if (kSanitizer) GTEST_SKIP() << "sanitizers reserve terabytes";
   GuardLimits limits;
   limits.memory_bytes = std::size_t{200} << 20;
   const auto of_size = [&](std::size_t mebibytes) {
@@ -163,7 +163,7 @@ TEST_F(GuardedProcessTest, WhatTheSystemRefusesIsNoFault) {
   EXPECT_TRUE(refused(RLIMIT_NOFILE, 5, nothing, "socket"));
   const volatile std::size_t gigabyte = std::size_t{1} << 30;  // clang leaves out what it can count
   const auto large = [&](AskParent) { return Bytes(Bytes(gigabyte, 1).size() >> 20, 1); };
-  if (!test::kAddressSanitizer && !test::kThreadSanitizer) {
+  if (!kSanitizer) {
     EXPECT_TRUE(refused(RLIMIT_AS, std::size_t{900} << 20, large, "ulimit -v"));
   }
   const ShortageWatch watch;
@@ -263,7 +263,7 @@ TEST_F(GuardedProcessTest, DescriptorsOfTheParentAreClosed) {
 
 // While other threads allocate and fork: no lock is left held in a child.
 TEST_F(GuardedProcessTest, ManyThreadsAtOnce) {
-  if (test::kAddressSanitizer) GTEST_SKIP() << "its allocator's locks are not looked after by fork";
+  if (kAddressSanitizer) GTEST_SKIP() << "its allocator may be locked at a fork";
   std::atomic<int> good = 0;
   const Workers workers(7);
   workers.For(200, [&](std::size_t i, std::size_t) {

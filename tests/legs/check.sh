@@ -90,7 +90,7 @@ leg_wheel() {
   ./run wheel
   local environment
   environment=$(mktemp -d)
-  /usr/bin/python3 -m venv --system-site-packages "$environment"  # whose packages has NumPy
+  /usr/bin/python3 -m venv --system-site-packages "$environment"  # Debian's, which has NumPy
   "$environment/bin/pip" install -q --no-index --no-deps --force-reinstall out/wheel/*.whl
   (cd / && "$environment/bin/python" -c 'import tilegrad; print(tilegrad.__file__)' && "$environment/bin/tilegrad" selftest --only files)
   rm -rf "$environment"
@@ -108,15 +108,18 @@ leg_asan() {  # by clang, which takes half as long for it
 leg_tsan() { tree tsan tsan "$THREADS_TESTS"; }
 leg_scalar() { tree scalar scalar "$KERNEL_TESTS"; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
+# GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
 by_clang() {
   want "clang-$2"
   tree dev "$1" "$FILES_TESTS" -DCMAKE_C_COMPILER="clang-$2" -DCMAKE_CXX_COMPILER="clang++-$2" -DTILEGRAD_SIMD=few -DCMAKE_BUILD_TYPE=None \
-    -DCMAKE_CXX_FLAGS="-O1 -Wno-error=deprecated-declarations" -DCMAKE_C_FLAGS=-O1  # GCC 12's std::stable_sort calls what it deprecates
+    -DCMAKE_CXX_FLAGS="-O1 -Wno-error=deprecated-declarations" -DCMAKE_C_FLAGS=-O1
 }
 leg_clang() { by_clang clang 14; }
 leg_clang-new() { by_clang clang-new 19; }
-leg_tidy() {
-  git ls-files 'src/*.cc' | awk -v every="${SHORT:+60}" 'NR % (every ? every : 1) == 0' | xargs ./run lint --tidy  # --short: every sixtieth
+leg_tidy() {  # --short: every sixtieth file
+  local every=1
+  [ -z "$SHORT" ] || every=60
+  git ls-files 'src/*.cc' | awk "NR % $every == 0" | xargs ./run lint --tidy
 }
 # Which lines of the readers their tests and the fuzz targets' seeds reach; --short: their tests alone.
 leg_coverage() {

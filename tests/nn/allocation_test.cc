@@ -3,9 +3,9 @@
 // graph nodes and lists from its step memory, and scratch is kept.
 #include <gtest/gtest.h>
 
+#include "base/sanitizers.h"
 #include "nn/game.h"
 #include "support/allocation_count.h"
-#include "support/sanitizers.h"
 
 namespace tilegrad::nn {
 namespace {
@@ -70,7 +70,7 @@ TEST_P(Allocation, NoneInAnEncoder) {
   EXPECT_EQ(AllocationsOfTraining(context, net, {3, 4, 16, 16}), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Workers, Allocation, testing::Range(1, test::kThreadSanitizer ? 2 : 3));
+INSTANTIATE_TEST_SUITE_P(Workers, Allocation, testing::Range(1, kThreadSanitizer ? 2 : 3));
 
 }  // namespace
 }  // namespace tilegrad::nn

@@ -7,7 +7,7 @@
 
 #include <cstdlib>
 
-#include "support/sanitizers.h"
+#include "base/sanitizers.h"
 
 namespace tilegrad::test {
 

@@ -10,10 +10,10 @@
 #include <limits>
 #include <utility>
 
+#include "base/sanitizers.h"
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/test_batch.h"
 #include "support/allocation_count.h"
-#include "support/sanitizers.h"
 
 namespace tilegrad {
 namespace {
@@ -62,7 +62,7 @@ void ExpectSteadyStateAllocatesNothing(Batch batch, int count) {
 }
 
 TEST(RendererMemory, SteadyStateAllocatesNothing) {
-  for (int workers = 1; workers <= (test::kThreadSanitizer ? 1 : 3); ++workers) {
+  for (int workers = 1; workers <= (kThreadSanitizer ? 1 : 3); ++workers) {
     ExpectSteadyStateAllocatesNothing(Batch(), workers);
     ExpectSteadyStateAllocatesNothing(Batch::Large(), workers);
   }

@@ -148,7 +148,8 @@ struct WinogradCorrelation {
   }
 };
 
-// Items: kOutputRows rows of tiles of one panel of output channels.
+// Work items: a few rows of tiles of one panel of output channels, as layers of few channels have
+// one panel, which would be the work of one worker.
 constexpr std::size_t kOutputRows = 8;
 
 inline std::size_t OutputItems(const WinogradCorrelation& product) {

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which sanitizer this is built under. GCC 12 defines macros; clang answers __has_feature.
+#pragma once
+
+namespace tilegrad {
+
+#ifdef __has_feature
+inline constexpr bool kAddressSanitizer = __has_feature(address_sanitizer);
+inline constexpr bool kThreadSanitizer = __has_feature(thread_sanitizer);
+#else
+#ifdef __SANITIZE_ADDRESS__
+inline constexpr bool kAddressSanitizer = true;
+#else
+inline constexpr bool kAddressSanitizer = false;
+#endif
+#ifdef __SANITIZE_THREAD__
+inline constexpr bool kThreadSanitizer = true;
+#else
+inline constexpr bool kThreadSanitizer = false;
+#endif
+#endif
+
+// Both reserve terabytes of addresses, which no limit of memory may count, and must be the first
+// library that a process loads.
+inline constexpr bool kSanitizer = kAddressSanitizer || kThreadSanitizer;
+
+}  // namespace tilegrad
