@@ -7,21 +7,14 @@
 # --short: a part of each leg that takes minutes, for CI. What each leg holds stands beside it below.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
+source cmake/packages.sh
 
-readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan tsan scalar clang clang-new tidy coverage aarch64)
+readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|renderer_bits|render_pipeline|nn_tape)'
 # Tests that hold kernels to their references.
 readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|shaded|nn_|compat_|rivals_)'
 readonly OUT=$PWD/out/check RELEASE=build/release
-
-say() { printf '\n== %s\n' "$*"; }
-die() { printf 'check: %s\n' "$*" >&2; exit 1; }
-want() {  # PACKAGE...
-  local missing=() name
-  for name; do dpkg-query -W -f='${db:Status-Status}' "$name" 2>/dev/null | grep -qx installed || missing+=("$name"); done
-  [ "${#missing[@]}" = 0 ] || die "missing; type:  sudo apt-get install --no-install-recommends ${missing[*]}"
-}
 
 SHORT=
 LAUNCHER=()
@@ -102,15 +95,16 @@ leg_avx512() {
 }
 leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON; }
 leg_asan() {  # by clang, which takes half as long for it
-  want clang-14 libclang-rt-14-dev
+  require clang-14 libclang-rt-14-dev
   tree asan asan "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14
 }
+leg_fuzz() { ./run fuzz "$([ -n "$SHORT" ] && echo 5 || echo 20)"; }
 leg_tsan() { tree tsan tsan "$THREADS_TESTS"; }
 leg_scalar() { tree scalar scalar "$KERNEL_TESTS"; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
 # GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
 by_clang() {
-  want "clang-$2"
+  require "clang-$2"
   tree dev "$1" "$FILES_TESTS" -DCMAKE_C_COMPILER="clang-$2" -DCMAKE_CXX_COMPILER="clang++-$2" -DTILEGRAD_SIMD=few -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="-O1 -Wno-error=deprecated-declarations" -DCMAKE_C_FLAGS=-O1
 }
@@ -123,7 +117,7 @@ leg_tidy() {  # --short: every sixtieth file
 }
 # Which lines of the readers their tests and the fuzz targets' seeds reach; --short: their tests alone.
 leg_coverage() {
-  want clang-14 llvm-14
+  require clang-14 libclang-rt-14-dev llvm-14
   leg_configure dev coverage -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DTILEGRAD_SIMD=few -DCMAKE_BUILD_TYPE=None \
     -DTILEGRAD_WERROR=OFF -DTILEGRAD_BENCH=OFF -DTILEGRAD_PYTHON=OFF -DCMAKE_CXX_FLAGS='-O0 -fprofile-instr-generate -fcoverage-mapping'
   local chosen
@@ -132,7 +126,7 @@ leg_coverage() {
   tests/legs/coverage.py build/coverage "$OUT/coverage" "${chosen[@]}"
 }
 leg_aarch64() {
-  want g++-aarch64-linux-gnu qemu-user
+  require g++-aarch64-linux-gnu qemu-user
   if [ -n "$SHORT" ]; then tests/cross/aarch64.sh -R '^(base_|raster_project|raster_visibility|shade)'; else tests/cross/aarch64.sh; fi
 }
 
