@@ -37,6 +37,8 @@ struct LoadedExr {
 // works in a process of its own (guarded_process.h). `name` stands in messages. Errors: not an EXR,
 // cut short or damaged, deep, a channel that is subsampled, more than kMaxImageSide pixels a side.
 Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::string& name);
+// From what that process hands over, which is untrusted: the library may have gone wrong.
+Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes);
 Result<LoadedExr> LoadExr(const Path& path);
 
 }  // namespace tilegrad::io

@@ -123,11 +123,13 @@ Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits
   }
 }
 
-// From untrusted bytes.
-Result<LoadedExr> FromChild(std::span<const std::uint8_t> bytes) {
+}  // namespace
+
+Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes) {
   const Status damaged = DataLoss("the reader returned no whole image");
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.starts_with(static_cast<char>(kError))) return DataLoss("{}", text.substr(1));
+  if (text.size() > 1 && text[0] == static_cast<char>(kError))
+    return DataLoss("{}", text.substr(1));
   std::array<std::int32_t, 3> sizes = {};
   std::size_t at = 1 + sizeof(sizes);
   if (bytes.size() < at || bytes[0] != kImage) return damaged;
@@ -153,8 +155,6 @@ Result<LoadedExr> FromChild(std::span<const std::uint8_t> bytes) {
   return out;
 }
 
-}  // namespace
-
 Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::string& name) {
   constexpr std::array<std::uint8_t, 4> kMagic = {0x76, 0x2f, 0x31, 0x01};
   if (bytes.size() < kMagic.size() || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin()))
@@ -165,7 +165,7 @@ Result<LoadedExr> DecodeExr(std::span<const std::uint8_t> bytes, const std::stri
                                  [](std::string_view) { return std::optional<Bytes>(); }, limits);
   const std::string place = name + ": reading an EXR image";
   if (!result.ok()) return result.status().Within(place);
-  auto image = FromChild(*result);
+  auto image = ExrFromReader(*result);
   if (!image.ok()) return image.status().Within(place);
   return image;
 }

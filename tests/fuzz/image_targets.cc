@@ -157,14 +157,29 @@ std::vector<Bytes> SgiSeeds() {
           ToBytes(header(0, 1, 4) + "abcdefghijklmnopqrstuvwx"), ToBytes(runs)};
 }
 
-// In a process of its own for each file.
-void Exr(Input input) {
-  const ReadBudget budget(kBudget);
-  const auto exr = io::DecodeExr(input, "image");
+void CheckExr(const Result<io::LoadedExr>& exr) {
   if (!exr.ok()) return Require(!exr.status().message().empty(), "an error has a message");
   const std::size_t pixels = static_cast<std::size_t>(exr->width) * exr->height;
   Require(exr->values.size() == pixels * exr->names.size(), "all values are there");
   Require(pixels > 0 && !exr->names.empty(), "there is a pixel and a channel");
+}
+
+// In a process of its own for each file.
+void Exr(Input input) {
+  const ReadBudget budget(kBudget);
+  CheckExr(io::DecodeExr(input, "image"));
+}
+
+// What such a process leaves behind.
+void ExrFromReader(Input input) {
+  const ReadBudget budget(kBudget);
+  CheckExr(io::ExrFromReader(input));
+}
+
+std::vector<Bytes> ExrFromReaderSeeds() {
+  Bytes image = {'I', 2, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 'A', 0, 'n', '.', 'X', 0};
+  image.resize(image.size() + 2 * 1 * 2 * sizeof(float));
+  return {image, ToBytes("Ethe file is cut short")};
 }
 
 std::vector<Bytes> ExrSeeds() {
@@ -181,6 +196,7 @@ const Registration kTargets[] = {
     Registration({"pnm", Decode, PnmSeeds}),
     Registration({"sgi", Decode, SgiSeeds}),
     Registration({"exr", Exr, ExrSeeds, nullptr, true}),
+    Registration({"exr_from_reader", ExrFromReader, ExrFromReaderSeeds}),
 };
 
 }  // namespace
