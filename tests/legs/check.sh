@@ -40,7 +40,7 @@ build_and_test() {
   local chosen
   mapfile -t chosen < <(targets "build/$1" "$2")
   [ "${#chosen[@]}" -gt 0 ] || die "no test of build/$1 matches $2"
-  cmake --build "build/$1" --target "${chosen[@]}"
+  cmake --build "build/$1" --target "${chosen[@]}" -- -k 0
   ctest --test-dir "build/$1" -L short -R "$2" --output-on-failure --no-tests=error -j "$(nproc)"
 }
 
@@ -50,7 +50,7 @@ tree() {
   shift 3
   leg_configure "$preset" "$name" "$@"
   if [ -n "$SHORT" ]; then build_and_test "$name" "$pattern"; return; fi
-  cmake --build "build/$name"
+  cmake --build "build/$name" -- -k 0  # one error does not hide the others
   ctest --test-dir "build/$name" -L short --output-on-failure --no-tests=error -j "$(nproc)"
 }
 

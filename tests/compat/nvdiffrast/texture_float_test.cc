@@ -305,7 +305,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 // Zeros, and nothing is pulled, whatever else the pixel and its neighbours have.
 TEST(TextureInFloatAt, NoPointThereIsNothing) {
-  constexpr float kInf = std::numeric_limits<float>::infinity(), kNan = std::nanf("");
+  constexpr float kInf = std::numeric_limits<float>::infinity(),
+                  kNan = std::numeric_limits<float>::quiet_NaN();
   for (const auto boundary : {kWrap, kClamp, kZero, kCube}) {
     for (const auto filter : {kNearest, kLinear, kMipNearest, kMipLinear}) {
       const bool cube = boundary == kCube;
