@@ -27,8 +27,9 @@ std::string LineBehind(const std::string& text, const std::string& start) {
 TEST(InfoCommand, TakesTheBestTargetUnlessOneIsForced) {
   ::unsetenv("TILEGRAD_TARGET");
   std::istringstream targets(LineBehind(Info(), "best first: "));
-  std::string best, target;
+  std::string best;
   targets >> best;
+  std::string target = best;
   EXPECT_EQ(LineBehind(Info(), "in use: ").rfind(best + " (the best", 0), 0u) << Info();
   while (targets >> target) {
     ::setenv("TILEGRAD_TARGET", target.c_str(), 1);

@@ -16,6 +16,7 @@
 #include "../data/photographs/miniature.h"
 #include "../same_run.h"
 #include "../tiny_run.h"
+#include "base/simd_target.h"
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
@@ -309,6 +310,7 @@ TEST_F(Ranks, OfAnotherConfigurationAreRefused) {
 }
 
 TEST_F(Ranks, OfAnotherInstructionSetAreRefused) {
+  if (RunnableTargets().size() == 1) GTEST_SKIP() << "this build has one instruction set";
   Words other = TrainWords("run", 1);
   other.insert(other.begin(), {"/usr/bin/env", "TILEGRAD_TARGET=EMU128"});
   ExpectRefused(Pair(TrainWords("run", 1), other), 2, "has another instruction set (EMU128)");
