@@ -15,13 +15,13 @@ void AddPadding(CaseList& list) {
        {ModeCase{"zero", PadMode::kZero}, ModeCase{"circular", PadMode::kCircular},
         ModeCase{"reflect", PadMode::kReflect}, ModeCase{"replicate", PadMode::kReplicate}}) {
     list.Add({std::string("pad image ") + name,
-              [mode = mode](const Inputs& v) {
-                return Square(PadImage(v[0], {2, 1, 0, 2}, mode));
+              [how = mode](const Inputs& v) {
+                return Square(PadImage(v[0], {2, 1, 0, 2}, how));
               },
               {{shape}},
               48});
     list.Add({std::string("pad axis 0 ") + name,
-              [mode = mode](const Inputs& v) { return Square(Pad(v[0], 0, 1, 2, mode)); },
+              [how = mode](const Inputs& v) { return Square(Pad(v[0], 0, 1, 2, how)); },
               {{{3, list.Extent(11)}}},
               48});
   }
@@ -34,7 +34,7 @@ void AddResizing(CaseList& list) {
     const Shape shape = {list.Extent(2), list.Extent(2), list.Extent(5), list.Extent(9)};
     const ImageSize size{list.Extent(7), list.Extent(12)};
     list.Add({std::string("resize ") + name,
-              [mode = mode, size](const Inputs& v) { return Square(Resize(v[0], size, mode)); },
+              [how = mode, size](const Inputs& v) { return Square(Resize(v[0], size, how)); },
               {{shape}},
               64});
   }

@@ -69,7 +69,7 @@ using Parts = std::vector<bool>;
 class Rendering {
  public:
   Rendering(nn::Context& context, const Batch& batch, const Parts& parts, nn::DType type)
-      : context_(context), batch_(batch), renderer_(context.workers()) {
+      : batch_(batch), renderer_(context.workers()) {
     const auto v = static_cast<std::int64_t>(batch.ball.positions.size());
     const nn::Shape shapes[] = {{kMeshes, v, 3}, {kMeshes, v, 3}, {kMeshes, 5, 7, 3}, {kImages, 3},
                                 {kImages},       {kImages, 9},    {kImages, 16}};
@@ -96,7 +96,6 @@ class Rendering {
   std::vector<nn::Var> parameters;
 
  private:
-  nn::Context& context_;
   const Batch& batch_;
   SceneRenderer renderer_;
   nn::Var vars_[7];
