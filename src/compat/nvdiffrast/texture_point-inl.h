@@ -151,7 +151,9 @@ HWY_INLINE void FindCubePoints(const RunCoordinates& at, std::size_t i, PointLan
 HWY_INLINE PointLanes FindPoints(const TextureInput<float>& input, const RunCoordinates& at,
                                  std::size_t i) {
   PointLanes out;
+  // Adjoints multiply both by 0 where there are no derivatives: garbage may be NaN.
   for (RunVec& s : out.slopes) s = hn::Zero(RunTag());
+  for (RunVec& m : out.d_major) m = hn::Zero(RunTag());
   if (input.boundary == TextureBoundary::kCube) {
     FindCubePoints(at, i, &out);
   } else {
