@@ -101,7 +101,10 @@ leg_asan() {  # by clang, which takes half as long for it
   tree asan asan "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14
 }
 leg_fuzz() { ./run fuzz "$([ -n "$SHORT" ] && echo 5 || echo 20)"; }
-leg_tsan() { tree tsan tsan "$THREADS_TESTS"; }
+leg_tsan() {
+  export TSAN_OPTIONS=suppressions=$PWD/tests/legs/thread_sanitizer.supp
+  tree tsan tsan "$THREADS_TESTS"
+}
 leg_scalar() { tree scalar scalar "$KERNEL_TESTS"; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
 # GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
