@@ -170,7 +170,7 @@ tilegrad_status tilegrad_render(tilegrad_renderer* renderer, const tilegrad_scen
   return Run(renderer, [&]() -> Status {
     if (frame == nullptr) return InvalidArgument("frame is NULL");
     tilegrad_options known = DefaultOptions();
-    const Status status = tilegrad::Guarded([&]() -> Status {
+    Status status = tilegrad::Guarded([&]() -> Status {
       TILEGRAD_TRY(api::ReadSized("options", options, &known));
       return ReadScenes(scenes, count, frame);
     });

@@ -148,7 +148,7 @@ std::string WhyNoColor(const FitterOptions& options, const Sight& s, Parameter p
 std::string WhyBlocked(const FitterOptions& options, const FitStep& step, const Sight& s,
                        const FitValues& values, Parameter p) {
   if (values.image.total == 0) return "the images are already as they should be: the loss is 0";
-  const std::string unseen = WhyUnseen(s);
+  std::string unseen = WhyUnseen(s);
   if (!unseen.empty()) return unseen;
   if (OnlyColor(p)) return WhyNoColor(options, s, p);
   if (options.loss.silhouette_weight > 0 && s.lost_far > 0) return FarSentence(s, step);

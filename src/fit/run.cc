@@ -59,7 +59,7 @@ RunPlan PlanOf(const FitJob& job) {
 
 class FitWork : public RunWork {
  public:
-  FitWork(const FitJob& job, FitStart start, nn::Context& context, Fitter fitter)
+  FitWork(const FitJob& job, const FitStart& start, nn::Context& context, Fitter fitter)
       : job_(job),
         config_(start.config),
         remesh_(start.remesh),
@@ -190,7 +190,7 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
-  FitWork work(job, std::move(start), context, std::move(fitter));
+  FitWork work(job, start, context, std::move(fitter));
   const RunPlan plan = PlanOf(job);
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));

@@ -100,7 +100,7 @@ Status Engine::Impl::RenderPlain(const RenderOptions& options, FrameImages* fram
     return pipeline.Render(inputs.views(), options, request, frame);
   }
   frame->attributes.swap(frame->color);
-  const Status status = pipeline.Render(inputs.views(), options, request, frame);
+  Status status = pipeline.Render(inputs.views(), options, request, frame);
   frame->attributes.swap(frame->color);
   frame->attributes.clear();
   frame->channels = 0;
@@ -162,8 +162,8 @@ Status Engine::Impl::RunBackward(const RenderOptions& options, const FrameImages
   PipelineCotangents d_images{{}, d_frame.alpha};
   if (backward.colors_only) d_images.attributes = d_frame.color;
   if (backward.user_only) d_images.attributes = d_frame.attributes;
-  const Status status = pipeline.Backward(inputs.views(), options, frame, d_images, d_views,
-                                          staged ? &stage : nullptr);
+  Status status = pipeline.Backward(inputs.views(), options, frame, d_images, d_views,
+                                    staged ? &stage : nullptr);
   // Cotangents that pull nothing have been looked at by nobody.
   const bool unseen = !staged && !backward.colors_only && !backward.user_only;
   if (!status.ok() || unseen || (staged && !stage.sound())) {

@@ -69,6 +69,7 @@ void ForEachCovered(const LevelSize& fine, const LevelSize& coarse, const Visit&
         for (int c = 0; c < columns.count; ++c) {
           const auto from = fine.first + static_cast<std::size_t>((rows.first + r) * fine.width +
                                                                   columns.first + c);
+          // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): counts are up to 3
           visit(to, from, rows.weight[r] * columns.weight[c]);
         }
       }

@@ -38,7 +38,7 @@ Result<TrainConfig> ParseConfig(std::string_view text, const std::string& name) 
 
 Status ApplyOverrides(const std::vector<std::string>& assignments, TrainConfig* config) {
   const std::string kind = config->kind;
-  const Status status = OverrideFields(assignments, config->Fields());
+  Status status = OverrideFields(assignments, config->Fields());
   if (std::exchange(config->kind, kind) == kind) return status;
   return InvalidArgument("task.kind cannot be overridden: name the task in the configuration file");
 }

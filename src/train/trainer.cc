@@ -36,7 +36,7 @@ class Training : public RunWork {
 
   Status Step(std::int64_t step, StepValues* values) override {
     if (job_.crew) job_.crew->Order(step);
-    const Status status = Updates(step, values);
+    Status status = Updates(step, values);
     if (!status.ok() && job_.crew) job_.crew->Break();
     return status;
   }

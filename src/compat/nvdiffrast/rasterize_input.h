@@ -41,7 +41,7 @@ class LastFace {
   const RasterizeInput<T>& input_;
   std::size_t image_;
   std::int32_t face_ = raster::kNoFace;
-  ClipCorners<double> corners_;
+  ClipCorners<double> corners_{};
 };
 
 }  // namespace tilegrad::compat::nvdiffrast

@@ -18,7 +18,7 @@ constexpr std::uint32_t kCell = 1, kStruct = 2, kChar = 4, kFirstNumeric = 6, kL
 constexpr std::uint32_t kComplexFlag = 0x800, kLogicalFlag = 0x200;
 
 struct Tag {
-  MatType type;
+  MatType type{};
   std::size_t size = 0;    // bytes of data
   std::size_t padded = 0;  // with what fills up to 8 bytes
   bool small = false;      // the data stand in the tag itself

@@ -130,7 +130,7 @@ Var Sum(const Var& x) {
 }
 
 Var Mean(const Var& x, std::initializer_list<int> axes, Keep keep) {
-  const Var sum = Sum(x, axes, keep);
+  Var sum = Sum(x, axes, keep);
   if (!sum.valid()) return sum;
   AxisSet set{};
   const Status status = ParseAxes("mean", x.shape(), axes, set);

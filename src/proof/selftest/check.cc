@@ -27,7 +27,7 @@ Result<Finding> RunOnEveryTarget(const Check& check, const CheckContext& context
 
 }  // namespace
 
-Check OnEveryTarget(Check check) {
+Check OnEveryTarget(const Check& check) {
   return {check.title,
           [check](const CheckContext& context) { return RunOnEveryTarget(check, context); }};
 }

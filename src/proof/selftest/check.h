@@ -49,7 +49,7 @@ struct Check {
 
 // The check on each target of the context. Finds what the target found whose numbers are off the
 // most; errors name the target.
-Check OnEveryTarget(Check check);
+Check OnEveryTarget(const Check& check);
 
 // Compares results with what they must be, and remembers the worst. Errors name the first number
 // that is too far off; NaN is.

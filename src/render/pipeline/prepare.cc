@@ -32,7 +32,7 @@ bool SameBits(std::span<const T> a, const AlignedVector<T>& b) {
 
 bool SameCamera(const Camera& a, const Camera& b) {
   static_assert(sizeof(Camera) == 17 * sizeof(float));  // no padding
-  return std::memcmp(&a, &b, sizeof(Camera)) == 0;
+  return std::memcmp(&a, &b, sizeof(Camera)) == 0;  // NOLINT(bugprone-suspicious-memory-comparison)
 }
 
 bool IsSoundScene(const PipelineScene& scene, bool same_positions) {

@@ -66,7 +66,7 @@ void ShapeTextureGenerator::ShapeNet::Visit(const std::string& prefix, nn::Modul
 }
 
 nn::Var ShapeTextureGenerator::TextureNet::Forward(const nn::Var& noise, nn::Mode mode) {
-  const nn::Var flat = first.Forward(noise, mode);
+  nn::Var flat = first.Forward(noise, mode);
   if (!flat.valid()) return flat;
   const nn::Var map =
       net.Forward(nn::Reshape(flat, {flat.shape()[0], root[0], root[1], root[2]}), mode);

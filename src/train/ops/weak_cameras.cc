@@ -128,7 +128,7 @@ nn::Var PinholeCameras(const nn::Var& cameras, int size) {
   nn::Context& context = cameras.context();
   const std::int64_t batch = cameras.shape()[0];
   nn::Tensor out = context.Empty({batch, 16}, cameras.dtype());
-  const nn::Tensor at = cameras.value();
+  const nn::Tensor& at = cameras.value();
   nn::WithFloatType(cameras.dtype(), [&]<class T>(T) {
     for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b)
       PutPinhole(

@@ -28,7 +28,7 @@ ConfigFields FieldsOf(const SphereKeys& keys) {
     fields.push_back({"network.template_radius", keys.template_radius, 1e-3, 10, "world units"});
   fields.push_back({"network.smoothing", keys.smoothing, 0, 64,
                     "rounds of diffusion over the template that offsets go through"});
-  if (keys.symmetric) {
+  if (keys.symmetric != nullptr) {
     fields.push_back(
         {"network.symmetric", keys.symmetric, 0, 1, "every shape is symmetric at x = 0"});
   }

@@ -124,7 +124,7 @@ FeatureRows ColorFeatures(const ObjectViews& set, std::int64_t cells) {
   return CellsOf(set.colors, cells, true);
 }
 
-GanWatch::GanWatch(ObjectViews truth, const Workers& workers)
+GanWatch::GanWatch(const ObjectViews& truth, const Workers& workers)
     : workers_(workers),
       cover_(CoverFeatures(truth)),
       colors_(ColorFeatures(truth)),

@@ -31,7 +31,7 @@ struct Watched {
 class GanWatch {
  public:
   // Beside `truth`, which no critic saw.
-  GanWatch(ObjectViews truth, const Workers& workers);
+  GanWatch(const ObjectViews& truth, const Workers& workers);
   Result<Watched> Compare(const ObjectViews& generated, GanStage stage) const;
   const Spread& truth() const { return spread_; }
 

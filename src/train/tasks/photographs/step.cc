@@ -83,7 +83,7 @@ nn::Var PhotographStep::Masked(const nn::Var& colors, const PhotographBatch& bat
 nn::Var PhotographStep::AdversaryLoss(const nn::Var& colors, const PhotographBatch& batch,
                                       std::vector<LossTerm>* terms) const {
   Adversary::Values values;
-  const nn::Var loss =
+  nn::Var loss =
       adversary_->GeneratorLoss({Masked(colors, batch), batch.colors, batch.portion}, &values);
   adversary_->AddTerms(values, terms);
   return loss;

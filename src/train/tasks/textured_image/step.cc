@@ -216,7 +216,7 @@ nn::Var TexturedStep::Loss(const TexturedRenders& renders, const TexturedBatch& 
     values->pose = pose.item(), values->total = total.item();
   }
   if (LearnsLights() && ShareOfRun(step) >= config_.color.from) {
-    const nn::Var light = LightLoss(objects, batch);
+    nn::Var light = LightLoss(objects, batch);
     if (!light.valid()) return light;
     total = total + config_.color.light * light;
     values->light = light.item(), values->total = total.item();
