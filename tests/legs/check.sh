@@ -9,11 +9,14 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 source cmake/packages.sh
 
-readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
+readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|renderer_bits|render_pipeline|nn_tape)'
 # Tests that hold kernels to their references.
 readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|shaded|nn_|compat_|rivals_)'
+# Those that valgrind, which takes fifty times as long, runs in minutes.
+readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_|compat_)'
+readonly MEMCHECK_SHORT='^(base_array|raster_(project|interp)|renderer_simd|shade|nn_ops|compat_)'
 readonly OUT=$PWD/out/check RELEASE=build/release
 
 SHORT=
@@ -94,6 +97,21 @@ leg_avx512() {
   if grep -q -m 1 avx512dq /proc/cpuinfo; then only AVX3; return; fi
   require bochs bochs-term vgabios isolinux syslinux-common xorriso busybox-static cpio
   tests/cross/avx512.sh
+}
+# Values that nobody set, in kernels: valgrind runs them as far as AVX2.
+memcheck() {  # PROGRAM
+  local log=$OUT/memcheck-${1##*/}.txt
+  valgrind -q --error-exitcode=9 --suppressions=tests/legs/memcheck.supp --show-mismatched-frees=no --num-callers=20 "$1" \
+    --gtest_brief=1 '--gtest_filter=-*Long*:*Death*:*AllocatesNothing*' >"$log" 2>&1 || { echo "not clean: $1"; tail -n 40 "$log"; exit 1; }
+}
+leg_memcheck() {
+  require valgrind
+  local chosen name
+  mapfile -t chosen < <(targets "$RELEASE" "$([ -n "$SHORT" ] && echo "$MEMCHECK_SHORT" || echo "$MEMCHECK_TESTS")")
+  cmake --build "$RELEASE" --target "${chosen[@]}"
+  export -f memcheck
+  export OUT
+  for name in "${chosen[@]}"; do ls "$RELEASE"/tests/*/"$name"; done | xargs -P "$(nproc)" -n 1 bash -c 'memcheck "$0"'
 }
 leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON; }
 leg_asan() {  # by clang, which takes half as long for it
