@@ -15,7 +15,7 @@ readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(ba
 # Tests that hold kernels to their references.
 readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|shaded|nn_|compat_|rivals_)'
 # Those that valgrind, which takes fifty times as long, runs in minutes.
-readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_|compat_)'
+readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_[^a]|nn_a[^l]|compat_)'
 readonly MEMCHECK_SHORT='^(base_array|raster_(project|interp)|renderer_simd|shade|nn_ops|compat_)'
 readonly OUT=$PWD/out/check RELEASE=build/release
 
@@ -111,7 +111,7 @@ leg_memcheck() {
   cmake --build "$RELEASE" --target "${chosen[@]}"
   export -f memcheck
   export OUT
-  for name in "${chosen[@]}"; do ls "$RELEASE"/tests/*/"$name"; done | xargs -P "$(nproc)" -n 1 bash -c 'memcheck "$0"'
+  for name in "${chosen[@]}"; do find "$RELEASE/tests" -name "$name" -type f; done | xargs -P "$(nproc)" -n 1 bash -c 'memcheck "$0"'
 }
 leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON; }
 leg_asan() {  # by clang, which takes half as long for it
