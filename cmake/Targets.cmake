@@ -17,6 +17,9 @@ if(TILEGRAD_SANITIZE)
   target_compile_options(tilegrad_flags INTERFACE
     -fsanitize=${TILEGRAD_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(tilegrad_flags INTERFACE -fsanitize=${TILEGRAD_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
+    target_compile_options(tilegrad_flags INTERFACE -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/cmake/sanitizers.txt)
+  endif()
 endif()
 
 # Highway: every kernel is compiled for each attainable target and EMU128, chosen at run time. Left out: targets between two

@@ -38,8 +38,8 @@ TEST(MeshNetwork, PredictionsFillTheirBox) {
     EXPECT_NEAR(y.value().data<double>()[i], want[i], 1e-9);
   const nn::Var point = nn::Parameter(context, context.Full({1, 4, 3}, 2.0));
   const nn::Var collapsed = NormalizeMeshes(point, 0.45);
-  for (const double v : nn::Grad(nn::Sum(collapsed), {point})[0].value().span<double>())
-    EXPECT_TRUE(std::isfinite(v));
+  const nn::Var gradient = nn::Grad(nn::Sum(collapsed), {point})[0];
+  for (const double v : gradient.value().span<double>()) EXPECT_TRUE(std::isfinite(v));
 }
 
 // A few weights, offsets large enough to look at.

@@ -84,10 +84,12 @@ TEST_F(CheckpointTest, OneAboveTheLimitIsNotDamaged) {
 TEST_F(CheckpointTest, NoFileHandleIsNoDamage) {
   rlimit before = {};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  nn::Context& context = context_;
+  const Path folder = folder_, newest = newest_;  // UBSan cannot look at *this without a handle
   const rlimit none = {3, before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
-  const Status status = LoadNewestCheckpoint(context_, folder_).status();
-  const auto alone = LoadCheckpoint(context_, newest_).status();
+  const Status status = LoadNewestCheckpoint(context, folder).status();
+  const auto alone = LoadCheckpoint(context, newest).status();
   ::setrlimit(RLIMIT_NOFILE, &before);
   ExpectMessage(status, "cannot list", "nothing was changed");
   EXPECT_EQ(status.code(), StatusCode::kIo);

@@ -54,7 +54,8 @@ HWY_INLINE void StoreQuad(Quad v, float* to, const float* end) {
 // Faster than std::fill, which asks the processor for help even with a few kilobytes.
 HWY_INLINE void WriteZeros(float* to, float* end) {
   const hn::ScalableTag<float> d;
-  for (; to + hn::Lanes(d) <= end; to += hn::Lanes(d)) hn::StoreU(hn::Zero(d), d, to);
+  const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  for (; end - to >= lanes; to += lanes) hn::StoreU(hn::Zero(d), d, to);
   for (; to < end; ++to) *to = 0;
 }
 

@@ -197,7 +197,8 @@ TEST(GradientSums, AreMeansOverPortions) {
   for (std::int64_t portion = 0; portion < kPortions; ++portion) {
     std::vector<double> row;
     for (const nn::Gradient& g : nn::Gradients(p.Loss(portion), p.Parameters())) {
-      for (const float x : g.Value().value().span<float>()) row.push_back(double{x});
+      const nn::Var value = g.Value();
+      for (const float x : value.value().span<float>()) row.push_back(double{x});
     }
     of_portion.push_back(row);
   }
