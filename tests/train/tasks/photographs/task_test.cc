@@ -256,7 +256,8 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
                              .template_level = 2,
                              .output_deviation = 0.5},
                             {shape, 15}, 16, 1);
-  const auto p = network.MeanShape().value().span<double>();
+  const nn::Var mean = network.MeanShape();
+  const auto p = mean.value().span<double>();
   double longest = 0;
   for (std::size_t i = 0; i < p.size(); i += 3)
     longest = std::max(longest, std::hypot(p[i], p[i + 1], p[i + 2]));
@@ -272,7 +273,8 @@ TEST(PhotographNetworks, StartAsTheHullAndStaySymmetric) {
   EXPECT_EQ(out.keypoints.shape(), (nn::Shape{2, 15, 3}));
   EXPECT_EQ(out.cameras.shape(), (nn::Shape{2, 7}));
   // Each keypoint's weights sum to 1.
-  const auto w = network.KeypointWeights().value().span<double>();
+  const nn::Var weights = network.KeypointWeights();
+  const auto w = weights.value().span<double>();
   double first = 0;
   for (std::size_t v = 0; v < w.size() / 15; ++v) first += w[v];
   EXPECT_NEAR(first, 1, 1e-12);

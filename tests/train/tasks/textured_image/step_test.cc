@@ -244,7 +244,7 @@ TEST(TexturedStep, ColorsWaitUntilTheirShareOfTheRun) {
     std::vector<LossTerm> terms;
     p.step.Loss(p.step.Draw(p.batch, step), p.batch, step, &values);
     p.step.AddTerms(values, step, &terms);
-    EXPECT_EQ(terms[1].name, "color");
+    EXPECT_STREQ(terms[1].name, "color");
     EXPECT_EQ(terms[1].weight > 0, counts);
     EXPECT_GT(values.color, 0);
   }
