@@ -24,8 +24,9 @@ install() {
     as=(sudo)
   fi
   say "installing ${missing[*]}"
-  "${as[@]}" apt-get update -qq || true  # an old list may do
-  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+  local wait=DPkg::Lock::Timeout=300  # another apt-get may be at work, as on a machine that updates itself
+  "${as[@]}" apt-get -o "$wait" update -qq || true  # an old list may do
+  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o "$wait" install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
 # require PACKAGE...: installs what is missing, or ends with the command to type.
