@@ -28,6 +28,19 @@ std::vector<std::string> NamesIn(const std::string& name) {
   }
 }
 
+// Wrong names are said before any package that is missing.
+Result<std::vector<const InstalledSource*>> SourcesNamed(const std::string& name) {
+  std::vector<const InstalledSource*> sources;
+  for (const std::string& one : NamesIn(name)) {
+    sources.push_back(FindInstalledSource(one));
+    if (sources.back() == nullptr || std::count(sources.begin(), sources.end(), sources.back()) > 1)
+      return InvalidArgument(
+          "the source {}: of several, each is sweethome3d, planes, ships or cars, and there once",
+          name);
+  }
+  return sources;
+}
+
 }  // namespace
 
 std::span<const InstalledSource> InstalledSources() { return kSources; }
@@ -39,16 +52,10 @@ const InstalledSource* FindInstalledSource(std::string_view name) {
 }
 
 Result<std::unique_ptr<ModelSource>> OpenInstalledSources(const std::string& name) {
-  const std::vector<std::string> names = NamesIn(name);
+  TILEGRAD_ASSIGN(const std::vector<const InstalledSource*> installed, SourcesNamed(name));
   std::vector<std::unique_ptr<ModelSource>> sources;
-  for (auto at = names.begin(); at != names.end(); ++at) {
-    const InstalledSource* installed = FindInstalledSource(*at);
-    if (installed == nullptr || std::find(names.begin(), at, *at) != at) {
-      return InvalidArgument(
-          "the source {}: of several, each is sweethome3d, planes, ships or cars, and there once",
-          name);
-    }
-    TILEGRAD_ASSIGN(auto source, installed->open(installed->folder));
+  for (const InstalledSource* one : installed) {
+    TILEGRAD_ASSIGN(auto source, one->open(one->folder));
     sources.push_back(std::move(source));
   }
   if (sources.size() == 1) return std::move(sources[0]);
