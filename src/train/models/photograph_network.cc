@@ -35,14 +35,10 @@ Point Middle(const std::vector<Point>& points) {
   return sum;  // in the plane of symmetry
 }
 
-nn::Var Unit(const nn::Var& v) {
-  return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
-}
-
 // Scale, shift and quaternion of what the last layer says. Its bias is an upright camera.
 nn::Var CamerasOf(const nn::Var& raw) {
   return nn::Concat({kStartScale * nn::Exp(nn::Tanh(nn::Slice(raw, 1, 0, 1))),
-                     nn::Slice(raw, 1, 1, 3), Unit(nn::Slice(raw, 1, 3, 7))},
+                     nn::Slice(raw, 1, 1, 3), UnitRows(nn::Slice(raw, 1, 3, 7))},
                     1);
 }
 
@@ -82,9 +78,7 @@ Status CheckNetwork(const PhotographNetworkConfig& config, int image_size) {
 }
 
 void PhotographNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
-  unet->Visit(prefix + "unet.", visitor);
-  latent.Visit(prefix + "latent.", visitor);
-  map.Visit(prefix + "map.", visitor);
+  code->Visit(prefix, visitor);
   shape.Visit(prefix + "shape.", visitor);
   camera.Visit(prefix + "camera.", visitor);
   visitor.Parameter(prefix + "mean_shape", mean_shape);
@@ -114,23 +108,16 @@ PhotographNetwork::PhotographNetwork(nn::Context& context, const PhotographNetwo
                            .enlarge = static_cast<int>(config.enlarge),
                            .wrap = true,
                            .output = flow ? &nn::Tanh : &nn::Sigmoid};
-  all_.unet = std::make_unique<nn::UNet>(context, unet, rng);
-  const std::int64_t side = image_size >> config.levels;
-  code_shape_ = {std::min(config.most, config.base << (config.levels - 1)), side, side};
+  all_.code.emplace(
+      context, unet,
+      PictureCodeShape{.image_size = image_size, .latent = config.latent, .layers = 2}, rng);
   BuildHeads(rng);
   StartShape(start);
   if (config.symmetric_texture) mirror_ = MirrorColumns(context, texture_size_);
 }
 
 void PhotographNetwork::BuildHeads(Rng& rng) {
-  const std::int64_t code = code_shape_.elements(), latent = config_.latent;
-  all_.latent.Add<nn::Flatten>("flatten");
-  all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  nn::AddLinear(all_.latent, "fc1", context_, code, latent, rng);
-  all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  nn::AddLinear(all_.latent, "fc2", context_, latent, latent, rng);
-  all_.latent.Add<nn::Activation>("act3", &nn::LeakyRelu02);
-  nn::AddLinear(all_.map, "fc", context_, latent, code, rng);
+  const std::int64_t latent = config_.latent;
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
   auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
@@ -183,31 +170,26 @@ nn::Var PhotographNetwork::Keypoints(const nn::Var& positions) const {
   return nn::Permute(nn::Reshape(product, {count, batch, 3}), {1, 0, 2});
 }
 
-void PhotographNetwork::Texture(const nn::Var& pictures, const nn::Var& latent,
-                                const nn::StepVector<nn::Var>& levels, nn::Mode mode,
+void PhotographNetwork::Texture(const PictureCode::Encoded& encoded, nn::Mode mode,
                                 PredictedPhotographs* out) {
-  const nn::Var code =
-      nn::Reshape(all_.map.Forward(latent, mode),
-                  {latent.shape()[0], code_shape_[0], code_shape_[1], code_shape_[2]});
-  nn::Var map = all_.unet->Decode(code, levels, mode);
+  nn::Var map = all_.code->DecodeMap(encoded, mode);
   if (config_.symmetric_texture) map = nn::MapAxis(map, 3, mirror_);
   if (config_.texture == "flow") {
     out->flow = map;
-    map = nn::SamplePictures(pictures.value(), map);
+    map = nn::SamplePictures(encoded.levels.front().value(), map);
   }
   out->textures = nn::Permute(map, {0, 2, 3, 1});
 }
 
 PredictedPhotographs PhotographNetwork::Forward(const nn::Var& pictures, nn::Mode mode) {
   PredictedPhotographs out;
-  const nn::StepVector<nn::Var> levels = all_.unet->Encode(pictures, mode);
-  const nn::Var latent = all_.latent.Forward(levels.back(), mode);
-  if (!latent.valid()) return out;
-  out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
+  const PictureCode::Encoded encoded = all_.code->Encode(pictures, mode);
+  if (!encoded.latent.valid()) return out;
+  out.movement = offsets_.Apply(all_.shape.Forward(encoded.latent, mode));
   out.positions = MeanShape() + out.movement;
   out.keypoints = Keypoints(out.positions);
-  out.cameras = CamerasOf(all_.camera.Forward(latent, mode));
-  Texture(pictures, latent, levels, mode, &out);
+  out.cameras = CamerasOf(all_.camera.Forward(encoded.latent, mode));
+  Texture(encoded, mode, &out);
   return out;
 }
 

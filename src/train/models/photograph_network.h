@@ -6,14 +6,14 @@
 #pragma once
 
 #include <array>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "nn/networks/unet.h"
 #include "nn/ops/axis_map.h"
 #include "scene/mesh.h"
 #include "train/models/offset_map.h"
+#include "train/models/picture_code.h"
 
 namespace tilegrad::train {
 
@@ -71,8 +71,7 @@ class PhotographNetwork {
  private:
   void BuildHeads(Rng& rng);
   void StartShape(const PhotographStart& start);
-  void Texture(const nn::Var& pictures, const nn::Var& latent,
-               const nn::StepVector<nn::Var>& levels, nn::Mode mode, PredictedPhotographs* out);
+  void Texture(const PictureCode::Encoded& encoded, nn::Mode mode, PredictedPhotographs* out);
 
   nn::Context& context_;
   PhotographNetworkConfig config_;
@@ -80,14 +79,13 @@ class PhotographNetwork {
   Mesh template_;
   std::vector<glm::vec2> uvs_;
   OffsetMap mean_, offsets_;
-  nn::AxisMap mirror_;    // of texel columns
-  nn::Shape code_shape_;  // of one picture
+  nn::AxisMap mirror_;  // of texel columns
   struct Parts : nn::Module {
-    std::unique_ptr<nn::UNet> unet;
-    nn::Sequential latent, map, shape, camera;
+    std::optional<PictureCode> code;
+    nn::Sequential shape, camera;
     nn::Var mean_shape;  // [1, 3 V]
     nn::Var keypoints;   // [K, V], logits
-    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return unet->Forward(x, mode); }
+    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return code->Forward(x, mode); }
     void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
   } all_;
 };

@@ -10,15 +10,11 @@
 #include "scene/sphere_uv.h"
 #include "train/models/mesh_network.h"
 #include "train/models/mirror_columns.h"
-#include "train/models/palette.h"
 
 namespace tilegrad::train {
 namespace {
 
-constexpr int kResidualPairs = 3;          // of two layers: the six of section 5.2
-constexpr std::int64_t kPaintNumbers = 8;  // of a texel: three shares, two gains, a colour
-// Of what is above 1 this share is taken off; the rest leaves a gradient that leads back.
-constexpr double kTooBright = 0.9;
+constexpr int kResidualPairs = 3;    // of two layers: the six of section 5.2
 constexpr double kStartLight = 0.7;  // of harmonics, from everywhere
 
 std::int64_t LightNumbers(Lighting lighting) {
@@ -48,15 +44,6 @@ void SetStartLight(Lighting lighting, nn::Tensor& bias) {
   });
 }
 
-nn::Var Unit(const nn::Var& v) {
-  return v / nn::Sqrt(nn::Sum(nn::Square(v), {1}, nn::Keep::kYes) + 1e-8);
-}
-
-// A frame of one pixel around a map of the sphere: left and right edges are neighbours.
-nn::Var WrapAround(const nn::Var& map) {
-  return nn::Pad(nn::Pad(map, 3, 1, 1, nn::PadMode::kCircular), 2, 1, 1, nn::PadMode::kReplicate);
-}
-
 // The third number to above 0, smoothly; 1 stays about where it is.
 nn::Var Facing(const nn::Var& raw) {
   return nn::Concat({nn::Slice(raw, 1, 0, 2), nn::Softplus(nn::Slice(raw, 1, 2, 3))}, 1);
@@ -74,13 +61,11 @@ Status CheckImageSize(const TextureNetworkConfig& config, int image_size) {
 }
 
 void TextureNetwork::Parts::Visit(const std::string& prefix, nn::ModuleVisitor& visitor) {
-  unet->Visit(prefix + "unet.", visitor);
-  latent.Visit(prefix + "latent.", visitor);
-  map.Visit(prefix + "map.", visitor);
+  code->Visit(prefix, visitor);
   shape.Visit(prefix + "shape.", visitor);
   light.Visit(prefix + "light.", visitor);
   pose.Visit(prefix + "pose.", visitor);
-  paint.Visit(prefix + "paint.", visitor);
+  if (paint) paint->Visit(prefix + "paint.", visitor);
 }
 
 TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig& config,
@@ -104,10 +89,8 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
                            .enlarge = config.lookup ? 0 : static_cast<int>(config.enlarge),
                            .wrap = config.wrap,
                            .output = config.lookup ? &nn::LeakyRelu02 : &nn::Sigmoid};
-  all_.unet = std::make_unique<nn::UNet>(context, unet, rng);
-  const std::int64_t side = image_size >> config.levels;
-  const std::int64_t channels = std::min(config.most, config.base << (config.levels - 1));
-  code_shape_ = {channels, side, side};
+  all_.code.emplace(context, unet,
+                    PictureCodeShape{.image_size = image_size, .latent = config.latent}, rng);
   BuildHeads(rng);
   const std::span<const float> flat(&template_.positions[0].x, 3 * template_.positions.size());
   template_positions_ =
@@ -120,12 +103,7 @@ TextureNetwork::TextureNetwork(nn::Context& context, const TextureNetworkConfig&
 }
 
 void TextureNetwork::BuildHeads(Rng& rng) {
-  const std::int64_t code = code_shape_.elements(), latent = config_.latent;
-  all_.latent.Add<nn::Flatten>("flatten");
-  all_.latent.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  nn::AddLinear(all_.latent, "fc", context_, code, latent, rng);
-  all_.latent.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  nn::AddLinear(all_.map, "fc", context_, latent, code, rng);
+  const std::int64_t latent = config_.latent;
   nn::AddLinear(all_.shape, "fc1", context_, latent, config_.hidden, rng);
   all_.shape.Add<nn::Activation>("act", &nn::Relu);
   const auto numbers = static_cast<std::int64_t>(3 * template_.positions.size());
@@ -149,75 +127,37 @@ void TextureNetwork::BuildHeads(Rng& rng) {
 }
 
 void TextureNetwork::BuildLookup(int image_size, Rng& rng) {
-  coarse_.emplace(template_, image_size);
-  fine_.emplace(template_, texture_size_);
   nn::AddLinear(all_.pose, "fc1", context_, config_.latent, config_.light_width, rng);
   all_.pose.Add<nn::Activation>("act", &nn::Relu);
   nn::AddLinear(all_.pose, "fc2", context_, config_.light_width, kPoseNumbers, rng);
-  const std::int64_t width = config_.lookup_width;
-  const auto add = [&](const std::string& name, std::int64_t in, std::int64_t out) {
-    all_.paint.Add<nn::Activation>("wrap" + name, &WrapAround);
-    all_.paint.Add<nn::Conv2dLayer>("conv" + name, context_, nn::ConvShape{.in = in, .out = out},
-                                    rng);
-  };
-  add("1", width + 2 * PictureLookup::kChannels, width);
-  all_.paint.Add<nn::Activation>("act1", &nn::LeakyRelu02);
-  add("2", width, width);
-  all_.paint.Add<nn::Activation>("act2", &nn::LeakyRelu02);
-  add("3", width, kPaintNumbers + (config_.palette > 0 ? 1 + config_.palette : 0));
+  const TexturePainterShape painter{.image_size = image_size,
+                                    .texture_size = texture_size_,
+                                    .width = config_.lookup_width,
+                                    .palette = config_.palette};
+  all_.paint.emplace(context_, template_, painter, rng);
 }
 
-// A mixture of colours: what the picture shows at the texel and at its mirror image, without
-// the predicted light and then brighter or darker, what the network makes up, and that
-// of the texel's paint (palette.h). Were the light
-// left in it, textures would explain their own pictures best under no light at all.
-nn::Var TextureNetwork::Painted(const nn::Var& map, const nn::Tensor& images,
+nn::Var TextureNetwork::Texture(const PictureCode::Encoded& encoded,
                                 const PredictedObjects& objects, nn::Mode mode) {
-  const nn::Tensor light = objects.directions.valid() ? objects.directions.value() : nn::Tensor();
-  const PictureLookup::Job job{images, objects.positions.value(), objects.pose.value(), light};
-  const nn::Var seen = nn::Constant(context_, coarse_->Look(context_, job));
-  const nn::Var raw = all_.paint.Forward(nn::Concat({map, seen}, 1), mode);
-  const std::int64_t paints = config_.palette;
-  const nn::Var shares =
-      nn::Softmax(paints == 0 ? nn::Slice(raw, 1, 0, 3)
-                              : nn::Concat({nn::Slice(raw, 1, 0, 3), nn::Slice(raw, 1, 8, 9)}, 1),
-                  1);
-  const nn::Var unlit =
-      nn::Concat({nn::Slice(seen, 1, 5, 6), nn::Slice(seen, 1, 11, 12)}, 1);  // ln 1 / light
-  const nn::Var looked = nn::Slice(shares, 1, 0, 2) * nn::Exp(nn::Slice(raw, 1, 3, 5) + unlit);
-  const nn::Var guess = nn::Sigmoid(nn::Slice(raw, 1, 5, 8));
-  nn::Var made = nn::Slice(shares, 1, 2, 3) * guess;
-  if (paints > 0) {
-    const nn::Var kinds = nn::Softmax(nn::Slice(raw, 1, 9, 9 + paints), 1);
-    made = made + nn::Slice(shares, 1, 3, 4) * PaletteColors(kinds, seen.value(), guess);
+  nn::Var image = all_.code->DecodeMap(encoded, mode);
+  if (all_.paint) {
+    const nn::Tensor light = objects.directions.valid() ? objects.directions.value() : nn::Tensor();
+    image = all_.paint->Paint(
+        image,
+        {encoded.levels.front().value(), objects.positions.value(), objects.pose.value(), light},
+        mode);
   }
-  const nn::Var all = nn::Resize(nn::Concat({looked, made}, 1), {texture_size_, texture_size_},
-                                 nn::ResizeMode::kBilinear);
-  const nn::Var colors = nn::Constant(context_, fine_->Colors(context_, job));
-  const nn::Var sum = nn::Slice(all, 1, 0, 1) * nn::Slice(colors, 1, 0, 3) +
-                      nn::Slice(all, 1, 1, 2) * nn::Slice(colors, 1, 3, 6) +
-                      nn::Slice(all, 1, 2, 5);
-  return sum - kTooBright * nn::Relu(sum - 1.0);
-}
-
-nn::Var TextureNetwork::Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels,
-                                const PredictedObjects& objects, nn::Mode mode) {
-  const nn::Var code =
-      nn::Reshape(all_.map.Forward(latent, mode),
-                  {latent.shape()[0], code_shape_[0], code_shape_[1], code_shape_[2]});
-  nn::Var image = all_.unet->Decode(code, levels, mode);
-  if (config_.lookup) image = Painted(image, levels.front().value(), objects, mode);
   if (config_.symmetric_texture) image = nn::MapAxis(image, 3, mirror_);
   return nn::Permute(image, {0, 2, 3, 1});
 }
 
-void TextureNetwork::Light(const nn::Var& latent, const nn::Tensor& images, nn::Mode mode,
+void TextureNetwork::Light(const PictureCode::Encoded& encoded, nn::Mode mode,
                            PredictedObjects* out) {
   if (light_.lighting == Lighting::kNone) return;
-  nn::Var from = latent;
-  if (config_.lookup) {
-    const nn::Tensor cues =
-        coarse_->Cues(context_, {images, out->positions.value(), out->pose.value()});
+  nn::Var from = encoded.latent;
+  if (all_.paint) {
+    const nn::Tensor cues = all_.paint->Cues(
+        {encoded.levels.front().value(), out->positions.value(), out->pose.value()});
     from = nn::Concat({from, nn::Constant(context_, cues)}, 1);
   }
   nn::Var raw = all_.light.Forward(from, mode);
@@ -225,11 +165,11 @@ void TextureNetwork::Light(const nn::Var& latent, const nn::Tensor& images, nn::
     out->sh = raw;
     return;
   }
-  if (config_.lookup) {
+  if (all_.paint) {  // the last cues are a direction, which the head corrects
     const std::int64_t cues = from.shape()[1];
     raw = raw + nn::Pad(nn::Slice(from, 1, cues - 3, cues), 1, 0, raw.shape()[1] - 3);
   }
-  out->directions = Unit(light_.facing ? Facing(raw) : nn::Slice(raw, 1, 0, 3));
+  out->directions = UnitRows(light_.facing ? Facing(raw) : nn::Slice(raw, 1, 0, 3));
   if (light_.lighting != Lighting::kPhong) return;
   const double low = std::log(light_.shininess_low), high = std::log(light_.shininess_high);
   const nn::Var share = nn::Sigmoid(nn::Reshape(nn::Slice(raw, 1, 3, 4), {raw.shape()[0]}));
@@ -238,15 +178,14 @@ void TextureNetwork::Light(const nn::Var& latent, const nn::Tensor& images, nn::
 
 PredictedObjects TextureNetwork::Forward(const nn::Var& images, nn::Mode mode) {
   PredictedObjects out;
-  const nn::StepVector<nn::Var> levels = all_.unet->Encode(images, mode);
-  const nn::Var latent = all_.latent.Forward(levels.back(), mode);
-  if (!latent.valid()) return out;
-  out.movement = offsets_.Apply(all_.shape.Forward(latent, mode));
+  const PictureCode::Encoded encoded = all_.code->Encode(images, mode);
+  if (!encoded.latent.valid()) return out;
+  out.movement = offsets_.Apply(all_.shape.Forward(encoded.latent, mode));
   out.positions = out.movement + nn::Constant(context_, template_positions_);
   if (config_.normalize) out.positions = NormalizeMeshes(out.positions, kPredictionHalfExtent);
-  if (config_.lookup) out.pose = all_.pose.Forward(latent, mode);
-  Light(latent, levels.front().value(), mode, &out);
-  out.textures = Texture(latent, levels, out, mode);
+  if (config_.lookup) out.pose = all_.pose.Forward(encoded.latent, mode);
+  Light(encoded, mode, &out);
+  out.textures = Texture(encoded, out, mode);
   if (config_.cubes && mode == nn::Mode::kEval)
     out.textures = cubes_.Maps(cubes_.Cubes(out.textures));
   return out;

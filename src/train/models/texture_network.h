@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "nn/networks/unet.h"
 #include "scene/mesh.h"
 #include "tilegrad/scene.h"
 #include "train/models/face_cubes.h"
 #include "train/models/offset_map.h"
-#include "train/models/picture_lookup.h"
+#include "train/models/picture_code.h"
+#include "train/models/texture_painter.h"
 
 namespace tilegrad::train {
 
@@ -82,11 +82,9 @@ class TextureNetwork {
  private:
   void BuildHeads(Rng& rng);
   void BuildLookup(int image_size, Rng& rng);
-  nn::Var Texture(const nn::Var& latent, const nn::StepVector<nn::Var>& levels,
-                  const PredictedObjects& objects, nn::Mode mode);
-  nn::Var Painted(const nn::Var& map, const nn::Tensor& images, const PredictedObjects& objects,
+  nn::Var Texture(const PictureCode::Encoded& encoded, const PredictedObjects& objects,
                   nn::Mode mode);
-  void Light(const nn::Var& latent, const nn::Tensor& images, nn::Mode mode, PredictedObjects* out);
+  void Light(const PictureCode::Encoded& encoded, nn::Mode mode, PredictedObjects* out);
 
   nn::Context& context_;
   TextureNetworkConfig config_;
@@ -96,15 +94,14 @@ class TextureNetwork {
   std::vector<glm::vec2> uvs_;
   nn::Tensor template_positions_;  // [V, 3]
   OffsetMap offsets_;
-  nn::AxisMap mirror_;    // of texel columns
-  nn::Shape code_shape_;  // of one image
+  nn::AxisMap mirror_;  // of texel columns
   FaceCubes cubes_;
-  std::optional<PictureLookup> coarse_, fine_;  // of the picture's size, and of the texture's
   // The parts, shown to visitors as one module.
   struct Parts : nn::Module {
-    std::unique_ptr<nn::UNet> unet;
-    nn::Sequential latent, map, shape, light, pose, paint;
-    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return unet->Forward(x, mode); }
+    std::optional<PictureCode> code;
+    nn::Sequential shape, light, pose;
+    std::optional<TexturePainter> paint;  // with `lookup`
+    nn::Var Forward(const nn::Var& x, nn::Mode mode) override { return code->Forward(x, mode); }
     void Visit(const std::string& prefix, nn::ModuleVisitor& visitor) override;
   } all_;
 };
