@@ -8,7 +8,6 @@
 #include <cstring>
 #include <limits>
 
-#include "base/sanitizers.h"
 #include "fit/make_views.h"
 #include "fit/poses/crop.h"
 #include "fit/poses/input_poses.h"
@@ -73,7 +72,6 @@ double MeanError(const FitInput& input) {
 }
 
 TEST_F(Poses, AreFoundFromMasksAndColours) {
-  if (kThreadSanitizer) GTEST_SKIP() << "takes long under it; SameBitsForAnyWorkers runs the same";
   FitInput input = Input(20);
   // What the search must not see.
   const std::vector<Camera> given = input.cameras;
@@ -92,7 +90,6 @@ TEST_F(Poses, AreFoundFromMasksAndColours) {
 }
 
 TEST_F(Poses, HeldOutCamerasFollow) {
-  if (kThreadSanitizer) GTEST_SKIP() << "takes long under it; SameBitsForAnyWorkers runs the same";
   FitInput input = Input(12);
   InputPosesJob job = Job();
   job.options.starts = job.options.sweeps = 1;
