@@ -36,7 +36,7 @@ class PictureCode : public nn::Module {
   nn::Shape bottom_;  // of the U-Net, for one picture
 };
 
-// Rows of v [B, n] divided by their lengths, which are taken as at least 1e-4.
+// Rows of v [B, n], each divided by sqrt(|v|^2 + 1e-8), so that a row of zeros stays one.
 nn::Var UnitRows(const nn::Var& v);
 
 }  // namespace tilegrad::train
