@@ -7,7 +7,7 @@ target_include_directories(tilegrad_flags INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
 # -ffp-contract=off: the reference means what it says, and gives the same bits under every compiler.
 target_compile_options(tilegrad_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -fno-math-errno -ffp-contract=off)
+  -Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -fno-math-errno -ffp-contract=off -pthread)
 # g++ 12 reports std::string code of its own library as overlapping (GCC bug 105651).
 target_compile_options(tilegrad_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 if(TILEGRAD_WERROR)
@@ -57,6 +57,7 @@ function(tilegrad_library name)
   add_library(tilegrad::${name} ALIAS tilegrad_${name})
   set_target_properties(tilegrad_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(tilegrad_${name} PUBLIC tilegrad_flags ${ARG_LINK} PRIVATE ${ARG_FOREIGN})
+  tilegrad_precompiled(tilegrad_${name} shared)
 endfunction()
 
 # tilegrad_test(raster_project project_test.cc LINK tilegrad::raster [LONG]): gtest binary <name>_test.
@@ -65,6 +66,8 @@ function(tilegrad_test name)
   cmake_parse_arguments(ARG "LONG" "" "LINK" ${ARGN})
   add_executable(${name}_test ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name}_test PRIVATE ${ARG_LINK} tilegrad_flags GTest::gtest GTest::gtest_main)
+  target_compile_options(${name}_test PRIVATE ${TILEGRAD_TEST_LEVEL})
+  tilegrad_precompiled(${name}_test test)
   target_include_directories(${name}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_BINARY_DIR}/tests/include)
   add_test(NAME ${name} COMMAND ${name}_test --gtest_filter=-*Long* --gtest_brief=1)
   set(seconds 600)
@@ -83,4 +86,5 @@ function(tilegrad_bench name)
   cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
   add_executable(${name}_bench ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${name}_bench PRIVATE ${ARG_LINK} tilegrad_bench_main)
+  tilegrad_precompiled(${name}_bench program)
 endfunction()
