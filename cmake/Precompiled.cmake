@@ -1,9 +1,9 @@
 # tilegrad_precompiled(target kind): compiles the standard library's headers that most files include once for all targets of a kind,
-# whose flags are the same: `shared` (position-independent), `program`, `test` (with GoogleTest). Saves a fifth of the compile time.
+# whose flags are the same: `shared` (position-independent), `program`, `test` (with GoogleTest). A file takes 15 to 25 % less time to compile.
 # Builds by clang do without, and so say whether every file includes what it uses.
 
-# Tests take a third less time to compile so; what they test keeps its own level. At this one g++ 12 takes a test's own operator new for
-# another's.
+# Tests take a quarter less time to compile so; what they test keeps its own level. At this level g++ 12 reports a test's own operator new
+# and delete as a mismatch.
 set(TILEGRAD_TEST_LEVEL $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   list(APPEND TILEGRAD_TEST_LEVEL $<$<CONFIG:Release,RelWithDebInfo>:-Wno-mismatched-new-delete>)

@@ -6,6 +6,7 @@ target_compile_features(tilegrad_flags INTERFACE cxx_std_20)
 target_include_directories(tilegrad_flags INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
 # -ffp-contract=off: the reference means what it says, and gives the same bits under every compiler.
+# -pthread: some libraries ask for it, and precompiled headers serve only files with the same flags.
 target_compile_options(tilegrad_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -fno-math-errno -ffp-contract=off -pthread)
 # g++ 12 reports std::string code of its own library as overlapping (GCC bug 105651).

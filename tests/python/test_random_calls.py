@@ -350,7 +350,7 @@ class RandomCalls(unittest.TestCase):
 
 @long_test
 class RandomCallsLong(RandomCalls):
-    """Three minutes of it."""
+    """Four minutes of it: one for each of the tests above."""
 
     SECONDS = 60
 
