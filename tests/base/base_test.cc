@@ -394,7 +394,9 @@ TEST_F(FileTest, FailedWriteLeavesTheOldFile) {
 TEST(SimdTarget, ForcesEveryRunnableTargetAndRefusesOthers) {
   const auto targets = RunnableTargets();
   ASSERT_FALSE(targets.empty());
+#ifndef HWY_COMPILE_ONLY_STATIC  // TILEGRAD_SIMD=native
   EXPECT_EQ(targets.back(), "EMU128");
+#endif
   for (const auto& name : targets) {
     ASSERT_TRUE(ForceTarget(name).ok());
     EXPECT_EQ(ActiveTarget(), name);

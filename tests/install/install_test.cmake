@@ -14,7 +14,7 @@ function(build_consumer source)
   get_filename_component(name ${source} NAME)
   run(${CMAKE_COMMAND} -S ${source} -B ${WORK}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${PREFIX} -DTILEGRAD_EXAMPLES=${SOURCE}/examples
       -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_C_FLAGS=${FLAGS} -DCMAKE_CXX_FLAGS=${FLAGS}
-      -DCMAKE_BUILD_TYPE=Release)
+      -DCMAKE_EXE_LINKER_FLAGS=${LINK_FLAGS} -DCMAKE_BUILD_TYPE=Release)
   run(${CMAKE_COMMAND} --build ${WORK}/${name})
 endfunction()
 
