@@ -182,11 +182,19 @@ ImportedScene ConvertScene(const aiScene& from) {
   return scene;
 }
 
+// A face without indices has no type, and Assimp writes out of bounds when it sorts faces by type.
+void DropEmptyFaces(aiMesh& part) {
+  const auto empty = [](const aiFace& face) { return face.mNumIndices == 0; };
+  aiFace* const end = std::remove_if(part.mFaces, part.mFaces + part.mNumFaces, empty);
+  part.mNumFaces = static_cast<unsigned>(end - part.mFaces);
+}
+
 // Sets the primitive types that a part really holds. Some importers claim polygons where there are
 // only lines, on which triangulation aborts the program.
-void CorrectPrimitiveTypes(const aiScene& scene) {
+void CorrectFaces(const aiScene& scene) {
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     aiMesh& part = *scene.mMeshes[m];
+    DropEmptyFaces(part);
     part.mPrimitiveTypes = 0;
     for (unsigned f = 0; f < part.mNumFaces; ++f)
       part.mPrimitiveTypes |= AI_PRIMITIVE_TYPE_FOR_N_INDICES(part.mFaces[f].mNumIndices);
@@ -199,7 +207,7 @@ Result<ImportedScene> ImportByAssimp(const std::string& name, const Bytes& file,
   try {
     auto* importer = new Assimp::Importer;
     importer->SetIOHandler(new ParentFiles(name, file, ask));  // the importer owns it
-    if (importer->ReadFile(name, 0) != nullptr) CorrectPrimitiveTypes(*importer->GetScene());
+    if (importer->ReadFile(name, 0) != nullptr) CorrectFaces(*importer->GetScene());
     const aiScene* scene =
         importer->ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType);
     if (scene == nullptr || scene->mRootNode == nullptr)

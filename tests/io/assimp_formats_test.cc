@@ -51,6 +51,15 @@ TEST_F(AssimpFormatsTest, WhatStopsTheReaderIsAnErrorWithTheFilesName) {
                 "the .fbx reader took more than 0 s");
 }
 
+TEST_F(AssimpFormatsTest, FacesWithoutIndicesAreLeftOut) {
+  const auto loaded = LoadMesh(Write("a.x",
+                                     "xof 0303txt 0032\nMesh t {\n"
+                                     "4;\n0;0;0;,1;0;0;,0;2;0;,0;0;3;;\n"
+                                     "3;\n3;0,2,1;,0;,3;0,1,3;;\n}\n"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->mesh.faces.size(), 2u);
+}
+
 TEST_F(AssimpFormatsTest, UnknownEndingsNameTheKnownOnes) {
   ExpectMessage(LoadMesh(Write("a.max", "x")).status(), "a.max", "\".max\"", ".glb, .gltf, .obj",
                 ".fbx", ".ms3d", ".md2");
