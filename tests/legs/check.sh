@@ -30,7 +30,7 @@ targets() {
   done
 }
 
-# leg_build PRESET NAME [OPTION OF CMAKE]...: configures build/NAME.
+# leg_configure PRESET NAME [OPTION OF CMAKE]...: configures build/NAME.
 leg_configure() {
   local preset=$1 name=$2
   shift 2
