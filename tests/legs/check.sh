@@ -17,7 +17,7 @@ readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|sh
 # Those that valgrind, which takes fifty times as long, runs in minutes.
 readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_[^a]|nn_a[^l]|compat_)'
 readonly MEMCHECK_SHORT='^(base_array|raster_(project|interp)|renderer_simd|shade|nn_ops|compat_)'
-readonly OUT=$PWD/out/check RELEASE=build/release
+readonly OUT=$PWD/out/check RELEASE=${RELEASE:-build/release}  # RELEASE=build/werror: that build will do, too
 
 SHORT=
 LAUNCHER=()
@@ -123,7 +123,8 @@ leg_tsan() {
   export TSAN_OPTIONS=suppressions=$PWD/tests/legs/thread_sanitizer.supp
   tree tsan tsan "$THREADS_TESTS"
 }
-leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_PRECOMPILED=OFF; }
+# With the flags of werror, so that ccache shares what has no kernels.
+leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
 # GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
 by_clang() {
