@@ -12,7 +12,7 @@ else()
   set(TILEGRAD_PROGRAM_LEVEL)
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  list(APPEND TILEGRAD_TEST_LEVEL $<$<CONFIG:Release,RelWithDebInfo>:-Wno-mismatched-new-delete>)
+  list(APPEND TILEGRAD_TEST_LEVEL $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release,RelWithDebInfo>>:-Wno-mismatched-new-delete>)
 endif()
 
 function(tilegrad_precompile kind)
