@@ -57,7 +57,7 @@ nn::Var TexturePainter::Shares(const nn::Var& raw) const {
 nn::Var TexturePainter::MadeUp(const nn::Var& raw, const nn::Var& shares,
                                const nn::Tensor& seen) const {
   const nn::Var guess = nn::Sigmoid(Take(raw, kColor));
-  const nn::Var made = nn::Slice(shares, 1, 2, 3) * guess;
+  nn::Var made = nn::Slice(shares, 1, 2, 3) * guess;
   if (shape_.palette == 0) return made;
   const Channels paints{kPaintShare.end, kPaintShare.end + shape_.palette};
   const nn::Var kinds = nn::Softmax(Take(raw, paints), 1);
