@@ -81,7 +81,7 @@ function(tilegrad_test name)
   add_test(NAME ${name} COMMAND ${name}_test --gtest_filter=-*Long* --gtest_brief=1)
   set(seconds 600)
   if(TILEGRAD_SANITIZE)
-    set(seconds 7200)  # the longest, fit_poses, takes above 50 minutes under the thread sanitizer beside another test
+    set(seconds 7200)  # the longest, fit_poses, takes 23 minutes by itself under the thread sanitizer
   endif()
   set_tests_properties(${name} PROPERTIES LABELS short TIMEOUT ${seconds})
   if(ARG_LONG)
