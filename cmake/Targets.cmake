@@ -35,7 +35,8 @@ add_library(tilegrad_simd INTERFACE)
 target_link_libraries(tilegrad_simd INTERFACE PkgConfig::LIBHWY)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
   set(TILEGRAD_DISABLED_TARGETS "HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV")
-  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that.
+  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that,
+  # precompiled headers included.
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
     target_compile_options(tilegrad_flags INTERFACE -march=armv8-a+crypto)
   endif()

@@ -17,7 +17,7 @@ readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|sh
 # Those that valgrind, which takes fifty times as long, runs in minutes.
 readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_[^a]|nn_a[^l]|compat_)'
 readonly MEMCHECK_SHORT='^(base_array|raster_(project|interp)|renderer_simd|shade|nn_ops|compat_)'
-readonly OUT=$PWD/out/check RELEASE=${RELEASE:-build/release}  # RELEASE=build/werror: that build will do, too
+readonly OUT=$PWD/out/check RELEASE=${TILEGRAD_RELEASE:-build/release}  # build/werror will do, too
 
 SHORT=
 LAUNCHER=()

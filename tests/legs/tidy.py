@@ -14,6 +14,7 @@ import json
 import os
 import pathlib
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -55,7 +56,7 @@ class Tidy:
     def check(self, file):
         """(whether it passed, whether it had before, what clang-tidy printed)"""
         if file not in self.commands:
-            return False, False, "%s: not compiled in %s\n" % (os.path.relpath(file, ROOT), os.path.relpath(self.build, ROOT))
+            return False, False, "%s: no target compiles it\n" % os.path.relpath(file, ROOT)
         try:
             mark = self.mark(file)
         except subprocess.CalledProcessError:
@@ -63,15 +64,23 @@ class Tidy:
         if mark.exists():
             return True, True, ""
         done = subprocess.run([TIDY, "-p", str(self.build), "--quiet", "--extra-arg=" + EXTRA, str(file)], check=False,
-                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         if done.returncode == 0:
             mark.touch()
-        return done.returncode == 0, False, done.stdout
+        return done.returncode == 0, False, done.stdout + done.stderr
 
 
 def progress(done, count, start):
     left = (time.monotonic() - start) / done * (count - done)
     print("clang-tidy: %d of %d files, %d min %02d s left" % (done, count, left // 60, left % 60), flush=True)
+
+
+def stop_early(pool):
+    """On Ctrl-C, begins no other file."""
+    def stop(number, frame):
+        pool.shutdown(wait=False, cancel_futures=True)
+        sys.exit(128 + number)
+    signal.signal(signal.SIGINT, stop)
 
 
 def main():
@@ -81,6 +90,7 @@ def main():
     failed, known, start = [], 0, time.monotonic()
     with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         results = {pool.submit(tidy.check, file): file for file in files}
+        stop_early(pool)
         for done, result in enumerate(concurrent.futures.as_completed(results), 1):
             passed, before, text = result.result()
             known += before
