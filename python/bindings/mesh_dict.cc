@@ -12,7 +12,7 @@
 namespace tilegrad::python {
 namespace {
 
-constexpr std::array kWraps = {"repeat", "mirror", "clamp"};
+constexpr std::array kTextureWraps = {"repeat", "mirror", "clamp"};
 constexpr std::array kAlphaModes = {"opaque", "mask", "blend"};
 
 // The index of a name.
@@ -30,14 +30,14 @@ Enum EnumOf(const char* function, const py::handle& value,
 
 // "repeat" along both axes, or "repeat clamp" along u and v.
 std::string NameOf(const std::array<TextureWrap, 2>& wrap) {
-  const auto name = [](TextureWrap w) { return kWraps[static_cast<std::size_t>(w)]; };
+  const auto name = [](TextureWrap w) { return kTextureWraps[static_cast<std::size_t>(w)]; };
   return wrap[0] == wrap[1] ? name(wrap[0]) : fmt::format("{} {}", name(wrap[0]), name(wrap[1]));
 }
 
 std::array<TextureWrap, 2> WrapOfName(const char* function, const std::string& name) {
   const std::size_t space = std::min(name.find(' '), name.size());
   const auto along = [&](const std::string& way) {
-    return EnumOf<TextureWrap>(function, py::str(way), kWraps);
+    return EnumOf<TextureWrap>(function, py::str(way), kTextureWraps);
   };
   const TextureWrap u = along(name.substr(0, space));
   return {u, space == name.size() ? u : along(name.substr(space + 1))};

@@ -23,30 +23,30 @@ struct Sight {
   double nearest = HUGE_VAL;      // of the far ones, pixels to a drawn pixel
 };
 
-enum class Place { kInImage, kOutside, kBehind };
+enum class PointPlace { kInImage, kOutside, kBehind };
 
-Place PlaceOf(const float* p, const Camera& camera, ImageSize size) {
+PointPlace PlaceOf(const float* p, const Camera& camera, ImageSize size) {
   const float *r = camera.rotation, *t = camera.translation;
   const auto row = [&](int i) {
     return r[3 * i] * p[0] + r[3 * i + 1] * p[1] + r[3 * i + 2] * p[2] + t[i];
   };
   const float depth = -row(2);
-  if (!(depth > camera.near_plane)) return Place::kBehind;
+  if (!(depth > camera.near_plane)) return PointPlace::kBehind;
   const float x = camera.cx + camera.fx * row(0) / depth,
               y = camera.cy - camera.fy * row(1) / depth;
   const bool inside = x >= 0 && y >= 0 && x <= static_cast<float>(size.width) &&
                       y <= static_cast<float>(size.height);
-  return inside ? Place::kInImage : Place::kOutside;
+  return inside ? PointPlace::kInImage : PointPlace::kOutside;
 }
 
 void LookAtVertices(const FitScene& scene, const Camera& camera, ImageSize size, Sight* sight) {
-  Place best = Place::kBehind;
-  for (std::size_t v = 0; v < scene.vertices() && best != Place::kInImage; ++v) {
+  PointPlace best = PointPlace::kBehind;
+  for (std::size_t v = 0; v < scene.vertices() && best != PointPlace::kInImage; ++v) {
     best = std::min(best, PlaceOf(&scene.positions[3 * v], camera, size));
   }
   ++sight->views;
-  sight->behind += best == Place::kBehind;
-  sight->outside += best == Place::kOutside;
+  sight->behind += best == PointPlace::kBehind;
+  sight->outside += best == PointPlace::kOutside;
 }
 
 // Steps (also diagonal) from each pixel to the nearest drawn one, -1 where there is none.

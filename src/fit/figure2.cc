@@ -12,7 +12,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr std::array kOneView = {0};
-constexpr double kFinalRate = 0.005;  // of the first
+constexpr double kFigure2FinalRate = 0.005;  // of the first
 
 FitRenderer::Job JobOf(const Figure2Case& one, const Figure2Options& options) {
   FitRenderer::Job job;
@@ -35,10 +35,10 @@ Result<TargetImages> RenderTarget(const Figure2Case& one, const FitRenderer::Job
                       {}};
 }
 
-// A half cosine from 1 to kFinalRate.
+// A half cosine from 1 to kFigure2FinalRate.
 double RateAt(int step, int steps) {
   const double t = static_cast<double>(step) / steps;
-  return kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+  return kFigure2FinalRate + (1 - kFigure2FinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
 }
 
 FitterOptions OptionsOf(const Figure2Case& one) {

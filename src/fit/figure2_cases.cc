@@ -151,7 +151,7 @@ Figure2Case CameraPosition(int size) {
   return one;
 }
 
-Figure2Case HarmonicLight(int size) {
+Figure2Case GreyHarmonicLight(int size) {
   FitScene target = LitScene(Torus(0.85f, 0.38f, 48, 24), size, Lighting::kSphericalHarmonics);
   target.sh = {2.2f, -0.5f, 0.4f, -0.7f, 0.3f, -0.2f, 0.25f, -0.3f, 0.35f};
   Figure2Case one = Make("g", Parameter::kSh, std::move(target));
@@ -180,8 +180,9 @@ Figure2Case PhongMaterial(int size) {
 }  // namespace
 
 std::vector<Figure2Case> Figure2Cases(int size) {
-  return {VertexPosition(size),  VertexColor(size),    TextureCase(size),   UvCase(size),
-          LambertPosition(size), CameraPosition(size), HarmonicLight(size), PhongMaterial(size)};
+  return {
+      VertexPosition(size),  VertexColor(size),    TextureCase(size),       UvCase(size),
+      LambertPosition(size), CameraPosition(size), GreyHarmonicLight(size), PhongMaterial(size)};
 }
 
 }  // namespace tilegrad::train

@@ -11,10 +11,11 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kTile = 100, kGap = 6, kCurve = 130, kTitle = 20, kHead = 22, kColumnGap = 24;
+constexpr double kTile = 100, kGap = 6, kCurve = 130, kTitle = 20, kHeadHeight = 22,
+                 kColumnGap = 24;
 constexpr double kRow = kTile + kTitle + 10, kColumn = 3 * (kTile + kGap) + kCurve + kColumnGap;
-constexpr double kLowest = -3;  // power of ten of the curve's lower end
-constexpr double kGoal = 0.05;  // of the starting loss
+constexpr double kLowestPower = -3;  // power of ten of the curve's lower end
+constexpr double kGoal = 0.05;       // of the starting loss
 
 std::string Text(double x, double y, const char* anchor, const std::string& text) {
   return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor,
@@ -27,14 +28,14 @@ std::string Line(double x0, double y0, double x1, double y1, const char* color) 
 }
 
 double CurveY(double top, double share) {
-  const double power = std::clamp(std::log10(std::max(share, 1e-12)), kLowest, 0.0);
-  return top + kTile * power / kLowest;
+  const double power = std::clamp(std::log10(std::max(share, 1e-12)), kLowestPower, 0.0);
+  return top + kTile * power / kLowestPower;
 }
 
-// Loss over its start, logarithmic from 1 to 10^kLowest.
+// Loss over its start, logarithmic from 1 to 10^kLowestPower.
 std::string Curve(const Figure2Result& r, double left, double top) {
   std::string svg;
-  for (int power = 0; power >= static_cast<int>(kLowest); --power) {
+  for (int power = 0; power >= static_cast<int>(kLowestPower); --power) {
     const double y = CurveY(top, std::pow(10.0, power));
     svg += Line(left, y, left + kCurve, y, "#dddddd");
   }
@@ -71,7 +72,7 @@ Result<std::string> Tiles(const Figure2Result& r, double left, double top) {
 
 Result<std::string> Figure2Svg(const std::vector<Figure2Result>& results) {
   const auto rows = (results.size() + 1) / 2;
-  const double width = 2 * kColumn, height = kHead + static_cast<double>(rows) * kRow + 4;
+  const double width = 2 * kColumn, height = kHeadHeight + static_cast<double>(rows) * kRow + 4;
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" "
       "viewBox=\"0 0 {0} {1}\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222222\">\n"
@@ -87,7 +88,7 @@ Result<std::string> Figure2Svg(const std::vector<Figure2Result>& results) {
   for (std::size_t i = 0; i < results.size(); ++i) {
     const Figure2Result& r = results[i];
     const double left = kGap + static_cast<double>(i / rows) * kColumn;
-    const double top = kHead + static_cast<double>(i % rows) * kRow + kTitle;
+    const double top = kHeadHeight + static_cast<double>(i % rows) * kRow + kTitle;
     svg += Text(left, top - 5, "start", fmt::format("({}) {}: {}", r.label, r.model, r.what));
     TILEGRAD_ASSIGN(const std::string tiles, Tiles(r, left, top));
     svg += tiles + Curve(r, left + 3 * (kTile + kGap), top);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kAzimuths = 24;
 constexpr std::array kElevations = {-5.0, 12.0, 27.0, 42.0, 60.0};  // degrees
 constexpr int kAlignments = 3;  // a move changes perspective, and with it the outline
-constexpr float kInside = 0.5f;
+constexpr float kInsideAlpha = 0.5f;
 
 // The middle and the longer side of what a mask covers, pixels.
 struct Extent {
@@ -51,15 +51,15 @@ void Align(const Extent& seen, const Extent& wanted, Camera* camera) {
   t[2] = -depth;
 }
 
-class Search {
+class CameraFinder {
  public:
-  Search(const FitScene& scene, const TargetImages& picture, const CameraRule& rule,
-         const Workers& workers)
+  CameraFinder(const FitScene& scene, const TargetImages& picture, const CameraRule& rule,
+               const Workers& workers)
       : scene_(scene), picture_(picture), rule_(rule), renderer_(workers) {}
 
   Result<std::vector<FoundCamera>> Run() {
     const auto wanted =
-        ExtentOf(picture_, [&](std::size_t p) { return picture_.alpha[p] >= kInside; });
+        ExtentOf(picture_, [&](std::size_t p) { return picture_.alpha[p] >= kInsideAlpha; });
     if (!wanted) return InvalidArgument("the picture shows no object: no pixel is opaque");
     Start();
     for (int i = 0; i < kAlignments; ++i) {
@@ -138,7 +138,7 @@ class Search {
 
 Result<std::vector<FoundCamera>> FindCameras(const FitScene& scene, const TargetImages& picture,
                                              const CameraRule& rule, const Workers& workers) {
-  return Search(scene, picture, rule, workers).Run();
+  return CameraFinder(scene, picture, rule, workers).Run();
 }
 
 }  // namespace tilegrad::train

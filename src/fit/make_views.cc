@@ -22,7 +22,7 @@ constexpr const char* kTrainName = "transforms_train.json";
 constexpr const char* kTestName = "transforms_test.json";
 constexpr const char* kTruthName = "truth.glb";
 
-Status Check(const ViewsOptions& o) {
+Status CheckViews(const ViewsOptions& o) {
   if (o.views < 1 || o.held_out < 0 || o.views + o.held_out > 100000) {
     return InvalidArgument("{} views and {} held out: needs 1 or more, and not over 100000 in all",
                            o.views, o.held_out);
@@ -105,7 +105,7 @@ Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard
 
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
                  const OutputGuard& guard, const ProgressSink& progress, const StopFlag& stop) {
-  TILEGRAD_TRY(Check(options));
+  TILEGRAD_TRY(CheckViews(options));
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
   TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out, guard));

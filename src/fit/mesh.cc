@@ -29,14 +29,14 @@ void SetUvs(const std::vector<Face>& faces, const std::vector<glm::vec2>& uvs, F
   }
 }
 
-glm::vec3 FactorOf(const Mesh& mesh) {
+glm::vec3 BaseColorFactor(const Mesh& mesh) {
   return mesh.materials.empty() ? glm::vec3(1) : glm::vec3(mesh.materials[0].base_color);
 }
 
 void SetTexture(const Mesh& mesh, FitScene* scene) {
   const ImageU8& image =
       mesh.textures[static_cast<std::size_t>(mesh.materials[0].base_color_texture)].image;
-  const glm::vec3 factor = FactorOf(mesh);
+  const glm::vec3 factor = BaseColorFactor(mesh);
   scene->texture = Image(image.width, image.height, 3);
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -62,7 +62,7 @@ std::vector<glm::vec4> VertexColors(const Mesh& mesh) {
 }
 
 void SetColors(const Mesh& mesh, bool textured, FitScene* scene) {
-  const glm::vec3 factor = textured ? glm::vec3(1) : FactorOf(mesh);
+  const glm::vec3 factor = textured ? glm::vec3(1) : BaseColorFactor(mesh);
   const std::vector<glm::vec4> colors = VertexColors(mesh);
   if (colors.empty() && textured) return;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {

@@ -23,8 +23,8 @@ namespace {
 
 // Where no other reason is given, values were chosen by eye and by silhouette and colour on a few
 // furniture pictures and photographs: docs/lab/single-image.md, "Refinement on the picture".
-constexpr std::size_t kCoarse = 2000;     // vertices below which faces are divided: the template of
-                                          // level 3 becomes that of level 4
+constexpr std::size_t kCoarseVertices = 2000;  // vertices below which faces are divided: the
+                                               // template of level 3 becomes that of level 4
 constexpr int kSearchSide = 64;           // pixels a side of pictures that cameras are searched in
 constexpr std::size_t kCandidates = 3;    // cameras that are tried by descent
 constexpr double kApart = 30;             // degrees between them: two steps of the search
@@ -32,13 +32,14 @@ constexpr double kPilotShare = 0.1;       // of the steps, for each candidate
 constexpr double kSymmetricShare = 0.75;  // of the steps that see the mirror image, too
 // Softness of outlines (equation 5), squared NDC, then pixels. Soft alpha lies outside of faces, so
 // a mesh that fits it is too small by about its width: it ends narrow, and before the last steps.
-constexpr double kDeltaStart = 2e-3, kFinalPixels = 0.15, kDeltaShare = 0.9;
-constexpr double kMaxAlphaError = 1e-4;  // as of fits
-constexpr double kFinalRate = 0.1;       // of the first, by a half cosine
+constexpr double kRefineDeltaStart = 2e-3, kRefineFinalPixels = 0.15, kRefineDeltaShare = 0.9;
+constexpr double kRefineMaxAlphaError = 1e-4;  // as of fits
+constexpr double kRefineFinalRate = 0.1;       // of the first, by a half cosine
 // World units and colours a step. Positions and colours go through diffusion, so that what the
 // picture does not show follows its neighbours; the movement's Laplacian holds it in shape.
-constexpr double kPositionRate = 0.02 * static_cast<double>(kPredictionHalfExtent);
-constexpr double kColorRate = 0.06, kTexelRate = 0.005, kSmoothing = 8, kColorSmoothing = 0.5;
+constexpr double kRefinePositionRate = 0.02 * static_cast<double>(kPredictionHalfExtent);
+constexpr double kRefineColorRate = 0.06, kTexelRate = 0.005, kRefineSmoothing = 8,
+                 kRefineColorSmoothing = 0.5;
 // The outline beside colours, whose loss counts pixels without the object as well: at 1 the shape
 // follows highlights and patterns at the outline's cost.
 constexpr double kSilhouetteWeight = 10;
@@ -75,11 +76,11 @@ FitterOptions OptionsFor(const FitScene& scene) {
   const Parameter paint = scene.texture.empty() ? Parameter::kColors : Parameter::kTexture;
   for (const Parameter p : {Parameter::kPositions, paint, Parameter::kCamera})
     out.parameters[p] = true;
-  out.rates[Parameter::kPositions] = kPositionRate;
-  out.rates[Parameter::kColors] = kColorRate, out.rates[Parameter::kTexture] = kTexelRate;
+  out.rates[Parameter::kPositions] = kRefinePositionRate;
+  out.rates[Parameter::kColors] = kRefineColorRate, out.rates[Parameter::kTexture] = kTexelRate;
   out.loss.silhouette_weight = kSilhouetteWeight;
   out.regularizers = kRegularizers;
-  out.smoothing = kSmoothing, out.color_smoothing = kColorSmoothing;
+  out.smoothing = kRefineSmoothing, out.color_smoothing = kRefineColorSmoothing;
   return out;
 }
 
@@ -122,10 +123,12 @@ class Descent {
     step.targets = coarse ? &*small_ : &targets_;
     step.job.scale = coarse ? 1.0f / static_cast<float>(factor_) : 1;
     step.job.options.width = step.job.options.height = step.targets->width;
-    const double end = kFinalPixels * 2 / targets_.width, share = std::min(1.0, t / kDeltaShare);
-    step.job.options.delta = kDeltaStart * std::pow(end * end / kDeltaStart, share);
-    step.job.options.max_alpha_error = kMaxAlphaError;
-    step.rate_factor = kFinalRate + (1 - kFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
+    const double end = kRefineFinalPixels * 2 / targets_.width,
+                 share = std::min(1.0, t / kRefineDeltaShare);
+    step.job.options.delta = kRefineDeltaStart * std::pow(end * end / kRefineDeltaStart, share);
+    step.job.options.max_alpha_error = kRefineMaxAlphaError;
+    step.rate_factor =
+        kRefineFinalRate + (1 - kRefineFinalRate) * 0.5 * (1 + std::cos(std::numbers::pi * t));
     return step;
   }
 
@@ -206,7 +209,7 @@ Status Normalize(Mesh* mesh, Camera* camera) {
 
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers) {
-  const bool coarse = prediction.positions.size() < kCoarse;
+  const bool coarse = prediction.positions.size() < kCoarseVertices;
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(coarse ? Subdivided(prediction) : prediction));
   scene.wrap = Wrap::kRepeatClamp;  // maps in longitude and latitude
   const auto [small, factor] = AtMost(picture, kSearchSide);

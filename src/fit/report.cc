@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kShownViews = 6;
 
-constexpr const char* kHead =
+constexpr const char* kPageHead =
     "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
     "<title>tilegrad fit</title>\n<style>body{font:16px/1.5 sans-serif;max-width:60rem;margin:2rem "
@@ -99,7 +99,7 @@ Result<std::string> Curves(const FitJob& job) {
 }  // namespace
 
 Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const ImageU8& sheet) {
-  std::string out = kHead + Summary(job, outcome);
+  std::string out = kPageHead + Summary(job, outcome);
   TILEGRAD_ASSIGN(const std::string views, Views(job, outcome));
   TILEGRAD_ASSIGN(const std::string curves, Curves(job));
   out += views + curves;

@@ -48,7 +48,7 @@ double Psnr(const std::vector<float>& a, const std::vector<float>& b) {
   return mean > 0 ? std::min(kBestPsnr, -10 * std::log10(mean)) : kBestPsnr;
 }
 
-double Iou(std::span<const float> a, std::span<const float> b) {
+double MaskIou(std::span<const float> a, std::span<const float> b) {
   double both = 0, either = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     both += static_cast<double>(a[i] * b[i]);
@@ -140,7 +140,7 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     }
     const Picture truth = TruthOf(input.images, static_cast<std::size_t>(score.view));
     score.psnr = Psnr(OverWhite(truth), OverWhite(rendered));
-    score.iou = Iou(rendered.alpha, truth.alpha);
+    score.iou = MaskIou(rendered.alpha, truth.alpha);
     score.truth = OverGrey(truth, kWhite), score.rendered = OverGrey(rendered, kWhite);
     scores.push_back(std::move(score));
   }

@@ -8,6 +8,8 @@
 #include <glm/vec2.hpp>
 #include <numeric>
 
+#include "fit/texels.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -57,15 +59,6 @@ class ChartUnion {
  private:
   std::vector<std::int32_t> parent_;
 };
-
-double Cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
-
-// In texels, with centres at whole numbers.
-glm::dvec2 TexelAt(const FitScene& scene, std::int32_t uv) {
-  const auto at = 2 * static_cast<std::size_t>(uv);
-  return {static_cast<double>(scene.uvs[at]) * scene.texture.width - 0.5,
-          (1 - static_cast<double>(scene.uvs[at + 1])) * scene.texture.height - 0.5};
-}
 
 // Calls visit(column, row) for each texel centre in a triangle, its border included.
 template <class Visit>

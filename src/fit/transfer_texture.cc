@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
+#include "fit/texels.h"
 #include "train/metrics/face_tree.h"
 
 namespace tilegrad::train {
@@ -22,25 +23,16 @@ Triangle CornersOf(const FitScene& scene, std::size_t face) {
   return out;
 }
 
-// In texels, with centres at whole numbers; row 0 is v = 1.
-glm::dvec2 TexelAt(const FitScene& scene, std::size_t corner) {
-  const float* uv = &scene.uvs[2 * Index(scene.uv_indices[corner])];
-  return {static_cast<double>(uv[0]) * scene.texture.width - 0.5,
-          (1 - static_cast<double>(uv[1])) * scene.texture.height - 0.5};
-}
-
 // The point of a surface that a texel's centre shows.
-struct Place {
+struct SurfacePoint {
   std::size_t texel;
   glm::dvec3 at;
 };
 
-double Cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
-
-void AddPlaces(const FitScene& scene, std::size_t face, std::vector<Place>* out) {
+void AddSurfacePoints(const FitScene& scene, std::size_t face, std::vector<SurfacePoint>* out) {
   const Triangle corners = CornersOf(scene, face);
-  const glm::dvec2 p[3] = {TexelAt(scene, 3 * face), TexelAt(scene, 3 * face + 1),
-                           TexelAt(scene, 3 * face + 2)};
+  const std::int32_t* uvs = &scene.uv_indices[3 * face];
+  const glm::dvec2 p[3] = {TexelAt(scene, uvs[0]), TexelAt(scene, uvs[1]), TexelAt(scene, uvs[2])};
   const double area = Cross(p[1] - p[0], p[2] - p[0]);
   if (!(std::abs(area) > 0)) return;
   const auto from = [](double a, double b, double c) {
@@ -73,7 +65,7 @@ struct Lookup {
 Lookup LookupAt(const FitScene& scene, const FaceTree::Nearest& nearest) {
   glm::dvec2 at(0);
   for (std::size_t k = 0; k < 3; ++k)
-    at += nearest.weights[k] * TexelAt(scene, 3 * Index(nearest.face) + k);
+    at += nearest.weights[k] * TexelAt(scene, scene.uv_indices[3 * Index(nearest.face) + k]);
   const int width = scene.texture.width, height = scene.texture.height;
   at.x = std::clamp(at.x, 0.0, width - 1.0), at.y = std::clamp(at.y, 0.0, height - 1.0);
   const int x = std::min(static_cast<int>(at.x), width - 2),
@@ -88,8 +80,8 @@ Lookup LookupAt(const FitScene& scene, const FaceTree::Nearest& nearest) {
 
 std::vector<bool> TransferTexels(const FitScene& from, const FitScene& to, const Workers& workers,
                                  std::span<AlignedVector<float>* const> arrays) {
-  std::vector<Place> places;
-  for (std::size_t f = 0; 3 * f < to.faces.size(); ++f) AddPlaces(to, f, &places);
+  std::vector<SurfacePoint> places;
+  for (std::size_t f = 0; 3 * f < to.faces.size(); ++f) AddSurfacePoints(to, f, &places);
   std::vector<Triangle> surface;
   for (std::size_t f = 0; 3 * f < from.faces.size(); ++f) surface.push_back(CornersOf(from, f));
   const FaceTree tree(surface);

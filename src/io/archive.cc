@@ -16,17 +16,12 @@
 #include "base/hash.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
+#include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
 
 constexpr zip_uint64_t kMaxEntryBytes = zip_uint64_t{1} << 30;
-
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
 
 // Finds a file below `folder`, ignoring case component by component.
 std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name) {

@@ -20,9 +20,9 @@ namespace {
 
 using SharedBytes = std::shared_ptr<const Bytes>;
 
-class MemoryStream : public Assimp::IOStream {
+class AssimpStream : public Assimp::IOStream {
  public:
-  explicit MemoryStream(SharedBytes bytes) : bytes_(std::move(bytes)) {}
+  explicit AssimpStream(SharedBytes bytes) : bytes_(std::move(bytes)) {}
   std::size_t Read(void* to, std::size_t size, std::size_t count) override {
     if (size == 0) return 0;
     const std::size_t whole = std::min(count, (bytes_->size() - at_) / size);
@@ -59,9 +59,9 @@ class ParentFiles : public Assimp::IOSystem {
   }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* name, const char*) override {
-    if (name == name_) return new MemoryStream(file_);  // Assimp owns it and calls Close
+    if (name == name_) return new AssimpStream(file_);  // Assimp owns it and calls Close
     auto bytes = ask_(kAskContent + std::string(name));
-    return bytes ? new MemoryStream(std::make_shared<const Bytes>(std::move(*bytes))) : nullptr;
+    return bytes ? new AssimpStream(std::make_shared<const Bytes>(std::move(*bytes))) : nullptr;
   }
   void Close(Assimp::IOStream* stream) override { delete stream; }
 
@@ -97,7 +97,7 @@ ImportedPart ConvertPart(const aiMesh& from) {
 }
 
 template <class T>
-T ValueOf(const aiMaterial& from, const char* key, T value) {
+T MaterialValue(const aiMaterial& from, const char* key, T value) {
   from.Get(key, aiTextureType_DIFFUSE, 0, value);
   return value;
 }
@@ -109,15 +109,15 @@ std::string NotReadOfImage(const aiMaterial& from) {
   const auto add = [&](bool is, std::string_view what) {
     if (is) list.append(list.empty() ? "" : ", ").append(what);
   };
-  add(ValueOf<int>(from, _AI_MATKEY_MAPPING_BASE, aiTextureMapping_UV) != aiTextureMapping_UV,
+  add(MaterialValue<int>(from, _AI_MATKEY_MAPPING_BASE, aiTextureMapping_UV) != aiTextureMapping_UV,
       "its projection (a sphere's, a box's, ...)");
-  const int set = ValueOf<int>(from, _AI_MATKEY_UVWSRC_BASE, 0);
+  const int set = MaterialValue<int>(from, _AI_MATKEY_UVWSRC_BASE, 0);
   add(set != 0, fmt::format("uv set {}; set 0 stands in", set));
   constexpr int kWrap = aiTextureMapMode_Wrap;
-  add(ValueOf(from, _AI_MATKEY_MAPPINGMODE_U_BASE, kWrap) != kWrap ||
-          ValueOf(from, _AI_MATKEY_MAPPINGMODE_V_BASE, kWrap) != kWrap,
+  add(MaterialValue(from, _AI_MATKEY_MAPPINGMODE_U_BASE, kWrap) != kWrap ||
+          MaterialValue(from, _AI_MATKEY_MAPPINGMODE_V_BASE, kWrap) != kWrap,
       "its wrapping (clamped, mirrored or once); it repeats");
-  const auto t = ValueOf(from, _AI_MATKEY_UVTRANSFORM_BASE, aiUVTransform());
+  const auto t = MaterialValue(from, _AI_MATKEY_UVTRANSFORM_BASE, aiUVTransform());
   add(t.mTranslation != aiVector2D(0, 0) || t.mScaling != aiVector2D(1, 1) || t.mRotation != 0,
       "its uv transform");
   return list;

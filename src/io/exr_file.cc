@@ -19,9 +19,9 @@
 namespace tilegrad::io {
 namespace {
 
-class MemoryStream : public Imf::OStream {
+class ExrStream : public Imf::OStream {
  public:
-  MemoryStream() : Imf::OStream("memory") {}
+  ExrStream() : Imf::OStream("memory") {}
   void write(const char* from, int count) override {
     const auto size = static_cast<std::size_t>(count);
     if (bytes.size() < at_ + size) bytes.resize(at_ + size);
@@ -90,7 +90,7 @@ void Write(const ExrImage& image, Imf::OStream& stream) {
 
 Result<Bytes> EncodeExr(const ExrImage& image) {
   TILEGRAD_TRY(Check(image));
-  MemoryStream stream;
+  ExrStream stream;
   try {  // the library throws
     Write(image, stream);
   } catch (const std::exception& error) {

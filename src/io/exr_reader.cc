@@ -53,7 +53,7 @@ std::vector<std::string> NamesOf(const Imf::ChannelList& channels) {
   return names;
 }
 
-Status CheckHeader(const Imf::Header& header, const GuardLimits& limits) {
+Status CheckExrHeader(const Imf::Header& header, const GuardLimits& limits) {
   const auto& window = header.dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
                      height = std::int64_t{window.max.y} - window.min.y + 1;
@@ -114,7 +114,7 @@ Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits
   try {  // the library throws
     MemoryInput stream(bytes);
     Imf::InputFile in(stream, /*numThreads=*/0);
-    const Status status = CheckHeader(in.header(), limits);
+    const Status status = CheckExrHeader(in.header(), limits);
     return status.ok() ? ReadPixels(in) : ErrorBytes(status.message());
   } catch (const std::bad_alloc&) {
     throw;

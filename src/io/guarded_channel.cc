@@ -19,7 +19,8 @@ namespace {
 struct Header {
   std::uint64_t magic, size;
 };
-constexpr std::uint64_t kMagic = 0x746c67642d626f78;  // any number that no other file begins with
+constexpr std::uint64_t kChannelMagic =
+    0x746c67642d626f78;  // any number that no other file begins with
 
 bool WriteAt(int fd, std::span<const std::uint8_t> bytes, std::size_t at) {
   while (!bytes.empty()) {
@@ -68,7 +69,7 @@ Result<Mailbox> Mailbox::Open() {
 }
 
 bool Mailbox::Put(std::span<const std::uint8_t> bytes) const {
-  const Header header{kMagic, bytes.size()};
+  const Header header{kChannelMagic, bytes.size()};
   return ::ftruncate(fd(), 0) == 0 && WriteAt(fd(), bytes, sizeof(header)) &&
          WriteAt(fd(), {reinterpret_cast<const std::uint8_t*>(&header), sizeof(header)}, 0);
 }
@@ -78,7 +79,7 @@ std::optional<Bytes> Mailbox::Get(std::size_t max_bytes) const {
   Header header = {};
   if (::fstat(fd(), &info) != 0 ||
       !ReadAt(fd(), {reinterpret_cast<std::uint8_t*>(&header), sizeof(header)}, 0) ||
-      header.magic != kMagic || header.size > max_bytes ||
+      header.magic != kChannelMagic || header.size > max_bytes ||
       static_cast<std::uint64_t>(info.st_size) != sizeof(header) + header.size) {
     return std::nullopt;
   }

@@ -12,11 +12,6 @@ namespace {
 
 using ByteSpan = std::span<const std::uint8_t>;
 
-std::uint32_t BigEndian(ByteSpan bytes) {
-  std::uint32_t value = 0;
-  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
-  return value;
-}
 std::uint32_t LittleEndian(ByteSpan bytes) {
   std::uint32_t value = 0;
   for (std::size_t i = bytes.size(); i-- > 0;) value = value << 8 | bytes[i];
@@ -70,6 +65,12 @@ std::optional<HeaderSize> TgaSize(ByteSpan bytes) {
 }
 
 }  // namespace
+
+std::uint32_t BigEndian(std::span<const std::uint8_t> bytes) {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
+  return value;
+}
 
 std::optional<HeaderSize> ImageHeaderSize(ByteSpan bytes) {
   if (IsPng(bytes)) return PngSize(bytes);

@@ -17,6 +17,9 @@ struct HeaderSize {
 // calls what is larger than its limit no image at all.
 std::optional<HeaderSize> ImageHeaderSize(std::span<const std::uint8_t> bytes);
 
+// The number of at most four bytes, the first of them the highest.
+std::uint32_t BigEndian(std::span<const std::uint8_t> bytes);
+
 // "GIF" and the like, by its first bytes: a format that is not read, whatever the file is called.
 // Empty for others.
 std::string_view UnreadImageFormat(std::span<const std::uint8_t> bytes);

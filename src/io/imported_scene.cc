@@ -10,7 +10,7 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x54475332;  // "TGS2"; the digit is the version
+constexpr std::uint32_t kSceneMagic = 0x54475332;  // "TGS2"; the digit is the version
 
 // The fields of each record in their order, for both directions.
 template <class Archive, class T>
@@ -37,9 +37,9 @@ template <>
 struct IsList<std::string> : std::true_type {};
 
 // Counts bytes if it has nowhere to put them, so that what is written is allocated once.
-class Writer {
+class SceneWriter {
  public:
-  explicit Writer(std::uint8_t* to) : to_(to) {}
+  explicit SceneWriter(std::uint8_t* to) : to_(to) {}
   template <class... T>
   void operator()(const T&... values) {
     (Write(values), ...);
@@ -71,9 +71,9 @@ class Writer {
   std::size_t written_ = 0;
 };
 
-class Reader {
+class SceneReader {
  public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : left_(bytes) {}
+  explicit SceneReader(std::span<const std::uint8_t> bytes) : left_(bytes) {}
   template <class... T>
   void operator()(T&... values) {
     (Read(values), ...);
@@ -151,8 +151,8 @@ Status CheckScene(const ImportedScene& scene) {
 Bytes EncodeScene(const Result<ImportedScene>& scene) {
   const Status status = scene.status();
   const auto write = [&](std::uint8_t* to) {
-    Writer writer(to);
-    writer(kMagic, static_cast<std::uint32_t>(status.code()), status.message());
+    SceneWriter writer(to);
+    writer(kSceneMagic, static_cast<std::uint32_t>(status.code()), status.message());
     if (scene.ok()) writer(*scene);
     return writer.written();
   };
@@ -163,11 +163,11 @@ Bytes EncodeScene(const Result<ImportedScene>& scene) {
 
 Result<ImportedScene> DecodeScene(std::span<const std::uint8_t> bytes) {
   const Status broken = DataLoss("the importer handed over data that is not whole");
-  Reader reader(bytes);
+  SceneReader reader(bytes);
   std::uint32_t magic = 0, code = 0;
   std::string message;
   reader(magic, code, message);
-  if (!reader.good() || magic != kMagic) return broken;
+  if (!reader.good() || magic != kSceneMagic) return broken;
   if (code != static_cast<std::uint32_t>(StatusCode::kOk)) {
     return message.empty() ? broken : DataLoss("{}", message);
   }

@@ -32,18 +32,18 @@ constexpr std::array<TypeRow, 11> kTypes = {{{NpyType::kBool, "b1", 1, "bool"},
 
 const TypeRow& Row(NpyType type) { return kTypes[static_cast<std::size_t>(type)]; }
 
-constexpr std::string_view kMagic = "\x93NUMPY";
-constexpr std::size_t kMaxRank = 8;
+constexpr std::string_view kNpyMagic = "\x93NUMPY";
+constexpr std::size_t kMaxNpyRank = 8;
 
 // What the Python dictionary in the header says.
-struct Header {
+struct NpyHeader {
   std::string descr;
   bool fortran = false;
   std::vector<std::size_t> shape;
 };
 
 // The text after 'key': in a dictionary literal; the writer's spacing is not relied upon.
-std::optional<std::string_view> ValueOf(std::string_view dictionary, std::string_view key) {
+std::optional<std::string_view> HeaderValue(std::string_view dictionary, std::string_view key) {
   for (const char quote : {'\'', '"'}) {
     const std::string quoted = quote + std::string(key) + quote;
     const auto at = dictionary.find(quoted);
@@ -69,30 +69,30 @@ std::optional<std::vector<std::size_t>> ParseShape(std::string_view text) {
     }
     std::size_t value = 0;
     const auto [next, error] = std::from_chars(at, last, value);
-    if (error != std::errc() || shape.size() == kMaxRank) return std::nullopt;
+    if (error != std::errc() || shape.size() == kMaxNpyRank) return std::nullopt;
     shape.push_back(value);
     at = next;
   }
   return shape;
 }
 
-std::optional<Header> ParseHeader(std::string_view text) {
-  const auto descr = ValueOf(text, "descr"), order = ValueOf(text, "fortran_order"),
-             shape = ValueOf(text, "shape");
+std::optional<NpyHeader> ParseHeader(std::string_view text) {
+  const auto descr = HeaderValue(text, "descr"), order = HeaderValue(text, "fortran_order"),
+             shape = HeaderValue(text, "shape");
   if (!descr || !order || !shape || descr->empty()) return std::nullopt;
   const auto close = descr->find(descr->front(), 1);
   const auto dims = ParseShape(*shape);
   const bool fortran = order->starts_with("True");
   if (close == std::string_view::npos || !dims || !(fortran || order->starts_with("False")))
     return std::nullopt;
-  return Header{std::string(descr->substr(1, close - 1)), fortran, *dims};
+  return NpyHeader{std::string(descr->substr(1, close - 1)), fortran, *dims};
 }
 
 // Splits magic, version and header length off; returns the header text and where data begins.
 std::optional<std::pair<std::string_view, std::size_t>> SplitHeader(
     std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (bytes.size() < 12 || !text.starts_with(kMagic)) return std::nullopt;
+  if (bytes.size() < 12 || !text.starts_with(kNpyMagic)) return std::nullopt;
   const int version = bytes[6];
   if (version < 1 || version > 3) return std::nullopt;
   const std::size_t fixed = version == 1 ? 10 : 12;
@@ -173,7 +173,7 @@ Bytes EncodeNpy(const NpyArray& array) {
   constexpr std::size_t kFixed = 10, kAlign = 64;  // data starts at a multiple of 64
   header.resize((kFixed + header.size() + 1 + kAlign - 1) / kAlign * kAlign - kFixed - 1, ' ');
   header += '\n';
-  std::string prefix(kMagic);
+  std::string prefix(kNpyMagic);
   prefix += {1, 0, static_cast<char>(header.size()), static_cast<char>(header.size() >> 8)};
   prefix += header;
   Bytes out(prefix.begin(), prefix.end());

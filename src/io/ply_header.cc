@@ -18,17 +18,17 @@ struct TypeName {
   PlyType type;
   std::size_t size;
 };
-constexpr std::array<TypeName, 8> kTypes = {{{"char", "int8", PlyType::kI8, 1},
-                                             {"uchar", "uint8", PlyType::kU8, 1},
-                                             {"short", "int16", PlyType::kI16, 2},
-                                             {"ushort", "uint16", PlyType::kU16, 2},
-                                             {"int", "int32", PlyType::kI32, 4},
-                                             {"uint", "uint32", PlyType::kU32, 4},
-                                             {"float", "float32", PlyType::kF32, 4},
-                                             {"double", "float64", PlyType::kF64, 8}}};
+constexpr std::array<TypeName, 8> kPlyTypes = {{{"char", "int8", PlyType::kI8, 1},
+                                                {"uchar", "uint8", PlyType::kU8, 1},
+                                                {"short", "int16", PlyType::kI16, 2},
+                                                {"ushort", "uint16", PlyType::kU16, 2},
+                                                {"int", "int32", PlyType::kI32, 4},
+                                                {"uint", "uint32", PlyType::kU32, 4},
+                                                {"float", "float32", PlyType::kF32, 4},
+                                                {"double", "float64", PlyType::kF64, 8}}};
 
 bool ParseType(std::string_view token, PlyType& type) {
-  for (const TypeName& row : kTypes) {
+  for (const TypeName& row : kPlyTypes) {
     if (token != row.name && token != row.sized_name) continue;
     type = row.type;
     return true;
@@ -114,7 +114,7 @@ Status CheckCounts(const PlyHeader& header, const std::string& place) {
 
 }  // namespace
 
-std::size_t PlyTypeSize(PlyType type) { return kTypes[static_cast<std::size_t>(type)].size; }
+std::size_t PlyTypeSize(PlyType type) { return kPlyTypes[static_cast<std::size_t>(type)].size; }
 
 std::size_t PlyHeader::CountOf(std::string_view element) const {
   for (const PlyElement& e : elements) {

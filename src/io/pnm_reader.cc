@@ -19,9 +19,9 @@ bool IsSpace(std::uint8_t c) {
 }
 
 // Numbers with white space and comments before each.
-class Header {
+class PnmHeader {
  public:
-  Header(ByteSpan bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+  PnmHeader(ByteSpan bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
   Result<int> Number() {
     PassSpace();
@@ -68,7 +68,7 @@ bool IsPnm(ByteSpan bytes) {
 }
 
 Result<ImageU8> DecodePnm(ByteSpan bytes, const std::string& name) {
-  Header header(bytes, name);
+  PnmHeader header(bytes, name);
   TILEGRAD_ASSIGN(const int width, header.Number());
   TILEGRAD_ASSIGN(const int height, header.Number());
   TILEGRAD_ASSIGN(const int most, header.Number());

@@ -13,7 +13,7 @@ using ByteSpan = std::span<const std::uint8_t>;
 // A TGA's header, and that of a BMP up to its bits a pixel.
 constexpr std::size_t kTgaHeader = 18, kBmpHeader = 30;
 
-std::size_t LittleEndian(ByteSpan bytes, std::size_t at, int size) {
+std::size_t LittleEndianAt(ByteSpan bytes, std::size_t at, int size) {
   std::size_t value = 0;
   for (int i = 0; i < size; ++i) value |= std::size_t{bytes[at + i]} << 8 * i;
   return value;
@@ -32,8 +32,8 @@ std::size_t ColorsOfBmp(std::size_t offset, std::size_t header) {
 
 Status CheckBmp(ByteSpan bytes, std::size_t width, std::size_t height, const std::string& name) {
   if (bytes.size() < kBmpHeader) return Truncated(name, "BMP", kBmpHeader, bytes.size());
-  const std::size_t offset = LittleEndian(bytes, 10, 4), header = LittleEndian(bytes, 14, 4),
-                    bits = LittleEndian(bytes, header == 12 ? 24 : 28, 2);
+  const std::size_t offset = LittleEndianAt(bytes, 10, 4), header = LittleEndianAt(bytes, 14, 4),
+                    bits = LittleEndianAt(bytes, header == 12 ? 24 : 28, 2);
   const std::size_t used = (width * bits + 7) / 8, row = (used + 3) / 4 * 4;
   const std::size_t end = offset + (height - 1) * row + used;
   if (end > bytes.size()) return Truncated(name, "BMP", end, bytes.size());
@@ -68,7 +68,7 @@ Status CheckTga(ByteSpan bytes, std::size_t pixels, const std::string& name) {
   const bool palette = bytes[1] != 0, packed = bytes[2] >= 8;
   const std::size_t bits = bytes[16], bytes_of_color = (bytes[7] + std::size_t{7}) / 8;
   std::size_t at = kTgaHeader + bytes[0];
-  if (palette) at += LittleEndian(bytes, 3, 2) + LittleEndian(bytes, 5, 2) * bytes_of_color;
+  if (palette) at += LittleEndianAt(bytes, 3, 2) + LittleEndianAt(bytes, 5, 2) * bytes_of_color;
   const std::size_t pixel_bytes = palette ? (bits == 8 ? 1 : 2) : (bits + 7) / 8;
   const std::size_t end =
       packed ? EndOfPackets(bytes, at, pixels, pixel_bytes) : at + pixels * pixel_bytes;

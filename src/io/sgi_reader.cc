@@ -3,6 +3,7 @@
 
 #include "base/read_budget.h"
 #include "io/image_check.h"
+#include "io/image_header.h"
 
 namespace tilegrad::io {
 namespace {
@@ -12,23 +13,17 @@ using ByteSpan = std::span<const std::uint8_t>;
 constexpr std::size_t kHeaderBytes = 512;
 constexpr int kMostChannels = 4;
 
-std::uint32_t BigEndian(ByteSpan bytes) {
-  std::uint32_t value = 0;
-  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
-  return value;
-}
-
 std::uint8_t ToByte(std::uint32_t sample, std::size_t bytes) {
   return static_cast<std::uint8_t>(bytes == 1 ? sample : (sample * 255 + 32767) / 65535);
 }
 
-struct Header {
+struct SgiHeader {
   bool runs = false;             // rows are run-length encoded
   std::size_t sample_bytes = 1;  // 1 or 2
   int width = 0, height = 1, channels = 1;
 };
 
-Result<Header> ReadHeader(ByteSpan bytes, const std::string& name) {
+Result<SgiHeader> ReadHeader(ByteSpan bytes, const std::string& name) {
   if (bytes.size() < kHeaderBytes) {
     return DataLoss("{}: truncated SGI image: a header has {} bytes, {} are there", name,
                     kHeaderBytes, bytes.size());
@@ -44,7 +39,7 @@ Result<Header> ReadHeader(ByteSpan bytes, const std::string& name) {
   if (colormap != 0)
     return DataLoss("{}: an SGI image with a palette (colour map {}); save it as RGB", name,
                     colormap);
-  Header header{.runs = bytes[2] == 1, .sample_bytes = bytes[3]};
+  SgiHeader header{.runs = bytes[2] == 1, .sample_bytes = bytes[3]};
   header.width = static_cast<int>(BigEndian(bytes.subspan(6, 2)));
   if (dimensions > 1) header.height = static_cast<int>(BigEndian(bytes.subspan(8, 2)));
   if (dimensions > 2) header.channels = static_cast<int>(BigEndian(bytes.subspan(10, 2)));
@@ -55,9 +50,9 @@ Result<Header> ReadHeader(ByteSpan bytes, const std::string& name) {
   return header;
 }
 
-class Reader {
+class SgiReader {
  public:
-  Reader(ByteSpan bytes, const Header& header, const std::string& name)
+  SgiReader(ByteSpan bytes, const SgiHeader& header, const std::string& name)
       : bytes_(bytes),
         header_(header),
         name_(name),
@@ -136,7 +131,7 @@ class Reader {
   }
 
   ByteSpan bytes_;
-  const Header header_;
+  const SgiHeader header_;
   const std::string& name_;
   const std::size_t rows_, row_bytes_;  // rows of all channels; bytes of one that is not encoded
   ImageU8 image_;
@@ -147,8 +142,8 @@ class Reader {
 bool IsSgi(ByteSpan bytes) { return bytes.size() > 2 && bytes[0] == 0x01 && bytes[1] == 0xda; }
 
 Result<ImageU8> DecodeSgi(ByteSpan bytes, const std::string& name) {
-  TILEGRAD_ASSIGN(const Header header, ReadHeader(bytes, name));
-  return Reader(bytes, header, name).Read();
+  TILEGRAD_ASSIGN(const SgiHeader header, ReadHeader(bytes, name));
+  return SgiReader(bytes, header, name).Read();
 }
 
 }  // namespace tilegrad::io

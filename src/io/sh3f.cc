@@ -10,7 +10,7 @@
 namespace tilegrad::io {
 namespace {
 
-void AppendUtf8(std::string& out, unsigned code) {
+void AppendUtf16Unit(std::string& out, unsigned code) {
   if (code < 0x80) {
     out += static_cast<char>(code);
   } else if (code < 0x800) {
@@ -53,7 +53,7 @@ std::string Unescape(std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto c = static_cast<unsigned char>(text[i]);
     if (c != '\\' || i + 1 == text.size()) {
-      AppendUtf8(out, c);
+      AppendUtf16Unit(out, c);
       continue;
     }
     const char next = text[++i];
@@ -61,7 +61,7 @@ std::string Unescape(std::string_view text) {
     if (next == 'u' && i + 4 < text.size() &&
         std::from_chars(text.data() + i + 1, text.data() + i + 5, code, 16).ptr ==
             text.data() + i + 5) {
-      AppendUtf8(out, code);
+      AppendUtf16Unit(out, code);
       i += 4;
     } else {
       out += next == 'n' ? '\n' : next == 't' ? '\t' : next == 'r' ? '\r' : next;

@@ -47,6 +47,12 @@ class Shape {
   int rank() const { return rank_; }
   std::int64_t operator[](int axis) const { return extents_[static_cast<std::size_t>(axis)]; }
   std::int64_t& operator[](int axis) { return extents_[static_cast<std::size_t>(axis)]; }
+  // The same with another extent of one axis.
+  Shape With(int axis, std::int64_t extent) const {
+    Shape other = *this;
+    other[axis] = extent;
+    return other;
+  }
   void Append(std::int64_t extent) {
     assert(rank_ < kMaxRank);
     extents_[static_cast<std::size_t>(rank_++)] = extent;

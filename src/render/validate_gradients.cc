@@ -13,13 +13,6 @@
 namespace tilegrad {
 namespace {
 
-std::string SceneName(std::size_t n) { return fmt::format("scene {}", n); }
-
-template <class T>
-bool SameArray(std::span<T> a, std::span<T> b) {
-  return a.data() == b.data() && a.size() == b.size();
-}
-
 Status CheckWanted(const char* kind, const char* array, std::size_t got, std::size_t expected) {
   if (got == 0 || got == expected) return {};
   return InvalidArgument("{}.{} has {} numbers, expected {}", kind, array, got, expected);

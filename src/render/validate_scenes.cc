@@ -17,8 +17,6 @@ namespace {
 
 constexpr float kMostShininess = 1e6f;
 
-std::string SceneName(std::size_t n) { return fmt::format("scene {}", n); }
-
 template <class Enum>
 Status CheckEnumerator(const char* name, Enum value, Enum last) {
   const int number = static_cast<int>(value), end = static_cast<int>(last);
@@ -68,11 +66,6 @@ Status CheckDirections(const SceneT<T>& scene) {
 
 // Many views of one mesh share its arrays: what was checked for the scene before is not looked
 // through again.
-template <class T>
-bool SameArray(std::span<T> a, std::span<T> b) {
-  return a.data() == b.data() && a.size() == b.size();
-}
-
 template <class T>
 Status CheckMesh(const SceneT<T>& scene, const SceneT<T>& known) {
   const PipelineSceneT<T> mesh = PipelineSceneOf(scene);

@@ -13,7 +13,7 @@
 namespace tilegrad {
 namespace {
 
-constexpr float kMostTurn = 0.5f;  // cosine: faces turn by less than 60 degrees a collapse
+constexpr float kMostCollapseTurn = 0.5f;  // cosine: faces turn by less than 60 degrees a collapse
 constexpr double kTowardsMiddle =
     1e-3;                        // of a quadric's weight: holds vertices in planes and lines
 constexpr double kShape = 1e-6;  // of an edge's squared length, as error: short ones first
@@ -78,7 +78,8 @@ class Simplification {
       if (IsTooFar(next)) break;
       if (!mesh_.CanCollapse(next.a, next.b)) continue;
       const auto place = glm::vec3(BestOf(next.a, next.b).place + glm::dvec3(origin_));
-      if (mesh_.CollapseTurnsFaces(next.a, next.b, place, kMostTurn) || IsTooLong(next, place))
+      if (mesh_.CollapseTurnsFaces(next.a, next.b, place, kMostCollapseTurn) ||
+          IsTooLong(next, place))
         continue;
       Take(next, place);
     }

@@ -232,7 +232,7 @@ py::tuple AntialiasBackward(const py::array& color, const AntialiasCall& call,
   return py::make_tuple(d_color, d_pos);
 }
 
-void BindRasterize(py::module_& m) {
+void BindNvdiffrastRasterize(py::module_& m) {
   py::class_<NvdiffrastRasterizer>(
       m, "NvdiffrastRasterizer",
       "Memory that rasterizing reuses. Several threads may share one: whoever finds it at work\n"
@@ -333,7 +333,7 @@ void BindAntialias(py::module_& m) {
 }  // namespace
 
 void BindNvdiffrast(py::module_& m) {
-  BindRasterize(m);
+  BindNvdiffrastRasterize(m);
   BindInterpolate(m);
   BindAntialias(m);
   BindNvdiffrastTexture(m);

@@ -14,11 +14,11 @@ namespace tilegrad::train {
 namespace {
 
 constexpr int kBlock = 8;           // points along a side of what is decided as one
-constexpr int kCoarse = 64;         // points along a side of the cube that is searched first
+constexpr int kCoarseSide = 64;     // points along a side of the cube that is searched first
 constexpr float kSlack = 1.5f;      // pixels: of distances, which are not exact, and of lenses
 constexpr float kFirstSide = 6.0f;  // of the search, in radii of the sphere that masks suggest
 constexpr int kMostDoublings = 3;   // of the side
-constexpr float kMargin = 3;        // cells between the hull and the grid's border
+constexpr float kBorderCells = 3;   // cells between the hull and the grid's border
 constexpr float kOutside = -1, kInside = 1;  // where no distance is needed, in cells
 
 struct View {
@@ -158,15 +158,15 @@ class Carver {
 };
 
 // Where the hull may be, on a coarse grid of balls over a cube around `middle`.
-Box Search(const Carver& carver, glm::vec3 middle, float side, const Workers& workers) {
-  const float step = side / kCoarse, radius = 0.5f * std::sqrt(3.0f) * step;
+Box SearchCells(const Carver& carver, glm::vec3 middle, float side, const Workers& workers) {
+  const float step = side / kCoarseSide, radius = 0.5f * std::sqrt(3.0f) * step;
   const auto centre = [&](int i, int j, int k) {
     return middle - 0.5f * side + step * (glm::vec3(i, j, k) + 0.5f);
   };
-  std::vector<Box> layers(kCoarse);
-  workers.For(kCoarse, [&](std::size_t x, std::size_t) {
-    for (int j = 0; j < kCoarse; ++j) {
-      for (int k = 0; k < kCoarse; ++k) {
+  std::vector<Box> layers(kCoarseSide);
+  workers.For(kCoarseSide, [&](std::size_t x, std::size_t) {
+    for (int j = 0; j < kCoarseSide; ++j) {
+      for (int k = 0; k < kCoarseSide; ++k) {
         const glm::vec3 c = centre(static_cast<int>(x), j, k);
         if (carver.Judge(c, radius) == Verdict::kOut) continue;
         layers[x].Add(c - 0.5f * step), layers[x].Add(c + 0.5f * step);
@@ -182,7 +182,7 @@ Box Search(const Carver& carver, glm::vec3 middle, float side, const Workers& wo
 // Twice, so that the second grid is fine where the hull is.
 Box FindHull(const Carver& carver, const Sphere& sphere, const Workers& workers) {
   float side = kFirstSide * sphere.radius;
-  Box box = Search(carver, sphere.centre, side, workers);
+  Box box = SearchCells(carver, sphere.centre, side, workers);
   const auto touches = [&] {
     const glm::vec3 reach =
         glm::max(glm::abs(box.low - sphere.centre), glm::abs(box.high - sphere.centre));
@@ -190,12 +190,12 @@ Box FindHull(const Carver& carver, const Sphere& sphere, const Workers& workers)
   };
   for (int i = 0; i < kMostDoublings && !box.empty() && touches(); ++i) {
     side *= 2;
-    box = Search(carver, sphere.centre, side, workers);
+    box = SearchCells(carver, sphere.centre, side, workers);
   }
   if (box.empty()) return box;
   const glm::vec3 extent = box.high - box.low;
-  return Search(carver, 0.5f * (box.low + box.high), std::max({extent.x, extent.y, extent.z}),
-                workers);
+  return SearchCells(carver, 0.5f * (box.low + box.high), std::max({extent.x, extent.y, extent.z}),
+                     workers);
 }
 
 Status NothingLeft() {
@@ -219,7 +219,7 @@ Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options,
   std::array<int, 3> size;
   for (int a = 0; a < 3; ++a)
     size[static_cast<std::size_t>(a)] =
-        static_cast<int>(std::ceil(extent[a] / cell + 2 * kMargin)) + 1;
+        static_cast<int>(std::ceil(extent[a] / cell + 2 * kBorderCells)) + 1;
   const glm::vec3 points(size[0] - 1, size[1] - 1, size[2] - 1);
   ScalarGrid grid = carver.Fill(middle - 0.5f * cell * points, cell, size);
   if (std::none_of(grid.values.begin(), grid.values.end(), [](float v) { return v > 0; }))

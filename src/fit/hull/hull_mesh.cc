@@ -13,7 +13,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kSpeck = 8;  // cells' volumes: parts of less are left out
+constexpr double kSpeckCells = 8;  // cells' volumes: parts of less are left out
 // Taubin's two steps (A signal processing approach to fair surface design, 1995), which smooth what
 // the grid left without shrinking.
 constexpr float kShrink = 0.5f, kGrow = -0.53f;
@@ -84,7 +84,7 @@ void DropSpecks(double volume, Mesh* mesh) {
 Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers) {
   TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options.carve, workers));
   Mesh mesh = LevelSet(grid);
-  DropSpecks(kSpeck * std::pow(static_cast<double>(grid.cell), 3), &mesh);
+  DropSpecks(kSpeckCells * std::pow(static_cast<double>(grid.cell), 3), &mesh);
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
   const double pixel = static_cast<double>(grid.cell) / options.carve.cell_pixels;

@@ -9,9 +9,9 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr float kInside = 0.5f;
-constexpr int kSamples = 2;      // a side of a crop's pixel
-constexpr double kMargin = 1.1;  // of the square, so that outlines stay inside
+constexpr float kInsideShare = 0.5f;
+constexpr int kCropSamples = 2;      // a side of a crop's pixel
+constexpr double kCropMargin = 1.1;  // of the square, so that outlines stay inside
 
 struct Square {
   double x = 0, y = 0, side = 0;  // pixels; the middle
@@ -21,14 +21,14 @@ std::optional<Square> SquareAround(const CropSource& image) {
   int left = image.width, right = -1, top = image.height, bottom = -1;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
-      if (image.alpha[static_cast<std::size_t>(y * image.width + x)] < kInside) continue;
+      if (image.alpha[static_cast<std::size_t>(y * image.width + x)] < kInsideShare) continue;
       left = std::min(left, x), right = std::max(right, x);
       top = std::min(top, y), bottom = std::max(bottom, y);
     }
   }
   if (right < left) return std::nullopt;
   return Square{0.5 * (left + right + 1), 0.5 * (top + bottom + 1),
-                kMargin * (std::max(right - left, bottom - top) + 1)};
+                kCropMargin * (std::max(right - left, bottom - top) + 1)};
 }
 
 // Adds the bilinear sample at (x, y), which counts pixel centres at +0.5, to pixel `to`.
@@ -40,7 +40,7 @@ void AddSample(const CropSource& image, double x, double y, std::size_t to, Crop
     const int column = left + k % 2, row = top + k / 2;
     if (column < 0 || row < 0 || column >= image.width || row >= image.height) continue;
     const double weight = (k % 2 == 1 ? u - left : 1 - (u - left)) *
-                          (k / 2 == 1 ? v - top : 1 - (v - top)) / (kSamples * kSamples);
+                          (k / 2 == 1 ? v - top : 1 - (v - top)) / (kCropSamples * kCropSamples);
     const auto p = static_cast<std::size_t>(row * image.width + column);
     const float share = static_cast<float>(weight) * image.alpha[p];
     crop->alpha[to] += share;
@@ -65,11 +65,11 @@ std::optional<Crop> CropOf(const CropSource& image, const Camera& camera) {
   if (!square) return std::nullopt;
   Crop out;
   out.alpha.resize(kCropPixels), out.color.resize(3 * kCropPixels);
-  const double step = square->side / (kCropSide * kSamples);
+  const double step = square->side / (kCropSide * kCropSamples);
   const double left = square->x - 0.5 * square->side, top = square->y - 0.5 * square->side;
-  for (int j = 0; j < kCropSide * kSamples; ++j) {
-    for (int i = 0; i < kCropSide * kSamples; ++i) {
-      const auto to = static_cast<std::size_t>(j / kSamples * kCropSide + i / kSamples);
+  for (int j = 0; j < kCropSide * kCropSamples; ++j) {
+    for (int i = 0; i < kCropSide * kCropSamples; ++i) {
+      const auto to = static_cast<std::size_t>(j / kCropSamples * kCropSide + i / kCropSamples);
       AddSample(image, left + (i + 0.5) * step, top + (j + 0.5) * step, to, &out);
     }
   }
@@ -84,7 +84,7 @@ double CropCost(const Crop& a, const Crop& b, double color_weight) {
   for (std::size_t p = 0; p < kCropPixels; ++p) {
     both += std::min(a.alpha[p], b.alpha[p]);
     either += std::max(a.alpha[p], b.alpha[p]);
-    if (a.alpha[p] < kInside || b.alpha[p] < kInside) continue;
+    if (a.alpha[p] < kInsideShare || b.alpha[p] < kInsideShare) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t i = c * kCropPixels + p;
       gap += std::abs(a.color[i] - b.color[i]);

@@ -19,7 +19,7 @@ namespace tilegrad::train {
 namespace {
 
 // Chosen on twelve models (docs/lab/poses.md).
-constexpr int kSide = 64, kLevel = 3;           // pixels and template of the search
+constexpr int kPoseSide = 64, kLevel = 3;       // pixels and template of the search
 constexpr int kFineSide = 128, kFineLevel = 4;  // of the last refinement
 // With a third of these steps half of the pictures are looked for around a mesh that tells nothing.
 constexpr int kShapeSteps = 150;
@@ -28,7 +28,7 @@ constexpr int kJointSteps = 40, kWarmUp = 60, kFinalSteps = 150, kFineSteps = 30
 constexpr double kStays = 12;  // degrees: nearer viewpoints are what descent does better
 constexpr double kRepulsion = 0.1, kReach = 35;  // at the first sweep; degrees
 constexpr double kAgree = 12;                    // degrees, mean
-constexpr double kDistance = 1.6;
+constexpr double kCameraDistance = 1.6;
 
 struct Start {
   std::vector<Camera> cameras;
@@ -42,9 +42,9 @@ double MeanGap(std::span<const Camera> a, std::span<const Camera> b) {
   return sum / static_cast<double>(a.size());
 }
 
-class Search {
+class PoseSearch {
  public:
-  Search(const PosePictures& pictures, const Workers& workers, std::uint64_t seed, int start)
+  PoseSearch(const PosePictures& pictures, const Workers& workers, std::uint64_t seed, int start)
       : pictures_(pictures),
         renderer_(workers),
         unlike_(Unlikeness(pictures)),
@@ -73,17 +73,17 @@ class Search {
 };
 
 // Evenly over the sphere, between the elevations of usual photographs.
-void Search::Scatter() {
+void PoseSearch::Scatter() {
   for (std::size_t i = 0; i < all_.size(); ++i) {
     const double elevation = std::asin(rng_.Uniform(-0.4, 0.94)) * 180 / std::numbers::pi;
-    const Camera camera = OrbitCamera({}, rng_.Uniform(0, 360), elevation, kDistance);
+    const Camera camera = OrbitCamera({}, rng_.Uniform(0, 360), elevation, kCameraDistance);
     Crop sphere;
-    sphere.side = 1 / kDistance;
+    sphere.side = 1 / kCameraDistance;
     estimate_.Place(i, Aligned(sphere, pictures_.crops[i], camera));
   }
 }
 
-double Search::Repulsion(std::size_t picture, const Camera& there) const {
+double PoseSearch::Repulsion(std::size_t picture, const Camera& there) const {
   double sum = 0;
   for (std::size_t j = 0; j < all_.size(); ++j) {
     const double near = 1 - DirectionGap(there, estimate_.cameras()[j]) / kReach;
@@ -92,7 +92,7 @@ double Search::Repulsion(std::size_t picture, const Camera& there) const {
   return sum;
 }
 
-Result<bool> Search::LookForPictures(std::span<const int> pictures, double repulsion) {
+Result<bool> PoseSearch::LookForPictures(std::span<const int> pictures, double repulsion) {
   estimate_.Normalize();
   TILEGRAD_ASSIGN(const std::vector<Viewpoint> around,
                   LookAround(estimate_.scene(), estimate_.Up(), &renderer_));
@@ -115,7 +115,7 @@ Result<bool> Search::LookForPictures(std::span<const int> pictures, double repul
   return moved;
 }
 
-Result<bool> Search::Sweep(double repulsion) {
+Result<bool> PoseSearch::Sweep(double repulsion) {
   std::vector<int> order = all_;
   for (std::size_t k = 0; k + 1 < order.size(); ++k) {
     std::swap(order[k], order[k + rng_.Below(order.size() - k)]);
@@ -137,7 +137,7 @@ Result<bool> Search::Sweep(double repulsion) {
   return moved;
 }
 
-Result<Start> Search::Finish() {
+Result<Start> PoseSearch::Finish() {
   estimate_.ForgetShape();
   TILEGRAD_TRY(estimate_.Refit({.steps = kWarmUp, .cameras = false}, all_).status());
   Start out;
@@ -168,8 +168,8 @@ Result<std::vector<Camera>> Refine(const PosePictures& pictures, std::span<const
   return out;
 }
 
-Status Check(const TargetImages& images, std::span<const Camera> lenses,
-             const PoseOptions& options) {
+Status CheckPoses(const TargetImages& images, std::span<const Camera> lenses,
+                  const PoseOptions& options) {
   if (options.starts < 1 || options.sweeps < 1) {
     return InvalidArgument("{} starts of {} sweeps: needs one or more", options.starts,
                            options.sweeps);
@@ -211,7 +211,7 @@ class Searches {
 
  private:
   Result<Start> Next(const StopFlag& stop) {
-    Search search(pictures_, workers_, static_cast<std::uint64_t>(options_.seed), starts());
+    PoseSearch search(pictures_, workers_, static_cast<std::uint64_t>(options_.seed), starts());
     bool moved = true;
     for (int sweep = 0; sweep < options_.sweeps && moved; ++sweep) {
       if (stop) return Cancelled("stopped while looking for cameras");
@@ -258,8 +258,8 @@ class Searches {
 Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera> lenses,
                              const PoseOptions& options, const Workers& workers,
                              const ProgressSink& progress, const StopFlag& stop) {
-  TILEGRAD_TRY(Check(images, lenses, options));
-  TILEGRAD_ASSIGN(const PosePictures pictures, PreparePictures(images, lenses, kSide));
+  TILEGRAD_TRY(CheckPoses(images, lenses, options));
+  TILEGRAD_ASSIGN(const PosePictures pictures, PreparePictures(images, lenses, kPoseSide));
   Searches searches(pictures, options, workers, progress);
   TILEGRAD_ASSIGN(const Start best, searches.Run(stop));
   FoundPoses out{{}, best.loss, searches.starts(), searches.agreement()};

@@ -13,7 +13,7 @@ namespace {
 constexpr int kSide = 64;  // pixels of a look around
 constexpr double kDistance = 1.6, kFov = 45;
 constexpr int kAround = 24;  // viewpoints on the horizon
-constexpr double kLowest = -45, kElevationStep = 12.5, kHighest = 80;
+constexpr double kLowestElevation = -45, kElevationStep = 12.5, kHighestElevation = 80;
 constexpr int kLeastAround = 6;
 
 std::vector<Camera> CamerasAround(const glm::dvec3& up) {
@@ -22,7 +22,7 @@ std::vector<Camera> CamerasAround(const glm::dvec3& up) {
   const glm::dvec3 south = glm::cross(east, up);
   const double target[3] = {0, 0, 0}, upward[3] = {up.x, up.y, up.z};
   std::vector<Camera> out;
-  for (double e = kLowest; e <= kHighest; e += kElevationStep) {
+  for (double e = kLowestElevation; e <= kHighestElevation; e += kElevationStep) {
     const double height = std::sin(e * std::numbers::pi / 180),
                  flat = std::sqrt(1 - height * height);
     const int count = std::max(kLeastAround, static_cast<int>(std::lround(kAround * flat)));

@@ -86,10 +86,11 @@ Status CheckNesting(std::string_view json, const std::string& place) {
   return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, at, kMaxJsonNesting);
 }
 
-using Json = nlohmann::json;
+using ParsedJson = nlohmann::json;
 
 // The members of `list` in the document that an index of `object` names; null if there is none.
-const Json* Referred(const Json& document, const char* list, const Json& object, const char* key) {
+const ParsedJson* Referred(const ParsedJson& document, const char* list, const ParsedJson& object,
+                           const char* key) {
   const auto index = object.find(key);
   const auto entries = document.find(list);
   if (index == object.end() || !index->is_number_integer() || entries == document.end() ||
@@ -100,7 +101,7 @@ const Json* Referred(const Json& document, const char* list, const Json& object,
   return i >= 0 && static_cast<std::size_t>(i) < entries->size() ? &(*entries)[i] : nullptr;
 }
 
-std::uint64_t CountOf(const Json& object, const char* key) {
+std::uint64_t CountOf(const ParsedJson& object, const char* key) {
   const auto count = object.find(key);
   return count != object.end() && count->is_number_unsigned() ? count->get<std::uint64_t>() : 0;
 }
@@ -110,12 +111,13 @@ std::uint64_t CountOf(const Json& object, const char* key) {
 // Whatever else is wrong is left to tinygltf, which finds it before.
 Status CheckImages(std::string_view text, const std::string& place) {
   if (text.find("images") == std::string_view::npos) return {};
-  const Json document = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const ParsedJson document = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
   const auto images = document.find("images");
   if (images == document.end() || !images->is_array()) return {};
   for (std::size_t i = 0; i < images->size(); ++i) {
-    const Json* const view = Referred(document, "bufferViews", (*images)[i], "bufferView");
-    const Json* const buffer = view ? Referred(document, "buffers", *view, "buffer") : nullptr;
+    const ParsedJson* const view = Referred(document, "bufferViews", (*images)[i], "bufferView");
+    const ParsedJson* const buffer =
+        view ? Referred(document, "buffers", *view, "buffer") : nullptr;
     if (buffer == nullptr) continue;
     const std::uint64_t begin = CountOf(*view, "byteOffset"), size = CountOf(*buffer, "byteLength");
     if (begin >= size) {

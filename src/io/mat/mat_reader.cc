@@ -12,10 +12,10 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr std::size_t kHeader = 128, kMaxDepth = 16, kMaxRank = 32, kMaxFields = 4096;
+constexpr std::size_t kHeader = 128, kMaxMatDepth = 16, kMaxMatRank = 32, kMaxFields = 4096;
 constexpr std::size_t kPiece = std::size_t{1} << 20;  // arrays grow by this as their bytes arrive
-constexpr std::uint32_t kCell = 1, kStruct = 2, kChar = 4, kFirstNumeric = 6, kLastNumeric = 15;
-constexpr std::uint32_t kComplexFlag = 0x800, kLogicalFlag = 0x200;
+constexpr std::uint32_t kFirstNumeric = 6, kLastNumeric = 15;
+constexpr std::uint32_t kComplexFlag = 0x800;
 
 struct Tag {
   MatType type{};
@@ -117,7 +117,7 @@ class Parser {
 
   Status Dims(MatArray* out) {
     std::vector<std::uint8_t> bytes;
-    TILEGRAD_TRY(Expect(MatType::kInt32, 4 * kMaxRank, "dimensions", &bytes));
+    TILEGRAD_TRY(Expect(MatType::kInt32, 4 * kMaxMatRank, "dimensions", &bytes));
     if (bytes.size() < 8 || bytes.size() % 4 != 0)
       return Damaged("its dimensions are {} bytes", bytes.size());
     out->dims.clear();
@@ -135,7 +135,8 @@ class Parser {
   Status Body(const Tag& tag, MatArray* out, std::string* name, std::size_t depth) {
     if (tag.type != MatType::kMatrix || tag.small)
       return Damaged("expected an array, found type {}", static_cast<std::uint32_t>(tag.type));
-    if (depth == kMaxDepth) return Damaged("arrays within arrays, more than {} deep", kMaxDepth);
+    if (depth == kMaxMatDepth)
+      return Damaged("arrays within arrays, more than {} deep", kMaxMatDepth);
     const std::size_t outside = depth == 0 ? 0 : left_;
     if (depth > 0 && tag.size > outside)
       return Damaged("an array is longer than the array that it is part of");
@@ -239,7 +240,7 @@ class Parser {
   std::size_t left_ = 0;
 };
 
-Status CheckHeader(std::span<const std::uint8_t> bytes, const std::string& name) {
+Status CheckMatHeader(std::span<const std::uint8_t> bytes, const std::string& name) {
   constexpr std::uint8_t kHdf[] = {0x89, 'H', 'D', 'F'};
   if (bytes.size() >= 4 && std::equal(std::begin(kHdf), std::end(kHdf), bytes.begin()))
     return InvalidArgument("{}: a MATLAB file of version 7.3 (HDF5): save it with -v7", name);
@@ -261,7 +262,7 @@ Status CheckHeader(std::span<const std::uint8_t> bytes, const std::string& name)
 
 Result<MatFile> ReadMat(std::span<const std::uint8_t> bytes, const std::string& name) {
   const ReadBudget budget;
-  TILEGRAD_TRY(CheckHeader(bytes, name));
+  TILEGRAD_TRY(CheckMatHeader(bytes, name));
   MatFile file{name, {}};
   std::size_t at = kHeader;
   while (at < bytes.size()) {

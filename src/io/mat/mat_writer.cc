@@ -8,10 +8,9 @@
 namespace tilegrad::io {
 namespace {
 
-constexpr std::uint32_t kCell = 1, kStruct = 2, kChar = 4, kDouble = 6, kUint8 = 9;
-constexpr std::uint32_t kLogicalFlag = 0x200;
+constexpr std::uint32_t kDouble = 6, kUint8 = 9;
 
-class Writer {
+class MatWriter {
  public:
   void Word(std::uint32_t word) { Append({reinterpret_cast<std::uint8_t*>(&word), sizeof word}); }
   void Element(MatType type, std::span<const std::uint8_t> data) {
@@ -49,7 +48,7 @@ std::uint32_t ClassOf(const MatArray& array) {
   }
 }
 
-void Writer::Matrix(const MatArray& array, const std::string& name) {
+void MatWriter::Matrix(const MatArray& array, const std::string& name) {
   Word(static_cast<std::uint32_t>(MatType::kMatrix));
   const std::size_t size_at = bytes.size();
   Word(0);
@@ -63,7 +62,7 @@ void Writer::Matrix(const MatArray& array, const std::string& name) {
   std::memcpy(&bytes[size_at], &size, sizeof size);
 }
 
-void Writer::FieldNames(const std::vector<std::string>& fields) {
+void MatWriter::FieldNames(const std::vector<std::string>& fields) {
   std::size_t longest = 0;
   for (const std::string& field : fields) longest = std::max(longest, field.size());
   const std::int32_t length = static_cast<std::int32_t>(longest) + 1;
@@ -76,7 +75,7 @@ void Writer::FieldNames(const std::vector<std::string>& fields) {
   Elements(MatType::kInt8, std::span<const char>(names));
 }
 
-void Writer::Content(const MatArray& array) {
+void MatWriter::Content(const MatArray& array) {
   if (array.kind == MatKind::kText) {
     std::vector<std::uint16_t> units;  // MATLAB's own characters; of ASCII the same as UTF-8
     for (const char c : array.text) units.push_back(static_cast<std::uint8_t>(c));
@@ -95,7 +94,7 @@ void Writer::Content(const MatArray& array) {
   Elements(MatType::kUint8, std::span<const std::uint8_t>(flags));
 }
 
-Bytes Header() {
+Bytes WriteHeader() {
   constexpr std::string_view kText = "MATLAB 5.0 MAT-file, written by tilegrad";
   Bytes header(128, ' ');
   std::ranges::copy(kText, header.begin());
@@ -107,14 +106,14 @@ Bytes Header() {
 }  // namespace
 
 Bytes EncodeMat(const MatVariables& variables, MatPacking packing) {
-  Writer file;
-  file.bytes = Header();
+  MatWriter file;
+  file.bytes = WriteHeader();
   for (const auto& [name, array] : variables) {
     if (packing == MatPacking::kPlain) {
       file.Matrix(array, name);
       continue;
     }
-    Writer variable;
+    MatWriter variable;
     variable.Matrix(array, name);
     const Bytes packed = Deflated(variable.bytes);
     file.Word(static_cast<std::uint32_t>(MatType::kCompressed));

@@ -13,13 +13,6 @@
 namespace tilegrad::io {
 namespace {
 
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return lower;
-}
-
 // What only other ways of lighting use.
 bool IsOfOtherLighting(std::string_view keyword) {
   constexpr std::array<std::string_view, 14> kKeywords = {

@@ -6,10 +6,10 @@
 namespace tilegrad::nn {
 namespace {
 
-constexpr std::size_t kGrain = 16384;  // elements to a task
+constexpr std::size_t kCopyGrain = 16384;  // elements to a task
 
 std::size_t RowsPerTask(std::size_t length) {
-  return std::max<std::size_t>(1, kGrain / std::max<std::size_t>(1, length));
+  return std::max<std::size_t>(1, kCopyGrain / std::max<std::size_t>(1, length));
 }
 
 template <class T>

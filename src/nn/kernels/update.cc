@@ -4,7 +4,7 @@
 namespace tilegrad::nn {
 namespace {
 
-constexpr std::size_t kGrain = 65536;  // elements to a task
+constexpr std::size_t kUpdateGrain = 65536;  // elements to a task
 
 }  // namespace
 
@@ -16,7 +16,7 @@ void SgdStep(const SgdProblem<T>& problem, const Workers& workers) {
   // p - rate (ahead g + along v)
   const auto ahead = static_cast<T>(c.nesterov ? 1 : 0);
   const T along = c.nesterov ? momentum : T(1);
-  workers.ForRanges(problem.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
+  workers.ForRanges(problem.n, kUpdateGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
       const T g = scale * problem.gradient[i] + decay * problem.parameter[i];
       problem.v[i] = momentum * problem.v[i] + g;
@@ -28,7 +28,7 @@ void SgdStep(const SgdProblem<T>& problem, const Workers& workers) {
 template <class T>
 void Blend(const BlendShape& shape, const T* x, T* y, const Workers& workers) {
   const auto decay = static_cast<T>(shape.decay), rest = static_cast<T>(1 - shape.decay);
-  workers.ForRanges(shape.n, kGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
+  workers.ForRanges(shape.n, kUpdateGrain, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) y[i] = decay * y[i] + rest * x[i];
   });
 }

@@ -9,11 +9,6 @@
 namespace tilegrad::nn {
 namespace {
 
-Shape WithExtent(Shape shape, int axis, std::int64_t extent) {
-  shape[axis] = extent;
-  return shape;
-}
-
 // Why elements below `extent` cannot be addressed by `indices`, or OK.
 Status CheckIndices(const char* op, const Tensor& indices, std::int64_t extent) {
   if (indices.empty() || indices.dtype() != DType::kI32) {
@@ -49,7 +44,7 @@ Var Gather(const Var& x, int axis, const Tensor& indices) {
   if (const Status s = CheckRows("gather", x.shape(), axis, indices, extent); !s.ok()) {
     return Fail(x, s);
   }
-  const Shape picked = WithExtent(x.shape(), axis, indices.shape()[0]);
+  const Shape picked = x.shape().With(axis, indices.shape()[0]);
   if (!IsPossibleResult("gather", x, picked)) return Invalid({&x});
   Tensor y = x.context().Empty(picked, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
@@ -70,7 +65,7 @@ Var ScatterAdd(const Var& x, int axis, const Tensor& indices, std::int64_t exten
     return Fail(x, InvalidArgument("scatter: {} indices for axis {} of {}", indices.shape()[0],
                                    axis, x.shape().ToString()));
   }
-  const Shape whole = WithExtent(x.shape(), axis, extent);
+  const Shape whole = x.shape().With(axis, extent);
   if (!IsPossibleResult("scatter", x, whole)) return Invalid({&x});
   Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {
@@ -96,7 +91,7 @@ Status CheckPicks(const char* op, const Shape& shape, const Tensor& indices, std
   TILEGRAD_TRY(CheckIndices(op, indices, extent));
   const int last = shape.rank() - 1;
   if (last >= 0 && indices.shape().rank() == shape.rank() &&
-      WithExtent(indices.shape(), last, 0) == WithExtent(shape, last, 0)) {
+      indices.shape().With(last, 0) == shape.With(last, 0)) {
     return {};
   }
   return InvalidArgument("{}: indices {} for {}", op, indices.shape().ToString(), shape.ToString());
@@ -128,7 +123,7 @@ Var PlaceAlong(const Var& x, const Tensor& indices, std::int64_t extent) {
                              x.shape().ToString());
   }
   if (!status.ok()) return Fail(x, status);
-  const Shape whole = WithExtent(x.shape(), x.shape().rank() - 1, extent);
+  const Shape whole = x.shape().With(x.shape().rank() - 1, extent);
   if (!IsPossibleResult("place along", x, whole)) return Invalid({&x});
   Tensor y = x.context().Empty(whole, x.dtype());
   WithFloatType(x.dtype(), [&]<class T>(T) {

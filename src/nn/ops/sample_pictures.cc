@@ -26,7 +26,7 @@ Place<T> PlaceOf(T at, std::size_t extent) {
   return {low, 1, cut - static_cast<T>(low), raw > T(0) && raw < last ? pixels / T(2) : T(0)};
 }
 
-struct Sampling {
+struct PictureSampling {
   Tensor pictures, flow;
   std::size_t Extent(const Tensor& t, std::size_t axis) const {
     return static_cast<std::size_t>(t.shape()[static_cast<int>(axis)]);
@@ -89,7 +89,7 @@ Var SamplePictures(const Tensor& pictures, const Var& flow) {
     return Fail(flow,
                 InternalError("pictures {} cannot be looked up at {}", p.ToString(), f.ToString()));
   Context& context = flow.context();
-  const Sampling at{pictures, flow.value()};
+  const PictureSampling at{pictures, flow.value()};
   const auto batch = static_cast<std::size_t>(p[0]);
   Tensor out = context.Empty({p[0], p[1], f[2], f[3]}, flow.dtype());
   WithFloatType(flow.dtype(), [&]<class T>(T) {

@@ -70,11 +70,6 @@ void MoveRows(const RowMove& move, const Var& x, Tensor& y) {
   Copy(box, x, move.begin_x * vx.inner, y, move.begin_y * vy.inner);
 }
 
-Shape WithExtent(Shape shape, int axis, std::int64_t extent) {
-  shape[axis] = extent;
-  return shape;
-}
-
 bool IsPadding(std::int64_t count) { return count >= 0 && count <= Shape::kMostElements; }
 
 }  // namespace
@@ -157,7 +152,7 @@ Var Slice(const Var& x, int axis, std::int64_t begin, std::int64_t end) {
     return Fail(x, InvalidArgument("slice: [{}, {}) of axis {} of {}", begin, end, axis,
                                    x.shape().ToString()));
   }
-  Tensor y = x.context().Empty(WithExtent(x.shape(), axis, end - begin), x.dtype());
+  Tensor y = x.context().Empty(x.shape().With(axis, end - begin), x.dtype());
   const auto first = static_cast<std::size_t>(begin), count = static_cast<std::size_t>(end - begin);
   MoveRows({axis, first, 0, count}, x, y);
   const std::int64_t after = x.shape()[axis] - end;
@@ -173,7 +168,7 @@ Var Pad(const Var& x, int axis, std::int64_t before, std::int64_t after) {
                                    x.shape().ToString()));
   }
   const std::int64_t extent = x.shape()[axis];
-  const Shape padded = WithExtent(x.shape(), axis, before + extent + after);
+  const Shape padded = x.shape().With(axis, before + extent + after);
   if (!IsPossibleResult("pad", x, padded)) return Invalid({&x});
   Tensor y = Zeros(x, padded);
   MoveRows({axis, 0, static_cast<std::size_t>(before), static_cast<std::size_t>(extent)}, x, y);
@@ -187,7 +182,7 @@ namespace {
 // Joining two at a time would copy the first parts repeatedly; this copies each part once.
 Var ConcatChecked(std::span<const Var> parts, int axis, std::int64_t extent) {
   Context& context = parts[0].context();
-  Tensor y = context.Empty(WithExtent(parts[0].shape(), axis, extent), parts[0].dtype());
+  Tensor y = context.Empty(parts[0].shape().With(axis, extent), parts[0].dtype());
   InlineVector<std::int64_t, 8> ends = {0};
   for (const Var& part : parts) {
     const std::int64_t count = part.shape()[axis];
@@ -214,7 +209,7 @@ Var Concat(std::span<const Var> parts, int axis) {
   for (const Var& part : parts) {
     if (!Usable("concat", {&parts[0], &part})) return Invalid({&parts[0], &part});
     if (!HasAxis(first, axis) || part.shape().rank() != first.rank() ||
-        !(WithExtent(part.shape(), axis, 0) == WithExtent(first, axis, 0))) {
+        !(part.shape().With(axis, 0) == first.With(axis, 0))) {
       return Fail(part, InvalidArgument("concat: {} and {} along axis {}", first.ToString(),
                                         part.shape().ToString(), axis));
     }

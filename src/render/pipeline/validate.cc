@@ -41,8 +41,8 @@ Status CheckCameraGradient(const Camera& d_camera) {
 }
 
 template <class T>
-Camera InFloat(const CameraT<T>& c) {
-  const auto cast = [](T x) { return tilegrad::InFloat(x); };
+Camera CameraInFloat(const CameraT<T>& c) {
+  const auto cast = [](T x) { return InFloat(x); };
   Camera out;
   std::transform(std::begin(c.rotation), std::end(c.rotation), out.rotation, cast);
   std::transform(std::begin(c.translation), std::end(c.translation), out.translation, cast);
@@ -111,9 +111,9 @@ Status CheckFaceIds(const PipelineScene& scene, std::span<const std::int32_t> id
   return {};
 }
 
-std::string SceneName(std::size_t index) { return fmt::format("scene {}", index); }
-
 }  // namespace
+
+std::string SceneName(std::size_t n) { return fmt::format("scene {}", n); }
 
 Status CheckShape(const char* array, std::size_t got, std::size_t rows, std::size_t width) {
   if (got == rows * width) return {};
@@ -203,7 +203,7 @@ Status ValidateSceneNumbers(const PipelineSceneT<T>& scene) {
   TILEGRAD_TRY(CheckFaces(scene.faces, scene.positions.size() / 3));
   TILEGRAD_TRY(CheckNumbers("positions", scene.positions));
   TILEGRAD_TRY(CheckNumbers("attributes", scene.attributes));
-  return CheckCamera(InFloat(scene.camera));
+  return CheckCamera(CameraInFloat(scene.camera));
 }
 
 template Status ValidateSceneSizes(const PipelineScene&);

@@ -6,11 +6,21 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 
 #include "render/pipeline/records.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad {
+
+// What errors call the n-th scene of a batch.
+std::string SceneName(std::size_t n);
+
+// Whether both are the same memory: what was checked once need not be checked again.
+template <class T>
+bool SameArray(std::span<T> a, std::span<T> b) {
+  return a.data() == b.data() && a.size() == b.size();
+}
 
 // OK if all values are finite, else an error that names the first one that is not.
 Status CheckFinite(const char* array, std::span<const float> values);

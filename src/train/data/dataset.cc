@@ -12,6 +12,12 @@ Camera CameraRule::View(int index) const {
   return OrbitCamera(lens, azimuth_step * index, elevation, distance);
 }
 
+std::vector<int> SpreadViews(int views, int count) {
+  std::vector<int> out;
+  for (int i = 0; i < count; ++i) out.push_back(i * views / count);
+  return out;
+}
+
 std::size_t CountShapes(const std::vector<ModelInfo>& models) {
   std::set<std::pair<int, std::string>> shapes;
   for (const ModelInfo& model : models) shapes.emplace(model.class_index, ShapeOf(model));

@@ -43,6 +43,9 @@ struct DatasetInfo {
   UpAxis up = UpAxis::kY;            // of the source's meshes; only while the files are made
 };
 
+// `count` of `views`, evenly spread: 0, step, 2 step, ...
+std::vector<int> SpreadViews(int views, int count);
+
 enum class Split { kTrain, kValidation, kTest };
 
 struct ModelInfo {

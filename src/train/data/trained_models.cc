@@ -11,9 +11,9 @@
 namespace tilegrad::train {
 namespace {
 
-Path ListOf(const Path& run) { return run / "training_models.txt"; }
+Path ModelListOf(const Path& run) { return run / "training_models.txt"; }
 
-std::string LineOf(const Dataset& dataset, int index) {
+std::string ModelLine(const Dataset& dataset, int index) {
   const ModelInfo& model = dataset.models()[static_cast<std::size_t>(index)];
   return fmt::format("{:016x} {}/{}", model.geometry,
                      dataset.info().classes[static_cast<std::size_t>(model.class_index)], model.id);
@@ -21,7 +21,7 @@ std::string LineOf(const Dataset& dataset, int index) {
 
 std::string TextOf(const Dataset& dataset) {
   std::string text = fmt::format("recipe {}\n", dataset.info().recipe);
-  for (const int model : dataset.Select(Split::kTrain)) text += LineOf(dataset, model) + "\n";
+  for (const int model : dataset.Select(Split::kTrain)) text += ModelLine(dataset, model) + "\n";
   return text;
 }
 
@@ -55,7 +55,7 @@ bool HasContents(const std::string& list) { return list.find("\ncamera ") != std
 }  // namespace
 
 Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart start) {
-  const Path file = ListOf(run);
+  const Path file = ModelListOf(run);
   const std::string models = TextOf(dataset);
   TILEGRAD_ASSIGN(const std::string contents, ContentsOf(dataset));
   const std::string now = models + contents;
@@ -72,7 +72,7 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart s
 }
 
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
-  const Path file = ListOf(run);
+  const Path file = ModelListOf(run);
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return {};
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
@@ -82,7 +82,8 @@ Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
   const std::vector<int> held_out = dataset.Select(split);
   std::vector<std::string> seen;
   for (const int model : held_out) {
-    if (trained.count(MeshOf(LineOf(dataset, model))) > 0) seen.push_back(LineOf(dataset, model));
+    if (trained.count(MeshOf(ModelLine(dataset, model))) > 0)
+      seen.push_back(ModelLine(dataset, model));
   }
   if (seen.empty()) return {};
   return InvalidArgument(

@@ -17,13 +17,6 @@ namespace tilegrad::train {
 namespace {
 
 constexpr int kColorViews = 4;  // that colours are compared in
-// `count` of `views`, evenly spread: 0, step, 2 step, ...
-std::vector<int> SpreadViews(int views, int count) {
-  std::vector<int> out;
-  for (int i = 0; i < count; ++i) out.push_back(i * views / count);
-  return out;
-}
-
 // The training models, for the baselines that know nothing else.
 struct TrainingShapes {
   std::vector<std::vector<std::uint8_t>> grids;  // of each shape, once

@@ -8,14 +8,14 @@
 namespace tilegrad::train {
 namespace {
 
-using Json = nlohmann::json;
+using ParsedJson = nlohmann::json;
 
-Result<const Json*> Array(const Json& json, const char* key, const std::string& place) {
+Result<const ParsedJson*> Array(const ParsedJson& json, const char* key, const std::string& place) {
   if (json.is_object() && json.contains(key) && json[key].is_array()) return &json[key];
   return DataLoss("{}: \"{}\" must be an array", place, key);
 }
 
-Result<Score> ReadScore(const Json& json, const std::string& place) {
+Result<Score> ReadScore(const ParsedJson& json, const std::string& place) {
   Score score;
   JsonFields fields(json, place);
   const auto read = [&](const char* key, std::optional<double>* out) {
@@ -36,25 +36,26 @@ Result<Score> ReadScore(const Json& json, const std::string& place) {
   return score;
 }
 
-Result<EvaluationRow> ReadRow(const Json& json, std::size_t classes, const std::string& place) {
+Result<EvaluationRow> ReadRow(const ParsedJson& json, std::size_t classes,
+                              const std::string& place) {
   EvaluationRow row;
   JsonFields fields(json, place);
   fields.Read("method", &row.method);
   if (!fields.status().ok()) return fields.status();
-  TILEGRAD_ASSIGN(const Json* scores, Array(json, "classes", place));
+  TILEGRAD_ASSIGN(const ParsedJson* scores, Array(json, "classes", place));
   if (scores->size() != classes)
     return DataLoss("{}: {} scores for {} classes", place, scores->size(), classes);
-  for (const Json& item : *scores) {
+  for (const ParsedJson& item : *scores) {
     TILEGRAD_ASSIGN(const Score score, ReadScore(item, place));
     row.classes.push_back(score);
   }
-  TILEGRAD_ASSIGN(row.mean, ReadScore(json.value("mean", Json()), place + ": \"mean\""));
+  TILEGRAD_ASSIGN(row.mean, ReadScore(json.value("mean", ParsedJson()), place + ": \"mean\""));
   return row;
 }
 
-Status ReadRows(const Json& json, const std::string& place, Evaluation* out) {
-  TILEGRAD_ASSIGN(const Json* rows, Array(json, "rows", place));
-  for (const Json& item : *rows) {
+Status ReadRows(const ParsedJson& json, const std::string& place, Evaluation* out) {
+  TILEGRAD_ASSIGN(const ParsedJson* rows, Array(json, "rows", place));
+  for (const ParsedJson& item : *rows) {
     TILEGRAD_ASSIGN(EvaluationRow row,
                     ReadRow(item, out->classes.size(), place + ": an entry of \"rows\""));
     out->rows.push_back(std::move(row));
@@ -63,9 +64,9 @@ Status ReadRows(const Json& json, const std::string& place, Evaluation* out) {
   return {};
 }
 
-Status ReadClassModels(const Json& json, const std::string& place, Evaluation* out) {
-  TILEGRAD_ASSIGN(const Json* counts, Array(json, "class_models", place));
-  for (const Json& count : *counts) {
+Status ReadClassModels(const ParsedJson& json, const std::string& place, Evaluation* out) {
+  TILEGRAD_ASSIGN(const ParsedJson* counts, Array(json, "class_models", place));
+  for (const ParsedJson& count : *counts) {
     const bool whole = count.is_number_unsigned();
     if (!whole || count.get<std::uint64_t>() > std::numeric_limits<int>::max())
       return DataLoss("{}: \"class_models\" must hold whole numbers from 0 on", place);
@@ -75,9 +76,9 @@ Status ReadClassModels(const Json& json, const std::string& place, Evaluation* o
   return DataLoss("{}: \"class_models\" and \"classes\" differ in length", place);
 }
 
-Status ReadModelScores(const Json& json, const std::string& place, Evaluation* out) {
-  TILEGRAD_ASSIGN(const Json* models, Array(json, "models", place));
-  for (const Json& item : *models) {
+Status ReadModelScores(const ParsedJson& json, const std::string& place, Evaluation* out) {
+  TILEGRAD_ASSIGN(const ParsedJson* models, Array(json, "models", place));
+  for (const ParsedJson& item : *models) {
     const std::string entry = place + ": an entry of \"models\"";
     ModelScore& model = out->models.emplace_back();
     TILEGRAD_ASSIGN(model.score, ReadScore(item, entry));
@@ -97,7 +98,7 @@ Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   if (!std::filesystem::exists(file, error)) return std::optional<Evaluation>();
   const std::string place = file.string();
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
-  TILEGRAD_ASSIGN(const Json json, ParseJson(text, place));
+  TILEGRAD_ASSIGN(const ParsedJson json, ParseJson(text, place));
   Evaluation out;
   JsonFields fields(json, place);
   const int most = std::numeric_limits<int>::max();

@@ -8,12 +8,13 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kSide = kThumbnail, kBytes = 4 * kSide * kSide;
+constexpr std::size_t kThumbnailSide = kThumbnail,
+                      kThumbnailBytes = 4 * kThumbnailSide * kThumbnailSide;
 
 // Adds up to 1024 squares of differences of bytes, which fit in 32 bits.
-std::uint32_t SquaredDistance(const std::uint8_t* a, const std::uint8_t* b) {
+std::uint32_t ThumbnailDistance(const std::uint8_t* a, const std::uint8_t* b) {
   std::uint32_t sum = 0;
-  for (std::size_t i = 0; i < kBytes; ++i) {
+  for (std::size_t i = 0; i < kThumbnailBytes; ++i) {
     const int difference = int{a[i]} - int{b[i]};
     sum += static_cast<std::uint32_t>(difference * difference);
   }
@@ -24,18 +25,19 @@ std::uint32_t SquaredDistance(const std::uint8_t* a, const std::uint8_t* b) {
 
 std::vector<std::uint8_t> Thumbnail(std::span<const std::uint8_t> image, int size) {
   const auto side = static_cast<std::size_t>(size);
-  std::vector<std::uint8_t> out(kBytes);
-  const auto begin = [&](std::size_t i) { return i * side / kSide; };
+  std::vector<std::uint8_t> out(kThumbnailBytes);
+  const auto begin = [&](std::size_t i) { return i * side / kThumbnailSide; };
   const auto end = [&](std::size_t i) { return std::max(begin(i + 1), begin(i) + 1); };
   for (std::size_t c = 0; c < 4; ++c) {
-    for (std::size_t y = 0; y < kSide; ++y) {
-      for (std::size_t x = 0; x < kSide; ++x) {
+    for (std::size_t y = 0; y < kThumbnailSide; ++y) {
+      for (std::size_t x = 0; x < kThumbnailSide; ++x) {
         std::size_t sum = 0, count = 0;
         for (std::size_t j = begin(y); j < end(y); ++j) {
           for (std::size_t i = begin(x); i < end(x); ++i, ++count)
             sum += image[(c * side + j) * side + i];
         }
-        out[(c * kSide + y) * kSide + x] = static_cast<std::uint8_t>((sum + count / 2) / count);
+        out[(c * kThumbnailSide + y) * kThumbnailSide + x] =
+            static_cast<std::uint8_t>((sum + count / 2) / count);
       }
     }
   }
@@ -57,10 +59,11 @@ ImageIndex::Match ImageIndex::Nearest(std::span<const std::uint8_t> image, int s
   std::uint32_t best = std::numeric_limits<std::uint32_t>::max();
   std::size_t at = 0;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
-    const std::uint32_t distance = SquaredDistance(small.data(), &thumbnails_[i * kBytes]);
+    const std::uint32_t distance =
+        ThumbnailDistance(small.data(), &thumbnails_[i * kThumbnailBytes]);
     if (distance < best) best = distance, at = i;
   }
-  return {entries_[at].model, entries_[at].view, std::sqrt(best / double{kBytes}) / 255};
+  return {entries_[at].model, entries_[at].view, std::sqrt(best / double{kThumbnailBytes}) / 255};
 }
 
 }  // namespace tilegrad::train

@@ -13,7 +13,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize, kBytes = 4 * kPixels;
+constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
+                      kPictureBytes = 4 * kPixels;
 
 Path FileOf(const Path& run) { return run / "thumbnails.npz"; }
 
@@ -24,7 +25,7 @@ Path RunOf(const Path& path) {
 }
 
 // Which of `count` are taken so that at most `most` are, evenly spread.
-std::vector<std::size_t> Spread(std::size_t count, std::size_t most) {
+std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
   const std::size_t taken = std::min(count, most);
   std::vector<std::size_t> out;
   for (std::size_t i = 0; i < taken; ++i) out.push_back(i * count / taken);
@@ -48,13 +49,13 @@ ImageU8 Straight(std::span<const std::uint8_t> planar, int size) {
 
 // Of two framed pictures, in [0, 1]: the mean over what either covers of the squared differences of
 // colour and of coverage, which count alike.
-double SquaredDistance(const std::uint8_t* a, const std::uint8_t* b) {
+double PictureDistance(const std::uint8_t* a, const std::uint8_t* b) {
   std::uint32_t color = 0, alpha = 0, covered = 0;  // at most 768 * 255^2
   for (std::size_t i = 0; i < 3 * kPixels; ++i) {
     const int difference = int{a[i]} - int{b[i]};
     color += static_cast<std::uint32_t>(difference * difference);
   }
-  for (std::size_t i = 3 * kPixels; i < kBytes; ++i) {
+  for (std::size_t i = 3 * kPixels; i < kPictureBytes; ++i) {
     const int difference = int{a[i]} - int{b[i]};
     alpha += static_cast<std::uint32_t>(difference * difference);
     covered += std::max(a[i], b[i]);
@@ -93,7 +94,7 @@ TrainingPictures TrainingPictures::Of(const Dataset& dataset, const ImageStore& 
 
 void TrainingPictures::Keep(const ImageStore& store, const Workers& workers) {
   count_ = std::int64_t{store.models} * store.views;
-  const auto chosen = Spread(static_cast<std::size_t>(count_), kMostThumbnails);
+  const auto chosen = SpreadIndices(static_cast<std::size_t>(count_), kMostThumbnails);
   std::vector<std::vector<std::uint8_t>> small(chosen.size());
   const auto model_of = [&](std::size_t i) { return static_cast<int>(chosen[i]) / store.views; };
   workers.For(chosen.size(), [&](std::size_t i, std::size_t) {
@@ -109,7 +110,7 @@ void TrainingPictures::Keep(const ImageStore& store, const Workers& workers) {
 }
 
 std::span<const std::uint8_t> TrainingPictures::Picture(std::size_t i) const {
-  return std::span(pictures_).subspan(i * kBytes, kBytes);
+  return std::span(pictures_).subspan(i * kPictureBytes, kPictureBytes);
 }
 
 template <class MayMatch>
@@ -118,7 +119,7 @@ std::optional<TrainingPictures::Found> TrainingPictures::Search(std::span<const 
   std::optional<Found> best;
   for (std::size_t i = 0; i < of_.size(); ++i) {
     if (!may_match(i)) continue;
-    const double square = SquaredDistance(small.data(), Picture(i).data());
+    const double square = PictureDistance(small.data(), Picture(i).data());
     if (!best || square < best->square) best = Found{i, square};
   }
   return best;
@@ -126,7 +127,7 @@ std::optional<TrainingPictures::Found> TrainingPictures::Search(std::span<const 
 
 void TrainingPictures::Measure(std::span<const int> shapes, const Workers& workers) {
   const auto shape = [&](std::size_t i) { return shapes[static_cast<std::size_t>(of_[i])]; };
-  const auto measured = Spread(of_.size(), kMostMeasured);
+  const auto measured = SpreadIndices(of_.size(), kMostMeasured);
   std::vector<std::optional<Found>> found(measured.size());
   workers.For(measured.size(), [&](std::size_t i, std::size_t) {
     const int own = shape(measured[i]);
@@ -174,7 +175,7 @@ Status TrainingPictures::Write(const Path& run) const {
 
 // What the arrays of a file say of each other.
 Status TrainingPictures::Check() const {
-  if (pictures_.size() != of_.size() * kBytes || of_.size() > kMostThumbnails)
+  if (pictures_.size() != of_.size() * kPictureBytes || of_.size() > kMostThumbnails)
     return DataLoss("{} bytes of {} pictures", pictures_.size(), of_.size());
   for (const std::int32_t model : of_) {
     if (model < 0 || static_cast<std::size_t>(model) >= models_.size())

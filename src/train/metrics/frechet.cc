@@ -12,16 +12,16 @@
 namespace tilegrad::train {
 namespace {
 
-struct Normal {
+struct NormalFit {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
 
-Normal NormalOf(const FeatureRows& rows) {
+NormalFit NormalFitOf(const FeatureRows& rows) {
   const auto n = static_cast<Eigen::Index>(rows.rows()), d = static_cast<Eigen::Index>(rows.width);
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Eigen::MatrixXd x = Eigen::Map<const RowMajor>(rows.values.data(), n, d).cast<double>();
-  Normal out;
+  NormalFit out;
   out.mean = x.colwise().mean();
   x.rowwise() -= out.mean.transpose();
   out.covariance = x.transpose() * x / static_cast<double>(n - 1);
@@ -72,7 +72,7 @@ double KernelSum(const FeatureRows& a, const FeatureRows& b, const Workers& work
 
 Result<double> FrechetDistance(const FeatureRows& a, const FeatureRows& b) {
   TILEGRAD_TRY(CheckPair(a, b, 2, "Frechet distance"));
-  const Normal p = NormalOf(a), q = NormalOf(b);
+  const NormalFit p = NormalFitOf(a), q = NormalFitOf(b);
   TILEGRAD_ASSIGN(const double root, TraceOfRoot(p.covariance, q.covariance));
   const double distance =
       (p.mean - q.mean).squaredNorm() + p.covariance.trace() + q.covariance.trace() - 2 * root;

@@ -17,7 +17,7 @@ constexpr int kMaxResolution = 512;
 
 // One direction of the separating axis test: the triangle's interval, and the half-width of a unit
 // voxel's.
-struct Axis {
+struct GridAxis {
   dvec3 direction;
   double low, high, radius;
 
@@ -29,8 +29,8 @@ struct Axis {
 
 // The triangle's normal and the nine products of its edges with the box's edges (Akenine-Moller:
 // Fast 3D triangle-box overlap testing). The box's own axes are the loop over the bounding box.
-std::array<Axis, 10> SeparatingAxes(const Triangle& corners) {
-  std::array<Axis, 10> axes;
+std::array<GridAxis, 10> SeparatingAxes(const Triangle& corners) {
+  std::array<GridAxis, 10> axes;
   std::size_t n = 0;
   const auto add = [&](dvec3 d) {
     const double p[3] = {glm::dot(d, corners[0]), glm::dot(d, corners[1]), glm::dot(d, corners[2])};
@@ -67,8 +67,9 @@ class Grid {
       for (int y = first[1]; y <= last[1]; ++y) {
         for (int z = first[2]; z <= last[2]; ++z) {
           const dvec3 centre(x + 0.5, y + 0.5, z + 0.5);
-          const bool apart = std::any_of(axes.begin(), axes.end(),
-                                         [&](const Axis& axis) { return axis.Separates(centre); });
+          const bool apart = std::any_of(axes.begin(), axes.end(), [&](const GridAxis& axis) {
+            return axis.Separates(centre);
+          });
           if (!apart) state_[Index(x, y, z)] = kSurface;
         }
       }

@@ -12,15 +12,15 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::uint64_t kWeightStream = 0x636c617373696679;
-constexpr int kColors = 3;
+constexpr std::uint64_t kClassifierWeightStream = 0x636c617373696679;
+constexpr int kColorChannels = 3;
 
 }  // namespace
 
 ClassifierNetwork::ClassifierNetwork(nn::Context& context, const ClassifierConfig& config,
                                      std::int64_t classes, std::uint64_t seed) {
-  Rng rng(seed, kWeightStream);
-  std::int64_t in = kColors, out = std::min(config.channels, config.most);
+  Rng rng(seed, kClassifierWeightStream);
+  std::int64_t in = kColorChannels, out = std::min(config.channels, config.most);
   for (std::int64_t i = 0; i < config.levels; ++i) {
     nn::Sequential& level = levels_.emplace_back();
     const nn::ConvShape same{

@@ -17,7 +17,7 @@ constexpr double kWideStart =
 constexpr nn::ConvOptions kHalve = {.stride = 2, .padding = 2};
 const nn::BatchNormOptions kRelu = {.relu = true};
 
-struct Builder {
+struct NetworkBuilder {
   nn::Context& context;
   const NetworkConfig& config;
   Rng& rng;
@@ -53,7 +53,7 @@ struct Builder {
   }
 };
 
-void BuildEncoder(Builder& b, nn::Sequential& net, int image_size) {
+void BuildEncoder(NetworkBuilder& b, nn::Sequential& net, int image_size) {
   const std::int64_t c = b.config.channels, code = b.config.code, side = image_size / 8;
   b.Conv(net, "1", 4, c);
   b.Conv(net, "2", c, 2 * c);
@@ -66,7 +66,7 @@ void BuildEncoder(Builder& b, nn::Sequential& net, int image_size) {
   b.Fc(net, "3", code, code);
 }
 
-nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t numbers) {
+nn::LinearLayer& BuildDecoder(NetworkBuilder& b, nn::Sequential& net, std::int64_t numbers) {
   b.FcRelu(net, "1", b.config.code, b.config.hidden1);
   b.FcRelu(net, "2", b.config.hidden1, b.config.hidden2);
   auto& output = b.Fc(net, "3", b.config.hidden2, numbers);
@@ -75,7 +75,7 @@ nn::LinearLayer& BuildDecoder(Builder& b, nn::Sequential& net, std::int64_t numb
 }
 
 // Colours that are read from the picture start as the mean of nearly all of it, all alike.
-void BuildColors(Builder& b, nn::Sequential& net, std::int64_t vertices) {
+void BuildColors(NetworkBuilder& b, nn::Sequential& net, std::int64_t vertices) {
   if (!b.config.picture_colors) {
     nn::FillConstant(BuildDecoder(b, net, 3 * vertices).bias.value(), b.config.color_bias);
     return;
@@ -99,7 +99,7 @@ MeshNetwork::MeshNetwork(nn::Context& context, const NetworkConfig& config, int 
                          std::uint64_t seed)
     : config_(config), template_(context, config.shape) {
   Rng rng(seed, /*stream=*/0x6e6574);
-  Builder builder{context, config, rng};
+  NetworkBuilder builder{context, config, rng};
   BuildEncoder(builder, all_.encoder, image_size);
   BuildDecoder(builder, all_.shape, template_.numbers());
   BuildColors(builder, all_.color, template_.vertices());

@@ -9,8 +9,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr double kBlack = 0.03;   // of a channel: no light reaches what is darker
-constexpr double kFewTexels = 1;  // of so many a guess weighs as much as what is seen
+constexpr double kDarkChannel = 0.03;  // of a channel: no light reaches what is darker
+constexpr double kFewTexels = 1;       // of so many a guess weighs as much as what is seen
 constexpr double kNoShare = 1e-3;
 
 // [M, 4, h, w]: colours of `seen` (PictureLookup::Look) without light, and how much to trust each:
@@ -32,7 +32,7 @@ nn::Tensor TrustedColors(nn::Context& context, const nn::Tensor& seen) {
           to[c * plane + t] = std::min(T(1), in[c * plane + t] * gain);
         }
         const T facing = std::max(T(0), in[4 * plane + t]);
-        to[3 * plane + t] = brightest > T(kBlack) ? facing * in[3 * plane + t] / gain : T(0);
+        to[3 * plane + t] = brightest > T(kDarkChannel) ? facing * in[3 * plane + t] / gain : T(0);
       }
     });
   });

@@ -13,24 +13,26 @@
 namespace tilegrad::train {
 namespace {
 
-using Point = std::array<double, 3>;
+using KeypointPlace = std::array<double, 3>;
 
-constexpr double kStartRadius = 0.6;  // without keypoints; the object's longest is about 2
-constexpr double kStartScale = 0.9;   // of cameras, where an object fills its crop
-constexpr double kLeastReach = 0.12;  // a hull that is flat or thin is filled up to this
-constexpr double kNearness = 8;       // of a keypoint's weights: exp(-(this * distance)^2)
-constexpr std::int64_t kCameraNumbers = 7;
+constexpr double kStartRadius = 0.6;     // without keypoints; the object's longest is about 2
+constexpr double kStartScale = 0.9;      // of cameras, where an object fills its crop
+constexpr double kLeastReach = 0.12;     // a hull that is flat or thin is filled up to this
+constexpr double kKeypointNearness = 8;  // of a keypoint's weights: exp(-(this * distance)^2)
+constexpr std::int64_t kWeakCameraNumbers = 7;
 
-double Determinant(const Point& a, const Point& b, const Point& c) {
+double Determinant(const KeypointPlace& a, const KeypointPlace& b, const KeypointPlace& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-Point Minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+KeypointPlace Minus(const KeypointPlace& a, const KeypointPlace& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 
-Point Middle(const std::vector<Point>& points) {
-  Point sum = {};
-  for (const Point& p : points)
+KeypointPlace Middle(const std::vector<KeypointPlace>& points) {
+  KeypointPlace sum = {};
+  for (const KeypointPlace& p : points)
     for (std::size_t c = 1; c < 3; ++c) sum[c] += p[c] / static_cast<double>(points.size());
   return sum;  // in the plane of symmetry
 }
@@ -45,18 +47,19 @@ nn::Var CamerasOf(const nn::Var& raw) {
 }  // namespace
 
 // All triangles of the points lie within the hull, and its faces are among them.
-double HullReach(const std::vector<Point>& points, const Point& centre, const Point& direction) {
+double HullReach(const std::vector<KeypointPlace>& points, const KeypointPlace& centre,
+                 const KeypointPlace& direction) {
   double reach = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = i + 1; j < points.size(); ++j) {
       for (std::size_t k = j + 1; k < points.size(); ++k) {
-        const Point a = Minus(points[i], centre), u = Minus(points[j], points[i]),
-                    v = Minus(points[k], points[i]);
-        const Point back = {-direction[0], -direction[1], -direction[2]};
+        const KeypointPlace a = Minus(points[i], centre), u = Minus(points[j], points[i]),
+                            v = Minus(points[k], points[i]);
+        const KeypointPlace back = {-direction[0], -direction[1], -direction[2]};
         // a + s u + r v = t direction, by Cramer's rule
         const double all = Determinant(u, v, back);
         if (std::abs(all) < 1e-12) continue;
-        const Point to = {-a[0], -a[1], -a[2]};
+        const KeypointPlace to = {-a[0], -a[1], -a[2]};
         const double s = Determinant(to, v, back) / all, r = Determinant(u, to, back) / all,
                      t = Determinant(u, v, to) / all;
         if (s >= -1e-9 && r >= -1e-9 && s + r <= 1 + 1e-9) reach = std::max(reach, t);
@@ -122,19 +125,19 @@ void PhotographNetwork::BuildHeads(Rng& rng) {
   auto& offsets = nn::AddLinear(all_.shape, "fc", context_, latent, numbers, rng);
   nn::FillNormal(offsets.weight.value(), rng, config_.output_deviation);
   nn::FillConstant(offsets.bias.value(), 0);
-  auto& camera = nn::AddLinear(all_.camera, "fc", context_, latent, kCameraNumbers, rng);
+  auto& camera = nn::AddLinear(all_.camera, "fc", context_, latent, kWeakCameraNumbers, rng);
   // Half a turn about x: the world's y, which is up, to the image's, which is down.
   camera.bias.value() =
-      context_.From({kCameraNumbers}, std::span<const double>({0., 0., 0., 0., 1., 0., 0.}));
+      context_.From({kWeakCameraNumbers}, std::span<const double>({0., 0., 0., 0., 1., 0., 0.}));
 }
 
 void PhotographNetwork::StartShape(const PhotographStart& start) {
   const std::size_t vertices = template_.positions.size();
-  const Point centre = start.keypoints.empty() ? Point{} : Middle(start.keypoints);
+  const KeypointPlace centre = start.keypoints.empty() ? KeypointPlace{} : Middle(start.keypoints);
   std::vector<double> shape, logits(start.count * vertices);
   for (std::size_t v = 0; v < vertices; ++v) {
     const glm::vec3& p = template_.positions[v];
-    const Point direction = {p.x, p.y, p.z};
+    const KeypointPlace direction = {p.x, p.y, p.z};
     const double reach = start.keypoints.empty()
                              ? kStartRadius
                              : std::max(HullReach(start.keypoints, centre, direction), kLeastReach);
@@ -143,7 +146,7 @@ void PhotographNetwork::StartShape(const PhotographStart& start) {
       double squares = 0;
       for (std::size_t c = 0; c < 3; ++c)
         squares += std::pow(start.keypoints[k][c] - shape[3 * v + c], 2);
-      logits[k * vertices + v] = -kNearness * kNearness * squares;
+      logits[k * vertices + v] = -kKeypointNearness * kKeypointNearness * squares;
     }
   }
   const auto v = static_cast<std::int64_t>(vertices), k = static_cast<std::int64_t>(start.count);

@@ -11,7 +11,7 @@ namespace {
 rivals::RendererT<float>& RendererOf(RivalRenderer& r, float) { return r.renderer; }
 rivals::RendererT<double>& RendererOf(RivalRenderer& r, double) { return r.renderer64; }
 
-struct ColorsOf {
+struct RivalColors {
   const nn::Var& colors;  // invalid: none
   bool faces = false;     // texels of faces, else colours of vertices
 };
@@ -25,7 +25,7 @@ struct RivalBatch {
   bool textured;                 // they are texels of faces
   std::vector<CameraT<T>> cameras;
 
-  RivalBatch(RivalRenderer& r, RivalJob rival_job, const nn::Var& at, const ColorsOf& of)
+  RivalBatch(RivalRenderer& r, RivalJob rival_job, const nn::Var& at, const RivalColors& of)
       : renderer(RendererOf(r, T{})),
         job(std::move(rival_job)),
         positions(at.value()),
@@ -75,7 +75,7 @@ std::vector<nn::Tensor> RivalBatch<T>::Gradients(nn::Context& context,
 }
 
 template <class T>
-RenderedImages Render(RivalRenderer& renderer, const nn::Var& positions, const ColorsOf& colors,
+RenderedImages Render(RivalRenderer& renderer, const nn::Var& positions, const RivalColors& colors,
                       RivalJob job) {
   nn::Context& context = positions.context();
   auto batch = std::make_shared<RivalBatch<T>>(renderer, std::move(job), positions, colors);
@@ -99,7 +99,7 @@ RenderedImages Render(RivalRenderer& renderer, const nn::Var& positions, const C
 }
 
 RenderedImages RenderChecked(RivalRenderer& renderer, const nn::Var& positions,
-                             const ColorsOf& colors, RivalJob job) {
+                             const RivalColors& colors, RivalJob job) {
   if (!positions.valid()) return {positions, positions};
   const nn::Shape& shape = positions.shape();
   if (shape.rank() != 3 || shape[2] != 3 || job.size < 1) {

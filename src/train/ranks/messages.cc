@@ -8,7 +8,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr auto kPause = std::chrono::microseconds(20);
+constexpr auto kMessagePause = std::chrono::microseconds(20);
 constexpr std::size_t kMostBytes = std::size_t{1} << 26;  // of one message; MPI counts in int
 
 // data in pieces of at most kMostBytes.
@@ -26,7 +26,7 @@ void InPieces(Bytes data, Use use) {
 bool Await(Transport& ranks, Transport::Ticket ticket, const std::function<bool()>& meanwhile) {
   while (!ranks.Done(ticket)) {
     if (meanwhile && !meanwhile()) return false;
-    std::this_thread::sleep_for(kPause);
+    std::this_thread::sleep_for(kMessagePause);
   }
   return true;
 }

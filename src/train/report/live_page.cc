@@ -63,7 +63,7 @@ Result<Json> MeshOf(Mesh mesh) {
   return json;
 }
 
-std::string Dump(const Json& json) {
+std::string DumpForScript(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -107,7 +107,7 @@ Result<std::string> LiveRun::State() {
   const std::int64_t saved = CheckpointStep(source_.run);
   if (json["meshes"].empty() && !source_.data.empty() && saved >= 0) json["meshes"] = {saved};
   json.update(CurveData(log, known.labels));
-  return Dump(json);
+  return DumpForScript(json);
 }
 
 Result<std::string> LiveRun::Mesh(std::int64_t step) {
@@ -116,7 +116,7 @@ Result<std::string> LiveRun::Mesh(std::int64_t step) {
   if (found == files.end()) return Predicted(step);
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(found->second));
   TILEGRAD_ASSIGN(Json mesh, MeshOf(std::move(loaded.mesh)));
-  return Dump({{"mesh", std::move(mesh)}, {"truth", nullptr}});
+  return DumpForScript({{"mesh", std::move(mesh)}, {"truth", nullptr}});
 }
 
 Result<std::string> LiveRun::Predicted(std::int64_t step) {
@@ -135,7 +135,7 @@ Result<std::string> LiveRun::Predicted(std::int64_t step) {
     TILEGRAD_ASSIGN(json["mesh"], MeshOf(std::move(show.examples[0].prediction)));
     TILEGRAD_ASSIGN(json["truth"], MeshOf(std::move(show.examples[0].truth)));
   }
-  predicted_ = Dump(json), predicted_step_ = step;
+  predicted_ = DumpForScript(json), predicted_step_ = step;
   return predicted_;
 }
 

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kCurvePoints = 1000;
 
-void Append(std::uint32_t value, std::size_t bytes, Bytes* out) {
+void AppendLittleEndian(std::uint32_t value, std::size_t bytes, Bytes* out) {
   for (std::size_t i = 0; i < bytes; ++i) out->push_back(static_cast<std::uint8_t>(value >> 8 * i));
 }
 
@@ -29,7 +29,8 @@ std::string Positions(const Mesh& mesh, const Bounds& bounds) {
   for (const glm::vec3& p : mesh.positions) {
     for (int k = 0; k < 3; ++k) {
       const float extent = bounds.high[k] - bounds.low[k];
-      Append(Quantise(extent > 0 ? (p[k] - bounds.low[k]) / extent : 0, 65535), 2, &bytes);
+      AppendLittleEndian(Quantise(extent > 0 ? (p[k] - bounds.low[k]) / extent : 0, 65535), 2,
+                         &bytes);
     }
   }
   return Base64(bytes);
@@ -39,7 +40,7 @@ std::string Colors(const Mesh& mesh) {
   if (mesh.colors.empty()) return Base64(Bytes(3 * mesh.positions.size(), 255));
   Bytes bytes;
   for (const glm::vec4& color : mesh.colors) {
-    for (int k = 0; k < 3; ++k) Append(Quantise(color[k], 255), 1, &bytes);
+    for (int k = 0; k < 3; ++k) AppendLittleEndian(Quantise(color[k], 255), 1, &bytes);
   }
   return Base64(bytes);
 }
@@ -47,7 +48,8 @@ std::string Colors(const Mesh& mesh) {
 std::string Faces(const Mesh& mesh, std::size_t index_bytes) {
   Bytes bytes;
   for (const Face& face : mesh.faces) {
-    for (const std::int32_t v : face) Append(static_cast<std::uint32_t>(v), index_bytes, &bytes);
+    for (const std::int32_t v : face)
+      AppendLittleEndian(static_cast<std::uint32_t>(v), index_bytes, &bytes);
   }
   return Base64(bytes);
 }
@@ -98,7 +100,7 @@ std::string TitleOf(const std::string& name, const std::vector<TermLabel>& label
   return words;
 }
 
-Json ModelJson(const Example& example) {
+Json ExampleJson(const Example& example) {
   return {{"name", example.name},
           {"class", example.class_name},
           {"prediction", MeshJson(example.prediction)},
@@ -136,7 +138,7 @@ Json PageData(const ReportFacts& facts) {
                    {"distance", show.distance}};
   out["generated"] = show.generated;
   out["models"] = Json::array();
-  for (const Example& example : show.examples) out["models"].push_back(ModelJson(example));
+  for (const Example& example : show.examples) out["models"].push_back(ExampleJson(example));
   return out;
 }
 

@@ -11,8 +11,9 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::string_view kFormatName = "tilegrad-checkpoint-", kFormat = "tilegrad-checkpoint-1";
-constexpr std::string_view kPrefix = "step_", kSuffix = ".safetensors";
+constexpr std::string_view kCheckpointFormatName = "tilegrad-checkpoint-",
+                           kCheckpointFormat = "tilegrad-checkpoint-1";
+constexpr std::string_view kStepPrefix = "step_", kStepSuffix = ".safetensors";
 constexpr const char* kChecksum = "checksum";
 
 Path Folder(const Path& run) { return run / "checkpoints"; }
@@ -45,10 +46,10 @@ std::string ChecksumOf(const nn::TensorFile& file) {
 // The number in "step_00000012.safetensors"; nothing for files that people put beside them.
 std::optional<std::int64_t> StepOf(const Path& file) {
   const std::string name = file.filename().string();
-  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
+  if (!name.starts_with(kStepPrefix) || !name.ends_with(kStepSuffix)) return std::nullopt;
   std::int64_t step = 0;
-  const char* end = name.data() + name.size() - kSuffix.size();
-  const auto [at, error] = std::from_chars(name.data() + kPrefix.size(), end, step);
+  const char* end = name.data() + name.size() - kStepSuffix.size();
+  const auto [at, error] = std::from_chars(name.data() + kStepPrefix.size(), end, step);
   return error == std::errc() && at == end && step >= 0 ? std::optional(step) : std::nullopt;
 }
 
@@ -57,25 +58,25 @@ std::optional<std::int64_t> StepOf(const Path& file) {
 Status SaveCheckpoint(const Path& run, const CheckpointInfo& info,
                       std::vector<nn::NamedTensor> tensors) {
   nn::TensorFile file{std::move(tensors),
-                      {{"format", std::string(kFormat)},
+                      {{"format", std::string(kCheckpointFormat)},
                        {"step", std::to_string(info.step)},
                        {"image_size", std::to_string(info.image_size)},
                        {"seconds", fmt::format("{}", info.seconds)},
                        {"config", info.config}}};
   file.metadata[kChecksum] = ChecksumOf(file);
-  return nn::WriteSafetensors(Folder(run) / fmt::format("{}{:08}{}", kPrefix, info.step, kSuffix),
-                              file);
+  return nn::WriteSafetensors(
+      Folder(run) / fmt::format("{}{:08}{}", kStepPrefix, info.step, kStepSuffix), file);
 }
 
 namespace {
 
 Status CheckFormat(const std::map<std::string, std::string>& metadata, const Path& path) {
   const auto format = metadata.find("format");
-  if (format != metadata.end() && format->second == kFormat) return {};
-  if (format != metadata.end() && format->second.starts_with(kFormatName)) {
+  if (format != metadata.end() && format->second == kCheckpointFormat) return {};
+  if (format != metadata.end() && format->second.starts_with(kCheckpointFormatName)) {
     return DataLoss(
         "{}: of another version of tilegrad, which reads it: its format is \"{}\", not \"{}\"",
-        path.string(), format->second, kFormat);
+        path.string(), format->second, kCheckpointFormat);
   }
   return DataLoss(
       "{}: a safetensors file, but not a checkpoint of tilegrad: its metadata has no "

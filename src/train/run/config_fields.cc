@@ -140,7 +140,7 @@ std::string TableOf(const ConfigField& field) {
   return dot == std::string::npos ? "" : field.key.substr(0, dot);
 }
 
-std::string LineOf(const ConfigField& field) {
+std::string FieldLine(const ConfigField& field) {
   const std::string setting = fmt::format("{} = {}", LastPart(field.key), TomlText(field.target));
   return fmt::format("{:<36}  # {}\n", setting, field.help);
 }
@@ -209,7 +209,7 @@ std::string WriteFields(const ConfigFields& fields) {
     auto at = std::find_if(tables.begin(), tables.end(),
                            [&](const auto& known) { return known.first == table; });
     if (at == tables.end()) at = tables.insert(at, {table, ""});
-    at->second += LineOf(field);
+    at->second += FieldLine(field);
   }
   std::string out;
   for (const auto& [table, lines] : tables) {

@@ -29,7 +29,7 @@ void AppendLittleEndian(std::string& out, T value) {
 }
 
 // Protocol buffers: a key is field number << 3 | wire type.
-enum WireType : std::uint8_t { kVarint = 0, kFixed64 = 1, kBytes = 2, kFixed32 = 5 };
+enum WireType : std::uint8_t { kVarint = 0, kFixed64 = 1, kLengthDelimited = 2, kFixed32 = 5 };
 
 void AppendVarint(std::string& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out += static_cast<char>(value | 0x80);
@@ -39,7 +39,7 @@ void AppendKey(std::string& out, int field, WireType type) {
   AppendVarint(out, static_cast<std::uint64_t>(field) << 3 | type);
 }
 void AppendBytes(std::string& out, int field, std::string_view bytes) {
-  AppendKey(out, field, kBytes);
+  AppendKey(out, field, kLengthDelimited);
   AppendVarint(out, bytes.size());
   out += bytes;
 }

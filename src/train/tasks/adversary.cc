@@ -11,8 +11,8 @@
 namespace tilegrad::train {
 namespace {
 
-const std::string kPrefix = "critic.";
-constexpr std::uint64_t kWeightStream = 0x637269746963, kPenaltyStream = 0x70656e616c7479;
+const std::string kCriticPrefix = "critic.";
+constexpr std::uint64_t kCriticWeightStream = 0x637269746963, kPenaltyStream = 0x70656e616c7479;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ ConfigFields FieldsOf(AdversaryConfig* c) {
 Adversary::Adversary(nn::Context& context, const AdversaryConfig& config, std::uint64_t seed)
     : context_(context), config_(config), seed_(seed) {
   if (!config.HasCritic()) return;
-  Rng rng(seed, kWeightStream);
+  Rng rng(seed, kCriticWeightStream);
   critic_.emplace(
       context, nn::CriticShape{.base = config.base, .halvings = static_cast<int>(config.halvings)},
       rng);
@@ -119,7 +119,7 @@ std::vector<nn::NamedTensor> Adversary::State() {
   if (!critic_) return {};
   std::vector<nn::NamedTensor> out = nn::State(*critic_);
   for (const nn::NamedTensor& moment : adam_->State()) out.push_back(moment);
-  for (nn::NamedTensor& tensor : out) tensor.name = kPrefix + tensor.name;
+  for (nn::NamedTensor& tensor : out) tensor.name = kCriticPrefix + tensor.name;
   return out;
 }
 
@@ -127,8 +127,8 @@ Status Adversary::LoadState(const std::vector<nn::NamedTensor>& state) {
   if (!critic_) return {};
   std::vector<nn::NamedTensor> own;
   for (const nn::NamedTensor& tensor : state) {
-    if (tensor.name.starts_with(kPrefix))
-      own.push_back({tensor.name.substr(kPrefix.size()), tensor.value});
+    if (tensor.name.starts_with(kCriticPrefix))
+      own.push_back({tensor.name.substr(kCriticPrefix.size()), tensor.value});
   }
   TILEGRAD_TRY(nn::LoadState(*critic_, own));
   return adam_->LoadState(own);

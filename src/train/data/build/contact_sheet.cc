@@ -10,8 +10,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kModels = 6, kViews = 3;
-constexpr int kGap = 4;  // pixels between models and rows
+constexpr int kModels = 6, kSheetViews = 3;
+constexpr int kSheetGap = 4;  // pixels between models and rows
 
 // Up to kModels models of a class, evenly spread.
 std::vector<int> Pick(const Dataset& dataset, int class_index) {
@@ -28,10 +28,10 @@ std::vector<int> Pick(const Dataset& dataset, int class_index) {
 
 Status WriteContactSheet(const Dataset& dataset) {
   const DatasetInfo& info = dataset.info();
-  const int size = info.image_size, views = std::min(kViews, info.views);
-  const int step_x = views * size + kGap, step_y = size + kGap;
+  const int size = info.image_size, views = std::min(kSheetViews, info.views);
+  const int step_x = views * size + kSheetGap, step_y = size + kSheetGap;
   const int rows = static_cast<int>(info.classes.size());
-  ImageU8 sheet(kModels * step_x + kGap, rows * step_y + kGap, 3, ToByte(kPaper));
+  ImageU8 sheet(kModels * step_x + kSheetGap, rows * step_y + kSheetGap, 3, ToByte(kPaper));
   const std::size_t plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   for (int row = 0; row < rows; ++row) {
     const auto models = Pick(dataset, row);
@@ -42,8 +42,8 @@ Status WriteContactSheet(const Dataset& dataset) {
         const auto planes = std::span(images).subspan(4 * view * plane, 4 * plane);
         const PlanarRgba<std::uint8_t> image{planes.first(3 * plane), planes.subspan(3 * plane),
                                              size, size};
-        Paste(OverGrey(image, kPaper), kGap + static_cast<int>(column) * step_x + v * size,
-              kGap + row * step_y, &sheet);
+        Paste(OverGrey(image, kPaper), kSheetGap + static_cast<int>(column) * step_x + v * size,
+              kSheetGap + row * step_y, &sheet);
       }
     }
   }

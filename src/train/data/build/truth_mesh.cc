@@ -13,9 +13,9 @@
 namespace tilegrad::train {
 namespace {
 
-using Colors = std::vector<glm::vec3>;  // [3F], of corners
+using ColorList = std::vector<glm::vec3>;  // [3F], of corners
 
-struct Sum {
+struct VertexSum {
   glm::vec3 position = glm::vec3(0), color = glm::vec3(0);
   float count = 0;
 };
@@ -26,9 +26,9 @@ std::uint64_t MaterialOf(const Mesh& mesh, std::size_t face) {
 
 // Joins the corners that `key_of(face, k)` gives the same key.
 template <class KeyOf>
-Mesh JoinCorners(const Mesh& mesh, const Colors& colors, KeyOf key_of) {
+Mesh JoinCorners(const Mesh& mesh, const ColorList& colors, KeyOf key_of) {
   Mesh out;
-  std::vector<Sum> sums;
+  std::vector<VertexSum> sums;
   std::unordered_map<std::uint64_t, std::int32_t> index;
   std::set<Face> seen;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -37,7 +37,7 @@ Mesh JoinCorners(const Mesh& mesh, const Colors& colors, KeyOf key_of) {
       const auto [at, fresh] =
           index.try_emplace(key_of(f, k), static_cast<std::int32_t>(sums.size()));
       if (fresh) sums.emplace_back();
-      Sum& sum = sums[static_cast<std::size_t>(at->second)];
+      VertexSum& sum = sums[static_cast<std::size_t>(at->second)];
       const auto corner = static_cast<std::size_t>(k);
       sum.position += mesh.positions[static_cast<std::size_t>(mesh.faces[f][corner])];
       sum.color += colors[3 * f + corner];
@@ -49,7 +49,7 @@ Mesh JoinCorners(const Mesh& mesh, const Colors& colors, KeyOf key_of) {
     std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
     if (seen.insert(face).second) out.faces.push_back(face);
   }
-  for (const Sum& sum : sums) {
+  for (const VertexSum& sum : sums) {
     out.positions.push_back(sum.position / sum.count);
     out.colors.emplace_back(sum.color / sum.count, 1.0f);
   }
@@ -87,7 +87,7 @@ std::uint64_t Cell(glm::vec3 p, const Bounds& bounds, float cell) {
   return key;
 }
 
-Mesh Cluster(const Mesh& mesh, const Colors& colors, const Bounds& bounds, int cells) {
+Mesh Cluster(const Mesh& mesh, const ColorList& colors, const Bounds& bounds, int cells) {
   const glm::vec3 size = bounds.high - bounds.low;
   const float cell = std::max({size.x, size.y, size.z}) / static_cast<float>(cells);
   return JoinCorners(mesh, colors, [&](std::size_t f, int k) {
@@ -99,7 +99,7 @@ Mesh Cluster(const Mesh& mesh, const Colors& colors, const Bounds& bounds, int c
 }  // namespace
 
 Mesh MakeTruthMesh(const Mesh& mesh, std::size_t max_faces) {
-  const Colors colors = CornerColors(mesh);
+  const ColorList colors = CornerColors(mesh);
   Mesh out;
   if (mesh.faces.size() <= max_faces) {
     out = JoinCorners(mesh, colors, [&](std::size_t f, int k) {

@@ -131,9 +131,9 @@ Result<WeakPerspective> ReadCamera(const MatPlace& anno, std::size_t index) {
   return InvalidArgument("{}: not a rotation (off by {:.2g})", rot.where(), off);
 }
 
-class Reader {
+class CmrReader {
  public:
-  explicit Reader(Layout layout) : layout_(std::move(layout)) {}
+  explicit CmrReader(Layout layout) : layout_(std::move(layout)) {}
 
   Result<PhotographSet> Read(const Path& folder) {
     set_.folder = folder;
@@ -256,7 +256,7 @@ Result<std::optional<PhotographSet>> OpenCmrLayout(const Path& folder) {
   std::optional<Layout> layout = FindCub(folder);
   if (!layout) layout = FindPascal(folder);
   if (!layout) return std::optional<PhotographSet>();
-  TILEGRAD_ASSIGN(PhotographSet set, Reader(std::move(*layout)).Read(folder));
+  TILEGRAD_ASSIGN(PhotographSet set, CmrReader(std::move(*layout)).Read(folder));
   return std::optional(std::move(set));
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 using io::MatArray;
 
-MatArray Row(std::initializer_list<double> values) {
+MatArray RowArray(std::initializer_list<double> values) {
   return MatArray::Numbers({values.size(), 1}, std::vector<double>(values));
 }
 
@@ -59,7 +59,7 @@ struct Part {
     cameras.push_back(RotationArray(*photo.camera));
     cameras.push_back(MatArray::Number(photo.camera->scale));
     cameras.push_back(
-        Row({photo.camera->translation[0] + 0.5, photo.camera->translation[1] + 0.5}));
+        RowArray({photo.camera->translation[0] + 0.5, photo.camera->translation[1] + 0.5}));
   }
 };
 

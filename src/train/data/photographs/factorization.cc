@@ -14,12 +14,11 @@ namespace {
 
 using points3::Cross, points3::Dot, points3::Point, points3::Unit, points3::operator+,
     points3::operator-, points3::operator*;
-using Views = KeypointRows;
 constexpr int kStarts = 6;
 constexpr std::size_t kFewestViews = 8, kFewestKeypoints = 4;
 
 // How much nearer visible keypoints are than hidden ones, summed over the views.
-double Nearer(const RigidMotion& rigid, const Views& views) {
+double Nearer(const RigidMotion& rigid, const KeypointRows& views) {
   double sum = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
     double depth[2] = {}, count[2] = {};
@@ -75,7 +74,7 @@ std::array<Point, 3> Axes(const std::vector<Point>& shape, const KeypointViews& 
 }
 
 // Left, up and front together say which of the two shapes it is; else what hides what does.
-bool IsTurnedAround(const RigidMotion& rigid, const KeypointViews& job, const Views& views) {
+bool IsTurnedAround(const RigidMotion& rigid, const KeypointViews& job, const KeypointRows& views) {
   if (job.up.empty() || job.front.empty()) return Nearer(rigid, views) < 0;
   return Dot(Axes(rigid.shape, job)[1], MeanDirection(rigid.shape, job.up)) < 0;
 }
@@ -116,11 +115,11 @@ void Align(const KeypointViews& job, RigidMotion* rigid) {
 }
 
 // Keypoints about their mean in parts of the view's extent, so that all views count the same.
-struct Normal {
+struct Normalization {
   double x = 0, y = 0, extent = 1;
 };
 
-Normal NormalOf(const std::vector<Keypoint>& view) {
+Normalization NormalizationOf(const std::vector<Keypoint>& view) {
   double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
   for (const Keypoint& k : view) {
     if (!k.visible) continue;
@@ -131,7 +130,7 @@ Normal NormalOf(const std::vector<Keypoint>& view) {
           std::max({high[0] - low[0], high[1] - low[1], 1e-9})};
 }
 
-std::vector<Keypoint> Normalized(std::vector<Keypoint> view, const Normal& n) {
+std::vector<Keypoint> Normalized(std::vector<Keypoint> view, const Normalization& n) {
   for (Keypoint& k : view) k.x = (k.x - n.x) / n.extent, k.y = (k.y - n.y) / n.extent;
   return view;
 }
@@ -167,7 +166,7 @@ Status Check(const KeypointViews& job) {
 
 }  // namespace
 
-std::vector<Point> LocateKeypoints(const Views& views,
+std::vector<Point> LocateKeypoints(const KeypointRows& views,
                                    const std::vector<WeakPerspective>& cameras) {
   std::vector<Point> out(views.empty() ? 0 : views[0].size());
   for (std::size_t k = 0; k < out.size(); ++k) out[k] = LocateKeypoint(views, cameras, k);
@@ -176,10 +175,10 @@ std::vector<Point> LocateKeypoints(const Views& views,
 
 Result<Structure> FactorizeKeypoints(const KeypointViews& job) {
   TILEGRAD_TRY(Check(job));
-  Views views;
-  std::vector<Normal> normals;
+  KeypointRows views;
+  std::vector<Normalization> normals;
   for (const auto& view : job.views) {
-    normals.push_back(NormalOf(view));
+    normals.push_back(NormalizationOf(view));
     views.push_back(Normalized(view, normals.back()));
   }
   for (std::size_t v = 0; v < job.views.size(); ++v)
@@ -197,7 +196,7 @@ Result<Structure> FactorizeKeypoints(const KeypointViews& job) {
     const WeakPerspective camera = FitWeakCamera(out.shape, views[v], best->cameras[v]);
     const double error = WeakCameraError(out.shape, views[v], camera);
     squares += error * error;
-    const Normal& n = normals[v];
+    const Normalization& n = normals[v];
     out.cameras.push_back(
         {camera.scale * n.extent,
          {camera.translation[0] * n.extent + n.x, camera.translation[1] * n.extent + n.y},

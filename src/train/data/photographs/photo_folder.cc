@@ -17,7 +17,7 @@
 namespace tilegrad::train {
 namespace {
 
-using Json = nlohmann::json;
+using ParsedJson = nlohmann::json;
 
 constexpr const char* kTrain = "transforms_train.json";
 constexpr const char* kTest = "transforms_test.json";
@@ -25,7 +25,7 @@ constexpr int kTestEvery = 6;  // the last of each six pictures is held out
 constexpr std::size_t kMostNames = 256;
 constexpr double kFarthest = 1 << 20;  // pixels from the picture's corner that a keypoint may be
 
-std::error_code ignored;
+std::error_code unused_error;
 
 bool IsPicture(const Path& path) {
   std::string ending = path.extension().string();
@@ -35,7 +35,7 @@ bool IsPicture(const Path& path) {
 
 std::vector<Path> PicturesIn(const Path& folder) {
   std::vector<Path> out;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder, unused_error)) {
     if (entry.is_regular_file() && IsPicture(entry.path())) out.push_back(entry.path());
   }
   std::ranges::sort(out);
@@ -46,7 +46,7 @@ std::vector<Path> PicturesIn(const Path& folder) {
 Result<ImageU8> Masked(const Path& folder, const Path& picture) {
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(picture));
   const Path mask = folder / "masks" / (picture.stem().string() + ".png");
-  if (!std::filesystem::exists(mask, ignored)) return io::ToColor(std::move(image));
+  if (!std::filesystem::exists(mask, unused_error)) return io::ToColor(std::move(image));
   TILEGRAD_ASSIGN(const ImageU8 values, io::LoadImage(mask));
   const ImageU8 color = io::ToColor(std::move(image));
   ImageU8 rgb(color.width, color.height, 3);
@@ -98,7 +98,7 @@ class FolderReader {
   }
 
  private:
-  bool Has(const char* name) const { return std::filesystem::exists(folder_ / name, ignored); }
+  bool Has(const char* name) const { return std::filesystem::exists(folder_ / name, unused_error); }
 
   // As `tilegrad views` and NeRF's datasets have them, which say what is held out.
   Result<std::vector<io::CameraView>> ReadSplitCameras() {
@@ -139,7 +139,7 @@ class FolderReader {
     return {};
   }
 
-  Result<int> IndexOf(const Json& name) const {
+  Result<int> IndexOf(const ParsedJson& name) const {
     const auto found = name.is_string()
                            ? std::ranges::find(set_.keypoint_names, name.get<std::string>())
                            : set_.keypoint_names.end();
@@ -149,12 +149,12 @@ class FolderReader {
   }
 
   // [[a, b], ...] of names.
-  Result<std::vector<std::pair<int, int>>> Pairs(const Json& json, const char* key) const {
+  Result<std::vector<std::pair<int, int>>> Pairs(const ParsedJson& json, const char* key) const {
     std::vector<std::pair<int, int>> out;
     const auto found = json.find(key);
     if (found == json.end()) return out;
     if (!found->is_array()) return InvalidArgument("{}: \"{}\" is no list of pairs", file_, key);
-    for (const Json& pair : *found) {
+    for (const ParsedJson& pair : *found) {
       if (!pair.is_array() || pair.size() != 2)
         return InvalidArgument("{}: \"{}\" is no list of pairs of names", file_, key);
       TILEGRAD_ASSIGN(const int a, IndexOf(pair[0]));
@@ -164,11 +164,11 @@ class FolderReader {
     return out;
   }
 
-  Status ReadNames(const Json& json) {
+  Status ReadNames(const ParsedJson& json) {
     const auto names = json.find("names");
     if (names == json.end() || !names->is_array() || names->empty() || names->size() > kMostNames)
       return InvalidArgument("{}: \"names\" has to be a list of 1 to {} names", file_, kMostNames);
-    for (const Json& name : *names) {
+    for (const ParsedJson& name : *names) {
       if (!name.is_string()) return InvalidArgument("{}: {} is no name", file_, name.dump());
       if (IndexOf(name).ok())
         return InvalidArgument("{}: \"names\" has {} twice", file_, name.dump());
@@ -190,7 +190,7 @@ class FolderReader {
     return {};
   }
 
-  Result<Keypoint> ReadKeypoint(const Json& json, const std::string& where) const {
+  Result<Keypoint> ReadKeypoint(const ParsedJson& json, const std::string& where) const {
     if (json.is_null()) return Keypoint{};
     if (!json.is_array() || json.size() != 2 || !json[0].is_number() || !json[1].is_number())
       return InvalidArgument("{}: {}: {} is neither [x, y] nor null", file_, where, json.dump());
@@ -201,7 +201,7 @@ class FolderReader {
     return keypoint;
   }
 
-  Status ReadPlaces(const Json& json) {
+  Status ReadPlaces(const ParsedJson& json) {
     const auto places = json.find("photographs");
     if (places == json.end() || !places->is_object())
       return InvalidArgument("{}: no \"photographs\" in it", file_);
@@ -211,7 +211,7 @@ class FolderReader {
           found->size() != set_.keypoint_names.size())
         return InvalidArgument("{}: \"{}\" needs {} keypoints, each [x, y] or null", file_,
                                photo.id, set_.keypoint_names.size());
-      for (const Json& place : *found) {
+      for (const ParsedJson& place : *found) {
         TILEGRAD_ASSIGN(const Keypoint keypoint, ReadKeypoint(place, photo.id));
         photo.keypoints.push_back(keypoint);
       }
@@ -224,7 +224,7 @@ class FolderReader {
     TILEGRAD_ASSIGN(const std::string text, ReadText(file_));
     if (FirstNestedDeeper(text, 16) != std::string::npos)
       return InvalidArgument("{}: nested too deeply", file_);
-    const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+    const ParsedJson json = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
     if (!json.is_object()) return InvalidArgument("{}: not a JSON object", file_);
     TILEGRAD_TRY(ReadNames(json));
     TILEGRAD_TRY(ReadPlaces(json));
@@ -264,7 +264,7 @@ class FolderReader {
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder) {
   const Path images = folder / "images";
   const std::vector<Path> pictures =
-      PicturesIn(std::filesystem::is_directory(images, ignored) ? images : folder);
+      PicturesIn(std::filesystem::is_directory(images, unused_error) ? images : folder);
   if (pictures.empty()) return std::optional<PhotographSet>();
   TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(pictures));
   return std::optional(std::move(set));

@@ -9,7 +9,7 @@
 namespace tilegrad::train {
 namespace {
 
-using Point = std::array<double, 3>;
+using PlanePoint = std::array<double, 3>;
 
 // scale, x, y, and a turn about each axis of the camera.
 struct NormalEquations {
@@ -18,12 +18,12 @@ struct NormalEquations {
   double squares = 0;
 };
 
-NormalEquations Build(const std::vector<Point>& shape, const std::vector<Keypoint>& keypoints,
+NormalEquations Build(const std::vector<PlanePoint>& shape, const std::vector<Keypoint>& keypoints,
                       const WeakPerspective& camera) {
   NormalEquations out;
   for (std::size_t k = 0; k < shape.size(); ++k) {
     if (!keypoints[k].visible) continue;
-    const Point seen = ProjectWeakly(camera, shape[k]);
+    const PlanePoint seen = ProjectWeakly(camera, shape[k]);
     const double s = camera.scale, x = (seen[0] - camera.translation[0]) / s,
                  y = (seen[1] - camera.translation[1]) / s, z = seen[2];
     const Vector<6> rows[2] = {{x, 1, 0, 0, s * z, -s * y}, {y, 0, 1, -s * z, 0, s * x}};
@@ -56,7 +56,7 @@ WeakPerspective Moved(const WeakPerspective& camera, const Vector<6>& by) {
 
 }  // namespace
 
-WeakPerspective FitWeakCamera(const std::vector<Point>& shape,
+WeakPerspective FitWeakCamera(const std::vector<PlanePoint>& shape,
                               const std::vector<Keypoint>& keypoints, WeakPerspective camera) {
   NormalEquations at = Build(shape, keypoints, camera);
   double damping = 1e-3;
@@ -76,7 +76,7 @@ WeakPerspective FitWeakCamera(const std::vector<Point>& shape,
   return camera;
 }
 
-double WeakCameraError(const std::vector<Point>& shape, const std::vector<Keypoint>& keypoints,
+double WeakCameraError(const std::vector<PlanePoint>& shape, const std::vector<Keypoint>& keypoints,
                        const WeakPerspective& camera) {
   const auto visible = std::ranges::count_if(keypoints, &Keypoint::visible);
   const double squares = Build(shape, keypoints, camera).squares;

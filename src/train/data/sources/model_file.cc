@@ -13,7 +13,7 @@ namespace {
 using io::MakeNpy;
 using io::NpyArray;
 using io::NpzArrays;
-using Shape = std::vector<std::size_t>;
+using ArrayShape = std::vector<std::size_t>;
 
 constexpr std::size_t kAny = static_cast<std::size_t>(-1);  // in a wanted shape: whatever is there
 
@@ -24,13 +24,14 @@ NpyArray VectorsToNpy(const std::vector<Vector>& values) {
   return MakeNpy<float>({values.size(), width}, {first, values.size() * width});
 }
 
-bool Matches(const Shape& shape, const Shape& wanted) {
+bool Matches(const ArrayShape& shape, const ArrayShape& wanted) {
   return std::equal(shape.begin(), shape.end(), wanted.begin(), wanted.end(),
                     [](std::size_t a, std::size_t b) { return b == kAny || a == b; });
 }
 
 template <class T>
-Result<std::vector<T>> Take(const NpyArray& array, const std::string& name, const Shape& wanted) {
+Result<std::vector<T>> Take(const NpyArray& array, const std::string& name,
+                            const ArrayShape& wanted) {
   if (!Matches(array.shape, wanted)) {
     return DataLoss("array \"{}\" has another shape than dataset.json promises", name);
   }
@@ -40,7 +41,8 @@ Result<std::vector<T>> Take(const NpyArray& array, const std::string& name, cons
 }
 
 template <class T>
-Result<std::vector<T>> Take(const NpzArrays& arrays, const std::string& name, const Shape& wanted) {
+Result<std::vector<T>> Take(const NpzArrays& arrays, const std::string& name,
+                            const ArrayShape& wanted) {
   const auto at = arrays.find(name);
   if (at == arrays.end()) return DataLoss("array \"{}\" is missing", name);
   return Take<T>(at->second, name, wanted);
@@ -75,7 +77,7 @@ Status TakeOccupancy(const NpzArrays& arrays, std::vector<std::uint8_t>* out) {
   return {};
 }
 
-Shape ImageShape(const DatasetInfo& info) {
+ArrayShape ImageShape(const DatasetInfo& info) {
   const auto size = static_cast<std::size_t>(info.image_size);
   return {static_cast<std::size_t>(info.views), 4, size, size};
 }

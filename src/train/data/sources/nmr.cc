@@ -17,9 +17,9 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kViews = 24, kSize = 64, kSide = kOccupancyResolution;
+constexpr std::size_t kNmrViews = 24, kSize = 64, kVoxelSide = kOccupancyResolution;
 
-struct Part {
+struct NmrPart {
   std::string class_name;
   Split split;
   Path images, voxels;
@@ -41,17 +41,17 @@ Result<io::NpyArray> LoadOnlyArray(const Path& path, const std::vector<std::size
   return array;
 }
 
-Result<io::NpyArray> LoadVoxels(const Part& part) {
-  return LoadOnlyArray(part.voxels, {kSide, kSide, kSide});
+Result<io::NpyArray> LoadVoxels(const NmrPart& part) {
+  return LoadOnlyArray(part.voxels, {kVoxelSide, kVoxelSide, kVoxelSide});
 }
 
 std::vector<std::uint8_t> ToOurFrame(const std::uint8_t* grid) {
   std::vector<std::uint8_t> out;
-  out.reserve(kSide * kSide * kSide);
-  for (std::size_t x = 0; x < kSide; ++x) {
-    for (std::size_t y = 0; y < kSide; ++y) {
-      for (std::size_t z = 0; z < kSide; ++z) {
-        out.push_back(grid[(y * kSide + (kSide - 1 - z)) * kSide + x] != 0);
+  out.reserve(kVoxelSide * kVoxelSide * kVoxelSide);
+  for (std::size_t x = 0; x < kVoxelSide; ++x) {
+    for (std::size_t y = 0; y < kVoxelSide; ++y) {
+      for (std::size_t z = 0; z < kVoxelSide; ++z) {
+        out.push_back(grid[(y * kVoxelSide + (kVoxelSide - 1 - z)) * kVoxelSide + x] != 0);
       }
     }
   }
@@ -60,7 +60,7 @@ std::vector<std::uint8_t> ToOurFrame(const std::uint8_t* grid) {
 
 class Nmr : public ModelSource {
  public:
-  Status Add(Part part) {
+  Status Add(NmrPart part) {
     TILEGRAD_ASSIGN(const io::NpyArray voxels, LoadVoxels(part));
     for (std::size_t i = 0; i < voxels.shape[0]; ++i) {
       const std::string id = fmt::format("{}-{:05}", SplitName(part.split), i);
@@ -88,7 +88,7 @@ class Nmr : public ModelSource {
   std::optional<DatasetInfo> FixedInfo() const override {
     DatasetInfo info;
     info.image_size = kSize;
-    info.views = kViews;
+    info.views = kNmrViews;
     info.camera.lens.fov_y = 30;
     info.camera.azimuth_step = 15;
     info.camera.elevation = 30;
@@ -104,11 +104,12 @@ class Nmr : public ModelSource {
       return DataLoss("{}: {} models, but its voxels are {}", parts_[part].images.string(),
                       arrays->images.shape[0], arrays->voxels.shape[0]);
     }
-    constexpr std::size_t kImageBytes = kViews * 4 * kSize * kSize;
+    constexpr std::size_t kImageBytes = kNmrViews * 4 * kSize * kSize;
     const auto* images = arrays->images.data.data() + row * kImageBytes;
     ModelData data;
     data.images.assign(images, images + kImageBytes);
-    data.occupancy = ToOurFrame(arrays->voxels.data.data() + row * kSide * kSide * kSide);
+    data.occupancy =
+        ToOurFrame(arrays->voxels.data.data() + row * kVoxelSide * kVoxelSide * kVoxelSide);
     return SourceModel{std::move(data)};
   }
 
@@ -123,14 +124,15 @@ class Nmr : public ModelSource {
     if (cached_ != nullptr && cached_part_ == part) return cached_;
     cached_ = nullptr;
     Arrays arrays;
-    TILEGRAD_ASSIGN(arrays.images, LoadOnlyArray(parts_[part].images, {kViews, 4, kSize, kSize}));
+    TILEGRAD_ASSIGN(arrays.images,
+                    LoadOnlyArray(parts_[part].images, {kNmrViews, 4, kSize, kSize}));
     TILEGRAD_ASSIGN(arrays.voxels, LoadVoxels(parts_[part]));
     cached_ = std::make_shared<const Arrays>(std::move(arrays));
     cached_part_ = part;
     return cached_;
   }
 
-  std::vector<Part> parts_;
+  std::vector<NmrPart> parts_;
   std::vector<SourceEntry> entries_;
   std::map<std::pair<std::string, std::string>, std::pair<std::size_t, std::size_t>> places_;
   mutable std::mutex mutex_;
@@ -139,7 +141,7 @@ class Nmr : public ModelSource {
 };
 
 // "chair_train_images.npz" -> chair, train; nothing for other names.
-std::optional<Part> ParsePart(const Path& file) {
+std::optional<NmrPart> ParsePart(const Path& file) {
   constexpr std::pair<const char*, Split> kEndings[] = {{"_train_images.npz", Split::kTrain},
                                                         {"_val_images.npz", Split::kValidation},
                                                         {"_test_images.npz", Split::kTest}};
@@ -149,8 +151,8 @@ std::optional<Part> ParsePart(const Path& file) {
     if (name.size() <= tail.size() || name.substr(name.size() - tail.size()) != tail) continue;
     const std::string stem = name.substr(0, name.size() - std::string("images.npz").size());
     const std::string class_name = name.substr(0, name.size() - tail.size());
-    return Part{SafeFileName(SynsetName(class_name)), split, file,
-                file.parent_path() / (stem + "voxels.npz")};
+    return NmrPart{SafeFileName(SynsetName(class_name)), split, file,
+                   file.parent_path() / (stem + "voxels.npz")};
   }
   return std::nullopt;
 }

@@ -38,20 +38,20 @@ constexpr Package kPackages[] = {
     {"ufoai-data", "ufoai/base/0models.pk3",
      "3D models of cars: UFO: Alien Invasion (GPL-2, GPL-2+: its contributors)."}};
 
-using Words = std::vector<std::string_view>;
+using WordList = std::vector<std::string_view>;
 
 // A line of a list.
-struct Row {
+struct PackageRow {
   std::string class_name, shape, name, package, license, model;
   std::string_view front, up;     // axes of the file: "-x", "z", ...
   std::vector<std::string> with;  // other files of the same model
-  Words without;                  // as PackageList::without
+  WordList without;               // as PackageList::without
   std::string_view textures;      // package_textures.h
   std::vector<Wheel> wheels;
 };
 
-Result<std::vector<Row>> ReadRows(const PackageList& list) {
-  std::vector<Row> rows;
+Result<std::vector<PackageRow>> ReadPackageRows(const PackageList& list) {
+  std::vector<PackageRow> rows;
   int number = 0;
   for (const std::string_view line : SplitText(list.text, '\n')) {
     ++number;
@@ -59,18 +59,18 @@ Result<std::vector<Row>> ReadRows(const PackageList& list) {
     if (line.empty() || part[0] == "class") continue;
     if (part.size() != 12)
       return InternalError("list {}: line {}: {} columns", list.name, number, part.size());
-    Row row{.class_name = std::string(part[0]),
-            .shape = std::string(part[1]),
-            .name = std::string(part[2]),
-            .package = std::string(part[3]),
-            .license = std::string(part[4]),
-            .model = std::string(part[5]),
-            .front = part[6],
-            .up = part[7],
-            .with = {},
-            .without = {},
-            .textures = part[10],
-            .wheels = {}};
+    PackageRow row{.class_name = std::string(part[0]),
+                   .shape = std::string(part[1]),
+                   .name = std::string(part[2]),
+                   .package = std::string(part[3]),
+                   .license = std::string(part[4]),
+                   .model = std::string(part[5]),
+                   .front = part[6],
+                   .up = part[7],
+                   .with = {},
+                   .without = {},
+                   .textures = part[10],
+                   .wheels = {}};
     TILEGRAD_ASSIGN(row.wheels, ReadWheels(part[11]));
     if (!part[8].empty()) {
       for (const auto file : SplitText(part[8], '|')) row.with.emplace_back(file);
@@ -88,7 +88,7 @@ glm::vec3 Axis(std::string_view text) {
 }
 
 // The rotation that takes `front` to +z and `up` to +y, row-major.
-std::array<float, 9> Turn(const Row& row) {
+std::array<float, 9> TurnOf(const PackageRow& row) {
   const glm::vec3 z = Axis(row.front), y = Axis(row.up), x = glm::cross(y, z);
   return {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
 }
@@ -99,14 +99,14 @@ std::string Lower(std::string text) {
   return text;
 }
 
-bool HasOneOf(const std::string& name, const Words& words) {
+bool HasOneOf(const std::string& name, const WordList& words) {
   const std::string lower = Lower(name);
   return std::any_of(words.begin(), words.end(),
                      [&](std::string_view word) { return lower.find(word) != std::string::npos; });
 }
 
 // Takes the faces out whose object or texture has one of the words in its name.
-void LeaveOut(const Words& words, io::LoadedMesh* loaded) {
+void LeaveOut(const WordList& words, io::LoadedMesh* loaded) {
   Mesh& mesh = loaded->mesh;
   std::vector<char> keep(mesh.faces.size(), 1);
   for (std::size_t p = 0; p < loaded->parts.size(); ++p) {
@@ -134,10 +134,10 @@ class Models : public ModelSource {
     for (const std::string_view word : without_) version_ = HashText(word, version_);
   }
 
-  Status Open(const std::vector<Row>& rows, const Path& games) {
+  Status Open(const std::vector<PackageRow>& rows, const Path& games) {
     for (const Package& package : kPackages) {
       if (std::any_of(rows.begin(), rows.end(),
-                      [&](const Row& row) { return row.package == package.name; }))
+                      [&](const PackageRow& row) { return row.package == package.name; }))
         TILEGRAD_TRY(OpenPackage(package, rows, games));
     }
     SortEntries(&entries_);
@@ -162,17 +162,18 @@ class Models : public ModelSource {
     }
     const glm::vec3 axle = glm::cross(Axis(item.row.up), Axis(item.row.front));
     for (const Wheel& wheel : item.row.wheels) AddWheel(wheel, axle, &loaded.mesh);
-    io::ApplyRotation(loaded.mesh, Turn(item.row));
+    io::ApplyRotation(loaded.mesh, TurnOf(item.row));
     return SourceModel{std::move(loaded.mesh), std::move(loaded.warnings)};
   }
 
  private:
   struct Item {
-    Row row;
+    PackageRow row;
     TextureSet textures;
   };
 
-  Status OpenPackage(const Package& package, const std::vector<Row>& rows, const Path& games) {
+  Status OpenPackage(const Package& package, const std::vector<PackageRow>& rows,
+                     const Path& games) {
     const Path archive = games / package.archive;
     std::error_code error;
     const bool folder = std::filesystem::is_directory(archive, error);
@@ -183,7 +184,7 @@ class Models : public ModelSource {
       TILEGRAD_ASSIGN(files, io::OpenZip(archive));
     }
     bool found = false;
-    for (const Row& row : rows) {
+    for (const PackageRow& row : rows) {
       if (row.package != package.name || files == nullptr) continue;
       found = found || files->Exists(row.model);
       Add(row, folder ? archive : Path());
@@ -198,7 +199,7 @@ class Models : public ModelSource {
     return {};
   }
 
-  void Add(const Row& row, const Path& archive) {
+  void Add(const PackageRow& row, const Path& archive) {
     const std::string model = archives_.at(row.package)->Describe(row.model);
     for (TextureSet& textures : FindTextureSets(row.textures, archive)) {
       const std::string& set = textures.name;
@@ -217,7 +218,7 @@ class Models : public ModelSource {
   }
 
   const std::string name_;
-  const Words without_;
+  const WordList without_;
   std::uint64_t version_;                                            // a hash of the list
   std::map<std::string, std::shared_ptr<io::FileSource>> archives_;  // by package
   std::map<std::string, Item> items_;                                // by SourceEntry::file
@@ -228,7 +229,7 @@ class Models : public ModelSource {
 }  // namespace
 
 Result<std::unique_ptr<ModelSource>> PackageModels(const PackageList& list, const Path& games) {
-  TILEGRAD_ASSIGN(const std::vector<Row> rows, ReadRows(list));
+  TILEGRAD_ASSIGN(const std::vector<PackageRow> rows, ReadPackageRows(list));
   auto source = std::make_unique<Models>(list);
   TILEGRAD_TRY(source->Open(rows, games));
   return std::unique_ptr<ModelSource>(std::move(source));

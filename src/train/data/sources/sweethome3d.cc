@@ -19,12 +19,12 @@ struct Library {
 };
 
 // Columns of one line of the list.
-struct Row {
+struct FurnitureRow {
   std::string class_name, furniture_library, license, name, model, creator;
 };
 
-std::vector<Row> ReadList() {
-  std::vector<Row> rows;
+std::vector<FurnitureRow> ReadList() {
+  std::vector<FurnitureRow> rows;
   for (std::string_view line : SplitText(SweetHome3dList(), '\n')) {
     const auto part = SplitText(line, '\t');
     if (part.size() != 7 || part[0] == "class") continue;
@@ -48,7 +48,7 @@ class SweetHome3d : public ModelSource {
  public:
   static Result<std::unique_ptr<ModelSource>> Open(const Path& folder) {
     auto source = std::make_unique<SweetHome3d>();
-    for (const Row& row : ReadList()) TILEGRAD_TRY(source->Add(folder, row));
+    for (const FurnitureRow& row : ReadList()) TILEGRAD_TRY(source->Add(folder, row));
     SortEntries(&source->entries_);
     return std::unique_ptr<ModelSource>(std::move(source));
   }
@@ -71,7 +71,7 @@ class SweetHome3d : public ModelSource {
   }
 
  private:
-  Status Add(const Path& folder, const Row& row) {
+  Status Add(const Path& folder, const FurnitureRow& row) {
     if (libraries_.count(row.furniture_library) == 0) {
       auto library = OpenLibrary(folder / (row.furniture_library + ".sh3f"));
       if (!library.ok() && library.status().code() == StatusCode::kNotFound) {

@@ -24,6 +24,9 @@ struct LightConfig {
   double sky_low = 0.2, sky_high = 0.6;
 };
 
+// Colours as they are.
+inline LightConfig NoLight() { return {.model = "none"}; }
+
 ConfigFields FieldsOf(LightConfig* config);
 // InvalidArgument names a word that is not known, or a range that is upside down.
 Status CheckConfig(const LightConfig& config);

@@ -10,6 +10,11 @@
 
 namespace tilegrad::train {
 
+// The numbers of colours or points, one after the other.
+inline std::span<const float> Flat(const std::vector<glm::vec3>& values) {
+  return {&values.data()->x, 3 * values.size()};
+}
+
 // Turns hues by an angle about the grey axis and keeps luminance (YIQ), then mixes in a tint of the
 // same luminance; a brightness for all. Colours in [0, 1] stay there.
 class Recolor {

@@ -41,10 +41,6 @@ Result<ColoredMesh> LoadOne(const Dataset& dataset, int model, std::int64_t max_
   return Stripped(data.mesh, max_faces);
 }
 
-std::span<const float> Flat(const std::vector<glm::vec3>& values) {
-  return {&values.data()->x, 3 * values.size()};
-}
-
 }  // namespace
 
 Result<std::vector<ColoredMesh>> LoadStreamMeshes(const Dataset& dataset,

@@ -20,10 +20,6 @@ namespace {
 
 constexpr std::uint64_t kTexturedStream = 0x7465787475726564;
 
-std::span<const float> Flat(const std::vector<glm::vec3>& values) {
-  return {&values.data()->x, 3 * values.size()};
-}
-
 void RecolorAll(const Recolor& recolor, std::span<const float> from, std::vector<float>* to) {
   to->resize(from.size());
   for (std::size_t i = 0; i < from.size(); i += 3) {

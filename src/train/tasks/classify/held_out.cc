@@ -26,15 +26,9 @@ Status CheckClasses(const Dataset& dataset, const ClassifierModel& model) {
                          model.classes().size());
 }
 
-std::vector<int> SpreadViews(int views, int count) {
-  std::vector<int> out;
-  for (int i = 0; i < count; ++i) out.push_back(i * views / count);
-  return out;
-}
-
 // Some views of one model, one after the other.
-std::vector<std::uint8_t> Views(std::span<const std::uint8_t> images, int of,
-                                std::span<const int> views) {
+std::vector<std::uint8_t> SelectedViews(std::span<const std::uint8_t> images, int of,
+                                        std::span<const int> views) {
   const std::size_t bytes = images.size() / static_cast<std::size_t>(of);
   std::vector<std::uint8_t> out;
   for (const int view : views) {
@@ -114,7 +108,7 @@ class Examiner {
   Status Examine(std::size_t i, int model) {
     const int truth = Info(model).class_index;
     TILEGRAD_ASSIGN(const auto all, data_.LoadImages(model));
-    const std::vector<std::uint8_t> images = Views(all, data_.info().views, views_);
+    const std::vector<std::uint8_t> images = SelectedViews(all, data_.info().views, views_);
     std::vector<int> said, found(views_.size());
     const std::size_t bytes = images.size() / views_.size();
     for (std::size_t v = 0; v < views_.size(); v += Model::kImagesAtOnce) {
@@ -171,7 +165,7 @@ Result<Example> Exhibit(const Dataset& dataset, int model, ClassifierModel& clas
   Example out = NamedExample(dataset, model);
   TILEGRAD_ASSIGN(const auto all, dataset.LoadImages(model));
   const std::vector<int> views = ShownViews(info.views);
-  const std::vector<std::uint8_t> images = Views(all, info.views, views);
+  const std::vector<std::uint8_t> images = SelectedViews(all, info.views, views);
   TILEGRAD_ASSIGN(const auto said, classifier.Classify(images));
   const std::size_t bytes = images.size() / views.size(), rgb = bytes / 4 * 3;
   for (std::size_t v = 0; v < views.size(); ++v) {

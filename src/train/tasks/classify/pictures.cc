@@ -7,7 +7,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr std::uint64_t kShiftStream = 0x7368696674;
-constexpr int kColors = 3;
+constexpr int kPictureChannels = 3;
 
 // How one picture is read: numbers of `image` from [4][size][size] bytes.
 struct Placement {
@@ -24,7 +24,7 @@ struct Placement {
   }
   template <class T>
   void Read(std::span<const std::uint8_t> image, T* to) const {
-    for (int c = 0; c < kColors; ++c) {
+    for (int c = 0; c < kPictureChannels; ++c) {
       for (int y = 0; y < size; ++y) {
         for (int x = 0; x < size; ++x)
           *to++ = static_cast<T>(At(image, c, y, x)) * static_cast<T>(1.0 / 255);
@@ -57,8 +57,9 @@ Shift RandomShift(std::uint64_t seed, std::uint64_t position, int most) {
 LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
                              std::span<const Sample> batch, std::span<const Shift> shifts) {
   const int size = data.images.size;
-  LabelledBatch out{context.Empty({static_cast<std::int64_t>(batch.size()), kColors, size, size}),
-                    context.Empty({static_cast<std::int64_t>(batch.size())}, nn::DType::kI32)};
+  LabelledBatch out{
+      context.Empty({static_cast<std::int64_t>(batch.size()), kPictureChannels, size, size}),
+      context.Empty({static_cast<std::int64_t>(batch.size())}, nn::DType::kI32)};
   const std::size_t numbers = out.images.elements() / batch.size();
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
     context.workers().For(batch.size(), [&](std::size_t i, std::size_t) {
@@ -75,11 +76,11 @@ LabelledBatch GatherLabelled(nn::Context& context, const LabelledImages& data,
 nn::Tensor ColorsOf(nn::Context& context, std::span<const std::uint8_t> images, int size) {
   const auto plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   const std::size_t count = images.size() / (4 * plane);
-  nn::Tensor out = context.Empty({static_cast<std::int64_t>(count), kColors, size, size});
+  nn::Tensor out = context.Empty({static_cast<std::int64_t>(count), kPictureChannels, size, size});
   nn::WithFloatType(context.dtype(), [&]<class T>(T) {
     for (std::size_t i = 0; i < count; ++i) {
       Placement{size, false, {}}.Read(images.subspan(4 * plane * i, 4 * plane),
-                                      out.data<T>() + kColors * plane * i);
+                                      out.data<T>() + kPictureChannels * plane * i);
     }
   });
   return out;

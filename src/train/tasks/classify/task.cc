@@ -18,7 +18,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSampleModels = 24, kSampleColumns = 8, kFrame = 3, kGap = 2;
+constexpr int kSampleModels = 24, kSampleColumns = 8, kFrame = 3, kFrameGap = 2;
 constexpr std::uint8_t kRight[3] = {40, 110, 200}, kWrong[3] = {230, 120, 20};
 
 // The share of `scores` [n, classes] that is largest at its label.
@@ -227,7 +227,7 @@ Result<ImageU8> ClassifyTask::SamplePicture(std::int64_t /*steps*/) {
         kPaper);
     cells.push_back(Framed(shown, said[i] == held_out_.labels[i] ? kRight : kWrong));
   }
-  return TileImages(cells, kSampleColumns, kGap);
+  return TileImages(cells, kSampleColumns, kFrameGap);
 }
 
 }  // namespace

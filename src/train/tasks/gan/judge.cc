@@ -10,8 +10,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::int64_t kAtOnce = 16;     // objects
-constexpr std::int64_t kColorCells = 4;  // to a plane: Frechet distances of wide rows take long
+constexpr std::int64_t kJudgedAtOnce = 16;  // objects
+constexpr std::int64_t kColorCells = 4;     // to a plane: Frechet distances of wide rows take long
 constexpr double kLeastDeviation = 0.05;
 constexpr int kFirstLevel = 3;  // of the classifier: what lies before compares little but pixels
 
@@ -60,8 +60,8 @@ Result<FeatureRows> Judge::Levels(const ObjectViews& set) const {
   const nn::Shape& shape = set.colors.shape();
   FeatureRows out;
   const nn::Var all = nn::Constant(context_, set.colors);
-  for (std::int64_t i = 0; i < shape[0]; i += kAtOnce) {
-    const std::int64_t end = std::min(shape[0], i + kAtOnce);
+  for (std::int64_t i = 0; i < shape[0]; i += kJudgedAtOnce) {
+    const std::int64_t end = std::min(shape[0], i + kJudgedAtOnce);
     const nn::Var some = nn::Reshape(nn::Slice(all, 0, i, end), {-1, 3, shape[2], shape[3]});
     std::vector<nn::Var> means;
     for (const nn::Var& level : network_(some)) means.push_back(nn::Mean(level, {2, 3}));

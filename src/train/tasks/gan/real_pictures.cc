@@ -10,12 +10,6 @@
 namespace tilegrad::train {
 namespace {
 
-LightConfig NoLight() {
-  LightConfig light;
-  light.model = "none";
-  return light;
-}
-
 // Width and height in pixels of what is covered by half and more.
 template <class T>
 std::array<double, 2> BoxOf(std::span<const T> plane, std::size_t side) {

@@ -17,7 +17,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr std::uint64_t kSampleStream = 0x7368656574;
-constexpr std::int64_t kSamples = 24;
+constexpr std::int64_t kSheetSamples = 24;
 constexpr int kStreamRows = 8, kStreamViews = 6;
 
 class GanTask : public Task {
@@ -151,7 +151,7 @@ Result<nn::StepVector<nn::Gradient>> GanTask::Backward(const UpdateIndex& at, St
 
 Result<ImageU8> GanTask::SamplePicture(std::int64_t steps) {
   TILEGRAD_ASSIGN(ShapeTextureGenerator * generator, learner_->Shown(steps));
-  const nn::Tensor codes = learner_->step().Noise(kSampleStream, 0, kSamples);
+  const nn::Tensor codes = learner_->step().Noise(kSampleStream, 0, kSheetSamples);
   TILEGRAD_ASSIGN(const auto meshes,
                   GenerateMeshes(*context_, *generator, codes, steps > config_.shape_steps));
   return DrawSheet(meshes, {}, context_->workers());

@@ -34,7 +34,7 @@ std::vector<std::uint32_t> CellOfEach(const nn::Shape& shape, std::int64_t cells
   return out;
 }
 
-struct Cell {
+struct SheetCell {
   double count = 0, sum = 0, squares = 0;
   double mean() const { return sum / count; }
   double deviation() const { return std::sqrt(std::max(0.0, squares / count - mean() * mean())); }
@@ -48,19 +48,19 @@ FeatureRows CellsOf(const nn::Tensor& planes, std::int64_t cells_a_side, bool de
   const auto count = static_cast<std::size_t>(shape[1] * side * side);
   const std::vector<float> numbers = Numbers(planes);
   const std::vector<std::uint32_t> at = CellOfEach(shape, side);
-  std::vector<Cell> cells(objects * count);
+  std::vector<SheetCell> cells(objects * count);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto x = static_cast<double>(numbers[i]);
-    Cell& cell = cells[at[i]];
+    SheetCell& cell = cells[at[i]];
     ++cell.count, cell.sum += x, cell.squares += x * x;
   }
   FeatureRows out;
   out.width = deviations ? 2 * count : count;
   for (std::size_t object = 0; object < objects; ++object) {
-    const std::span<const Cell> own = std::span(cells).subspan(object * count, count);
-    for (const Cell& cell : own) out.values.push_back(static_cast<float>(cell.mean()));
+    const std::span<const SheetCell> own = std::span(cells).subspan(object * count, count);
+    for (const SheetCell& cell : own) out.values.push_back(static_cast<float>(cell.mean()));
     if (!deviations) continue;
-    for (const Cell& cell : own) out.values.push_back(static_cast<float>(cell.deviation()));
+    for (const SheetCell& cell : own) out.values.push_back(static_cast<float>(cell.deviation()));
   }
   return out;
 }

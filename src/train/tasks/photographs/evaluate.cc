@@ -23,10 +23,10 @@ namespace tilegrad::train {
 namespace {
 
 constexpr double kPckThreshold = 0.1;
-enum Method { kMean, kOwnCamera, kOurs, kMethods };
-constexpr const char* kNames[kMethods] = {"mean shape", "predicted camera", "tilegrad"};
+enum CameraMethod { kMean, kOwnCamera, kOurs, kMethods };
+constexpr const char* kRowNames[kMethods] = {"mean shape", "predicted camera", "tilegrad"};
 
-Path ListOf(const Path& run) { return run / "training_photographs.txt"; }
+Path PhotographListOf(const Path& run) { return run / "training_photographs.txt"; }
 
 std::string TextOf(const PhotographSet& set) {
   std::string text;
@@ -177,7 +177,7 @@ class PhotographJudge {
     out.classes = {set_.source}, out.class_models = {static_cast<int>(chosen.size())};
     for (int m = 0; m < kMethods; ++m) {
       const Score mean = tallies_[static_cast<std::size_t>(m)].Mean(set_.keypoint_names.size());
-      out.rows.push_back({kNames[m], {mean}, mean});
+      out.rows.push_back({kRowNames[m], {mean}, mean});
     }
     for (std::size_t i = 0; i < chosen.size(); ++i)
       out.models.push_back({set_.source, set_.photographs[static_cast<std::size_t>(chosen[i])].id,
@@ -200,8 +200,8 @@ class PhotographJudge {
 
 Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_new) {
   const std::string now = TextOf(set);
-  if (is_new) return WriteTextAtomic(ListOf(run), now);
-  TILEGRAD_ASSIGN(const std::string then, ReadText(ListOf(run)));
+  if (is_new) return WriteTextAtomic(PhotographListOf(run), now);
+  TILEGRAD_ASSIGN(const std::string then, ReadText(PhotographListOf(run)));
   if (then == now) return {};
   return InvalidArgument("{}: this run was started with other photographs than those of {}: {}",
                          run.string(), set.folder.string(), FirstDifference(then, now));
@@ -209,8 +209,8 @@ Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_ne
 
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
   std::error_code error;
-  if (!std::filesystem::exists(ListOf(run), error)) return {};
-  TILEGRAD_ASSIGN(const std::string text, ReadText(ListOf(run)));
+  if (!std::filesystem::exists(PhotographListOf(run), error)) return {};
+  TILEGRAD_ASSIGN(const std::string text, ReadText(PhotographListOf(run)));
   std::set<std::string> trained;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) trained.insert(line);

@@ -13,14 +13,8 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSamples = 3, kZoom = 4;
+constexpr int kPixelSamples = 3, kPictureZoom = 4;
 constexpr std::uint8_t kSeen[3] = {255, 60, 30}, kPredicted[3] = {40, 200, 255};
-
-LightConfig NoLight() {
-  LightConfig light;
-  light.model = "none";
-  return light;
-}
 
 // Looks at the object from the side (azimuth 90), or obliquely from in front.
 WeakPerspective LookAround(double azimuth, double scale) {
@@ -52,7 +46,7 @@ ImageU8 PhotoImage(std::span<const float> rgb, int size) {
 }  // namespace
 
 PhotographPictures::PhotographPictures(int size)
-    : size_(size), pictures_(NoLight(), size, kSamples) {}
+    : size_(size), pictures_(NoLight(), size, kPixelSamples) {}
 
 Result<std::vector<float>> PhotographPictures::Draw(const Mesh& mesh,
                                                     const WeakPerspective& camera) {
@@ -70,7 +64,7 @@ Result<std::vector<ShownPicture>> PhotographPictures::Row(const std::string& nam
   const ImageU8 photo = PhotoImage(rgb, size_);
   add("photograph", photo);
   if (!predicted.keypoints.empty()) {
-    ImageU8 marked = Enlarged(photo, kZoom);
+    ImageU8 marked = Enlarged(photo, kPictureZoom);
     for (std::size_t k = 0; k < crop.keypoints.size(); ++k) {
       if (!crop.keypoints[k].visible) continue;
       const auto seen = ProjectWeakly(crop.camera, predicted.keypoints[k]);

@@ -17,7 +17,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSampleRows = 8;
+constexpr int kPhotographRows = 8;
 
 class PhotographsTask : public AdversarialTask {
  public:
@@ -94,7 +94,7 @@ Status PhotographsTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(train_, PhotoStore::Load(set_, train, config_.crop, image_size(), workers,
                                            start.progress, start.stop));
   TILEGRAD_ASSIGN(
-      held_out_, PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kSampleRows),
+      held_out_, PhotoStore::Load(set_, ChoosePhotographs(set_, Split::kTest, kPhotographRows),
                                   config_.crop, image_size(), workers, start.progress, start.stop));
   order_.emplace(static_cast<int>(train.size()), 1,
                  static_cast<std::uint64_t>(start.schedule.seed));

@@ -10,7 +10,7 @@ namespace {
 
 // Numbers times `scale`; rows of `size` pixels, each from right to left if mirrored.
 template <class From>
-struct Reader {
+struct BatchReader {
   std::size_t size;
   bool mirrored;
   double scale;
@@ -40,7 +40,7 @@ struct Gathering {
 
   // Object b, whose view v is image(v).
   template <class T, class From, class Image>
-  void Fill(std::size_t b, const Reader<From>& reader, const Image& image) {
+  void Fill(std::size_t b, const BatchReader<From>& reader, const Image& image) {
     reader.Read(image(0), out.input.data<T>() + b * store.ImageBytes());
     for (std::size_t v = 0; v < views; ++v)
       reader.template ReadTruth<T>(image(v), b * views + v, out);
@@ -51,8 +51,8 @@ struct Gathering {
 
   template <class T>
   void FromStore(std::size_t b, const Sample& sample) {
-    const Reader<std::uint8_t> reader{static_cast<std::size_t>(store.size), sample.mirrored,
-                                      1.0 / 255};
+    const BatchReader<std::uint8_t> reader{static_cast<std::size_t>(store.size), sample.mirrored,
+                                           1.0 / 255};
     Fill<T>(b, reader, [&](std::size_t v) { return store.Image(sample.model, sample.views[v]); });
     for (std::size_t v = 0; v < views; ++v)
       CamerasOf(b)[v] = store.cameras[static_cast<std::size_t>(sample.views[v])];
@@ -60,7 +60,7 @@ struct Gathering {
   }
   template <class T>
   void FromStream(std::size_t b, const Sample& sample, std::span<const float> rgba) {
-    const Reader<float> reader{static_cast<std::size_t>(store.size), sample.mirrored, 1};
+    const BatchReader<float> reader{static_cast<std::size_t>(store.size), sample.mirrored, 1};
     Fill<T>(b, reader, [&](std::size_t v) {
       return rgba.subspan(v * store.ImageBytes(), store.ImageBytes());
     });

@@ -10,12 +10,12 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kZoom = 2, kGap = 2;
+constexpr int kSampleZoom = 2, kSampleGap = 2;
 
-ImageU8 Shown(const float* rgb, const float* alpha, int size) {
+ImageU8 ShownPixels(const float* rgb, const float* alpha, int size) {
   const std::size_t plane = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   return Enlarged(OverGrey(PlanarRgba<float>{{rgb, 3 * plane}, {alpha, plane}, size, size}, kPaper),
-                  kZoom);
+                  kSampleZoom);
 }
 
 }  // namespace
@@ -40,12 +40,12 @@ Result<ImageU8> SampleSheet(nn::Context& context, TrainStep& step, const ImageSt
                          [](std::int32_t id) { return id < 0 ? 0.0f : 1.0f; });
   std::vector<ImageU8> cells;
   for (std::size_t n = 0; n < samples.size() * static_cast<std::size_t>(views); ++n) {
-    cells.push_back(Shown(batch.truth_colors.data<float>() + 3 * plane * n,
-                          batch.truth_alpha.data<float>() + plane * n, store.size));
-    cells.push_back(Shown(images.colors.value().data<float>() + 3 * plane * n,
-                          covered.data() + plane * n, store.size));
+    cells.push_back(ShownPixels(batch.truth_colors.data<float>() + 3 * plane * n,
+                                batch.truth_alpha.data<float>() + plane * n, store.size));
+    cells.push_back(ShownPixels(images.colors.value().data<float>() + 3 * plane * n,
+                                covered.data() + plane * n, store.size));
   }
-  return TileImages(cells, 2 * views, kGap);
+  return TileImages(cells, 2 * views, kSampleGap);
 }
 
 }  // namespace tilegrad::train

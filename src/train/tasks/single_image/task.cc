@@ -17,7 +17,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::size_t kSampleRows = 8;
+constexpr std::size_t kSingleImageRows = 8;
 
 class SingleImageTask : public Task {
  public:
@@ -105,7 +105,7 @@ Status SingleImageTask::Begin(const Path& run, std::int64_t first_step) {
   TILEGRAD_TRY(KeepPictures(run, first_step));
   if (first_step == 0) WarnOfFewModels();
   if (!stream_ || first_step > 0) return {};
-  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
+  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSingleImageRows, 6));
   return io::SavePng(run / "stream.png", sheet);
 }
 
@@ -143,9 +143,10 @@ Status SingleImageTask::LoadImages(const TaskStart& start) {
   std::vector<int> test = dataset_->Select(Split::kTest);
   // The pictures show models spread over the held-out ones, which stand in the order of their
   // classes.
-  if (test.size() > kSampleRows) {
-    for (std::size_t i = 0; i < kSampleRows; ++i) test[i] = test[i * test.size() / kSampleRows];
-    test.resize(kSampleRows);
+  if (test.size() > kSingleImageRows) {
+    for (std::size_t i = 0; i < kSingleImageRows; ++i)
+      test[i] = test[i * test.size() / kSingleImageRows];
+    test.resize(kSingleImageRows);
   }
   const Workers& workers = start.context.workers();
   TILEGRAD_ASSIGN(train_, LoadImageStore(*dataset_, dataset_->Select(Split::kTrain), workers,

@@ -19,9 +19,9 @@
 namespace tilegrad::train {
 namespace {
 
-enum Method { kWithoutLight, kMeanLight, kOurs, kMethods };
-constexpr const char* kNames[kMethods] = {"without light", "mean light", "tilegrad"};
-using MethodScores = std::array<Score, kMethods>;
+enum LightMethod { kWithoutLight, kMeanLight, kTexturedOurs, kLightMethods };
+constexpr const char* kMethodNames[kLightMethods] = {"without light", "mean light", "tilegrad"};
+using MethodScores = std::array<Score, kLightMethods>;
 
 // Over the colours of two pictures [4][size][size].
 double MeanDifference(std::span<const float> a, std::span<const float> b) {
@@ -53,8 +53,8 @@ class Judge {
     for (Score& score : scores)
       score.texture_l1 = MeanDifference(texture, truth.Of(truth.texture, v));
     scores[kWithoutLight].lit_l1 = MeanDifference(texture, input);
-    const std::pair<Method, const DrawnLight*> lights[] = {{kMeanLight, &mean_},
-                                                           {kOurs, &object.light}};
+    const std::pair<LightMethod, const DrawnLight*> lights[] = {{kMeanLight, &mean_},
+                                                                {kTexturedOurs, &object.light}};
     for (const auto& [method, light] : lights) {
       view.light = *light;
       TILEGRAD_ASSIGN(const auto lit, pictures_.Draw(object.mesh, view, Appearance::kLit));
@@ -72,10 +72,10 @@ class Judge {
   ObjectPictures pictures_;
 };
 
-class Evaluator {
+class TexturedEvaluator {
  public:
-  Evaluator(const TexturedImageConfig& config, const TaskEvaluation& job, const Dataset& dataset,
-            const Workers& workers)
+  TexturedEvaluator(const TexturedImageConfig& config, const TaskEvaluation& job,
+                    const Dataset& dataset, const Workers& workers)
       : config_(config),
         job_(job),
         dataset_(dataset),
@@ -139,7 +139,7 @@ class Evaluator {
     });
     for (const Status& failure : failures) TILEGRAD_TRY(failure);
     for (const auto flag : unusable) unusable_[i] += flag;
-    for (int m = 0; m < kMethods; ++m) {
+    for (int m = 0; m < kLightMethods; ++m) {
       std::vector<train::Score> of_method;
       for (const MethodScores& view : scores) of_method.push_back(view[m]);
       scores_[i][m] = MeanScore(of_method);
@@ -158,15 +158,15 @@ class Evaluator {
     const ClassMeans means(dataset_, models);
     out_.classes = means.classes(), out_.class_models = means.class_models();
     const bool lit = LightingOf(config_.light) != Lighting::kNone;
-    for (int m = lit ? kWithoutLight : kOurs; m < kMethods; ++m) {
+    for (int m = lit ? kWithoutLight : kTexturedOurs; m < kLightMethods; ++m) {
       std::vector<train::Score> of_method;
       for (const MethodScores& model : scores_) of_method.push_back(model[m]);
-      out_.rows.push_back(means.Row(kNames[m], of_method));
+      out_.rows.push_back(means.Row(kMethodNames[m], of_method));
     }
     for (std::size_t i = 0; i < models.size(); ++i) {
       const ModelInfo& info = dataset_.models()[static_cast<std::size_t>(models[i])];
       out_.models.push_back({dataset_.info().classes[static_cast<std::size_t>(info.class_index)],
-                             info.id, scores_[i][kOurs]});
+                             info.id, scores_[i][kTexturedOurs]});
       out_.unusable_predictions += unusable_[i];
     }
     out_.predictor = job_.predictor.description();
@@ -198,7 +198,7 @@ Result<Evaluation> EvaluateTextured(const TexturedImageConfig& config, const Tas
   if (job.oracle_steps > 0) return InvalidArgument("textures and lights have no oracle");
   if (job.split != Split::kTrain) TILEGRAD_TRY(CheckHeldOut(job.run, dataset, job.split));
   TILEGRAD_TRY(job.predictor.CheckImageSize(dataset));
-  return Evaluator(config, job, dataset, workers).Run(progress, stop);
+  return TexturedEvaluator(config, job, dataset, workers).Run(progress, stop);
 }
 
 }  // namespace tilegrad::train

@@ -12,36 +12,36 @@ namespace {
 
 using Direction = std::array<double, 3>;
 
-constexpr int kDirections = 160;     // some 11 degrees apart on a hemisphere
-constexpr int kRings = 3;            // finer and finer around the best
-constexpr int kAround = 8;           // directions of a ring
-constexpr double kFirstRing = 0.1;   // radians; each is half of the one before
-constexpr double kLeastCover = 0.5;  // outlines say nothing about light
-constexpr std::size_t kFewest = 16;  // pixels
+constexpr int kDirections = 160;            // some 11 degrees apart on a hemisphere
+constexpr int kRings = 3;                   // finer and finer around the best
+constexpr int kAround = 8;                  // directions of a ring
+constexpr double kFirstRing = 0.1;          // radians; each is half of the one before
+constexpr double kLeastOutlineCover = 0.5;  // outlines say nothing about light
+constexpr std::size_t kFewest = 16;         // pixels
 
-struct Sample {
+struct LitPixel {
   std::array<double, 3> normal, texture, picture;
 };
 
-double Dot(const Direction& a, const Direction& b) {
+double DotOf(const Direction& a, const Direction& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-Direction Unit(const Direction& d) {
-  const double length = std::sqrt(Dot(d, d));
+Direction UnitOf(const Direction& d) {
+  const double length = std::sqrt(DotOf(d, d));
   return {d[0] / length, d[1] / length, d[2] / length};
 }
 
 // Normals turned to the camera's axes.
 template <class T>
-std::vector<Sample> Samples(const LightEvidence<T>& e, std::span<const float, 9> r) {
+std::vector<LitPixel> Samples(const LightEvidence<T>& e, std::span<const float, 9> r) {
   const std::size_t pixels = e.cover.size();
-  std::vector<Sample> out;
+  std::vector<LitPixel> out;
   for (std::size_t p = 0; p < pixels; ++p) {
     const Direction n = {double(e.normals[p]), double(e.normals[pixels + p]),
                          double(e.normals[2 * pixels + p])};
-    if (double(e.cover[p]) < kLeastCover || Dot(n, n) < 0.5) continue;
-    Sample sample;
+    if (double(e.cover[p]) < kLeastOutlineCover || DotOf(n, n) < 0.5) continue;
+    LitPixel sample;
     for (std::size_t c = 0; c < 3; ++c) {
       sample.normal[c] =
           double{r[3 * c]} * n[0] + double{r[3 * c + 1]} * n[1] + double{r[3 * c + 2]} * n[2];
@@ -62,7 +62,7 @@ double FromDirection(double t) { return 0.25 + 0.5 * t + 5.0 / 32 * (3 * t * t -
 // The best light so far of one picture.
 class LightSearch::Attempts {
  public:
-  Attempts(const LightSearch& search, std::vector<Sample> samples)
+  Attempts(const LightSearch& search, std::vector<LitPixel> samples)
       : search_(search), samples_(std::move(samples)) {}
 
   void Try(const Direction& direction) {
@@ -73,15 +73,15 @@ class LightSearch::Attempts {
   // Those around the best one.
   void TryRing(double radius) {
     const Direction center = best_.direction;
-    const Direction a = Unit(std::abs(center[2]) < 0.9 ? Direction{center[1], -center[0], 0}
-                                                       : Direction{0, center[2], -center[1]});
+    const Direction a = UnitOf(std::abs(center[2]) < 0.9 ? Direction{center[1], -center[0], 0}
+                                                         : Direction{0, center[2], -center[1]});
     const Direction b = {center[1] * a[2] - center[2] * a[1], center[2] * a[0] - center[0] * a[2],
                          center[0] * a[1] - center[1] * a[0]};
     for (int k = 0; k < kAround; ++k) {
       const double x = radius * std::cos(2 * std::numbers::pi * k / kAround);
       const double y = radius * std::sin(2 * std::numbers::pi * k / kAround);
-      const Direction d = Unit({center[0] + x * a[0] + y * b[0], center[1] + x * a[1] + y * b[1],
-                                center[2] + x * a[2] + y * b[2]});
+      const Direction d = UnitOf({center[0] + x * a[0] + y * b[0], center[1] + x * a[1] + y * b[1],
+                                  center[2] + x * a[2] + y * b[2]});
       if (d[2] >= search_.cosine_ - 1e-9) Try(d);
     }
   }
@@ -91,8 +91,8 @@ class LightSearch::Attempts {
   // By least squares: the picture is linear in it.
   double BestSky(const Direction& direction) const {
     double above = 0, below = 0;
-    for (const Sample& s : samples_) {
-      const double lit = FromDirection(Dot(s.normal, direction));
+    for (const LitPixel& s : samples_) {
+      const double lit = FromDirection(DotOf(s.normal, direction));
       for (std::size_t c = 0; c < 3; ++c) {
         const double slope = (1 - lit) * s.texture[c];
         above += slope * (s.picture[c] - lit * s.texture[c]);
@@ -105,8 +105,8 @@ class LightSearch::Attempts {
 
   double Error(const FoundLight& light) const {
     double sum = 0;
-    for (const Sample& s : samples_) {
-      const double t = Dot(s.normal, light.direction);
+    for (const LitPixel& s : samples_) {
+      const double t = DotOf(s.normal, light.direction);
       const double lit = search_.has_sky_ ? light.sky + (1 - light.sky) * FromDirection(t)
                                           : search_.config_.ambient + std::max(0.0, t);
       for (std::size_t c = 0; c < 3; ++c)
@@ -116,7 +116,7 @@ class LightSearch::Attempts {
   }
 
   const LightSearch& search_;
-  const std::vector<Sample> samples_;
+  const std::vector<LitPixel> samples_;
   FoundLight best_;
   double least_ = std::numeric_limits<double>::infinity();
 };
@@ -137,7 +137,7 @@ LightSearch::LightSearch(const LightConfig& config)
 template <class T>
 FoundLight LightSearch::Find(const LightEvidence<T>& evidence,
                              std::span<const float, 9> rotation) const {
-  std::vector<Sample> samples = Samples(evidence, rotation);
+  std::vector<LitPixel> samples = Samples(evidence, rotation);
   if (samples.size() < kFewest) return {};
   Attempts attempts(*this, std::move(samples));
   for (const Direction& d : directions_) attempts.Try(d);

@@ -11,14 +11,14 @@ constexpr std::size_t ImageFromOther(std::size_t m) { return 2 * (m ^ 1) + 1; }
 static_assert(InputOfImage(ImageFromOther(6)) == 6 && InputOfImage(ImageFromOther(7)) == 7);
 
 template <class T>
-struct Row {
+struct TargetRow {
   const T* said;
   T* out;
   std::size_t numbers;  // 3: a direction, 9: harmonics
 };
 
 template <class T>
-void Write(const FoundLight& found, const Row<T>& row) {
+void Write(const FoundLight& found, const TargetRow<T>& row) {
   const auto& d = found.direction;
   if (d == std::array<double, 3>{}) {
     std::copy_n(row.said, row.numbers, row.out);

@@ -8,9 +8,9 @@
 namespace tilegrad::train {
 namespace {
 
-class Row {
+class PictureRow {
  public:
-  Row(const ShownObject& shown, ObjectPictures& pictures, int size)
+  PictureRow(const ShownObject& shown, ObjectPictures& pictures, int size)
       : shown_(shown), pictures_(pictures), size_(size) {}
 
   Result<std::vector<ShownPicture>> Make() {
@@ -55,7 +55,7 @@ class Row {
 
 Result<std::vector<ShownPicture>> PicturesOf(const ShownObject& shown, ObjectPictures& pictures,
                                              int size) {
-  return Row(shown, pictures, size).Make();
+  return PictureRow(shown, pictures, size).Make();
 }
 
 ImageU8 SheetOf(const std::vector<std::vector<ShownPicture>>& rows, int size) {

@@ -19,7 +19,7 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr int kSampleRows = 8, kRowViews = 3;
+constexpr int kTexturedRows = 8, kRowViews = 3;
 
 class TexturedImageTask : public AdversarialTask {
  public:
@@ -88,7 +88,7 @@ Status TexturedImageTask::Start(const TaskStart& start) {
   TILEGRAD_ASSIGN(meshes_, LoadTexturedMeshes(*dataset_, train, config_.stream.meshes, workers,
                                               start.progress, start.stop));
   TILEGRAD_ASSIGN(HeldOutViews held_out,
-                  HeldOutViews::Load({config_, *dataset_, ChooseModels(*dataset_, kSampleRows)},
+                  HeldOutViews::Load({config_, *dataset_, ChooseModels(*dataset_, kTexturedRows)},
                                      workers, start.progress, start.stop));
   held_out_.emplace(std::move(held_out));
   const auto seed = static_cast<std::uint64_t>(start.schedule.seed);
@@ -108,7 +108,7 @@ Status TexturedImageTask::Begin(const Path& run, std::int64_t first_step) {
   if (first_step > 0) return {};
   if (!config_.start.empty())
     TILEGRAD_TRY(StartAs(*context_, step_->network().module(), config_.start));
-  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kSampleRows, 6));
+  TILEGRAD_ASSIGN(const ImageU8 sheet, stream_->Sheet(kTexturedRows, 6));
   return io::SavePng(run / "stream.png", sheet);
 }
 
