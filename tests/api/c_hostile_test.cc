@@ -17,8 +17,7 @@
 
 #include "api/c_caller.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::c_hostile_test {
 
 // Two that work, and numbers that are none.
 Caller MakeCaller(std::uint64_t seed) { return {Dice(seed), {1, 2, 0, -1, 5000}}; }
@@ -67,5 +66,4 @@ TEST(HostileC, CallersOnSeveralThreadsDoNotMeet) {
   for (std::thread& thread : threads) thread.join();
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::c_hostile_test

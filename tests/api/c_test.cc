@@ -9,8 +9,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::c_test {
 
 using test::kAll;
 using test::kTestOptions;
@@ -267,5 +266,4 @@ TEST_F(CApi, SaysWhatIsWrong) {
             "the frame holds nothing: Render into it first");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::c_test

@@ -12,8 +12,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::cut_faces_test {
 
 // A wall that reaches past the camera: what the image shows of it lies far from where it is cut, at
 // a hundredth of that depth. T: float or double.
@@ -209,5 +208,4 @@ TEST(CutFaces, GradientsKeepTheirDigits) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::cut_faces_test

@@ -14,8 +14,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::double_path_test {
 
 using test::TestCotangents;
 using test::TestGradients;
@@ -209,5 +208,4 @@ TEST(DoubleConstants, APyramidOfOneColourIsThatColour) {
 INSTANTIATE_TEST_SUITE_P(All, DoublePath, testing::ValuesIn(kTrials),
                          [](const auto& p) { return p.param.name; });
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::double_path_test

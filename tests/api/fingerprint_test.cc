@@ -32,8 +32,7 @@
 #include "api/fingerprint_table.h"
 #include "support/source_dir.h"
 
-namespace tilegrad::test {
-namespace {
+namespace tilegrad::test::fingerprint_test {
 
 const std::string kFile = TILEGRAD_SOURCE_DIR "/tests/api/fingerprints.txt";
 const std::string kReference = "double";  // the target of RendererT<double>
@@ -280,5 +279,4 @@ TEST(ApiFingerprintCases, HaveNamesOfTheirOwn) {
   for (const Case& c : FingerprintCases()) EXPECT_TRUE(names.insert(c.name).second) << c.name;
 }
 
-}  // namespace
-}  // namespace tilegrad::test
+}  // namespace tilegrad::test::fingerprint_test

@@ -12,8 +12,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::gradient_arrays_test {
 
 using test::kAll;
 using test::kTestOptions;
@@ -21,7 +20,7 @@ using test::TestCotangents;
 using test::TestGradients;
 using test::TestScene;
 
-TEST(ApiBackward, AddsToWhatIsThere) {
+TEST(ApiGradientArrays, AddsToWhatIsThere) {
   const TestScene<float> s(Lighting::kPhong);
   Renderer renderer;
   Frame frame;
@@ -72,7 +71,7 @@ void ExpectSharedArraysGetTheSum() {
   EXPECT_EQ(both.lights[0].intensity, first.lights[0].intensity + second.lights[0].intensity);
 }
 
-TEST(ApiBackward, ScenesThatShareAnArrayGetTheSum) {
+TEST(ApiGradientArrays, ScenesThatShareAnArrayGetTheSum) {
   ExpectSharedArraysGetTheSum<float>();
   ExpectSharedArraysGetTheSum<double>();
 }
@@ -122,13 +121,13 @@ void ExpectArraysThatMeetAreRefused() {
             "");
 }
 
-TEST(ApiBackward, ArraysOfGradientsThatMeetAreRefused) {
+TEST(ApiGradientArrays, ArraysOfGradientsThatMeetAreRefused) {
   ExpectArraysThatMeetAreRefused<float>();
   ExpectArraysThatMeetAreRefused<double>();
 }
 
 // Without mip levels in one scene, with them in the next: there is room for those of both.
-TEST(ApiBackward, TexturesOfTwoFiltersShareAGradient) {
+TEST(ApiGradientArrays, TexturesOfTwoFiltersShareAGradient) {
   const TestScene<float> s(Lighting::kNone);
   std::vector<std::vector<Texture>> textures(2, s.textures);
   textures[1][0].filter = Filter::kTrilinear;
@@ -169,12 +168,12 @@ void ExpectNoGradientOfNormalsThatAreNotUsed() {
   EXPECT_NE(d_positions, std::vector<T>(48, T(0)));
 }
 
-TEST(ApiBackward, NormalsThatAreNotUsedHaveNoGradient) {
+TEST(ApiGradientArrays, NormalsThatAreNotUsedHaveNoGradient) {
   ExpectNoGradientOfNormalsThatAreNotUsed<float>();
   ExpectNoGradientOfNormalsThatAreNotUsed<double>();
 }
 
-TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
+TEST(ApiGradientArrays, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
   const TestScene<float> s(Lighting::kNone);
   Renderer renderer;
   Frame frame;
@@ -194,5 +193,4 @@ TEST(ApiBackward, LeavesArraysAsTheyWereAfterAnErrorWhenAdding) {
   EXPECT_EQ(g.positions, before);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::gradient_arrays_test

@@ -9,8 +9,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::gradients_test {
 
 using test::kTestOptions;
 using test::TestCotangents;
@@ -158,5 +157,4 @@ TEST(ApiGradients, DoubleRefusesWhatFloatCannotHold) {
             "scene 0: positions[4] is inf");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::gradients_test

@@ -8,8 +8,7 @@
 #include "api/test_scene.h"
 #include "support/allocation_count.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::memory_test {
 
 using test::g_allocations;
 using test::g_refused;
@@ -82,5 +81,4 @@ TEST(ApiMemory, NoMemoryIsAnErrorLikeOthers) {
   EXPECT_GT(refused, 50);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::memory_test

@@ -13,8 +13,7 @@
 
 #include "api/test_scene.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::nothing_test {
 
 using test::kAll;
 using test::kTestOptions;
@@ -193,5 +192,4 @@ TEST(ApiNothing, IsBackgroundInC) {
   tilegrad_renderer_destroy(renderer);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::nothing_test

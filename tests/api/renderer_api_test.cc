@@ -14,8 +14,7 @@
 #include "api/test_scene.h"
 #include "support/forked.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_api_test {
 
 using test::kAll;
 using test::kTestOptions;
@@ -394,5 +393,4 @@ TEST(ApiCamera, OfDoubleHasTheDigitsOfDouble) {
   EXPECT_EQ(CameraFromParameters(parameters)->near_plane, 0.01);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_api_test

@@ -13,8 +13,7 @@
 
 #include "base/simd_target.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::array_checks_test {
 
 template <class T>
 void CheckFinite() {
@@ -85,5 +84,4 @@ TEST(ArrayChecks, FindWrongValuesOnEveryTarget) {
   ASSERT_TRUE(ForceTarget("").ok());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::array_checks_test

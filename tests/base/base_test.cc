@@ -25,8 +25,7 @@
 #include "base/temporary_file.h"
 #include "support/forked.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::base_test {
 
 TEST(Workers, CallsEachIndexOnceAndNeverTwoAtATimePerWorker) {
   for (int count : {1, 2, 3, 7}) {
@@ -394,9 +393,6 @@ TEST_F(FileTest, FailedWriteLeavesTheOldFile) {
 TEST(SimdTarget, ForcesEveryRunnableTargetAndRefusesOthers) {
   const auto targets = RunnableTargets();
   ASSERT_FALSE(targets.empty());
-#ifndef HWY_COMPILE_ONLY_STATIC  // TILEGRAD_SIMD=native
-  EXPECT_EQ(targets.back(), "EMU128");
-#endif
   for (const auto& name : targets) {
     ASSERT_TRUE(ForceTarget(name).ok());
     EXPECT_EQ(ActiveTarget(), name);
@@ -407,5 +403,4 @@ TEST(SimdTarget, ForcesEveryRunnableTargetAndRefusesOthers) {
   EXPECT_EQ(ActiveTarget(), targets.front());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::base_test

@@ -5,8 +5,7 @@
 
 #include "base/escape_html.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::escape_text_test {
 
 TEST(EscapeControls, KeepsTextOfEveryLanguage) {
   for (const char* text : {"", "chair.obj", "St\u00fchle \u6905\u5b50 \U0001fa91", "a\tb\nc\n"}) {
@@ -59,5 +58,4 @@ TEST(EscapeCsv, QuotesWhereItMust) {
   EXPECT_EQ(EscapeCsv("a\"b\nc"), "\"a\"\"b\nc\"");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::escape_text_test

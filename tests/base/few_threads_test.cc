@@ -13,8 +13,7 @@
 #include "base/parallel.h"
 #include "support/forked.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::few_threads_test {
 
 class FewThreads : public testing::TestWithParam<int> {
  protected:
@@ -104,5 +103,4 @@ TEST_P(FewThreads, DoTheWorkOfAForkedChild) {
 
 INSTANTIATE_TEST_SUITE_P(Granted, FewThreads, testing::Values(0, 1, 2, 3, 4, 7));
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::few_threads_test

@@ -8,8 +8,7 @@
 
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::output_guard_test {
 
 class Guard : public TempFolderTest {
  protected:
@@ -174,5 +173,4 @@ TEST_F(Guard, NotesAreNotWrittenThroughLinks) {
   EXPECT_FALSE(OutputGuard().Check(file).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::output_guard_test

@@ -10,8 +10,7 @@
 #include "base/file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::read_budget_test {
 
 class ReadBudgetTest : public TempFolderTest {
  protected:
@@ -78,5 +77,4 @@ TEST_F(ReadBudgetTest, FilesCount) {
   ExpectMessage(second.status(), file.string());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::read_budget_test

@@ -11,8 +11,7 @@
 #include "raster/project.h"
 #include "render/pipeline/frame_layout.h"
 
-namespace tilegrad::bench {
-namespace {
+namespace tilegrad::bench::culled_test {
 
 constexpr SceneSpec kScene{"small", 3, 96, 3};
 
@@ -108,5 +107,4 @@ TEST(Culled, GradientsAgreeWithTheRenderer) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::bench
+}  // namespace tilegrad::bench::culled_test

@@ -6,8 +6,7 @@
 
 #include "report/tables.h"
 
-namespace tilegrad::bench {
-namespace {
+namespace tilegrad::bench::report_test {
 
 std::string Sample(const std::string& name, double cpu, double wall, const std::string& more) {
   return R"({"run_name":")" + name + R"(/process_time/real_time","run_type":"iteration",)" +
@@ -131,5 +130,4 @@ TEST(LogPlotSvg, DrawsPointsWhereTheyBelongAndEscapesTexts) {
   EXPECT_NE(LogPlotSvg({"x", "y", {}}).find("</svg>"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::bench
+}  // namespace tilegrad::bench::report_test

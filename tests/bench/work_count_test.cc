@@ -10,8 +10,7 @@
 #include "base/simd_target.h"
 #include "raster/bench_scenes.h"
 
-namespace tilegrad::bench {
-namespace {
+namespace tilegrad::bench::work_count_test {
 
 double SquaredToSegment(const double p[2], const float* a, const float* b) {
   const double e[2] = {b[0] - a[0], b[1] - a[1]}, q[2] = {p[0] - a[0], p[1] - a[1]};
@@ -124,5 +123,4 @@ TEST(WorkCount, WhatIsNotAskedForCostsNothing) {
   EXPECT_EQ(ForwardLimit(work, {false, true}).bytes, 8 * work.pixels);
 }
 
-}  // namespace
-}  // namespace tilegrad::bench
+}  // namespace tilegrad::bench::work_count_test

@@ -13,8 +13,7 @@
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::broken_inputs_test {
 
 // A tiny dataset and a run of two steps, made once for all cases.
 class BrokenInputs : public TempFolderTest {
@@ -360,5 +359,4 @@ TEST_F(BrokenInputs, PlacesThatCannotBeWritten) {
   EXPECT_EQ(ReadText(folder_ / "file").value(), "in the way");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::broken_inputs_test

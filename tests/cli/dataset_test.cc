@@ -8,8 +8,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::dataset_test {
 
 // A wedge without symmetry, with integer coordinates, so that turning it rounds nothing.
 constexpr int kWedge[6][3] = {{0, 0, 0}, {3, 0, 0}, {0, 5, 0}, {0, 0, 2}, {3, 0, 2}, {0, 5, 2}};
@@ -121,5 +120,4 @@ TEST_F(DatasetTest, WhatAFolderHoldsBesidesIsNamed) {
     EXPECT_NE(again.output.find(text), std::string::npos) << again.output;
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::dataset_test

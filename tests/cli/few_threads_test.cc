@@ -10,8 +10,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::few_threads_test {
 
 // With support/few_threads.c as the system.
 class FewThreads : public TempFolderTest {
@@ -62,5 +61,4 @@ TEST_F(FewThreads, MakeADataset) {
 // Which makes workers of up to 7 itself.
 TEST_F(FewThreads, PassTheSelfTest) { ExpectSame("selftest --only 'same bits'"); }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::few_threads_test

@@ -12,8 +12,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::help_test {
 
 using Json = nlohmann::json;
 
@@ -139,5 +138,4 @@ TEST_F(Help, JsonIsOneObjectAndQuietSaysNothing) {
   EXPECT_NE(wrong.output.find("none.glb"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::help_test

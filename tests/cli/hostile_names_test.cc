@@ -6,8 +6,7 @@
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::hostile_names_test {
 
 constexpr const char* kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n";
 
@@ -139,5 +138,4 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
   for (const Path& file : kept) EXPECT_TRUE(std::filesystem::exists(file)) << file;
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::hostile_names_test

@@ -8,8 +8,7 @@
 #include "base/simd_target.h"
 #include "support/run_program.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::info_test {
 
 std::string Info() {
   const Outcome outcome = RunProgram("info");
@@ -40,5 +39,4 @@ TEST(InfoCommand, TakesTheBestTargetUnlessOneIsForced) {
   ::unsetenv("TILEGRAD_TARGET");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::info_test

@@ -8,8 +8,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::option_words_test {
 
 class OptionWords : public TempFolderTest {
  protected:
@@ -149,5 +148,4 @@ TEST_F(OptionWords, TheLimitOfMemoryIsAnOptionOfEveryReader) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::option_words_test

@@ -9,8 +9,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::outputs_test {
 
 class Outputs : public TempFolderTest {
  protected:
@@ -185,5 +184,4 @@ TEST_F(Outputs, PagesAndStudies) {
   EXPECT_FALSE(Exists("tradeoff/tradeoff.md"));
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::outputs_test

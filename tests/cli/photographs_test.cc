@@ -8,8 +8,7 @@
 #include "support/temp_folder.h"
 #include "train/data/photographs/miniature.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::photographs_test {
 
 class Photographs : public TempFolderTest {
  protected:
@@ -47,5 +46,4 @@ TEST_F(Photographs, FromAnnotationsToATableInThreeCommands) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::photographs_test

@@ -11,8 +11,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::predict_test {
 
 class Predict : public TempFolderTest {
  protected:
@@ -131,5 +130,4 @@ TEST_F(Predict, WritesTheLightAndMovesIt) {
   EXPECT_NE(plain.output.find("predicts no light and camera"), std::string::npos) << plain.output;
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::predict_test

@@ -13,8 +13,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::render_test {
 
 class Render : public TempFolderTest {
  protected:
@@ -408,5 +407,4 @@ TEST_F(Render, BrokenFiles) {
   EXPECT_NE(blocked.output.find("in_the_way"), std::string::npos) << blocked.output;
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::render_test

@@ -18,8 +18,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::resources_test {
 
 class Resources : public TempFolderTest {
  protected:
@@ -141,5 +140,4 @@ TEST_F(Signals, StopAReaderAtOnceWithTheirOwnCode) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::resources_test

@@ -9,8 +9,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::runs_test {
 
 using Json = nlohmann::json;
 
@@ -104,5 +103,4 @@ TEST_F(Runs, OfFitsAreAnimated) {
   ExpectRefused("timelapse " + In("bare"), 3, "no meshes in it");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::runs_test

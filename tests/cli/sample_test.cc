@@ -9,8 +9,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::sample_test {
 
 constexpr const char* kTextured = R"(name = "textures"
 [task]
@@ -139,5 +138,4 @@ TEST_F(Sample, RefusesWhatItCannotDo) {
   ExpectRefused("eval --run " + Run("g") + " --data " + Run("d"), "tilegrad sample --score");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::sample_test

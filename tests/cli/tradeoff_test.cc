@@ -10,8 +10,7 @@
 #include "support/source_dir.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::tradeoff_test {
 
 class TradeoffCommand : public TempFolderTest {
  protected:
@@ -151,5 +150,4 @@ TEST_F(TradeoffCommand, HelpSaysUnits) {
   EXPECT_NE(outcome.output.find("delta"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::tradeoff_test

@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::background_test {
 
 constexpr int kSide = 96;
 constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
@@ -148,5 +147,4 @@ TEST_F(BackgroundInput, RendersWithNoiseGetTheirMasks) {
   EXPECT_NEAR(lone->cameras[0].fx, 32, 1e-4);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::background_test

@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::baked_mesh_test {
 
 constexpr int kSize = 48;
 
@@ -105,5 +104,4 @@ TEST_F(BakedMesh, WithALightOfItsOwnItIsLit) {
   EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::baked_mesh_test

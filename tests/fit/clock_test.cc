@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::clock_test {
 
 constexpr std::int64_t kWindow = FitClock::kWindow;
 
@@ -131,5 +130,4 @@ TEST_F(HurriedFit, AFinishedFitGoesOnWithMoreSteps) {
   EXPECT_EQ(Read("once"), Read("parts"));
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::clock_test

@@ -6,8 +6,7 @@
 
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::doctor_test {
 
 constexpr int kSize = 32;
 constexpr int kView = 0;
@@ -126,5 +125,4 @@ TEST(Doctor, ReachIsWhereAMillionthIsLeft) {
   EXPECT_NEAR(std::exp(-ndc * ndc / 1e-3), 1e-6, 1e-12);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::doctor_test

@@ -10,8 +10,7 @@
 #include "fit/diffusion.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::edge_length_test {
 
 std::vector<double> NoisyPositions(const Mesh& mesh) {
   std::vector<double> p;
@@ -116,5 +115,4 @@ TEST(Diffusion, LambdaZeroChangesNothing) {
   EXPECT_EQ(x, before);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::edge_length_test

@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::exposure_test {
 
 class Exposure : public TempFolderTest {
  protected:
@@ -186,5 +185,4 @@ TEST_F(Exposure, OneViewHasNone) {
   EXPECT_FALSE(Fitter::Make(scene, options, workers_).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::exposure_test

@@ -6,8 +6,7 @@
 
 #include <algorithm>
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::figure2_test {
 
 constexpr Figure2Options kSmall{.size = 48, .steps = 300};
 
@@ -61,5 +60,4 @@ TEST(Figure2, StopsWhenAsked) {
   EXPECT_EQ(RunFigure2({}, workers, {}, stop).status().code(), StatusCode::kCancelled);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::figure2_test

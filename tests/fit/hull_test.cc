@@ -14,8 +14,7 @@
 #include "support/temp_folder.h"
 #include "train/metrics/metrics.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::hull_test {
 
 TEST(MaskDistance, IsThatToADiscsOutlineUpToAFractionOfAPixel) {
   constexpr int kSize = 48;
@@ -127,5 +126,4 @@ TEST_F(Hull, ToleratesBadMasks) {
             0.75);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::hull_test

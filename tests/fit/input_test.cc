@@ -8,8 +8,7 @@
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::input_test {
 
 class Input : public TempFolderTest {
  protected:
@@ -124,5 +123,4 @@ TEST_F(Input, TransformsOfOtherLenses) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::input_test

@@ -16,8 +16,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::material_test {
 
 constexpr int kSize = 48;
 const glm::dvec3 kSun = glm::normalize(glm::dvec3(0.5, 0.8, 0.3));
@@ -184,5 +183,4 @@ TEST(MainLightOf, HarmonicsOfOneSide) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::material_test

@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "scene/sphere_uv.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::refine_test {
 
 constexpr int kSize = 64;
 
@@ -174,5 +173,4 @@ TEST(RefineMesh, PaintsATextureMap) {
   for (int x = 0; x < 32; x += 4) EXPECT_GT(map.at(x, 10)[2], map.at(x, 10)[0]) << x;
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::refine_test

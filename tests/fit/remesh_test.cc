@@ -16,8 +16,7 @@
 #include "scene/unwrap.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::remesh_test {
 
 // A sphere with charts and a texture whose colour says where on the sphere it is.
 FitScene ColoredSphere(int level, float radius) {
@@ -192,5 +191,4 @@ TEST_F(RemeshedFit, KeepsTheHole) {
   for (const glm::vec3& p : mesh->mesh.positions) EXPECT_GT(std::hypot(p.x, p.z), 0.02f);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::remesh_test

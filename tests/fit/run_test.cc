@@ -17,8 +17,7 @@
 #include "support/temp_folder.h"
 #include "train/run/checkpoint.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::run_test {
 
 class Fit : public TempFolderTest {
  protected:
@@ -452,5 +451,4 @@ TEST(FitScore, AlignmentIsARotationWhateverTheCameras) {
   EXPECT_NEAR(determinant, 1, 1e-12);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::run_test

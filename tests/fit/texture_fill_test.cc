@@ -6,8 +6,7 @@
 
 #include "scene/camera.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::texture_fill_test {
 
 // Squares in the plane z = 0, two faces each: `from` to `to` in x and y, and the same place in the
 // texture but for `uv_from`. A texture of 8 x 8 grey texels.
@@ -122,5 +121,4 @@ TEST(TextureFill, SeenTexelsAreThoseInPixels) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::texture_fill_test

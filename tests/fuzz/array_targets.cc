@@ -7,8 +7,7 @@
 #include "io/sh3f.h"
 #include "nn/serialize.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::array_targets {
 
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 
@@ -177,5 +176,4 @@ const Registration kTargets[] = {
     Registration({"safetensors", Safetensors, SafetensorsSeeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::array_targets

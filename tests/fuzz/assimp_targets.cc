@@ -8,8 +8,7 @@
 #include "io/mesh_readers.h"
 #include "io/mesh_samples.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::assimp_targets {
 
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 
@@ -38,5 +37,4 @@ std::vector<Bytes> Seeds() {
 
 const Registration kTarget({"assimp", Assimp, Seeds, nullptr, true});
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::assimp_targets

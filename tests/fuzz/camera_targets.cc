@@ -5,8 +5,7 @@
 #include "fuzz/target.h"
 #include "io/camera_file.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::camera_targets {
 
 std::vector<io::CameraView> SampleViews() {
   Camera64 camera;
@@ -83,5 +82,4 @@ const Registration kTargets[] = {
     Registration({"colmap_binary", [](Input i) { Colmap(i, ".bin"); }, BinarySeeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::camera_targets

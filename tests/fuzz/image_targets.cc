@@ -18,8 +18,7 @@
 #include <stb_image_write.h>
 #pragma GCC diagnostic pop
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::image_targets {
 
 constexpr std::size_t kBudget = std::size_t{16} << 20;
 
@@ -199,5 +198,4 @@ const Registration kTargets[] = {
     Registration({"exr_from_reader", ExrFromReader, ExrFromReaderSeeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::image_targets

@@ -3,8 +3,7 @@
 #include "api/c_caller.h"
 #include "fuzz/target.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::interface_targets {
 
 void Calls(Input input) {
   const bool failed_before = testing::UnitTest::GetInstance()->ad_hoc_test_result().Failed();
@@ -27,5 +26,4 @@ std::vector<Bytes> Seeds() {
 
 const Registration kTarget({"c_interface", Calls, Seeds, nullptr, true});
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::interface_targets

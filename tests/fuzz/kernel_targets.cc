@@ -12,8 +12,7 @@
 #include "raster/extremes/truth.h"
 #include "render/trial.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::kernel_targets {
 
 // A coordinate: mostly of the image, at steps of 1/256 pixel; else any float.
 float Coordinate(Numbers* in, int size) {
@@ -120,5 +119,4 @@ const Registration kTargets[] = {
     Registration({"threads", Threads, Seeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::kernel_targets

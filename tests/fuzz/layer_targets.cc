@@ -13,8 +13,7 @@
 #include "shade/texture_levels.h"
 #include "shade/texture_levels_ref.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::layer_targets {
 
 std::string TargetOf(Numbers* in) {
   const auto targets = RunnableTargets();
@@ -125,5 +124,4 @@ const Registration kTargets[] = {
     Registration({"texture", Texture, Seeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::layer_targets

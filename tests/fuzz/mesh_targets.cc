@@ -10,8 +10,7 @@
 #include "io/mesh_file.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::mesh_targets {
 
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 
@@ -181,5 +180,4 @@ const Registration kTargets[] = {
     Registration({"imported", Imported, ImportedSeeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::mesh_targets

@@ -13,8 +13,7 @@
 #include "fuzz/target.h"
 #include "support/source_dir.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::replay_test {
 
 Path Folder(const char* kind, const std::string& target) {
   return Path(TILEGRAD_SOURCE_DIR) / "tests" / "fuzz" / kind / target;
@@ -118,5 +117,4 @@ TEST(ReplayFolders, EachIsOfATarget) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::replay_test

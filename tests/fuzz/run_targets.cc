@@ -14,8 +14,7 @@
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
 
-namespace tilegrad::fuzz {
-namespace {
+namespace tilegrad::fuzz::run_targets {
 
 using Json = nlohmann::json;
 
@@ -234,5 +233,4 @@ const Registration kTargets[] = {
     Registration({"evaluation", Evaluation, EvaluationSeeds}),
 };
 
-}  // namespace
-}  // namespace tilegrad::fuzz
+}  // namespace tilegrad::fuzz::run_targets

@@ -5,8 +5,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::ac3d_test {
 
 class Ac3dTest : public TempFolderTest {
  protected:
@@ -147,5 +146,4 @@ TEST_F(Ac3dTest, NestedTooDeep) {
   ExpectMessage(Load(text), "bad.ac", "line 518", "deep");
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::ac3d_test

@@ -11,8 +11,7 @@
 #include "io/mesh_samples.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::assimp_formats_test {
 
 class AssimpFormatsTest : public TempFolderTest {};
 
@@ -149,5 +148,4 @@ TEST_F(AssimpFormatsTest, DamagedFiles) { DamagedFilesAreErrorsOrMeshes(folder_,
 
 TEST_F(AssimpFormatsTest, DamagedFilesLong) { DamagedFilesAreErrorsOrMeshes(folder_, 1000); }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::assimp_formats_test

@@ -11,8 +11,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::assimp_warnings_test {
 
 class AssimpWarningsTest : public TempFolderTest {
  protected:
@@ -251,5 +250,4 @@ TEST_F(AssimpWarningsTest, BonesAndMorphTargetsAreSaid) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::assimp_warnings_test

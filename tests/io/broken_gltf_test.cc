@@ -12,8 +12,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::broken_gltf_test {
 
 using Json = nlohmann::json;
 
@@ -319,5 +318,4 @@ TEST_F(BrokenGltfTest, GlbWithAFlippedByteNeverCrashes) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::broken_gltf_test

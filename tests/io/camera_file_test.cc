@@ -11,8 +11,7 @@
 #include "base/error.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::camera_file_test {
 
 using io::CameraView;
 
@@ -309,5 +308,4 @@ TEST_F(CameraFiles, NamesComeBackOrAreRefused) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::camera_file_test

@@ -11,8 +11,7 @@
 #include "io/exr_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::exr_test {
 
 class Exr : public TempFolderTest {};
 
@@ -84,5 +83,4 @@ TEST_F(Exr, DamagedFilesAreErrors) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::exr_test

@@ -21,8 +21,7 @@
 #include <stb_image_write.h>
 #pragma GCC diagnostic pop
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::formats_test {
 
 class FormatsTest : public TempFolderTest {};
 
@@ -465,5 +464,4 @@ TEST_F(FormatsTest, FurnitureCatalog) {
   EXPECT_EQ(mesh.positions[0], glm::vec3(3, -1, -2));
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::formats_test

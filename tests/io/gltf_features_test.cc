@@ -12,8 +12,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::gltf_features_test {
 
 using Json = nlohmann::json;
 
@@ -345,5 +344,4 @@ TEST_F(GltfFeatures, WhatAMaterialHasAndIsNotDrawnWarnsOnce) {
   EXPECT_NE(warnings[0].find("TEXCOORD_3"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::gltf_features_test

@@ -11,8 +11,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::gltf_scene_test {
 
 using nlohmann::json;
 
@@ -164,5 +163,4 @@ TEST_F(GltfScene, LightsPointToTheSun) {
   EXPECT_FALSE(io::EncodeLitGlb({}, glm::dvec3(0, 1, 0)).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::gltf_scene_test

@@ -23,8 +23,7 @@
 #include "support/forked.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::guarded_process_test {
 
 const auto kNoAnswer = [](std::string_view) { return std::optional<Bytes>(); };
 
@@ -277,5 +276,4 @@ TEST_F(GuardedProcessTest, ManyThreadsAtOnce) {
   EXPECT_EQ(good, 200);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::guarded_process_test

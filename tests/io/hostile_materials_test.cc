@@ -9,8 +9,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::hostile_materials_test {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
@@ -107,5 +106,4 @@ TEST_F(HostileMaterials, AreNotSavedAsWhite) {
   EXPECT_FALSE(std::filesystem::exists(file));
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::hostile_materials_test

@@ -9,8 +9,7 @@
 #include "io/orientation.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::image_people_test {
 
 std::string Big(std::uint32_t value, int bytes) {
   std::string out;
@@ -260,5 +259,4 @@ TEST(Image, GreyBecomesColor) {
   EXPECT_EQ(ToColor(grey).pixels, (std::vector<std::uint8_t>{70, 70, 70}));
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::image_people_test

@@ -8,8 +8,7 @@
 #include "base/rng.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::imported_scene_test {
 
 ImportedScene Scene() {
   ImportedScene scene;
@@ -77,5 +76,4 @@ TEST(ImportedScene, CutAndChangedBytes) {
   EXPECT_GT(errors, 5000);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::imported_scene_test

@@ -10,8 +10,7 @@
 #include "io/mat/mat_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::mat_test {
 
 void Put(Bytes& out, std::uint32_t value, int bytes = 4) {
   for (int i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
@@ -233,5 +232,4 @@ TEST(Mat, DamagedFilesAreReadOrRefused) {
   EXPECT_LT(refused, 10'000);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::mat_test

@@ -7,8 +7,7 @@
 #include "io/mesh_samples.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::md2_test {
 
 class Md2Test : public TempFolderTest {
  protected:
@@ -51,5 +50,4 @@ TEST_F(Md2Test, AxesAndUv) {
   EXPECT_EQ(found, 3);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::md2_test

@@ -15,8 +15,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::mesh_file_test {
 
 class MeshFileTest : public TempFolderTest {
  protected:
@@ -285,5 +284,4 @@ TEST(MeshFileLong, EveryModelOfTheFurniturePackageLoads) {
   EXPECT_GT(textured, 350);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::mesh_file_test

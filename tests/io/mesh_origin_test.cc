@@ -13,8 +13,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::mesh_origin_test {
 
 const glm::dvec3 kPlace(431000, 4600000, 300);
 
@@ -227,5 +226,4 @@ TEST_F(MeshOriginTest, GltfSharedAccessors) {
   EXPECT_EQ(apart.mesh.face_materials, (std::vector<std::int32_t>{0, 1, 0}));
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::mesh_origin_test

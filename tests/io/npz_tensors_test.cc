@@ -7,8 +7,7 @@
 #include "nn/nn.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::npz_tensors_test {
 
 TEST(NpzTensors, OfEveryType) {
   const Workers workers(1);
@@ -64,5 +63,4 @@ TEST_F(NpzTensorFiles, WeightsOfANetwork) {
   EXPECT_EQ((*one)[0].value.data<double>()[0], 3.0);
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::npz_tensors_test

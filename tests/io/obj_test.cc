@@ -11,8 +11,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::obj_test {
 
 const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 const std::string kUvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
@@ -340,5 +339,4 @@ TEST_F(ObjTest, ImagesWithoutCoordinates) {
               "lost.png");
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::obj_test

@@ -9,8 +9,7 @@
 #include "io/mesh_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::ply_off_test {
 
 class PlyOffTest : public TempFolderTest {
  protected:
@@ -347,5 +346,4 @@ TEST_F(PlyOffTest, OffColors) {
   ExpectMessage(LoadOff("COFF\n3 1 0\n0 0 0 1 2\n"), "line 3", "colour");
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::ply_off_test

@@ -15,8 +15,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::read_limit_test {
 
 constexpr int kSide = 512;
 constexpr std::size_t kPicture = std::size_t{3} * kSide * kSide;  // bytes of one, decoded
@@ -112,5 +111,4 @@ TEST_F(ReadLimitTest, EachFileHasItsOwn) {
   EXPECT_TRUE(LoadMesh(file).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::read_limit_test

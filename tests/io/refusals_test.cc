@@ -7,8 +7,7 @@
 #include "io/npz.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::refusals_test {
 
 using Refusals = TempFolderTest;
 
@@ -86,5 +85,4 @@ TEST_F(Refusals, NpzNamesComeBackOrAreRefused) {
   ExpectMessage(SaveNpz(file, {{std::string("a\0b", 3), {}}}), "a.npz", "\"a\"", "NUL");
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::refusals_test

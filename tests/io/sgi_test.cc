@@ -6,8 +6,7 @@
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::sgi_test {
 
 void PutBig(Bytes& out, std::uint32_t value, int bytes) {
   for (int i = bytes - 1; i >= 0; --i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
@@ -190,5 +189,4 @@ TEST(Sgi, DamagedFiles) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::sgi_test

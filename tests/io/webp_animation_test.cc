@@ -10,8 +10,7 @@
 
 #include "support/temp_folder.h"
 
-namespace tilegrad::io {
-namespace {
+namespace tilegrad::io::webp_animation_test {
 
 // A red square that moves over grey, one step a frame.
 std::vector<ImageU8> MovingSquare(int count, int channels) {
@@ -103,5 +102,4 @@ TEST_F(WebpFile, ErrorsNameTheFile) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "b.webp"));
 }
 
-}  // namespace
-}  // namespace tilegrad::io
+}  // namespace tilegrad::io::webp_animation_test

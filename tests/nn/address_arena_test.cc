@@ -10,8 +10,7 @@
 #include "base/aligned.h"
 #include "base/rng.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::address_arena_test {
 
 constexpr std::size_t kMega = std::size_t{1} << 20;
 
@@ -107,5 +106,4 @@ TEST(AddressArena, RepeatedRoundsHoldNoMore) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::address_arena_test

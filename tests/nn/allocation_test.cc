@@ -7,8 +7,7 @@
 #include "nn/game.h"
 #include "support/allocation_count.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::allocation_test {
 
 using test::g_allocations;
 
@@ -72,5 +71,4 @@ TEST_P(Allocation, NoneInAnEncoder) {
 
 INSTANTIATE_TEST_SUITE_P(Workers, Allocation, testing::Range(1, kThreadSanitizer ? 2 : 3));
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::allocation_test

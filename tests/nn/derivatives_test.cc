@@ -6,8 +6,7 @@
 #include "base/simd_target.h"
 #include "nn/gradient_check.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::derivatives_test {
 
 void Examine(const OpCase& c) {
   SCOPED_TRACE(c.name);
@@ -47,5 +46,4 @@ TEST(Derivatives, Images) { ExamineAll(AddImageCases); }
 TEST(Derivatives, Softmax) { ExamineAll(AddSoftmaxCases); }
 TEST(Derivatives, Normalisation) { ExamineAll(AddNormCases); }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::derivatives_test

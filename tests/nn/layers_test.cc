@@ -11,8 +11,7 @@
 #include "base/simd_target.h"
 #include "nn/nn.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::layers_test {
 
 std::vector<double> Values(const Tensor& t) {
   const auto span = t.span<double>();
@@ -69,7 +68,7 @@ TEST(Layers, RunningStatistics) {
   EXPECT_DOUBLE_EQ(Values(norm.running_mean)[0], 0.1 * 3);  // eval tracks nothing
 }
 
-TEST(Adam, HandComputedSteps) {
+TEST(AdamOptimizer, HandComputedSteps) {
   const Workers workers(1);
   Context context(workers, DType::kF64);
   Var p = Parameter(context, context.Full({1}, 1.0));
@@ -87,7 +86,7 @@ TEST(Adam, HandComputedSteps) {
   EXPECT_EQ(adam.steps(), 2);
 }
 
-TEST(Adam, RefusesWhatDoesNotFit) {
+TEST(AdamOptimizer, RefusesWhatDoesNotFit) {
   const Workers workers(1);
   Context context(workers);
   Var p = Parameter(context, context.Full({2}, 1.0));
@@ -100,7 +99,7 @@ TEST(Adam, RefusesWhatDoesNotFit) {
   EXPECT_EQ(adam.steps(), 0);
 }
 
-TEST(Adam, ClippingByNorm) {
+TEST(AdamOptimizer, ClippingByNorm) {
   const Workers workers(2);
   Context context(workers);
   const std::vector<Var> g = {Constant(context, context.Full({4}, 1.5)),
@@ -248,5 +247,4 @@ TEST(Training, LoadingChecksBeforeItChanges) {
   EXPECT_EQ(b.Weights(), before);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::layers_test

@@ -10,8 +10,7 @@
 #include "nn/gradient_check.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::networks_test {
 
 class Networks : public ::testing::Test {
  protected:
@@ -380,5 +379,4 @@ TEST_F(Networks, Initialisers) {
   EXPECT_NEAR(variance(), 2.0 / (750 + 1000), 0.05 * 2.0 / (750 + 1000));
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::networks_test

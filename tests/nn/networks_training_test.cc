@@ -7,8 +7,7 @@
 
 #include "nn/game.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::networks_training_test {
 
 TEST(NetworksTraining, SameBitsForAnyNumberOfWorkersOver100Steps) {
   Bytes want;
@@ -32,5 +31,4 @@ TEST(NetworksTraining, MemoryIsReused) {
   EXPECT_EQ(game.memory().peak_bytes, warm.peak_bytes);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::networks_training_test

@@ -8,8 +8,7 @@
 
 #include "nn/gradient_check.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::ops_test {
 
 class Ops : public ::testing::Test {
  protected:
@@ -334,5 +333,4 @@ TEST_F(Ops, GradientPenalty) {
   EXPECT_GT(std::abs(slope), 1e-3);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::ops_test

@@ -10,8 +10,7 @@
 
 #include "nn/nn.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::optim_test {
 
 class Optimisers : public ::testing::Test {
  protected:
@@ -254,5 +253,4 @@ TEST(FinitenessOfProducts, IsThatOfTheirValues) {
   EXPECT_FALSE(finite(INFINITY, 0));
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::optim_test

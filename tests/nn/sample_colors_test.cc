@@ -12,8 +12,7 @@
 #include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::sample_colors_test {
 
 using Complex = std::complex<double>;
 using Flow = std::array<double, 4>;
@@ -177,5 +176,4 @@ TEST(SampleColors, BitsDoNotDependOnWorkers) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::sample_colors_test

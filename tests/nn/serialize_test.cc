@@ -8,8 +8,7 @@
 #include <cstring>
 #include <ctime>
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::serialize_test {
 
 class Safetensors : public ::testing::Test {
  protected:
@@ -269,5 +268,4 @@ TEST_F(Safetensors, ManyTensorsAreWritten) {
   EXPECT_LT(taken, kLinear);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::serialize_test

@@ -8,8 +8,7 @@
 
 #include "nn/nn.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::tape_test {
 
 class Tape : public ::testing::Test {
  protected:
@@ -264,5 +263,4 @@ TEST_F(Tape, AListenerHearsOfEachGradientOnceAndBeforeEarlierLayersAreDone) {
   for (const auto& [i, value] : heard.ready) EXPECT_EQ(d[i].Value().item(), value);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::tape_test

@@ -14,8 +14,7 @@
 #include "support/run_program.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::selftest_test {
 
 using selftest::Check;
 using selftest::CheckContext;
@@ -227,5 +226,4 @@ TEST_F(SelftestChecks, TargetsAreRestored) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::selftest_test

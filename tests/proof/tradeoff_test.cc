@@ -6,8 +6,7 @@
 #include "scene/camera.h"
 #include "scene/shapes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::tradeoff_test {
 
 struct SphereJob {
   std::vector<float> positions;
@@ -77,5 +76,4 @@ TEST(Tradeoff, RefusesWhatHasNoAnswer) {
       << nothing.status().message();
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::tradeoff_test

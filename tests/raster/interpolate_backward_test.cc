@@ -17,8 +17,7 @@
 #include "raster/interpolate_ref.h"
 #include "raster/visibility_ref.h"
 
-namespace tilegrad::raster {
-namespace {
+namespace tilegrad::raster::interpolate_backward_test {
 
 // A jittered grid of cells, two faces each, over an image; some of them missing. Faces are several
 // pixels high, so that nothing is ill-conditioned.
@@ -230,5 +229,4 @@ TEST_F(InterpolateBackward, ABandOfBackgroundSeesNoFace) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::raster::interpolate_backward_test

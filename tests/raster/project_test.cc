@@ -16,8 +16,7 @@
 #include "raster/project_ref.h"
 #include "support/source_dir.h"
 
-namespace tilegrad::raster {
-namespace {
+namespace tilegrad::raster::project_test {
 
 // shared/vectors/08_cameras.json, where the data that travels beside the repository is present.
 Path SharedVectors() {
@@ -191,5 +190,4 @@ TEST(Project, OverflowingFacesAreRejected) {
   ASSERT_TRUE(ForceTarget("").ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::raster::project_test

@@ -19,8 +19,7 @@
 #include "raster/fragments.h"
 #include "raster/visibility_ref.h"
 
-namespace tilegrad::raster {
-namespace {
+namespace tilegrad::raster::visibility_test {
 
 // A mesh that is on the screen already.
 struct Flat {
@@ -343,5 +342,4 @@ TEST(Bin, ListsAreAscendingAndMissNoCoveringFace) {
   EXPECT_LT(listed, mesh.faces() * grid.cells() / 2);  // it does reject
 }
 
-}  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::raster::visibility_test

@@ -12,8 +12,7 @@
 #include "render/validate.h"
 #include "scene/camera.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::overflow_test {
 
 constexpr float kMost = std::numeric_limits<float>::max();
 
@@ -116,5 +115,4 @@ TEST_F(Overflow, OrdinaryNumbersAreNotLookedThrough) {
   EXPECT_TRUE(ValidateScenes<float>({&view, 1})->may_overflow);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::overflow_test

@@ -13,8 +13,7 @@
 #include "render/trial.h"
 #include "support/allocation_count.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_contract_test {
 
 using test::g_allocations;
 using test::SceneRecipe;
@@ -495,5 +494,4 @@ TEST_F(ShadedErrorsOfPhong, AttributesAreCheckedWhateverIsWanted) {
   EXPECT_EQ(status.message(), "scene 0: attributes[2] is nan");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_contract_test

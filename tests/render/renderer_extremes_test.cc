@@ -9,8 +9,7 @@
 #include "proof/owned_rendering.h"
 #include "render/trial.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_extremes_test {
 
 // A sphere under Phong light with a texture.
 OwnedScene<float> Sphere(Lighting lighting = Lighting::kPhong) {
@@ -183,5 +182,4 @@ TEST(ShadedExtremeValues, NoDirectionOfLightIsDarkness) {
   for (const float c : RenderAll(scene).frame.color) EXPECT_EQ(c, 0);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_extremes_test

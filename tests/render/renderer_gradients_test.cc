@@ -9,8 +9,7 @@
 #include "proof/complex_step.h"
 #include "render/trial.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_gradients_test {
 
 using test::SceneRecipe;
 
@@ -66,5 +65,4 @@ INSTANTIATE_TEST_SUITE_P(Models, ShadedGradients, testing::ValuesIn(test::kRecip
 INSTANTIATE_TEST_SUITE_P(Models, ShadedGradientsLong, testing::ValuesIn(test::kRecipes),
                          [](const auto& p) { return std::string(p.param.name); });
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_gradients_test

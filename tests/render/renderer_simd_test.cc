@@ -11,8 +11,7 @@
 #include "proof/owned_rendering.h"
 #include "render/trial.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_simd_test {
 
 using test::SceneRecipe;
 using test::Trial;
@@ -134,5 +133,4 @@ INSTANTIATE_TEST_SUITE_P(Models, ShadedSimd, testing::ValuesIn(test::kRecipes),
 INSTANTIATE_TEST_SUITE_P(Models, ShadedSimdLong, testing::ValuesIn(test::kRecipes),
                          [](const auto& p) { return std::string(p.param.name); });
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_simd_test

@@ -9,8 +9,7 @@
 
 #include "render/engine.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::renderer_test {
 
 constexpr int kSize = 16;
 constexpr std::size_t kPixels = kSize * kSize;
@@ -157,5 +156,4 @@ TEST(Engine, BackgroundIsZeroAndFacesSeenFromBehindAreDark) {
   ExpectColor(frame, 1, 1, {0, 0, 0});
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::renderer_test

@@ -8,8 +8,7 @@
 #include "rivals/n3mr_color_ref.h"
 #include "rivals/test_util.h"
 
-namespace tilegrad::rivals {
-namespace {
+namespace tilegrad::rivals::n3mr_color_test {
 
 using namespace test;  // NOLINT: of the tests of one folder
 
@@ -274,5 +273,4 @@ TEST(N3mrColors, FastIsTheReference) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::n3mr_color_test

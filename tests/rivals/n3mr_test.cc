@@ -6,8 +6,7 @@
 #include "rivals/n3mr_ref.h"
 #include "rivals/test_util.h"
 
-namespace tilegrad::rivals {
-namespace {
+namespace tilegrad::rivals::n3mr_test {
 
 using namespace test;  // NOLINT: of the tests of one folder
 
@@ -239,5 +238,4 @@ TEST(N3mr, OddFacesAreLeftOut) {
   EXPECT_EQ(mixed.d_corners, want);
 }
 
-}  // namespace
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::n3mr_test

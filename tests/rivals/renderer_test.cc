@@ -8,8 +8,7 @@
 #include "scene/shapes.h"
 #include "support/allocation_count.h"
 
-namespace tilegrad::rivals {
-namespace {
+namespace tilegrad::rivals::renderer_test {
 
 using namespace test;  // NOLINT: of the tests of one folder
 
@@ -307,5 +306,4 @@ TEST(RivalRenderer, ErrorsSayWhatDoesNotFit) {
          "the adjoint of color has 256 numbers, expected 0");
 }
 
-}  // namespace
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::renderer_test

@@ -9,8 +9,7 @@
 #include "rivals/softras_color_ref.h"
 #include "rivals/test_util.h"
 
-namespace tilegrad::rivals {
-namespace {
+namespace tilegrad::rivals::softras_color_test {
 
 using namespace test;  // NOLINT: of the tests of one folder
 
@@ -237,5 +236,4 @@ TEST(SoftRasColors, FloatIsTheReference) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::rivals
+}  // namespace tilegrad::rivals::softras_color_test

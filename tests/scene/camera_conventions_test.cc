@@ -21,8 +21,7 @@
 #include "support/shared_data.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::camera_conventions_test {
 
 constexpr double kPixelTolerance = 2e-10;
 constexpr double kNumberTolerance = 1e-11;  // entries up to 2,000 after some 10 roundings
@@ -396,5 +395,4 @@ TEST_F(CameraVectors, KaolinsOwnTest) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(kaolin.projection[i], projection[i], 1e-6);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::camera_conventions_test

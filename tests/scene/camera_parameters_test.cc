@@ -13,8 +13,7 @@
 #include "scene/camera_ref.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::camera_parameters_test {
 
 using Complex = std::complex<double>;
 using P64 = CameraParametersT<double>;
@@ -142,5 +141,4 @@ TEST(CameraParameters, WhatGivesNoRotationIsRefused) {
   ExpectMessage(CameraFromParameters({}, 0).status(), "near plane");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::camera_parameters_test

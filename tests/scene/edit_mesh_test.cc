@@ -13,8 +13,7 @@
 #include "scene/simplify.h"
 #include "scene/topology.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::edit_mesh_test {
 
 VertexRows RowsOf(const Mesh& mesh) {
   VertexRows rows;
@@ -163,5 +162,4 @@ TEST(Simplified, EndsAtTheFacesAndTheLengthAskedFor) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::edit_mesh_test

@@ -8,8 +8,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::framing_test {
 
 // Every vertex is inside of every picture and beyond the near plane, and some vertex touches the
 // margin: the camera is as near as it may be. Tolerance: pixels of up to 320 in float.
@@ -48,5 +47,4 @@ TEST(Framing, WhatCannotBeSeenIsRefused) {
   ExpectMessage(FrameMesh(box, {lens, 0, -1}, one).status(), "distance");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::framing_test

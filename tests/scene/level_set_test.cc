@@ -13,8 +13,7 @@
 #include "scene/edit_mesh.h"
 #include "scene/topology.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::level_set_test {
 
 ScalarGrid GridOf(int n, const std::function<float(glm::vec3)>& value) {
   ScalarGrid grid{{n, n, n}, glm::vec3(-1), 2.0f / static_cast<float>(n - 1), {}};
@@ -87,5 +86,4 @@ TEST(LevelSet, KeepsPartsApart) {
   EXPECT_TRUE(EditMesh::Make(RowsOf(two), two.faces).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::level_set_test

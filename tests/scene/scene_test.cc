@@ -10,8 +10,7 @@
 #include "scene/subdivide.h"
 #include "scene/topology.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::scene_test {
 
 // Divergence theorem: sum of a . (b x c) / 6. Positive only if faces are counter-clockwise seen
 // from outside.
@@ -276,5 +275,4 @@ TEST(SubdividedMeshes, KeepTheirTextureMap) {
   EXPECT_TRUE(Validate(out).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::scene_test

@@ -8,8 +8,7 @@
 
 #include "scene/shapes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::sphere_uv_test {
 
 // Faces near a pole span up to a quarter of the map; one that ran backwards would span most of it.
 TEST(SphereUv, NoFaceRunsBackwardsThroughTheMap) {
@@ -72,5 +71,4 @@ TEST(SphereUv, TexelsArePointsOfTheSurface) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::sphere_uv_test

@@ -7,8 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::triangulate_test {
 
 std::vector<Face> Split(const std::vector<glm::vec3>& corners) {
   std::vector<Face> triangles;
@@ -86,5 +85,4 @@ TEST(Triangulate, PolygonsWithoutAreaOrThatCrossThemselves) {
   EXPECT_EQ(Split(std::vector<glm::vec3>(100000, {1, 1, 1})).size(), 99998u);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::triangulate_test

@@ -9,8 +9,7 @@
 
 #include "scene/shapes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::unwrap_test {
 
 // Each texel's centre is in one face at most, all faces turn as they do on the surface, and none
 // leaves the texture.
@@ -94,5 +93,4 @@ TEST(Unwrap, SaysThatThereIsNoRoom) {
   EXPECT_NE(quality.status().message().find("400 charts"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::unwrap_test

@@ -5,8 +5,7 @@
 
 #include "scene/shapes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::up_axis_test {
 
 TEST(UpAxis, Names) {
   EXPECT_EQ(UpAxisNamed("y"), UpAxis::kY);
@@ -50,5 +49,4 @@ TEST(UpAxis, CamerasOfTheFileSeeTheSame) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::up_axis_test

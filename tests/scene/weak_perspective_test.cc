@@ -8,8 +8,7 @@
 #include "base/rng.h"
 #include "scene/weak_perspective_ref.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::weak_perspective_test {
 
 using Complex = std::complex<double>;
 constexpr double kHalf = std::numbers::sqrt2 / 2;
@@ -200,5 +199,4 @@ TEST(WeakPerspective, MirrorsAndCrops) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::weak_perspective_test

@@ -5,8 +5,7 @@
 
 #include "shade/lambert_ref.h"
 
-namespace tilegrad::shade {
-namespace {
+namespace tilegrad::shade::lambert_test {
 
 using Complex = std::complex<double>;
 constexpr double kStep = 1e-30;
@@ -57,5 +56,4 @@ TEST(Lambert, AvertedLightPullsNothing) {
   for (double d : d_n) EXPECT_EQ(d, 0.0);
 }
 
-}  // namespace
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::lambert_test

@@ -8,8 +8,7 @@
 #include "base/rng.h"
 #include "shade/mesh_normals_ref.h"
 
-namespace tilegrad::shade {
-namespace {
+namespace tilegrad::shade::mesh_normals_test {
 
 using Complex = std::complex<double>;
 constexpr double kStep = 1e-40;
@@ -128,5 +127,4 @@ TEST(MeshNormals, AdjointsAreTheComplexStepDerivative) {
       [](auto... all) { FlatNormalsAdjointRef(all...); });
 }
 
-}  // namespace
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::mesh_normals_test

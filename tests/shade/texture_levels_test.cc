@@ -12,8 +12,7 @@
 #include "shade/texture_levels_ref.h"
 #include "shade/vec3_ref.h"
 
-namespace tilegrad::shade {
-namespace {
+namespace tilegrad::shade::texture_levels_test {
 
 std::vector<float> RandomTexels(int width, int height) {
   Rng rng(static_cast<std::uint64_t>(width * 100 + height), 1);
@@ -140,5 +139,4 @@ TEST(TextureLevels, TrilinearIsContinuousInTheLevel) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::texture_levels_test

@@ -8,8 +8,7 @@
 #include "base/rng.h"
 #include "shade/texture_ref.h"
 
-namespace tilegrad::shade {
-namespace {
+namespace tilegrad::shade::texture_test {
 
 using Complex = std::complex<double>;
 
@@ -135,5 +134,4 @@ TEST(Texture, AdjointIsTheComplexStepDerivative) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::texture_test

@@ -14,8 +14,7 @@
 #include "shade/texture_ref.h"
 #include "support/shared_data.h"
 
-namespace tilegrad::shade {
-namespace {
+namespace tilegrad::shade::vectors_test {
 
 using Json = nlohmann::json;
 using Vector = std::vector<double>;
@@ -280,5 +279,4 @@ TEST(VectorsPhong, Lambert) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::shade
+}  // namespace tilegrad::shade::vectors_test

@@ -12,8 +12,7 @@
 #include "support/source_dir.h"
 #include "tilegrad/version.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::structure_test {
 
 const Path kRoot = TILEGRAD_SOURCE_DIR;
 
@@ -276,5 +275,4 @@ TEST(Structure, VersionIsWrittenTheSameEverywhere) {
   EXPECT_NE(ReadText(kRoot / "CHANGELOG.md").value().find(TILEGRAD_VERSION), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::structure_test

@@ -15,8 +15,7 @@
 #include "train/models/offset_map.h"
 #include "train/tasks/single_image/step.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::chain_test {
 
 TEST(MeshNetwork, HasThePapersParameters) {
   const Workers workers(1);
@@ -450,5 +449,4 @@ TEST(RivalConfig, UnknownWordsNameTheKnownOnes) {
             rivals::N3mrReduction::kBilinear);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::chain_test

@@ -14,8 +14,7 @@
 #include "train/predictor.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::checkpoint_test {
 
 class CheckpointTest : public TempFolderTest {
  protected:
@@ -158,5 +157,4 @@ TEST_F(ResumeTest, StopsAtAnotherVersionsCheckpoint) {
   EXPECT_EQ(outcome->first_step, 3);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::checkpoint_test

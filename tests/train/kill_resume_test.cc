@@ -20,8 +20,7 @@
 #include "tiny_run.h"
 #include "train/run/checkpoint.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::kill_resume_test {
 
 using Seconds = std::chrono::duration<double>;
 using Clock = std::chrono::steady_clock;
@@ -215,5 +214,4 @@ TEST_F(KillResume, FilesThatMayNotGrowAreAnError) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / "run" / "checkpoints"));  // no temporary left
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::kill_resume_test

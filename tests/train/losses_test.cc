@@ -15,8 +15,7 @@
 #include "train/losses/laplacian.h"
 #include "train/losses/smoothness.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::losses_test {
 
 using Losses = GradientCheck;
 
@@ -187,5 +186,4 @@ TEST_F(LossVectors, Smoothness) {
                 "vertices", "dibr_flatten_loss", "dibr_flatten_grad_vertices");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::losses_test

@@ -15,8 +15,7 @@
 #include "train/metrics/keypoint_score.h"
 #include "train/ops/weak_cameras.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::photograph_parts_test {
 
 using PhotographParts = GradientCheck;
 
@@ -142,5 +141,4 @@ TEST(DistanceBarriers, AreAboutNothingInsideAndOneOutside) {
   EXPECT_EQ(barrier[0], 0.0f);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::photograph_parts_test

@@ -17,8 +17,7 @@
 #include "train/tasks/held_out.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::report_test {
 
 constexpr const char* kEvil = "</script><b onclick=\"x\">&'";
 
@@ -329,5 +328,4 @@ TEST(ReportData, ThinKeepsMeansAndTheLastStep) {
   EXPECT_EQ(Thin(log, 10).size(), 10u);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::report_test

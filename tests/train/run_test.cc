@@ -17,8 +17,7 @@
 #include "train/run/log.h"
 #include "train/run/tensorboard.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::run_test {
 
 class RunTest : public TempFolderTest {
  protected:
@@ -344,5 +343,4 @@ TEST(MirroredCamera, SeesTheMirroredWorldFlipped) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::run_test

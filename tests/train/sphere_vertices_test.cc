@@ -12,8 +12,7 @@
 #include "nn/nn.h"
 #include "support/shared_data.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::sphere_vertices_test {
 
 using Numbers = std::vector<double>;
 
@@ -113,5 +112,4 @@ TEST(SphereVertices, GradientsAreDerivatives) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::sphere_vertices_test

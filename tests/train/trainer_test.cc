@@ -17,8 +17,7 @@
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::trainer_test {
 
 // While it lives no file can grow beyond `bytes`: writes fail as on a full disk.
 class FullDisk {
@@ -374,5 +373,4 @@ TEST_F(TrainerTest, BadDatasetsAreNamed) {
   ExpectMessage(Run().status(), "m3.npz");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::trainer_test

@@ -11,8 +11,7 @@
 #include "base/simd_target.h"
 #include "compat/kaolin/face_visibility_ref.h"
 
-namespace tilegrad::compat::kaolin {
-namespace {
+namespace tilegrad::compat::kaolin::face_visibility_test {
 
 template <class T>
 struct Faces {
@@ -199,5 +198,4 @@ TYPED_TEST(FaceVisibilityOf, NoCracksBetweenNeighbours) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::kaolin
+}  // namespace tilegrad::compat::kaolin::face_visibility_test

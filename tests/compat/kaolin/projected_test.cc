@@ -14,8 +14,7 @@
 #include "compat/projected_scenes.h"
 #include "support/shared_data.h"
 
-namespace tilegrad::compat::kaolin {
-namespace {
+namespace tilegrad::compat::kaolin::projected_test {
 
 using Json = nlohmann::json;
 using test::Cast;
@@ -383,5 +382,4 @@ TEST(Projected, NothingToDraw) {
   EXPECT_EQ(images.mask, std::vector<float>(2 * 37 * 41, 0.0f));
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::kaolin
+}  // namespace tilegrad::compat::kaolin::projected_test

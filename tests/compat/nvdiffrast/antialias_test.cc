@@ -8,8 +8,7 @@
 
 #include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::compat::nvdiffrast {
-namespace {
+namespace tilegrad::compat::nvdiffrast::antialias_test {
 
 template <class T>
 AntialiasInput<T> InputOf(const Scene<T>& scene, const EdgeRings& rings, const Numbers<T>& rast,
@@ -308,5 +307,4 @@ TEST(Antialias, RingsOfOtherFacesAreRefused) {
   EXPECT_NE(status.message().find("of 1 triangles, but tri has 2"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::antialias_test

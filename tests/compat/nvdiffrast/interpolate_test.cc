@@ -7,8 +7,7 @@
 
 #include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::compat::nvdiffrast {
-namespace {
+namespace tilegrad::compat::nvdiffrast::interpolate_test {
 
 template <class T>
 struct Attributes {
@@ -288,5 +287,4 @@ TEST(Interpolate, BadInputIsNamed) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::interpolate_test

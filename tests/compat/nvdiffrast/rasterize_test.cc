@@ -11,8 +11,7 @@
 #include "compat/nvdiffrast/barycentrics_ref.h"
 #include "compat/nvdiffrast/test_util.h"
 
-namespace tilegrad::compat::nvdiffrast {
-namespace {
+namespace tilegrad::compat::nvdiffrast::rasterize_test {
 
 // w = 1: the triangle (-1, -1), (1, -1), (-1, 1) of an image of 4 x 4, its lower left half.
 Scene<float> HalfImage() {
@@ -399,5 +398,4 @@ TEST(RasterizeBackward, EdgeOnFacesPullNothing) {
   for (const double d : gradient) EXPECT_EQ(d, 0);
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::rasterize_test

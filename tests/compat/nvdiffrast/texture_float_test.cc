@@ -24,8 +24,7 @@
 #include "compat/nvdiffrast/texture_lookups.h"
 #include "compat/nvdiffrast/texture_ref.h"
 
-namespace tilegrad::compat::nvdiffrast {
-namespace {
+namespace tilegrad::compat::nvdiffrast::texture_float_test {
 
 constexpr double r = kRounding;
 
@@ -336,5 +335,4 @@ TEST(TextureInFloatAt, NoPointThereIsNothing) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::texture_float_test

@@ -10,8 +10,7 @@
 #include "compat/nvdiffrast/texture_lookups.h"
 #include "compat/nvdiffrast/texture_point.h"
 
-namespace tilegrad::compat::nvdiffrast {
-namespace {
+namespace tilegrad::compat::nvdiffrast::texture_test {
 
 // 4 x 2 texels, 10 times the row plus the column.
 Lookups<double> Ramp(TextureFilter filter, TextureBoundary boundary) {
@@ -368,5 +367,4 @@ TEST(Texture, SameBitsForAnyNumberOfWorkers) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::nvdiffrast
+}  // namespace tilegrad::compat::nvdiffrast::texture_test

@@ -9,8 +9,7 @@
 
 #include "base/rng.h"
 
-namespace tilegrad::compat::pytorch3d {
-namespace {
+namespace tilegrad::compat::pytorch3d::layered_fragment_test {
 
 using Complex = std::complex<double>;
 
@@ -64,5 +63,4 @@ TEST(LayeredFragment, AdjointIsThatOfAComplexStep) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::pytorch3d
+}  // namespace tilegrad::compat::pytorch3d::layered_fragment_test

@@ -12,8 +12,7 @@
 
 #include "base/rng.h"
 
-namespace tilegrad::compat::pytorch3d {
-namespace {
+namespace tilegrad::compat::pytorch3d::layered_raster_test {
 
 template <class T>
 struct Layers {
@@ -212,5 +211,4 @@ TEST(LayeredRaster, Errors) {
             "pix_to_face[3] is 2, outside of [-1, 2)");
 }
 
-}  // namespace
-}  // namespace tilegrad::compat::pytorch3d
+}  // namespace tilegrad::compat::pytorch3d::layered_raster_test

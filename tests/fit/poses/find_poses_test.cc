@@ -15,8 +15,7 @@
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::find_poses_test {
 
 // Boxes of several colours: no two sides look alike.
 Mesh Thing() {
@@ -187,5 +186,4 @@ TEST(PoseCrop, AlignedCamerasSeeItWhereItIsWanted) {
               1e-5);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::find_poses_test

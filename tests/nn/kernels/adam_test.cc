@@ -5,8 +5,7 @@
 #include "nn/kernels/adam_ref.h"
 #include "nn/kernels/kernel_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::adam_test {
 
 TEST(Adam, EqualsReference) {
   const Workers workers(2);
@@ -37,5 +36,4 @@ TEST(Adam, EqualsReference) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::adam_test

@@ -6,8 +6,7 @@
 #include "nn/kernels/axis_map_ref.h"
 #include "nn/kernels/kernel_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::axis_map_test {
 
 template <class T>
 std::vector<T> Reference(AxisMapProblem<float> like, const std::vector<T>& x,
@@ -65,5 +64,4 @@ TEST(AxisMap, OneTermEachAlongTheLastAxis) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::axis_map_test

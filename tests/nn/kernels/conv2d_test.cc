@@ -9,8 +9,7 @@
 
 #include "nn/kernels/conv2d_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::conv2d_test {
 
 void CheckAgainstReference(const Conv2dShape& s, std::uint64_t seed) {
   SCOPED_TRACE(Describe(s));
@@ -125,5 +124,4 @@ TEST(Conv2d, CheckRefusesShapesThatHaveNoOutput) {
   EXPECT_NE(status.message().find("5x6"), std::string::npos) << status.message();
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::conv2d_test

@@ -7,8 +7,7 @@
 #include "nn/kernels/conv2d/winograd.h"
 #include "nn/kernels/conv2d_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::conv2d_winograd_test {
 
 // Every kind of kernel; odd extents and paddings, so that tiles hang over each edge; channels that
 // leave tails, and more inputs than are packed at a time, with panels of the fewest outputs; pixels
@@ -135,5 +134,4 @@ TEST(Conv2dWinograd, LeavesWhatItDoesNotFitToTheDirectKernels) {
   EXPECT_FALSE(WinogradFits({2, 16, 4, 4, 16, 4, 4, 2, 1}));    // tiles mostly beyond the edge
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::conv2d_winograd_test

@@ -8,8 +8,7 @@
 #include "nn/kernels/gemm_ref.h"
 #include "nn/kernels/kernel_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::gemm_test {
 
 struct GemmCase {
   std::size_t m, n, k;
@@ -181,5 +180,4 @@ TEST(Gemm, RepeatedCallsKeepTheirScratch) {
   EXPECT_EQ(scratch.bytes(), bytes);
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::gemm_test

@@ -5,8 +5,7 @@
 #include "nn/kernels/kernel_test_util.h"
 #include "nn/kernels/pointwise_ref.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::pointwise_test {
 
 constexpr double kUlp = 0x1.0p-23;
 
@@ -166,5 +165,4 @@ TEST(Pointwise, MaximumKeepsNaN) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::pointwise_test

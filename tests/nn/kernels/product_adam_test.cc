@@ -5,8 +5,7 @@
 
 #include "nn/kernels/kernel_test_util.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::product_adam_test {
 
 struct Case {
   std::size_t m, n, k;
@@ -101,5 +100,4 @@ TEST(ProductAdam, OfNoParametersDoesNothing) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::product_adam_test

@@ -9,8 +9,7 @@
 #include "nn/kernels/kernel_test_util.h"
 #include "nn/kernels/reduce_ref.h"
 
-namespace tilegrad::nn {
-namespace {
+namespace tilegrad::nn::reduce_test {
 
 const ReduceLayout kLayouts[] = {{{1, 1, 1}, {1, 1, 1}},  {{1, 1, 1}, {1, 1, 100003}},
                                  {{3, 1, 1}, {37, 1, 1}}, {{5, 7, 1}, {2, 3, 1}},
@@ -161,5 +160,4 @@ TEST(AdamKernel, SumOfSquaresIsExactToDouble) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::nn
+}  // namespace tilegrad::nn::reduce_test

@@ -12,8 +12,7 @@
 #include "base/simd_target.h"
 #include "raster/extremes/bound_check.h"
 
-namespace tilegrad::test {
-namespace {
+namespace tilegrad::test::bound_test {
 
 void CheckBound(std::uint64_t first, std::size_t count) {
   const Workers workers, one(1);
@@ -58,5 +57,4 @@ TEST(AlphaBoundLong, TwentyThousandScenes) {
   ASSERT_TRUE(ForceTarget("").ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::test
+}  // namespace tilegrad::test::bound_test

@@ -19,8 +19,7 @@
 #include "base/simd_target.h"
 #include "raster/extremes/truth.h"
 
-namespace tilegrad::test {
-namespace {
+namespace tilegrad::test::extremes_test {
 
 struct SceneRange {
   std::uint64_t first, count;
@@ -196,5 +195,4 @@ TEST(Extremes, OneSceneAlone) {
   ASSERT_TRUE(ForceTarget("").ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::test
+}  // namespace tilegrad::test::extremes_test

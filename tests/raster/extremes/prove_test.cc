@@ -8,8 +8,7 @@
 #include "raster/extremes/prove_tally.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::test {
-namespace {
+namespace tilegrad::test::prove_test {
 
 class ProveTest : public TempFolderTest {
  protected:
@@ -69,5 +68,4 @@ TEST_F(ProveTest, AFileThatIsNoTallyIsRefusedAndKept) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::test
+}  // namespace tilegrad::test::prove_test

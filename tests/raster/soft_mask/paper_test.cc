@@ -15,8 +15,7 @@
 #include "raster/soft_mask/paper_ref.h"
 #include "support/source_dir.h"
 
-namespace tilegrad::raster {
-namespace {
+namespace tilegrad::raster::paper_test {
 
 using Json = nlohmann::json;
 
@@ -173,5 +172,4 @@ TEST(SoftMaskPaper, FartherThanFarthest) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::raster::paper_test

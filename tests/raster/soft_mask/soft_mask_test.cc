@@ -16,8 +16,7 @@
 #include "raster/soft_mask/plan.h"
 #include "raster/soft_mask/test_util.h"
 
-namespace tilegrad::raster {
-namespace {
+namespace tilegrad::raster::soft_mask_test {
 
 using test::CheckScene;
 using test::RandomScene;
@@ -390,5 +389,4 @@ TEST(SoftMaskRef, GradientIsThatOfAComplexStep) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::raster
+}  // namespace tilegrad::raster::soft_mask_test

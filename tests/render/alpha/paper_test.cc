@@ -18,8 +18,7 @@
 #include "render/pipeline/test_scenes.h"
 #include "support/shared_data.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::paper_test {
 
 using Json = nlohmann::json;
 using test::TestScene;
@@ -256,5 +255,4 @@ TEST(PaperAlpha, BadOptionsAndGradientsAreErrors) {
             "options.paper_box is -1, must be finite and >= 0");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::paper_test

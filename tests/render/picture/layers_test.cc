@@ -12,8 +12,7 @@
 #include "render/picture/picture.h"
 #include "scene/camera.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::layers_test {
 
 constexpr int kSize = 8;
 constexpr glm::vec4 kRed = {1, 0, 0, 1}, kGreen = {0, 1, 0, 1}, kBlue = {0, 0, 1, 1};
@@ -227,5 +226,4 @@ TEST_F(Layers, ThereIsALastLayer) {
   EXPECT_NEAR(At(Draw(), 4, 4).a, 1 - std::pow(0.999f, LayerRenderer::kMostLayers), 1e-5f);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::layers_test

@@ -7,8 +7,7 @@
 
 #include "scene/shapes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::mesh_pictures_test {
 
 constexpr int kSize = 32;
 constexpr std::size_t kPlane = kSize * kSize;
@@ -116,5 +115,4 @@ TEST(CornerColors, MultiplyFactorTextureAndVertexColour) {
   for (const auto& color : CornerColors(mesh)) EXPECT_EQ(color, glm::vec3(0.5f, 1, 0.25f));
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::mesh_pictures_test

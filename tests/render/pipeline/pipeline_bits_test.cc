@@ -7,8 +7,7 @@
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/test_batch.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::pipeline_bits_test {
 
 using test::Batch;
 using test::Options;
@@ -113,5 +112,4 @@ TEST(RendererBits, BackwardDoesNotDependOnWhatWasRenderedLast) {
   check_after(wide, "another kernel");
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::pipeline_bits_test

@@ -15,8 +15,7 @@
 #include "render/pipeline/test_batch.h"
 #include "support/allocation_count.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::pipeline_contract_test {
 
 using test::Batch;
 using test::g_allocations;
@@ -451,5 +450,4 @@ TEST(RendererEdgeCases, CulledFacesAreBackgroundWithAlpha) {
   EXPECT_GT(std::count(frame.face_ids.begin(), frame.face_ids.end(), 0), 0);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::pipeline_contract_test

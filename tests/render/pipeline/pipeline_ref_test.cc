@@ -10,8 +10,7 @@
 
 #include "render/pipeline/test_scenes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::pipeline_ref_test {
 
 using Complex = std::complex<double>;
 using test::TestScene;
@@ -142,5 +141,4 @@ TEST_P(ReferenceGradient, EqualsComplexStep) {
 INSTANTIATE_TEST_SUITE_P(Scenes, ReferenceGradient, testing::ValuesIn(kCases),
                          [](const auto& param) { return std::string(param.param.name); });
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::pipeline_ref_test

@@ -12,8 +12,7 @@
 #include "render/pipeline/pipeline_ref.h"
 #include "render/pipeline/test_scenes.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::pipeline_test {
 
 using test::TestScene;
 
@@ -209,5 +208,4 @@ TEST_P(AgainstReference, Gradients) {
 INSTANTIATE_TEST_SUITE_P(Scenes, AgainstReference, testing::ValuesIn(kCases),
                          [](const auto& param) { return std::string(param.param.name); });
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::pipeline_test

@@ -11,8 +11,7 @@
 #include "render/pipeline/pipeline.h"
 #include "render/pipeline/test_batch.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::topologies_test {
 
 using test::kHeight;
 using test::kWidth;
@@ -160,5 +159,4 @@ TEST(Topologies, AnIndexOutOfRangeIsNamedAndForgotten) {
   EXPECT_TRUE(Bytes(&renderer, pool.Views({0, 1, 3})) == before);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::topologies_test

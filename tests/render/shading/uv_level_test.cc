@@ -13,8 +13,7 @@
 #include "render/pipeline/pipeline_ref.h"
 #include "render/reference.h"
 
-namespace tilegrad {
-namespace {
+namespace tilegrad::uv_level_test {
 
 constexpr int kWidth = 48, kHeight = 40;
 
@@ -126,5 +125,4 @@ TEST(Sides, OfFacesThatReachFarOutAreTheReferences) {
   EXPECT_GT(pixels, 50000);
 }
 
-}  // namespace
-}  // namespace tilegrad
+}  // namespace tilegrad::uv_level_test

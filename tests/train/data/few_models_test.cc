@@ -3,8 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::few_models_test {
 
 std::vector<ModelInfo> Models(int training, int test) {
   std::vector<ModelInfo> out;
@@ -36,5 +35,4 @@ TEST(FewModels, NamesTheRemedies) {
   EXPECT_NE(streamed.find("tilegrad fit"), std::string::npos) << streamed;
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::few_models_test

@@ -6,8 +6,7 @@
 #include "train/data/build/build.h"
 #include "train/data/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::index_test {
 
 class IndexTest : public FolderTest {
  protected:
@@ -171,5 +170,4 @@ TEST_F(IndexTest, ModelFilesThatAreNotWhatTheyShould) {
   EXPECT_FALSE(dataset->LoadImages(0).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::index_test

@@ -8,8 +8,7 @@
 #include <map>
 #include <set>
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::split_test {
 
 std::vector<ModelInfo> Models(int count, int class_index = 0) {
   std::vector<ModelInfo> models(static_cast<std::size_t>(count));
@@ -123,5 +122,4 @@ TEST(Split, WithoutGeometryEachModelIsItsOwn) {
   EXPECT_EQ(Count(models), (std::array<int, 3>{8, 0, 2}));
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::split_test

@@ -7,8 +7,7 @@
 #include "train/data/temp_folder.h"
 #include "train/eval/evaluate.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::evaluate_shapes_test {
 
 class EvaluateShapesTest : public FolderTest {
  protected:
@@ -93,5 +92,4 @@ TEST_F(EvaluateShapesTest, TheNearestPictureIsOfTrainingModelsThatItMayKnow) {
   EXPECT_EQ(names(score(Split::kTrain, 1000)), three);  // each would find itself
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::evaluate_shapes_test

@@ -7,8 +7,7 @@
 #include "support/temp_folder.h"
 #include "train/eval/evaluation.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::evaluation_table_test {
 
 Evaluation Named(const std::string& name) {
   Evaluation e;
@@ -46,5 +45,4 @@ TEST_F(WrittenEvaluation, NamesNeedNotBeUtf8) {
   EXPECT_NE(ReadText(folder_ / "eval.md").value().find("caf\\\\xe9"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::evaluation_table_test

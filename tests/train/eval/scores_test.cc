@@ -7,8 +7,7 @@
 #include "scene/shapes.h"
 #include "train/eval/retrieval.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::scores_test {
 
 TEST(Scores, AShapeIsLikeItself) {
   const Mesh ball = Icosphere(3, 0.2f);
@@ -104,5 +103,4 @@ TEST(ImageIndex, ThumbnailsAreMeans) {
   EXPECT_EQ(Thumbnail(Flat(7, 5), 5), std::vector<std::uint8_t>(4 * 256, 7));  // fewer than it has
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::scores_test

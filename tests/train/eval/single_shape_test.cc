@@ -9,8 +9,7 @@
 #include "base/rng.h"
 #include "train/metrics/metrics.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::single_shape_test {
 
 using Grid = std::vector<std::uint8_t>;
 
@@ -83,5 +82,4 @@ TEST(VoxelSurface, OneVoxelIsACube) {
   EXPECT_EQ(bounds.high, glm::vec3(2));
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::single_shape_test

@@ -9,8 +9,7 @@
 #include "support/temp_folder.h"
 #include "train/data/dataset_files.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::training_pictures_test {
 
 constexpr int kSize = 32, kViews = 2;
 
@@ -164,5 +163,4 @@ TEST_F(TrainingPicturesTest, RunsOfEarlierVersionsHaveNoneAndBrokenOnesAreErrors
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::training_pictures_test

@@ -9,8 +9,7 @@
 #include "support/temp_folder.h"
 #include "train/models/classifier.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::feature_l1_test {
 
 class FeatureL1 : public testing::Test {
  protected:
@@ -92,5 +91,4 @@ TEST_F(FeatureL1, ClassifierHasTheLevelsItIsAskedFor) {
   EXPECT_EQ(weights.back().name, "head.fc.bias");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::feature_l1_test

@@ -11,8 +11,7 @@
 #include "support/temp_folder.h"
 #include "train/ops/render_op.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::wgan_gp_test {
 
 // D(x) = sum of x^2: its gradient is 2 x, its norm 2 |x|.
 class SquareCritic : public nn::Module {
@@ -186,5 +185,4 @@ TEST(WganGpBits, AreTheSameForAnyNumberOfWorkers) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::wgan_gp_test

@@ -13,8 +13,7 @@
 #include "base/rng.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::face_tree_test {
 
 using glm::dvec3;
 
@@ -147,5 +146,4 @@ TEST(FaceTree, EnclosesATorusButNotItsHole) {
   EXPECT_GT(inside, 200);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::face_tree_test

@@ -9,8 +9,7 @@
 
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::high_pass_test {
 
 double Energy(const std::vector<float>& values, int channels, int height, int width,
               const std::vector<std::uint8_t>& covered = {}) {
@@ -64,5 +63,4 @@ TEST(HighPass, WhatDoesNotFitIsAnError) {
   ExpectMessage(HighPassEnergy({broken, 1, 3, 4}).status(), "not finite");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::high_pass_test

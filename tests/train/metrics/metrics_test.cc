@@ -11,8 +11,7 @@
 #include "base/rng.h"
 #include "train/metrics/nearest_point.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::metrics_test {
 
 using Points = std::vector<glm::vec3>;
 
@@ -130,5 +129,4 @@ TEST(SampleFaces, FollowsTheAreas) {
   EXPECT_FALSE(SampleFaces(areas, -1, 7).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::metrics_test

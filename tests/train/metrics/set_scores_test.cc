@@ -11,8 +11,7 @@
 #include "support/temp_folder.h"
 #include "train/metrics/frechet.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::set_scores_test {
 
 // Rows at +-s along each of two axes turned by `angle`, moved by m: the mean is m, the unbiased
 // covariance has the eigenvalues 2 s^2 / 3 along them.
@@ -178,5 +177,4 @@ TEST_F(SetScoresTest, WhatDoesNotFitIsAnError) {
   ExpectMessage(ScoreSets(Normals(7, 2, 0, 1), good, 1, workers_).status(), "truth", "7 rows");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::set_scores_test

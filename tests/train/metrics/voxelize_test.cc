@@ -10,8 +10,7 @@
 #include "scene/shapes.h"
 #include "train/metrics/metrics.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::voxelize_test {
 
 int Count(const std::vector<std::uint8_t>& grid) {
   return std::accumulate(grid.begin(), grid.end(), 0);
@@ -181,5 +180,4 @@ TEST(SurfaceVoxels, ASurfaceOnABorderMarksOneSide) {
   EXPECT_EQ(Count(SurfaceVoxels(std::vector<Triangle>{border}, 4).value()), 1);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::voxelize_test

@@ -10,8 +10,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::face_cubes_test {
 
 constexpr std::int64_t kSide = 64;
 
@@ -102,5 +101,4 @@ TEST(FaceLight, IsTheCosineOfOutwardNormals) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::face_cubes_test

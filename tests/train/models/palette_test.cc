@@ -7,8 +7,7 @@
 
 #include "nn/nn.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::palette_test {
 
 constexpr std::int64_t kSide = 8, kTexels = kSide * kSide;
 
@@ -58,5 +57,4 @@ TEST_F(Palette, GuessesWhereNothingIsLit) {
   for (const float x : colors.span<float>()) EXPECT_NEAR(x, 0.9, 1e-3);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::palette_test

@@ -13,8 +13,7 @@
 #include "scene/shapes.h"
 #include "train/tasks/textured_image/object_pictures.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::picture_lookup_test {
 
 constexpr int kSize = 64, kSide = 32;
 
@@ -138,5 +137,4 @@ TEST_F(Lookup, SurvivesPosesThatAreNone) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::picture_lookup_test

@@ -12,8 +12,7 @@
 #include "scene/light_frame.h"
 #include "shade/spherical_harmonics_ref.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::light_frames_test {
 
 std::vector<Camera> SomeCameras() {
   return {OrbitCamera(Lens{}, 0, 0, 2), OrbitCamera(Lens{}, 50, 20, 2),
@@ -120,5 +119,4 @@ TEST(LightFrames, OneLightForEachCamera) {
   EXPECT_NE(context.TakeStatus().message().find("lights [2, 3] of 3 cameras"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::light_frames_test

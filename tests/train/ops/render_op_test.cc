@@ -14,8 +14,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::render_op_test {
 
 constexpr int kMeshes = 2, kViews = 2, kImages = kMeshes * kViews, kSide = 12;
 
@@ -193,5 +192,4 @@ TEST(RenderScenes, WrongShapesAreErrors) {
             std::string::npos);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::render_op_test

@@ -8,8 +8,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::rival_op_test {
 
 constexpr int kSide = 12;
 
@@ -127,5 +126,4 @@ TEST(RenderRival, ErrorsReachTheContext) {
   expect("positions have the shape [42, 3]");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::rival_op_test

@@ -11,8 +11,7 @@
 #include "base/parallel.h"
 #include "support/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::placement_test {
 
 class Placement : public TempFolderTest {
  protected:
@@ -72,5 +71,4 @@ TEST(KeepToCores, ThreadsThatStartLaterStayThere) {
   }).join();
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::placement_test

@@ -14,8 +14,7 @@
 #include "train/ranks/value_sums.h"
 #include "train/ranks/weight_share.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::sums_test {
 
 TEST(PortionTree, RanksShareAllPortionsAndSubtreesAreComplete) {
   for (std::int64_t portions = 1; portions <= 64; portions *= 2) {
@@ -302,5 +301,4 @@ TEST(Crew, RefusesByNameAndTheLeaderSpeaksForAll) {
   });
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::sums_test

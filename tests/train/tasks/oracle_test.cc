@@ -7,8 +7,7 @@
 #include "scene/shapes.h"
 #include "train/eval/scores.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::oracle_test {
 
 DatasetInfo SmallInfo() {
   DatasetInfo info;
@@ -87,5 +86,4 @@ TEST(Oracle, EachFitStartsAnew) {
   EXPECT_EQ(fit(red)->positions, first.positions);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::oracle_test

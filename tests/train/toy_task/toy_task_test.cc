@@ -21,8 +21,7 @@
 #include "train/tasks/registry.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::toy_task_test {
 
 constexpr const char* kFolder = "TILEGRAD_TOY_FOLDER";
 constexpr const char* kConfig = R"(name = "toy"
@@ -165,5 +164,4 @@ TEST_F(ToyTaskTest, LearnsPredictsIsEvaluatedAndReported) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::toy_task_test

@@ -13,8 +13,7 @@
 #include "scene/shapes.h"
 #include "train/data/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::build_test {
 
 BuildOptions SmallOptions() {
   BuildOptions options;
@@ -268,5 +267,4 @@ TEST_F(BuildTest, RecolouredCopiesAreOnOneSideOfTheSplit) {
   EXPECT_EQ(summary->models[0].split, summary->models[1].split);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::build_test

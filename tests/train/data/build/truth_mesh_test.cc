@@ -9,8 +9,7 @@
 #include "scene/shapes.h"
 #include "train/data/build/glass.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::truth_mesh_test {
 
 Mesh TwoMaterials() {  // a red box and one of glass
   Mesh mesh = Box({0, 0, 0}, {0.9f, 0.9f, 0.9f});
@@ -73,5 +72,4 @@ TEST(RemoveGlass, TakesGlassUnlessThatIsAllThereIs) {
   EXPECT_EQ(mesh.faces.size(), faces - 4);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::truth_mesh_test

@@ -12,8 +12,7 @@
 #include "support/temp_folder.h"
 #include "train/data/photographs/small_systems.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::factorization_test {
 
 using Point = std::array<double, 3>;
 
@@ -177,5 +176,4 @@ TEST(SmallSystems, SolveAndDecompose) {
     }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::factorization_test

@@ -9,8 +9,7 @@
 #include "train/data/photographs/miniature.h"
 #include "train/data/photographs/photo_store.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::photographs_test {
 
 class PhotographsTest : public TempFolderTest {
  protected:
@@ -334,5 +333,4 @@ TEST_F(PhotoFolderTest, PicturesNeedMasks) {
   EXPECT_TRUE(OpenPhotographs(folder_).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::photographs_test

@@ -9,8 +9,7 @@
 #include "support/temp_folder.h"
 #include "train/data/photographs/extreme_points.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::rendered_set_test {
 
 class RenderedSet : public TempFolderTest {
  protected:
@@ -94,5 +93,4 @@ TEST(MaskNoise, MovesTheOutlineAndNothingElse) {
   EXPECT_EQ(DisturbedMask(mask, 0, rng).inside, mask.inside);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::rendered_set_test

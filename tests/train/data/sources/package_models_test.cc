@@ -15,8 +15,7 @@
 #include "train/data/sources/package_textures.h"
 #include "train/data/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::package_models_test {
 
 constexpr const char* kHead =
     "class\tshape\tname\tpackage\tlicence\tmodel\tfront\tup\twith\twithout\ttextures\twheels\n";
@@ -305,5 +304,4 @@ INSTANTIATE_TEST_SUITE_P(
                     Installed{"cars", "torcs", CarsSource, 33, 100}),
     [](const auto& test) { return std::string(test.param.name); });
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::package_models_test

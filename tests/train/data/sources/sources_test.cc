@@ -13,8 +13,7 @@
 #include "train/data/sources/sweethome3d_list.h"
 #include "train/data/temp_folder.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::sources_test {
 
 constexpr const char* kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
@@ -277,5 +276,4 @@ TEST_F(SourcesTest, NmrVoxelsMeetTheirImages) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::sources_test

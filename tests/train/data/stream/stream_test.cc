@@ -14,8 +14,7 @@
 #include "train/data/stream/scene_stream.h"
 #include "train/data/stream/view_draw.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::stream_test {
 
 // Nothing is left to chance but the azimuth.
 StreamConfig Still() {
@@ -239,5 +238,4 @@ TEST(SceneStream, ASheetShowsAllOfIt) {
   EXPECT_EQ(sheet->height, 2 * 16 + 4);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::stream_test

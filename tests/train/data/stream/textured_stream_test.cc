@@ -14,8 +14,7 @@
 #include "support/temp_folder.h"
 #include "train/data/build/build.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::textured_stream_test {
 
 constexpr int kSize = 24;
 
@@ -236,5 +235,4 @@ TEST_F(TexturedMeshes, ChangesSinceThenAreErrors) {
   ExpectMessage(Load((folder_ / "models").string()).status(), "ball/a", "is not there any more");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::textured_stream_test

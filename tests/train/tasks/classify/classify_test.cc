@@ -18,8 +18,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::classify_test {
 
 constexpr const char* kConfig = R"(name = "tiny"
 [task]
@@ -280,5 +279,4 @@ TEST_F(ClassifyTest, PerceptualNetworkFromSafetensors) {
                 "alexnet.safetensors", "features.");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::classify_test

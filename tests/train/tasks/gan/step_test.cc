@@ -11,8 +11,7 @@
 #include "train/tasks/gan/model.h"
 #include "train/tasks/gan/watch.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::gan_step_test {
 
 constexpr int kSize = 16;
 
@@ -222,5 +221,4 @@ TEST(GanWatch, OneObjectAgainAndAgainHasNoSpread) {
   EXPECT_GT(collapsed->distance, alike->distance);
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::gan_step_test

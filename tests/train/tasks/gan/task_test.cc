@@ -13,8 +13,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::gan_task_test {
 
 const ProgressSink kSilent = [](const Progress&) {};
 
@@ -195,5 +194,4 @@ TEST_F(GanTaskTest, WhatCannotBeIsAnError) {
   ExpectMessage(said("textures.run=" + (folder_ / "shape").string()), "extracts no textures");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::gan_task_test

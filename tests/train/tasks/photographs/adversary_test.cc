@@ -15,8 +15,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::adversary_test {
 
 constexpr int kSteps = 12;  // of kTinyPhotographs
 
@@ -123,5 +122,4 @@ TEST_F(PhotographsWithACritic, GradientsOfAStep) {
   EXPECT_GT(largest, 1e-3);  // something depends on the critic
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::adversary_test

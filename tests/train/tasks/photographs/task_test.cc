@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "nn/nn.h"
+#include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "train/config.h"
 #include "train/data/photographs/miniature.h"
@@ -17,8 +18,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::photographs_task_test {
 
 constexpr int kSteps = 12;  // of kTinyPhotographs
 const ProgressSink kSilent = [](const Progress&) {};
@@ -291,5 +291,4 @@ TEST(PhotographConfigs, AreRead) {
   }
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::photographs_task_test

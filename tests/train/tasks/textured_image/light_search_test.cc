@@ -10,8 +10,7 @@
 #include "scene/harmonics.h"
 #include "train/tasks/textured_image/step.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::light_search_test {
 
 constexpr int kSize = 32;
 constexpr std::size_t kPixels = std::size_t{kSize} * kSize;
@@ -118,5 +117,4 @@ TEST(LightSearch, StaysInItsCapAndSaysNothingOfNothing) {
   EXPECT_EQ(search.Find(ball.evidence(), camera.rotation).direction, (std::array<double, 3>{}));
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::light_search_test

@@ -11,8 +11,7 @@
 #include "nn/nn.h"
 #include "scene/shapes.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::textured_image_step_test {
 
 constexpr int kSize = 16;
 
@@ -317,5 +316,4 @@ TEST(TextureNetwork, ImageSizesAreChecked) {
   EXPECT_FALSE(CheckImageSize({.levels = 4}, 72).ok());
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::textured_image_step_test

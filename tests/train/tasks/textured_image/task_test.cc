@@ -3,6 +3,7 @@
 // by Table 2 and reported.
 #include <gtest/gtest.h>
 
+#include "support/source_dir.h"
 #include "support/temp_folder.h"
 #include "train/predictor.h"
 #include "train/report/report.h"
@@ -11,8 +12,7 @@
 #include "train/tiny_run.h"
 #include "train/trainer.h"
 
-namespace tilegrad::train {
-namespace {
+namespace tilegrad::train::textured_image_task_test {
 
 const ProgressSink kSilent = [](const Progress&) {};
 
@@ -185,5 +185,4 @@ TEST_F(TexturedTask, WordsThatAreNotKnownAreErrors) {
   ExpectMessage(train::Train(job, workers_, kSilent, stop_).status(), "light.model is \"neon\"");
 }
 
-}  // namespace
-}  // namespace tilegrad::train
+}  // namespace tilegrad::train::textured_image_task_test
