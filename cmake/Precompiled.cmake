@@ -3,13 +3,15 @@
 # Builds by clang do without, and so say whether every file includes what it uses.
 
 # Tests take a quarter less time to compile so; what they test keeps its own level. At this level g++ 12 reports a test's own operator new
-# and delete as a mismatch. With sanitizers, tests, command line and benchmarks take half the time without optimisation.
+# and delete as a mismatch. So do the command line and the Python bindings (GLUE), which only call what takes time. With sanitizers, tests, command line and benchmarks take half the time without optimisation.
 if(TILEGRAD_SANITIZE)
   set(TILEGRAD_TEST_LEVEL -O0)
   set(TILEGRAD_PROGRAM_LEVEL -O0)
+  set(TILEGRAD_GLUE_LEVEL -O0)
 else()
   set(TILEGRAD_TEST_LEVEL $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
   set(TILEGRAD_PROGRAM_LEVEL)
+  set(TILEGRAD_GLUE_LEVEL $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   list(APPEND TILEGRAD_TEST_LEVEL $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release,RelWithDebInfo>>:-Wno-mismatched-new-delete>)
@@ -33,6 +35,8 @@ if(TILEGRAD_PRECOMPILED)
   set_target_properties(tilegrad_precompiled_shared PROPERTIES POSITION_INDEPENDENT_CODE ON)
   tilegrad_precompile(program)
   target_compile_options(tilegrad_precompiled_program PRIVATE ${TILEGRAD_PROGRAM_LEVEL})
+  tilegrad_precompile(glue)
+  target_compile_options(tilegrad_precompiled_glue PRIVATE ${TILEGRAD_GLUE_LEVEL})
   if(TILEGRAD_TESTS)
     tilegrad_precompile(test)
     target_compile_options(tilegrad_precompiled_test PRIVATE ${TILEGRAD_TEST_LEVEL})

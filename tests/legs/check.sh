@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 source cmake/packages.sh
 
-readonly LEGS=(format headers docs install wheel emu128 avx2 avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
+readonly LEGS=(format headers docs install wheel targets emu128 avx2 avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|renderer_bits|render_pipeline|nn_tape)'
 # Tests that hold kernels to their references.
@@ -17,7 +17,7 @@ readonly KERNEL_TESTS='^(base_simd|base_array|raster_|render_|renderer_|shade|sh
 # Those that valgrind, which takes fifty times as long, runs in minutes.
 readonly MEMCHECK_TESTS='^(base_simd|base_array|raster_(project|interp|vis|extr)|render_|renderer_|shade|shaded|nn_[^a]|nn_a[^l]|compat_)'
 readonly MEMCHECK_SHORT='^(base_array|raster_(project|interp)|renderer_simd|shade|nn_ops|compat_)'
-readonly OUT=$PWD/out/check RELEASE=${TILEGRAD_RELEASE:-build/release}  # build/werror will do, too
+readonly OUT=$PWD/out/check
 
 SHORT=
 LAUNCHER=()
@@ -25,9 +25,7 @@ LAUNCHER=()
 
 # targets BUILD PATTERN: the programs behind tests whose names match, as targets of ninja.
 targets() {
-  ctest --test-dir "$1" -N -L short -R "$2" | sed -n 's/^ *Test *#[0-9]*: //p' | sort -u | while read -r name; do
-    ! ninja -C "$1" -t query "${name}_test" >/dev/null 2>&1 || echo "${name}_test"
-  done
+  tests/legs/programs.py "$1" "$2"
 }
 
 # leg_configure PRESET NAME [OPTION OF CMAKE]...: configures build/NAME.
@@ -57,17 +55,24 @@ tree() {
   ctest --test-dir "build/$name" -L short --output-on-failure --no-tests=error -j "$(nproc)"
 }
 
-# only TARGET: the release build's tests of kernels, where Highway finds this target and no other.
+# targets_build PATTERN: builds tests in build/targets, whose kernels are compiled for every instruction set and EMU128.
+targets_build() {
+  leg_configure release targets -DTILEGRAD_SIMD=all -DTILEGRAD_BENCH=OFF -DTILEGRAD_PYTHON=OFF
+  local chosen
+  mapfile -t chosen < <(targets build/targets "$1")
+  [ "${#chosen[@]}" -gt 0 ] || die "no test of build/targets matches $1"
+  cmake --build build/targets --target "${chosen[@]}"
+}
+
+# only TARGET: tests of kernels, where Highway finds this target and no other.
 only() {
   local library=$OUT/only_$1.so
   g++ -O1 -shared -fPIC -x c++ -o "$library" - -lhwy <<CODE
 #include <hwy/targets.h>
 __attribute__((constructor)) static void Only() { hwy::DisableTargets(~static_cast<int64_t>(HWY_$1)); }
 CODE
-  local chosen
-  mapfile -t chosen < <(targets "$RELEASE" "$KERNEL_TESTS")
-  cmake --build "$RELEASE" --target "${chosen[@]}"
-  LD_PRELOAD=$library ctest --test-dir "$RELEASE" -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
+  targets_build "$KERNEL_TESTS"
+  LD_PRELOAD=$library ctest --test-dir build/targets -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
 }
 
 leg_format() { ./run lint; }
@@ -81,7 +86,11 @@ leg_headers() {
 }
 
 leg_docs() { ./run docs; python3 tests/structure/links.py; }
-leg_install() { cmake --build "$RELEASE"; ctest --test-dir "$RELEASE" -R '^install$' --output-on-failure --no-tests=error; }
+leg_install() {
+  leg_configure portable portable
+  cmake --build build/portable
+  cmake -DBUILD="$PWD/build/portable" -DSOURCE="$PWD" -DWORK="$OUT/install" -DCC=gcc -DCXX=g++ -DFLAGS= -DLINK_FLAGS= -P tests/install/install_test.cmake
+}
 leg_wheel() {
   ./run wheel
   local environment
@@ -91,6 +100,11 @@ leg_wheel() {
   (cd / && "$environment/bin/python" -c 'import tilegrad; print(tilegrad.__file__)' && "$environment/bin/tilegrad" selftest --only files)
   rm -rf "$environment"
 }
+# Each kernel beside its reference, on every instruction set that this machine has.
+leg_targets() {
+  targets_build "$KERNEL_TESTS"
+  ctest --test-dir build/targets -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
+}
 leg_emu128() { only EMU128; }
 leg_avx2() { only AVX2; }
 leg_avx512() {
@@ -99,21 +113,21 @@ leg_avx512() {
   tests/cross/avx512.sh
 }
 # Values that nobody set, in kernels: valgrind runs them as far as AVX2. Tests of how long something takes are left out.
-memcheck() {  # PROGRAM
-  local log=$OUT/memcheck-${1##*/}.txt
-  valgrind -q --error-exitcode=9 --suppressions=tests/legs/memcheck.supp --show-mismatched-frees=no --num-callers=20 "$1" \
-    --gtest_brief=1 '--gtest_filter=-*Long*:*Death*:*AllocatesNothing*:*ManyTensors*' >"$log" 2>&1 || { echo "not clean: $1"; tail -n 40 "$log"; exit 1; }
+memcheck() {  # NAME PROGRAM FILTER
+  local log=$OUT/memcheck-$1.txt
+  valgrind -q --error-exitcode=9 --suppressions=tests/legs/memcheck.supp --show-mismatched-frees=no --num-callers=20 "$2" \
+    --gtest_brief=1 "$3:*Death*:*AllocatesNothing*:*ManyTensors*" >"$log" 2>&1 || { echo "not clean: $1"; tail -n 40 "$log"; exit 1; }
 }
 leg_memcheck() {
   require valgrind
-  local chosen name
-  mapfile -t chosen < <(targets "$RELEASE" "$([ -n "$SHORT" ] && echo "$MEMCHECK_SHORT" || echo "$MEMCHECK_TESTS")")
-  cmake --build "$RELEASE" --target "${chosen[@]}"
+  local pattern=$MEMCHECK_TESTS
+  [ -z "$SHORT" ] || pattern=$MEMCHECK_SHORT
+  targets_build "$pattern"
   export -f memcheck
   export OUT
-  for name in "${chosen[@]}"; do find "$RELEASE/tests" -name "$name" -type f; done | xargs -P "$(nproc)" -n 1 bash -c 'memcheck "$0"'
+  tests/legs/programs.py build/targets "$pattern" --filters | tr '\t' '\n' | xargs -d '\n' -P "$(nproc)" -n 3 bash -c 'memcheck "$@"' _
 }
-leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF; }
+leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF -DTILEGRAD_UNITY=OFF; }
 leg_asan() {  # by clang, which takes half as long for it
   require clang-14 libclang-rt-14-dev
   tree asan asan "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14
@@ -124,7 +138,7 @@ leg_tsan() {
   tree tsan tsan "$THREADS_TESTS"
 }
 # With the flags of werror, so that ccache shares what has no kernels.
-leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF; }
+leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF -DTILEGRAD_UNITY=OFF; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
 # GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
 by_clang() {

@@ -24,7 +24,7 @@ class Mutant(NamedTuple):
     path: str
     old: str
     new: str
-    tests: List[str]  # targets; the name of the test is without "_test"
+    tests: List[str]  # names for ctest
 
 
 MUTANTS = [
@@ -95,8 +95,10 @@ def prepare(build):
 
 
 def known_tests(names):
-    listed = sh(["ninja", "-C", "build/release", "-t", "targets", "all"]).stdout
-    return [n + "_test" for n in names if "\n%s_test:" % n in listed]
+    """(name, target of ninja) of those that the build has."""
+    listed = sh(["tests/legs/programs.py", "build/release", "^(%s)$" % "|".join(names), "--filters"]).stdout
+    rows = [line.split("\t") for line in listed.splitlines()]
+    return [(name, pathlib.Path(program).name) for name, program, _ in rows]
 
 
 def seen_by(mutant, jobs):
@@ -110,11 +112,11 @@ def seen_by(mutant, jobs):
         return "NOT APPLIED: no such test"
     try:
         path.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
-        for test in tests:
-            if sh(["ninja", "-C", "build/release", "-j%d" % jobs, test]).returncode != 0:
+        for test, program in tests:
+            if sh(["ninja", "-C", "build/release", "-j%d" % jobs, program]).returncode != 0:
                 return "the compiler"
-            if sh(["ctest", "--test-dir", "build/release", "-L", "short", "-R", "^%s$" % test[:-len("_test")]]).returncode:
-                return test[:-len("_test")]
+            if sh(["ctest", "--test-dir", "build/release", "-L", "short", "-R", "^%s$" % test]).returncode:
+                return test
         return ""
     finally:
         path.write_text(text, encoding="utf-8")

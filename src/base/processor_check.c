@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels that are compiled for one instruction set (TILEGRAD_SIMD=native) end a program on a
+// processor without it. This ends it first, with a sentence: before main, and before anything of
+// C++ whose code may be theirs. Compiled for any x86-64.
+#include <string.h>
+#include <unistd.h>
+
+#if TILEGRAD_X86_LEVEL == 4
+#define TILEGRAD_MISSING                                                         \
+  (!__builtin_cpu_supports("avx512f") || !__builtin_cpu_supports("avx512bw") ||  \
+   !__builtin_cpu_supports("avx512dq") || !__builtin_cpu_supports("avx512vl") || \
+   !__builtin_cpu_supports("avx512cd"))
+#define TILEGRAD_SET "AVX-512"
+#elif TILEGRAD_X86_LEVEL == 3
+#define TILEGRAD_MISSING                                                \
+  (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || \
+   !__builtin_cpu_supports("bmi2"))
+#define TILEGRAD_SET "AVX2"
+#else
+#define TILEGRAD_MISSING (!__builtin_cpu_supports("sse4.2"))
+#define TILEGRAD_SET "SSE4.2"
+#endif
+
+// The linker is told to look for it (cmake/Simd.cmake), or it would leave this file out.
+__attribute__((constructor(101))) void tilegrad_check_processor(void);
+void tilegrad_check_processor(void) {
+  __builtin_cpu_init();
+  if (!TILEGRAD_MISSING) return;
+  static const char kText[] =
+      "tilegrad: this build is for processors with " TILEGRAD_SET
+      ", which this one lacks; build on this machine, or anywhere with -DTILEGRAD_SIMD=dynamic\n";
+  const ssize_t written = write(STDERR_FILENO, kText, strlen(kText));
+  (void)written;
+  _exit(1);
+}
