@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad train: a run from a configuration and a dataset.
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -94,6 +95,16 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   return {};
 }
 
+// Says where sample sheets are, as soon as there is one.
+train::PictureSink TellOfSheets(ProgressLine* line, std::int64_t every) {
+  return [line, every, told = false](const Path& file) mutable {
+    if (std::exchange(told, true)) return;
+    line->Finish();
+    PrintRemark("sample sheet: {} (a new one beside it every {} steps or sooner)\n", file.string(),
+                every);
+  };
+}
+
 Status RunTraining(TrainOptions options) {
   Ranks ranks;
   TILEGRAD_TRY(ranks.Join());
@@ -111,6 +122,7 @@ Status RunTraining(TrainOptions options) {
                   StartLive(options.live, {options.out, options.data, job.config.schedule.steps}));
   ProgressLine line;
   job.warn = line.Warnings();
+  job.drawn = TellOfSheets(&line, job.config.schedule.sample_every);
   auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   ranks.EndIfBroken(outcome.status());

@@ -88,8 +88,7 @@ class Training : public RunWork {
   }
 
   bool HasPicture(std::int64_t steps) const override {
-    const Schedule& s = config_.schedule;
-    return steps > 0 && (steps % s.sample_every == 0 || steps == s.steps);
+    return SampleIsDue(config_.schedule, steps);
   }
   Result<ImageU8> Picture(std::int64_t steps) override { return task_.SamplePicture(steps); }
 
@@ -157,7 +156,8 @@ Result<RunOutcome> Train(const TrainJob& job, const Workers& workers, const Prog
                .existing = job.existing,
                .may_differ = job.extends ? "schedule.steps" : "",
                .max_minutes = job.max_minutes,
-               .warn = job.warn};
+               .warn = job.warn,
+               .drawn = job.drawn};
   nn::Context context(workers);
   // A task of its own: that of the job stays as it is, for the next call.
   TILEGRAD_ASSIGN(TrainConfig config, ParseConfig(plan.settings, "configuration"));

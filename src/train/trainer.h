@@ -27,6 +27,7 @@ struct TrainJob {
   // this process alone. Only rank 0 looks at `run`.
   Crew* crew = nullptr;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
+  PictureSink drawn = nullptr;
 };
 
 // As ExecuteRun. With a crew, every rank calls it and rank 0's result tells; after an error with

@@ -61,6 +61,19 @@ TEST_F(Runs, GoOnFromTheirFolderAlone) {
       << said.output;
 }
 
+TEST_F(Runs, SayWhereTheirFirstSampleSheetIs) {
+  MakeData();
+  const Outcome said = RunProgram(Start("run") + " --set schedule.steps=12");
+  const std::string line = "sample sheet: " + In("run/samples/step_00000010.png") +
+                           " (a new one beside it every 1000 steps or sooner)\n";
+  const auto at = said.output.find(line);
+  ASSERT_NE(at, std::string::npos) << said.output;
+  EXPECT_EQ(said.output.find("sample sheet", at + 1), std::string::npos) << said.output;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "run/samples/step_00000010.png"));
+  const Outcome quiet = RunProgram(Start("quiet") + " --quiet");
+  EXPECT_EQ(quiet.output.find("sample sheet"), std::string::npos) << quiet.output;
+}
+
 TEST_F(Runs, AreExtendedIfAskedTo) {
   MakeData();
   Done(Start("run"));

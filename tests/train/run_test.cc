@@ -277,6 +277,20 @@ TEST(Tensorboard, CrcAndFraming) {
   EXPECT_EQ(event, std::string(reinterpret_cast<const char*>(want), sizeof(want)));
 }
 
+TEST(Schedule, SamplesComeEarlyThenEvenlyAndAtTheEnd) {
+  const auto due = [](const Schedule& schedule) {
+    std::vector<std::int64_t> out;
+    for (std::int64_t step = 0; step <= schedule.steps; ++step) {
+      if (SampleIsDue(schedule, step)) out.push_back(step);
+    }
+    return out;
+  };
+  using Steps = std::vector<std::int64_t>;
+  EXPECT_EQ(due({.steps = 250, .sample_every = 100}), (Steps{10, 20, 40, 80, 100, 200, 250}));
+  EXPECT_EQ(due({.steps = 50, .sample_every = 20}), (Steps{10, 20, 40, 50}));
+  EXPECT_EQ(due({.steps = 7, .sample_every = 3}), (Steps{3, 6, 7}));
+}
+
 TEST(BatchOrder, EveryEpochShowsEachModelOnceAndViewsAreDistinct) {
   BatchOrder order(10, 6, 3), again(10, 6, 3);
   std::multiset<int> seen;

@@ -148,6 +148,33 @@ TEST_F(TrainerTest, StreamedRunsResumeAndDoNotDependOnWorkers) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / "stream.png"));
 }
 
+// Whoever looks more often gets the same weights.
+TEST_F(TrainerTest, SampleSheetsComeEarlyAndLeaveTheBitsAlone) {
+  ASSERT_TRUE(WriteNoiseDataset(folder_ / "boxes", Meshes::kBoxes, /*classes=*/2).ok());
+  job_.data = folder_ / "boxes";
+  const std::string streamed = std::string(kTinyConfig) + "[stream]\nshare = 0.5\n";
+  for (const std::string& text :
+       {streamed, std::string(kTinyTextured), std::string(kTinyClassifier)}) {
+    for (const std::int64_t every : {1, 1000}) {
+      job_.config = ParseConfig(text, "tiny").value();
+      job_.config.schedule.steps = 12, job_.config.schedule.sample_every = every;
+      std::vector<std::string> drawn;
+      job_.drawn = [&](const Path& file) {
+        EXPECT_TRUE(std::filesystem::exists(file)) << file;
+        drawn.push_back(file.filename().string());
+      };
+      RunWhole(std::to_string(every), 2);
+      const std::vector<std::string> few = {"step_00000010.png", "step_00000012.png"};
+      if (every == 1)
+        EXPECT_EQ(drawn.size(), 12u);
+      else
+        EXPECT_EQ(drawn, few);
+    }
+    ExpectSameBits("1", "1000");
+    for (const char* run : {"1", "1000"}) std::filesystem::remove_all(folder_ / run);
+  }
+}
+
 TEST_F(TrainerTest, ANewRunKeepsItsPicturesAndWarnsOfFewModels) {
   int warnings = 0;
   job_.warn = [&](const std::string& text) {

@@ -177,6 +177,7 @@ Status Session::Draw() {
   if (picture.empty()) return {};
   const Path file = PictureFile(plan_, done_);
   TILEGRAD_TRY(io::SavePng(file, picture));
+  if (plan_.drawn) plan_.drawn(file);
   const Mesh mesh = work_.PictureMesh();
   return mesh.faces.empty() ? Status() : io::SaveGlb(Path(file).replace_extension(".glb"), mesh);
 }

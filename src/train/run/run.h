@@ -9,6 +9,7 @@
 //   <run>/checkpoints/                   see checkpoint.h
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,9 @@ enum class ExistingRun {
   kContinue,  // continues from its newest whole checkpoint; starts if there is no run yet
 };
 
+// Told of each picture of a run once it is written.
+using PictureSink = std::function<void(const Path& file)>;
+
 struct RunPlan {
   std::string stage;            // what the progress line calls it: "training"
   Path folder;                  // of the run
@@ -41,6 +45,7 @@ struct RunPlan {
   std::string may_differ = {};
   double max_minutes = 0;      // > 0: save and stop after this long
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
+  PictureSink drawn = nullptr;
 };
 
 // What is computed in a run.

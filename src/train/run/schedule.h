@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "train/run/config_fields.h"
@@ -20,6 +21,15 @@ struct Schedule {
   std::int64_t keep_checkpoints = 3;  // the newest ones
 };
 
+// Whether a sample sheet is due after `steps` steps: every `sample_every`, at the end, and before
+// that after 10, 20, 40, ..., so that who waits for a slow task soon sees something, too.
+inline bool SampleIsDue(const Schedule& s, std::int64_t steps) {
+  if (steps <= 0) return false;
+  if (steps % s.sample_every == 0 || steps == s.steps) return true;
+  const bool early = steps % 10 == 0 && std::has_single_bit(static_cast<std::uint64_t>(steps / 10));
+  return early && steps < s.sample_every;
+}
+
 // Its keys, in table [schedule].
 inline ConfigFields FieldsOf(Schedule* s) {
   const auto reporting = Affects::kReporting;
@@ -30,7 +40,8 @@ inline ConfigFields FieldsOf(Schedule* s) {
           {"schedule.shard_optimizer", &s->shard_optimizer, 0, 1,
            "each of several processes moves its share of the weights; the same bits", reporting},
           {"schedule.log_every", &s->log_every, 1, kNoLimit, "steps", reporting},
-          {"schedule.sample_every", &s->sample_every, 1, kNoLimit, "steps", reporting},
+          {"schedule.sample_every", &s->sample_every, 1, kNoLimit,
+           "steps; before them after 10, 20, 40 and so on", reporting},
           {"schedule.checkpoint_every", &s->checkpoint_every, 1, kNoLimit, "steps", reporting},
           {"schedule.keep_checkpoints", &s->keep_checkpoints, 1, kNoLimit,
            "the newest ones are kept", reporting}};

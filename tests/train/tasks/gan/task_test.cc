@@ -93,6 +93,15 @@ TEST_F(GanTaskTest, StoppedInEachStageAndContinuedEndsInTheSameBits) {
     EXPECT_EQ(a->at(i).values[0], b->at(i).values[0]) << "loss of step " << i;
 }
 
+TEST_F(GanTaskTest, SampleSheetsLeaveTheBitsAlone) {
+  ASSERT_NO_FATAL_FAILURE(TrainTextures());
+  ASSERT_TRUE(TrainGan({"few"}).ok());
+  ASSERT_TRUE(TrainGan({.run = "many", .settings = {"schedule.sample_every=1"}}).ok());
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "few/samples/step_00000010.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "many/samples/step_00000001.png"));
+  ExpectSameBits(Final("few"), Final("many"));
+}
+
 TEST_F(GanTaskTest, ShapesLearnFirstAndThenStay) {
   ASSERT_NO_FATAL_FAILURE(TrainTextures());
   ASSERT_TRUE(TrainGan({.run = "shape", .settings = {"schedule.steps=6"}}).ok());

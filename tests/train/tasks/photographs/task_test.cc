@@ -39,11 +39,13 @@ class PhotographsTask : public TempFolderTest {
     std::int64_t steps = kSteps;
     std::string data = "cub";
     int smoothing = 0;
+    std::int64_t sample_every = 1000;
   };
   Result<RunOutcome> Train(const std::string& run, const Changes& changes) {
     TrainJob job;
     TILEGRAD_ASSIGN(job.config, ParseConfig(TinyConfig(changes.smoothing) + changes.more, "tiny"));
     job.config.schedule.steps = changes.steps;
+    job.config.schedule.sample_every = changes.sample_every;
     job.extends = true;
     job.data = folder_ / changes.data, job.run = folder_ / run;
     job.existing = ExistingRun::kContinue;
@@ -135,6 +137,14 @@ TEST_F(PhotographsTask, SameBitsForAnyWorkers) {
   ASSERT_TRUE(Train("one", {.workers = 1}).ok());
   ASSERT_TRUE(Train("two", {.workers = 2}).ok());
   ExpectSame("one", "two");
+}
+
+TEST_F(PhotographsTask, SampleSheetsLeaveTheBitsAlone) {
+  ASSERT_TRUE(Train("few", {}).ok());
+  ASSERT_TRUE(Train("many", {.sample_every = 1}).ok());
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "few/samples/step_00000010.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "many/samples/step_00000001.png"));
+  ExpectSame("few", "many");
 }
 
 TEST_F(PhotographsTask, GoesOnToTheSameBitsAfterAStop) {
