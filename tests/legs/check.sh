@@ -41,7 +41,7 @@ build_and_test() {
   local chosen
   mapfile -t chosen < <(targets "build/$1" "$2")
   [ "${#chosen[@]}" -gt 0 ] || die "no test of build/$1 matches $2"
-  cmake --build "build/$1" --target "${chosen[@]}" -- -k 0
+  compile "build/$1" --target "${chosen[@]}" -- -k 0
   ctest --test-dir "build/$1" -L short -R "$2" --output-on-failure --no-tests=error -j "$(nproc)"
 }
 
@@ -51,7 +51,7 @@ tree() {
   shift 3
   leg_configure "$preset" "$name" "$@"
   if [ -n "$SHORT" ]; then build_and_test "$name" "$pattern"; return; fi
-  cmake --build "build/$name" -- -k 0  # one error does not hide the others
+  compile "build/$name" -- -k 0  # one error does not hide the others
   ctest --test-dir "build/$name" -L short --output-on-failure --no-tests=error -j "$(nproc)"
 }
 
@@ -61,7 +61,7 @@ targets_build() {
   local chosen
   mapfile -t chosen < <(targets build/targets "$1")
   [ "${#chosen[@]}" -gt 0 ] || die "no test of build/targets matches $1"
-  cmake --build build/targets --target "${chosen[@]}"
+  compile build/targets --target "${chosen[@]}"
 }
 
 # only TARGET: tests of kernels, where Highway finds this target and no other.
@@ -88,7 +88,7 @@ leg_headers() {
 leg_docs() { ./run docs; python3 tests/structure/links.py; }
 leg_install() {
   leg_configure portable portable
-  cmake --build build/portable
+  compile build/portable
   cmake -DBUILD="$PWD/build/portable" -DSOURCE="$PWD" -DWORK="$OUT/install" -DCC=gcc -DCXX=g++ -DFLAGS= -DLINK_FLAGS= -P tests/install/install_test.cmake
 }
 leg_wheel() {
@@ -160,7 +160,7 @@ leg_coverage() {
     -DTILEGRAD_WERROR=OFF -DTILEGRAD_BENCH=OFF -DTILEGRAD_PYTHON=OFF -DCMAKE_CXX_FLAGS='-O0 -fprofile-instr-generate -fcoverage-mapping'
   local chosen
   mapfile -t chosen < <(targets build/coverage "$( [ -n "$SHORT" ] && echo "^io_" || echo "^(io_|fuzz_replay)")")
-  cmake --build build/coverage --target "${chosen[@]}"
+  compile build/coverage --target "${chosen[@]}"
   tests/legs/coverage.py build/coverage "$OUT/coverage" "${chosen[@]}"
 }
 leg_aarch64() {
