@@ -11,20 +11,20 @@ namespace {
 constexpr int kMeshLevel = 5;  // 20,480 faces, as S3
 constexpr int kImageSize = 256;
 
-void AddBoth(const std::string& name, const RunSpec& spec) {
+void AddPoint(const std::string& name, const RunSpec& spec) {
   AddRun({name, "both", "1"}, spec, Who::kRenderer);
   AddRun({name, "both", "culled"}, spec, Who::kCulled);
 }
 
 void AddFaces() {
   for (int level = 1, faces = 80; level <= 7; ++level, faces *= 4) {
-    AddBoth(fmt::format("faces-{}", faces), {{"faces", 1, kImageSize, level}});
+    AddPoint(fmt::format("faces-{}", faces), {{"faces", 1, kImageSize, level}});
   }
 }
 
 void AddPixels() {
   for (int size = 32; size <= 2048; size *= 2) {
-    AddBoth(fmt::format("pixels-{}", size), {{"pixels", 1, size, kMeshLevel}});
+    AddPoint(fmt::format("pixels-{}", size), {{"pixels", 1, size, kMeshLevel}});
   }
 }
 
