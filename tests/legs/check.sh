@@ -8,6 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source cmake/packages.sh
+export PYTHONDONTWRITEBYTECODE=1  # as ./run
 
 readonly LEGS=(format headers docs install wheel targets emu128 avx2 avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
