@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Runs tests of build/release on a CPU with AVX-512 that Bochs emulates, where the machine has none: Debian's kernel for clouds,
+# Runs tests of build/targets on a CPU with AVX-512 that Bochs emulates, where the machine has none: Debian's kernel for clouds,
 # busybox and the tests start in it, and what they print comes out of its serial port.
 #
 #   tests/cross/avx512.sh [NAME[:GTEST FILTER]...]   e.g. shade 'nn_conv2d:Conv2dWinograd.*'; default: the kernels' quicker tests
@@ -8,17 +8,17 @@
 # The tests find AVX3, Highway's name for AVX-512, and no other target. They take some 200 times as long as on the machine, after
 # a minute in which the kernel starts.
 #
-# Wants the PACKAGES below (Debian 12) and the tests built (./run setup). The kernel is fetched with apt into build/avx512: nothing
+# Wants the PACKAGES below (Debian 12) and the tests built (./run check targets). The kernel is fetched with apt into build/avx512: nothing
 # is installed, no root is needed.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-readonly TESTS=$PWD/build/release/tests WORK=$PWD/build/avx512
+readonly BUILD=build/targets WORK=$PWD/build/avx512
 readonly PACKAGES='bochs bochs-term vgabios isolinux syslinux-common xorriso busybox-static cpio'
 readonly KERNEL=$WORK/kernel ROOT=$WORK/root DISC=$WORK/disc
 readonly SYSLINUX=/usr/lib/syslinux/modules/bios/ldlinux.c32 ISOLINUX=/usr/lib/ISOLINUX/isolinux.bin
-readonly QUICK=(base_array_checks raster_project raster_visibility raster_face_visibility raster_interpolate_backward
-  raster_extremes renderer_bits shade shaded_simd nn_reduce nn_axis_map nn_pointwise nn_adam 'nn_conv2d:Conv2dWinograd.*'
+readonly QUICK=(base_array_checks raster_project raster_visibility raster_interpolate_backward
+  raster_extremes render_pipeline_bits shade nn_reduce nn_axis_map nn_pointwise nn_adam 'nn_conv2d:Conv2dWinograd.*'
   'nn_gemm:-*Random*')
 
 die() { printf 'avx512.sh: %s\n' "$*" >&2; exit 1; }
@@ -87,14 +87,14 @@ make_root() {  # NAME[:FILTER]...
   add_init
   local job name binary filter
   for job; do
-    name=${job%%:*}_test filter='-*Long*'
-    case $job in *:*) filter=${job#*:} ;; esac
-    binary=$(find "$TESTS" -name "$name" -type f | head -n 1)
-    [ -n "$binary" ] || die "there is no $name in $TESTS: build it with ./run setup"
-    "$binary" "--gtest_filter=$filter" --gtest_list_tests | grep '^  ' >/dev/null || die "$name has no test '$filter'"
+    name=${job%%:*}
+    IFS=$'\t' read -r _ binary filter < <(tests/legs/programs.py "$BUILD" "^$name\$" --filters) || die "$BUILD has no test $name"
+    case $job in *:*) filter=--gtest_filter=${job#*:} ;; esac
+    [ -x "$binary" ] || die "there is no $binary: build it with ./run check targets"
+    "$binary" "$filter" --gtest_list_tests | grep '^  ' >/dev/null || die "$name has no test '$filter'"
     add_program "$binary" "/tests/$name"
     strip "$ROOT/tests/$name"
-    printf '%s %s\n' "$name" "$filter" >>"$ROOT/jobs"
+    printf '%s %s\n' "$name" "${filter#--gtest_filter=}" >>"$ROOT/jobs"
   done
 }
 
