@@ -6,23 +6,20 @@
 
 namespace tilegrad::cli {
 
-void AddCompletion(CLI::App& app, Action* action) {
+void AddCompletion(CommandList* list) {
   auto shell = std::make_shared<std::string>();
-  auto* command = app.add_subcommand(
+  Command& command = list->emplace_back(Command{
       "completion",
-      "Print the completion script of a shell, e.g. for: source <(tilegrad completion bash)");
-  command->add_option("shell", *shell, "bash, zsh or fish")
-      ->required()
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
-  command->callback([&app, shell, action] {
-    *action = [&app, shell]() -> Status {
-      const auto tree = ReadCommandTree(app);
-      Print("{}", *shell == "bash"  ? BashCompletion(tree)
-                  : *shell == "zsh" ? ZshCompletion(tree)
-                                    : FishCompletion(tree));
-      return {};
-    };
-  });
+      "Print the completion script of a shell, e.g. for: source <(tilegrad completion bash)"});
+  command.Add("shell", shell.get(), "bash, zsh or fish",
+              {Required{}, OneOf{{"bash", "zsh", "fish"}}});
+  command.action = [list, shell]() -> Status {
+    const auto tree = ReadCommandTree(*list);
+    Print("{}", *shell == "bash"  ? BashCompletion(tree)
+                : *shell == "zsh" ? ZshCompletion(tree)
+                                  : FishCompletion(tree));
+    return {};
+  };
 }
 
 }  // namespace tilegrad::cli

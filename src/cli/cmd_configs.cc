@@ -33,12 +33,10 @@ Status RunConfigs(const std::string& name) {
 
 }  // namespace
 
-void AddConfigs(CLI::App& app, Action* action) {
-  auto name = std::make_shared<std::string>();
-  auto* command =
-      app.add_subcommand("configs", "List the configurations that train --config knows by name");
-  command->add_option("name", *name, "print this one instead, e.g. to a file to change");
-  command->callback([name, action] { *action = [name] { return RunConfigs(*name); }; });
+void AddConfigs(CommandList* list) {
+  const auto [command, name] = AddCommand(
+      list, "configs", "List the configurations that train --config knows by name", RunConfigs);
+  command->Add("name", name, "print this one instead, e.g. to a file to change");
 }
 
 }  // namespace tilegrad::cli

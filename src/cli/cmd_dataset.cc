@@ -13,7 +13,6 @@
 #include "cli/console.h"
 #include "cli/dataset_source.h"
 #include "cli/mesh_options.h"
-#include "cli/option_checks.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/data/build/build.h"
@@ -107,7 +106,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
   for (const auto& [reason, count] : reasons) Print("  {:>5}  {}\n", count, reason);
 }
 
-void PrintWarnings(const train::BuildSummary& summary) {
+void PrintModelWarnings(const train::BuildSummary& summary) {
   constexpr std::size_t kShown = 10;
   if (summary.warnings.empty()) return;
   Print("{} of reading models:\n", Count(summary.warnings.size(), "warning"));
@@ -169,7 +168,7 @@ Status Make(const DatasetOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   PrintTable(summary);
   PrintRejected(summary, folder);
-  PrintWarnings(summary);
+  PrintModelWarnings(summary);
   PrintIgnored(summary);
   Print("{}, {} of {} x {} pixels, {:.1f} MB in {} ({} kept from earlier), {:.1f} s\n",
         Count(summary.models.size(), "model"),
@@ -184,65 +183,53 @@ Status Make(const DatasetOptions& options) {
   return {};
 }
 
-void AddSourceOptions(CLI::App* command, DatasetOptions* options) {
-  command->add_option("--source", options->sources, DatasetSourceHelp())
-      ->delimiter(',')
-      ->check(CLI::IsMember(DatasetSourceNames()))
-      ->capture_default_str();
-  command->add_option(
-      "--input", options->input,
-      "folder of the models; those of packages have a default, procedural needs none");
-  command->add_option("--out", options->out, "folder to fill [datasets/SOURCE]");
-  command->add_option("--split-list", options->split_list,
-                      "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
+void AddSourceOptions(Command* command, DatasetOptions* options) {
+  command->Add("--source", &options->sources, DatasetSourceHelp(),
+               {SplitAtCommas{}, OneOf{DatasetSourceNames()}});
+  command->Add("--input", &options->input,
+               "folder of the models; those of packages have a default, procedural needs none");
+  command->Add("--out", &options->out, "folder to fill [datasets/SOURCE]");
+  command->Add("--split-list", &options->split_list,
+               "shapenet: lines \"SYNSET/MODEL train|val|test\"; only these are used");
 }
 
-void AddBuildOptions(CLI::App* command, train::BuildOptions* build) {
-  command->add_option("--size", build->image_size, "pixels a side")->capture_default_str();
-  command->add_option("--views", build->views, "views of a model")->capture_default_str();
-  command
-      ->add_option("--per-class", build->per_class,
-                   "at most this many shapes of a class; 0: all, or 100 if procedural")
-      ->capture_default_str();
-  command->add_option("--liveries", build->liveries,
-                      "at most this many textures of one shape; 0: all [1 of thirteen, else 0]");
-  command->add_option("--limit", build->limit, "at most this many models in all; 0: all")
-      ->capture_default_str();
-  command
-      ->add_option("--seed", build->split.seed,
-                   "seed of the choice of models, the split and procedural shapes")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command
-      ->add_option("--test-share", build->split.test_share,
-                   "share of each class's shapes to test with")
-      ->capture_default_str();
-  command
-      ->add_option("--validation-share", build->split.validation_share,
-                   "share of each class's shapes to validate with")
-      ->capture_default_str();
+void AddBuildOptions(Command* command, train::BuildOptions* build) {
+  command->Add("--size", &build->image_size, "pixels a side");
+  command->Add("--views", &build->views, "views of a model");
+  command->Add("--per-class", &build->per_class,
+               "at most this many shapes of a class; 0: all, or 100 if procedural");
+  command->Add("--liveries", &build->liveries,
+               "at most this many textures of one shape; 0: all [1 of thirteen, else 0]",
+               {NoDefault{}});
+  command->Add("--limit", &build->limit, "at most this many models in all; 0: all");
+  command->Add("--seed", &build->split.seed,
+               "seed of the choice of models, the split and procedural shapes", {NotNegative()});
+  command->Add("--test-share", &build->split.test_share,
+               "share of each class's shapes to test with");
+  command->Add("--validation-share", &build->split.validation_share,
+               "share of each class's shapes to validate with");
 }
 
 }  // namespace
 
-void AddDataset(CLI::App& app, Action* action) {
+void AddDataset(CommandList* list) {
   auto options = std::make_shared<DatasetOptions>();
-  auto* command =
-      app.add_subcommand("dataset",
-                         "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
-                         "After Ctrl-C the same command goes on where it stopped.");
-  AddSourceOptions(command, options.get());
-  AddBuildOptions(command, &options->build);
-  AddUpOption(command, &options->build.up);
-  AddForceOption(command, &options->force);
-  AddWorkersOption(command, &options->workers);
-  command->callback([options, action, command] {
-    options->fixed_size = command->count("--size") + command->count("--views") > 0;
-    options->liveries = command->count("--liveries") > 0;
-    options->shares = command->count("--test-share") + command->count("--validation-share") > 0;
+  Command& command = list->emplace_back(
+      Command{"dataset",
+              "Render 3D models into a dataset: RGBA views, occupancy, surface points.\n"
+              "After Ctrl-C the same command goes on where it stopped."});
+  AddSourceOptions(&command, options.get());
+  AddBuildOptions(&command, &options->build);
+  AddUpOption(&command, &options->build.up);
+  AddForceOption(&command, &options->force);
+  AddWorkersOption(&command, &options->workers);
+  command.action = [&command, options] {
+    options->fixed_size = command.Given("--size") || command.Given("--views");
+    options->liveries = command.Given("--liveries");
+    options->shares = command.Given("--test-share") || command.Given("--validation-share");
     if (!options->liveries && options->Name() == "thirteen") options->build.liveries = 1;
-    *action = [options] { return Make(*options); };
-  });
+    return Make(*options);
+  };
 }
 
 }  // namespace tilegrad::cli

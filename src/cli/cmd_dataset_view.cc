@@ -9,7 +9,6 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "io/image_file.h"
 #include "train/data/dataset.h"
@@ -105,26 +104,19 @@ Status WriteView(const ViewOptions& options) {
 
 }  // namespace
 
-void AddDatasetView(CLI::App& app, Action* action) {
-  auto options = std::make_shared<ViewOptions>();
-  auto* command = app.add_subcommand("dataset-view", "Save one image of a dataset as an RGBA PNG");
-  command->add_option("--data", options->data, "dataset folder")->required();
-  auto* model = command->add_option("--model", options->model,
-                                    "CLASS/ID, named as the files below models/ [one of --split]");
-  command->add_option("--class", options->class_name, "choose among the models of this class")
-      ->excludes(model);
-  command->add_option("--split", options->split, "train, validation or test")
-      ->excludes(model)
-      ->capture_default_str()
-      ->check(CLI::IsMember({"train", "validation", "test"}));
-  command->add_option("--view", options->view, "which view")
-      ->capture_default_str()
-      ->check(NotNegative());
-  command->add_option("--out", options->out, "PNG file")
-      ->check(FileEnding(".png"))
-      ->capture_default_str();
+void AddDatasetView(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "dataset-view", "Save one image of a dataset as an RGBA PNG", WriteView);
+  command->Add("--data", &options->data, "dataset folder", {Required{}});
+  command->Add("--model", &options->model,
+               "CLASS/ID, named as the files below models/ [one of --split]");
+  command->Add("--class", &options->class_name, "choose among the models of this class",
+               {Excludes{{"--model"}}});
+  command->Add("--split", &options->split, "train, validation or test",
+               {Excludes{{"--model"}}, OneOf{{"train", "validation", "test"}}});
+  command->Add("--view", &options->view, "which view", {NotNegative()});
+  command->Add("--out", &options->out, "PNG file", {EndsIn(".png")});
   AddForceOption(command, &options->force);
-  command->callback([options, action] { *action = [options] { return WriteView(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -121,35 +121,25 @@ Status RunEvaluation(const EvalOptions& options) {
 
 }  // namespace
 
-void AddEval(CLI::App& app, Action* action) {
-  auto options = std::make_shared<EvalOptions>();
-  auto* command = app.add_subcommand(
-      "eval", "3D IoU and F-score of a run on held-out models, beside three baselines");
+void AddEval(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "eval", "3D IoU and F-score of a run on held-out models, beside three baselines",
+      RunEvaluation);
   AddRunOptions(command, &options->on);
-  command
-      ->add_option("--views-per-model", options->views_per_model,
-                   "images of each model that are predicted from")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  command
-      ->add_option("--split", options->split,
-                   "which models are scored; the scores of others than test are printed only")
-      ->capture_default_str()
-      ->check(CLI::IsMember(kSplits));
-  command
-      ->add_option("--refine", options->refine,
-                   "steps of refinement of each prediction on its image, as of predict; the scores "
-                   "are printed only")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
-  command
-      ->add_option("--oracle", options->oracle,
-                   "steps of fitting the template to all views of each model, for a row that says "
-                   "how good predictions can be at best; 300 take a second a model or two")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
+  command->Add("--views-per-model", &options->views_per_model,
+               "images of each model that are predicted from", {Range{1, 1000}});
+  command->Add("--split", &options->split,
+               "which models are scored; the scores of others than test are printed only",
+               {OneOf{{"test", "train", "validation"}}});
+  command->Add("--refine", &options->refine,
+               "steps of refinement of each prediction on its image, as of predict; the scores are "
+               "printed only",
+               {Range{0, 100000}});
+  command->Add("--oracle", &options->oracle,
+               "steps of fitting the template to all views of each model, for a row that says how "
+               "good predictions can be at best; 300 take a second a model or two",
+               {Range{0, 100000}});
   AddForceOption(command, &options->force);
-  command->callback([options, action] { *action = [options] { return RunEvaluation(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -1,26 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad figure2: the paper's sanity check of all gradients.
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "fit/figure2.h"
 
 namespace tilegrad::cli {
 namespace {
 
-struct Options {
+struct FigureOptions {
   std::string out = "figure2.svg";
   int workers = 0;
   bool force = false;
   train::Figure2Options figure;
 };
 
-Status Run(const Options& options) {
+Status RunFigure(const FigureOptions& options) {
   const OutputGuard guard(options.force);
   TILEGRAD_TRY(guard.Check(options.out));  // before the work
   const Workers workers(options.workers);
@@ -37,24 +35,17 @@ Status Run(const Options& options) {
 
 }  // namespace
 
-void AddFigure2(CLI::App& app, Action* action) {
-  auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand(
-      "figure2",
+void AddFigure2(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "figure2",
       "The paper's Figure 2: optimise positions, colours, texture, uv, camera, light and material\n"
-      "in eight small scenes, and draw start, target, result and error curve of each");
-  command->add_option("--out", options->out, "the picture, SVG")
-      ->check(FileEnding(".svg"))
-      ->capture_default_str();
-  command->add_option("--size", options->figure.size, "pixels a side of each image")
-      ->check(CLI::Range(8, 2048))
-      ->capture_default_str();
-  command->add_option("--steps", options->figure.steps, "of each optimisation")
-      ->check(AboveZero())
-      ->capture_default_str();
+      "in eight small scenes, and draw start, target, result and error curve of each",
+      RunFigure);
+  command->Add("--out", &options->out, "the picture, SVG", {EndsIn(".svg")});
+  command->Add("--size", &options->figure.size, "pixels a side of each image", {Range{8, 2048}});
+  command->Add("--steps", &options->figure.steps, "of each optimisation", {AboveZero()});
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return Run(*options); }; });
 }
 
 }  // namespace tilegrad::cli

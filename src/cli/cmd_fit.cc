@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -13,8 +12,6 @@
 #include "cli/fit_parameters.h"
 #include "cli/fit_pictures.h"
 #include "cli/live_server.h"
-#include "cli/option_checks.h"
-#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "fit/poses/start_cameras.h"
 #include "fit/run.h"
@@ -27,8 +24,8 @@ namespace {
 using train::FitConfig;
 using train::Parameter;
 
-struct Options {
-  std::string input, dataset_model, out, start = "auto", truth, optimize, quality = "normal";
+struct FitOptions {
+  std::string input, dataset_model, out = "fit", start = "auto", truth, optimize;
   std::string material = "unlit", lighting = "none", filter = "bilinear";
   std::vector<std::string> rates;
   std::vector<float> light_direction;
@@ -39,7 +36,7 @@ struct Options {
   LiveOption live;
 };
 
-Result<Mesh> Load(const std::string& path, OutputGuard* guard) {
+Result<Mesh> LoadFitMesh(const std::string& path, OutputGuard* guard) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(path));
   guard->AddInputs(loaded.files);
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
@@ -51,7 +48,7 @@ Result<Mesh> Load(const std::string& path, OutputGuard* guard) {
   return std::move(loaded.mesh);
 }
 
-Status SetConfig(const Options& options, FitConfig* config) {
+Status SetConfig(const FitOptions& options, FitConfig* config) {
   TILEGRAD_TRY(ParseParameters(options.optimize, &config->parameters));
   for (const auto& rate : options.rates) {
     TILEGRAD_TRY(ParseRate(rate, config->parameters, &config->rates));
@@ -72,14 +69,14 @@ Status SetConfig(const Options& options, FitConfig* config) {
 }
 
 // Before anything is read or made: a folder that was misspelt would get a fit of its own.
-Status CheckResume(const Options& options) {
+Status CheckResume(const FitOptions& options) {
   if (!options.resume || !train::ListCheckpoints(options.out).empty()) return {};
   return NotFound(
       "{}: no fit to go on with: there is no checkpoint in it; leave out --resume to start one",
       options.out);
 }
 
-Result<train::FitJob> MakeJob(const Options& options) {
+Result<train::FitJob> MakeJob(const FitOptions& options) {
   train::FitJob job;
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
@@ -101,10 +98,10 @@ Result<train::FitJob> MakeJob(const Options& options) {
   if (const auto shape = shapes.find(options.start); shape != shapes.end()) {
     job.config.start = shape->second;
   } else {
-    TILEGRAD_ASSIGN(job.start, Load(options.start, &job.guard));
+    TILEGRAD_ASSIGN(job.start, LoadFitMesh(options.start, &job.guard));
   }
   if (!options.truth.empty()) {
-    TILEGRAD_ASSIGN(job.truth, Load(options.truth, &job.guard));
+    TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, &job.guard));
   }
   job.out = options.out;
   job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
@@ -128,7 +125,7 @@ void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) 
         100 * train::MeanIou(scores));
 }
 
-void PrintOutcome(const Options& options, const train::FitOutcome& o) {
+void PrintOutcome(const FitOptions& options, const train::FitOutcome& o) {
   const bool early = o.last_step < options.config.steps;
   Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
         FormatDuration(o.seconds), early ? ", for more gained nothing (--stop-gain)" : "");
@@ -151,7 +148,7 @@ nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {
           {"silhouette_iou", train::MeanIou(scores)}};
 }
 
-void PrintJson(const Options& options, const train::FitOutcome& o) {
+void PrintJson(const FitOptions& options, const train::FitOutcome& o) {
   const Path out = options.out;
   nlohmann::ordered_json json = {{"folder", out.string()},
                                  {"steps", o.last_step},
@@ -165,7 +162,7 @@ void PrintJson(const Options& options, const train::FitOutcome& o) {
   PrintResult(json);
 }
 
-Status Run(const Options& options) {
+Status RunFitting(const FitOptions& options) {
   TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
   const Workers workers(options.workers);
   ProgressLine line;
@@ -198,95 +195,79 @@ Status Run(const Options& options) {
   return {};
 }
 
-void AddWhat(CLI::App* command, Options* o) {
-  command
-      ->add_option("input", o->input,
-                   "folder with transforms.json (as NeRF's) and images with alpha or masks; or a "
-                   "COLMAP project; or pictures alone, whose cameras are then found; or a dataset, "
-                   "with --model")
-      ->required();
-  command->add_option("--model", o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
-  command->add_option("--out", o->out, "folder for mesh.glb, report.html, ...")
-      ->capture_default_str();
+void AddWhat(Command* command, FitOptions* o) {
+  command->Add(
+      "input", &o->input,
+      "folder with transforms.json (as NeRF's) and images with alpha or masks; or a COLMAP "
+      "project; or pictures alone, whose cameras are then found; or a dataset, with --model",
+      {Required{}});
+  command->Add("--model", &o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
+  command->Add("--out", &o->out, "folder for mesh.glb, report.html, ...");
   AddForceOption(command, &o->force);
-  command
-      ->add_option("--start,--mesh", o->start,
-                   "hull: what all masks have in common; sphere; or a mesh file; auto: the hull "
-                   "where masks and cameras allow. --mesh is the old name")
-      ->capture_default_str();
-  command->add_option("--optimize", o->optimize,
-                      "any of positions, colors, texture, uv, camera, light, sh, material, "
-                      "exposure, focal; "
-                      "separated by commas [positions and texture, or the colors that --mesh has]");
-  command
-      ->add_option("--material", o->material,
-                   "unlit: colors hold the light of the images; lambert, phong: light is learned "
-                   "beside them, and where it comes from")
-      ->check(CLI::IsMember({"unlit", "lambert", "phong"}))
-      ->capture_default_str();
-  command->add_option("--lighting", o->lighting, "none, lambert, phong or sh")
-      ->check(CLI::IsMember({"none", "lambert", "phong", "sh"}))
-      ->capture_default_str();
-  AddVector(command, "--light-direction", &o->light_direction, 3, "x y z towards the light, world");
-  command->add_option("--filter", o->filter, "texture lookup: bilinear or trilinear")
-      ->check(CLI::IsMember({"bilinear", "trilinear"}))
-      ->capture_default_str();
-  command->add_option("--truth", o->truth, "a mesh to compare with (3D IoU)");
-  command
-      ->add_option("--hold-out", o->hold_out,
-                   "hold out every N-th image to judge by; 0: those of transforms_test.json")
-      ->capture_default_str()
-      ->check(NotNegative());
+  command->Add("--start,--mesh", &o->start,
+               "hull: what all masks have in common; sphere; or a mesh file; auto: the hull where "
+               "masks and cameras allow. --mesh is the old name");
+  command->Add("--optimize", &o->optimize,
+               "any of positions, colors, texture, uv, camera, light, sh, material, exposure, "
+               "focal; separated by commas [positions and texture, or the colors that --mesh has]");
+  command->Add("--material", &o->material,
+               "unlit: colors hold the light of the images; lambert, phong: light is learned "
+               "beside them, and where it comes from",
+               {OneOf{{"unlit", "lambert", "phong"}}});
+  command->Add("--lighting", &o->lighting, "none, lambert, phong or sh",
+               {OneOf{{"none", "lambert", "phong", "sh"}}});
+  command->Add("--light-direction", &o->light_direction, "x y z towards the light, world",
+               {Numbers{3}});
+  command->Add("--filter", &o->filter, "texture lookup: bilinear or trilinear",
+               {OneOf{{"bilinear", "trilinear"}}});
+  command->Add("--truth", &o->truth, "a mesh to compare with (3D IoU)");
+  command->Add("--hold-out", &o->hold_out,
+               "hold out every N-th image to judge by; 0: those of transforms_test.json",
+               {NotNegative()});
 }
 
-// Steps of each; --steps counts before it.
+// Steps of each.
 const std::map<std::string, std::int64_t> kQualities = {
     {"fast", 300}, {"normal", FitConfig().steps}, {"best", 3000}};
 
-// --views-per-step for "views_per_step", and so on.
-void AddNumbers(CLI::App* command, FitConfig* config) {
+// --views-per-step for "views_per_step", and so on; and --quality, which sets --steps.
+void AddNumbers(Command* command, FitConfig* config) {
   for (const train::ConfigField& field : train::FieldsOf(config)) {
     std::string name = "--" + field.key;
     std::replace(name.begin(), name.end(), '_', '-');
-    std::visit(
-        [&](auto* value) { command->add_option(name, *value, field.help)->capture_default_str(); },
-        field.target);
+    const Target target = std::visit([](auto* value) -> Target { return value; }, field.target);
+    std::vector<Trait> traits;
+    if (field.key == "seed") traits = {NotNegative()};
+    command->Add(name, target, field.help, traits);
   }
-  command->get_option("--seed")->check(NotNegative());
-}
-
-void AddQuality(CLI::App* command, Options* options) {
-  command
-      ->add_option("--quality", options->quality, "fast, normal or best: 300, 1000 or 3000 steps")
-      ->check(CLI::IsMember({"fast", "normal", "best"}))
-      ->excludes(command->get_option("--steps"))
-      ->each([options](const std::string& word) {
-        const auto at = kQualities.find(word);
-        if (at != kQualities.end()) options->config.steps = at->second;
-      });
+  const auto set_steps = [config](const std::string& quality) {
+    const auto found = kQualities.find(quality);
+    if (found != kQualities.end()) config->steps = found->second;
+    return std::string();  // OneOf says what is wrong
+  };
+  command->Add("--quality", WordCheck{set_steps, ""},
+               "fast, normal or best: 300, 1000 or 3000 steps",
+               {OneOf{{"fast", "normal", "best"}}, Excludes{{"--steps"}}});
 }
 
 }  // namespace
 
-void AddFit(CLI::App& app, Action* action) {
-  auto options = std::make_shared<Options>();
-  options->out = "fit";
-  auto* command = app.add_subcommand(
-      "fit", "Fit a mesh, texture, light or cameras to images by gradient descent");
-  AddWhat(command, options.get());
+void AddFit(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "fit", "Fit a mesh, texture, light or cameras to images by gradient descent",
+                 RunFitting);
+  AddWhat(command, options);
   AddPictureOptions(command, &options->pictures);
   AddNumbers(command, &options->config);
-  AddQuality(command, options.get());
-  command->add_option("--rate", options->rates, "learning rate, NAME=NUMBER (repeatable)")
-      ->delimiter(',');
-  command->add_flag("--resume", options->resume,
-                    "go on with the fit in --out, which has saved something; "
-                    "a finished one with more --steps");
-  command->add_flag("--doctor", options->doctor,
-                    "only say what gets a gradient at the start, and why not");
+  command->Add("--rate", &options->rates, "learning rate, NAME=NUMBER (repeatable)",
+               {SplitAtCommas{}});
+  command->Add(
+      "--resume", &options->resume,
+      "go on with the fit in --out, which has saved something; a finished one with more --steps");
+  command->Add("--doctor", &options->doctor,
+               "only say what gets a gradient at the start, and why not");
   AddLiveOption(command, &options->live);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return Run(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -30,9 +30,9 @@ Status PrintInfo() {
 
 }  // namespace
 
-void AddInfo(CLI::App& app, Action* action) {
-  auto* command = app.add_subcommand("info", "Show version, SIMD targets and cores");
-  command->callback([action] { *action = PrintInfo; });
+void AddInfo(CommandList* list) {
+  Command& command = list->emplace_back(Command{"info", "Show version, SIMD targets and cores"});
+  command.action = PrintInfo;
 }
 
 }  // namespace tilegrad::cli

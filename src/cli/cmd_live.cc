@@ -45,16 +45,14 @@ Status RunLive(const LiveOptions& options) {
 
 }  // namespace
 
-void AddLive(CLI::App& app, Action* action) {
-  auto options = std::make_shared<LiveOptions>();
-  auto* command = app.add_subcommand(
-      "live", "Show a run or a fit in the browser: as it goes on, or after it has ended");
-  command->add_option("run", options->run, "folder of a training or a fit")->required();
-  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
-  command->add_option("--port", options->port, "of 127.0.0.1; 0: 8642, or any that is free")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 65535));
-  command->callback([options, action] { *action = [options] { return RunLive(*options); }; });
+void AddLive(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "live", "Show a run or a fit in the browser: as it goes on, or after it has ended",
+      RunLive);
+  command->Add("run", &options->run, "folder of a training or a fit", {Required{}});
+  command->Add("--data", &options->data, "dataset folder [the one it was trained on]");
+  command->Add("--port", &options->port, "of 127.0.0.1; 0: 8642, or any that is free",
+               {Range{0, 65535}});
 }
 
 }  // namespace tilegrad::cli

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad man: manual pages of the program and its commands.
-#include <algorithm>
+#include <utility>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/did_you_mean.h"
 #include "cli/man_page.h"
-#include "cli/parse_errors.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -47,15 +47,16 @@ Status RunMan(const std::vector<CommandNode>& tree, const ManOptions& options) {
 
 }  // namespace
 
-void AddMan(CLI::App& app, Action* action) {
+void AddMan(CommandList* list) {
   auto options = std::make_shared<ManOptions>();
-  auto* command =
-      app.add_subcommand("man", "Print a manual page, e.g. for: tilegrad man fit | man -l -");
-  command->add_option("command", options->command, "the command that it is about [the program]");
-  command->add_option("--out", options->out, "write all pages into this folder instead");
-  command->callback([&app, options, action] {
-    *action = [&app, options] { return RunMan(ReadCommandTree(app), *options); };
-  });
+  Command& command = list->emplace_back(
+      Command{"man", "Print a manual page, e.g. for: tilegrad man fit | man -l -"});
+  command.Add("command", &options->command, "the command that it is about [the program]");
+  command.Add("--out", &options->out, "write all pages into this folder instead");
+  command.action = [list, options] {
+    const ManOptions given = std::exchange(*options, {});  // else the page took them for defaults
+    return RunMan(ReadCommandTree(*list), given);
+  };
 }
 
 }  // namespace tilegrad::cli

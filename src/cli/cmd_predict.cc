@@ -184,38 +184,30 @@ Status RunPrediction(const PredictOptions& options) {
 
 }  // namespace
 
-void AddPredict(CLI::App& app, Action* action) {
-  auto options = std::make_shared<PredictOptions>();
-  auto* command = app.add_subcommand(
-      "predict", "Predict a coloured 3D mesh from one image of an object that is cut out");
-  command->add_option("images", options->images, "RGBA cut-outs (PNG), or an RGB image with --mask")
-      ->required();
-  command->add_option("--run", options->run,
-                      "run folder or one checkpoint [the newest below runs/]");
-  command
-      ->add_option("--out", options->out,
-                   "folder for NAME_predicted.glb, NAME_turntable.png and NAME_turntable.webp (an "
-                   "animation), "
-                   "named after the image; NAME_2 for a second image of that name")
-      ->capture_default_str();
+void AddPredict(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "predict", "Predict a coloured 3D mesh from one image of an object that is cut out",
+      RunPrediction);
+  command->Add("images", &options->images, "RGBA cut-outs (PNG), or an RGB image with --mask",
+               {Required{}});
+  command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
+  command->Add("--out", &options->out,
+               "folder for NAME_predicted.glb, NAME_turntable.png and NAME_turntable.webp (an "
+               "animation), named after the image; NAME_2 for a second image of that name");
   AddForceOption(command, &options->force);
-  command->add_option(
-      "--mask", options->mask,
-      "image of the same size: the object is white or, in one with transparency, opaque");
-  command->add_flag("--keep-framing", options->keep_framing,
-                    "only resize: the image is framed like a training image already");
-  command
-      ->add_option("--refine", options->refine,
-                   "steps of gradient descent that move the prediction onto the image, and write "
-                   "NAME_match.png (image, prediction, refined) and NAME_match.json (how well they "
-                   "agree); 0: the network alone")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
-  command->add_flag("--relight", options->relight,
-                    "also NAME_relit.webp: the object under a light that moves around; of a run "
-                    "that predicts light");
+  command->Add("--mask", &options->mask,
+               "image of the same size: the object is white or, in one with transparency, opaque");
+  command->Add("--keep-framing", &options->keep_framing,
+               "only resize: the image is framed like a training image already");
+  command->Add("--refine", &options->refine,
+               "steps of gradient descent that move the prediction onto the image, and write "
+               "NAME_match.png (image, prediction, refined) and NAME_match.json (how well they "
+               "agree); 0: the network alone",
+               {Range{0, 100000}});
+  command->Add("--relight", &options->relight,
+               "also NAME_relit.webp: the object under a light that moves around; of a run that "
+               "predicts light");
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return RunPrediction(*options); }; });
 }
 
 }  // namespace tilegrad::cli

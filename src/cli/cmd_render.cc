@@ -236,16 +236,14 @@ Status RunRender(const RenderSettings& settings) {
 
 }  // namespace
 
-void AddRender(CLI::App& app, Action* action) {
+void AddRender(CommandList* list) {
   auto settings = std::make_shared<RenderSettings>();
-  auto* command = app.add_subcommand("render", "Render mesh files to pictures");
-  AddRenderOptions(command, settings.get());
-  command->callback([settings, action, command] {
-    *action = [settings, command]() -> Status {
-      TILEGRAD_TRY(CheckRenderOptions(*command, *settings));
-      return RunRender(*settings);
-    };
-  });
+  Command& command = list->emplace_back(Command{"render", "Render mesh files to pictures"});
+  AddRenderOptions(&command, settings.get());
+  command.action = [&command, settings]() -> Status {
+    TILEGRAD_TRY(CheckRenderOptions(command, *settings));
+    return RunRender(*settings);
+  };
 }
 
 }  // namespace tilegrad::cli

@@ -5,7 +5,6 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "train/report/report.h"
 
@@ -62,22 +61,17 @@ Status RunReport(const ReportOptions& options) {
 
 }  // namespace
 
-void AddReport(CLI::App& app, Action* action) {
-  auto options = std::make_shared<ReportOptions>();
-  auto* command = app.add_subcommand(
-      "report", "One page about a run: scores, curves, pictures, meshes to turn in the browser");
+void AddReport(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "report",
+      "One page about a run: scores, curves, pictures, meshes to turn in the browser", RunReport);
   AddRunOptions(command, &options->on);
-  command->add_option("--models", options->models, "held-out models to show")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 200));
-  command
-      ->add_option(
-          "--out", options->out,
-          "the page [RUN/report.html]; the models in one picture go to RUN/summary.png, or "
-          "PAGE_summary.png beside it")
-      ->check(FileEnding(".html"));
+  command->Add("--models", &options->models, "held-out models to show", {Range{0, 200}});
+  command->Add("--out", &options->out,
+               "the page [RUN/report.html]; the models in one picture go to RUN/summary.png, or "
+               "PAGE_summary.png beside it",
+               {EndsIn(".html")});
   AddForceOption(command, &options->force);
-  command->callback([options, action] { *action = [options] { return RunReport(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -145,43 +145,32 @@ Status RunSampling(const SampleOptions& options) {
 
 }  // namespace
 
-void AddSample(CLI::App& app, Action* action) {
-  auto options = std::make_shared<SampleOptions>();
-  auto* command =
-      app.add_subcommand("sample", "Make new textured 3D objects with a trained generator");
-  command->add_option("--run", options->run,
-                      "run folder or one checkpoint [the newest below runs/]");
-  command->add_option("--count", options->count, "objects")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 999));
-  command
-      ->add_option("--out", options->out,
-                   "folder for sample_001.glb and so on, sheet.png (each from the front and from "
-                   "behind) and turntable.webp")
-      ->capture_default_str();
-  command
-      ->add_option("--seed", options->seed,
-                   "of the latent codes: the same seed makes the same objects, to the bit")
-      ->capture_default_str();
-  command
-      ->add_option("--interpolate", options->interpolate,
-                   "steps from each object to the next, for interpolation.png (a row for each "
-                   "pair) and interpolation.webp; 0: none")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 64));
-  command->add_flag("--score", options->score,
-                    "compare as many objects more with true ones, as sets: scores.md, scores.json, "
-                    "and nearest.png with the nearest training objects");
-  command->add_option("--data", options->data, "with --score: dataset [the run's own]");
-  command->add_option("--judge", options->judge,
-                      "with --score: run of configs/classify.toml whose features pictures are "
-                      "compared by [cells of the pictures]");
-  command->add_option("--score-count", options->score_count, "with --score: objects of each set")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 100000));
+void AddSample(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "sample", "Make new textured 3D objects with a trained generator", RunSampling);
+  command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
+  command->Add("--count", &options->count, "objects", {Range{1, 999}});
+  command->Add("--out", &options->out,
+               "folder for sample_001.glb and so on, sheet.png (each from the front and from "
+               "behind) and turntable.webp");
+  command->Add("--seed", &options->seed,
+               "of the latent codes: the same seed makes the same objects, to the bit");
+  command->Add(
+      "--interpolate", &options->interpolate,
+      "steps from each object to the next, for interpolation.png (a row for each pair) and "
+      "interpolation.webp; 0: none",
+      {Range{0, 64}});
+  command->Add("--score", &options->score,
+               "compare as many objects more with true ones, as sets: scores.md, scores.json, and "
+               "nearest.png with the nearest training objects");
+  command->Add("--data", &options->data, "with --score: dataset [the run's own]");
+  command->Add("--judge", &options->judge,
+               "with --score: run of configs/classify.toml whose features pictures are compared by "
+               "[cells of the pictures]");
+  command->Add("--score-count", &options->score_count, "with --score: objects of each set",
+               {Range{16, 100000}});
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return RunSampling(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad selftest: does this program on this machine compute what formulas say?
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <exception>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "proof/selftest/checks.h"
 #include "tilegrad/version.h"
@@ -26,12 +26,6 @@ struct SelftestOptions {
   bool list = false;
   int workers = 0;
 };
-
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 std::string Titles(const std::vector<Check>& checks) {
   std::string out;
@@ -124,17 +118,16 @@ Status RunSelftest(const SelftestOptions& options) {
 
 }  // namespace
 
-void AddSelftest(CLI::App& app, Action* action) {
-  auto options = std::make_shared<SelftestOptions>();
-  auto* command = app.add_subcommand(
-      "selftest",
-      "Check this program on this machine: images, gradients, networks, files, on every SIMD "
-      "target, within seconds");
-  command->add_option("--only", options->only,
-                      "run checks whose title has this in it (upper and lower case are the same)");
+void AddSelftest(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "selftest",
+                 "Check this program on this machine: images, gradients, networks, files, on every "
+                 "SIMD target, within seconds",
+                 RunSelftest);
+  command->Add("--only", &options->only,
+               "run checks whose title has this in it (upper and lower case are the same)");
   AddWorkersOption(command, &options->workers);
-  command->add_flag("--list", options->list, "print the titles of the checks, run none");
-  command->callback([options, action] { *action = [options] { return RunSelftest(*options); }; });
+  command->Add("--list", &options->list, "print the titles of the checks, run none");
 }
 
 }  // namespace tilegrad::cli

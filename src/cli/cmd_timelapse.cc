@@ -8,7 +8,6 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "io/mesh_file.h"
 #include "io/webp_animation.h"
@@ -105,27 +104,18 @@ Status RunTimelapse(const TimelapseOptions& options) {
 
 }  // namespace
 
-void AddTimelapse(CLI::App& app, Action* action) {
-  auto options = std::make_shared<TimelapseOptions>();
-  auto* command = app.add_subcommand(
-      "timelapse", "Animate a fit: its mesh turns while it forms, as an animated WebP");
-  command->add_option("run", options->run, "folder of a fit")->required();
-  command->add_option("--out", options->out, "the animation [RUN/timelapse.webp]")
-      ->check(FileEnding(".webp"));
-  command->add_option("--size", options->size, "pixels a side")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 2048));
-  command->add_option("--frames", options->frames, "pictures in it")
-      ->capture_default_str()
-      ->check(CLI::Range(2, 2000));
-  command->add_option("--seconds", options->seconds, "how long it takes")
-      ->capture_default_str()
-      ->check(AboveZero());
-  command->add_option("--turns", options->turns, "about the object, in that time")
-      ->capture_default_str();
+void AddTimelapse(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "timelapse",
+                 "Animate a fit: its mesh turns while it forms, as an animated WebP", RunTimelapse);
+  command->Add("run", &options->run, "folder of a fit", {Required{}});
+  command->Add("--out", &options->out, "the animation [RUN/timelapse.webp]", {EndsIn(".webp")});
+  command->Add("--size", &options->size, "pixels a side", {Range{16, 2048}});
+  command->Add("--frames", &options->frames, "pictures in it", {Range{2, 2000}});
+  command->Add("--seconds", &options->seconds, "how long it takes", {AboveZero()});
+  command->Add("--turns", &options->turns, "about the object, in that time");
   AddForceOption(command, &options->force);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return RunTimelapse(*options); }; });
 }
 
 }  // namespace tilegrad::cli

@@ -9,7 +9,6 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/option_checks.h"
 #include "cli/run_folder.h"
 #include "proof/tradeoff_study.h"
 
@@ -99,52 +98,32 @@ Status RunTradeoff(const TradeoffOptions& options) {
 
 }  // namespace
 
-void AddTradeoff(CLI::App& app, Action* action) {
-  auto options = std::make_shared<TradeoffOptions>();
-  auto* command = app.add_subcommand(
-      "tradeoff",
-      "Measure what max_alpha_error costs and gains: time, error of alpha and of gradients against "
-      "float64, and what a network learns with it");
-  auto* mesh = command->add_option("mesh", options->mesh, "mesh file [two built-in scenes]");
-  command
-      ->add_option("--out", options->out,
-                   "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs")
-      ->capture_default_str();
+void AddTradeoff(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "tradeoff",
+                 "Measure what max_alpha_error costs and gains: time, error of alpha and of "
+                 "gradients against float64, and what a network learns with it",
+                 RunTradeoff);
+  command->Add("mesh", &options->mesh, "mesh file [two built-in scenes]");
+  command->Add("--out", &options->out,
+               "folder for tradeoff.md, .csv, .svg, and of trainings training.csv and the runs");
   AddForceOption(command, &options->force);
-  command->add_option("--size", options->size, "pixels of a mesh file's image, each axis")
-      ->needs(mesh)
-      ->capture_default_str()
-      ->check(CLI::Range(1, 4096));
-  command->add_option("--errors", options->errors, "values of max_alpha_error, in [0, 1]")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
-  command
-      ->add_option("--deltas", options->deltas,
-                   "kernels: A = exp(-d^2 / delta), d in NDC (the paper's code: 1/7000)")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(AboveZero());
-  command->add_option("--repetitions", options->repetitions, "timings of each setting")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  auto* training =
-      command->add_option("--training", options->data,
-                          "dataset folder: also train and evaluate with --training-errors");
-  command->add_option("--training-errors", options->training_errors, "for --training")
-      ->needs(training)
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--config", options->config, "for --training")
-      ->needs(training)
-      ->capture_default_str();
-  command->add_option("--steps", options->steps, "of each training")
-      ->needs(training)
-      ->capture_default_str()
-      ->check(CLI::Range(1, 10000000));
+  command->Add("--size", &options->size, "pixels of a mesh file's image, each axis",
+               {Needs{"mesh"}, Range{1, 4096}});
+  command->Add("--errors", &options->errors, "values of max_alpha_error, in [0, 1]",
+               {SplitAtCommas{}, Range{0, 1}});
+  command->Add("--deltas", &options->deltas,
+               "kernels: A = exp(-d^2 / delta), d in NDC (the paper's code: 1/7000)",
+               {SplitAtCommas{}, AboveZero()});
+  command->Add("--repetitions", &options->repetitions, "timings of each setting", {Range{1, 1000}});
+  command->Add("--training", &options->data,
+               "dataset folder: also train and evaluate with --training-errors");
+  command->Add("--training-errors", &options->training_errors, "for --training",
+               {Needs{"--training"}, SplitAtCommas{}, Range{0, 1}});
+  command->Add("--config", &options->config, "for --training", {Needs{"--training"}});
+  command->Add("--steps", &options->steps, "of each training",
+               {Needs{"--training"}, Range{1, 10000000}});
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return RunTradeoff(*options); }; });
 }
 
 }  // namespace tilegrad::cli

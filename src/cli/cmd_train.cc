@@ -8,7 +8,6 @@
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/live_server.h"
-#include "cli/option_checks.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/named_configs.h"
@@ -105,7 +104,8 @@ train::PictureSink TellOfSheets(ProgressLine* line, std::int64_t every) {
   };
 }
 
-Status RunTraining(TrainOptions options) {
+Status RunTraining(const TrainOptions& given) {
+  TrainOptions options = given;
   Ranks ranks;
   TILEGRAD_TRY(ranks.Join());
   train::TrainJob job;
@@ -134,36 +134,27 @@ Status RunTraining(TrainOptions options) {
 
 }  // namespace
 
-void AddTrain(CLI::App& app, Action* action) {
-  auto options = std::make_shared<TrainOptions>();
-  auto* command = app.add_subcommand("train", "Train what a configuration names on a dataset");
-  command->add_option("--config", options->config,
-                      "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file");
-  command->add_option("--data", options->data, "dataset folder (see: tilegrad dataset)");
-  command->add_option("--out", options->out, "run folder: checkpoints, curves, samples");
-  command->add_option("--set", options->overrides,
-                      "override a key: --set schedule.steps=100 (repeatable)");
-  command
-      ->add_option("--resume", options->resume,
-                   "continue the run in this folder, with its configuration and dataset; without a "
-                   "folder the one in --out (started if there is none)")
-      ->expected(0, 1)
-      ->default_str(kRunInOut)
-      ->option_text("[RUN]");
-  command
-      ->add_option(
-          "--steps", options->steps,
-          "as --set schedule.steps=N; with --resume it may be more than the run began with")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
+void AddTrain(CommandList* list) {
+  const auto [command, options] =
+      AddCommand(list, "train", "Train what a configuration names on a dataset", RunTraining);
+  command->Add("--config", &options->config,
+               "a name (tilegrad configs lists them: quick, paper, ...) or a TOML file");
+  command->Add("--data", &options->data, "dataset folder (see: tilegrad dataset)");
+  command->Add("--out", &options->out, "run folder: checkpoints, curves, samples");
+  command->Add("--set", &options->overrides,
+               "override a key: --set schedule.steps=100 (repeatable)");
+  command->Add("--resume", &options->resume,
+               "continue the run in this folder, with its configuration and dataset; without a "
+               "folder the one in --out (started if there is none)",
+               {ValueMayLack{kRunInOut, "[RUN]"}});
+  command->Add("--steps", &options->steps,
+               "as --set schedule.steps=N; with --resume it may be more than the run began with",
+               {NoDefault{}, Range{1, 0x1p40}});
   AddForceOption(command, &options->force);
-  command
-      ->add_option("--max-minutes", options->max_minutes,
-                   "save and stop after this many minutes; 0: no limit")
-      ->capture_default_str()
-      ->check(NotNegative());
+  command->Add("--max-minutes", &options->max_minutes,
+               "save and stop after this many minutes; 0: no limit", {NotNegative()});
   AddLiveOption(command, &options->live);
   AddWorkersOption(command, &options->workers);
-  command->callback([options, action] { *action = [options] { return RunTraining(*options); }; });
 }
 
 }  // namespace tilegrad::cli

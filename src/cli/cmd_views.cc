@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad views: images of a mesh from all around, with their cameras.
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
@@ -13,14 +12,14 @@
 namespace tilegrad::cli {
 namespace {
 
-struct Options {
+struct ViewsOptions {
   std::string mesh, out, texture;
   UpAxis up = UpAxis::kY;
   bool force = false;
   train::ViewsOptions views;
 };
 
-Status Run(const Options& options) {
+Status RunViews(const ViewsOptions& options) {
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(options.mesh));
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   TILEGRAD_TRY(TakeTexture(options.texture, &loaded));
@@ -41,29 +40,24 @@ Status Run(const Options& options) {
 
 }  // namespace
 
-void AddViews(CLI::App& app, Action* action) {
-  auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand(
-      "views",
-      "Render a mesh from all around into a folder of images and cameras for tilegrad fit");
-  command->add_option("mesh", options->mesh, "a file: " + io::MeshFileEndings())->required();
-  command->add_option("--out", options->out, "folder to fill")->required();
+void AddViews(CommandList* list) {
+  const auto [command, options] = AddCommand(
+      list, "views",
+      "Render a mesh from all around into a folder of images and cameras for tilegrad fit",
+      RunViews);
+  command->Add("mesh", &options->mesh, "a file: " + io::MeshFileEndings(), {Required{}});
+  command->Add("--out", &options->out, "folder to fill", {Required{}});
   AddForceOption(command, &options->force);
   AddUpOption(command, &options->up);
   AddTextureOption(command, &options->texture);
   train::ViewsOptions& v = options->views;
-  command->add_option("--views", v.views, "images to fit")->capture_default_str();
-  command->add_option("--held-out", v.held_out, "more images, to judge a fit by")
-      ->capture_default_str();
-  command->add_option("--size", v.size, "pixels a side")->capture_default_str();
-  command->add_option("--distance", v.distance, "of the cameras; the mesh is scaled to 0.9 across")
-      ->capture_default_str();
-  command->add_option("--fov", v.fov_y, "vertical field of view, degrees")->capture_default_str();
-  command->add_option("--lowest", v.lowest, "elevation of the lowest camera, degrees")
-      ->capture_default_str();
-  command->add_option("--highest", v.highest, "elevation of the highest camera, degrees")
-      ->capture_default_str();
-  command->callback([options, action] { *action = [options] { return Run(*options); }; });
+  command->Add("--views", &v.views, "images to fit");
+  command->Add("--held-out", &v.held_out, "more images, to judge a fit by");
+  command->Add("--size", &v.size, "pixels a side");
+  command->Add("--distance", &v.distance, "of the cameras; the mesh is scaled to 0.9 across");
+  command->Add("--fov", &v.fov_y, "vertical field of view, degrees");
+  command->Add("--lowest", &v.lowest, "elevation of the lowest camera, degrees");
+  command->Add("--highest", &v.highest, "elevation of the highest camera, degrees");
 }
 
 }  // namespace tilegrad::cli

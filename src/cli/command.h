@@ -1,38 +1,147 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands of the program. Each lives in its own file cmd_<name>.cc, declares its options on a
-// CLI11 subcommand and, when chosen, returns a Status whose message the program prints; main.cc
-// alone maps it to an exit code.
+// The commands of the program and their options, as plain records. Each command lives in its own
+// file cmd_<name>.cc; command_line.cc declares it to CLI11. What it does returns a Status whose
+// message the program prints; main.cc alone maps it to an exit code.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <deque>
 #include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <variant>
+#include <vector>
 
+#include "cli/option_words.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::cli {
 
-// What a chosen subcommand does once options are parsed.
+// Looks at a word of an option. Says what is wrong with it, or nothing.
+struct WordCheck {
+  std::function<std::string(const std::string& word)> fault;
+  std::string description;  // in the help, behind the type; empty: none
+};
+WordCheck AboveZero();
+WordCheck NotNegative();
+// Refuses names that end otherwise: pic.jpg would be a PNG that programs take for something else.
+// Names without an ending, as of devices, are fine.
+WordCheck EndsIn(const std::string& ending);
+
+// What else there is to say of an option.
+struct Required {};
+struct Hidden {};         // the help has nothing of it
+struct NoDefault {};      // the help does not show the value that is there before parsing
+struct SplitAtCommas {};  // of a vector: a word with commas is several values
+struct Numbers {          // of a vector: "0 -.5 4" or, as one word, "0,-.5,4"
+  int count;
+};
+struct Range {
+  double low, high;  // included
+};
+struct OneOf {
+  std::vector<std::string> words;
+};
+struct TypeName {
+  std::string name;  // in the help
+};
+struct ValueMayLack {
+  std::string value, text;  // the value then; what the help shows for it
+};
+struct Needs {
+  std::string option;  // that is added before
+};
+struct Excludes {
+  std::vector<std::string> options;  // that are added before
+};
+using Trait = std::variant<Required, Hidden, NoDefault, SplitAtCommas, Numbers, Range, OneOf,
+                           TypeName, ValueMayLack, Needs, Excludes, WordCheck>;
+
+// A flag that may have a word behind "=", never the next one.
+struct FlagWord {
+  std::string* word;
+  std::string lone;  // the word if there is none
+};
+// Where the values of an option go. A bool makes it a flag, a vector one that may be repeated; a
+// WordCheck keeps the word itself.
+using Target =
+    std::variant<bool*, int*, std::int64_t*, std::uint64_t*, float*, double*, std::string*,
+                 std::vector<float>*, std::vector<double>*, std::vector<std::string>*,
+                 std::vector<std::tuple<float, float, float, float>>*, FlagWord, WordCheck>;
+
+// A value of an enumeration by its name, in upper or lower case.
+template <class T>
+WordCheck Choice(T* target, const std::map<std::string, T>& values) {
+  std::string names;
+  for (const auto& [name, _] : values) names += (names.empty() ? "" : ",") + name;
+  const auto take = [target, values, names](const std::string& word) {
+    const auto found = values.find(LowerCase(word));
+    if (found == values.end()) return word + " is not one of " + names;
+    *target = found->second;
+    return std::string();
+  };
+  return {take, "{" + names + "}"};
+}
+
+struct Option {
+  std::string names;  // "--start,--mesh"; "run": a word that no option stands before
+  Target target;
+  std::string help;
+  std::vector<Trait> traits = {};
+  std::vector<std::string> words = {};  // once the command line is read, as they were given
+
+  std::string FirstName() const { return names.substr(0, names.find(',')); }
+};
+
+// What a chosen command does once options are parsed.
 using Action = std::function<Status()>;
 
-// Adds a subcommand to `app`; when it is given on the command line, sets *action.
-void AddCompletion(CLI::App& app, Action* action);
-void AddConfigs(CLI::App& app, Action* action);
-void AddDataset(CLI::App& app, Action* action);
-void AddDatasetView(CLI::App& app, Action* action);
-void AddEval(CLI::App& app, Action* action);
-void AddFigure2(CLI::App& app, Action* action);
-void AddFit(CLI::App& app, Action* action);
-void AddInfo(CLI::App& app, Action* action);
-void AddLive(CLI::App& app, Action* action);
-void AddMan(CLI::App& app, Action* action);
-void AddPredict(CLI::App& app, Action* action);
-void AddRender(CLI::App& app, Action* action);
-void AddReport(CLI::App& app, Action* action);
-void AddSample(CLI::App& app, Action* action);
-void AddSelftest(CLI::App& app, Action* action);
-void AddTimelapse(CLI::App& app, Action* action);
-void AddTradeoff(CLI::App& app, Action* action);
-void AddTrain(CLI::App& app, Action* action);
-void AddViews(CLI::App& app, Action* action);
+struct Command {
+  std::string name, help;
+  std::vector<Option> options = {};
+  Action action = {};
+
+  void Add(const std::string& names, const Target& target, const std::string& text,
+           const std::vector<Trait>& traits = {});
+  // Whether the command line, once it is read, has the option of this first name.
+  bool Given(const std::string& option) const;
+};
+// A reference to a command stays valid when others are added.
+using CommandList = std::deque<Command>;
+
+// Adds a command that calls `run` with options, to which those of the command line are to be
+// written.
+template <class Options>
+std::pair<Command*, Options*> AddCommand(CommandList* list, const char* name, const char* help,
+                                         Status (*run)(const Options&)) {
+  const auto options = std::make_shared<Options>();
+  Command& command = list->emplace_back(Command{name, help});
+  command.action = [options, run] { return run(*options); };
+  return {&command, options.get()};
+}
+
+// Each adds a command.
+void AddCompletion(CommandList* list);
+void AddConfigs(CommandList* list);
+void AddDataset(CommandList* list);
+void AddDatasetView(CommandList* list);
+void AddEval(CommandList* list);
+void AddFigure2(CommandList* list);
+void AddFit(CommandList* list);
+void AddInfo(CommandList* list);
+void AddLive(CommandList* list);
+void AddMan(CommandList* list);
+void AddPredict(CommandList* list);
+void AddRender(CommandList* list);
+void AddReport(CommandList* list);
+void AddSample(CommandList* list);
+void AddSelftest(CommandList* list);
+void AddTimelapse(CommandList* list);
+void AddTradeoff(CommandList* list);
+void AddTrain(CommandList* list);
+void AddViews(CommandList* list);
 
 }  // namespace tilegrad::cli

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/command_tree.h"
 
-#include <sstream>
+#include <CLI/CLI.hpp>
 
+#include "cli/command_line.h"
+#include "cli/option_words.h"
 #include "train/named_configs.h"
 
 namespace tilegrad::cli {
@@ -10,12 +12,9 @@ namespace {
 
 // Of "TEXT:{none,lambert}" what stands in the braces.
 std::vector<std::string> ChoicesOf(const std::string& type) {
-  std::vector<std::string> choices;
   const auto open = type.find('{'), close = type.find('}');
-  if (open == std::string::npos || close == std::string::npos) return choices;
-  std::istringstream words(type.substr(open + 1, close - open - 1));
-  for (std::string word; std::getline(words, word, ',');) choices.push_back(word);
-  return choices;
+  if (open == std::string::npos || close == std::string::npos) return {};
+  return PartsBetweenCommas(type.substr(open + 1, close - open - 1));
 }
 
 // What a value is called: option_text "FLOAT x 3", or the type without its range or choices.
@@ -59,9 +58,11 @@ std::vector<std::string> ConfigNames() {
   return names;
 }
 
-std::vector<CommandNode> ReadCommandTree(const CLI::App& app) {
-  std::vector<CommandNode> tree = {NodeOf(app)};
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+std::vector<CommandNode> ReadCommandTree(const CommandList& commands) {
+  const auto app = MakeApp(commands);
+  std::vector<CommandNode> tree = {NodeOf(*app)};
+  for (const CLI::App* command :
+       std::as_const(*app).get_subcommands([](const CLI::App*) { return true; }))
     tree.push_back(NodeOf(*command));
   return tree;
 }

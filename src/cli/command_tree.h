@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands and options of the program as plain records, read from CLI11's own tree: what man
-// pages and completions are written from, so that they cannot say anything else than --help.
+// The commands and options of the program as CLI11 knows them, in plain records: what man pages and
+// completions are written from, so that they cannot say anything else than --help.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "cli/command.h"
 
 namespace tilegrad::cli {
 
@@ -28,6 +29,6 @@ struct CommandNode {
 std::vector<std::string> ConfigNames();
 
 // The program's own options first, under the program's name, then its commands.
-std::vector<CommandNode> ReadCommandTree(const CLI::App& app);
+std::vector<CommandNode> ReadCommandTree(const CommandList& commands);
 
 }  // namespace tilegrad::cli

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
+#include "cli/command.h"
 #include "io/guarded_process.h"
 
 namespace tilegrad::cli {
@@ -40,10 +41,10 @@ double Seconds(std::chrono::steady_clock::duration d) {
 
 Speech SpeechNow() { return g_json ? Speech::kJson : g_quiet ? Speech::kQuiet : Speech::kFull; }
 
-void AddSpeechOptions(CLI::App* command) {
-  command->add_flag("--quiet", g_quiet, "print warnings and errors only, no progress");
-  command->add_flag("--json", g_json,
-                    "print one JSON object on standard output at the end, for programs");
+void AddSpeechOptions(Command* command) {
+  command->Add("--quiet", &g_quiet, "print warnings and errors only, no progress");
+  command->Add("--json", &g_json,
+               "print one JSON object on standard output at the end, for programs");
 }
 
 void PrintResult(const nlohmann::ordered_json& result) {

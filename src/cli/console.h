@@ -5,7 +5,6 @@
 
 #include <fmt/core.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json_fwd.hpp>
@@ -17,6 +16,8 @@
 
 namespace tilegrad::cli {
 
+struct Command;
+
 // What is said beside files, exit codes and errors.
 enum class Speech {
   kFull,
@@ -25,7 +26,7 @@ enum class Speech {
 };
 Speech SpeechNow();
 // --quiet and --json, which every command has that prints what it has done.
-void AddSpeechOptions(CLI::App* command);
+void AddSpeechOptions(Command* command);
 
 // What a command has done, for programs: printed under --json, else nothing.
 void PrintResult(const nlohmann::ordered_json& result);

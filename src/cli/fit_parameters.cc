@@ -2,10 +2,9 @@
 #include "cli/fit_parameters.h"
 
 #include <map>
-#include <sstream>
 
 #include "base/error.h"
-#include "cli/command.h"
+#include "cli/option_words.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -33,8 +32,7 @@ bool MayMove(const train::ParameterSet& set, Parameter p) {
 }  // namespace
 
 Status ParseParameters(const std::string& text, train::ParameterSet* out) {
-  std::istringstream words(text);
-  for (std::string word; std::getline(words, word, ',');) {
+  for (const std::string& word : PartsBetweenCommas(text)) {
     TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(word));
     (*out)[p] = true;
   }
@@ -46,8 +44,8 @@ Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
   const auto equals = text.find('=');
   TILEGRAD_ASSIGN(const Parameter p, ParameterNamed(text.substr(0, equals)));
   const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
-  double rate = 0;
-  if (!CLI::detail::lexical_cast(number, rate) || !(rate >= 0 && rate < kMostRate)) {
+  const auto rate = RealNumber(number);
+  if (!rate || !(*rate >= 0 && *rate < kMostRate)) {
     return InvalidArgument("--rate {}: expected NAME=NUMBER with a number in [0, {})", text,
                            kMostRate);
   }
@@ -55,7 +53,7 @@ Status ParseRate(const std::string& text, const train::ParameterSet& fitted,
     return InvalidArgument("--rate {}: {} is not fitted; name it in --optimize", text,
                            train::NameOf(p));
   }
-  (*rates)[p] = rate;
+  (*rates)[p] = *rate;
   return {};
 }
 

@@ -7,7 +7,7 @@
 
 namespace tilegrad::cli {
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out) {
-  // CLI11 has checked it.
+  // OneOf has checked it.
   return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov};
 }
 
@@ -20,22 +20,16 @@ void PrintWarnings(const train::FitInput& input, std::size_t first) {
   if (count > kShown) PrintNote("tilegrad: warning: and {} more of these\n", count - kShown);
 }
 
-void AddPictureOptions(CLI::App* command, FitPictures* o) {
-  command
-      ->add_option("--background", o->background,
-                   "where masks come from: the images' alpha or masks (mask), their plain "
-                   "backgrounds (plain), the former if there are any (auto); none: every pixel "
-                   "shows the object")
-      ->check(CLI::IsMember({"auto", "mask", "plain", "none"}))
-      ->capture_default_str();
-  command->add_flag("--find-cameras", o->find_cameras,
-                    "look for the cameras in the images, though the folder has some; these judge "
-                    "the result");
-  command
-      ->add_option("--fov", o->fov,
-                   "degrees that images without cameras see along their longer side")
-      ->check(CLI::Range(5.0, 150.0))
-      ->capture_default_str();
+void AddPictureOptions(Command* command, FitPictures* o) {
+  command->Add("--background", &o->background,
+               "where masks come from: the images' alpha or masks (mask), their plain backgrounds "
+               "(plain), the former if there are any (auto); none: every pixel shows the object",
+               {OneOf{{"auto", "mask", "plain", "none"}}});
+  command->Add(
+      "--find-cameras", &o->find_cameras,
+      "look for the cameras in the images, though the folder has some; these judge the result");
+  command->Add("--fov", &o->fov, "degrees that images without cameras see along their longer side",
+               {Range{5, 150}});
 }
 
 }  // namespace tilegrad::cli

@@ -2,9 +2,9 @@
 // tilegrad fit: what pictures need that lack masks or cameras.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
+#include "cli/command.h"
 #include "fit/run.h"
 
 namespace tilegrad::cli {
@@ -14,7 +14,7 @@ struct FitPictures {
   double fov = train::kUsualFov;
   bool find_cameras = false;
 };
-void AddPictureOptions(CLI::App* command, FitPictures* pictures);
+void AddPictureOptions(Command* command, FitPictures* pictures);
 train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out);
 
 // Warnings of the input from the `first` on, a few of them.

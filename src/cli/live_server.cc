@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "cli/console.h"
+#include "cli/option_words.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -30,8 +31,7 @@ void Answer(const Result<std::string>& text, const char* type, httplib::Response
 }
 
 std::int64_t StepOf(const httplib::Request& request) {
-  std::int64_t step = 0;
-  return CLI::detail::lexical_cast(request.get_param_value("step"), step) ? step : -1;
+  return WholeNumber(request.get_param_value("step")).value_or(-1);
 }
 
 }  // namespace
@@ -106,20 +106,19 @@ Result<LiveServer> LiveServer::Start(train::LiveSource source, int port) {
   return LiveServer(std::move(impl));
 }
 
-void AddLiveOption(CLI::App* command, LiveOption* option) {
-  command->add_flag(
-      "--live{any}", option->port,  // CLI11 takes a number for a count
-      "serve a page for this machine that shows curves, pictures and the mesh as they "
-      "form; --live=PORT: at that port");
+void AddLiveOption(Command* command, LiveOption* option) {
+  command->Add("--live", FlagWord{&option->port, "any"},
+               "serve a page for this machine that shows curves, pictures and the mesh as they "
+               "form; --live=PORT: at that port");
 }
 
 Result<std::unique_ptr<LiveServer>> StartLive(const LiveOption& option, train::LiveSource source) {
   if (option.port.empty()) return std::unique_ptr<LiveServer>();
-  int port = 0;
-  if (option.port != "any" &&
-      (!CLI::detail::lexical_cast(option.port, port) || port < 1 || port > 65535))
+  const bool any = option.port == "any";
+  const std::int64_t port = any ? 0 : WholeNumber(option.port).value_or(-1);
+  if (!any && (port < 1 || port > 65535))
     return InvalidArgument("--live={}: a port is a number from 1 to 65535", option.port);
-  TILEGRAD_ASSIGN(LiveServer server, LiveServer::Start(std::move(source), port));
+  TILEGRAD_ASSIGN(LiveServer server, LiveServer::Start(std::move(source), static_cast<int>(port)));
   return std::make_unique<LiveServer>(std::move(server));
 }
 

@@ -2,10 +2,10 @@
 // Serves the live page of a run (train/report/live_page.h) to this machine, and to it alone.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 
+#include "cli/command.h"
 #include "tilegrad/status.h"
 #include "train/report/live_page.h"
 
@@ -15,7 +15,7 @@ namespace tilegrad::cli {
 struct LiveOption {
   std::string port;  // empty: not asked for; "any", or a number
 };
-void AddLiveOption(CLI::App* command, LiveOption* option);
+void AddLiveOption(Command* command, LiveOption* option);
 
 // Listens on 127.0.0.1 during its lifetime, on a thread of its own. Requests that name another
 // host are refused, as a page of a stranger could send them (DNS rebinding).

@@ -10,16 +10,16 @@
 #include <cstring>
 #include <exception>
 #include <new>
-#include <sstream>
 #include <system_error>
 
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
+#include "cli/command_line.h"
 #include "cli/console.h"
+#include "cli/did_you_mean.h"
 #include "cli/option_words.h"
-#include "cli/parse_errors.h"
 #include "cli/run_folder.h"
 #include "tilegrad/version.h"
 #include "train/ranks/launch.h"
@@ -45,10 +45,9 @@ void TurnHelpAround(std::vector<std::string>* words) {
 }
 
 // The first word is a command, or asks for help or the version, with or without dashes.
-Status CheckFirstWord(const CLI::App& app, std::string* word) {
+Status CheckFirstWord(const CommandList& commands, std::string* word) {
   std::vector<std::string> known;
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    known.push_back(command->get_name());
+  for (const Command& command : commands) known.push_back(command.name);
   if (*word == "help" || *word == "version") word->insert(0, "--");
   if (std::find(known.begin(), known.end(), *word) != known.end()) return {};
   const std::vector<std::string> options = {"--help", "--version"};
@@ -59,75 +58,60 @@ Status CheckFirstWord(const CLI::App& app, std::string* word) {
 }
 
 // An empty value is a variable that was not set: a folder of that name would be the current one.
-Status CheckValues(const CLI::App& app) {
-  for (const CLI::App* command : app.get_subcommands()) {
-    for (const CLI::Option* option : command->get_options()) {
-      for (const std::string& value : option->results()) {
-        if (value.empty()) return InvalidArgument("{}: its value is empty", option->get_name());
-      }
+Status CheckValues(const Command& command) {
+  for (const Option& option : command.options) {
+    for (const std::string& word : option.words) {
+      if (word.empty()) return InvalidArgument("{}: its value is empty", option.FirstName());
     }
   }
   return {};
 }
 
 // Other commands know nothing of other processes, which would write the same files.
-Status CheckRanks(const CLI::App& app) {
+Status CheckRanks(const Command& command) {
   if (train::LaunchedRanks() == 1) return {};
-  for (const char* command : {"train", "dataset", "eval"})
-    if (app.got_subcommand(command)) return {};
+  for (const char* name : {"train", "dataset", "eval"})
+    if (command.name == name) return {};
   return InvalidArgument(
       "started as one of {} processes, but among the commands only train, dataset and eval share "
       "their work with others: start this one without mpirun",
       train::LaunchedRanks());
 }
 
-void AddCommands(CLI::App& app, Action* action) {
+void AddCommands(CommandList* list) {
   for (const auto add :
        {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender, AddReport, AddSample,
         AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews}) {
-    add(app, action);
+    add(list);
   }
-  for (CLI::App* reader : app.get_subcommands({})) AddReadLimitOption(reader);
-  for (const auto add : {AddFigure2, AddInfo, AddSelftest}) add(app, action);
-  for (CLI::App* worker : app.get_subcommands([](const CLI::App*) { return true; }))
-    AddSpeechOptions(worker);
-  for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(app, action);
-  EndOptions(app);
+  for (Command& reader : *list) AddReadLimitOption(&reader);
+  for (const auto add : {AddFigure2, AddInfo, AddSelftest}) add(list);
+  for (Command& worker : *list) AddSpeechOptions(&worker);
+  for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(list);
 }
 
-int Run(int argc, char** argv) {
-  CLI::App app("tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
-               "tilegrad");
-  app.footer(
-      "tilegrad help COMMAND shows the options of a command; tilegrad configs, the networks "
-      "that train knows by name.");
-  app.set_version_flag("--version", TILEGRAD_VERSION);
-  app.require_subcommand(1);
-  Action action;
-  AddCommands(app, &action);
-  app.failure_message(ExplainParseError);
+int RunProgram(int argc, char** argv) {
+  CommandList commands;
+  AddCommands(&commands);
   std::vector<std::string> words = JoinLists({argv + std::min(argc, 1), argv + argc});
   TurnHelpAround(&words);
   if (!words.empty()) {
-    if (const Status status = CheckFirstWord(app, &words[0]); !status.ok()) return Report(status);
+    const Status status = CheckFirstWord(commands, &words[0]);
+    if (!status.ok()) return Report(status);
   }
-  try {
-    std::reverse(words.begin(), words.end());  // as CLI11 takes them
-    app.parse(std::move(words));
-  } catch (const CLI::ParseError& error) {
-    std::ostringstream out, note;
-    const int code = app.exit(error, out, note);
-    Print("{}", out.str());
-    PrintNote("{}", note.str());
-    return code == 0 ? 0 : 2;
+  const ParsedLine line = ParseLine(std::move(words), &commands);
+  if (line.command == nullptr) {
+    Print("{}", line.out);
+    PrintNote("{}", line.note);
+    return line.exit_code;
   }
   for (const auto check : {CheckValues, CheckRanks}) {
-    if (const Status status = check(app); !status.ok()) return Report(status);
+    if (const Status status = check(*line.command); !status.ok()) return Report(status);
   }
   if (const auto threads = ThreadsFromEnvironment(); !threads.ok()) return Report(threads.status());
   if (const auto limit = ReadLimit(); !limit.ok()) return Report(limit.status());
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
-  const Status done = action();
+  const Status done = line.command->action();
   PrintThreadNotice();
   if (!done.ok()) return Report(done);
   return Report(FlushOutput());
@@ -140,7 +124,7 @@ int main(int argc, char** argv) {
   tilegrad::cli::OpenStandardStreams();
   tilegrad::cli::WritesFailWithoutSignals();
   try {
-    return tilegrad::cli::Run(argc, argv);
+    return tilegrad::cli::RunProgram(argc, argv);
   } catch (const std::bad_alloc&) {
     tilegrad::cli::PrintNote(
         "tilegrad: not enough memory; smaller images, batches or networks take less\n");

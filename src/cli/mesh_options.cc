@@ -1,25 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/mesh_options.h"
 
-#include <map>
-
 #include "base/error.h"
-#include "cli/option_checks.h"
 #include "io/image_file.h"
 
 namespace tilegrad::cli {
 
-void AddUpOption(CLI::App* command, UpAxis* up) {
-  static const std::map<std::string, UpAxis> axes = {
-      {"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}};
-  command->add_option("--up", *up, "the axis of the mesh that points up: y (default), z or x")
-      ->transform(OneOf(axes))
-      ->type_name("TEXT");
+void AddUpOption(Command* command, UpAxis* up) {
+  command->Add("--up", Choice(up, {{"y", UpAxis::kY}, {"z", UpAxis::kZ}, {"x", UpAxis::kX}}),
+               "the axis of the mesh that points up: y (default), z or x");
 }
 
-void AddTextureOption(CLI::App* command, std::string* file) {
-  command->add_option("--texture", *file,
-                      "an image for those materials of the mesh that have no texture");
+void AddTextureOption(Command* command, std::string* file) {
+  command->Add("--texture", file, "an image for those materials of the mesh that have no texture");
 }
 
 Status TakeTexture(const std::string& file, io::LoadedMesh* loaded) {

@@ -2,17 +2,17 @@
 // What a mesh file does not say and a person has to: which axis is up, which image is its texture.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
+#include "cli/command.h"
 #include "io/mesh_file.h"
 #include "scene/up_axis.h"
 
 namespace tilegrad::cli {
 
 // --up with y, z or x.
-void AddUpOption(CLI::App* command, UpAxis* up);
-void AddTextureOption(CLI::App* command, std::string* file);
+void AddUpOption(Command* command, UpAxis* up);
+void AddTextureOption(Command* command, std::string* file);
 
 // Puts the image on all materials without a texture, in place of their colour; nothing if `file` is
 // empty. Errors: no such material, no texture coordinates, an image that cannot be read.

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
+#include <cstdlib>
+#include <sstream>
 #include <string_view>
 
 #include "cli/render_job.h"
@@ -11,10 +14,7 @@
 namespace tilegrad::cli {
 namespace {
 
-bool IsNumber(const std::string& word) {
-  double number = 0;
-  return CLI::detail::lexical_cast(word, number);
-}
+bool IsNumber(const std::string& word) { return RealNumber(word).has_value(); }
 
 bool IsOutput(const std::string& word) {
   return std::find(kOutputNames.begin(), kOutputNames.end(), word) != kOutputNames.end();
@@ -47,15 +47,32 @@ std::size_t CountValues(const List& list, Word first, Word end) {
 
 }  // namespace
 
-void EndOptions(CLI::App& app) {
-  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    const auto options = command->get_options();
-    const bool has_files = std::any_of(options.begin(), options.end(),
-                                       [](const auto* option) { return option->get_positional(); });
-    for (CLI::Option* option : options) {
-      if (has_files && !option->get_positional()) option->allow_extra_args(false);
-    }
-  }
+// std::from_chars would refuse a plus sign, "0x" and white space before the number.
+std::optional<double> RealNumber(const std::string& word) {
+  char* end = nullptr;
+  const double number = std::strtod(word.c_str(), &end);
+  if (word.empty() || end != word.c_str() + word.size()) return std::nullopt;
+  return number;
+}
+
+std::optional<std::int64_t> WholeNumber(const std::string& word) {
+  char* end = nullptr;
+  const std::int64_t number = std::strtoll(word.c_str(), &end, /*base=*/0);
+  if (word.empty() || end != word.c_str() + word.size()) return std::nullopt;
+  return number;
+}
+
+std::string LowerCase(std::string word) {
+  std::transform(word.begin(), word.end(), word.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return word;
+}
+
+std::vector<std::string> PartsBetweenCommas(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream rest(text);
+  for (std::string part; std::getline(rest, part, ',');) parts.push_back(part);
+  return parts;
 }
 
 std::vector<std::string> JoinLists(std::vector<std::string> words) {

@@ -14,7 +14,8 @@
 namespace tilegrad::cli {
 namespace {
 
-constexpr int kFrames = 36, kFrameMilliseconds = 100, kQuality = 85, kZoom = 4, kSamples = 2;
+constexpr int kLightFrames = 36, kLightFrameMilliseconds = 100, kLightQuality = 85, kLightZoom = 4,
+              kLightSamples = 2;
 constexpr double kLeastTilt = 20 * std::numbers::pi / 180;  // less would not be seen to move
 
 // The light turned about the camera's axis.
@@ -48,17 +49,18 @@ Status AnimateRelighting(const Mesh& mesh, const Relighting& job, const Path& fi
   // Harmonics are shown as a direction: turning nine coefficients would turn the sky, too.
   train::LightConfig light = job.light;
   if (train::LightingOf(light) == Lighting::kSphericalHarmonics) light.model = "lambert";
-  const int size = kZoom * job.size;
-  train::ObjectPictures pictures(light, size, kSamples);
-  train::TexturedView view{ScaledCamera(*job.object.camera, kZoom), job.object.light};
+  const int size = kLightZoom * job.size;
+  train::ObjectPictures pictures(light, size, kLightSamples);
+  train::TexturedView view{ScaledCamera(*job.object.camera, kLightZoom), job.object.light};
   const auto predicted = train::DirectionOf(job.object.light, train::LightingOf(job.light));
   std::vector<ImageU8> frames;
-  for (int k = 0; k < kFrames; ++k) {
-    view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kFrames);
+  for (int k = 0; k < kLightFrames; ++k) {
+    view.light.direction = Turned(predicted, 2 * std::numbers::pi * k / kLightFrames);
     TILEGRAD_ASSIGN(const auto rgba, pictures.Draw(mesh, view, train::Appearance::kLit));
     frames.push_back(train::OnPaper(rgba, size));
   }
-  return io::SaveWebpAnimation(file, frames, {.frame_ms = kFrameMilliseconds, .quality = kQuality});
+  return io::SaveWebpAnimation(file, frames,
+                               {.frame_ms = kLightFrameMilliseconds, .quality = kLightQuality});
 }
 
 }  // namespace tilegrad::cli

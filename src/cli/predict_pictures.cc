@@ -11,15 +11,16 @@
 namespace tilegrad::cli {
 namespace {
 
-constexpr int kTurntableViews = 8, kTurntableColumns = 4, kFrames = 36, kSize = 256;
-constexpr int kFrameMilliseconds = 100, kQuality = 85;
+constexpr int kTurntableViews = 8, kTurntableColumns = 4, kTurntableFrames = 36,
+              kTurntableSize = 256;
+constexpr int kTurntableFrameMilliseconds = 100, kTurntableQuality = 85;
 
 Result<std::vector<ImageU8>> DrawAround(const Mesh& mesh, int views, const Workers& workers) {
   const train::CameraRule rule;
   std::vector<Camera> cameras;
   for (int i = 0; i < views; ++i)
     cameras.push_back(OrbitCamera(rule.lens, -360.0 * i / views, rule.elevation, rule.distance));
-  return DrawMesh(mesh, {cameras, rule.lens.width, kSize}, workers);
+  return DrawMesh(mesh, {cameras, rule.lens.width, kTurntableSize}, workers);
 }
 
 }  // namespace
@@ -30,8 +31,9 @@ Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers)
 }
 
 Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers) {
-  TILEGRAD_ASSIGN(const auto frames, DrawAround(mesh, kFrames, workers));
-  return io::SaveWebpAnimation(file, frames, {.frame_ms = kFrameMilliseconds, .quality = kQuality});
+  TILEGRAD_ASSIGN(const auto frames, DrawAround(mesh, kTurntableFrames, workers));
+  return io::SaveWebpAnimation(
+      file, frames, {.frame_ms = kTurntableFrameMilliseconds, .quality = kTurntableQuality});
 }
 
 Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
@@ -39,10 +41,10 @@ Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,
   constexpr int size = train::kRefineSize;
   const PlanarRgba<std::uint8_t> planes{picture.first(3 * size * size),
                                         picture.subspan(3 * size * size), size, size};
-  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kSize / size)};
+  std::vector<ImageU8> cells = {Enlarged(OverGrey(planes, kPaper), kTurntableSize / size)};
   for (const auto& [mesh, camera] : {std::pair(&prediction, &refined.camera_before),
                                      std::pair(&refined.mesh, &refined.camera)}) {
-    TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kSize}, workers));
+    TILEGRAD_ASSIGN(auto views, DrawMesh(*mesh, {{camera, 1}, size, kTurntableSize}, workers));
     cells.push_back(std::move(views[0]));
   }
   return io::SavePng(file, TileImages(cells, static_cast<int>(cells.size())));

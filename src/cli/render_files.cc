@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "cli/option_words.h"
 #include "cli/render_job.h"
 #include "io/exr_file.h"
 #include "io/image_file.h"
@@ -208,10 +209,8 @@ Status RequestOutputs(const FileSettings& settings, PictureRequest* request) {
 Result<PictureName> NamePicture(const FileSettings& settings, const std::string& name,
                                 bool single) {
   const Path out(settings.out);
-  std::string ending = out.extension().string();
+  std::string ending = LowerCase(out.extension());
   if (!ending.empty()) ending.erase(0, 1);
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   // A folder pic.jpg with a PNG in it is not what anybody asks for.
   for (const char* other : {"jpg", "jpeg", "bmp", "gif", "tga", "tif", "tiff", "webp", "ppm"}) {
     if (ending != other) continue;

@@ -2,12 +2,12 @@
 // The options of `tilegrad render`.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "cli/command.h"
 #include "cli/render_job.h"
 #include "render/picture/mesh_scene.h"
 #include "tilegrad/status.h"
@@ -38,9 +38,9 @@ struct RenderSettings {
 };
 
 // Declares them on `command`, which writes to `settings` when it is parsed.
-void AddRenderOptions(CLI::App* command, RenderSettings* settings);
+void AddRenderOptions(Command* command, RenderSettings* settings);
 
 // After parsing. An option that would change nothing is a mistake: what it is for is not asked for.
-Status CheckRenderOptions(const CLI::App& command, const RenderSettings& settings);
+Status CheckRenderOptions(const Command& command, const RenderSettings& settings);
 
 }  // namespace tilegrad::cli

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 
 #include "base/error.h"
+#include "cli/option_words.h"
 #include "cli/render_job.h"
 #include "cli/unique_names.h"
 #include "scene/framing.h"
@@ -92,15 +92,16 @@ Result<std::vector<CameraView>> GltfViews(const ViewSettings& settings, const io
 
 // X,Y,Z, or the direction of an axis.
 Result<std::array<double, 3>> UpOf(const ViewSettings& s) {
-  std::array<double, 3> up = {};
-  const std::vector<std::string> words = CLI::detail::split(s.up, ',');
-  if (words.size() == 3 && CLI::detail::lexical_cast(words[0], up[0]) &&
-      CLI::detail::lexical_cast(words[1], up[1]) && CLI::detail::lexical_cast(words[2], up[2])) {
-    return up;
+  std::vector<double> numbers;
+  const std::vector<std::string> words = PartsBetweenCommas(s.up);
+  for (const std::string& word : words) {
+    if (const auto number = RealNumber(word)) numbers.push_back(*number);
   }
+  if (words.size() == 3 && numbers.size() == 3)
+    return std::array<double, 3>{numbers[0], numbers[1], numbers[2]};
   TILEGRAD_ASSIGN(const UpAxis axis, UpAxisOf(s));
-  up[axis == UpAxis::kX ? 0 : axis == UpAxis::kY ? 1 : 2] = 1;
-  return up;
+  return std::array<double, 3>{axis == UpAxis::kX ? 1.0 : 0, axis == UpAxis::kY ? 1.0 : 0,
+                               axis == UpAxis::kZ ? 1.0 : 0};
 }
 
 Result<std::vector<CameraView>> LookAtView(const ViewSettings& s, ImageSize size) {

@@ -34,45 +34,42 @@ Result<int> ThreadsFromEnvironment() {
                          kMostThreads);
 }
 
-void AddWorkersOption(CLI::App* command, int* workers) {
+void AddWorkersOption(Command* command, int* workers) {
   const auto threads = ThreadsFromEnvironment();  // main looks at its error
   if (threads.ok()) *workers = *threads;
-  command
-      ->add_option("--threads", *workers,
-                   fmt::format("0: one per core. The result does not depend on it. Default: {} in "
-                               "the environment",
-                               kThreadsVariable))
-      ->capture_default_str()
-      ->check(CLI::Range(0, kMostThreads));
-  command
-      ->add_option("--workers", *workers)  // the name in earlier versions
-      ->group("")
-      ->check(CLI::Range(0, kMostThreads));
+  command->Add(
+      "--threads", workers,
+      fmt::format(
+          "0: one per core. The result does not depend on it. Default: {} in the environment",
+          kThreadsVariable),
+      {Range{0, kMostThreads}});
+  command->Add("--workers", workers, "the name in earlier versions",
+               {Hidden{}, Range{0, kMostThreads}});
 }
 
-void AddReadLimitOption(CLI::App* command) {
-  command
-      ->add_option_function<std::string>(
-          "--read-limit",
-          [](const std::string& text) {
-            ::setenv(kReadLimitVariable, text.c_str(), /*overwrite=*/1);  // processes inherit it
-          },
-          fmt::format("what one file may become in memory with all that it names: bytes, or 500M, "
-                      "16G [{} in the environment, else 4G]",
-                      kReadLimitVariable))
-      ->check([](const std::string& text) { return ParseByteCount(text).status().message(); })
-      ->type_name("BYTES");
+void AddReadLimitOption(Command* command) {
+  const auto take = [](const std::string& text) {
+    const Status status = ParseByteCount(text).status();
+    // Processes inherit it.
+    if (status.ok()) ::setenv(kReadLimitVariable, text.c_str(), /*overwrite=*/1);
+    return status.message();
+  };
+  command->Add("--read-limit", WordCheck{take, ""},
+               fmt::format("what one file may become in memory with all that it names: bytes, or "
+                           "500M, 16G [{} in the environment, else 4G]",
+                           kReadLimitVariable),
+               {TypeName{"BYTES"}});
 }
 
-void AddForceOption(CLI::App* command, bool* force) {
-  command->add_flag("--force", *force,
-                    "replace files that are there even if tilegrad did not write them; never what "
-                    "is read here");
+void AddForceOption(Command* command, bool* force) {
+  command->Add(
+      "--force", force,
+      "replace files that are there even if tilegrad did not write them; never what is read here");
 }
 
-void AddRunOptions(CLI::App* command, RunOptions* options) {
-  command->add_option("--run", options->run, "run folder [the newest below runs/]");
-  command->add_option("--data", options->data, "dataset folder [the one it was trained on]");
+void AddRunOptions(Command* command, RunOptions* options) {
+  command->Add("--run", &options->run, "run folder [the newest below runs/]");
+  command->Add("--data", &options->data, "dataset folder [the one it was trained on]");
   AddWorkersOption(command, &options->workers);
 }
 

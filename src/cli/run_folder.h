@@ -2,10 +2,10 @@
 // What commands that work on a run share: which run, and which dataset it was trained on.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "base/output_guard.h"
+#include "cli/command.h"
 #include "train/predictor.h"
 
 namespace tilegrad::cli {
@@ -15,16 +15,16 @@ struct RunOptions {
   std::string run, data;  // empty: see ChooseRun, ChooseDataset
   int workers = 0;
 };
-void AddRunOptions(CLI::App* command, RunOptions* options);
+void AddRunOptions(Command* command, RunOptions* options);
 // --threads. CLI11's envname() would give the variable to commands that were not chosen, and blame
 // the option.
-void AddWorkersOption(CLI::App* command, int* workers);
+void AddWorkersOption(Command* command, int* workers);
 // TILEGRAD_THREADS; 0 if it is not set.
 Result<int> ThreadsFromEnvironment();
 // --read-limit (base/read_budget.h): the same as its variable of the environment.
-void AddReadLimitOption(CLI::App* command);
+void AddReadLimitOption(Command* command);
 // --force, for base/output_guard.h.
-void AddForceOption(CLI::App* command, bool* force);
+void AddForceOption(Command* command, bool* force);
 
 // Whether a run may begin or go on in the folder: it holds a run, or nothing that is not ours.
 Status CheckRunFolder(const Path& folder, const OutputGuard& guard);

@@ -13,9 +13,9 @@
 namespace tilegrad::cli {
 namespace {
 
-constexpr int kTurning = 8, kTurningColumns = 4, kTurningSize = 112, kFrames = 30;
-constexpr int kStripSize = 96, kAnimationSize = 192, kAnimated = 6, kFrameMilliseconds = 100,
-              kQuality = 70;
+constexpr int kTurning = 8, kTurningColumns = 4, kTurningSize = 112, kTurningFrames = 30;
+constexpr int kStripSize = 96, kAnimationSize = 192, kAnimated = 6, kSampleFrameMilliseconds = 100,
+              kSampleQuality = 70;
 
 double Difference(const ImageU8& a, const ImageU8& b) {
   double sum = 0;
@@ -49,12 +49,13 @@ Status AnimateSamples(std::span<const Mesh> meshes, const Path& file, const Work
   const auto some = meshes.first(std::min<std::size_t>(meshes.size(), kTurning));
   const int columns = std::min<int>(kTurningColumns, static_cast<int>(some.size()));
   std::vector<ImageU8> frames;
-  for (int frame = 0; frame < kFrames; ++frame) {
-    const Camera camera = train::SheetCamera(kTurningSize, 360.0 * frame / kFrames);
+  for (int frame = 0; frame < kTurningFrames; ++frame) {
+    const Camera camera = train::SheetCamera(kTurningSize, 360.0 * frame / kTurningFrames);
     TILEGRAD_ASSIGN(const auto pictures, train::DrawObjects(some, camera, kTurningSize, workers));
     frames.push_back(TileImages(pictures, columns, 0));
   }
-  return io::SaveWebpAnimation(file, frames, {.frame_ms = kFrameMilliseconds, .quality = kQuality});
+  return io::SaveWebpAnimation(file, frames,
+                               {.frame_ms = kSampleFrameMilliseconds, .quality = kSampleQuality});
 }
 
 Result<InterpolationSteps> DrawInterpolation(const InterpolationJob& job,
@@ -79,8 +80,8 @@ Result<InterpolationSteps> DrawInterpolation(const InterpolationJob& job,
     for (ImageU8& frame : large) frames.push_back(std::move(frame));
   }
   TILEGRAD_TRY(io::SavePng(job.strip, TileImages(cells, job.steps + 1, 2)));
-  TILEGRAD_TRY(io::SaveWebpAnimation(job.animation, frames,
-                                     {.frame_ms = kFrameMilliseconds, .quality = kQuality}));
+  TILEGRAD_TRY(io::SaveWebpAnimation(
+      job.animation, frames, {.frame_ms = kSampleFrameMilliseconds, .quality = kSampleQuality}));
   return out;
 }
 

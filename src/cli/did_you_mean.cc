@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cli/parse_errors.h"
+#include "cli/did_you_mean.h"
 
 #include <fmt/core.h>
 
@@ -24,22 +24,6 @@ std::size_t EditDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-std::vector<std::string> OptionNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
-}
-
-// Of the words that nobody takes, the first: what follows an unknown option is its value.
-std::string ExplainExtra(const CLI::App& command) {
-  const std::string word = command.remaining().front();
-  if (!word.starts_with('-')) return fmt::format("\"{}\" is one word too many", word);
-  const std::string name = word.substr(0, word.find('='));
-  return fmt::format("unknown option {}{}", name, DidYouMean(name, OptionNames(command)));
-}
-
 }  // namespace
 
 std::string DidYouMean(const std::string& word, const std::vector<std::string>& known) {
@@ -58,16 +42,6 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
   for (std::size_t i = 0; i < std::min(found.size(), kMost); ++i)
     list += (i == 0 ? "" : " or ") + found[i].second;
   return list.empty() ? "" : fmt::format(" (did you mean {}?)", list);
-}
-
-std::string ExplainParseError(const CLI::App* app, const CLI::Error& error) {
-  const auto chosen = app->get_subcommands();
-  const CLI::App& command = chosen.empty() ? *app : *chosen[0];
-  const std::string name = chosen.empty() ? "" : command.get_name();
-  const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
-                     !command.remaining().empty();
-  return fmt::format("tilegrad: {}{}; see tilegrad {}--help\n", name.empty() ? "" : name + ": ",
-                     extra ? ExplainExtra(command) : error.what(), name.empty() ? "" : name + " ");
 }
 
 }  // namespace tilegrad::cli

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/command_line.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "cli/did_you_mean.h"
+#include "tilegrad/version.h"
+
+namespace tilegrad::cli {
+namespace {
+
+// CLI11 chooses the type's name and how words are read by the target's type.
+struct Declare {
+  CLI::App* app;
+  const Option& option;
+
+  CLI::Option* operator()(const WordCheck& keeper) const {
+    const auto keep_nothing = [](const std::string&) {};
+    return app->add_option_function<std::string>(option.names, keep_nothing, option.help)
+        ->check(keeper.fault, keeper.description);
+  }
+  CLI::Option* operator()(const FlagWord& flag) const {
+    return app->add_flag(option.names + "{" + flag.lone + "}", *flag.word, option.help);
+  }
+  CLI::Option* operator()(bool* flag) const {
+    return app->add_flag(option.names, *flag, option.help);
+  }
+  template <class T>
+  CLI::Option* operator()(T* value) const {
+    return app->add_option(option.names, *value, option.help);
+  }
+};
+
+struct Apply {
+  CLI::App* app;
+  CLI::Option* option;
+  bool whole;  // its value is an integer
+
+  void operator()(Required) const { option->required(); }
+  void operator()(Hidden) const { option->group(""); }
+  void operator()(NoDefault) const { option->default_str(""); }
+  void operator()(SplitAtCommas) const { option->delimiter(','); }
+  void operator()(Numbers numbers) const {
+    option->type_size(numbers.count)->expected(1)->delimiter(',');
+    option->option_text("FLOAT x " + std::to_string(numbers.count));
+  }
+  void operator()(Range range) const {
+    if (!whole) option->check(CLI::Range(range.low, range.high));
+    if (whole) option->check(CLI::Range(std::llround(range.low), std::llround(range.high)));
+  }
+  void operator()(const OneOf& choice) const { option->check(CLI::IsMember(choice.words)); }
+  void operator()(const TypeName& type) const { option->type_name(type.name); }
+  void operator()(const ValueMayLack& lacking) const {
+    option->expected(0, 1)->default_str(lacking.value)->option_text(lacking.text);
+  }
+  void operator()(const Needs& other) const { option->needs(app->get_option(other.option)); }
+  void operator()(const Excludes& others) const {
+    for (const std::string& other : others.options) option->excludes(app->get_option(other));
+  }
+  void operator()(const WordCheck& check) const { option->check(check.fault, check.description); }
+};
+
+// Where files may follow, an option takes no word more than it needs. CLI11 would go on with the
+// words behind it: of `--eye 0 0 4 --size 64 mesh.obj` with `--eye` last, the mesh would be a
+// fourth number. Lists then want commas (JoinLists gives them) or their option again.
+void AddOptions(const std::vector<Option>& options, CLI::App* app) {
+  const auto is_word = [](const Option& option) { return !option.names.starts_with('-'); };
+  const bool has_files = std::any_of(options.begin(), options.end(), is_word);
+  for (const Option& option : options) {
+    CLI::Option* const out = std::visit(Declare{app, option}, option.target);
+    out->capture_default_str();
+    if (out->get_default_str() == "[]") out->default_str("");  // an empty list
+    const bool whole = std::holds_alternative<int*>(option.target) ||
+                       std::holds_alternative<std::int64_t*>(option.target);
+    for (const Trait& trait : option.traits) std::visit(Apply{app, out, whole}, trait);
+    if (has_files && !is_word(option)) out->allow_extra_args(false);
+  }
+}
+
+// Of the words that nobody takes, the first: what follows an unknown option is its value.
+std::string ExplainExtra(const CLI::App& command) {
+  const std::string word = command.remaining().front();
+  if (!word.starts_with('-')) return fmt::format("\"{}\" is one word too many", word);
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  const std::string name = word.substr(0, word.find('='));
+  return fmt::format("unknown option {}{}", name, DidYouMean(name, known));
+}
+
+// The command that was chosen, what is wrong, and where its options are listed.
+std::string Explain(const CLI::App* app, const CLI::Error& error) {
+  const auto chosen = app->get_subcommands();
+  const CLI::App& command = chosen.empty() ? *app : *chosen[0];
+  const std::string name = chosen.empty() ? "" : command.get_name();
+  const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
+                     !command.remaining().empty();
+  return fmt::format("tilegrad: {}{}; see tilegrad {}--help\n", name.empty() ? "" : name + ": ",
+                     extra ? ExplainExtra(command) : error.what(), name.empty() ? "" : name + " ");
+}
+
+}  // namespace
+
+std::unique_ptr<CLI::App> MakeApp(const CommandList& commands) {
+  auto app = std::make_unique<CLI::App>(
+      "tilegrad: a differentiable rasterizer for CPUs, and the training system around it",
+      "tilegrad");
+  app->footer(
+      "tilegrad help COMMAND shows the options of a command; tilegrad configs, the networks "
+      "that train knows by name.");
+  app->set_version_flag("--version", TILEGRAD_VERSION);
+  app->require_subcommand(1);
+  for (const Command& command : commands) {
+    CLI::App* const out = app->add_subcommand(command.name, command.help);
+    AddOptions(command.options, out);
+  }
+  app->failure_message(Explain);
+  return app;
+}
+
+ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands) {
+  const auto app = MakeApp(*commands);
+  try {
+    std::reverse(words.begin(), words.end());  // as CLI11 takes them
+    app->parse(std::move(words));
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream out, note;
+    const int code = app->exit(error, out, note);
+    return {nullptr, code == 0 ? 0 : 2, out.str(), note.str()};
+  }
+  const CLI::App& chosen = *app->get_subcommands().front();
+  const auto command = std::find_if(commands->begin(), commands->end(),
+                                    [&](const Command& c) { return c.name == chosen.get_name(); });
+  for (Option& option : command->options)
+    option.words = chosen.get_option(option.FirstName())->results();
+  return {&*command};
+}
+
+}  // namespace tilegrad::cli
