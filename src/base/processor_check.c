@@ -22,8 +22,8 @@
 #endif
 
 // The linker is told to look for it (cmake/Simd.cmake), or it would leave this file out.
-__attribute__((constructor(101))) void tilegrad_check_processor(void);
-void tilegrad_check_processor(void) {
+__attribute__((constructor(101))) void check_processor_for_tilegrad(void);
+void check_processor_for_tilegrad(void) {
   __builtin_cpu_init();
   if (!TILEGRAD_MISSING) return;
   static const char kText[] =
