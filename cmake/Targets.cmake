@@ -11,6 +11,10 @@ target_compile_options(tilegrad_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -fno-math-errno -ffp-contract=off -pthread)
 # g++ 12 reports std::string code of its own library as overlapping (GCC bug 105651).
 target_compile_options(tilegrad_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
+# GCC takes every file but the one on its command line for a header, whose types should not hold types of anonymous namespaces.
+if(TILEGRAD_UNITY)
+  target_compile_options(tilegrad_flags INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+endif()
 if(TILEGRAD_WERROR)
   target_compile_options(tilegrad_flags INTERFACE -Werror)
 endif()
