@@ -166,9 +166,9 @@ class Parser {
     const std::uint32_t of_class = flags & 0xFF;
     out->logical = (flags & kLogicalFlag) != 0;
     if ((flags & kComplexFlag) != 0) return Damaged("complex numbers, which nothing here needs");
-    if (of_class == kCell) return Elements(MatKind::kCell, 1, out, depth);
-    if (of_class == kStruct) return Struct(out, depth);
-    if (of_class == kChar) return Text(out);
+    if (of_class == kCellClass) return Elements(MatKind::kCell, 1, out, depth);
+    if (of_class == kStructClass) return Struct(out, depth);
+    if (of_class == kCharClass) return Text(out);
     if (of_class >= kFirstNumeric && of_class <= kLastNumeric) return Numbers(out);
     return Damaged("an array of class {}: neither numbers, text, structs nor cells", of_class);
   }

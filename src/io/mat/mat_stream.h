@@ -15,7 +15,7 @@
 namespace tilegrad::io {
 
 // Classes and a flag of arrays, as files number them.
-inline constexpr std::uint32_t kCell = 1, kStruct = 2, kChar = 4, kLogicalFlag = 0x200;
+inline constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kCharClass = 4, kLogicalFlag = 0x200;
 
 class MatStream {
  public:

@@ -38,11 +38,11 @@ class MatWriter {
 std::uint32_t ClassOf(const MatArray& array) {
   switch (array.kind) {
     case MatKind::kCell:
-      return kCell;
+      return kCellClass;
     case MatKind::kStruct:
-      return kStruct;
+      return kStructClass;
     case MatKind::kText:
-      return kChar;
+      return kCharClass;
     default:
       return array.logical ? kUint8 | kLogicalFlag : kDouble;
   }
