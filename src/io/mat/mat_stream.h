@@ -15,7 +15,8 @@
 namespace tilegrad::io {
 
 // Classes and a flag of arrays, as files number them.
-inline constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kCharClass = 4, kLogicalFlag = 0x200;
+inline constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kCharClass = 4,
+                               kLogicalFlag = 0x200;
 
 class MatStream {
  public:
