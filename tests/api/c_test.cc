@@ -143,7 +143,7 @@ TEST_F(CApi, ShorterStructsHaveDefaultsForTheRest) {
   tilegrad_options_init(static_cast<tilegrad_options*>(nullptr));  // nothing to fill
 }
 
-TEST_F(CApi, LongerStructsMustNotSayWhatIsNotKnown) {
+TEST_F(CApi, LargerStructsMustNotSayWhatIsNotKnown) {
   struct {
     tilegrad_options known;
     int future;

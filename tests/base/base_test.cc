@@ -342,7 +342,7 @@ TEST_F(FileTest, LinksAndPipesStayWhatTheyAre) {
   EXPECT_TRUE(std::filesystem::is_fifo(pipe));
 }
 
-TEST_F(FileTest, NamesAsLongAsTheyMayBe) {
+TEST_F(FileTest, NamesOfTheGreatestLength) {
   for (const std::size_t length : {240u, 255u}) {
     ASSERT_TRUE(WriteTextAtomic(folder_ / std::string(length, 'n'), "x").ok()) << length;
     EXPECT_EQ(ReadText(folder_ / std::string(length, 'n')).value(), "x");

@@ -32,7 +32,7 @@ TEST_F(Guard, WhatSomebodyElseWroteIsKept) {
   EXPECT_TRUE(OutputGuard(true).Check(file).ok());
 }
 
-TEST_F(Guard, WhatWeWroteIsReplacedAsLongAsNobodyEditedIt) {
+TEST_F(Guard, WhatWeWroteIsReplacedUnlessSomebodyEditedIt) {
   const Path file = Made("a.npy", "ours");
   EXPECT_TRUE(OutputGuard().Check(file).ok());
   Write("a.npy", std::string("edited"));

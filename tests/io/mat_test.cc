@@ -187,7 +187,7 @@ TEST(Mat, RefusesOtherFiles) {
   ExpectMessage(LoadMat("/no/such.mat").status(), "/no/such.mat");
 }
 
-TEST(Mat, RefusesWhatIsNotFinishedOrTooLong) {
+TEST(Mat, RefusesWhatIsNotFinishedOrTooLarge) {
   const Bytes whole = Header() + BirdStruct();
   for (std::size_t size = 129; size < whole.size(); size += 3)
     EXPECT_FALSE(ReadMat(std::span(whole).first(size), "cut.mat").ok()) << size;

@@ -127,7 +127,7 @@ TEST_F(Tape, ReleasedGraphIsAnError) {
 }
 
 // Recursive destruction of nodes would overflow the stack.
-TEST_F(Tape, LongChainsAreTakenApart) {
+TEST_F(Tape, DeepChainsAreTakenApart) {
   const Var x = Vector({1});
   Var y = x;
   for (int i = 0; i < 400000; ++i) y = y + 1.0;

@@ -48,7 +48,7 @@ TEST(Rasterize, TriangleByHand) {
   }
 }
 
-TEST(Rasterize, PerspectiveCorrectOverALongFloor) {
+TEST(Rasterize, PerspectiveCorrectOverADeepFloor) {
   // A floor strip from w = 1 to w = 9: the middle of the strip in space is at w = 5, not in the
   // middle of the screen.
   Scene<double> scene;

@@ -375,7 +375,7 @@ TEST(RendererEdgeCases, EmptyMeshesAndBatchesGiveBackground) {
 
 // Weights sum to one, so the gradients of a channel at all vertices sum to those at all pixels that
 // are covered.
-TEST(RendererEdgeCases, TheSmallestAndTheLongestImages) {
+TEST(RendererEdgeCases, TheSmallestAndTheWidestImages) {
   const std::vector<float> positions = {-50, -50, 0, 50, -50, 0.1f, 0, 80, -0.1f};
   const std::vector<std::int32_t> faces = {0, 1, 2};
   const std::vector<float> attributes = {0.1f, 0.5f, 0.9f};

@@ -151,7 +151,7 @@ TEST(GanGenerator, TexturesStartAsTheMeanMap) {
   }
 }
 
-TEST(GanGenerator, CodesBetweenTwoStayAsLong) {
+TEST(GanGenerator, CodesBetweenTwoKeepTheirLength) {
   const std::vector<float> a = {3, 0, 0}, b = {0, 3, 0};
   const auto half = BetweenCodes(a, b, 0.5);
   EXPECT_NEAR(half[0], 3 / std::sqrt(2.0), 1e-6);
