@@ -1,6 +1,6 @@
 # Which instruction sets kernels are compiled for (TILEGRAD_SIMD), by Highway.
 #
-#   dynamic  each that a CPU of this kind may have; the best one is chosen at run time. For what travels: wheels, installed trees
+#   dynamic  SSE4, AVX2 and AVX-512; the best one is chosen at run time. For what travels: wheels, installed trees
 #   native   the best one of the machine that builds; its programs say so on a lesser one. For who builds where it runs
 #   avx2     AVX2 alone, as native: for sanitizers and valgrind
 #   few      AVX2 and EMU128, chosen at run time
@@ -9,26 +9,12 @@
 add_library(tilegrad_simd INTERFACE)
 target_link_libraries(tilegrad_simd INTERFACE PkgConfig::LIBHWY)
 
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
-  # Vectors without a size at compile time cannot be members of records, which hold them here. NEON serves machines with SVE.
-  set(TILEGRAD_DISABLED_TARGETS "HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV")
-  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that,
-  # precompiled headers included.
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
-    target_compile_options(tilegrad_flags INTERFACE -march=armv8-a+crypto)
-  endif()
-elseif(TILEGRAD_SIMD STREQUAL "all")  # but SSSE3 and AVX3_DL, which lie between two others and would only cost compile time
-  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL")
-elseif(TILEGRAD_SIMD STREQUAL "few")
-  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL")
-else()
-  # Emulation serves tests alone.
-  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL|HWY_EMU128")
-endif()
-
-# TILEGRAD_LEVEL: the level of x86-64 that kernels of native and avx2 need; empty for others.
+# TILEGRAD_LEVEL: the level of x86-64 that files of kernels are compiled for; empty: any. Highway's least target above emulation, which
+# 1.0.3 has for any x86-64, is that of x86-64-v2.
 set(TILEGRAD_LEVEL "")
-if(TILEGRAD_SIMD STREQUAL "avx2")
+if(TILEGRAD_SIMD STREQUAL "dynamic" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(TILEGRAD_LEVEL x86-64-v2)
+elseif(TILEGRAD_SIMD STREQUAL "avx2")
   set(TILEGRAD_LEVEL x86-64-v3)
 elseif(TILEGRAD_SIMD STREQUAL "native" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   execute_process(COMMAND ${CMAKE_CXX_COMPILER} -march=native -dM -E -x c++ /dev/null OUTPUT_VARIABLE MACROS ERROR_QUIET)
@@ -41,14 +27,33 @@ elseif(TILEGRAD_SIMD STREQUAL "native" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_6
   endif()
 endif()
 
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
+  # Vectors without a size at compile time cannot be members of records, which hold them here. NEON serves machines with SVE.
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV")
+  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that,
+  # precompiled headers included.
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+    target_compile_options(tilegrad_flags INTERFACE -march=armv8-a+crypto)
+  endif()
+elseif(NOT TILEGRAD_LEVEL AND NOT TILEGRAD_SIMD STREQUAL "few")  # but SSSE3 and AVX3_DL, which lie between others and would only cost compile time
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL")
+elseif(TILEGRAD_SIMD STREQUAL "few")
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL")
+else()
+  # Emulation serves tests alone.
+  set(TILEGRAD_DISABLED_TARGETS "HWY_SSSE3|HWY_AVX3_DL|HWY_EMU128")
+endif()
+
 if(TILEGRAD_SIMD STREQUAL "scalar")
   target_compile_definitions(tilegrad_simd INTERFACE HWY_COMPILE_ONLY_EMU128)
 elseif(TILEGRAD_SIMD MATCHES "^(native|avx2)$")
-  # Highway takes AES for a part of SSE4 and above; machines that can run the level without it are not known.
-  target_compile_definitions(tilegrad_simd INTERFACE HWY_COMPILE_ONLY_STATIC HWY_DISABLE_PCLMUL_AES "HWY_DISABLED_TARGETS=(${TILEGRAD_DISABLED_TARGETS})")
+  target_compile_definitions(tilegrad_simd INTERFACE HWY_COMPILE_ONLY_STATIC "HWY_DISABLED_TARGETS=(${TILEGRAD_DISABLED_TARGETS})")
 else()
   target_compile_definitions(tilegrad_simd INTERFACE
     HWY_COMPILE_ALL_ATTAINABLE "HWY_DISABLED_TARGETS=(${TILEGRAD_DISABLED_TARGETS})")
+endif()
+if(TILEGRAD_LEVEL)
+  target_compile_definitions(tilegrad_simd INTERFACE HWY_DISABLE_PCLMUL_AES)  # which Highway takes for a part of SSE4, and no level has
 endif()
 # Highway falls back from EMU128 to its one-lane target for GCC before 12.3; Debian 12 has 12.2. The tests hold EMU128 to the
 # reference with that very compiler, so the block is lifted: vectors of four lanes everywhere, one code path less.
