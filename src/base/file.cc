@@ -169,6 +169,21 @@ Status AppendText(const Path& path, std::string_view text, bool durable) {
   return {};
 }
 
+bool PathExists(const Path& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error);
+}
+
+bool IsFolder(const Path& path) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error);
+}
+
+bool IsFile(const Path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
 Status MakeFolder(const Path& path) {
   if (path.empty()) return InvalidArgument("the name of a folder is empty");
   std::error_code error;

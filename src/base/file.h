@@ -32,6 +32,11 @@ Status WriteTextAtomic(const Path& path, std::string_view text);
 // Appends and fsyncs if `durable`. A line that was cut by a crash is the reader's to detect.
 Status AppendText(const Path& path, std::string_view text, bool durable);
 
+// Whether a path leads to anything, a folder, a file; no where that cannot be found out.
+bool PathExists(const Path& path);
+bool IsFolder(const Path& path);
+bool IsFile(const Path& path);
+
 Status MakeFolder(const Path& path);  // with parents; existing is fine
 
 }  // namespace tilegrad

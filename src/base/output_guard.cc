@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/output_notes.h"
 
 namespace tilegrad {
@@ -92,7 +93,7 @@ Status OutputGuard::CheckAll(std::span<const Path> files) const {
 
 std::optional<Path> OutputGuard::ForeignFile(const Path& folder) const {
   std::error_code error;
-  if (std::filesystem::exists(folder / kLock, error)) return std::nullopt;
+  if (PathExists(folder / kLock)) return std::nullopt;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     if (entry.path().filename() == kOutputNotes) continue;
     if (entry.is_directory(error) && !entry.is_symlink(error)) {

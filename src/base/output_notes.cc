@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/hash.h"
 #include "base/shortage.h"
 
@@ -34,8 +35,7 @@ Status NoRoom(const Path& notes, int error) {
 // One write, so that several processes may do this at once. A link under that name, which others
 // can make in a folder that is open to all, is not followed.
 Status Append(const Path& notes, const std::string& line) {
-  std::error_code error;
-  const bool fresh = !std::filesystem::exists(notes, error);
+  const bool fresh = !PathExists(notes);
   const int fd = ::open(notes.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (fd < 0) return errno == ENOSPC || errno == EDQUOT ? NoRoom(notes, errno) : Status();
   // A disk that was full left a part of a line.

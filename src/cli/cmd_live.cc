@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/live_server.h"
@@ -20,9 +21,7 @@ struct LiveOptions {
 
 // Only runs of train have a dataset; without it the page has no meshes of them.
 Path DatasetOf(const LiveOptions& options) {
-  std::error_code error;
-  if (options.data.empty() && !std::filesystem::exists(Path(options.run) / "run.json", error))
-    return {};
+  if (options.data.empty() && !PathExists(Path(options.run) / "run.json")) return {};
   const auto data = ChooseDataset(options.data, options.run);
   if (data.ok()) return *data;
   PrintNote("tilegrad: warning: {}: no meshes are shown\n", data.status().message());
@@ -30,9 +29,7 @@ Path DatasetOf(const LiveOptions& options) {
 }
 
 Status RunLive(const LiveOptions& options) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(options.run, error))
-    return NotFound("{}: no such folder of a run", options.run);
+  if (!IsFolder(options.run)) return NotFound("{}: no such folder of a run", options.run);
   const StopFlag& stop = StopOnSignals();
   TILEGRAD_ASSIGN(const LiveServer server,
                   LiveServer::Start({options.run, DatasetOf(options)}, options.port));

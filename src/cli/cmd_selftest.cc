@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/simd_target.h"
+#include "base/text.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/option_words.h"

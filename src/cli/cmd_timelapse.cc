@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -34,7 +35,7 @@ Result<std::vector<Path>> MeshFiles(const Path& run) {
   }
   std::sort(files.begin(), files.end());  // steps are padded with zeros
   const Path result = run / "mesh.glb";
-  if (!files.empty() && std::filesystem::exists(result, error)) files.push_back(result);
+  if (!files.empty() && PathExists(result)) files.push_back(result);
   if (!files.empty()) return files;
   return NotFound("{}: no meshes in it; fits keep them beside each picture of --timelapse",
                   (run / "timelapse").string());

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "base/file.h"
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -48,8 +49,7 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   PrintResult({{"folder", folder.string()},
                {"files", {"tradeoff.md", "tradeoff.csv", "tradeoff.svg"}},
                {"trained", !training.empty()}});
-  std::error_code error;
-  if (training.empty() && std::filesystem::exists(folder / "training.csv", error)) {
+  if (training.empty() && PathExists(folder / "training.csv")) {
     Print("training.csv there is of an earlier call\n");
   }
   return {};

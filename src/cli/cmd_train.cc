@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
@@ -58,7 +59,7 @@ Status TakeFromRun(TrainOptions* options) {
   if (!options->out.empty() && !std::filesystem::equivalent(run, options->out, error))
     return InvalidArgument("--resume {}: it goes on there; leave out --out {}", run.string(),
                            options->out);
-  if (!std::filesystem::exists(run / "config.toml", error))
+  if (!PathExists(run / "config.toml"))
     return NotFound("{}: not a run of tilegrad train: there is no config.toml in it", run.string());
   options->out = run.string();
   if (options->config.empty()) options->config = (run / "config.toml").string();

@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/text.h"
 #include "cli/option_words.h"
 #include "tilegrad/status.h"
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <cstdlib>
 #include <sstream>
@@ -60,12 +59,6 @@ std::optional<std::int64_t> WholeNumber(const std::string& word) {
   const std::int64_t number = std::strtoll(word.c_str(), &end, /*base=*/0);
   if (word.empty() || end != word.c_str() + word.size()) return std::nullopt;
   return number;
-}
-
-std::string LowerCase(std::string word) {
-  std::transform(word.begin(), word.end(), word.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return word;
 }
 
 std::vector<std::string> PartsBetweenCommas(const std::string& text) {

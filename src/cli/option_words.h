@@ -13,7 +13,6 @@ namespace tilegrad::cli {
 std::optional<double> RealNumber(const std::string& word);
 std::optional<std::int64_t> WholeNumber(const std::string& word);
 
-std::string LowerCase(std::string word);
 // "a,b" is a and b.
 std::vector<std::string> PartsBetweenCommas(const std::string& text);
 

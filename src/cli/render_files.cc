@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "base/text.h"
 #include "cli/option_words.h"
 #include "cli/render_job.h"
 #include "io/exr_file.h"
@@ -209,7 +210,7 @@ Status RequestOutputs(const FileSettings& settings, PictureRequest* request) {
 Result<PictureName> NamePicture(const FileSettings& settings, const std::string& name,
                                 bool single) {
   const Path out(settings.out);
-  std::string ending = LowerCase(out.extension());
+  std::string ending = LowerCase(out.extension().string());
   if (!ending.empty()) ending.erase(0, 1);
   // A folder pic.jpg with a PNG in it is not what anybody asks for.
   for (const char* other : {"jpg", "jpeg", "bmp", "gif", "tga", "tif", "tiff", "webp", "ppm"}) {

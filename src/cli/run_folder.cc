@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/read_budget.h"
 #include "cli/console.h"
 #include "train/run/checkpoint.h"
@@ -85,7 +86,7 @@ Result<Path> ChooseRun(const std::string& given) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator("runs", error)) {
     const std::vector<Path> files = train::ListCheckpoints(entry.path());
-    if (files.empty() || !std::filesystem::exists(entry.path() / "run.json", error)) continue;
+    if (files.empty() || !PathExists(entry.path() / "run.json")) continue;
     const auto when = std::filesystem::last_write_time(files.back(), error);
     newest = std::max(newest, std::optional(std::pair(when, entry.path())));
   }
@@ -111,12 +112,12 @@ namespace {
 // A relative name counts from where the run was started: here, or some folder above the run.
 std::optional<Path> FindDataset(const Path& dataset, const Path& run) {
   std::error_code error;
-  if (std::filesystem::exists(dataset, error)) return dataset;
+  if (PathExists(dataset)) return dataset;
   if (dataset.is_absolute()) return std::nullopt;
   Path above = std::filesystem::canonical(run, error);
   while (!error && above.has_relative_path()) {
     above = above.parent_path();
-    if (std::filesystem::exists(above / dataset, error)) return above / dataset;
+    if (PathExists(above / dataset)) return above / dataset;
   }
   return std::nullopt;
 }
@@ -126,9 +127,8 @@ std::optional<Path> FindDataset(const Path& dataset, const Path& run) {
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
   const Path file = run / "run.json";
-  std::error_code error;
-  if (!std::filesystem::exists(run, error)) return NotFound("{}: no such folder", run.string());
-  if (!std::filesystem::exists(file, error)) {
+  if (!PathExists(run)) return NotFound("{}: no such folder", run.string());
+  if (!PathExists(file)) {
     return NotFound("{}: not a run folder of tilegrad train: there is no run.json in it",
                     run.string());
   }

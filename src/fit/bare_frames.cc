@@ -7,6 +7,7 @@
 #include <numbers>
 #include <string_view>
 
+#include "base/text.h"
 #include "fit/colmap_frames.h"
 
 namespace tilegrad::train {
@@ -14,8 +15,7 @@ namespace {
 
 bool IsPicture(const Path& file) {
   static constexpr std::array<std::string_view, 4> kEndings = {".png", ".jpg", ".jpeg", ".webp"};
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = LowerCase(file.extension().string());
   return std::ranges::find(kEndings, ending) != kEndings.end();
 }
 

@@ -2,16 +2,12 @@
 #include "fit/colmap_frames.h"
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/camera_file.h"
 #include "io/transforms_lens.h"
 
 namespace tilegrad::train {
 namespace {
-
-bool IsThere(const Path& path) {
-  std::error_code error;
-  return std::filesystem::is_regular_file(path, error);
-}
 
 // The folder that the names of images count from.
 Result<Path> FindImages(const Path& model, const std::string& first) {
@@ -20,7 +16,7 @@ Result<Path> FindImages(const Path& model, const std::string& first) {
   if (folder.filename().empty()) folder = folder.parent_path();  // "model/"
   for (int up = 0; up < 4; ++up, folder = folder.parent_path()) {
     for (const Path& candidate : {folder / "images", folder}) {
-      if (IsThere(candidate / first)) return candidate;
+      if (IsFile(candidate / first)) return candidate;
     }
   }
   return NotFound(
@@ -36,7 +32,7 @@ Path MaskFileOf(const Path& images, const Path& name) {
        {images.parent_path() / "masks", images.parent_path() / "mask", images / "masks"}) {
     for (const Path& candidate : {folder / (name.string() + ".png"),
                                   (folder / name).replace_extension(".png"), folder / name}) {
-      if (IsThere(candidate)) return candidate;
+      if (IsFile(candidate)) return candidate;
     }
   }
   return {};

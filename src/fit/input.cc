@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/read_budget.h"
 #include "fit/bare_frames.h"
 #include "fit/colmap_frames.h"
@@ -115,23 +116,21 @@ Status Finish(FitInput* input) {
 // Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
 Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, bool* posed) {
   *posed = true;
-  std::error_code error;
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
-    if (std::filesystem::exists(folder / name, error)) return ReadTransforms(folder / name);
+    if (PathExists(folder / name)) return ReadTransforms(folder / name);
   }
   if (const auto model = io::FindColmapModel(folder)) return ReadColmapFrames(*model);
   TILEGRAD_ASSIGN(auto bare, ReadBareFrames(folder, fov));
-  if (std::filesystem::exists(DatasetInfoPath(folder), error)) {
+  if (PathExists(DatasetInfoPath(folder))) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
                            folder.string());
   }
-  if (std::filesystem::is_regular_file(folder, error)) {
+  if (IsFile(folder)) {
     return InvalidArgument(
         "{}: a file; a fit takes the folder of transforms.json and its images, or of COLMAP",
         folder.string());
   }
-  if (!std::filesystem::exists(folder, error))
-    return NotFound("{}: no such folder", folder.string());
+  if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
   if (!bare.empty()) {
     *posed = false;
     return bare;
@@ -178,9 +177,8 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   FitInput input;
   TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input.posed));
   for (const TransformsFrame& frame : frames) TILEGRAD_TRY(AddView(frame, &input));
-  std::error_code error;
   const Path test = folder / "transforms_test.json";
-  const bool has_test = std::filesystem::exists(test, error);
+  const bool has_test = PathExists(test);
   if (has_test && options.hold_out > 0) {
     return InvalidArgument(
         "{}: already says which views are held out: leave out --hold-out, or that file",

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "fit/transforms.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
@@ -83,7 +84,7 @@ std::vector<Path> EarlierImages(const Path& folder, int count, const OutputGuard
 Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard) {
   std::error_code error;
   const Path other = folder / "transforms.json";  // what a fit reads first
-  if (std::filesystem::exists(other, error)) {
+  if (PathExists(other)) {
     return InvalidArgument("{}: already exists, and belongs to other images; choose another folder",
                            other.string());
   }
@@ -91,7 +92,7 @@ Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard
   const std::vector<Path> images = EarlierImages(folder, count, guard);
   for (const char* name : {kTrainName, kTestName}) {
     const Path file = folder / name;
-    if (!std::filesystem::exists(file, error)) continue;
+    if (!PathExists(file)) continue;
     TILEGRAD_TRY(guard.Check(file));
     if (!std::filesystem::remove(file, error)) {
       return IoError("{}: cannot be replaced: {}", file.string(), error.message());

@@ -77,10 +77,12 @@ FitterOptions OptionsFor(const FitScene& scene) {
   for (const Parameter p : {Parameter::kPositions, paint, Parameter::kCamera})
     out.parameters[p] = true;
   out.rates[Parameter::kPositions] = kRefinePositionRate;
-  out.rates[Parameter::kColors] = kRefineColorRate, out.rates[Parameter::kTexture] = kTexelRate;
+  out.rates[Parameter::kColors] = kRefineColorRate;
+  out.rates[Parameter::kTexture] = kTexelRate;
   out.loss.silhouette_weight = kSilhouetteWeight;
   out.regularizers = kRegularizers;
-  out.smoothing = kRefineSmoothing, out.color_smoothing = kRefineColorSmoothing;
+  out.smoothing = kRefineSmoothing;
+  out.color_smoothing = kRefineColorSmoothing;
   return out;
 }
 

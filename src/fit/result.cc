@@ -2,6 +2,7 @@
 #include "fit/result.h"
 
 #include "base/error.h"
+#include "base/file.h"
 #include "fit/camera_score.h"
 #include "fit/material.h"
 #include "fit/transforms.h"
@@ -22,12 +23,11 @@ constexpr int kSheetColumns = 6;
 // are its own.
 Result<ImageU8> FitResult::Sheet(const RunPlan& plan) const {
   std::vector<ImageU8> pictures;
-  std::error_code error;
   for (std::int64_t step = 0; step <= clock_.End(); ++step) {
     const bool own =
         ShowsAt(job_.config, step) || step <= clock_.extended_at() || step == clock_.End();
     const Path file = PictureFile(plan, step);
-    if (!own || !std::filesystem::exists(file, error)) continue;
+    if (!own || !PathExists(file)) continue;
     TILEGRAD_ASSIGN(ImageU8 picture, io::LoadImage(file));
     if (picture.width != job_.input.images.width || picture.channels != 3) continue;
     pictures.push_back(std::move(picture));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/file.h"
 #include "io/transforms_lens.h"
 #include "train/json_fields.h"
 
@@ -62,9 +63,8 @@ Status ReadPose(const Json& frame, NerfCamera* out) {
 Path FindFile(const Path& folder, const std::string& name) {
   const Path path = folder / name;
   Path portable = folder / io::PortablePath(name);
-  std::error_code error;
   for (const Path& candidate : {path, portable, Path(portable.string() + ".png")}) {
-    if (std::filesystem::exists(candidate, error)) return candidate;
+    if (PathExists(candidate)) return candidate;
   }
   return portable;
 }

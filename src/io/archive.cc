@@ -13,10 +13,11 @@
 #include <mutex>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/hash.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
-#include "io/text_scan.h"
+#include "base/text.h"
 
 namespace tilegrad::io {
 namespace {
@@ -28,14 +29,14 @@ std::optional<Path> FindIgnoringCase(const Path& folder, const std::string& name
   Path at = folder;
   for (const Path& part : Path(name)) {
     std::error_code error;
-    if (std::filesystem::exists(at / part, error)) {
+    if (PathExists(at / part)) {
       at /= part;
       continue;
     }
-    const std::string wanted = Lower(part.string());
+    const std::string wanted = LowerCase(part.string());
     std::optional<Path> found;
     for (const auto& entry : std::filesystem::directory_iterator(at, error)) {
-      if (Lower(entry.path().filename().string()) == wanted) found = entry.path();
+      if (LowerCase(entry.path().filename().string()) == wanted) found = entry.path();
     }
     NoteShortage(error.value());
     if (!found) return std::nullopt;
@@ -55,8 +56,7 @@ class Folder : public FileSource {
   }
   bool Exists(const std::string& name) const override {
     const auto found = Find(name);
-    std::error_code error;
-    return found && std::filesystem::is_regular_file(*found, error);
+    return found && IsFile(*found);
   }
   std::string Describe(const std::string& name) const override { return (path_ / name).string(); }
 
@@ -113,7 +113,8 @@ class Zip : public FileSource {
     const zip_int64_t count = zip_get_num_entries(zip_.get(), 0);
     for (zip_int64_t i = 0; i < count; ++i) {
       const char* name = zip_get_name(zip_.get(), static_cast<zip_uint64_t>(i), 0);
-      if (name != nullptr) by_lower_name_.try_emplace(Lower(name), static_cast<zip_uint64_t>(i));
+      if (name != nullptr)
+        by_lower_name_.try_emplace(LowerCase(name), static_cast<zip_uint64_t>(i));
     }
   }
 
@@ -146,7 +147,7 @@ class Zip : public FileSource {
     if (!normal) return std::nullopt;
     const zip_int64_t exact = zip_name_locate(zip_.get(), normal->c_str(), 0);
     if (exact >= 0) return static_cast<zip_uint64_t>(exact);
-    const auto it = by_lower_name_.find(Lower(*normal));
+    const auto it = by_lower_name_.find(LowerCase(*normal));
     return it == by_lower_name_.end() ? std::nullopt : std::optional(it->second);
   }
 

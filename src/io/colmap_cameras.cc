@@ -6,6 +6,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/camera_file.h"
 #include "io/text_scan.h"
 
@@ -255,11 +256,10 @@ Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras
 }  // namespace
 
 std::optional<Path> FindColmapModel(const Path& folder) {
-  std::error_code error;
   for (const Path& root : {folder, folder / "colmap"}) {
     for (const Path& model : {root, root / "sparse/0", root / "sparse"}) {
       for (const char* file : {"cameras.txt", "cameras.bin"}) {
-        if (std::filesystem::is_regular_file(model / file, error)) return model;
+        if (IsFile(model / file)) return model;
       }
     }
   }
@@ -273,8 +273,7 @@ Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
         "{}: not a COLMAP model: neither cameras.txt nor cameras.bin is in it or its sparse/0",
         folder.string());
   }
-  std::error_code error;
-  const bool text = std::filesystem::is_regular_file(*model / "cameras.txt", error);
+  const bool text = IsFile(*model / "cameras.txt");
   TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(*model / "cameras.txt")
                                               : ReadCamerasBinary(*model / "cameras.bin"));
   TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(*model / "images.txt", cameras)

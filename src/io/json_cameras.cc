@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/camera_file.h"
 #include "io/transforms_lens.h"
 
@@ -243,8 +244,7 @@ Result<std::vector<CameraView>> ReadJsonCameras(const std::string& text, const P
 }
 
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return LoadColmapCameras(path);
+  if (IsFolder(path)) return LoadColmapCameras(path);
   TILEGRAD_ASSIGN(const std::string text, ReadText(path));
   return ReadJsonCameras(text, path, options);
 }

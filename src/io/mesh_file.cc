@@ -7,8 +7,10 @@
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
+#include "base/text.h"
 #include "io/guarded_process.h"
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
@@ -196,10 +198,7 @@ void Polygon::AddTo(LoadedMesh& out) {
 }
 
 std::string MeshEnding(const std::string& name) {
-  std::string ending = Path(name).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return ending;
+  return LowerCase(Path(name).extension().string());
 }
 
 std::string MeshFileEndings() {
@@ -239,8 +238,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
 }
 
 Result<LoadedMesh> LoadMesh(const Path& path) {
-  std::error_code no_file;
-  if (std::filesystem::is_directory(path, no_file))
+  if (IsFolder(path))
     return InvalidArgument("{}: is a folder; name a mesh file in it", path.string());
   // The source begins one folder above the mesh's: textures often lie in "../images".
   Path folder = path.parent_path();

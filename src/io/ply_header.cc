@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
@@ -72,10 +73,7 @@ bool ParseProperty(std::string_view rest, PlyHeader& header) {
 }
 
 void ParseComment(std::string_view rest, PlyHeader& header) {
-  std::string keyword(NextToken(rest));
-  std::transform(keyword.begin(), keyword.end(), keyword.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (keyword != "texturefile") return;
+  if (LowerCase(NextToken(rest)) != "texturefile") return;
   const auto begin = rest.find_first_not_of(" \t");
   if (begin != std::string_view::npos) header.textures.emplace_back(rest.substr(begin));
 }

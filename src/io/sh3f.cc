@@ -5,23 +5,11 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::io {
 namespace {
-
-void AppendUtf16Unit(std::string& out, unsigned code) {
-  if (code < 0x80) {
-    out += static_cast<char>(code);
-  } else if (code < 0x800) {
-    out += static_cast<char>(0xC0 | code >> 6);
-    out += static_cast<char>(0x80 | (code & 0x3F));
-  } else {
-    out += static_cast<char>(0xE0 | code >> 12);
-    out += static_cast<char>(0x80 | (code >> 6 & 0x3F));
-    out += static_cast<char>(0x80 | (code & 0x3F));
-  }
-}
 
 // Logical lines: comments dropped, a trailing odd backslash joins the next line, leading white
 // space removed. Bytes are kept.
@@ -53,7 +41,7 @@ std::string Unescape(std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto c = static_cast<unsigned char>(text[i]);
     if (c != '\\' || i + 1 == text.size()) {
-      AppendUtf16Unit(out, c);
+      AppendUtf8(c, &out);
       continue;
     }
     const char next = text[++i];
@@ -61,7 +49,7 @@ std::string Unescape(std::string_view text) {
     if (next == 'u' && i + 4 < text.size() &&
         std::from_chars(text.data() + i + 1, text.data() + i + 5, code, 16).ptr ==
             text.data() + i + 5) {
-      AppendUtf16Unit(out, code);
+      AppendUtf8(code, &out);
       i += 4;
     } else {
       out += next == 'n' ? '\n' : next == 't' ? '\t' : next == 'r' ? '\r' : next;

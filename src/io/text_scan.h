@@ -2,24 +2,13 @@
 // Internal to io: lines, tokens and numbers of the text formats, without copies.
 #pragma once
 
-#include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <string_view>
 #include <type_traits>
 
 namespace tilegrad::io {
-
-// The text in small ASCII letters.
-inline std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return lower;
-}
 
 // The text without UTF-8's byte order mark, if it begins with one.
 inline std::string_view WithoutByteOrderMark(std::string_view text) {

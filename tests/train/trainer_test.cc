@@ -157,7 +157,8 @@ TEST_F(TrainerTest, SampleSheetsComeEarlyAndLeaveTheBitsAlone) {
        {streamed, std::string(kTinyTextured), std::string(kTinyClassifier)}) {
     for (const std::int64_t every : {1, 1000}) {
       job_.config = ParseConfig(text, "tiny").value();
-      job_.config.schedule.steps = 12, job_.config.schedule.sample_every = every;
+      job_.config.schedule.steps = 12;
+      job_.config.schedule.sample_every = every;
       std::vector<std::string> drawn;
       job_.drawn = [&](const Path& file) {
         EXPECT_TRUE(std::filesystem::exists(file)) << file;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/file.h"
 #include "fit/score.h"
 #include "train/json_fields.h"
 
@@ -102,8 +103,7 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
   if (!input->posed) views.resize(input->names.size()), std::iota(views.begin(), views.end(), 0);
   const std::vector<Camera> lenses = Chosen(input->cameras, views);
   FoundPoses found;
-  std::error_code error;
-  if (job.reuse && std::filesystem::exists(job.file, error)) {
+  if (job.reuse && PathExists(job.file)) {
     TILEGRAD_TRY(ReadPoses(job.file, lenses, &found));
   } else {
     TILEGRAD_ASSIGN(found, FindPoses(Chosen(input->images, views), lenses, job.options, workers,
@@ -134,8 +134,7 @@ Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const Fit
   const std::vector<Camera> from = Chosen(cameras, input.training);
   FoundPoses refined;
   refined.agreement = 0;
-  std::error_code error;
-  if (job.reuse && std::filesystem::exists(job.file, error)) {
+  if (job.reuse && PathExists(job.file)) {
     TILEGRAD_TRY(ReadPoses(job.file, from, &refined));
   } else {
     TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/read_budget.h"
+#include "base/text.h"
 #include "io/mat/mat_file.h"
 #include "io/mat/mat_stream.h"
 
@@ -29,16 +30,6 @@ std::uint32_t Word(const std::uint8_t* at) {
   std::uint32_t word;
   std::memcpy(&word, at, sizeof word);
   return word;
-}
-
-void AppendUtf8(std::uint32_t c, std::string* out) {
-  const auto add = [&](std::uint32_t byte) { out->push_back(static_cast<char>(byte)); };
-  if (c < 0x80) return add(c);
-  if (c < 0x800) return add(0xC0 | (c >> 6)), add(0x80 | (c & 63));
-  if (c > 0x10FFFF || (c >= 0xD800 && c < 0xE000)) c = 0xFFFD;
-  if (c < 0x10000) return add(0xE0 | (c >> 12)), add(0x80 | (c >> 6 & 63)), add(0x80 | (c & 63));
-  add(0xF0 | (c >> 18)), add(0x80 | (c >> 12 & 63)), add(0x80 | (c >> 6 & 63));
-  add(0x80 | (c & 63));
 }
 
 // The arrays of one variable, from its bytes. `left_` counts what is left of the innermost array:

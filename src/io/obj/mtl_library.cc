@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/obj/obj_text.h"
 #include "io/text_scan.h"
 
@@ -44,7 +45,7 @@ class MtlParser {
 
   Status Parse() {
     for (std::string_view keyword, rest; lines_.Next(keyword, rest);)
-      TILEGRAD_TRY(Statement(Lower(keyword), rest));
+      TILEGRAD_TRY(Statement(LowerCase(keyword), rest));
     return {};
   }
 
@@ -127,7 +128,7 @@ class MtlParser {
     MtlImage image;
     while (rest.starts_with('-')) {
       std::string_view after = rest;
-      const std::string option = Lower(NextToken(after));
+      const std::string option = LowerCase(NextToken(after));
       if (!Option(option, after, image)) break;  // then it is a name
       rest = Trimmed(after);
     }
@@ -146,7 +147,7 @@ class MtlParser {
       return true;
     }
     if (option == "-clamp") {
-      image.clamp = Lower(NextToken(rest)) == "on";
+      image.clamp = LowerCase(NextToken(rest)) == "on";
       return true;
     }
     const auto* skipped = std::find_if(kSkippedOptions.begin(), kSkippedOptions.end(),

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "train/data/dataset_files.h"
 
 namespace tilegrad::train {
@@ -27,15 +28,13 @@ std::size_t CountShapes(const std::vector<ModelInfo>& models) {
 Result<Dataset> Dataset::Open(const Path& folder) {
   Dataset dataset;
   dataset.folder_ = folder;
-  std::error_code error;
-  if (!std::filesystem::exists(folder, error))
-    return NotFound("{}: no such folder", folder.string());
-  if (!std::filesystem::exists(DatasetInfoPath(folder), error)) {
+  if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
+  if (!PathExists(DatasetInfoPath(folder))) {
     return NotFound("{}: not a folder of tilegrad dataset: there is no dataset.json in it",
                     folder.string());
   }
   TILEGRAD_ASSIGN(dataset.info_, ReadDatasetInfo(folder));
-  if (!std::filesystem::exists(ModelsPath(folder), error)) {
+  if (!PathExists(ModelsPath(folder))) {
     return NotFound(
         "{}: the dataset is not complete; run the same `tilegrad dataset` command again to finish "
         "it",

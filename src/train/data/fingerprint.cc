@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/data/fingerprint.h"
 
+#include "base/file.h"
 #include "base/hash.h"
 #include "train/data/dataset_files.h"
 #include "train/data/photographs/photographs.h"
@@ -74,10 +75,8 @@ Result<std::string> PhotographsFingerprint(const Path& folder, const Workers& wo
 }  // namespace
 
 Result<std::string> DataFingerprint(const Path& folder, const Workers& workers) {
-  std::error_code error;
-  return std::filesystem::exists(DatasetInfoPath(folder), error)
-             ? DatasetFingerprint(folder, workers)
-             : PhotographsFingerprint(folder, workers);
+  return PathExists(DatasetInfoPath(folder)) ? DatasetFingerprint(folder, workers)
+                                             : PhotographsFingerprint(folder, workers);
 }
 
 Result<std::string> WithFile(const std::string& fingerprint, const Path& file) {

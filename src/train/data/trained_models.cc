@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/archive.h"
 #include "train/run/first_difference.h"
 
@@ -73,8 +74,7 @@ Status RememberTrainedModels(const Path& run, const Dataset& dataset, RunStart s
 
 Status CheckHeldOut(const Path& run, const Dataset& dataset, Split split) {
   const Path file = ModelListOf(run);
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return {};
+  if (!PathExists(file)) return {};
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   std::unordered_set<std::string> trained;
   std::istringstream lines(text);

@@ -2,6 +2,7 @@
 // eval.json back into an Evaluation.
 #include <limits>
 
+#include "base/file.h"
 #include "train/eval/evaluation.h"
 #include "train/json_fields.h"
 
@@ -94,8 +95,7 @@ Status ReadModelScores(const ParsedJson& json, const std::string& place, Evaluat
 
 Result<std::optional<Evaluation>> ReadEvaluation(const Path& run) {
   const Path file = run / "eval.json";
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return std::optional<Evaluation>();
+  if (!PathExists(file)) return std::optional<Evaluation>();
   const std::string place = file.string();
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
   TILEGRAD_ASSIGN(const ParsedJson json, ParseJson(text, place));

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/npz.h"
 #include "train/data/cutout.h"
 
@@ -19,10 +20,7 @@ constexpr std::size_t kPixels = std::size_t{kThumbnailSize} * kThumbnailSize,
 Path FileOf(const Path& run) { return run / "thumbnails.npz"; }
 
 // A file is a checkpoint: <run>/checkpoints/step_NUMBER.safetensors.
-Path RunOf(const Path& path) {
-  std::error_code error;
-  return std::filesystem::is_regular_file(path, error) ? path.parent_path().parent_path() : path;
-}
+Path RunOf(const Path& path) { return IsFile(path) ? path.parent_path().parent_path() : path; }
 
 // Which of `count` are taken so that at most `most` are, evenly spread.
 std::vector<std::size_t> SpreadIndices(std::size_t count, std::size_t most) {
@@ -211,8 +209,7 @@ Status TrainingPictures::Load(const Path& file) {
 
 Result<std::optional<TrainingPictures>> TrainingPictures::Read(const Path& run) {
   const Path file = FileOf(RunOf(run));
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return std::optional<TrainingPictures>();
+  if (!PathExists(file)) return std::optional<TrainingPictures>();
   TrainingPictures out;
   if (const Status loaded = out.Load(file); !loaded.ok()) return loaded.Within(file.string());
   return std::optional(std::move(out));

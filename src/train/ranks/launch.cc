@@ -38,7 +38,7 @@ Result<Path> FindPlugin() {
   std::error_code error;
   const Path program = std::filesystem::read_symlink("/proc/self/exe", error);
   for (const Path& folder : {program.parent_path(), program.parent_path() / kPluginFolder}) {
-    if (std::filesystem::exists(folder / kPlugin, error)) return folder / kPlugin;
+    if (PathExists(folder / kPlugin)) return folder / kPlugin;
   }
   return NotFound(
       "started as one of {} processes, but this tilegrad was built without MPI: install "

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/folder_lock.h"
 #include "io/mesh_file.h"
 #include "train/config.h"
@@ -89,15 +90,14 @@ Known ReadKnown(const LiveSource& source) {
 
 Result<std::string> LiveRun::State() {
   const Known known = ReadKnown(source_);
-  std::error_code error;
   std::vector<LogEntry> log;
-  if (std::filesystem::exists(source_.run / "metrics.jsonl", error)) {
+  if (PathExists(source_.run / "metrics.jsonl")) {
     TILEGRAD_ASSIGN(log, ReadLog(source_.run));
   }
   const bool running = FolderLock::IsHeld(source_.run);
   const std::int64_t step = log.empty() ? 0 : log.back().step;
   // A fit writes its result at the end.
-  const bool fitted = !running && std::filesystem::exists(source_.run / "mesh.glb", error);
+  const bool fitted = !running && PathExists(source_.run / "mesh.glb");
   Json json = {{"name", known.name},
                {"running", running},
                {"step", step},
@@ -135,7 +135,8 @@ Result<std::string> LiveRun::Predicted(std::int64_t step) {
     TILEGRAD_ASSIGN(json["mesh"], MeshOf(std::move(show.examples[0].prediction)));
     TILEGRAD_ASSIGN(json["truth"], MeshOf(std::move(show.examples[0].truth)));
   }
-  predicted_ = DumpForScript(json), predicted_step_ = step;
+  predicted_ = DumpForScript(json);
+  predicted_step_ = step;
   return predicted_;
 }
 

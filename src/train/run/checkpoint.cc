@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/hash.h"
 #include "base/temporary_file.h"
 
@@ -184,8 +185,7 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
 }
 
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return LoadNewestCheckpoint(context, path);
+  if (IsFolder(path)) return LoadNewestCheckpoint(context, path);
   TILEGRAD_ASSIGN(Checkpoint checkpoint, LoadCheckpoint(context, path));
   return FoundCheckpoint{std::move(checkpoint), path, {}, {}};
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/folder_lock.h"
 #include "base/processor_time.h"
 #include "io/glb_writer.h"
@@ -109,8 +110,7 @@ Status Session::Restore() {
   const std::string file = found->file.string();
   // config.toml, which is written when a run is extended, was compared before: the newest
   // checkpoint may be older than that.
-  std::error_code error;
-  const bool compared = std::filesystem::exists(plan_.folder / "config.toml", error);
+  const bool compared = PathExists(plan_.folder / "config.toml");
   TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
                              compared ? kStepsKey : plan_.may_differ));
   if (info.step > plan_.schedule.steps) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/mat/mat_file.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/photographs.h"
@@ -29,11 +30,9 @@ struct Layout {
   std::string class_name;  // empty: CUB
 };
 
-std::error_code ignored;
-
 std::optional<Path> FirstThere(const Path& folder, std::initializer_list<const char*> names) {
   for (const char* name : names) {
-    if (std::filesystem::exists(folder / name, ignored)) return folder / name;
+    if (PathExists(folder / name)) return folder / name;
   }
   return std::nullopt;
 }
@@ -41,7 +40,7 @@ std::optional<Path> FirstThere(const Path& folder, std::initializer_list<const c
 std::optional<Layout> FindCub(const Path& folder) {
   for (const char* below : {".", "cub", "cachedir/cub"}) {
     const Path base = (folder / below).lexically_normal();
-    if (!std::filesystem::exists(base / "data/train_cub_cleaned.mat", ignored)) continue;
+    if (!PathExists(base / "data/train_cub_cleaned.mat")) continue;
     const auto images = FirstThere(folder, {"CUB_200_2011/images", "images"});
     return Layout{base / "data", base / "sfm", images.value_or(folder / "CUB_200_2011/images"), ""};
   }
@@ -51,9 +50,9 @@ std::optional<Layout> FindCub(const Path& folder) {
 std::optional<Layout> FindPascal(const Path& folder) {
   for (const char* below : {".", "p3d", "cachedir/p3d"}) {
     const Path base = (folder / below).lexically_normal(), data = base / "data";
-    if (!std::filesystem::is_directory(data, ignored)) continue;
+    if (!IsFolder(data)) continue;
     for (const char* name : {"car", "aeroplane"}) {
-      if (!std::filesystem::exists(data / (std::string(name) + "_kps.mat"), ignored)) continue;
+      if (!PathExists(data / (std::string(name) + "_kps.mat"))) continue;
       const auto images = FirstThere(folder, {"PASCAL3D+_release1.1/Images", "Images"});
       return Layout{data, base / "sfm", images.value_or(folder / "Images"), name};
     }
@@ -200,7 +199,7 @@ class CmrReader {
 
   Status ReadSplit(const std::string& part, Split split) {
     const Path anno_file = AnnoFile(part), sfm_file = SfmFile(part);
-    if (part != "train" && !std::filesystem::exists(anno_file, ignored)) return {};
+    if (part != "train" && !PathExists(anno_file)) return {};
     TILEGRAD_ASSIGN(const io::MatFile anno, io::LoadMat(anno_file));
     TILEGRAD_ASSIGN(const io::MatFile sfm, io::LoadMat(sfm_file));
     TILEGRAD_ASSIGN(const MatPlace images, MatPlace::Variable(anno, "images"));

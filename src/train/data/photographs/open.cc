@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
@@ -17,9 +18,7 @@ std::vector<int> PhotographSet::Select(Split split) const {
 }
 
 Result<PhotographSet> OpenPhotographs(const Path& folder) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error))
-    return NotFound("{}: no such folder", folder.string());
+  if (!IsFolder(folder)) return NotFound("{}: no such folder", folder.string());
   TILEGRAD_ASSIGN(std::optional<PhotographSet> set, OpenCmrLayout(folder));
   if (!set) {
     TILEGRAD_ASSIGN(set, OpenPhotoFolder(folder));

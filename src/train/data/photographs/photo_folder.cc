@@ -7,7 +7,9 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/json_nesting.h"
+#include "base/text.h"
 #include "io/camera_file.h"
 #include "io/image_file.h"
 #include "train/data/cutout.h"
@@ -25,18 +27,16 @@ constexpr int kTestEvery = 6;  // the last of each six pictures is held out
 constexpr std::size_t kMostNames = 256;
 constexpr double kFarthest = 1 << 20;  // pixels from the picture's corner that a keypoint may be
 
-std::error_code unused_error;
-
 bool IsPicture(const Path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = LowerCase(path.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
 std::vector<Path> PicturesIn(const Path& folder) {
   std::vector<Path> out;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, unused_error)) {
-    if (entry.is_regular_file() && IsPicture(entry.path())) out.push_back(entry.path());
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (IsFile(entry.path()) && IsPicture(entry.path())) out.push_back(entry.path());
   }
   std::ranges::sort(out);
   return out;
@@ -46,7 +46,7 @@ std::vector<Path> PicturesIn(const Path& folder) {
 Result<ImageU8> Masked(const Path& folder, const Path& picture) {
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(picture));
   const Path mask = folder / "masks" / (picture.stem().string() + ".png");
-  if (!std::filesystem::exists(mask, unused_error)) return io::ToColor(std::move(image));
+  if (!PathExists(mask)) return io::ToColor(std::move(image));
   TILEGRAD_ASSIGN(const ImageU8 values, io::LoadImage(mask));
   const ImageU8 color = io::ToColor(std::move(image));
   ImageU8 rgb(color.width, color.height, 3);
@@ -98,7 +98,7 @@ class FolderReader {
   }
 
  private:
-  bool Has(const char* name) const { return std::filesystem::exists(folder_ / name, unused_error); }
+  bool Has(const char* name) const { return PathExists(folder_ / name); }
 
   // As `tilegrad views` and NeRF's datasets have them, which say what is held out.
   Result<std::vector<io::CameraView>> ReadSplitCameras() {
@@ -263,8 +263,7 @@ class FolderReader {
 
 Result<std::optional<PhotographSet>> OpenPhotoFolder(const Path& folder) {
   const Path images = folder / "images";
-  const std::vector<Path> pictures =
-      PicturesIn(std::filesystem::is_directory(images, unused_error) ? images : folder);
+  const std::vector<Path> pictures = PicturesIn(IsFolder(images) ? images : folder);
   if (pictures.empty()) return std::optional<PhotographSet>();
   TILEGRAD_ASSIGN(PhotographSet set, FolderReader(folder).Read(pictures));
   return std::optional(std::move(set));

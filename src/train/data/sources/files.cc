@@ -7,6 +7,8 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/file.h"
+#include "base/text.h"
 #include "io/mesh_file.h"
 #include "train/data/sources/model_source.h"
 
@@ -63,19 +65,12 @@ Result<SplitList> ReadSplitList(const Path& path) {
   return list;
 }
 
-bool IsFolder(const Path& path) {
-  std::error_code error;
-  return std::filesystem::is_directory(path, error);
-}
-
 // Images, materials and buffers, which models name; and what file managers hide.
 bool BelongsToModels(const Path& file) {
   static const std::set<std::string> endings = {".png", ".jpg", ".jpeg", ".bmp", ".tga",
                                                 ".ppm", ".pgm", ".rgb",  ".bw",  ".rgba",
                                                 ".sgi", ".mtl", ".bin"};
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = LowerCase(file.extension().string());
   return file.filename().string().starts_with('.') || endings.count(ending) > 0;
 }
 

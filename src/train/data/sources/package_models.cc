@@ -8,6 +8,8 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/file.h"
+#include "base/text.h"
 #include "io/sh3f.h"
 #include "scene/keep_faces.h"
 #include "scene/shapes.h"
@@ -93,14 +95,8 @@ std::array<float, 9> TurnOf(const PackageRow& row) {
   return {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
 }
 
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 bool HasOneOf(const std::string& name, const WordList& words) {
-  const std::string lower = Lower(name);
+  const std::string lower = LowerCase(name);
   return std::any_of(words.begin(), words.end(),
                      [&](std::string_view word) { return lower.find(word) != std::string::npos; });
 }
@@ -175,12 +171,11 @@ class Models : public ModelSource {
   Status OpenPackage(const Package& package, const std::vector<PackageRow>& rows,
                      const Path& games) {
     const Path archive = games / package.archive;
-    std::error_code error;
-    const bool folder = std::filesystem::is_directory(archive, error);
+    const bool folder = IsFolder(archive);
     std::shared_ptr<io::FileSource>& files = archives_[std::string(package.name)];
     if (folder) {
       files = io::OpenFolder(archive);
-    } else if (std::filesystem::exists(archive, error)) {
+    } else if (PathExists(archive)) {
       TILEGRAD_ASSIGN(files, io::OpenZip(archive));
     }
     bool found = false;

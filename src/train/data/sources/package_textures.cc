@@ -4,6 +4,7 @@
 #include <span>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "io/image_file.h"
 #include "train/data/sources/model_source.h"
 
@@ -50,17 +51,15 @@ void Match(const Path& archive, const Path& at, std::span<const Path> parts,
            const std::string& name, std::vector<TextureSet>* out) {
   if (parts.empty()) return;
   const Path& part = parts.front();
-  std::error_code error;
   if (part != "*") {
     if (parts.size() > 1) return Match(archive, at / part, parts.subspan(1), name, out);
-    if (std::filesystem::exists(archive / at / part, error))
-      out->push_back({name, at.string(), ""});
+    if (PathExists(archive / at / part)) out->push_back({name, at.string(), ""});
     return;
   }
   const auto folders = ListFolder(archive / at);
   if (!folders.ok()) return;
   for (const Path& folder : *folders) {
-    if (!std::filesystem::is_directory(folder, error)) continue;
+    if (!IsFolder(folder)) continue;
     const std::string own = folder.filename().string();
     Match(archive, at / own, parts.subspan(1), name.empty() ? own : name + "-" + own, out);
   }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "nn/nn.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/dataset_files.h"
@@ -208,8 +209,7 @@ Status RememberPhotographs(const Path& run, const PhotographSet& set, bool is_ne
 }
 
 Status CheckHeldOutPhotographs(const Path& run, const PhotographSet& set, Split split) {
-  std::error_code error;
-  if (!std::filesystem::exists(PhotographListOf(run), error)) return {};
+  if (!PathExists(PhotographListOf(run))) return {};
   TILEGRAD_ASSIGN(const std::string text, ReadText(PhotographListOf(run)));
   std::set<std::string> trained;
   std::istringstream lines(text);
