@@ -59,9 +59,9 @@ endif()
 # reference with that very compiler, so the block is lifted: vectors of four lanes everywhere, one code path less.
 target_compile_definitions(tilegrad_simd INTERFACE HWY_BROKEN_EMU128=0)
 
-# tilegrad_read_source(<target> <source>): files with Highway's vectors, and those that set up a library by macros, are compiled by themselves; the
+# tilegrad_set_source_flags(<target> <source>): files with Highway's vectors, and those that set up a library by macros, are compiled by themselves; the
 # former for TILEGRAD_LEVEL. All others are compiled for any x86-64, so that a program starts, and can say what it lacks, everywhere.
-function(tilegrad_read_source target source)
+function(tilegrad_set_source_flags target source)
   get_filename_component(file ${source} ABSOLUTE)
   if(NOT source MATCHES "\\.c+$" OR NOT EXISTS ${file})
     return()
@@ -71,7 +71,11 @@ function(tilegrad_read_source target source)
   if(vectors OR macros OR source MATCHES "\\.c$")
     set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   endif()
-  if(vectors AND TILEGRAD_LEVEL)
-    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES COMPILE_OPTIONS -march=${TILEGRAD_LEVEL} SKIP_PRECOMPILE_HEADERS ON)
+  if(vectors)
+    set(flags $<$<CONFIG:Release>:-O3>)
+    if(TILEGRAD_LEVEL)
+      list(APPEND flags -march=${TILEGRAD_LEVEL})
+    endif()
+    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES COMPILE_OPTIONS "${flags}" SKIP_PRECOMPILE_HEADERS ON)
   endif()
 endfunction()

@@ -39,20 +39,26 @@ include(cmake/Simd.cmake)
 # by macros.
 function(tilegrad_compile_together target files)
   foreach(source IN LISTS ARGN)
-    tilegrad_read_source(${target} ${source})
+    tilegrad_set_source_flags(${target} ${source})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${TILEGRAD_UNITY} UNITY_BUILD_BATCH_SIZE ${files})
 endfunction()
 
-# tilegrad_library(base SOURCES a.cc b.cc LINK tilegrad::x FOREIGN fmt::fmt)
+# tilegrad_library(base SOURCES a.cc b.cc LINK tilegrad::x FOREIGN fmt::fmt [CALLER]). CALLER: a library that leaves what takes time to the
+# others; all but its kernels are compiled at CALLER_LEVEL.
 function(tilegrad_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;FOREIGN" ${ARGN})
+  cmake_parse_arguments(ARG "CALLER" "" "SOURCES;LINK;FOREIGN" ${ARGN})
   add_library(tilegrad_${name} STATIC ${ARG_SOURCES})
   tilegrad_compile_together(tilegrad_${name} 10 ${ARG_SOURCES})
   add_library(tilegrad::${name} ALIAS tilegrad_${name})
   set_target_properties(tilegrad_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(tilegrad_${name} PUBLIC tilegrad_flags ${ARG_LINK} PRIVATE ${ARG_FOREIGN})
-  tilegrad_precompiled(tilegrad_${name} shared)
+  if(ARG_CALLER)
+    target_compile_options(tilegrad_${name} PRIVATE ${TILEGRAD_CALLER_LEVEL})
+    tilegrad_precompiled(tilegrad_${name} caller)
+  else()
+    tilegrad_precompiled(tilegrad_${name} shared)
+  endif()
 endfunction()
 
 # tilegrad_test(raster_project project_test.cc LINK tilegrad::raster [LONG] [ALONE]): a test of this name, which runs the suites of these
