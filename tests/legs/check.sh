@@ -10,7 +10,7 @@ cd "$(dirname "$0")/../.."
 source cmake/packages.sh
 export PYTHONDONTWRITEBYTECODE=1  # as ./run
 
-readonly LEGS=(format headers docs install wheel targets emu128 avx2 avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
+readonly LEGS=(format headers docs install wheel targets avx512 memcheck werror asan fuzz tsan scalar clang clang-new tidy coverage aarch64)
 # Where the short form of a sanitizer's or compiler's leg looks: what files of strangers reach, and what runs in threads.
 readonly FILES_TESTS='^(base_|io_|fuzz_replay|api_c|scene_)' THREADS_TESTS='^(base_few_threads|render_pipeline|nn_tape)'
 # Tests that hold kernels to their references.
@@ -65,15 +65,14 @@ targets_build() {
   compile build/targets --target "${chosen[@]}"
 }
 
-# only TARGET: tests of kernels, where Highway finds this target and no other.
+# only TARGET: the tests of build/targets, where Highway finds this target and no other.
 only() {
   local library=$OUT/only_$1.so
   g++ -O1 -shared -fPIC -x c++ -o "$library" - -lhwy <<CODE
 #include <hwy/targets.h>
 __attribute__((constructor)) static void Only() { hwy::DisableTargets(~static_cast<int64_t>(HWY_$1)); }
 CODE
-  targets_build "$KERNEL_TESTS"
-  LD_PRELOAD=$library ctest --test-dir build/targets -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
+  LD_PRELOAD=$library kernel_tests
 }
 
 leg_format() { ./run lint; }
@@ -101,15 +100,17 @@ leg_wheel() {
   (cd / && "$environment/bin/python" -c 'import tilegrad; print(tilegrad.__file__)' && "$environment/bin/tilegrad" selftest --only files)
   rm -rf "$environment"
 }
-# Each kernel beside its reference, on every instruction set that this machine has.
+kernel_tests() { ctest --test-dir build/targets -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"; }
+# Each kernel beside its reference on every instruction set that this machine has; then all else that calls kernels, on some of them.
 leg_targets() {
   targets_build "$KERNEL_TESTS"
-  ctest --test-dir build/targets -L short -R "$KERNEL_TESTS" --output-on-failure --no-tests=error -j "$(nproc)"
+  kernel_tests
+  only EMU128
+  ! grep -q -m 1 avx2 /proc/cpuinfo || only AVX2
 }
-leg_emu128() { only EMU128; }
-leg_avx2() { only AVX2; }
+# On a processor with AVX-512 that Bochs emulates; one that has it runs these tests in `targets`.
 leg_avx512() {
-  if grep -q -m 1 avx512dq /proc/cpuinfo; then only AVX3; return; fi
+  ! grep -q -m 1 avx512dq /proc/cpuinfo || return 0
   require bochs bochs-term vgabios isolinux syslinux-common xorriso busybox-static cpio
   tests/cross/avx512.sh
 }
