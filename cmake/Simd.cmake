@@ -30,8 +30,7 @@ endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|riscv")
   # Vectors without a size at compile time cannot be members of records, which hold them here. NEON serves machines with SVE.
   set(TILEGRAD_DISABLED_TARGETS "HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV")
-  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that,
-  # precompiled headers included.
+  # Highway's NEON target includes AES. GCC inlines it into constructors that it makes itself only if all code may use that.
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
     target_compile_options(tilegrad_flags INTERFACE -march=armv8-a+crypto)
   endif()
@@ -76,6 +75,6 @@ function(tilegrad_set_source_flags target source)
     if(TILEGRAD_LEVEL)
       list(APPEND flags -march=${TILEGRAD_LEVEL})
     endif()
-    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES COMPILE_OPTIONS "${flags}" SKIP_PRECOMPILE_HEADERS ON)
+    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES COMPILE_OPTIONS "${flags}")
   endif()
 endfunction()

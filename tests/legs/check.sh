@@ -129,7 +129,7 @@ leg_memcheck() {
   export OUT
   tests/legs/programs.py build/targets "$pattern" --filters | tr '\t' '\n' | xargs -d '\n' -P "$(nproc)" -n 3 bash -c 'memcheck "$@"' _
 }
-leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF -DTILEGRAD_UNITY=OFF; }
+leg_werror() { tree release werror '^(base_|scene_|structure)' -DTILEGRAD_WERROR=ON -DTILEGRAD_UNITY=OFF; }
 leg_asan() {  # by clang, which takes half as long for it
   require clang-14 libclang-rt-14-dev
   tree asan asan "$FILES_TESTS" -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14
@@ -140,7 +140,7 @@ leg_tsan() {
   tree tsan tsan "$THREADS_TESTS"
 }
 # With the flags of werror, so that ccache shares what has no kernels.
-leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_WERROR=ON -DTILEGRAD_PRECOMPILED=OFF -DTILEGRAD_UNITY=OFF; }
+leg_scalar() { tree scalar scalar "$KERNEL_TESTS" -DTILEGRAD_WERROR=ON -DTILEGRAD_UNITY=OFF; }
 # by_clang NAME VERSION. Clang warns of the same at any level, so the quickest that tests bear is taken.
 # GCC 12's std::stable_sort calls what GCC 12 deprecates, so that is no error.
 by_clang() {
