@@ -9,7 +9,6 @@
 #include <cstring>
 
 #include "base/error.h"
-#include "base/output_notes.h"
 #include "base/read_budget.h"
 #include "base/shortage.h"
 #include "base/temporary_file.h"
@@ -145,7 +144,6 @@ Status WriteFileAtomic(const Path& path_or_link, std::span<const std::uint8_t> b
   if (path.has_parent_path()) TILEGRAD_TRY(MakeFolder(path.parent_path()));
   const Path temporary = TemporaryOf(path);
   Status status = WriteTemporary(temporary, path, bytes);
-  if (status.ok()) status = NoteIfExpected(path, bytes);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
     status = SystemError(path, "cannot be replaced");
   }
@@ -189,6 +187,15 @@ Status MakeFolder(const Path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error) return IoError("{}: cannot create the folder: {}", path.string(), error.message());
+  return {};
+}
+
+Status RemoveFiles(std::span<const Path> files) {
+  for (const Path& file : files) {
+    std::error_code error;
+    std::filesystem::remove(file, error);
+    if (error) return IoError("{}: cannot be removed: {}", file.string(), error.message());
+  }
   return {};
 }
 

@@ -38,5 +38,7 @@ bool IsFolder(const Path& path);
 bool IsFile(const Path& path);
 
 Status MakeFolder(const Path& path);  // with parents; existing is fine
+// In this order; an error names the first that cannot be removed. What is not there is fine.
+Status RemoveFiles(std::span<const Path> files);
 
 }  // namespace tilegrad

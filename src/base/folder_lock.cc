@@ -18,16 +18,17 @@ constexpr unsigned kPauseMicroseconds = 10'000;
 
 }  // namespace
 
+FolderLock::FolderLock(const Path& folder)
+    : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {}
+
 FolderLock::~FolderLock() {
   if (fd_ >= 0) ::close(fd_);
 }
 
 Result<FolderLock> FolderLock::Take(const Path& folder) {
   TILEGRAD_TRY(MakeFolder(folder));
-  const Path file = folder / ".lock";
-  FolderLock lock;
-  lock.fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (lock.fd_ < 0) return IoError("{}: cannot create: {}", file.string(), std::strerror(errno));
+  FolderLock lock(folder);
+  if (lock.fd_ < 0) return IoError("{}: cannot open: {}", folder.string(), std::strerror(errno));
   // IsHeld takes it for a moment: once more, then.
   for (int attempt = 0; ::flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
        ++attempt) {
@@ -39,11 +40,7 @@ Result<FolderLock> FolderLock::Take(const Path& folder) {
 }
 
 bool FolderLock::IsHeld(const Path& folder) {
-  const FolderLock probe = [&] {
-    FolderLock lock;
-    lock.fd_ = ::open((folder / ".lock").c_str(), O_RDONLY | O_CLOEXEC);
-    return lock;
-  }();
+  const FolderLock probe(folder);
   return probe.fd_ >= 0 && ::flock(probe.fd_, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 

@@ -19,13 +19,16 @@ class FolderLock {
     return *this;
   }
 
-  // Makes the folder and a file `.lock` in it. kInvalidArgument if another process holds it. On a
-  // file system without locks the result locks nothing.
+  // Makes the folder, and locks it itself: no file of ours is left in it. kInvalidArgument if
+  // another process holds it. On a file system without locks of folders (NFS) the result locks
+  // nothing.
   static Result<FolderLock> Take(const Path& folder);
   // Whether somebody holds it, this process included.
   static bool IsHeld(const Path& folder);
 
  private:
+  explicit FolderLock(const Path& folder);  // opened, not locked
+
   int fd_ = -1;
 };
 

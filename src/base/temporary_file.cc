@@ -46,6 +46,8 @@ Path TemporaryOf(const Path& path) {
   return path.parent_path() / (name + ending);
 }
 
+bool IsTemporary(const Path& file) { return WriterOf(file).has_value(); }
+
 LeftTemporaries::LeftTemporaries(const Path& folder) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {

@@ -13,6 +13,9 @@ namespace tilegrad {
 // of a name that would become too long.
 Path TemporaryOf(const Path& path);
 
+// Whether a file is called as one that is being written, or was when its process was killed.
+bool IsTemporary(const Path& file);
+
 // The temporaries in a folder whose process does not run any more.
 class LeftTemporaries {
  public:

@@ -143,7 +143,9 @@ void PrintJson(const train::BuildSummary& summary, const Path& folder) {
 
 Result<std::unique_ptr<train::ModelSource>> Open(const DatasetOptions& options, const Path& folder,
                                                  const Ranks& ranks) {
-  if (!ranks.follows()) TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
+  // It goes on with a dataset that is there, unless it is to be made anew.
+  if (!ranks.follows() && !PathExists(train::DatasetInfoPath(folder)))
+    TILEGRAD_TRY(OutputGuard(options.force).CheckFolder(folder));
   TILEGRAD_TRY(CheckEffects(options));
   return OpenDatasetSource(RequestOf(options));
 }
@@ -158,6 +160,7 @@ Status Make(const DatasetOptions& options) {
   if (!ready.ok()) return ranks.Told(ready);
   train::BuildOptions build = options.build;
   build.crew = ranks.crew();
+  build.anew = options.force;
   const Workers workers(ranks.Workers(options.workers));
   ProgressLine line;
   auto made = train::BuildDataset(**source, build, folder, workers,

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "base/output_guard.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/ranks.h"
@@ -54,7 +53,6 @@ Status Prepare(const EvalOptions& options, const Workers& workers, Ranks& ranks,
   TILEGRAD_ASSIGN(out->data, ChooseDataset(options.on.data, out->run));
   if (kSplits.at(options.split) == train::Split::kTest && options.refine == 0)
     out->files = {out->run / "eval.md", out->run / "eval.json"};
-  if (!ranks.follows()) TILEGRAD_TRY(OutputGuard(options.force).CheckAll(out->files));
   TILEGRAD_ASSIGN(out->predictor, LoadPredictor(out->run, workers));
   return {};
 }
@@ -90,7 +88,6 @@ Status Tell(const train::Evaluation& evaluation, const EvalOptions& options,
   Print("{}\n{}", evaluation.predictor, train::FormatTable(evaluation));
   PrintResult(train::EvaluationJson(evaluation));
   if (subject.files.empty()) return {};
-  OutputGuard(options.force).NoteAll(subject.files);
   Print("written to {} and {}\n", subject.files[0].string(), subject.files[1].string());
   return {};
 }
@@ -139,7 +136,8 @@ void AddEval(CommandList* list) {
                "steps of fitting the template to all views of each model, for a row that says how "
                "good predictions can be at best; 300 take a second a model or two",
                {Range{0, 100000}});
-  AddForceOption(command, &options->force);
+  command->Add("--force", &options->force, "of earlier versions: the files are the run's own",
+               {Hidden{}});
 }
 
 }  // namespace tilegrad::cli

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/fit_parameters.h"
@@ -16,7 +17,7 @@
 #include "fit/poses/start_cameras.h"
 #include "fit/run.h"
 #include "io/mesh_file.h"
-#include "train/run/checkpoint.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::cli {
 namespace {
@@ -70,21 +71,18 @@ Status SetConfig(const FitOptions& options, FitConfig* config) {
 
 // Before anything is read or made: a folder that was misspelt would get a fit of its own.
 Status CheckResume(const FitOptions& options) {
-  if (!options.resume || !train::ListCheckpoints(options.out).empty()) return {};
-  return NotFound(
-      "{}: no fit to go on with: there is no checkpoint in it; leave out --resume to start one",
-      options.out);
+  if (!options.resume) return {};
+  TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(options.out));
+  if (holds) return {};
+  return NotFound("{}: no checkpoint to resume; leave out --resume to start a fit", options.out);
 }
 
-Result<train::FitJob> MakeJob(const FitOptions& options) {
+// What the fit is about, and in `guard` what it reads.
+Result<train::FitJob> MakeJob(const FitOptions& options, OutputGuard* guard) {
   train::FitJob job;
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
-  job.guard = OutputGuard(options.force);
-  if (!options.doctor) {
-    TILEGRAD_TRY(CheckRunFolder(options.out, job.guard));
-    TILEGRAD_TRY(CheckResume(options));
-  }
+  guard->AddInput(options.input);
   TILEGRAD_ASSIGN(
       job.input,
       options.dataset_model.empty()
@@ -98,14 +96,28 @@ Result<train::FitJob> MakeJob(const FitOptions& options) {
   if (const auto shape = shapes.find(options.start); shape != shapes.end()) {
     job.config.start = shape->second;
   } else {
-    TILEGRAD_ASSIGN(job.start, LoadFitMesh(options.start, &job.guard));
+    TILEGRAD_ASSIGN(job.start, LoadFitMesh(options.start, guard));
   }
   if (!options.truth.empty()) {
-    TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, &job.guard));
+    TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, guard));
   }
-  job.out = options.out;
-  job.existing = options.resume ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
   return job;
+}
+
+// Before anything is read or made.
+Status CheckFolder(const FitOptions& options, const OutputGuard& guard) {
+  if (options.doctor) return {};
+  TILEGRAD_TRY(CheckResume(options));
+  return CheckRunFolder(options.out, ExistingOf(options.resume, options.force), guard);
+}
+
+// Nobody else works in the folder from now on. --force takes away what an earlier fit left there.
+Result<FolderLock> ClaimFolder(const FitOptions& options, const OutputGuard& guard) {
+  TILEGRAD_ASSIGN(FolderLock lock, FolderLock::Take(options.out));
+  TILEGRAD_TRY(CheckFolder(options, guard));
+  TILEGRAD_TRY(guard.CheckNotRead(train::RunFiles(options.out)));
+  if (options.force) TILEGRAD_TRY(train::RemoveRun(options.out));
+  return lock;
 }
 
 void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
@@ -163,8 +175,15 @@ void PrintJson(const FitOptions& options, const train::FitOutcome& o) {
 }
 
 Status RunFitting(const FitOptions& options) {
-  TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options));
+  OutputGuard guard(options.force);
+  TILEGRAD_TRY(CheckFolder(options, guard));
+  TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options, &guard));
   const Workers workers(options.workers);
+  FolderLock lock;
+  if (!options.doctor) {
+    TILEGRAD_ASSIGN(lock, ClaimFolder(options, guard));
+    job.out = options.out, job.locked = true, job.existing = train::ExistingRun::kContinue;
+  }
   ProgressLine line;
   const std::size_t warnings = job.input.warnings.size();
   const Status cameras = train::StartCameras({options.pictures.find_cameras, options.resume}, &job,
@@ -263,7 +282,8 @@ void AddFit(CommandList* list) {
                {SplitAtCommas{}});
   command->Add(
       "--resume", &options->resume,
-      "go on with the fit in --out, which has saved something; a finished one with more --steps");
+      "go on with the fit in --out, which has saved something; a finished one with more --steps",
+      {Excludes{{"--force"}}});
   command->Add("--doctor", &options->doctor,
                "only say what gets a gradient at the start, and why not");
   AddLiveOption(command, &options->live);

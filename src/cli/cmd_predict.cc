@@ -149,7 +149,6 @@ Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
   }
   TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
   TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
-  guard.NoteAll(written);
   Print("{} -> {}, {}, {}{}\n", file, glb.string(), turntable.string(), animation.string(),
         options.relight ? ", " + relit.string() : "");
   json->push_back({{"image", file},

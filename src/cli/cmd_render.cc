@@ -72,6 +72,8 @@ std::vector<std::string> MaterialNotes(const Mesh& mesh, bool soft) {
   return notes;
 }
 
+bool IsJson(const Path& cameras) { return cameras.extension() == ".json"; }
+
 class RenderRun {
  public:
   explicit RenderRun(const RenderSettings& settings)
@@ -84,6 +86,8 @@ class RenderRun {
     for (const std::string& mesh : settings.meshes) guard_.AddInput(mesh);
   }
 
+  // Whether files of cameras may be written, before anything is rendered.
+  Status CheckCameras() const;
   Status Mesh(const std::string& file);
   Status Finish();
 
@@ -92,7 +96,7 @@ class RenderRun {
                                                 const std::vector<io::CameraView>& views);
   Status ClaimFiles(const PictureName& name);
   Status View(const MeshScene& scene, const io::CameraView& view, const PictureName& name);
-  Status WriteCameras();
+  Status WriteCameras() const;
   FaceCulling Culling(const MeshScene& scene) const;
   void Explain(const Picture& picture, const std::string& name) const;
 
@@ -154,7 +158,6 @@ Status RenderRun::View(const MeshScene& mesh_scene, const io::CameraView& view,
   TILEGRAD_TRY(renderer_.Render(scene, request, &picture));
   TILEGRAD_TRY(WritePicture(picture, settings_.scene.color_space, settings_.file, name));
   const std::vector<Path> files = PictureFiles(settings_.file, name);
-  guard_.NoteAll(files);
   rendered_.insert(rendered_.end(), files.begin(), files.end());
   if (settings_.explain) Explain(picture, name.stem.string());
   views_.push_back(
@@ -208,19 +211,21 @@ Status RenderRun::Finish() {
   return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
 }
 
-Status RenderRun::WriteCameras() {
+Status RenderRun::CheckCameras() const {
   const Path out(settings_.write_cameras);
-  const bool json = out.extension() == ".json";
-  const auto files = json ? std::vector<Path>{out} : io::ColmapFiles(out);
-  TILEGRAD_TRY(guard_.CheckAll(files));
-  TILEGRAD_TRY(json ? io::SaveNerfCameras(out, views_) : io::SaveColmapCameras(out, views_));
-  guard_.NoteAll(files);
-  return {};
+  if (out.empty()) return {};
+  return guard_.CheckAll(IsJson(out) ? std::vector<Path>{out} : io::ColmapFiles(out));
+}
+
+Status RenderRun::WriteCameras() const {
+  const Path out(settings_.write_cameras);
+  return IsJson(out) ? io::SaveNerfCameras(out, views_) : io::SaveColmapCameras(out, views_);
 }
 
 // One bad mesh does not keep the others from being rendered; the first error is the result.
 Status RunRender(const RenderSettings& settings) {
   RenderRun run(settings);
+  TILEGRAD_TRY(run.CheckCameras());
   Status first;
   for (const std::string& file : settings.meshes) {
     const Status status = run.Mesh(file);

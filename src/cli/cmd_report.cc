@@ -33,14 +33,12 @@ Status RunReport(const ReportOptions& options) {
   job.models = options.models;
   const OutputGuard guard(options.force);
   const Path files[] = {job.out, job.sheet};
-  TILEGRAD_TRY(guard.CheckAll(files));
+  if (!options.out.empty()) TILEGRAD_TRY(guard.CheckAll(files));  // else the run's own
   const Workers workers(options.on.workers);
   ProgressLine line;
   const auto summary = train::WriteReport(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   if (!summary.ok()) return summary.status();
-  guard.Note(job.out);
-  if (!summary->sheet_columns.empty()) guard.Note(job.sheet);
   for (const std::string& warning : summary->warnings)
     PrintNote("tilegrad: warning: passed over: {}\n", warning);
   Print("{}: {}, {:.1f} MB; open it in a browser\n", job.out.string(),

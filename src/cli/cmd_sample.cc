@@ -138,7 +138,6 @@ Status RunSampling(const SampleOptions& options) {
   if (options.interpolate > 0)
     TILEGRAD_TRY(Interpolate(options, files, codes, *model, workers, &json));
   if (options.score) TILEGRAD_TRY(Score(options, files, run, *model, &json));
-  guard.NoteAll(files.all);
   PrintResult(json);
   return {};
 }

@@ -86,7 +86,8 @@ Result<std::vector<ImageU8>> DrawFrames(const TimelapseOptions& options,
 Status RunTimelapse(const TimelapseOptions& options) {
   const Path run = options.run;
   const Path out = options.out.empty() ? run / "timelapse.webp" : Path(options.out);
-  const OutputGuard guard(options.force);
+  // The run's own is replaced.
+  const OutputGuard guard(options.force || options.out.empty());
   TILEGRAD_TRY(guard.Check(out));
   TILEGRAD_ASSIGN(const auto files, MeshFiles(run));
   TILEGRAD_ASSIGN(const auto meshes, LoadMeshes(files));

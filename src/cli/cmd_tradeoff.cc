@@ -34,7 +34,7 @@ std::vector<Path> StudyFiles(const Path& folder, bool trained) {
 }
 
 Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
-                  const std::vector<StudyTraining>& training, const OutputGuard& guard) {
+                  const std::vector<StudyTraining>& training) {
   TILEGRAD_TRY(MakeFolder(folder));
   const std::string tables = StudyMarkdown(results, training);
   TILEGRAD_TRY(WriteTextAtomic(folder / "tradeoff.md", tables));
@@ -43,7 +43,6 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
   if (!training.empty()) {
     TILEGRAD_TRY(WriteTextAtomic(folder / "training.csv", TrainingCsv(training)));
   }
-  guard.NoteAll(StudyFiles(folder, !training.empty()));
   Print("{}written to {}: tradeoff.md, tradeoff.csv, tradeoff.svg{}\n", tables, folder.string(),
         training.empty() ? "" : ", training.csv");
   PrintResult({{"folder", folder.string()},
@@ -93,7 +92,7 @@ Status RunTradeoff(const TradeoffOptions& options) {
     TILEGRAD_ASSIGN(training, RunTrainingStudy(study, workers, line.Sink(), StopOnSignals()));
   }
   line.Finish();
-  return WriteStudy(options.out, results, training, guard);
+  return WriteStudy(options.out, results, training);
 }
 
 }  // namespace

@@ -89,8 +89,7 @@ Status MakeJob(TrainOptions* options, train::TrainJob* job) {
   TILEGRAD_TRY(train::ApplyOverrides(options->overrides, &job->config));
   job->data = options->data;
   job->run = options->out;
-  job->existing =
-      !options->resume.empty() ? train::ExistingRun::kContinue : train::ExistingRun::kRefuse;
+  job->existing = ExistingOf(!options->resume.empty(), options->force);
   job->max_minutes = options->max_minutes;
   return {};
 }
@@ -112,7 +111,7 @@ Status RunTraining(const TrainOptions& given) {
   train::TrainJob job;
   Status ready = MakeJob(&options, &job);
   if (ready.ok() && !ranks.follows())
-    ready = CheckRunFolder(options.out, OutputGuard(options.force));
+    ready = CheckRunFolder(options.out, job.existing, OutputGuard(options.force));
   ready = ranks.Agree(ready);
   if (!ready.ok()) return ranks.Told(ready);
   job.crew = ranks.crew();
@@ -144,14 +143,14 @@ void AddTrain(CommandList* list) {
   command->Add("--out", &options->out, "run folder: checkpoints, curves, samples");
   command->Add("--set", &options->overrides,
                "override a key: --set schedule.steps=100 (repeatable)");
+  AddForceOption(command, &options->force);
   command->Add("--resume", &options->resume,
                "continue the run in this folder, with its configuration and dataset; without a "
                "folder the one in --out (started if there is none)",
-               {ValueMayLack{kRunInOut, "[RUN]"}});
+               {ValueMayLack{kRunInOut, "[RUN]"}, Excludes{{"--force"}}});
   command->Add("--steps", &options->steps,
                "as --set schedule.steps=N; with --resume it may be more than the run began with",
                {NoDefault{}, Range{1, 0x1p40}});
-  AddForceOption(command, &options->force);
   command->Add("--max-minutes", &options->max_minutes,
                "save and stop after this many minutes; 0: no limit", {NotNegative()});
   AddLiveOption(command, &options->live);

@@ -20,11 +20,12 @@ struct ViewsOptions {
 };
 
 Status RunViews(const ViewsOptions& options) {
+  OutputGuard guard(options.force);
+  TILEGRAD_TRY(guard.CheckFolder(options.out));  // before the mesh is read
   TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(options.mesh));
   for (const auto& warning : loaded.warnings) PrintNote("tilegrad: warning: {}\n", warning);
   TILEGRAD_TRY(TakeTexture(options.texture, &loaded));
   TurnUpright(options.up, &loaded.mesh);
-  OutputGuard guard(options.force);
   guard.AddInputs(loaded.files);
   ProgressLine line;
   TILEGRAD_TRY(train::MakeViews(std::move(loaded.mesh), options.views, options.out, guard,

@@ -14,6 +14,7 @@
 #include "base/read_budget.h"
 #include "cli/console.h"
 #include "train/run/checkpoint.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::cli {
 
@@ -65,7 +66,8 @@ void AddReadLimitOption(Command* command) {
 void AddForceOption(Command* command, bool* force) {
   command->Add(
       "--force", force,
-      "replace files that are there even if tilegrad did not write them; never what is read here");
+      "start anew where an earlier call has been, and replace files that are there; never what is "
+      "read here");
 }
 
 void AddRunOptions(Command* command, RunOptions* options) {
@@ -74,8 +76,15 @@ void AddRunOptions(Command* command, RunOptions* options) {
   AddWorkersOption(command, &options->workers);
 }
 
-Status CheckRunFolder(const Path& folder, const OutputGuard& guard) {
-  return train::ListCheckpoints(folder).empty() ? guard.CheckFolder(folder) : Status();
+train::ExistingRun ExistingOf(bool resume, bool force) {
+  if (resume) return train::ExistingRun::kContinue;
+  return force ? train::ExistingRun::kReplace : train::ExistingRun::kRefuse;
+}
+
+Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const OutputGuard& guard) {
+  TILEGRAD_TRY(train::CheckExistingRun(folder, existing));
+  TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(folder));
+  return holds ? Status() : guard.CheckFolder(folder);
 }
 
 Result<Path> ChooseRun(const std::string& given) {

@@ -7,6 +7,7 @@
 #include "base/output_guard.h"
 #include "cli/command.h"
 #include "train/predictor.h"
+#include "train/run/run.h"
 
 namespace tilegrad::cli {
 
@@ -26,8 +27,11 @@ void AddReadLimitOption(Command* command);
 // --force, for base/output_guard.h.
 void AddForceOption(Command* command, bool* force);
 
-// Whether a run may begin or go on in the folder: it holds a run, or nothing that is not ours.
-Status CheckRunFolder(const Path& folder, const OutputGuard& guard);
+// What --resume and --force mean for a run that is there.
+train::ExistingRun ExistingOf(bool resume, bool force);
+// Whether a run may begin or go on in the folder: it holds one, and `existing` allows that, or it
+// holds nothing.
+Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const OutputGuard& guard);
 // `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
 // note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);

@@ -2,8 +2,8 @@
 #include "fit/make_views.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <vector>
 
@@ -60,46 +60,35 @@ bool IsHeldOut(const ViewsOptions& o, int index) {
 
 std::string ImageName(int index) { return fmt::format("images/{:03}.png", index); }
 
-// Those images beyond `count` that the files of cameras of an earlier call name as ours are named.
-std::vector<Path> EarlierImages(const Path& folder, int count, const OutputGuard& guard) {
-  std::vector<Path> out;
-  for (const char* name : {kTrainName, kTestName}) {
-    const auto frames = ReadTransforms(folder / name);
+// What an earlier call left that this one may not write: cameras, and the images that they name as
+// it names them.
+std::vector<Path> EarlierViews(const Path& folder) {
+  std::vector<Path> cameras = {folder / kTrainName, folder / kTestName}, images;
+  if (!PathExists(folder / kTruthName)) return cameras;
+  for (const Path& file : cameras) {
+    const auto frames = ReadTransforms(file);
     if (!frames.ok()) continue;
     for (const TransformsFrame& frame : *frames) {
-      const std::string stem = frame.image.stem().string();
-      int index = -1;
-      const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), index);
-      if (error != std::errc() || end != stem.data() + stem.size() || index < count) continue;
-      if (frame.image == folder / ImageName(index) && guard.IsOurs(frame.image)) {
-        out.push_back(frame.image);
-      }
+      const int index = std::atoi(frame.image.stem().c_str());
+      if (frame.image == folder / ImageName(index)) images.push_back(frame.image);
     }
   }
-  return out;
+  cameras.insert(cameras.end(), images.begin(), images.end());
+  return cameras;
 }
 
-// Takes away the cameras that an earlier call left: views of another mesh that stay would be fitted
-// or judged by. Then its images that none of the `count` new ones will replace.
-Status ClearEarlierViews(const Path& folder, int count, const OutputGuard& guard) {
-  std::error_code error;
+// Views of another mesh that stay would be fitted or judged by: they go, cameras first.
+Status ClearEarlierViews(const Path& folder, const OutputGuard& guard) {
   const Path other = folder / "transforms.json";  // what a fit reads first
   if (PathExists(other)) {
-    return InvalidArgument("{}: already exists, and belongs to other images; choose another folder",
-                           other.string());
+    return InvalidArgument(
+        "{}: belongs to other images, and a fit would read it; choose another folder",
+        other.string());
   }
-  if (!guard.IsOurs(folder / kTruthName)) TILEGRAD_TRY(guard.CheckFolder(folder));
-  const std::vector<Path> images = EarlierImages(folder, count, guard);
-  for (const char* name : {kTrainName, kTestName}) {
-    const Path file = folder / name;
-    if (!PathExists(file)) continue;
-    TILEGRAD_TRY(guard.Check(file));
-    if (!std::filesystem::remove(file, error)) {
-      return IoError("{}: cannot be replaced: {}", file.string(), error.message());
-    }
-  }
-  for (const Path& image : images) std::filesystem::remove(image, error);
-  return {};
+  TILEGRAD_TRY(guard.CheckFolder(folder));
+  const std::vector<Path> files = EarlierViews(folder);
+  TILEGRAD_TRY(guard.CheckAll(files));
+  return RemoveFiles(files);
 }
 
 }  // namespace
@@ -109,7 +98,7 @@ Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
   TILEGRAD_TRY(CheckViews(options));
   RemoveGlass(&mesh);
   TILEGRAD_TRY(NormalizeToBox(mesh, kHalfExtent));
-  TILEGRAD_TRY(ClearEarlierViews(folder, options.views + options.held_out, guard));
+  TILEGRAD_TRY(ClearEarlierViews(folder, guard));
   const Path truth = folder / kTruthName;
   TILEGRAD_TRY(WriteGuarded(guard, truth, [&] { return io::SaveGlb(truth, mesh); }));
   LitRenderer renderer;

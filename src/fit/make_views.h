@@ -22,11 +22,10 @@ struct ViewsOptions {
 //   <folder>/images/000.png, ...       RGBA, straight alpha
 //   <folder>/transforms_train.json, transforms_test.json
 //   <folder>/truth.glb                 the mesh as it was rendered
-// What an earlier call wrote there is replaced: files of cameras first, so that those of a call
-// that was stopped belong to nothing else. Images that they name, and that are not written again,
-// are removed, as is what killed calls left half-written. Cameras lie on a spiral that spreads
-// evenly over the sphere between the two elevations. Errors: options out of range; files that no
-// such call wrote, unless `guard` forces it; a transforms.json, which a fit would read instead.
+// A folder with files in it is refused, unless `guard` forces it: then what an earlier call left
+// goes, cameras first, so that those of a call that was stopped belong to nothing else. Cameras lie
+// on a spiral that spreads evenly over the sphere between the two elevations. Errors: options out
+// of range; such a folder; a transforms.json, which a fit would read instead.
 Status MakeViews(Mesh mesh, const ViewsOptions& options, const Path& folder,
                  const OutputGuard& guard, const ProgressSink& progress, const StopFlag& stop);
 

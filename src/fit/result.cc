@@ -68,20 +68,7 @@ Status FitResult::Score(FitOutcome* outcome) const {
   return {};
 }
 
-std::vector<Path> ResultFiles(const Path& out) {
-  return {out / "mesh.glb", out / "transforms_fitted.json", out / "timelapse.png",
-          out / "report.html"};
-}
-
 Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
-  const std::vector<Path> files = ResultFiles(job_.out);
-  TILEGRAD_TRY(job_.guard.CheckAll(files));
-  TILEGRAD_TRY(Write(plan, outcome));
-  job_.guard.NoteAll(files);
-  return {};
-}
-
-Status FitResult::Write(const RunPlan& plan, FitOutcome* outcome) const {
   TILEGRAD_TRY(SaveFittedGlb(job_.out / "mesh.glb", scene_));
   TILEGRAD_TRY(WriteCameras());
   TILEGRAD_TRY(ScoreCameras(job_, scene_, workers_, outcome));

@@ -10,9 +10,6 @@
 
 namespace tilegrad::train {
 
-// The files that stand for it, in its folder.
-std::vector<Path> ResultFiles(const Path& out);
-
 // The scene at the end, its scores and what is written of both.
 class FitResult {
  public:
@@ -21,7 +18,6 @@ class FitResult {
   Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
 
  private:
-  Status Write(const RunPlan& plan, FitOutcome* outcome) const;
   Result<ImageU8> Sheet(const RunPlan& plan) const;
   Status Score(FitOutcome* outcome) const;
   Status WriteCameras() const;

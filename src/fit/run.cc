@@ -48,6 +48,7 @@ RunPlan PlanOf(const FitJob& job) {
                .image_size = job.input.images.width,
                .existing = job.existing,
                .may_differ = "steps",  // only more of them: FitClock::LoadState
+               .locked = job.locked,
                .warn = job.warn};
   plan.schedule = {.steps = job.config.steps,
                    .seed = job.config.seed,
@@ -184,7 +185,7 @@ Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& worke
 Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop) {
   FitOutcome outcome;
-  TILEGRAD_TRY(job.guard.CheckAll(ResultFiles(job.out)));  // before the work
+  TILEGRAD_TRY(CheckExistingRun(job.out, job.existing));  // before the work
   TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers));
   if (!start.note.empty() && job.warn) job.warn(start.note);
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));

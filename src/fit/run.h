@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "base/output_guard.h"
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "fit/config.h"
@@ -31,7 +30,7 @@ struct FitJob {
   // Where cameras start; none: where the input has them, turned as the configuration says.
   std::vector<Camera> start_cameras;
   Path out;
-  OutputGuard guard;  // of the files beside the run's own
+  bool locked = false;  // RunPlan::locked
   ExistingRun existing = ExistingRun::kRefuse;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
 };

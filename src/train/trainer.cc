@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "train/portioned_update.h"
 #include "train/run/machine.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -29,7 +30,7 @@ class Training : public RunWork {
     header.dataset = job_.data.string();
     header.machine = DescribeMachine();
     TILEGRAD_TRY(WriteHeader(job_.run, header));
-    TILEGRAD_TRY(WriteTextAtomic(job_.run / "config.toml", WriteConfig(config_)));
+    TILEGRAD_TRY(WriteTextAtomic(job_.run / kTrainSettings, WriteConfig(config_)));
     if (job_.crew) ShareState(first_step);
     return {};
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nothing of the user's is overwritten, whatever the command: what stands there stays byte for byte
-// until --force, and what is read stays with it, too.
+// Nothing is overwritten, whatever the command: what stands there stays byte for byte until
+// --force, and what is read stays with it, too. A run's own folder knows its own files.
 #include <gtest/gtest.h>
 
 #include "io/glb_writer.h"
@@ -55,15 +55,13 @@ TEST_F(Outputs, DefaultNamesCannotBeThoseOfTextures) {
   EXPECT_TRUE(Exists("fuze_render_0001_depth.png"));
 }
 
-TEST_F(Outputs, PicturesOfOursAreReplacedOthersAreNot) {
+TEST_F(Outputs, PicturesAreReplacedByForceAlone) {
   for (const std::string name : {"a.png", "a.exr", "a.npy"}) {
     ExpectDone("render fuze.obj --size 8 --out " + name);
-    ExpectDone("render fuze.obj --size 9 --out " + name);
+    ExpectKept(name, "render fuze.obj --size 9 --out " + name, name + ": exists; --force");
     Write(name, std::string("mine"));
-    ExpectKept(name, "render fuze.obj --size 8 --out " + name, "--force");
     ExpectDone("render fuze.obj --size 8 --force --out " + name);
     EXPECT_NE(ReadText(folder_ / name).value(), "mine");
-    ExpectDone("render fuze.obj --size 9 --out " + name);
   }
   Write("turn/fuze_0001.png", std::string("mine"));
   ExpectKept("turn/fuze_0001.png", "render fuze.obj --size 8 --turntable 2 --out turn", "--force");
@@ -86,62 +84,99 @@ TEST_F(Outputs, InputsAreNotReplacedEvenByForce) {
 
 TEST_F(Outputs, CamerasAreNotReplaced) {
   ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras transforms.json");
-  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras transforms.json");
+  ExpectKept("transforms.json",
+             "render fuze.obj --size 8 --out b.png --write-cameras transforms.json",
+             "transforms.json: exists");
+  EXPECT_FALSE(Exists("b.png"));  // before anything is rendered
   ExpectKept("transforms.json",
              "render fuze.obj --size 8 --force --out a.png --cameras transforms.json "
              "--write-cameras transforms.json",
              "is read here");
   Write("sparse/images.txt", std::string("# mine\n"));
-  ExpectKept("sparse/images.txt", "render fuze.obj --size 8 --out a.png --write-cameras sparse",
+  ExpectKept("sparse/images.txt", "render fuze.obj --size 8 --out b.png --write-cameras sparse",
              "--force");
   EXPECT_FALSE(Exists("sparse/cameras.txt"));
   ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras sparse --force");
-  ExpectDone("render fuze.obj --size 8 --out a.png --write-cameras sparse");
 }
 
-TEST_F(Outputs, ViewsAndFits) {
+TEST_F(Outputs, ViewsFillAFolderOfTheirOwn) {
   const std::string views = "views fuze.obj --views 2 --held-out 0 --size 8 --out ";
   Write("photos/me.jpg", std::string("mine"));
   ExpectKept("photos/me.jpg", views + "photos", "--force");
   EXPECT_FALSE(Exists("photos/truth.glb"));
   ExpectDone(views + "photos --force");
   EXPECT_TRUE(Exists("photos/me.jpg"));
-  ExpectDone(views + "photos");
   Write("photos/images/001.png", std::string("retouched"));
   ExpectKept("photos/images/001.png", views + "photos", "--force");
-  ExpectDone(views + "v");
-  ExpectDone(views + "v");
+  ExpectDone(views + "photos --force");
+  EXPECT_NE(ReadText(folder_ / "photos/images/001.png").value(), "retouched");
+}
 
-  const std::string fit = "fit v --steps 1 --template-level 1 --texture-size 8 --out ";
-  ExpectKept("photos/me.jpg", fit + "photos", "--force");
-  Write("f/report.html", std::string("mine"));
-  ExpectKept("f/report.html", fit + "f", "--force");
-  ExpectDone(fit + "f --force");
-  EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "mine");
-  Write("f/report.html", std::string("annotated"));
-  ExpectKept("f/report.html", fit + "f --resume", "--force");
-  const Outcome resumed = Run(fit + "nowhere --resume");
+// Before a second of work; --force starts anew, --resume goes on.
+TEST_F(Outputs, FitsStartAnewOrGoOn) {
+  ExpectDone("views fuze.obj --views 2 --held-out 0 --size 8 --out v");
+  const std::string fit = "fit v --template-level 1 --texture-size 8 --steps ";
+  Write("f/me.jpg", std::string("mine"));
+  ExpectKept("f/me.jpg", fit + "2 --out f", "--force");
+  ExpectDone(fit + "2 --out f --force");
+  EXPECT_TRUE(Exists("f/me.jpg"));
+  ExpectKept("f/mesh.glb", fit + "2 --out f", "f: already holds a run; --resume goes on with it");
+  // The images are not even looked at.
+  ExpectKept("f/mesh.glb", "fit nowhere --out f", "already holds a run");
+  ExpectKept("f/mesh.glb", fit + "2 --out f --force --resume", "--resume excludes --force");
+  ExpectDone(fit + "1 --out f --force");
+  EXPECT_TRUE(Exists("f/checkpoints/step_00000001.safetensors"));
+  EXPECT_FALSE(Exists("f/checkpoints/step_00000002.safetensors"));
+  EXPECT_FALSE(Exists("f/timelapse/00000002.png"));
+  Write("f/report.html", std::string("of the run"));
+  ExpectDone(fit + "3 --out f --resume");
+  EXPECT_NE(ReadText(folder_ / "f/report.html").value(), "of the run");
+  EXPECT_TRUE(Exists("f/me.jpg"));
+  const Outcome resumed = Run(fit + "1 --out nowhere --resume");
   EXPECT_EQ(resumed.exit_code, 3) << resumed.output;
-  EXPECT_NE(resumed.output.find("nowhere: no fit to go on with"), std::string::npos)
+  EXPECT_NE(resumed.output.find("nowhere: no checkpoint to resume"), std::string::npos)
       << resumed.output;
   EXPECT_FALSE(Exists("nowhere"));
-  ExpectKept("f/mesh.glb", fit + "f --force --resume --mesh f/mesh.glb", "is read here");
+  for (const char* word : {" --force", " --resume"})
+    ExpectKept("f/mesh.glb", fit + "3 --out f --mesh f/mesh.glb" + word, "is read here");
 }
 
 TEST_F(Outputs, DatasetsAndRuns) {
-  const std::string dataset = "dataset --source procedural --per-class 1 --size 8 --views 1 --out ";
+  const std::string dataset = "dataset --source procedural --per-class 1 --views 1 --size ";
   Write("d/thesis.txt", std::string("mine"));
-  ExpectKept("d/thesis.txt", dataset + "d", "--force");
-  ExpectDone(dataset + "d --force");
-  ExpectDone(dataset + "d");  // it goes on in its own
+  ExpectKept("d/thesis.txt", dataset + "8 --out d", "--force");
+  ExpectDone(dataset + "8 --out d --force");
+  ExpectDone(dataset + "8 --out d");  // it goes on in its own
+  ExpectKept("d/dataset.json", dataset + "9 --out d", "of other settings");
+  ExpectDone(dataset + "9 --out d --force");
+  EXPECT_TRUE(Exists("d/thesis.txt"));
   Write("view.png", std::string("mine"));
   const std::string view = "dataset-view --split train --data d";
   ExpectKept("view.png", view, "--force");
   ExpectDone(view + " --force");
-  ExpectDone(view);
   Write("r/notes.txt", std::string("mine"));
   ExpectKept("r/notes.txt", "train --config " TILEGRAD_CONFIGS "/quick.toml --data d --out r",
              "--force");
+}
+
+TEST_F(Outputs, RunsStartAnewOrGoOn) {
+  ExpectDone("dataset --source procedural --per-class 2 --size 16 --views 2 --out d");
+  const std::string train = "train --config " TILEGRAD_CONFIGS
+                            "/quick.toml --data d --out r --set schedule.batch=2 --set "
+                            "network.channels=2 --set network.code=8 --set network.hidden1=8 --set "
+                            "network.hidden2=8 --set network.template_level=1 --steps ";
+  ExpectDone(train + "2");
+  ExpectDone("eval --run r --views-per-model 1");
+  Write("r/notes.txt", std::string("mine"));
+  ExpectKept("r/config.toml", train + "1", "already holds a run");
+  // What is wrong is said while the run is still there.
+  const Outcome wrong = Run(train + "1 --force --data nowhere");
+  EXPECT_NE(wrong.exit_code, 0);
+  EXPECT_TRUE(Exists("r/checkpoints/step_00000002.safetensors"));
+  ExpectDone(train + "1 --force");
+  EXPECT_TRUE(Exists("r/notes.txt"));
+  EXPECT_FALSE(Exists("r/checkpoints/step_00000002.safetensors"));
+  EXPECT_FALSE(Exists("r/eval.json"));  // of other weights
 }
 
 TEST_F(Outputs, PredictionsScoresAndReports) {
@@ -155,24 +190,24 @@ TEST_F(Outputs, PredictionsScoresAndReports) {
   Write("p/x_predicted.glb", std::string("mine"));
   ExpectKept("p/x_predicted.glb", predict + "p/x.png", "--force");
   EXPECT_FALSE(Exists("p/x_turntable.png"));
-  Write("p/x_turntable.webp", std::string("mine"));
-  ExpectKept("p/x_turntable.webp", predict + "p/x.png", "--force");
   ExpectDone(predict + "p/x.png --force");
-  ExpectDone(predict + "p/x.png");
+  ExpectKept("p/x_turntable.webp", predict + "p/x.png", "--force");
   // A picture that is read here, and has the name of a result.
   std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y.png");
   std::filesystem::copy_file(folder_ / "p/x.png", folder_ / "p/y_turntable.png");
   ExpectKept("p/y_turntable.png", predict + "--force p/y.png p/y_turntable.png", "is read here");
-  for (const auto& [file, command] :
-       {std::pair("r/eval.md", "eval --run r --views-per-model 1"),
-        std::pair("r/report.html", "report --run r --models 1"),
-        std::pair("r/summary.png", "report --run r --models 1"),
-        std::pair("page.html", "report --run r --models 1 --out page.html"),
-        std::pair("page_summary.png", "report --run r --models 1 --out page.html")}) {
-    Write(file, std::string("mine"));
-    ExpectKept(file, command, "--force");
-    ExpectDone(std::string(command) + " --force");
+  for (const auto& [file, command] : {std::pair("r/eval.md", "eval --run r --views-per-model 1"),
+                                      std::pair("r/report.html", "report --run r --models 1"),
+                                      std::pair("r/summary.png", "report --run r --models 1")}) {
+    Write(file, std::string("of an earlier call"));
     ExpectDone(command);
+    EXPECT_NE(ReadText(folder_ / file).value(), "of an earlier call") << file;
+  }
+  for (const char* file : {"page.html", "page_summary.png"}) {
+    const std::string report = "report --run r --models 1 --out page.html";
+    Write(file, std::string("mine"));
+    ExpectKept(file, report, "--force");
+    ExpectDone(report + " --force");
   }
 }
 

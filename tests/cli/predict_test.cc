@@ -40,7 +40,7 @@ class Predict : public TempFolderTest {
     return outcome.output;
   }
   std::string Said(const std::string& image, const std::string& run = "r") const {
-    return ExpectDone("predict --refine 0 --run " + In(run) + " --out " + In("out") + " " +
+    return ExpectDone("predict --refine 0 --force --run " + In(run) + " --out " + In("out") + " " +
                       In(image));
   }
 };
@@ -72,8 +72,8 @@ TEST_F(Predict, TheAnimationIsTheSameAgain) {
   const Bytes first = ReadFile(folder_ / "out/known_turntable.webp").value();
   ASSERT_GT(first.size(), 1000u);
   EXPECT_EQ(std::string(first.begin(), first.begin() + 4), "RIFF");
-  ExpectDone("predict --refine 0 --threads 3 --run " + In("r") + " --out " + In("out") + " " +
-             In("known.png"));
+  ExpectDone("predict --refine 0 --force --threads 3 --run " + In("r") + " --out " + In("out") +
+             " " + In("known.png"));
   EXPECT_EQ(ReadFile(folder_ / "out/known_turntable.webp").value(), first);
 }
 

@@ -202,7 +202,7 @@ TEST_F(Fit, ResumingWithOtherImagesIsRefused) {
 TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
   const auto make = [&](int held_out, const Path& folder) {
     return MakeViews(Icosphere(1, 1), {.views = 3, .held_out = held_out, .size = 16}, folder,
-                     OutputGuard(), {}, stop_);
+                     OutputGuard(true), {}, stop_);
   };
   ASSERT_TRUE(make(0, folder_ / "views").ok());
   const auto input = ReadFitFolder(folder_ / "views", 3);
@@ -223,13 +223,14 @@ TEST_F(Fit, ViewsMadeAnewLeaveNoneOfTheOldOnes) {
 }
 
 // Those of a longer call would be taken for views of the new mesh, by whoever looks. What no call
-// wrote, or none says that it did, stays.
+// made stays; and without a word nothing is replaced.
 TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
-  const auto make = [&](int views) {
+  const auto make = [&](int views, bool force) {
     return MakeViews(Icosphere(1, 1), {.views = views, .held_out = 1, .size = 16}, folder_ / "few",
-                     OutputGuard(), {}, stop_);
+                     OutputGuard(force), {}, stop_);
   };
-  ASSERT_TRUE(make(6).ok());
+  ASSERT_TRUE(make(6, false).ok());
+  ExpectMessage(make(2, false), "few", "--force");
   const Path images = folder_ / "few" / "images";
   Write("few/images/photo.png", std::string("mine"));
   Write("few/images/007.png", std::string("mine"));
@@ -237,15 +238,19 @@ TEST_F(Fit, FewerViewsLeaveNoImagesOfMoreViews) {
   for (const std::string name : {"001.png", "photo.png", "copy"}) {
     Write("few/images/" + name + ".99999999.tmp", std::string("half"));
   }
-  ASSERT_TRUE(make(2).ok());
+  ASSERT_TRUE(make(2, true).ok());
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(images)) {
     names.push_back(entry.path().filename().string());
   }
   std::sort(names.begin(), names.end());
-  const std::vector<std::string> expected = {
-      ".tilegrad-made", "000.png",           "001.png",   "002.png",
-      "007.png",        "copy.99999999.tmp", "photo.png", "photo.png.99999999.tmp"};
+  const std::vector<std::string> expected = {"000.png",
+                                             "001.png",
+                                             "002.png",
+                                             "007.png",
+                                             "copy.99999999.tmp",
+                                             "photo.png",
+                                             "photo.png.99999999.tmp"};
   EXPECT_EQ(names, expected);
 }
 

@@ -48,10 +48,10 @@ class Job:
             self.before(self.out)
 
     def next(self):
-        """The command as it is given after a kill: one that wants to be told that it goes on is told. A fit has to have
-        saved something; a training goes on with whatever there is."""
-        saved = self.words[0] != "fit" or any(self.out.glob("checkpoints/*.safetensors"))
-        return self.words + (self.again if saved else [])
+        """The command as it is given after a kill: one that wants to be told that it goes on, or may replace what is there,
+        is told. A fit has to have begun; a training goes on with whatever there is."""
+        begun = self.words[0] != "fit" or (self.out / "fit.txt").exists()
+        return self.words + (self.again if begun else [])
 
     def at(self, folder):
         """The same command, writing somewhere else."""
@@ -98,12 +98,12 @@ def jobs(f):
     yield Job("fit", ["fit", f / "views", "--out", f / "fit", "--steps", "20", "--checkpoint-every", "4", "--template-level", "2"],
               f / "fit", lambda out: bytes_of(out, ["*.glb"]), ["--resume"])
     yield Job("sample", ["sample", "--run", f / "generator", "--count", "2", "--interpolate", "2", "--out", f / "s"], f / "s",
-              lambda out: bytes_of(out, ["*.glb", "*.png"]))
+              lambda out: bytes_of(out, ["*.glb", "*.png"]), ["--force"])
     yield Job("eval", ["eval", "--run", f / "e", "--data", data, "--views-per-model", "1"], f / "e",
               lambda out: bytes_of(out, ["eval.json", "eval.md"]), before=copy_of_run)
     yield Job("report", ["report", "--run", f / "r", "--data", data, "--models", "1"], f / "r",
               lambda out: bytes_of(out, ["summary.png"]), before=copy_of_run)
     yield Job("predict", ["predict", "--run", run, "--refine", "1", "--out", f / "p", f / "view.png"], f / "p",
-              lambda out: bytes_of(out, ["*.glb", "*.png"]))
+              lambda out: bytes_of(out, ["*.glb", "*.png"]), ["--force"])
     yield Job("render", ["render", f / "ball.obj", "--size", "300", "--out", f / "d" / "drawn.png"], f / "d",
-              lambda out: bytes_of(out, ["*.png"]))
+              lambda out: bytes_of(out, ["*.png"]), ["--force"])

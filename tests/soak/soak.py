@@ -4,8 +4,8 @@
 
     tests/soak/soak.py PROGRAM KILLS [--folder FOLDER] [--seed N] [--only NAME]     exit code 1 if anything was lost
 
-After each kill every file that stands under its own name must be whole, and the same command, given again,
-must go on. When it is through, its results must be those of a command that nobody killed: the same bytes,
+After each kill every file that stands under its own name must be whole, and the same command, given again (with --resume
+or --force where it wants to be told so), must go on. When it is through, its results must be those of a command that nobody killed: the same bytes,
 weights tensor by tensor. Then what the system may refuse is refused to each (refusals.py). Counts are added to
 soak.tsv in FOLDER (default out/soak).
 """

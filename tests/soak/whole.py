@@ -65,7 +65,7 @@ CHECKS = {".png": check_png, ".safetensors": check_safetensors, ".glb": check_gl
 def check_folder(folder):
     """Everything that stands under its own name is whole."""
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-        if path.name.endswith(".tmp") or path.name == "lock":
+        if path.name.endswith(".tmp"):
             continue
         try:
             if path.suffix == ".npz":

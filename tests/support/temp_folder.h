@@ -22,7 +22,13 @@ class TempFolderTest : public testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
-  ~TempFolderTest() override { std::filesystem::remove_all(folder_); }
+  // Nothing hidden is left where somebody works.
+  ~TempFolderTest() override {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_, error))
+      EXPECT_FALSE(entry.path().filename().string().starts_with('.')) << entry.path();
+    std::filesystem::remove_all(folder_);
+  }
 
   // Without fsync, which would be most of the time of a test with many broken files.
   Path Write(const std::string& name, const std::string& text) const {

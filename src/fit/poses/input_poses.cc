@@ -74,10 +74,7 @@ Status ReadPoses(const Path& path, std::span<const Camera> lenses, FoundPoses* o
 }
 
 Status Keep(const InputPosesJob& job, const FoundPoses& found) {
-  std::error_code error;
-  std::filesystem::create_directories(job.file.parent_path(), error);
-  return WriteGuarded(job.guard, job.file,
-                      [&] { return WriteTextAtomic(job.file, TextOf(found)); });
+  return job.file.empty() ? Status() : WriteTextAtomic(job.file, TextOf(found));
 }
 
 // Held-out cameras were given in another world.

@@ -2,7 +2,6 @@
 // An input's cameras, found and kept beside the run.
 #pragma once
 
-#include "base/output_guard.h"
 #include "fit/input.h"
 #include "fit/poses/find_poses.h"
 
@@ -11,8 +10,7 @@ namespace tilegrad::train {
 struct InputPosesJob {
   PoseOptions options;
   Path file;  // cameras_start.json: keeps what was found, so that a fit that goes on need not look
-              // again
-  OutputGuard guard;
+              // again; empty: it is not kept
   bool reuse = false;  // reads `file` if it is there
 };
 

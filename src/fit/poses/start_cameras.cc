@@ -15,8 +15,8 @@ Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& work
                     const ProgressSink& progress, const StopFlag& stop) {
   InputPosesJob find;
   find.options.seed = job->config.seed;
-  find.file = job->out / "cameras_start.json";
-  find.guard = job->guard, find.reuse = search.resume;
+  if (!job->out.empty()) find.file = job->out / "cameras_start.json";
+  find.reuse = search.resume;
   const bool shaped = job->start.has_value();
   if (!job->input.posed || search.look) {
     TILEGRAD_TRY(FindInputPoses(find, &job->input, workers, progress, stop));

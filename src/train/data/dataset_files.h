@@ -29,7 +29,10 @@ const char* SplitName(Split split);  // "train", "validation", "test"
 Path DatasetInfoPath(const Path& folder);
 Path ModelsPath(const Path& folder);
 Path RejectedPath(const Path& folder);
+Path ContactSheetPath(const Path& folder);
 Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id);
+// Takes away the files of a dataset; others in its folder stay.
+Status RemoveDataset(const Path& folder);
 
 Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info);
 Result<DatasetInfo> ReadDatasetInfo(const Path& folder);

@@ -14,6 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "tilegrad-dataset-1";
+constexpr const char *kModelFolder = "models", *kModelEnding = ".npz";
 constexpr double kMostUnits = 1e6;  // far beyond any dataset, and float still has digits
 constexpr Split kSplits[] = {Split::kTrain, Split::kValidation, Split::kTest};
 
@@ -146,8 +147,21 @@ const char* SplitName(Split split) {
 Path DatasetInfoPath(const Path& folder) { return folder / "dataset.json"; }
 Path ModelsPath(const Path& folder) { return folder / "models.jsonl"; }
 Path RejectedPath(const Path& folder) { return folder / "rejected.jsonl"; }
+Path ContactSheetPath(const Path& folder) { return folder / "contact_sheet.png"; }
 Path ModelFilePath(const Path& folder, const std::string& class_name, const std::string& id) {
-  return folder / "models" / class_name / (id + ".npz");
+  return folder / kModelFolder / class_name / (id + kModelEnding);
+}
+
+// What marks the folder as ours last.
+Status RemoveDataset(const Path& folder) {
+  std::vector<Path> files = {ModelsPath(folder), RejectedPath(folder), ContactSheetPath(folder)};
+  std::error_code error;
+  for (std::filesystem::recursive_directory_iterator at(folder / kModelFolder, error), end;
+       !error && at != end; at.increment(error)) {
+    if (at->path().extension() == kModelEnding) files.push_back(at->path());
+  }
+  files.push_back(DatasetInfoPath(folder));
+  return RemoveFiles(files);
 }
 
 Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info) {

@@ -13,6 +13,7 @@
 #include "train/run/checkpoint.h"
 #include "train/run/first_difference.h"
 #include "train/run/log.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -89,8 +90,11 @@ class Session {
 };
 
 Status Session::Open() {
-  TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
+  if (!plan_.locked) {
+    TILEGRAD_ASSIGN(lock_, FolderLock::Take(plan_.folder));
+  }
   TILEGRAD_TRY(CheckExistingRun(plan_, work_));
+  if (plan_.existing == ExistingRun::kReplace) TILEGRAD_TRY(RemoveRun(plan_.folder));
   TILEGRAD_TRY(Restore());
   RemoveHalfWritten(plan_.folder);
   TILEGRAD_TRY(work_.Begin(first_step_));
@@ -110,7 +114,7 @@ Status Session::Restore() {
   const std::string file = found->file.string();
   // config.toml, which is written when a run is extended, was compared before: the newest
   // checkpoint may be older than that.
-  const bool compared = PathExists(plan_.folder / "config.toml");
+  const bool compared = PathExists(plan_.folder / kTrainSettings);
   TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
                              compared ? kStepsKey : plan_.may_differ));
   if (info.step > plan_.schedule.steps) {
@@ -218,22 +222,22 @@ RunOutcome Session::outcome() const { return {first_step_, done_, Seconds(), don
 
 }  // namespace
 
+Status CheckExistingRun(const Path& folder, ExistingRun existing) {
+  if (existing != ExistingRun::kRefuse) return {};
+  TILEGRAD_ASSIGN(const bool holds, HoldsRun(folder));
+  if (!holds) return {};
+  return InvalidArgument(
+      "{}: already holds a run; --resume goes on with it, --force starts anew, or choose another "
+      "--out",
+      folder.string());
+}
+
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work) {
-  const Path config_file = plan.folder / "config.toml";
-  std::error_code error;
-  const bool started = std::filesystem::exists(config_file, error);
-  if (error) {
-    return IoError("{}: cannot be looked for: {}", config_file.string(), error.message());
-  }
-  // Checkpoints alone are a run, too.
-  if ((started || !ListCheckpoints(plan.folder).empty()) && plan.existing == ExistingRun::kRefuse) {
-    return InvalidArgument(
-        "{}: already holds a run; give --resume to continue it, or another --out",
-        plan.folder.string());
-  }
-  if (!started) return {};
-  TILEGRAD_ASSIGN(const std::string before, ReadText(config_file));
-  return CheckSettings(plan, work, before, config_file, plan.may_differ);
+  TILEGRAD_TRY(CheckExistingRun(plan.folder, plan.existing));
+  const Path settings = plan.folder / kTrainSettings;
+  if (plan.existing != ExistingRun::kContinue || !PathExists(settings)) return {};
+  TILEGRAD_ASSIGN(const std::string before, ReadText(settings));
+  return CheckSettings(plan, work, before, settings, plan.may_differ);
 }
 
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,

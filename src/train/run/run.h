@@ -27,6 +27,7 @@ namespace tilegrad::train {
 enum class ExistingRun {
   kRefuse,    // an error that says what the choices are
   kContinue,  // continues from its newest whole checkpoint; starts if there is no run yet
+  kReplace,   // its files go (run_files.h), others stay; starts anew
 };
 
 // Told of each picture of a run once it is written.
@@ -43,6 +44,7 @@ struct RunPlan {
   // The setting that may differ from the run's own: its number of steps, "schedule.steps". Empty:
   // none.
   std::string may_differ = {};
+  bool locked = false;         // the caller holds the folder's lock already
   double max_minutes = 0;      // > 0: save and stop after this long
   WarningSink warn = nullptr;  // broken checkpoints that were passed over
   PictureSink drawn = nullptr;
@@ -87,6 +89,8 @@ struct RunOutcome {
 };
 
 // Refuses or accepts what is in the folder, before anything expensive: ExecuteRun does it again.
+// The first needs no settings to compare.
+Status CheckExistingRun(const Path& folder, ExistingRun existing);
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work);
 
 // Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled

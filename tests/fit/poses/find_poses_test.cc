@@ -37,7 +37,7 @@ class Poses : public TempFolderTest {
   FitInput Input(int views) {
     const Status made = MakeViews(
         Thing(), {.views = views, .held_out = 2, .size = 64, .lowest = -20, .highest = 60},
-        folder_ / "views", OutputGuard(), {}, stop_);
+        folder_ / "views", OutputGuard(true), {}, stop_);
     EXPECT_TRUE(made.ok()) << made.message();
     auto input = ReadFitFolder(folder_ / "views", 0);
     EXPECT_TRUE(input.ok()) << input.status().message();

@@ -118,6 +118,7 @@ class Builder {
 
   Status Prepare() {
     TILEGRAD_ASSIGN(lock_, FolderLock::Take(folder_));
+    if (options_.anew) TILEGRAD_TRY(RemoveDataset(folder_));
     info_.classes = ClassesOf(source_, chosen_);
     RemoveTemporaries(folder_);
     for (const std::string& name : info_.classes)
@@ -127,8 +128,8 @@ class Builder {
     if (!there.ok()) return there.status();
     if (there->recipe != info_.recipe) {
       return InvalidArgument(
-          "{} holds a dataset made with other settings (source {}, {} pixels, {} views); choose "
-          "another folder or delete it",
+          "{}: holds a dataset of other settings (source {}, {} pixels, {} views); choose another "
+          "folder, or --force to make it anew",
           folder_.string(), there->source, there->image_size, there->views);
     }
     // The index that may be there belongs to the classes of then, and stays until the new one.

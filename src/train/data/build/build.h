@@ -25,6 +25,7 @@ struct BuildOptions {
   int liveries = 0;   // at most that many models of a shape, chosen in the same way; 0: all
   int limit = 0;      // at most that many in all; 0: all
   UpAxis up = UpAxis::kY;  // of the source's meshes
+  bool anew = false;       // a dataset that is there goes first
   // Ranks that make the dataset together, in one folder that all of them see; null: this process
   // alone.
   Crew* crew = nullptr;

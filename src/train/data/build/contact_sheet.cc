@@ -6,6 +6,7 @@
 
 #include "io/image_file.h"
 #include "render/picture/composite.h"
+#include "train/data/dataset_files.h"
 
 namespace tilegrad::train {
 namespace {
@@ -47,7 +48,7 @@ Status WriteContactSheet(const Dataset& dataset) {
       }
     }
   }
-  return io::SavePng(dataset.folder() / "contact_sheet.png", sheet);
+  return io::SavePng(ContactSheetPath(dataset.folder()), sheet);
 }
 
 }  // namespace tilegrad::train

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run/run_files.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "base/error.h"
+#include "train/run/checkpoint.h"
+
+namespace tilegrad::train {
+namespace {
+
+constexpr std::array kNames = {kTrainSettings,
+                               kFitSettings,
+                               "run.json",
+                               "metrics.jsonl",
+                               "stream.png",
+                               "thumbnails.npz",
+                               "eval.json",
+                               "eval.md",
+                               "training_models.txt",
+                               "training_photographs.txt",
+                               "report.html",
+                               "summary.png",
+                               "cameras_start.json",
+                               "transforms_fitted.json",
+                               "mesh.glb",
+                               "timelapse.png",
+                               "timelapse.webp"};
+
+// Folders of a run, and how its files in them begin.
+struct Series {
+  const char *folder, *begin;
+};
+constexpr std::array kSeries = {Series{"checkpoints", "step_"}, Series{"samples", "step_"},
+                                Series{"timelapse", "0"}, Series{"tensorboard", "events."}};
+
+void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(run / series.folder, error), end; !error && at != end;
+       at.increment(error)) {
+    const bool ours = at->path().filename().string().starts_with(series.begin);
+    if (ours && at->is_regular_file(error)) out->push_back(at->path());
+  }
+}
+
+}  // namespace
+
+Result<bool> HoldsRun(const Path& folder) {
+  for (const char* name : {kTrainSettings, kFitSettings}) {
+    std::error_code error;
+    if (std::filesystem::exists(folder / name, error)) return true;
+    if (error)
+      return IoError("{}: cannot be looked for: {}", (folder / name).string(), error.message());
+  }
+  return !ListCheckpoints(folder).empty();
+}
+
+std::vector<Path> RunFiles(const Path& folder) {
+  std::vector<Path> out;
+  for (const char* name : kNames) {
+    if (PathExists(folder / name)) out.push_back(folder / name);
+  }
+  for (const Series& series : kSeries) AddSeries(folder, series, &out);
+  return out;
+}
+
+// Settings last: a run that is half removed still counts as one.
+Status RemoveRun(const Path& folder) {
+  std::vector<Path> files = RunFiles(folder);
+  std::ranges::reverse(files);
+  return RemoveFiles(files);
+}
+
+}  // namespace tilegrad::train

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// What stands in a run's folder, by name: the run and commands that look at it write these without
+// asking, and a run that starts anew takes them away first.
+#pragma once
+
+#include <vector>
+
+#include "base/file.h"
+
+namespace tilegrad::train {
+
+inline constexpr const char* kTrainSettings = "config.toml";  // of a training
+inline constexpr const char* kFitSettings = "fit.txt";        // of a fit
+
+// Whether it holds a run, which may have done no step yet: settings, or checkpoints.
+Result<bool> HoldsRun(const Path& folder);
+
+// The files of a run that are there now; other files in its folder are not ours.
+std::vector<Path> RunFiles(const Path& folder);
+// An error names the first that cannot be removed.
+Status RemoveRun(const Path& folder);
+
+}  // namespace tilegrad::train
