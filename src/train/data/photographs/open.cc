@@ -1,11 +1,72 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "train/data/photographs/photographs.h"
 
 namespace tilegrad::train {
+namespace {
+
+// What no annotation means: a crop of it would take hours, or a loss would not be finite.
+constexpr double kFarthestPlace = 1 << 20;                    // pixels
+constexpr double kSmallestScale = 1e-6, kLargestScale = 1e6;  // pixels for a unit of the world
+
+bool IsFarther(double at, double most) { return !(std::abs(at) <= most); }
+
+Status CheckBox(const Photograph& photo) {
+  const PhotoBox& box = photo.box;
+  const double width = photo.mask.width, height = photo.mask.height;
+  const double beyond = std::max(width, height);
+  if (box.left >= -beyond && box.top >= -beyond && box.right <= width + beyond &&
+      box.bottom <= height + beyond)
+    return {};
+  return InvalidArgument("its box ({}, {}) to ({}, {}) lies outside of its {} x {} pixels",
+                         box.left, box.top, box.right, box.bottom, width, height);
+}
+
+Status CheckKeypoints(const Photograph& photo) {
+  for (std::size_t k = 0; k < photo.keypoints.size(); ++k) {
+    const Keypoint& keypoint = photo.keypoints[k];
+    if (!keypoint.visible) continue;
+    if (IsFarther(keypoint.x, kFarthestPlace) || IsFarther(keypoint.y, kFarthestPlace))
+      return InvalidArgument("its keypoint {} at ({}, {}) is more than {} pixels away", k + 1,
+                             keypoint.x, keypoint.y, kFarthestPlace);
+  }
+  return {};
+}
+
+Status CheckCamera(const WeakPerspective& camera) {
+  if (!(camera.scale >= kSmallestScale && camera.scale <= kLargestScale))
+    return InvalidArgument("its camera's scale is {}; {:g} to {:g} pixels for a unit are possible",
+                           camera.scale, kSmallestScale, kLargestScale);
+  for (const double t : camera.translation) {
+    if (IsFarther(t, kFarthestPlace))
+      return InvalidArgument("its camera's translation of {} is more than {} pixels", t,
+                             kFarthestPlace);
+  }
+  return {};
+}
+
+Status CheckPlaces(const Photograph& photo) {
+  TILEGRAD_TRY(CheckBox(photo));
+  TILEGRAD_TRY(CheckKeypoints(photo));
+  return photo.camera ? CheckCamera(*photo.camera) : Status();
+}
+
+Status CheckMeanShape(const PhotographSet& set) {
+  for (const auto& place : set.mean_keypoints) {
+    for (const double x : place) {
+      if (IsFarther(x, kLargestScale))
+        return InvalidArgument("a mean keypoint is at {}, {:g} from the middle at most is possible",
+                               x, kLargestScale);
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 double PhotoBox::longer_side() const { return std::max(right - left, bottom - top); }
 
@@ -30,6 +91,9 @@ Result<PhotographSet> OpenPhotographs(const Path& folder) {
         folder.string());
   if (set->Select(Split::kTrain).empty())
     return InvalidArgument("{}: no photographs to train on", folder.string());
+  for (const Photograph& photo : set->photographs)
+    TILEGRAD_TRY(CheckPlaces(photo).Within((folder / photo.id).string()));
+  TILEGRAD_TRY(CheckMeanShape(*set).Within(folder.string()));
   return std::move(*set);
 }
 

@@ -29,7 +29,7 @@ class Averager {
       for (int i = 0; i < samples; ++i)
         Add(left + (i + 0.5) * side / samples, top + (j + 0.5) * side / samples, &sum);
     }
-    for (double& s : sum) s /= samples * samples;
+    for (double& s : sum) s /= static_cast<double>(samples) * samples;
     return sum;
   }
 
@@ -91,7 +91,7 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
   std::uint64_t done = 0;
   workers.For(photographs.size(), [&](std::size_t i, std::size_t) {
     if (stop) return;
-    failures[i] = store.LoadOne(i);
+    failures[i] = store.LoadOne(i, stop);
     const std::scoped_lock lock(mutex);
     if (progress) progress({"reading photographs", ++done, photographs.size(), ""});
   });
@@ -100,7 +100,7 @@ Result<PhotoStore> PhotoStore::Load(const PhotographSet& set, const std::vector<
   return store;
 }
 
-Status PhotoStore::LoadOne(std::size_t i) {
+Status PhotoStore::LoadOne(std::size_t i, const StopFlag& stop) {
   const Photograph& photo = *photos_[i];
   // Masks and boxes count pixels as the file stores them.
   TILEGRAD_ASSIGN(ImageU8 read, io::LoadImage(photo.image, io::PixelOrder::kStored));
@@ -114,7 +114,7 @@ Status PhotoStore::LoadOne(std::size_t i) {
   const double step = windows_[i].side / stored_;
   std::uint8_t* const out = &bytes_[i * stored_bytes()];
   const std::size_t plane = stored_bytes() / 4;
-  for (int y = 0; y < stored_; ++y) {
+  for (int y = 0; y < stored_ && !stop; ++y) {
     for (int x = 0; x < stored_; ++x) {
       const auto mean =
           averager.Mean(windows_[i].left + x * step, windows_[i].top + y * step, step);

@@ -65,7 +65,7 @@ class PhotoStore {
   struct Sub;  // a crop within what is stored
   void Resample(int i, const PhotoWindow& window, bool mirrored, std::span<float> rgb,
                 std::span<float> mask) const;
-  Status LoadOne(std::size_t i);
+  Status LoadOne(std::size_t i, const StopFlag& stop);
   std::size_t stored_bytes() const {
     return 4 * static_cast<std::size_t>(stored_) * static_cast<std::size_t>(stored_);
   }

@@ -72,7 +72,8 @@ struct PhotographSet {
   std::vector<int> Select(Split split) const;
 };
 
-// By what is there. Errors name file and place. At least one photograph of Split::kTrain; cameras,
+// By what is there. Errors name file and place, or the photograph: of boxes, keypoints and cameras,
+// too, that are far from any picture. At least one photograph of Split::kTrain; cameras,
 // where a folder has keypoints but none, are found by factorisation (factorization.h).
 Result<PhotographSet> OpenPhotographs(const Path& folder);
 

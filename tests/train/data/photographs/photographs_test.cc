@@ -95,7 +95,27 @@ struct Change {
   std::vector<std::string> parts;
 };
 
-// A field of the second picture or camera is replaced.
+// Of what WriteMiniature wrote, a field of the second picture or camera is replaced: the file that
+// has it, and how opening it ends.
+std::pair<Path, Status> OpenedWith(const Path& folder, const Change& change) {
+  const bool camera =
+      std::string(change.field) == "rot" || change.field[0] == 's' || change.field[0] == 't';
+  const Path path = folder / (camera ? "cachedir/cub/sfm/anno_train.mat"
+                                     : "cachedir/cub/data/train_cub_cleaned.mat");
+  const Bytes before = ReadFile(path).value();
+  auto file = io::LoadMat(path).value();
+  io::MatArray& array = file.variables[0].second;
+  const auto field = static_cast<std::size_t>(std::ranges::find(array.fields, change.field) -
+                                              array.fields.begin());
+  array.elements[array.fields.size() + field] = change.value;
+  EXPECT_TRUE(io::SaveMat(path, file.variables).ok());
+  const Status status = OpenPhotographs(folder).status();
+  EXPECT_TRUE(WriteFileAtomic(path, before).ok());
+  EXPECT_EQ(status.ok(), change.parts.empty()) << change.field << status.message();
+  for (const std::string& part : change.parts) ExpectMessage(status, part);
+  return {path, status};
+}
+
 TEST_F(PhotographsTest, ErrorsNameFileAndField) {
   WriteMiniature(folder_, "cub");
   const std::vector<double> nothing(45, NAN), shear = {1, 0, 0, 0.5, 1, 0, 0, 0, 1};
@@ -110,23 +130,32 @@ TEST_F(PhotographsTest, ErrorsNameFileAndField) {
       {"scale", io::MatArray::Number(-1), {"sfm_anno(2).scale", "-1"}},
       {"trans", io::MatArray::Number(1), {"sfm_anno(2).trans", "expected 2 numbers"}}};
   for (const Change& change : changes) {
-    const bool camera =
-        std::string(change.field) == "rot" || change.field[0] == 's' || change.field[0] == 't';
-    const Path path = folder_ / (camera ? "cachedir/cub/sfm/anno_train.mat"
-                                        : "cachedir/cub/data/train_cub_cleaned.mat");
-    const Bytes before = ReadFile(path).value();
-    auto file = io::LoadMat(path);
-    ASSERT_TRUE(file.ok());
-    io::MatArray& array = file->variables[0].second;
-    const auto field = static_cast<std::size_t>(std::ranges::find(array.fields, change.field) -
-                                                array.fields.begin());
-    array.elements[array.fields.size() + field] = change.value;
-    Write(std::filesystem::relative(path, folder_).string(), io::EncodeMat(file->variables));
-    const Status status = OpenPhotographs(folder_).status();
-    EXPECT_EQ(status.ok(), change.parts.empty()) << change.field << status.message();
-    for (const std::string& part : change.parts)
-      ExpectMessage(status, part, path.filename().string());
-    Write(std::filesystem::relative(path, folder_).string(), before);
+    const auto [file, status] = OpenedWith(folder_, change);
+    if (!status.ok()) ExpectMessage(status, file.filename().string());
+  }
+}
+
+io::MatArray Box(double x1, double y1, double x2, double y2) {
+  std::vector<io::MatArray> corners;
+  for (const double corner : {x1, y1, x2, y2}) corners.push_back(io::MatArray::Number(corner));
+  return io::MatArray::Structs({"x1", "y1", "x2", "y2"}, corners);
+}
+
+// Else a crop would take hours, and a training end many steps later with a loss of infinity.
+TEST_F(PhotographsTest, WhatIsFarFromAnyPictureNamesThePhotograph) {
+  WriteMiniature(folder_, "cub");
+  const std::vector<double> far_away(45, 1e300), down = {1, -1e300};
+  const Change changes[] = {
+      {"scale", io::MatArray::Number(1e300), {"scale is 1e+300"}},
+      {"scale", io::MatArray::Number(1e-300), {"scale is 1e-300"}},
+      {"trans", io::MatArray::Numbers({1, 2}, down), {"translation of -1e+300"}},
+      {"parts", io::MatArray::Numbers({3, 15}, far_away), {"keypoint 1 at (1e+300, 1e+300)"}},
+      {"bbox", Box(1, 1, 1e9, 48), {"box (0, 0) to (1000000000, 48)", "60 x 48 pixels"}},
+      {"bbox", Box(-1e5, 1, 60, 48), {"box (-100001, 0)"}},
+      {"bbox", Box(-58, -58, 120, 108), {}}};  // cut off at the edges, with room to spare
+  for (const Change& change : changes) {
+    const Status status = OpenedWith(folder_, change).second;
+    if (!status.ok()) ExpectMessage(status, "001.Bar/bar_1.png");
   }
 }
 
