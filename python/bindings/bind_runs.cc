@@ -109,7 +109,7 @@ train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& 
     const bool held = options.hold_out > 0 && (i + 1) % options.hold_out == 0;
     (held ? input.held_out : input.training).push_back(i);
   }
-  train::ApplyBackground(options.background, &input);
+  ThrowIfError(train::ApplyBackground(options.background, &input));
   return input;
 }
 

@@ -8,6 +8,8 @@
 #include <functional>
 #include <string>
 
+#include "tilegrad/status.h"
+
 namespace tilegrad {
 
 struct Progress {
@@ -27,5 +29,15 @@ using WarningSink = std::function<void(const std::string&)>;
 // Set from a signal handler or another thread; long work looks at it between units, saves, and
 // returns StatusCode::kCancelled.
 using StopFlag = std::atomic<bool>;
+
+// Both, for work that has many parts. Nobody watches one that is left out.
+struct Watch {
+  ProgressSink progress = nullptr;
+  const StopFlag* stop = nullptr;
+
+  bool stopped() const { return stop != nullptr && *stop; }
+  // Tells; kCancelled, naming the stage, once the work is to end.
+  Status At(const Progress& now) const;
+};
 
 }  // namespace tilegrad

@@ -13,6 +13,10 @@ std::string LowerCase(std::string_view text) {
   return lower;
 }
 
+std::string Plural(std::string_view thing, bool one) {
+  return std::string(thing) + (one ? "" : thing.ends_with('s') ? "es" : "s");
+}
+
 void AppendUtf8(std::uint32_t character, std::string* out) {
   if (character > 0x10FFFF || (character >= 0xD800 && character < 0xE000)) character = 0xFFFD;
   const int more = character < 0x80 ? 0 : character < 0x800 ? 1 : character < 0x10000 ? 2 : 3;

@@ -2,6 +2,7 @@
 // Letters and characters of text.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -10,6 +11,14 @@ namespace tilegrad {
 
 // ASCII's capital letters made small, as names of formats and endings are compared.
 std::string LowerCase(std::string_view text);
+
+// "file", or "files" unless there is one; "class", "classes".
+std::string Plural(std::string_view thing, bool one);
+// "1 file", "2 files".
+template <std::integral Number>
+std::string Count(Number number, std::string_view thing) {
+  return std::to_string(number) + " " + Plural(thing, number == 1);
+}
 
 // Appends a character of Unicode as UTF-8; U+FFFD for what is none (surrogates, above U+10FFFF).
 void AppendUtf8(std::uint32_t character, std::string* out);

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // tilegrad fit: images and cameras in, mesh, texture, light or better cameras out.
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <set>
 
 #include "base/error.h"
 #include "base/folder_lock.h"
 #include "cli/command.h"
 #include "cli/console.h"
+#include "cli/fit_outcome.h"
 #include "cli/fit_parameters.h"
 #include "cli/fit_pictures.h"
+#include "cli/given_options.h"
 #include "cli/live_server.h"
 #include "cli/run_folder.h"
 #include "fit/poses/start_cameras.h"
@@ -35,6 +36,7 @@ struct FitOptions {
   FitPictures pictures;
   FitConfig config;
   LiveOption live;
+  GivenOptions given;  // that the fit depends on
 };
 
 Result<Mesh> LoadFitMesh(const std::string& path, OutputGuard* guard) {
@@ -73,21 +75,26 @@ Status SetConfig(const FitOptions& options, FitConfig* config) {
 Status CheckResume(const FitOptions& options) {
   if (!options.resume) return {};
   TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(options.out));
+  if (holds && PathExists(Path(options.out) / train::kTrainSettings))
+    return InvalidArgument("{}: is a run of tilegrad train, not a fit", options.out);
   if (holds) return {};
   return NotFound("{}: no checkpoint to resume; leave out --resume to start a fit", options.out);
 }
 
+Result<train::FitInput> ReadInput(const FitOptions& options, const Watch& watch) {
+  return options.dataset_model.empty()
+             ? train::ReadFitFolder(options.input,
+                                    InputOptionsOf(options.pictures, options.hold_out, watch))
+             : train::ReadFitDataset(options.input, options.dataset_model, options.hold_out);
+}
+
 // What the fit is about, and in `guard` what it reads.
-Result<train::FitJob> MakeJob(const FitOptions& options, OutputGuard* guard) {
+Result<train::FitJob> MakeJob(const FitOptions& options, const Watch& watch, OutputGuard* guard) {
   train::FitJob job;
   job.config = options.config;
   TILEGRAD_TRY(SetConfig(options, &job.config));
   guard->AddInput(options.input);
-  TILEGRAD_ASSIGN(
-      job.input,
-      options.dataset_model.empty()
-          ? train::ReadFitFolder(options.input, InputOptionsOf(options.pictures, options.hold_out))
-          : train::ReadFitDataset(options.input, options.dataset_model, options.hold_out));
+  TILEGRAD_ASSIGN(job.input, ReadInput(options, watch));
   PrintWarnings(job.input, 0);
   static const std::map<std::string, train::StartShape> shapes = {
       {"auto", train::StartShape::kAuto},
@@ -101,125 +108,107 @@ Result<train::FitJob> MakeJob(const FitOptions& options, OutputGuard* guard) {
   if (!options.truth.empty()) {
     TILEGRAD_ASSIGN(job.truth, LoadFitMesh(options.truth, guard));
   }
+  TILEGRAD_TRY(train::CheckFit(job));
   return job;
 }
 
 // Before anything is read or made.
 Status CheckFolder(const FitOptions& options, const OutputGuard& guard) {
   if (options.doctor) return {};
-  TILEGRAD_TRY(CheckResume(options));
   return CheckRunFolder(options.out, ExistingOf(options.resume, options.force), guard);
 }
 
-// Nobody else works in the folder from now on. --force takes away what an earlier fit left there.
+// Nobody else works in the folder from now on. --force takes away what an earlier fit left there;
+// --resume finds there what this one was given.
 Result<FolderLock> ClaimFolder(const FitOptions& options, const OutputGuard& guard) {
   TILEGRAD_ASSIGN(FolderLock lock, FolderLock::Take(options.out));
   TILEGRAD_TRY(CheckFolder(options, guard));
   TILEGRAD_TRY(guard.CheckNotRead(train::RunFiles(options.out)));
   if (options.force) TILEGRAD_TRY(train::RemoveRun(options.out));
+  TILEGRAD_TRY(WriteGiven(Path(options.out) / train::kFitSettings, options.given));
   return lock;
 }
 
-void PrintFindings(const std::vector<train::Finding>& findings, bool all) {
-  for (const auto& f : findings) {
-    if (f.blocked) {
-      PrintNote("tilegrad: no gradient for {} at the start: {}\n", train::NameOf(f.parameter),
-                f.sentence);
-    } else if (all) {
-      Print("{}: {}\n", train::NameOf(f.parameter), f.sentence);
-    }
-  }
+Status RunDoctor(const FitOptions& options, train::FitJob job, const Workers& workers,
+                 const Watch& watch) {
+  const std::size_t warnings = job.input.warnings.size();
+  TILEGRAD_TRY(train::StartCameras({options.pictures.find_cameras}, &job, workers, watch.progress,
+                                   *watch.stop));
+  PrintWarnings(job.input, warnings);
+  TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers, watch));
+  PrintDiagnosis(findings);
+  return {};
 }
 
-void PrintScores(const char* name, const std::vector<train::ViewScore>& scores) {
-  if (scores.empty()) return;
-  Print("{}: PSNR {:.2f} dB, silhouette IoU {:.1f} %\n", name, train::MeanPsnr(scores),
-        100 * train::MeanIou(scores));
-}
-
-void PrintOutcome(const FitOptions& options, const train::FitOutcome& o) {
-  const bool early = o.last_step < options.config.steps;
-  Print("{} in {}{}\n", Count(static_cast<std::size_t>(o.last_step), "step"),
-        FormatDuration(o.seconds), early ? ", for more gained nothing (--stop-gain)" : "");
-  PrintScores("fitted views", o.training);
-  PrintScores("held-out views", o.held_out);
-  if (o.voxel_iou) Print("3D IoU at 32 voxels a side: {:.1f} %\n", 100 * *o.voxel_iou);
-  if (o.camera_error_before && o.camera_error_after) {
-    Print("cameras off by {:.2f} degrees at the start, {:.2f} at the end\n", *o.camera_error_before,
-          *o.camera_error_after);
-  }
-  const Path out = options.out;
-  Print("mesh {}\nlook at {}, or at it forming: tilegrad live {}\n", (out / "mesh.glb").string(),
-        (out / "report.html").string(), out.string());
-}
-
-nlohmann::ordered_json ScoresJson(const std::vector<train::ViewScore>& scores) {
-  if (scores.empty()) return nullptr;
-  return {{"views", scores.size()},
-          {"psnr", train::MeanPsnr(scores)},
-          {"silhouette_iou", train::MeanIou(scores)}};
-}
-
-void PrintJson(const FitOptions& options, const train::FitOutcome& o) {
-  const Path out = options.out;
-  nlohmann::ordered_json json = {{"folder", out.string()},
-                                 {"steps", o.last_step},
-                                 {"seconds", o.seconds},
-                                 {"training", ScoresJson(o.training)},
-                                 {"held_out", ScoresJson(o.held_out)},
-                                 {"voxel_iou", nullptr},
-                                 {"mesh", (out / "mesh.glb").string()},
-                                 {"report", (out / "report.html").string()}};
-  if (o.voxel_iou) json["voxel_iou"] = *o.voxel_iou;
-  PrintResult(json);
+// A fit whose folder is claimed.
+Status RunClaimed(const FitOptions& options, train::FitJob* job, const Workers& workers,
+                  ProgressLine* line) {
+  TILEGRAD_ASSIGN(const auto live,
+                  StartLive(options.live, {options.out, {}, options.config.steps}));
+  const std::size_t warnings = job->input.warnings.size();
+  TILEGRAD_TRY(train::StartCameras({options.pictures.find_cameras, options.resume}, job, workers,
+                                   line->Sink(), StopOnSignals()));
+  PrintWarnings(job->input, warnings);
+  job->warn = line->Warnings();
+  TILEGRAD_ASSIGN(const auto outcome, train::RunFit(*job, workers, line->Sink(), StopOnSignals()));
+  PrintFit(outcome, options.out, options.config.steps);
+  return {};
 }
 
 Status RunFitting(const FitOptions& options) {
   OutputGuard guard(options.force);
   TILEGRAD_TRY(CheckFolder(options, guard));
-  TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options, &guard));
-  const Workers workers(options.workers);
-  FolderLock lock;
-  if (!options.doctor) {
-    TILEGRAD_ASSIGN(lock, ClaimFolder(options, guard));
-    job.out = options.out, job.locked = true, job.existing = train::ExistingRun::kContinue;
-  }
   ProgressLine line;
-  const std::size_t warnings = job.input.warnings.size();
-  const Status cameras = train::StartCameras({options.pictures.find_cameras, options.resume}, &job,
-                                             workers, line.Sink(), StopOnSignals());
-  line.Finish();
-  PrintWarnings(job.input, warnings);
-  TILEGRAD_TRY(cameras);
-  if (options.doctor) {
-    TILEGRAD_ASSIGN(const auto findings, train::DiagnoseFit(job, workers));
-    PrintFindings(findings, true);
-    nlohmann::ordered_json json;
-    for (const auto& f : findings)
-      json.push_back({{"parameter", train::NameOf(f.parameter)},
-                      {"blocked", f.blocked},
-                      {"finding", f.sentence}});
-    PrintResult(json);
-    return {};
+  const Watch watch = line.Watching();
+  TILEGRAD_ASSIGN(train::FitJob job, MakeJob(options, watch, &guard));
+  const Workers workers(options.workers);
+  if (options.doctor) return RunDoctor(options, std::move(job), workers, watch);
+  TILEGRAD_ASSIGN(const FolderLock lock, ClaimFolder(options, guard));
+  job.out = options.out, job.locked = true, job.existing = train::ExistingRun::kContinue;
+  return WithCommand(RunClaimed(options, &job, workers, &line),
+                     "tilegrad fit --resume --out " + options.out);
+}
+
+// ---- Going on with what an earlier call was given.
+
+// Options that are no part of the fit, and those that a fit may go on with otherwise.
+const std::set<std::string> kOfTheCall = {"--out",  "--force",   "--resume",  "--doctor",
+                                          "--live", "--threads", "--workers", "--read-limit",
+                                          "--json", "--quiet"};
+const std::set<std::string> kMayDiffer = {"--steps", "--quality", "--timelapse",
+                                          "--checkpoint-every", "--truth"};
+
+Status TakeFromFit(const Path& fit, Command* command, CommandList* list) {
+  TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(fit));
+  if (!holds || !PathExists(fit / train::kFitSettings)) return {};
+  Continuation before;
+  TILEGRAD_ASSIGN(before.then, ReadGiven(fit / train::kFitSettings));
+  for (const char* name : {"input", "--start", "--truth"}) {
+    const auto found = before.then.find(name);
+    if (found == before.then.end()) continue;
+    found->second = FindFromRun(found->second, fit).value_or(found->second).string();
   }
-  TILEGRAD_ASSIGN(const auto live,
-                  StartLive(options.live, {options.out, {}, options.config.steps}));
-  job.warn = line.Warnings();
-  auto outcome = train::RunFit(job, workers, line.Sink(), StopOnSignals());
-  line.Finish();
-  if (!outcome.ok()) return outcome.status();
-  PrintFindings(outcome->findings, false);
-  PrintOutcome(options, *outcome);
-  PrintJson(options, *outcome);
-  return {};
+  before.may_differ = kMayDiffer;
+  before.may_differ.insert(kOfTheCall.begin(), kOfTheCall.end());
+  before.instead = {"--steps", "--quality"};
+  return ContinueWith(before, command, list);
+}
+
+Status StartOrGoOn(FitOptions* options, Command* command, CommandList* list) {
+  if (options->resume) TILEGRAD_TRY(TakeFromFit(options->out, command, list));
+  options->given = GivenOf(*command);
+  for (const std::string& name : kOfTheCall) options->given.erase(name);
+  TILEGRAD_TRY(CheckResume(*options));
+  if (options->input.empty())
+    return InvalidArgument("fit: input is required; see tilegrad fit --help");
+  return RunFitting(*options);
 }
 
 void AddWhat(Command* command, FitOptions* o) {
   command->Add(
       "input", &o->input,
       "folder with transforms.json (as NeRF's) and images with alpha or masks; or a COLMAP "
-      "project; or pictures alone, whose cameras are then found; or a dataset, with --model",
-      {Required{}});
+      "project; or pictures alone, whose cameras are then found; or a dataset, with --model");
   command->Add("--model", &o->dataset_model, "CLASS/ID: a model of a tilegrad dataset");
   command->Add("--out", &o->out, "folder for mesh.glb, report.html, ...");
   AddForceOption(command, &o->force);
@@ -272,18 +261,19 @@ void AddNumbers(Command* command, FitConfig* config) {
 }  // namespace
 
 void AddFit(CommandList* list) {
-  const auto [command, options] =
-      AddCommand(list, "fit", "Fit a mesh, texture, light or cameras to images by gradient descent",
-                 RunFitting);
-  AddWhat(command, options);
+  const auto options = std::make_shared<FitOptions>();
+  Command* const command = &list->emplace_back(
+      Command{"fit", "Fit a mesh, texture, light or cameras to images by gradient descent"});
+  command->action = [list, command, options] { return StartOrGoOn(options.get(), command, list); };
+  AddWhat(command, options.get());
   AddPictureOptions(command, &options->pictures);
   AddNumbers(command, &options->config);
   command->Add("--rate", &options->rates, "learning rate, NAME=NUMBER (repeatable)",
                {SplitAtCommas{}});
-  command->Add(
-      "--resume", &options->resume,
-      "go on with the fit in --out, which has saved something; a finished one with more --steps",
-      {Excludes{{"--force"}}});
+  command->Add("--resume", &options->resume,
+               "go on with the fit in --out, which knows what it was given; a finished one with "
+               "more --steps",
+               {Excludes{{"--force"}}});
   command->Add("--doctor", &options->doctor,
                "only say what gets a gradient at the start, and why not");
   AddLiveOption(command, &options->live);

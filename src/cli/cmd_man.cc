@@ -2,11 +2,11 @@
 // tilegrad man: manual pages of the program and its commands.
 #include <utility>
 
+#include "base/did_you_mean.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/did_you_mean.h"
 #include "cli/man_page.h"
 
 namespace tilegrad::cli {

@@ -11,6 +11,7 @@
 #include "cli/predict_pictures.h"
 #include "cli/run_folder.h"
 #include "cli/unique_names.h"
+#include "fit/background.h"
 #include "fit/input.h"
 #include "fit/refine.h"
 #include "io/glb_writer.h"
@@ -49,9 +50,16 @@ train::Framing FramingOf(const PredictOptions& options) {
   return options.keep_framing ? train::Framing::kKeep : train::Framing::kFit;
 }
 
-Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& file) {
+// A picture without transparency may stand before a plain background, as those of fits.
+Result<ImageU8> LoadCutout(const PredictOptions& options, const std::string& file,
+                           const Watch& watch) {
   TILEGRAD_ASSIGN(ImageU8 image, io::LoadImage(file));
-  if (options.mask.empty()) return image;
+  if (options.mask.empty() && !train::IsOpaque(image)) return image;
+  if (options.mask.empty()) {
+    TILEGRAD_TRY(watch.At({"looking for a plain background", 0, 0, ""}));
+    auto cutout = train::WithoutPlainBackground(image);
+    return cutout.ok() ? std::move(cutout) : cutout.status().Within(file);
+  }
   TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(options.mask));
   auto masked = train::WithMask(image, mask);
   return masked.ok() ? std::move(masked) : masked.status().Within(file);
@@ -69,18 +77,28 @@ std::vector<std::pair<std::string, std::string>> NameResults(
 
 Path RecordOf(Path match) { return match.replace_extension(".json"); }
 
-Status Refine(const PredictOptions& options, const ImageU8& cutout, const Path& file, Mesh* mesh,
-              const Workers& workers) {
+// What is the same for all images.
+struct Prediction {
+  const PredictOptions& options;
+  const TrainedNetwork& network;
+  const OutputGuard& guard;
+  const Workers& workers;
+  Watch watch;
+};
+
+Status Refine(const Prediction& p, const ImageU8& cutout, const Path& file, Mesh* mesh,
+              nlohmann::ordered_json* json) {
   TILEGRAD_ASSIGN(const auto planar,
-                  train::PrepareCutout(cutout, train::kRefineSize, FramingOf(options)));
+                  train::PrepareCutout(cutout, train::kRefineSize, FramingOf(p.options)));
   TILEGRAD_ASSIGN(train::RefinedMesh refined,
                   train::RefineMesh(*mesh, train::TargetsOfPlanar(planar, train::kRefineSize),
-                                    {.steps = options.refine}, workers));
-  TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, workers));
+                                    {.steps = p.options.refine, .watch = p.watch}, p.workers));
+  TILEGRAD_TRY(DrawMatch(planar, *mesh, refined, file, p.workers));
   TILEGRAD_TRY(WriteMatch(refined, RecordOf(file)));
+  const train::PictureMatch &before = refined.before, &after = refined.after;
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
-        100 * refined.before.silhouette_iou, 100 * refined.after.silhouette_iou,
-        refined.before.color_l1, refined.after.color_l1);
+        100 * before.silhouette_iou, 100 * after.silhouette_iou, before.color_l1, after.color_l1);
+  json->update(ScoresOf(refined));
   *mesh = std::move(refined.mesh);
   return {};
 }
@@ -119,43 +137,58 @@ Status Relight(const train::Predictor& predictor, std::span<const std::uint8_t> 
   return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size()}, file);
 }
 
-Status PredictOne(const TrainedNetwork& network, const PredictOptions& options,
-                  const std::pair<std::string, std::string>& image, const OutputGuard& guard,
-                  const Workers& workers, nlohmann::ordered_json* json) {
+// Where the results of an image go.
+struct ResultFiles {
+  ResultFiles(const PredictOptions& options, const std::string& stem)
+      : glb(Path(options.out) / (stem + "_predicted.glb")),
+        turntable(Path(options.out) / (stem + "_turntable.png")),
+        animation(Path(options.out) / (stem + "_turntable.webp")),
+        match(Path(options.out) / (stem + "_match.png")),
+        relit(Path(options.out) / (stem + "_relit.webp")),
+        all({glb, turntable, animation}) {
+    if (options.relight) all.push_back(relit);
+    if (options.refine > 0) all.insert(all.end(), {match, RecordOf(match)});
+  }
+  Path glb, turntable, animation, match, relit;
+  std::vector<Path> all;
+};
+
+Status Draw(const Prediction& p, const std::string& image, const ResultFiles& files,
+            const Mesh& mesh) {
+  TILEGRAD_TRY(p.watch.At({"drawing " + image, 0, 0, ""}));
+  TILEGRAD_TRY(DrawTurntable(mesh, files.turntable, p.workers));
+  return AnimateTurntable(mesh, files.animation, p.workers, p.watch);
+}
+
+Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>& image,
+                  nlohmann::ordered_json* all) {
   const auto& [file, stem] = image;
-  const Path out(options.out);
-  const Path glb = out / (stem + "_predicted.glb"), turntable = out / (stem + "_turntable.png"),
-             animation = out / (stem + "_turntable.webp"), match = out / (stem + "_match.png"),
-             relit = out / (stem + "_relit.webp");
-  std::vector<Path> written = {glb, turntable, animation};
-  if (options.relight) written.push_back(relit);
-  if (options.refine > 0) written.insert(written.end(), {match, RecordOf(match)});
-  TILEGRAD_TRY(guard.CheckAll(written));
-  TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(options, file));
-  const train::Predictor& predictor = network.predictor;
-  const auto input = train::PrepareCutout(cutout, predictor.image_size(), FramingOf(options));
+  const ResultFiles files(p.options, stem);
+  TILEGRAD_TRY(p.guard.CheckAll(files.all));
+  TILEGRAD_ASSIGN(const ImageU8 cutout, LoadCutout(p.options, file, p.watch));
+  const train::Predictor& predictor = p.network.predictor;
+  const auto input = train::PrepareCutout(cutout, predictor.image_size(), FramingOf(p.options));
   if (!input.ok()) return input.status().Within(file);
-  if (network.pictures) TILEGRAD_TRY(WarnOfUnlike(*network.pictures, cutout, file));
+  if (p.network.pictures) TILEGRAD_TRY(WarnOfUnlike(*p.network.pictures, cutout, file));
+  TILEGRAD_TRY(p.watch.At({"predicting from " + file, 0, 0, ""}));
   TILEGRAD_ASSIGN(auto meshes, predictor.Predict(*input));
-  if (options.refine > 0) {
+  nlohmann::ordered_json json = {{"image", file},
+                                 {"mesh", files.glb.string()},
+                                 {"turntable", files.turntable.string()},
+                                 {"animation", files.animation.string()}};
+  if (p.options.refine > 0) {
     TILEGRAD_TRY(predictor.model().CheckRefinable());
-    const Status refined = Refine(options, cutout, match, &meshes[0], workers);
-    if (!refined.ok()) return refined.Within(file);
+    TILEGRAD_TRY(Refine(p, cutout, files.match, &meshes[0], &json).Within(file));
   }
-  TILEGRAD_TRY(SaveResult(predictor, *input, glb, &meshes[0]));
-  if (options.relight) {
-    const Status status = Relight(predictor, *input, meshes[0], relit);
-    if (!status.ok()) return status.Within(file);
+  TILEGRAD_TRY(SaveResult(predictor, *input, files.glb, &meshes[0]));
+  if (p.options.relight) {
+    TILEGRAD_TRY(Relight(predictor, *input, meshes[0], files.relit).Within(file));
+    json["relit"] = files.relit.string();
   }
-  TILEGRAD_TRY(DrawTurntable(meshes[0], turntable, workers));
-  TILEGRAD_TRY(AnimateTurntable(meshes[0], animation, workers));
-  Print("{} -> {}, {}, {}{}\n", file, glb.string(), turntable.string(), animation.string(),
-        options.relight ? ", " + relit.string() : "");
-  json->push_back({{"image", file},
-                   {"mesh", glb.string()},
-                   {"turntable", turntable.string()},
-                   {"animation", animation.string()}});
-  if (options.relight) json->back()["relit"] = relit.string();
+  TILEGRAD_TRY(Draw(p, file, files, meshes[0]));
+  Print("{} -> {}, {}, {}{}\n", file, files.glb.string(), files.turntable.string(),
+        files.animation.string(), p.options.relight ? ", " + files.relit.string() : "");
+  all->push_back(std::move(json));
   return {};
 }
 
@@ -164,19 +197,25 @@ Status RunPrediction(const PredictOptions& options) {
     return InvalidArgument("--mask belongs to one image, got {}", options.images.size());
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const Workers workers(options.workers);
+  ProgressLine line;
+  const Watch watch = line.Watching();
+  TILEGRAD_TRY(watch.At({"reading the network", 0, 0, ""}));
   TILEGRAD_ASSIGN(const TrainedNetwork network, LoadNetwork(run, workers));
-  // One bad image does not keep the others from being predicted; the first error is the result.
-  Status first;
   OutputGuard guard(options.force);
   for (const std::string& image : options.images) guard.AddInput(image);
   guard.AddInput(options.mask);
+  const Prediction prediction{options, network, guard, workers, watch};
+  // One bad image does not keep the others from being predicted; the first error is the result.
+  Status first;
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const auto& image : NameResults(options.images)) {
-    const Status status = PredictOne(network, options, image, guard, workers, &json);
+    const Status status = PredictOne(prediction, image, &json);
     if (status.ok()) continue;
+    if (status.code() == StatusCode::kCancelled) return status;
     if (!first.ok()) PrintNote("tilegrad: {}\n", status.message());
     if (first.ok()) first = status;
   }
+  line.Finish();
   PrintResult(json);
   return first;
 }
@@ -185,9 +224,9 @@ Status RunPrediction(const PredictOptions& options) {
 
 void AddPredict(CommandList* list) {
   const auto [command, options] = AddCommand(
-      list, "predict", "Predict a coloured 3D mesh from one image of an object that is cut out",
-      RunPrediction);
-  command->Add("images", &options->images, "RGBA cut-outs (PNG), or an RGB image with --mask",
+      list, "predict", "Predict a coloured 3D mesh from one image of an object", RunPrediction);
+  command->Add("images", &options->images,
+               "pictures of an object: cut out (RGBA), before a plain background, or with --mask",
                {Required{}});
   command->Add("--run", &options->run, "run folder or one checkpoint [the newest below runs/]");
   command->Add("--out", &options->out,

@@ -39,7 +39,7 @@ void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
   Print("{}: {} at step {}, {} of training\n", options.out,
         outcome.finished ? "finished" : "stopped", outcome.last_step,
         FormatDuration(outcome.seconds));
-  if (!outcome.finished) Print("continue with: tilegrad train --resume {}\n", options.out);
+  if (!outcome.finished) Print("go on with: tilegrad train --resume {}\n", options.out);
   if (outcome.finished) Print("scores: tilegrad {} --run {}\n", score_command, options.out);
   Print("curves: tensorboard --logdir {}\n", options.out);
 }
@@ -126,7 +126,7 @@ Status RunTraining(const TrainOptions& given) {
   auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
   line.Finish();
   ranks.EndIfBroken(outcome.status());
-  if (!outcome.ok()) return outcome.status();
+  if (!outcome.ok()) return WithCommand(outcome.status(), "tilegrad train --resume " + options.out);
   PrintOutcome(*outcome, options, job.config.task->ScoreCommand());
   PrintJson(*outcome, options);
   return {};

@@ -92,7 +92,9 @@ struct Option {
   Target target;
   std::string help;
   std::vector<Trait> traits = {};
-  std::vector<std::string> words = {};  // once the command line is read, as they were given
+  // Once the command line is read: what was given, and as what it counts where nothing was.
+  std::vector<std::string> words = {};
+  std::string initial = {};
 
   std::string FirstName() const { return names.substr(0, names.find(',')); }
 };

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "cli/did_you_mean.h"
+#include "base/did_you_mean.h"
 #include "tilegrad/version.h"
 
 namespace tilegrad::cli {
@@ -137,8 +137,11 @@ ParsedLine ParseLine(std::vector<std::string> words, CommandList* commands) {
   const CLI::App& chosen = *app->get_subcommands().front();
   const auto command = std::find_if(commands->begin(), commands->end(),
                                     [&](const Command& c) { return c.name == chosen.get_name(); });
-  for (Option& option : command->options)
-    option.words = chosen.get_option(option.FirstName())->results();
+  for (Option& option : command->options) {
+    const CLI::Option* const read = chosen.get_option(option.FirstName());
+    option.words = read->results();
+    option.initial = read->get_default_str();
+  }
   return {&*command};
 }
 

@@ -3,11 +3,14 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "base/parallel.h"
 #include "cli/command.h"
@@ -16,10 +19,14 @@
 namespace tilegrad::cli {
 namespace {
 
-constexpr double kSilentSeconds = 2, kTerminalInterval = 0.2, kLogInterval = 10;
+constexpr double kSilentSeconds = 1, kTerminalInterval = 0.2, kLogInterval = 10;
+constexpr std::size_t kUsualColumns = 80;
+constexpr std::string_view kEraseLine = "\x1b[K";
 
 StopFlag g_stop = false;  // a signal handler can reach nothing but a global
 volatile std::sig_atomic_t g_signal = SIGINT;
+
+ProgressLine* g_line = nullptr;  // that is drawn now
 
 bool g_quiet = false, g_json = false;  // of this process, set by its command line
 
@@ -35,6 +42,46 @@ void StopOn(int signal) {
 
 double Seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
+}
+
+void WriteNote(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+
+std::size_t TerminalColumns() {
+  winsize size = {};
+  const bool known = ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : kUsualColumns;
+}
+
+// As much of UTF-8 text as surely fits: characters from Hangul on count as wide ones.
+std::string_view FirstColumns(std::string_view text, std::size_t columns) {
+  constexpr unsigned char kFirstWide = 0xE1;  // of three bytes or more, U+1000 and above
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte & 0xC0) == 0x80) continue;  // goes on a character
+    used += byte >= kFirstWide ? 2 : 1;
+    if (used > columns) return text.substr(0, i);
+  }
+  return text;
+}
+
+// "stage  12/820  1%  0:31 left  note"; `first`: done when the stage began.
+std::string TextOf(const Progress& p, std::uint64_t first, double seconds) {
+  std::string line = p.stage;
+  if (p.total > 0) {
+    line += fmt::format("  {}/{}  {:.0f}%", p.done, p.total,
+                        100.0 * static_cast<double>(p.done) / static_cast<double>(p.total));
+    if (p.done > first && p.done < p.total) {
+      const double each = seconds / static_cast<double>(p.done - first);
+      line +=
+          fmt::format("  {} left", FormatDuration(each * static_cast<double>(p.total - p.done)));
+    }
+  } else if (p.done > 0) {
+    line += fmt::format("  {}", p.done);
+  } else if (seconds >= kSilentSeconds) {
+    line += "  " + FormatDuration(seconds);
+  }
+  return p.note.empty() ? line : line + "  " + p.note;
 }
 
 }  // namespace
@@ -56,10 +103,6 @@ void OpenStandardStreams() {
   int fd = 0;
   while (fd >= 0 && fd <= STDERR_FILENO) fd = ::open("/dev/null", O_RDWR);
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
-}
-
-std::string Count(std::size_t number, const std::string& thing) {
-  return fmt::format("{} {}{}", number, thing, number == 1 ? "" : "s");
 }
 
 void PrintThreadNotice() {
@@ -92,56 +135,57 @@ ProgressSink ProgressLine::Sink() {
 }
 
 WarningSink ProgressLine::Warnings() {
-  return [this](const std::string& warning) {
-    Finish();
-    PrintNote("tilegrad: warning: {}\n", warning);
-  };
+  return [this](const std::string& warning) { PrintNote("tilegrad: warning: {}\n", warning); };
 }
 
+Watch ProgressLine::Watching() { return {Sink(), &StopOnSignals()}; }
+
+double ProgressLine::Elapsed() const { return Seconds(Clock::now() - stage_start_); }
+
 void ProgressLine::Show(const Progress& progress) {
-  const auto now = Clock::now();
   PrintThreadNotice();
   if (g_quiet) return;
+  const auto now = Clock::now();
   if (progress.stage != last_.stage) {
-    Finish();
-    stage_start_ = last_draw_ = now;
+    EndProgressLine();
+    stage_start_ = now;
     first_done_ = progress.done;
+    g_line = this;
   }
   last_ = progress;
-  const double elapsed = Seconds(now - stage_start_);
   const double interval = terminal_ ? kTerminalInterval : kLogInterval;
-  if (elapsed < kSilentSeconds || (drawn_ && Seconds(now - last_draw_) < interval)) return;
-  Draw(progress, elapsed);
+  const bool wait =
+      drawn_ ? Seconds(now - last_draw_) < interval : !terminal_ && Elapsed() < kSilentSeconds;
+  if (wait) return;
+  Draw();
   last_draw_ = now;
 }
 
-void ProgressLine::Draw(const Progress& p, double seconds) {
-  std::string line = p.stage;
-  if (p.total > 0) {
-    line += fmt::format("  {}/{}  {:.0f}%", p.done, p.total,
-                        100.0 * static_cast<double>(p.done) / static_cast<double>(p.total));
-    if (p.done > first_done_ && p.done < p.total) {
-      const double each = seconds / static_cast<double>(p.done - first_done_);
-      line +=
-          fmt::format("  {} left", FormatDuration(each * static_cast<double>(p.total - p.done)));
-    }
-  } else {
-    line += fmt::format("  {}", p.done);
-  }
-  if (!p.note.empty()) line += "  " + p.note;
-  line = EscapeControls(line);
-  line = terminal_ ? "\r" + line + "\x1b[K" : line + "\n";
-  std::fwrite(line.data(), 1, line.size(), stderr);
+void ProgressLine::Draw() {
+  std::string line = EscapeControls(TextOf(last_, first_done_, Elapsed()));
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  // In its last column the cursor of some terminals is in the next line already.
+  const auto shown = FirstColumns(line, TerminalColumns() - 1);
+  WriteNote(terminal_ ? fmt::format("\r{}{}", shown, kEraseLine) : line + "\n");
   drawn_ = true;
 }
 
 void ProgressLine::Finish() {
-  if (drawn_) {
-    Draw(last_, Seconds(Clock::now() - stage_start_));
-    if (terminal_) PrintNote("\n");
+  const bool worth = !last_.stage.empty() && Elapsed() >= kSilentSeconds;
+  if (worth) {
+    Draw();
+    if (terminal_) WriteNote("\n");
+  } else if (drawn_ && terminal_) {
+    WriteNote(fmt::format("\r{}", kEraseLine));
   }
   drawn_ = false;
   last_ = {};
+  if (g_line == this) g_line = nullptr;
+}
+
+void EndProgressLine() {
+  if (g_line != nullptr) g_line->Finish();
 }
 
 int ExitCode(StatusCode code) {

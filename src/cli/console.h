@@ -12,6 +12,7 @@
 
 #include "base/escape_text.h"
 #include "base/progress.h"
+#include "base/text.h"
 #include "tilegrad/status.h"
 
 namespace tilegrad::cli {
@@ -31,11 +32,15 @@ void AddSpeechOptions(Command* command);
 // What a command has done, for programs: printed under --json, else nothing.
 void PrintResult(const nlohmann::ordered_json& result);
 
+// Ends the line of progress that is being drawn: what is printed next begins a line of its own.
+void EndProgressLine();
+
 // As fmt::print to stdout, unless speech is less than full. Names of files and models, and all else
 // that strangers wrote, may hold what a terminal would obey: it is shown instead (EscapeControls).
 template <class... Args>
 void Print(fmt::format_string<Args...> format, Args&&... args) {
   if (SpeechNow() != Speech::kFull) return;
+  EndProgressLine();
   fmt::print("{}", EscapeControls(fmt::format(format, std::forward<Args>(args)...)));
 }
 
@@ -44,6 +49,7 @@ void Print(fmt::format_string<Args...> format, Args&&... args) {
 template <class... Args>
 void PrintNote(fmt::format_string<Args...> format, Args&&... args) {
   const std::string text = EscapeControls(fmt::format(format, std::forward<Args>(args)...));
+  EndProgressLine();
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
@@ -52,9 +58,6 @@ template <class... Args>
 void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
   if (SpeechNow() != Speech::kQuiet) PrintNote(format, std::forward<Args>(args)...);
 }
-
-// "1 file", "2 files".
-std::string Count(std::size_t number, const std::string& thing);
 
 // Says, once, that the system has refused threads.
 void PrintThreadNotice();
@@ -67,9 +70,10 @@ void OpenStandardStreams();
 // error like others instead of a signal that ends the process.
 void WritesFailWithoutSignals();
 
-// Draws "stage  12/820  1%  0:31 left  note" on stderr: rewritten in place on a terminal, a line
-// every ten seconds elsewhere. Work that ends within two seconds draws nothing, --quiet draws
-// nothing at all. Finish() (or a new stage, or the destructor) ends the line.
+// Draws "stage  12/820  1%  0:31 left  note" on stderr. On a terminal at once, rewritten in place
+// and cut to its width as it is then; stages of less than a second leave nothing. Elsewhere a line
+// every ten seconds, and one of each stage of a second or more. --quiet draws nothing at all.
+// Finish() (or a new stage, what is printed, or the destructor) ends the line.
 class ProgressLine {
  public:
   ProgressLine();
@@ -79,12 +83,14 @@ class ProgressLine {
 
   ProgressSink Sink();     // valid while this lives
   WarningSink Warnings();  // likewise; ends the line and prints
+  Watch Watching();        // likewise; signals stop the work
   void Finish();
 
  private:
   using Clock = std::chrono::steady_clock;
   void Show(const Progress& progress);
-  void Draw(const Progress& progress, double seconds);
+  void Draw();
+  double Elapsed() const;
 
   bool terminal_;
   bool drawn_ = false;  // something of this stage is on the screen

@@ -6,9 +6,9 @@
 #include "cli/console.h"
 
 namespace tilegrad::cli {
-train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out) {
+train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch) {
   // OneOf has checked it.
-  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov};
+  return {hold_out, *train::BackgroundNamed(pictures.background), pictures.fov, watch};
 }
 
 void PrintWarnings(const train::FitInput& input, std::size_t first) {

@@ -15,7 +15,7 @@ struct FitPictures {
   bool find_cameras = false;
 };
 void AddPictureOptions(Command* command, FitPictures* pictures);
-train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out);
+train::InputOptions InputOptionsOf(const FitPictures& pictures, int hold_out, const Watch& watch);
 
 // Warnings of the input from the `first` on, a few of them.
 void PrintWarnings(const train::FitInput& input, std::size_t first);

@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program `tilegrad`. Exit codes: 0 done, 1 the work failed, 2 the command line or
 // configuration is wrong, 3 an input file is missing or broken, 130 stopped by Ctrl-C and 143 by
-// SIGTERM (state saved).
+// SIGTERM (state saved), 141 where nobody reads what is printed.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <new>
 #include <system_error>
 
+#include "base/did_you_mean.h"
 #include "base/error.h"
 #include "base/read_budget.h"
 #include "base/simd_target.h"
 #include "cli/command.h"
 #include "cli/command_line.h"
 #include "cli/console.h"
-#include "cli/did_you_mean.h"
 #include "cli/option_words.h"
 #include "cli/run_folder.h"
 #include "tilegrad/version.h"
@@ -32,10 +33,17 @@ int Report(const Status& status) {
   return ExitCode(status.code());
 }
 
-// What was printed may still wait in memory: a full disk shows here.
-Status FlushOutput() {
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return {};
-  return {StatusCode::kIo, fmt::format("standard output: {}", std::strerror(errno))};
+// Of what was printed and cannot be: a full disk is an error, a reader that has seen enough, as
+// `head`, is none, and ends us as its signal would.
+int OutputLost(int error) {
+  if (error != EPIPE) PrintNote("tilegrad: standard output: {}\n", std::strerror(error));
+  return error == EPIPE ? 128 + SIGPIPE : 1;
+}
+
+// What was printed may still wait in memory.
+int FlushOutput(int exit_code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  return OutputLost(errno);
 }
 
 // "help fit" is "fit --help".
@@ -81,11 +89,11 @@ Status CheckRanks(const Command& command) {
 void AddCommands(CommandList* list) {
   for (const auto add :
        {AddDataset, AddTradeoff, AddTrain, AddEval, AddPredict, AddRender, AddReport, AddSample,
-        AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews}) {
+        AddLive, AddTimelapse, AddDatasetView, AddFit, AddViews, AddInfo}) {
     add(list);
   }
   for (Command& reader : *list) AddReadLimitOption(&reader);
-  for (const auto add : {AddFigure2, AddInfo, AddSelftest}) add(list);
+  for (const auto add : {AddFigure2, AddSelftest}) add(list);
   for (Command& worker : *list) AddSpeechOptions(&worker);
   for (const auto add : {AddConfigs, AddCompletion, AddMan}) add(list);
 }
@@ -103,7 +111,7 @@ int RunProgram(int argc, char** argv) {
   if (line.command == nullptr) {
     Print("{}", line.out);
     PrintNote("{}", line.note);
-    return line.exit_code;
+    return FlushOutput(line.exit_code);
   }
   for (const auto check : {CheckValues, CheckRanks}) {
     if (const Status status = check(*line.command); !status.ok()) return Report(status);
@@ -113,8 +121,7 @@ int RunProgram(int argc, char** argv) {
   if (const Status status = ForceTargetFromEnvironment(); !status.ok()) return Report(status);
   const Status done = line.command->action();
   PrintThreadNotice();
-  if (!done.ok()) return Report(done);
-  return Report(FlushOutput());
+  return done.ok() ? FlushOutput(0) : Report(done);
 }
 
 }  // namespace
@@ -130,8 +137,8 @@ int main(int argc, char** argv) {
         "tilegrad: not enough memory; smaller images, batches or networks take less\n");
     return 1;
   } catch (const std::system_error& error) {  // what was printed has nowhere to go, for one
-    const char* place = std::ferror(stdout) != 0 ? "standard output" : "the system refuses";
-    tilegrad::cli::PrintNote("tilegrad: {}: {}\n", place, error.code().message());
+    if (std::ferror(stdout) != 0) return tilegrad::cli::OutputLost(error.code().value());
+    tilegrad::cli::PrintNote("tilegrad: the system refuses: {}\n", error.code().message());
     return 1;
   } catch (const std::exception& error) {  // a library that throws: still a sentence and a code
     tilegrad::cli::PrintNote("tilegrad: unexpected failure: {}\n", error.what());

@@ -18,12 +18,15 @@ nlohmann::ordered_json CameraRecord(const Camera& camera) {
 
 }  // namespace
 
-Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {
+nlohmann::ordered_json ScoresOf(const train::RefinedMesh& refined) {
   const train::PictureMatch &before = refined.before, &after = refined.after;
-  const nlohmann::ordered_json record = {
-      {"silhouette_iou", {before.silhouette_iou, after.silhouette_iou}},
-      {"color_l1", {before.color_l1, after.color_l1}},
-      {"camera", CameraRecord(refined.camera)}};
+  return {{"silhouette_iou", {before.silhouette_iou, after.silhouette_iou}},
+          {"color_l1", {before.color_l1, after.color_l1}}};
+}
+
+Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {
+  nlohmann::ordered_json record = ScoresOf(refined);
+  record["camera"] = CameraRecord(refined.camera);
   return WriteTextAtomic(file, record.dump(1) + "\n");
 }
 

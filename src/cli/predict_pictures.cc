@@ -30,10 +30,12 @@ Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers)
   return io::SavePng(file, TileImages(views, kTurntableColumns));
 }
 
-Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers) {
+Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers,
+                        const Watch& watch) {
   TILEGRAD_ASSIGN(const auto frames, DrawAround(mesh, kTurntableFrames, workers));
   return io::SaveWebpAnimation(
-      file, frames, {.frame_ms = kTurntableFrameMilliseconds, .quality = kTurntableQuality});
+      file, frames,
+      {.frame_ms = kTurntableFrameMilliseconds, .quality = kTurntableQuality, .watch = watch});
 }
 
 Status DrawMatch(std::span<const std::uint8_t> picture, const Mesh& prediction,

@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "base/parallel.h"
+#include "base/progress.h"
 #include "fit/refine.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
@@ -16,7 +17,8 @@ namespace tilegrad::cli {
 // Eight views around the mesh in one PNG, from where cameras of datasets stand.
 Status DrawTurntable(const Mesh& mesh, const Path& file, const Workers& workers);
 // The mesh turning once around in 36 frames, as an animated WebP that loops.
-Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers);
+Status AnimateTurntable(const Mesh& mesh, const Path& file, const Workers& workers,
+                        const Watch& watch);
 
 // What the picture, planar RGBA of kRefineSize, shows; the network's mesh and the refined one, from
 // where it was taken.

@@ -108,6 +108,11 @@ Result<Path> ChooseRun(const std::string& given) {
   return newest->second;
 }
 
+Status WithCommand(const Status& status, const std::string& command) {
+  if (status.code() != StatusCode::kCancelled) return status;
+  return Cancelled("{}; go on with: {}", status.message(), command);
+}
+
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) {
   auto predictor = train::Predictor::Load(run, workers);
   if (!predictor.ok()) return predictor;
@@ -116,22 +121,17 @@ Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers) 
   return predictor;
 }
 
-namespace {
-
-// A relative name counts from where the run was started: here, or some folder above the run.
-std::optional<Path> FindDataset(const Path& dataset, const Path& run) {
+std::optional<Path> FindFromRun(const Path& name, const Path& run) {
   std::error_code error;
-  if (PathExists(dataset)) return dataset;
-  if (dataset.is_absolute()) return std::nullopt;
+  if (PathExists(name)) return name;
+  if (name.is_absolute()) return std::nullopt;
   Path above = std::filesystem::canonical(run, error);
   while (!error && above.has_relative_path()) {
     above = above.parent_path();
-    if (PathExists(above / dataset)) return above / dataset;
+    if (PathExists(above / name)) return above / name;
   }
   return std::nullopt;
 }
-
-}  // namespace
 
 Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   if (!given.empty()) return Path(given);
@@ -147,7 +147,7 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }
   const Path dataset = json["dataset"].get<std::string>();
-  if (const auto found = FindDataset(dataset, run)) return *found;
+  if (const auto found = FindFromRun(dataset, run)) return *found;
   return NotFound(
       "{}: its dataset {} is not there, seen from this folder or those above the run; name it with "
       "--data",

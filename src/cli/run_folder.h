@@ -2,6 +2,7 @@
 // What commands that work on a run share: which run, and which dataset it was trained on.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "base/output_guard.h"
@@ -35,8 +36,13 @@ Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const Out
 // `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
 // note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);
+// Of work that was stopped also the command that goes on with it.
+Status WithCommand(const Status& status, const std::string& command);
 // With a note on the terminal of each newer checkpoint that could not be read.
 Result<train::Predictor> LoadPredictor(const Path& run, const Workers& workers);
+// A name that a run was started with, as it is found from here: a relative one counts from where
+// the run was started, which is here or some folder above the run.
+std::optional<Path> FindFromRun(const Path& name, const Path& run);
 // `given`, or if that is empty the dataset that the run's run.json names, seen from here or from a
 // folder above the run.
 Result<Path> ChooseDataset(const std::string& given, const Path& run);

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "base/error.h"
+#include "train/data/cutout.h"
 
 namespace tilegrad::train {
 namespace {
@@ -255,6 +256,35 @@ std::string Separation::Doubt() const {
 
 BackgroundMask MaskFromPlainBackground(std::span<const float> color, int width, int height) {
   return Separation(color, width, height).Run();
+}
+
+bool IsOpaque(const ImageU8& image) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  if (channels == 1 || channels == 3) return true;
+  for (std::size_t i = channels - 1; i < image.pixels.size(); i += channels) {
+    if (image.pixels[i] < 255) return false;
+  }
+  return true;
+}
+
+Result<ImageU8> WithoutPlainBackground(const ImageU8& image) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  const std::size_t plane = image.pixels.size() / channels;
+  std::vector<float> color(3 * plane);
+  for (std::size_t i = 0; i < color.size(); ++i) {
+    const std::size_t channel = channels >= 3 ? i / plane : 0;
+    color[i] = static_cast<float>(image.pixels[channels * (i % plane) + channel]) / 255;
+  }
+  const BackgroundMask found = MaskFromPlainBackground(color, image.width, image.height);
+  if (!found.doubt.empty()) {
+    return InvalidArgument(
+        "the object is not cut out, and {}; give an image with a transparent background, or a mask",
+        found.doubt);
+  }
+  ImageU8 mask(image.width, image.height, 1);
+  std::ranges::transform(found.alpha, mask.pixels.begin(),
+                         [](float a) { return static_cast<std::uint8_t>(255 * a + 0.5f); });
+  return WithMask(image, mask);
 }
 
 }  // namespace tilegrad::train

@@ -19,6 +19,9 @@
 #include <string>
 #include <vector>
 
+#include "scene/image.h"
+#include "tilegrad/status.h"
+
 namespace tilegrad::train {
 
 struct BackgroundMask {
@@ -30,5 +33,10 @@ struct BackgroundMask {
 
 // `color`: [3,H,W] in [0, 1].
 BackgroundMask MaskFromPlainBackground(std::span<const float> color, int width, int height);
+
+// Whether every pixel is: a picture that is not cut out.
+bool IsOpaque(const ImageU8& image);
+// An opaque picture with its background transparent. An error says why there is none to be seen.
+Result<ImageU8> WithoutPlainBackground(const ImageU8& image);
 
 }  // namespace tilegrad::train

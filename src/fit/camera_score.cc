@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fit/camera_score.h"
 
-#include "base/error.h"
-
 namespace tilegrad::train {
 namespace {
 
@@ -24,14 +22,12 @@ const std::vector<Camera>& GivenCameras(const FitInput& input) {
   return input.given_cameras.empty() ? input.cameras : input.given_cameras;
 }
 
-Status ScoreCameras(const FitJob& job, const FitScene& scene, const Workers& workers,
-                    FitOutcome* outcome) {
+void ScoreCameras(const FitJob& job, const FitScene& scene, FitOutcome* outcome) {
   const bool found = !job.input.given_cameras.empty();
-  if (job.config.perturb_cameras == 0 && !found) return {};
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job, workers));
+  if (job.config.perturb_cameras == 0 && !found) return;
   const std::vector<int>& views = job.input.training;
   const std::vector<Camera> truth = Choose(GivenCameras(job.input), views);
-  std::vector<Camera> before = Choose(TurnedCameras(job, start.scene.pivot), views);
+  std::vector<Camera> before = Choose(TurnedCameras(job, scene.pivot), views);
   const Alignment first = found ? AlignCameras(before, truth) : Alignment();
   for (Camera& camera : before) camera = Moved(camera, first);
   outcome->camera_error_before = MeanAngle(before, truth);
@@ -39,7 +35,6 @@ Status ScoreCameras(const FitJob& job, const FitScene& scene, const Workers& wor
   const Alignment alignment = AlignCameras(fitted, truth);
   for (Camera& camera : fitted) camera = Moved(camera, alignment);
   outcome->camera_error_after = MeanAngle(fitted, truth);
-  return {};
 }
 
 }  // namespace tilegrad::train

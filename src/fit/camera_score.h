@@ -16,7 +16,6 @@ const std::vector<Camera>& GivenCameras(const FitInput& input);
 
 // camera_error_before and _after of the training views, where cameras were turned or found although
 // they were given; both after alignment, where that is free.
-Status ScoreCameras(const FitJob& job, const FitScene& scene, const Workers& workers,
-                    FitOutcome* outcome);
+void ScoreCameras(const FitJob& job, const FitScene& scene, FitOutcome* outcome);
 
 }  // namespace tilegrad::train

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 
 namespace tilegrad::train {
 namespace {
@@ -80,8 +81,8 @@ Status FitClock::LoadState(std::span<const nn::NamedTensor> state, std::int64_t 
   }
   extended_at_ = c[2];
   if (c[0] > steps_) {
-    return InvalidArgument("the fit was started with {} steps: continue with as many, or more",
-                           c[0]);
+    return InvalidArgument("the fit was started with {}: go on with as many, or more",
+                           Count(c[0], "step"));
   }
   if (c[0] < steps_) {
     extended_at_ = steps;

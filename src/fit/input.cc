@@ -98,6 +98,14 @@ Status AddView(const TransformsFrame& frame, FitInput* input) {
   return {};
 }
 
+Status AddViews(std::span<const TransformsFrame> frames, const Watch& watch, FitInput* input) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    TILEGRAD_TRY(watch.At({"reading images", i, frames.size(), ""}));
+    TILEGRAD_TRY(AddView(frames[i], input));
+  }
+  return watch.At({"reading images", frames.size(), frames.size(), ""});
+}
+
 // Every n-th view, from the n-th on, is held out.
 void HoldOut(int every, FitInput* input) {
   for (int i = 0; i < static_cast<int>(input->cameras.size()); ++i) {
@@ -176,7 +184,7 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {
   FitInput input;
   TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input.posed));
-  for (const TransformsFrame& frame : frames) TILEGRAD_TRY(AddView(frame, &input));
+  TILEGRAD_TRY(AddViews(frames, options.watch, &input));
   const Path test = folder / "transforms_test.json";
   const bool has_test = PathExists(test);
   if (has_test && options.hold_out > 0) {
@@ -187,12 +195,11 @@ Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) 
   HoldOut(options.hold_out, &input);
   if (has_test && input.posed) {
     TILEGRAD_ASSIGN(const auto more, ReadTransforms(test));
-    for (const TransformsFrame& frame : more) {
-      input.held_out.push_back(static_cast<int>(input.cameras.size()));
-      TILEGRAD_TRY(AddView(frame, &input));
-    }
+    for (std::size_t i = 0; i < more.size(); ++i)
+      input.held_out.push_back(static_cast<int>(frames.size() + i));
+    TILEGRAD_TRY(AddViews(more, options.watch, &input));
   }
-  ApplyBackground(options.background, &input);
+  TILEGRAD_TRY(ApplyBackground(options.background, &input, options.watch));
   TILEGRAD_TRY(Finish(&input));
   return input;
 }

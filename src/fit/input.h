@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "fit/bare_frames.h"
 #include "fit/image_loss.h"
 #include "scene/camera.h"
@@ -49,6 +50,7 @@ struct InputOptions {
   int hold_out = 0;  // every n-th view; 0: none
   Background background = Background::kAuto;
   double fov = kUsualFov;  // of images without cameras, degrees along their longer side
+  Watch watch = {};        // of reading and masks
 };
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
@@ -63,10 +65,11 @@ inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
 
 // Whether some pixel is not opaque.
 bool HasAlpha(const FitInput& input);
-// Masks as `background` says, of images with alpha or opaque ones. Sets `masked`.
-void ApplyBackground(Background background, FitInput* input);
+// Masks as `background` says, of images with alpha or opaque ones. Sets `masked`. An error only if
+// stopped.
+Status ApplyBackground(Background background, FitInput* input, const Watch& watch = {});
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
-void TakePlainBackgrounds(FitInput* input);
+Status TakePlainBackgrounds(FitInput* input, const Watch& watch = {});
 
 // One model of a dataset (train/data/dataset.h), named "CLASS/ID".
 Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, int hold_out);

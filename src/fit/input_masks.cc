@@ -20,9 +20,10 @@ bool HasAlpha(const FitInput& input) {
   return std::ranges::any_of(input.images.alpha, [](float a) { return a < 1; });
 }
 
-void TakePlainBackgrounds(FitInput* input) {
+Status TakePlainBackgrounds(FitInput* input, const Watch& watch) {
   TargetImages& all = input->images;
   for (std::size_t n = 0; n < input->names.size(); ++n) {
+    TILEGRAD_TRY(watch.At({"looking for plain backgrounds", n, input->names.size(), ""}));
     const auto color = std::span(all.color).subspan(3 * n * all.pixels(), 3 * all.pixels());
     const BackgroundMask mask = MaskFromPlainBackground(color, all.width, all.height);
     std::ranges::copy(mask.alpha,
@@ -31,26 +32,29 @@ void TakePlainBackgrounds(FitInput* input) {
       input->warnings.push_back(fmt::format("{}: {}", input->names[n], mask.doubt));
     }
   }
+  return watch.At({"looking for plain backgrounds", input->names.size(), input->names.size(), ""});
 }
 
 namespace {
 
-void LookForPlainBackgrounds(bool asked, FitInput* input) {
+Status LookForPlainBackgrounds(bool asked, FitInput* input, const Watch& watch) {
   FitInput masked = *input;
-  TakePlainBackgrounds(&masked);
+  TILEGRAD_TRY(TakePlainBackgrounds(&masked, watch));
   // Backgrounds that are not plain make no masks unless somebody says so.
   if (asked || 2 * masked.warnings.size() <= masked.names.size()) *input = std::move(masked);
+  return {};
 }
 
 }  // namespace
 
-void ApplyBackground(Background background, FitInput* input) {
+Status ApplyBackground(Background background, FitInput* input, const Watch& watch) {
   if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);
   const bool asked = background == Background::kPlain;
   if (asked || (background == Background::kAuto && !HasAlpha(*input))) {
-    LookForPlainBackgrounds(asked, input);
+    TILEGRAD_TRY(LookForPlainBackgrounds(asked, input, watch));
   }
   input->masked = HasAlpha(*input);
+  return {};
 }
 
 }  // namespace tilegrad::train

@@ -97,9 +97,12 @@ class Descent {
     return Descent(std::move(fitter), picture);
   }
 
-  // Takes steps [first, last) of `steps`.
-  Status Run(int first, int last, int steps) {
+  // Takes steps [first, last) of those of `options`.
+  Status Run(int first, int last, const RefineOptions& options) {
+    const int steps = options.steps;
     for (int i = first; i < last; ++i) {
+      TILEGRAD_TRY(options.watch.At(
+          {"refining", static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(steps), ""}));
       TILEGRAD_ASSIGN(const FitValues values, fitter_.Step(StepAt(static_cast<double>(i) / steps)));
       loss_ = values.total;
     }
@@ -186,12 +189,12 @@ Result<Descent> BestStart(const FitScene& scene, const std::vector<FoundCamera>&
   const int pilot = static_cast<int>(kPilotShare * options.steps);
   for (const FoundCamera& start : cameras) {
     TILEGRAD_ASSIGN(Descent descent, Descent::Make(scene, start.camera, picture, workers));
-    TILEGRAD_TRY(descent.Run(0, pilot, options.steps));
+    TILEGRAD_TRY(descent.Run(0, pilot, options));
     const double cost = descent.loss() + kSilhouetteWeight * start.cost();
     if (best && cost >= best_cost) continue;
     best.emplace(std::move(descent)), best_cost = cost;
   }
-  TILEGRAD_TRY(best->Run(pilot, options.steps, options.steps));
+  TILEGRAD_TRY(best->Run(pilot, options.steps, options));
   return std::move(*best);
 }
 
@@ -215,6 +218,7 @@ Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& pictu
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(coarse ? Subdivided(prediction) : prediction));
   scene.wrap = Wrap::kRepeatClamp;  // maps in longitude and latitude
   const auto [small, factor] = AtMost(picture, kSearchSide);
+  TILEGRAD_TRY(options.watch.At({"looking for the camera", 0, 0, ""}));
   TILEGRAD_ASSIGN(const auto found, FindCameras(scene, small, options.camera, workers));
   const std::vector<FoundCamera> cameras = Candidates(found, factor);
   scene.cameras = {cameras[0].camera};

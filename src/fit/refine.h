@@ -6,6 +6,7 @@
 #pragma once
 
 #include "base/parallel.h"
+#include "base/progress.h"
 #include "fit/image_loss.h"
 #include "scene/camera.h"
 #include "scene/mesh.h"
@@ -20,6 +21,7 @@ inline constexpr int kRefineSize = 128;   // pixels a side of the picture that p
 struct RefineOptions {
   int steps = kRefineSteps;  // of gradient descent; 0: only the camera is found
   CameraRule camera = {};    // of the training images: where the search for the camera begins
+  Watch watch = {};
 };
 
 // How a mesh looks from the picture's camera.
@@ -38,7 +40,8 @@ struct RefinedMesh {
 // `picture`: one square image. `prediction`: a mesh with vertex colours or one texture map,
 // normalised as predictions are, y up. Faces of a coarse mesh are divided once, so that the result
 // may have more vertices than the prediction. A pure function of its arguments; any number of
-// workers gives the same bits. Errors: a picture without an object; those of the renderer.
+// workers gives the same bits. Errors: a picture without an object; those of the renderer;
+// kCancelled.
 Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& picture,
                                const RefineOptions& options, const Workers& workers);
 

@@ -49,7 +49,8 @@ Status FitResult::WriteCameras() const {
 Status FitResult::Score(FitOutcome* outcome) const {
   const FitInput& input = job_.input;
   const std::vector<Camera> fitted = Choose(scene_.cameras, input.training);
-  TILEGRAD_ASSIGN(outcome->training, ScoreViews(scene_, input, input.training, fitted, workers_));
+  TILEGRAD_ASSIGN(outcome->training,
+                  ScoreViews(scene_, input, input.training, fitted, workers_, watch_));
   // Cameras that moved fix the scene only up to a similarity; held-out ones did not move.
   FitScene scene = scene_;
   const std::vector<Camera>& given = GivenCameras(input);
@@ -57,7 +58,7 @@ Status FitResult::Score(FitOutcome* outcome) const {
     Move(AlignCameras(fitted, Choose(given, input.training)), &scene.positions);
   }
   TILEGRAD_ASSIGN(outcome->held_out, ScoreViews(scene, input, input.held_out,
-                                                Choose(given, input.held_out), workers_));
+                                                Choose(given, input.held_out), workers_, watch_));
   std::vector<std::uint8_t> truth = input.occupancy;
   if (job_.truth.has_value()) {
     TILEGRAD_ASSIGN(truth, Voxelize(*job_.truth, kOccupancyResolution));
@@ -71,7 +72,7 @@ Status FitResult::Score(FitOutcome* outcome) const {
 Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
   TILEGRAD_TRY(SaveFittedGlb(job_.out / "mesh.glb", scene_));
   TILEGRAD_TRY(WriteCameras());
-  TILEGRAD_TRY(ScoreCameras(job_, scene_, workers_, outcome));
+  ScoreCameras(job_, scene_, outcome);
   TILEGRAD_TRY(Score(outcome));
   TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet(plan));
   if (!sheet.empty()) TILEGRAD_TRY(io::SavePng(job_.out / "timelapse.png", sheet));

@@ -13,8 +13,9 @@ namespace tilegrad::train {
 // The scene at the end, its scores and what is written of both.
 class FitResult {
  public:
-  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers)
-      : job_(job), scene_(scene), clock_(clock), workers_(workers) {}
+  FitResult(const FitJob& job, const FitScene& scene, const FitClock& clock, const Workers& workers,
+            const Watch& watch)
+      : job_(job), scene_(scene), clock_(clock), workers_(workers), watch_(watch) {}
   Status Finish(const RunPlan& plan, FitOutcome* outcome) const;
 
  private:
@@ -26,6 +27,7 @@ class FitResult {
   const FitScene& scene_;
   const FitClock& clock_;
   const Workers& workers_;
+  const Watch& watch_;
 };
 
 }  // namespace tilegrad::train

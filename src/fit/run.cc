@@ -21,6 +21,7 @@ namespace tilegrad::train {
 namespace {
 
 constexpr std::int64_t kLogEvery = 10;
+constexpr const char* kInput = "input = ";
 constexpr std::int64_t kKeptCheckpoints = 2;
 
 ImageSize SizeOf(const FitInput& input) { return {input.images.width, input.images.height}; }
@@ -68,13 +69,17 @@ class FitWork : public RunWork {
         fitter_(std::move(fitter)),
         clock_(config_) {}
 
-  // All lines count; earlier versions wrote them in another order, and took all steps.
+  // All lines count; earlier versions wrote them in another order, and took all steps. Of what is
+  // read, a checksum counts.
   Result<std::string> ResultSettings(const std::string& settings,
                                      const std::string& /*place*/) const override {
     std::istringstream text(settings);
     std::set<std::string> lines;
-    for (std::string line; std::getline(text, line);)
-      if (line != "stop_gain = 0") lines.insert(line);
+    for (std::string line; std::getline(text, line);) {
+      if (line == "stop_gain = 0") continue;
+      const bool input = line.starts_with(kInput);
+      lines.insert(input ? "checksum of images, cameras and mesh" + line.substr(5) : line);
+    }
     return fmt::format("{}\n", fmt::join(lines, "\n"));
   }
   Status Begin(std::int64_t /*first_step*/) override { return {}; }
@@ -177,17 +182,21 @@ Result<std::vector<Finding>> DiagnoseStart(const FitJob& job, const FitStart& st
 }
 }  // namespace
 
-Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers) {
-  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job, workers));
+Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers,
+                                         const Watch& watch) {
+  TILEGRAD_ASSIGN(const FitStart start, PrepareFit(job, workers, watch));
+  TILEGRAD_TRY(watch.At({"looking at gradients", 0, 0, ""}));
   return DiagnoseStart(job, start, workers);
 }
 
 Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const ProgressSink& progress,
                           const StopFlag& stop) {
   FitOutcome outcome;
+  const Watch watch{progress, &stop};
   TILEGRAD_TRY(CheckExistingRun(job.out, job.existing));  // before the work
-  TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers));
+  TILEGRAD_ASSIGN(FitStart start, PrepareFit(job, workers, watch));
   if (!start.note.empty() && job.warn) job.warn(start.note);
+  TILEGRAD_TRY(watch.At({"looking at gradients", 0, 0, ""}));
   TILEGRAD_ASSIGN(outcome.findings, DiagnoseStart(job, start, workers));
   TILEGRAD_ASSIGN(Fitter fitter, Fitter::Make(std::move(start.scene), start.options, workers));
   nn::Context context(workers);
@@ -196,8 +205,9 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
   TILEGRAD_ASSIGN(static_cast<RunOutcome&>(outcome),
                   ExecuteRun(plan, &work, context, progress, stop));
   FitScene scene = work.scene();
+  if (progress) progress({"filling the texture", 0, 0, ""});
   TILEGRAD_TRY(FillTexture(job, workers, &scene));
-  TILEGRAD_TRY(FitResult(job, scene, work.clock(), workers).Finish(plan, &outcome));
+  TILEGRAD_TRY(FitResult(job, scene, work.clock(), workers, watch).Finish(plan, &outcome));
   return outcome;
 }
 

@@ -48,7 +48,8 @@ Result<FitOutcome> RunFit(const FitJob& job, const Workers& workers, const Progr
                           const StopFlag& stop);
 
 // The doctor alone, on all training views at the first step.
-Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers);
+Result<std::vector<Finding>> DiagnoseFit(const FitJob& job, const Workers& workers,
+                                         const Watch& watch = {});
 
 // The scene that a job starts from, and what its steps need.
 struct FitStart {
@@ -58,7 +59,9 @@ struct FitStart {
   RemeshLimits remesh;
   std::string note;  // why it is not what one would expect, or empty
 };
-Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers);
+Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch = {});
+// Whether the configuration can be fitted to the input, as far as that is seen at once.
+Status CheckFit(const FitJob& job);
 
 // The input's cameras, turned as the configuration says about `middle`.
 std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>& middle);

@@ -124,13 +124,15 @@ Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view,
 
 Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
                                           std::span<const int> views,
-                                          std::span<const Camera> cameras, const Workers& workers) {
+                                          std::span<const Camera> cameras, const Workers& workers,
+                                          const Watch& watch) {
   FitScene seen = scene;
   seen.cameras.assign(cameras.begin(), cameras.end());
   FitRenderer renderer(workers);
   const ImageSize size{input.images.width, input.images.height};
   std::vector<ViewScore> scores;
   for (int i = 0; i < static_cast<int>(views.size()); ++i) {
+    TILEGRAD_TRY(watch.At({"scoring views", static_cast<std::uint64_t>(i), views.size(), ""}));
     TILEGRAD_ASSIGN(Picture rendered, DrawView(renderer, seen, i, size));
     ViewScore score;
     score.view = views[static_cast<std::size_t>(i)];
@@ -144,6 +146,7 @@ Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput&
     score.truth = OverGrey(truth, kWhite), score.rendered = OverGrey(rendered, kWhite);
     scores.push_back(std::move(score));
   }
+  if (!views.empty()) TILEGRAD_TRY(watch.At({"scoring views", views.size(), views.size(), ""}));
   return scores;
 }
 

@@ -24,7 +24,8 @@ Result<Picture> DrawView(FitRenderer& renderer, const FitScene& scene, int view,
 // Views of the input rendered from `cameras` (one for each of `views`), with their gains.
 Result<std::vector<ViewScore>> ScoreViews(const FitScene& scene, const FitInput& input,
                                           std::span<const int> views,
-                                          std::span<const Camera> cameras, const Workers& workers);
+                                          std::span<const Camera> cameras, const Workers& workers,
+                                          const Watch& watch = {});
 
 // Means over views; 0 for none.
 double MeanPsnr(std::span<const ViewScore> scores);

@@ -77,12 +77,13 @@ Result<int> UnwrapRagged(int side, Mesh* mesh) {
   }
 }
 
-Result<FitScene> HullScene(const FitJob& job, const Workers& workers) {
+Result<FitScene> HullScene(const FitJob& job, const Workers& workers, const Watch& watch) {
   HullOptions options;
   options.carve.tolerance = job.config.mask_tolerance;
-  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers));
+  TILEGRAD_ASSIGN(Mesh mesh, HullMesh(job.input, options, workers, watch));
   int size = job.config.texture_size;
   if (!job.config.vertex_colors) {
+    TILEGRAD_TRY(watch.At({"placing the texture", 0, 0, ""}));
     TILEGRAD_ASSIGN(size, UnwrapRagged(size, &mesh));
   }
   TILEGRAD_ASSIGN(FitScene scene, SceneOfMesh(mesh));
@@ -92,17 +93,17 @@ Result<FitScene> HullScene(const FitJob& job, const Workers& workers) {
 }
 
 // `note` gets why there is no hull where one was tried.
-Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, bool* from_hull,
-                               std::string* note) {
+Result<FitScene> TemplateScene(const FitJob& job, const Workers& workers, const Watch& watch,
+                               bool* from_hull, std::string* note) {
   const FitConfig& config = job.config;
   *from_hull = config.start == StartShape::kHull;
   if (config.start == StartShape::kSphere) return SphereScene(job);
-  if (config.start == StartShape::kHull) return HullScene(job, workers);
+  if (config.start == StartShape::kHull) return HullScene(job, workers, watch);
   const bool known_cameras = !config.parameters[Parameter::kCamera] && config.perturb_cameras == 0;
   if (job.input.masked && known_cameras && job.input.training.size() >= kLeastHullViews) {
-    auto hull = HullScene(job, workers);
+    auto hull = HullScene(job, workers, watch);
     *from_hull = hull.ok();
-    if (hull.ok()) return hull;
+    if (hull.ok() || hull.status().code() == StatusCode::kCancelled) return hull;
     *note = fmt::format("the fit starts from a sphere, because there is no hull: {}",
                         hull.status().message());
   }
@@ -251,10 +252,14 @@ std::string DescribeJob(const FitJob& job) {
                      InputHash(job));
 }
 
-Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
+Status CheckFit(const FitJob& job) {
   TILEGRAD_TRY(CheckConfig(job.config));
   TILEGRAD_TRY(CheckMaterial(job.config));
-  TILEGRAD_TRY(CheckMasks(job));
+  return CheckMasks(job);
+}
+
+Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers, const Watch& watch) {
+  TILEGRAD_TRY(CheckFit(job));
   if (!job.input.posed && !job.input.found) {
     return InvalidArgument("the images have no cameras, which `tilegrad fit` would look for first");
   }
@@ -262,7 +267,7 @@ Result<FitStart> PrepareFit(const FitJob& job, const Workers& workers) {
   bool from_hull = false;
   TILEGRAD_ASSIGN(start.scene, job.start.has_value()
                                    ? MeshScene(job)
-                                   : TemplateScene(job, workers, &from_hull, &start.note));
+                                   : TemplateScene(job, workers, watch, &from_hull, &start.note));
   start.config = Settled(job.config, from_hull, {job.input.images.width, job.input.images.height});
   start.remesh = LimitsOf(PixelOf(job, start.scene));
   SetCameras(job, &start.scene);

@@ -66,6 +66,7 @@ class Encoder {
   Result<Bytes> Encode(std::span<const ImageU8> frames) {
     TILEGRAD_TRY(Open(frames[0].width, frames[0].height));
     for (std::size_t i = 0; i < frames.size(); ++i) {
+      TILEGRAD_TRY(options_.watch.At({"coding the animation", i, frames.size(), ""}));
       Pixels pixels;
       const int time = static_cast<int>(i) * options_.frame_ms;
       if (!pixels.Import(frames[i]) ||

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "scene/image.h"
 
 namespace tilegrad::io {
@@ -13,6 +14,7 @@ struct AnimationOptions {
   int frame_ms = 83;  // how long each frame stands, 1 to 65535; 83: twelve a second
   int loops = 0;      // how often it is shown, 0 to 65535; 0: for ever
   int quality = 75;   // of the lossy coder, 0 to 100
+  Watch watch = {};   // asked at each frame
 };
 
 // 1 to 16384 frames of one size, 3 or 4 channels, straight alpha, at most 16383 pixels a side (the

@@ -13,6 +13,7 @@
 namespace tilegrad {
 namespace {
 
+constexpr std::size_t kTold = 1000;        // candidates between two questions
 constexpr float kMostCollapseTurn = 0.5f;  // cosine: faces turn by less than 60 degrees a collapse
 constexpr double kTowardsMiddle =
     1e-3;                        // of a quadric's weight: holds vertices in planes and lines
@@ -70,8 +71,9 @@ class Simplification {
     for (const auto& [a, b] : mesh_.Edges()) Push(a, b);
   }
 
-  void Run() {
-    while (!queue_.empty()) {
+  Status Run() {
+    for (std::size_t i = 0; !queue_.empty(); ++i) {
+      if (limits_.told && i % kTold == 0) TILEGRAD_TRY(limits_.told(faces_));
       const Candidate next = queue_.top();
       queue_.pop();
       if (next.stamp != stamps_[Index(next.a)] + stamps_[Index(next.b)]) continue;
@@ -83,6 +85,7 @@ class Simplification {
         continue;
       Take(next, place);
     }
+    return {};
   }
 
  private:
@@ -163,15 +166,15 @@ class Simplification {
 
 }  // namespace
 
-void Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh) {
-  Simplification(limits, keep, mesh).Run();
+Status Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh) {
+  return Simplification(limits, keep, mesh).Run();
 }
 
 Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits) {
   VertexRows rows;
   for (const glm::vec3& p : mesh.positions) rows.values.insert(rows.values.end(), {p.x, p.y, p.z});
   TILEGRAD_ASSIGN(EditMesh edit, EditMesh::Make(std::move(rows), mesh.faces));
-  Simplify(limits, {}, &edit);
+  TILEGRAD_TRY(Simplify(limits, {}, &edit));
   const EditMesh::Packed packed = edit.Pack();
   Mesh out;
   out.faces = packed.faces;

@@ -2,6 +2,8 @@
 // Fewer faces for the same surface.
 #pragma once
 
+#include <functional>
+
 #include "scene/edit_mesh.h"
 #include "scene/mesh.h"
 #include "tilegrad/status.h"
@@ -15,6 +17,8 @@ struct SimplifyLimits {
   float longest = 1e30f;  // edge that a collapse may make; world units
   std::size_t most_faces =
       0;  // as long as there are more, `error` does not stop; 0: it always does
+  // Now and then asked how it goes, by the faces that are left; an error ends the work.
+  std::function<Status(std::size_t faces)> told = nullptr;
 };
 
 // Collapses edges, the one of the least quadric error first (Garland, Heckbert 1997), and keeps the
@@ -24,6 +28,6 @@ Result<Mesh> Simplified(const Mesh& mesh, const SimplifyLimits& limits);
 
 // The same in place, with what vertices carry. Vertices for which `keep` is not 0 stay where they
 // are and are not taken out; empty: none.
-void Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh);
+Status Simplify(const SimplifyLimits& limits, std::span<const char> keep, EditMesh* mesh);
 
 }  // namespace tilegrad

@@ -29,7 +29,7 @@ struct TrainConfig {
 };
 
 // An unknown key, a wrong type or a value out of range is an error that names file, line and key,
-// and the closest known key.
+// and the known keys that are near.
 Result<TrainConfig> ReadConfig(const Path& path);
 Result<TrainConfig> ParseConfig(std::string_view text,
                                 const std::string& name);  // `name` stands in messages

@@ -8,6 +8,7 @@
 #include "scene/unlit.h"
 #include "train/config.h"
 #include "train/run/checkpoint.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 struct Predictor::Impl {
@@ -34,6 +35,10 @@ Result<Predictor> Predictor::Load(const Path& path, const Workers& workers) {
   impl.info = found.checkpoint.info, impl.checkpoint = found.file;
   if (impl.info.image_size < 1 || impl.info.image_size > 4096)
     return DataLoss("{}: image size {} is not possible", path.string(), impl.info.image_size);
+  if (IsOfFit(impl.info.config)) {
+    return InvalidArgument("{}: is a fit, which predicts nothing; name a run of tilegrad train",
+                           path.string());
+  }
   TILEGRAD_ASSIGN(impl.config,
                   ParseConfig(impl.info.config, path.string() + ": its configuration"));
   auto model = impl.config.task->LoadModel(impl.context, found.checkpoint);
@@ -47,6 +52,8 @@ const std::vector<std::string>& Predictor::warnings() const { return impl_->warn
 const Path& Predictor::checkpoint() const { return impl_->checkpoint; }
 
 int Predictor::image_size() const { return static_cast<int>(impl_->info.image_size); }
+
+std::int64_t Predictor::step() const { return impl_->info.step; }
 
 Status Predictor::CheckImageSize(const Dataset& dataset) const {
   if (dataset.info().image_size == image_size()) return {};

@@ -33,6 +33,7 @@ class Predictor {
   const std::vector<std::string>& warnings() const;
   const Path& checkpoint() const;  // the file
   int image_size() const;          // pixels
+  std::int64_t step() const;       // steps that it has learned for
   // InvalidArgument with the dataset's folder if its images are not of that size.
   Status CheckImageSize(const Dataset& dataset) const;
   std::string description() const;    // "quick network, 3,214,902 parameters, step 3000"

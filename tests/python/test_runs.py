@@ -92,7 +92,7 @@ class Fit(unittest.TestCase):
 
     def test_errors(self):
         for call, message in (
-                (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "the closest known one is"),
+                (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "did you mean steps"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "mask, plain or none"),
                 (lambda: tilegrad.fit(IMAGES, fov=200), "5 to 150 degrees"),
                 (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "no image says where"),

@@ -46,13 +46,16 @@ enum class Verdict { kOut, kIn, kMixed };
 
 class Carver {
  public:
-  Carver(const FitInput& input, const CarveOptions& options, const Workers& workers)
+  Carver(const FitInput& input, const CarveOptions& options, const Workers& workers,
+         const Watch& watch)
       : workers_(workers),
+        watch_(watch),
         views_(input.training.size()),
         margin_(static_cast<float>(options.margin_pixels)) {
     forgiven_ = static_cast<std::size_t>(options.tolerance * static_cast<double>(views_.size()));
     forgiven_ = std::min(forgiven_, views_.size() - 1);
     workers.For(views_.size(), [&](std::size_t i, std::size_t) {
+      if (watch.stopped()) return;
       const auto v = static_cast<std::size_t>(input.training[i]);
       const std::size_t plane = input.images.pixels();
       views_[i] = {input.cameras[v],
@@ -75,6 +78,7 @@ class Carver {
     for (std::size_t a = 0; a < 3; ++a)
       blocks[a] = static_cast<std::size_t>((size[a] + kBlock - 1) / kBlock);
     workers_.For(blocks[0] * blocks[1] * blocks[2], [&](std::size_t i, std::size_t) {
+      if (watch_.stopped()) return;
       const std::size_t z = i % blocks[2], y = i / blocks[2] % blocks[1],
                         x = i / blocks[2] / blocks[1];
       FillBlock({static_cast<int>(x) * kBlock, static_cast<int>(y) * kBlock,
@@ -152,6 +156,7 @@ class Carver {
   }
 
   const Workers& workers_;
+  const Watch& watch_;
   std::vector<View> views_;
   float margin_;
   std::size_t forgiven_ = 0;
@@ -206,10 +211,13 @@ Status NothingLeft() {
 
 }  // namespace
 
-Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options,
-                         const Workers& workers) {
+Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options, const Workers& workers,
+                         const Watch& watch) {
+  const Progress carving = {"carving the visual hull", 0, 0, ""};
+  TILEGRAD_TRY(watch.At(carving));
   TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
-  const Carver carver(input, options, workers);
+  const Carver carver(input, options, workers, watch);
+  TILEGRAD_TRY(watch.At(carving));
   const Box box = FindHull(carver, sphere, workers);
   if (box.empty()) return NothingLeft();
   const glm::vec3 extent = box.high - box.low, middle = 0.5f * (box.low + box.high);
@@ -221,7 +229,9 @@ Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options,
     size[static_cast<std::size_t>(a)] =
         static_cast<int>(std::ceil(extent[a] / cell + 2 * kBorderCells)) + 1;
   const glm::vec3 points(size[0] - 1, size[1] - 1, size[2] - 1);
+  TILEGRAD_TRY(watch.At(carving));
   ScalarGrid grid = carver.Fill(middle - 0.5f * cell * points, cell, size);
+  TILEGRAD_TRY(watch.At(carving));
   if (std::none_of(grid.values.begin(), grid.values.end(), [](float v) { return v > 0; }))
     return NothingLeft();
   return grid;

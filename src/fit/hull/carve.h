@@ -24,8 +24,8 @@ struct CarveOptions {
 // outlines, each in one view, the least (or the one after those that `tolerance` forgives). Near
 // the surface only; elsewhere the sign counts. What a camera does not have before it is outside.
 // The grid surrounds the hull. Any number of workers gives the same bits. An error if no point is
-// inside, that says so.
-Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options,
-                         const Workers& workers);
+// inside, that says so; or kCancelled.
+Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options, const Workers& workers,
+                         const Watch& watch = {});
 
 }  // namespace tilegrad::train

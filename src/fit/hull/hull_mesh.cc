@@ -81,18 +81,24 @@ void DropSpecks(double volume, Mesh* mesh) {
 
 }  // namespace
 
-Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers) {
-  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options.carve, workers));
+Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
+                      const Watch& watch) {
+  TILEGRAD_ASSIGN(const ScalarGrid grid, Carve(input, options.carve, workers, watch));
   Mesh mesh = LevelSet(grid);
   DropSpecks(kSpeckCells * std::pow(static_cast<double>(grid.cell), 3), &mesh);
   Smooth(&mesh);
   // A cell is as many pixels as asked for, or more where the grid would be too large.
   const double pixel = static_cast<double>(grid.cell) / options.carve.cell_pixels;
   const double patch = options.patch_pixels * pixel;
+  const auto faces = static_cast<std::uint64_t>(mesh.faces.size());
+  const auto told = [&watch, faces](std::size_t left) {
+    return watch.At({"simplifying the visual hull", faces - left, faces, ""});
+  };
   return Simplified(mesh, {.error = static_cast<float>(options.error_pixels * pixel),
                            .patch = static_cast<float>(patch * patch),
                            .longest = static_cast<float>(options.longest_pixels * pixel),
-                           .most_faces = options.most_faces});
+                           .most_faces = options.most_faces,
+                           .told = told});
 }
 
 }  // namespace tilegrad::train

@@ -18,6 +18,7 @@ struct HullOptions {
 
 // A closed manifold of any genus and number of parts, but for specks of less than a few cells.
 // Errors: as Carve.
-Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers);
+Result<Mesh> HullMesh(const FitInput& input, const HullOptions& options, const Workers& workers,
+                      const Watch& watch = {});
 
 }  // namespace tilegrad::train

@@ -9,6 +9,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "base/error.h"
 #include "base/rng.h"
 #include "scene/shapes.h"
 
@@ -53,8 +54,9 @@ FitterOptions OptionsOf(const RefitOptions& o, double color_weight) {
 
 }  // namespace
 
-PoseEstimate::PoseEstimate(const PosePictures& pictures, int level, const Workers& workers)
-    : pictures_(pictures), level_(level), workers_(workers) {
+PoseEstimate::PoseEstimate(const PosePictures& pictures, int level, const Workers& workers,
+                           const Watch& watch)
+    : pictures_(pictures), level_(level), workers_(workers), watch_(watch) {
   scene_.cameras = pictures.lenses;
   ForgetShape();
 }
@@ -89,6 +91,13 @@ FitStep PoseEstimate::StepAt(double t) const {
   return step;
 }
 
+Status PoseEstimate::Tell(const RefitOptions& o, int step) const {
+  if (o.told == 0 && watch_.stopped()) return Cancelled("stopped while looking for cameras");
+  if (o.told == 0) return {};
+  return watch_.At({"refining cameras", static_cast<std::uint64_t>(o.first + step),
+                    static_cast<std::uint64_t>(o.told), ""});
+}
+
 Result<double> PoseEstimate::Refit(const RefitOptions& o, std::span<const int> pictures) {
   TILEGRAD_ASSIGN(Fitter fitter,
                   Fitter::Make(scene_, OptionsOf(o, pictures_.color_weight), workers_));
@@ -96,6 +105,7 @@ Result<double> PoseEstimate::Refit(const RefitOptions& o, std::span<const int> p
   double sum = 0;
   int counted = 0;
   for (int i = 0; i < o.steps; ++i) {
+    TILEGRAD_TRY(Tell(o, i));
     const std::vector<int> views = Choose(pictures, kViewsPerStep, &rng);
     FitStep step = StepAt(static_cast<double>(i) / o.steps);
     step.views = views;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/progress.h"
 #include "fit/fitter.h"
 #include "fit/poses/pictures.h"
 
@@ -15,12 +16,15 @@ struct RefitOptions {
   int steps = 40;
   bool shape = true, cameras = true;
   double shape_rate = 1;  // times the usual rates
+  // Of these steps, as the watch is told: the first of them among `told` of "refining cameras"; 0:
+  // it is not told.
+  int first = 0, told = 0;
 };
 
 class PoseEstimate {
  public:
-  // A sphere of `level` (scene/shapes.h). Both references must outlive this.
-  PoseEstimate(const PosePictures& pictures, int level, const Workers& workers);
+  // A sphere of `level` (scene/shapes.h). All references must outlive this.
+  PoseEstimate(const PosePictures& pictures, int level, const Workers& workers, const Watch& watch);
 
   // A sphere of the pictures' mean colour again; cameras stay.
   void ForgetShape();
@@ -33,7 +37,7 @@ class PoseEstimate {
   std::array<double, 3> Up() const;
 
   // Descends on some of the pictures, from soft outlines to narrow ones; the mean loss of the last
-  // quarter of the steps.
+  // quarter of the steps. kCancelled between steps.
   Result<double> Refit(const RefitOptions& options, std::span<const int> pictures);
 
   // The object's middle to the origin and its longest side to 1, cameras with it: what pictures
@@ -42,10 +46,12 @@ class PoseEstimate {
 
  private:
   FitStep StepAt(double t) const;
+  Status Tell(const RefitOptions& o, int step) const;
 
   const PosePictures& pictures_;
   const int level_;
   const Workers& workers_;
+  const Watch& watch_;
   FitScene scene_;
   std::uint64_t refits_ = 0;  // each chooses its pictures anew
 };

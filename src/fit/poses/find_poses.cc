@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/rng.h"
+#include "base/text.h"
 #include "fit/poses/estimate.h"
 #include "fit/poses/viewpoints.h"
 #include "fit/score.h"
@@ -30,11 +31,6 @@ constexpr double kRepulsion = 0.1, kReach = 35;  // at the first sweep; degrees
 constexpr double kAgree = 12;                    // degrees, mean
 constexpr double kCameraDistance = 1.6;
 
-struct Start {
-  std::vector<Camera> cameras;
-  double loss = HUGE_VAL;
-};
-
 double MeanGap(std::span<const Camera> a, std::span<const Camera> b) {
   const Alignment alignment = AlignCameras(a, b);
   double sum = 0;
@@ -44,12 +40,12 @@ double MeanGap(std::span<const Camera> a, std::span<const Camera> b) {
 
 class PoseSearch {
  public:
-  PoseSearch(const PosePictures& pictures, const Workers& workers, std::uint64_t seed, int start)
+  PoseSearch(const PosePictures& pictures, const Workers& workers, const Watch& watch, Rng rng)
       : pictures_(pictures),
         renderer_(workers),
         unlike_(Unlikeness(pictures)),
-        estimate_(pictures, kLevel, workers),
-        rng_(seed, static_cast<std::uint64_t>(start)) {
+        estimate_(pictures, kLevel, workers, watch),
+        rng_(rng) {
     all_.resize(pictures.crops.size());
     std::iota(all_.begin(), all_.end(), 0);
     Scatter();
@@ -57,7 +53,7 @@ class PoseSearch {
 
   // Whether a camera moved.
   Result<bool> Sweep(double repulsion);
-  Result<Start> Finish();
+  Result<PoseStart> Finish();
 
  private:
   void Scatter();
@@ -137,10 +133,10 @@ Result<bool> PoseSearch::Sweep(double repulsion) {
   return moved;
 }
 
-Result<Start> PoseSearch::Finish() {
+Result<PoseStart> PoseSearch::Finish() {
   estimate_.ForgetShape();
   TILEGRAD_TRY(estimate_.Refit({.steps = kWarmUp, .cameras = false}, all_).status());
-  Start out;
+  PoseStart out;
   TILEGRAD_ASSIGN(out.loss, estimate_.Refit({.steps = kFinalSteps}, all_));
   out.cameras = estimate_.cameras();
   return out;
@@ -148,13 +144,16 @@ Result<Start> PoseSearch::Finish() {
 
 // The cameras again, with more pixels and vertices; in the frame that FoundPoses promises.
 Result<std::vector<Camera>> Refine(const PosePictures& pictures, std::span<const Camera> cameras,
-                                   const Workers& workers) {
-  PoseEstimate estimate(pictures, kFineLevel, workers);
+                                   const Workers& workers, const Watch& watch) {
+  PoseEstimate estimate(pictures, kFineLevel, workers, watch);
   for (std::size_t i = 0; i < cameras.size(); ++i) estimate.Place(i, cameras[i]);
   std::vector<int> all(cameras.size());
   std::iota(all.begin(), all.end(), 0);
-  TILEGRAD_TRY(estimate.Refit({.steps = kShapeSteps, .cameras = false}, all).status());
-  TILEGRAD_TRY(estimate.Refit({.steps = kFineSteps}, all).status());
+  constexpr int kAllSteps = kShapeSteps + kFineSteps;
+  TILEGRAD_TRY(
+      estimate.Refit({.steps = kShapeSteps, .cameras = false, .told = kAllSteps}, all).status());
+  TILEGRAD_TRY(
+      estimate.Refit({.steps = kFineSteps, .first = kShapeSteps, .told = kAllSteps}, all).status());
   estimate.Normalize();
   const auto up = estimate.Up();
   const glm::dvec3 y(up[0], up[1], up[2]);
@@ -175,11 +174,15 @@ Status CheckPoses(const TargetImages& images, std::span<const Camera> lenses,
                            options.sweeps);
   }
   if (lenses.size() < static_cast<std::size_t>(kLeastPictures)) {
-    return InvalidArgument("{} images without cameras are too few to find these: needs {} or more",
-                           lenses.size(), kLeastPictures);
+    return InvalidArgument("{} without cameras are too few to find these: it takes {} or more",
+                           Count(lenses.size(), "image"), kLeastPictures);
   }
   if (images.alpha.size() != lenses.size() * images.pixels()) {
     return InvalidArgument("needs a lens for each image");
+  }
+  for (const PoseStart& start : options.done) {
+    if (start.cameras.size() != lenses.size())
+      return InvalidArgument("an earlier search was for {} images", start.cameras.size());
   }
   return {};
 }
@@ -192,17 +195,16 @@ void CopyLens(const Camera& from, Camera* to) {
 class Searches {
  public:
   Searches(const PosePictures& pictures, const PoseOptions& options, const Workers& workers,
-           const ProgressSink& progress)
-      : pictures_(pictures), options_(options), workers_(workers), progress_(progress) {}
+           const Watch& watch)
+      : pictures_(pictures), options_(options), workers_(workers), watch_(watch) {}
 
   // The best, once two agree or all are done.
-  Result<Start> Run(const StopFlag& stop) {
-    while (static_cast<int>(done_.size()) < options_.starts && agreement_ > kAgree) {
-      TILEGRAD_ASSIGN(Start start, Next(stop));
-      done_.push_back(std::move(start));
-      best_ = static_cast<std::size_t>(std::ranges::min_element(done_, {}, &Start::loss) -
-                                       done_.begin());
-      agreement_ = Agreement();
+  Result<PoseStart> Run() {
+    for (const PoseStart& start : options_.done) Add(start);
+    while (starts() < options_.starts && agreement_ > kAgree) {
+      TILEGRAD_ASSIGN(PoseStart start, Next());
+      Add(std::move(start));
+      if (options_.keep) TILEGRAD_TRY(options_.keep(done_));
     }
     return done_[best_];
   }
@@ -210,27 +212,35 @@ class Searches {
   int starts() const { return static_cast<int>(done_.size()); }
 
  private:
-  Result<Start> Next(const StopFlag& stop) {
-    PoseSearch search(pictures_, workers_, static_cast<std::uint64_t>(options_.seed), starts());
+  void Add(PoseStart start) {
+    done_.push_back(std::move(start));
+    best_ = static_cast<std::size_t>(std::ranges::min_element(done_, {}, &PoseStart::loss) -
+                                     done_.begin());
+    agreement_ = Agreement();
+  }
+
+  Result<PoseStart> Next() {
+    const Rng rng(static_cast<std::uint64_t>(options_.seed), static_cast<std::uint64_t>(starts()));
+    PoseSearch search(pictures_, workers_, watch_, rng);
     bool moved = true;
     for (int sweep = 0; sweep < options_.sweeps && moved; ++sweep) {
-      if (stop) return Cancelled("stopped while looking for cameras");
-      Tell(sweep);
+      TILEGRAD_TRY(Tell(sweep));
       TILEGRAD_ASSIGN(moved,
                       search.Sweep(kRepulsion * (options_.sweeps - sweep) / options_.sweeps));
     }
     return search.Finish();
   }
 
-  void Tell(int sweep) const {
-    if (!progress_) return;
+  Status Tell(int sweep) const {
     const auto total = static_cast<std::uint64_t>(options_.starts * options_.sweeps);
     const auto done = static_cast<std::uint64_t>(starts() * options_.sweeps + sweep);
-    const std::string note = done_.empty()
-                                 ? ""
-                                 : fmt::format("loss {:.3f}, the best two agree to {:.0f} degrees",
-                                               done_[best_].loss, agreement_);
-    progress_({"looking for cameras", done, total, note});
+    std::string note;
+    if (starts() == 1) note = fmt::format("loss {:.3f}", done_[best_].loss);
+    if (starts() > 1) {
+      note = fmt::format("loss {:.3f}, the two best searches differ by {:.0f} degrees",
+                         done_[best_].loss, agreement_);
+    }
+    return watch_.At({"looking for cameras", done, total, note});
   }
 
   // Of the search nearest to the best.
@@ -247,8 +257,8 @@ class Searches {
   const PosePictures& pictures_;
   const PoseOptions& options_;
   const Workers& workers_;
-  const ProgressSink& progress_;
-  std::vector<Start> done_;
+  const Watch& watch_;
+  std::vector<PoseStart> done_;
   std::size_t best_ = 0;
   double agreement_ = kNone;
 };
@@ -257,22 +267,22 @@ class Searches {
 
 Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera> lenses,
                              const PoseOptions& options, const Workers& workers,
-                             const ProgressSink& progress, const StopFlag& stop) {
+                             const Watch& watch) {
   TILEGRAD_TRY(CheckPoses(images, lenses, options));
   TILEGRAD_ASSIGN(const PosePictures pictures, PreparePictures(images, lenses, kPoseSide));
-  Searches searches(pictures, options, workers, progress);
-  TILEGRAD_ASSIGN(const Start best, searches.Run(stop));
+  Searches searches(pictures, options, workers, watch);
+  TILEGRAD_ASSIGN(const PoseStart best, searches.Run());
   FoundPoses out{{}, best.loss, searches.starts(), searches.agreement()};
   std::vector<Camera> cameras = best.cameras;
   for (std::size_t i = 0; i < lenses.size(); ++i) CopyLens(lenses[i], &cameras[i]);
-  TILEGRAD_ASSIGN(out.cameras, RefinePoses(images, cameras, workers));
+  TILEGRAD_ASSIGN(out.cameras, RefinePoses(images, cameras, workers, watch));
   return out;
 }
 
 Result<std::vector<Camera>> RefinePoses(const TargetImages& images, std::span<const Camera> cameras,
-                                        const Workers& workers) {
+                                        const Workers& workers, const Watch& watch) {
   TILEGRAD_ASSIGN(const PosePictures fine, PreparePictures(images, cameras, kFineSide));
-  TILEGRAD_ASSIGN(std::vector<Camera> out, Refine(fine, cameras, workers));
+  TILEGRAD_ASSIGN(std::vector<Camera> out, Refine(fine, cameras, workers, watch));
   for (std::size_t i = 0; i < out.size(); ++i) CopyLens(cameras[i], &out[i]);
   return out;
 }

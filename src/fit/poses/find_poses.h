@@ -10,6 +10,8 @@
 // mesh that is the mean of everything. Starts end once two agree.
 #pragma once
 
+#include <cmath>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,10 +23,20 @@ namespace tilegrad::train {
 
 inline constexpr int kLeastPictures = 6;
 
+// What a search from one start has found.
+struct PoseStart {
+  std::vector<Camera> cameras;
+  double loss = HUGE_VAL;
+};
+
 struct PoseOptions {
   int starts = 8;  // at most
   int sweeps = 8;  // of each, at most
   std::int64_t seed = 1;
+  // Of an earlier call with the same arguments that was stopped: the starts that it came through.
+  std::vector<PoseStart> done = {};
+  // Told of all starts so far whenever one is through, so that they can be kept.
+  std::function<Status(std::span<const PoseStart>)> keep = nullptr;
 };
 
 struct FoundPoses {
@@ -44,12 +56,12 @@ struct FoundPoses {
 // image whose mask is empty; the loss is not finite; kCancelled.
 Result<FoundPoses> FindPoses(const TargetImages& images, std::span<const Camera> lenses,
                              const PoseOptions& options, const Workers& workers,
-                             const ProgressSink& progress, const StopFlag& stop);
+                             const Watch& watch);
 
 // Cameras that are some degrees off, brought nearer with a rough mesh: silhouettes and vertex
 // colours of pictures of about 128 pixels. The object must be about 1 across and around the origin;
 // it is so afterwards. Up is made +y.
 Result<std::vector<Camera>> RefinePoses(const TargetImages& images, std::span<const Camera> cameras,
-                                        const Workers& workers);
+                                        const Workers& workers, const Watch& watch = {});
 
 }  // namespace tilegrad::train

@@ -2,9 +2,11 @@
 #include "fit/poses/input_poses.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "base/file.h"
+#include "base/hash.h"
 #include "fit/score.h"
 #include "train/json_fields.h"
 
@@ -15,6 +17,7 @@ using Json = nlohmann::json;
 
 constexpr double kDoubt = 20;  // degrees between the two best starts
 constexpr std::size_t kNumbers = 12;
+constexpr double kMostNumber = 1e30;
 
 TargetImages Chosen(const TargetImages& images, std::span<const int> views) {
   TargetImages out;
@@ -37,44 +40,98 @@ std::vector<Camera> Chosen(std::span<const Camera> cameras, std::span<const int>
 }
 
 // Floats survive as decimal numbers of 9 digits.
-std::string TextOf(const FoundPoses& found) {
+Json JsonOf(std::span<const Camera> cameras) {
   Json poses = Json::array();
-  for (const Camera& c : found.cameras) {
+  for (const Camera& c : cameras) {
     std::vector<double> numbers(c.rotation, c.rotation + 9);
     numbers.insert(numbers.end(), c.translation, c.translation + 3);
     poses.push_back(numbers);
   }
-  const Json file = {{"agreement", found.agreement}, {"loss", found.loss}, {"poses", poses}};
-  return file.dump(1) + "\n";
+  return poses;
 }
 
-Status ReadPoses(const Path& path, std::span<const Camera> lenses, FoundPoses* out) {
-  TILEGRAD_ASSIGN(const std::string text, ReadText(path));
-  TILEGRAD_ASSIGN(const Json file, ParseJson(text, path.string()));
-  const auto bad = [&] {
-    return DataLoss("{}: does not hold {} poses of twelve numbers; remove it to look for them anew",
-                    path.string(), lenses.size());
-  };
-  if (!file.is_object() || !file.contains("poses") || !file["poses"].is_array() ||
-      file["poses"].size() != lenses.size() || !file.value("agreement", Json()).is_number()) {
-    return bad();
-  }
-  out->agreement = file["agreement"].get<double>();
-  out->cameras.assign(lenses.begin(), lenses.end());
+// Poses with these lenses; empty if `poses` is anything else than as many lists of numbers.
+std::vector<Camera> CamerasOf(const Json& poses, std::span<const Camera> lenses) {
+  std::vector<Camera> out(lenses.begin(), lenses.end());
+  if (!poses.is_array() || poses.size() != lenses.size()) return {};
   for (std::size_t i = 0; i < lenses.size(); ++i) {
-    const Json& pose = file["poses"][i];
-    if (!pose.is_array() || pose.size() != kNumbers) return bad();
+    const Json& pose = poses[i];
+    if (!pose.is_array() || pose.size() != kNumbers) return {};
     for (std::size_t k = 0; k < kNumbers; ++k) {
-      if (!pose[k].is_number()) return bad();
-      Camera& camera = out->cameras[i];
-      (k < 9 ? camera.rotation[k] : camera.translation[k - 9]) = pose[k].get<float>();
+      if (!pose[k].is_number() || !(std::abs(pose[k].get<double>()) < kMostNumber)) return {};
+      (k < 9 ? out[i].rotation[k] : out[i].translation[k - 9]) = pose[k].get<float>();
     }
   }
+  return out;
+}
+
+Result<Json> ReadKept(const Path& path) {
+  TILEGRAD_ASSIGN(const std::string text, ReadText(path));
+  TILEGRAD_ASSIGN(const Json file, ParseJson(text, path.string()));
+  return file.is_object() ? file : Json::object();
+}
+
+Status TakePoses(const Path& path, const Json& file, std::span<const Camera> lenses,
+                 FoundPoses* out) {
+  out->cameras = CamerasOf(file.value("poses", Json()), lenses);
+  if (out->cameras.empty() || !file.value("agreement", Json()).is_number()) {
+    return DataLoss("{}: does not hold {} poses of twelve numbers; remove it to look for them anew",
+                    path.string(), lenses.size());
+  }
+  out->agreement = file["agreement"].get<double>();
   return {};
 }
 
 Status Keep(const InputPosesJob& job, const FoundPoses& found) {
-  return job.file.empty() ? Status() : WriteTextAtomic(job.file, TextOf(found));
+  const Json file = {
+      {"agreement", found.agreement}, {"loss", found.loss}, {"poses", JsonOf(found.cameras)}};
+  return job.file.empty() ? Status() : WriteTextAtomic(job.file, file.dump(1) + "\n");
+}
+
+// ---- Searches that were stopped before they agreed.
+
+std::string ChecksumOf(const TargetImages& images) {
+  Hash hash;
+  hash.AddAll(images.color), hash.AddAll(images.alpha);
+  return hash.Text();
+}
+
+Status KeepSearches(const Path& path, const std::string& images,
+                    std::span<const PoseStart> searches) {
+  Json file = {{"images", images}, {"searches", Json::array()}};
+  for (const PoseStart& s : searches)
+    file["searches"].push_back({{"loss", s.loss}, {"poses", JsonOf(s.cameras)}});
+  return WriteTextAtomic(path, file.dump(1) + "\n");
+}
+
+// None where they are of other images.
+std::vector<PoseStart> SearchesOf(const Json& file, const std::string& images,
+                                  std::span<const Camera> lenses) {
+  std::vector<PoseStart> out;
+  if (file.value("images", Json()) != images || !file["searches"].is_array()) return out;
+  for (const Json& search : file["searches"]) {
+    if (!search.is_object() || !search.value("loss", Json()).is_number()) return {};
+    out.push_back({CamerasOf(search.value("poses", Json()), lenses), search["loss"].get<double>()});
+    if (out.back().cameras.empty()) return {};
+  }
+  return out;
+}
+
+// Found anew, or as far as `kept` has not found them.
+Result<FoundPoses> Search(const InputPosesJob& job, const TargetImages& images,
+                          std::span<const Camera> lenses, const Json& kept, const Workers& workers,
+                          const Watch& watch) {
+  PoseOptions options = job.options;
+  if (!job.file.empty()) {
+    const std::string checksum = ChecksumOf(images);
+    if (kept.contains("searches")) options.done = SearchesOf(kept, checksum, lenses);
+    options.keep = [&job, checksum](std::span<const PoseStart> searches) {
+      return KeepSearches(job.file, checksum, searches);
+    };
+  }
+  TILEGRAD_ASSIGN(FoundPoses found, FindPoses(images, lenses, options, workers, watch));
+  TILEGRAD_TRY(Keep(job, found));
+  return found;
 }
 
 // Held-out cameras were given in another world.
@@ -100,12 +157,15 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
   if (!input->posed) views.resize(input->names.size()), std::iota(views.begin(), views.end(), 0);
   const std::vector<Camera> lenses = Chosen(input->cameras, views);
   FoundPoses found;
+  Json kept = Json::object();
   if (job.reuse && PathExists(job.file)) {
-    TILEGRAD_TRY(ReadPoses(job.file, lenses, &found));
+    TILEGRAD_ASSIGN(kept, ReadKept(job.file));
+  }
+  if (kept.contains("poses")) {
+    TILEGRAD_TRY(TakePoses(job.file, kept, lenses, &found));
   } else {
-    TILEGRAD_ASSIGN(found, FindPoses(Chosen(input->images, views), lenses, job.options, workers,
-                                     progress, stop));
-    TILEGRAD_TRY(Keep(job, found));
+    TILEGRAD_ASSIGN(
+        found, Search(job, Chosen(input->images, views), lenses, kept, workers, {progress, &stop}));
   }
   const std::vector<Camera> given = input->cameras;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -127,12 +187,13 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
 
 Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const FitInput& input,
                                              std::span<const Camera> cameras,
-                                             const Workers& workers) {
+                                             const Workers& workers, const Watch& watch) {
   const std::vector<Camera> from = Chosen(cameras, input.training);
   FoundPoses refined;
   refined.agreement = 0;
   if (job.reuse && PathExists(job.file)) {
-    TILEGRAD_TRY(ReadPoses(job.file, from, &refined));
+    TILEGRAD_ASSIGN(const Json kept, ReadKept(job.file));
+    TILEGRAD_TRY(TakePoses(job.file, kept, from, &refined));
   } else {
     TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(input));
     Alignment shrink;
@@ -143,7 +204,7 @@ Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const Fit
     std::vector<Camera> near = from;
     for (Camera& camera : near) camera = Moved(camera, shrink);
     TILEGRAD_ASSIGN(refined.cameras,
-                    RefinePoses(Chosen(input.images, input.training), near, workers));
+                    RefinePoses(Chosen(input.images, input.training), near, workers, watch));
     const Alignment back = AlignCameras(refined.cameras, from);
     for (Camera& camera : refined.cameras) camera = Moved(camera, back);
     TILEGRAD_TRY(Keep(job, refined));

@@ -10,7 +10,7 @@ namespace tilegrad::train {
 struct InputPosesJob {
   PoseOptions options;
   Path file;  // cameras_start.json: keeps what was found, so that a fit that goes on need not look
-              // again; empty: it is not kept
+              // again, and one that was stopped does not begin anew; empty: nothing is kept
   bool reuse = false;  // reads `file` if it is there
 };
 
@@ -26,6 +26,6 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
 // also: those of GuessSphere.
 Result<std::vector<Camera>> RefineInputPoses(const InputPosesJob& job, const FitInput& input,
                                              std::span<const Camera> cameras,
-                                             const Workers& workers);
+                                             const Workers& workers, const Watch& watch = {});
 
 }  // namespace tilegrad::train

@@ -21,11 +21,11 @@ Status StartCameras(const CameraSearch& search, FitJob* job, const Workers& work
   if (!job->input.posed || search.look) {
     TILEGRAD_TRY(FindInputPoses(find, &job->input, workers, progress, stop));
   } else if (job->config.parameters[Parameter::kCamera] && !shaped && job->input.masked) {
-    if (progress) progress({"refining cameras", 0, 0, ""});
     TILEGRAD_ASSIGN(const Sphere sphere, GuessSphere(job->input));
     const std::array<float, 3> middle = {sphere.centre.x, sphere.centre.y, sphere.centre.z};
     TILEGRAD_ASSIGN(job->start_cameras,
-                    RefineInputPoses(find, job->input, TurnedCameras(*job, middle), workers));
+                    RefineInputPoses(find, job->input, TurnedCameras(*job, middle), workers,
+                                     {progress, &stop}));
   }
   if (!shaped) job->config.cameras_rest = kCamerasRest;
   return {};

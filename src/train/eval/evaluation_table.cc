@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/escape_text.h"
 #include "base/temporary_file.h"
+#include "base/text.h"
 #include "train/eval/evaluation.h"
 
 namespace tilegrad::train {
@@ -81,15 +82,14 @@ std::string Caption(const Evaluation& evaluation) {
   int models = 0;
   for (const int n : evaluation.class_models) models += n;
   if (IsOfPhotographs(evaluation))
-    return fmt::format("{} (%) on {} photographs of the {} split", MainMeasure(evaluation), models,
-                       evaluation.split);
+    return fmt::format("{} (%) on {} of the {} split", MainMeasure(evaluation),
+                       Count(models, "photograph"), evaluation.split);
   const std::string measures =
       Classifies(evaluation)
           ? "Accuracy (%)"
           : fmt::format("3D IoU at 32^3 (%) / F-score at {} (%)", kFScoreThreshold);
-  return fmt::format("{} on {} models of the {} split, {} view{} each", measures, models,
-                     evaluation.split, evaluation.views_per_model,
-                     evaluation.views_per_model == 1 ? "" : "s");
+  return fmt::format("{} on {} of the {} split, {} each", measures, Count(models, "model"),
+                     evaluation.split, Count(evaluation.views_per_model, "view"));
 }
 
 std::string ClassifierNotes(const Evaluation& evaluation) {

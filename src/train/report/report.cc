@@ -46,6 +46,7 @@ Result<ReportSummary> WriteReport(const ReportJob& job, const Workers& workers,
   TILEGRAD_ASSIGN(facts.evaluation, ReadEvaluation(job.run));
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(job.run, workers));
   facts.predictor = predictor.description();
+  facts.step = predictor.step();
   const ShowcaseRequest request{job.run, job.data, facts.run.header, predictor, job.models};
   TILEGRAD_ASSIGN(facts.showcase, predictor.task().Show(request, workers, progress, stop));
   TILEGRAD_ASSIGN(const std::string page, Page(facts));

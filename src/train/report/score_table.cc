@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "train/report/html.h"
 #include "train/report/sections.h"
 
@@ -77,10 +78,8 @@ std::string HeadHtml(const Evaluation& evaluation) {
 std::string NotesHtml(const ReportFacts& facts) {
   const Evaluation& evaluation = *facts.evaluation;
   std::string out = fmt::format(
-      "{} split, {} view{} of each model; the mean is over classes; the best of each measure is "
-      "bold.",
-      EscapeHtml(evaluation.split), evaluation.views_per_model,
-      evaluation.views_per_model == 1 ? "" : "s");
+      "{} split, {} of each model; the mean is over classes; the best of each measure is bold.",
+      EscapeHtml(evaluation.split), Count(evaluation.views_per_model, "view"));
   out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
   if (evaluation.shape_threshold > 0) {
     out += fmt::format(

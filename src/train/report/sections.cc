@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "train/report/html.h"
 
 namespace tilegrad::train {
@@ -59,8 +60,8 @@ std::string EvaluationSentence(const ReportFacts& facts) {
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
   return fmt::format(
-      "On {} models of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}", WithCommas(models),
-      EscapeHtml(evaluation.split), MainMeasure(evaluation),
+      "On {} {} of the {} split it reaches a mean {} of <b>{:.1f} %</b>{}", WithCommas(models),
+      Plural("model", models == 1), EscapeHtml(evaluation.split), MainMeasure(evaluation),
       100 * evaluation.rows.back().mean.main(),
       IsOfLight(evaluation) ? ComparisonOfLight(evaluation) : Comparison(evaluation));
 }
@@ -79,15 +80,14 @@ std::string Quoted(const std::string& word) {
 
 std::string SummaryHtml(const ReportFacts& facts) {
   const RunFacts& run = facts.run;
-  const std::int64_t step = run.log.empty() ? 0 : run.log.back().step;
-  const std::string progress =
-      step >= run.config.schedule.steps
-          ? WithCommas(step)
-          : fmt::format("{} of {}", WithCommas(step), WithCommas(run.config.schedule.steps));
-  return fmt::format("A network of {} parameters learned for {} steps {}. {} {}",
+  const std::int64_t step = facts.step, steps = run.config.schedule.steps;
+  const std::string progress = step >= steps
+                                   ? WithCommas(step)
+                                   : fmt::format("{} of {}", WithCommas(step), WithCommas(steps));
+  return fmt::format("A network of {} parameters learned for {} {} {}. {} {}",
                      WithCommas(run.header.parameters), progress,
-                     EscapeHtml(facts.showcase.purpose), EscapeHtml(facts.showcase.data),
-                     EvaluationSentence(facts));
+                     Plural("step", std::max(step, steps) == 1), EscapeHtml(facts.showcase.purpose),
+                     EscapeHtml(facts.showcase.data), EvaluationSentence(facts));
 }
 
 std::string ComparisonHtml(const ReportFacts& facts) {

@@ -15,6 +15,7 @@ struct ReportFacts {
   RunFacts run;
   std::string data;       // the dataset's folder, as it was given
   std::string predictor;  // Predictor::description
+  std::int64_t step = 0;  // of the network that is shown: its checkpoint's
   std::optional<Evaluation> evaluation;
   Showcase showcase;
 };

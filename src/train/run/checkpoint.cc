@@ -160,7 +160,10 @@ std::vector<Path> ListCheckpoints(const Path& run) {
 
 Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& run) {
   TILEGRAD_ASSIGN(const std::vector<Path> files, FindFiles(run));
-  if (files.empty()) return NotFound("{}: no checkpoint in it", Folder(run).string());
+  if (files.empty()) {
+    return NotFound("{}: not the folder of a run: there is no checkpoint in {}", run.string(),
+                    Folder(run).string());
+  }
   FoundCheckpoint found;
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     bool damaged = false;

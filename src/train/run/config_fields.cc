@@ -4,10 +4,10 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <numeric>
 #include <sstream>
 #include <type_traits>
 
+#include "base/did_you_mean.h"
 #include "base/error.h"
 
 namespace tilegrad::train {
@@ -15,33 +15,40 @@ namespace {
 
 using Target = decltype(ConfigField::target);
 
-std::size_t EditDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replace = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replace, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
 std::string_view LastPart(std::string_view key) { return key.substr(key.rfind('.') + 1); }
 
-// How far a key is from a known one: letters, but a table that is missing or another counts as one.
-std::size_t KeyDistance(const std::string& known, const std::string& key) {
-  return std::min(EditDistance(known, key), EditDistance(LastPart(known), LastPart(key)) + 1);
+std::string_view TablePart(std::string_view key) {
+  return key.substr(0, key.rfind('.') == std::string_view::npos ? 0 : key.rfind('.'));
+}
+
+// " (did you mean schedule.steps?)"; a table may be missing, or another.
+std::string NearKeys(const ConfigFields& fields, const std::string& key) {
+  std::vector<std::string> keys, elsewhere;
+  for (const ConfigField& field : fields) {
+    keys.push_back(field.key);
+    if (IsNear(LastPart(key), LastPart(field.key))) elsewhere.push_back(field.key);
+  }
+  const std::string near = DidYouMean(key, keys);
+  if (!near.empty() || elsewhere.empty()) return near;
+  return fmt::format(" (did you mean {}?)", fmt::join(elsewhere, " or "));
+}
+
+// What there is where a person has looked for it: in the same table, else the tables.
+std::string KeysBeside(const ConfigFields& fields, const std::string& key) {
+  std::vector<std::string_view> beside;
+  for (const ConfigField& field : fields) {
+    if (TablePart(field.key) == TablePart(key)) beside.push_back(LastPart(field.key));
+  }
+  if (beside.empty()) return "";
+  const std::string table(TablePart(key));
+  return fmt::format("; {} {}", table.empty() ? "there are" : "[" + table + "] has",
+                     fmt::join(beside, ", "));
 }
 
 Status UnknownKey(const ConfigFields& fields, const std::string& key) {
-  const auto closest = std::min_element(fields.begin(), fields.end(),
-                                        [&](const ConfigField& a, const ConfigField& b) {
-                                          return KeyDistance(a.key, key) < KeyDistance(b.key, key);
-                                        });
-  return InvalidArgument("unknown key \"{}\"; the closest known one is \"{}\"", key, closest->key);
+  const std::string near = NearKeys(fields, key);
+  return InvalidArgument("unknown key \"{}\"{}", key,
+                         near.empty() ? KeysBeside(fields, key) : near);
 }
 
 Status CheckRange(const ConfigField& field, double value) {
@@ -50,23 +57,38 @@ Status CheckRange(const ConfigField& field, double value) {
                          field.high);
 }
 
+// What a value of a field has to be.
+struct Expected {
+  const char* operator()(const std::string*) const { return "a string"; }
+  const char* operator()(const bool*) const { return "true or false"; }
+  const char* operator()(const double*) const { return "a number"; }
+  template <class Integer>
+  const char* operator()(const Integer*) const {
+    return "a whole number";
+  }
+};
+
+Status MustBe(const ConfigField& field) {
+  return InvalidArgument("{} must be {}", field.key, std::visit(Expected{}, field.target));
+}
+
 // One overload for each type of target.
 struct SetFromToml {
   const ConfigField& field;
   const toml::node& node;
 
   Status operator()(std::string* text) const {
-    if (!node.is_string()) return InvalidArgument("{} must be a string", field.key);
+    if (!node.is_string()) return MustBe(field);
     *text = node.ref<std::string>();
     return {};
   }
   Status operator()(bool* flag) const {
-    if (!node.is_boolean()) return InvalidArgument("{} must be true or false", field.key);
+    if (!node.is_boolean()) return MustBe(field);
     *flag = node.ref<bool>();
     return {};
   }
   Status operator()(double* number) const {
-    if (!node.is_number()) return InvalidArgument("{} must be a number", field.key);
+    if (!node.is_number()) return MustBe(field);
     // node.value<double>() is empty for whole numbers that double does not have.
     const auto* whole = node.as_integer();
     *number = whole != nullptr ? static_cast<double>(whole->get()) : node.ref<double>();
@@ -74,7 +96,7 @@ struct SetFromToml {
   }
   template <class Integer>
   Status operator()(Integer* integer) const {
-    if (!node.is_integer()) return InvalidArgument("{} must be a whole number", field.key);
+    if (!node.is_integer()) return MustBe(field);
     const std::int64_t value = node.ref<std::int64_t>();
     TILEGRAD_TRY(CheckRange(field, static_cast<double>(value)));
     *integer = static_cast<Integer>(value);
@@ -113,7 +135,8 @@ Status WithToml(std::string_view text, Use use) {
   try {
     return use(toml::parse(text));
   } catch (const toml::parse_error& error) {
-    return InvalidArgument("line {}: {}", error.source().begin.line, error.description());
+    return InvalidArgument("line {}: not TOML, in which texts have quotes and lists brackets: {}",
+                           error.source().begin.line, error.description());
   }
 }
 
@@ -145,6 +168,15 @@ std::string FieldLine(const ConfigField& field) {
   return fmt::format("{:<36}  # {}\n", setting, field.help);
 }
 
+Status OverrideText(const ConfigField& field, const std::string& value) {
+  // Text needs no quotes here.
+  std::string text = value;
+  TILEGRAD_TRY(ReadFields(field.key + " = " + TomlText(&text), {field}));
+  if (*std::get<std::string*>(field.target) != value)  // toml++ takes other bytes for Latin-1
+    return InvalidArgument("{} must be UTF-8", field.key);
+  return {};
+}
+
 Status OverrideField(const std::string& assignment, const ConfigFields& fields) {
   const auto equals = assignment.find('=');
   if (equals == std::string::npos)
@@ -153,14 +185,15 @@ Status OverrideField(const std::string& assignment, const ConfigFields& fields) 
   const auto field = std::find_if(fields.begin(), fields.end(),
                                   [&](const ConfigField& f) { return f.key == key; });
   if (field == fields.end()) return UnknownKey(fields, key);
-  // Text needs no quotes here.
-  std::string text = value;
-  auto* const* target = std::get_if<std::string*>(&field->target);
-  TILEGRAD_TRY(ReadFields(key + " = " + (target != nullptr ? TomlText(&text) : value), fields)
-                   .Within(assignment));
-  if (target != nullptr && **target != value)  // toml++ takes other bytes for Latin-1
-    return InvalidArgument("{} must be UTF-8", key);
-  return {};
+  if (std::holds_alternative<std::string*>(field->target)) return OverrideText(*field, value);
+  // Unless it is TOML of one value.
+  Status set = MustBe(*field);
+  const Status read = WithToml("value = " + value, [&](const toml::table& table) -> Status {
+    if (table.size() == 1)
+      set = std::visit(SetFromToml{*field, *table.get("value")}, field->target);
+    return {};
+  });
+  return read.ok() && set.ok() ? Status() : set.Within(assignment);
 }
 
 }  // namespace

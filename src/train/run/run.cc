@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/folder_lock.h"
 #include "base/processor_time.h"
+#include "base/text.h"
 #include "io/glb_writer.h"
 #include "io/image_file.h"
 #include "train/run/checkpoint.h"
@@ -118,7 +119,7 @@ Status Session::Restore() {
   TILEGRAD_TRY(CheckSettings(plan_, work_, info.config, found->file,
                              compared ? kStepsKey : plan_.may_differ));
   if (info.step > plan_.schedule.steps) {
-    return InvalidArgument("{}: it has {} steps already, more than {}", file, info.step,
+    return InvalidArgument("{}: it has {} already, more than {}", file, Count(info.step, "step"),
                            plan_.schedule.steps);
   }
   if (info.image_size != plan_.image_size) {
@@ -214,8 +215,7 @@ Status Session::Loop(const ProgressSink& progress, const StopFlag& stop) {
   }
   TILEGRAD_TRY(Save());
   if (!stop || done_ >= End()) return {};
-  return Cancelled("stopped at step {} of {}; everything is saved, continue with --resume", done_,
-                   End());
+  return Cancelled("stopped at step {} of {}; everything is saved", done_, End());
 }
 
 RunOutcome Session::outcome() const { return {first_step_, done_, Seconds(), done_ >= End()}; }

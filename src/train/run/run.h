@@ -93,10 +93,10 @@ struct RunOutcome {
 Status CheckExistingRun(const Path& folder, ExistingRun existing);
 Status CheckExistingRun(const RunPlan& plan, const RunWork& work);
 
-// Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled
-// and a message how to continue). A run that was stopped or killed and continued ends in the bits
-// of one that was not. Errors: another process works in the folder; settings or image size are not
-// those that the run was started with, naming the first line that differs; what `work` returns.
+// Saves before it returns, whether it ends by itself, by time or by `stop` (then with kCancelled).
+// A run that was stopped or killed and continued ends in the bits of one that was not. Errors:
+// another process works in the folder; settings or image size are not those that the run was
+// started with, naming the first line that differs; what `work` returns.
 Result<RunOutcome> ExecuteRun(const RunPlan& plan, RunWork* work, nn::Context& context,
                               const ProgressSink& progress, const StopFlag& stop);
 

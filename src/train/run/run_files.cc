@@ -57,6 +57,11 @@ Result<bool> HoldsRun(const Path& folder) {
   return !ListCheckpoints(folder).empty();
 }
 
+bool IsOfFit(const std::string& settings) {
+  return settings.find("\ninput = ") != std::string::npos &&
+         settings.find("\nmesh = ") != std::string::npos;
+}
+
 std::vector<Path> RunFiles(const Path& folder) {
   std::vector<Path> out;
   for (const char* name : kNames) {

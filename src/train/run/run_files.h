@@ -3,6 +3,7 @@
 // asking, and a run that starts anew takes them away first.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "base/file.h"
@@ -14,6 +15,9 @@ inline constexpr const char* kFitSettings = "fit.txt";        // of a fit
 
 // Whether it holds a run, which may have done no step yet: settings, or checkpoints.
 Result<bool> HoldsRun(const Path& folder);
+
+// Whether a checkpoint's settings are those of a fit.
+bool IsOfFit(const std::string& settings);
 
 // The files of a run that are there now; other files in its folder are not ours.
 std::vector<Path> RunFiles(const Path& folder);

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "render/picture/composite.h"
 #include "render/picture/mesh_pictures.h"
 #include "train/data/trained_models.h"
@@ -115,9 +116,9 @@ Showcase AboutDataset(const Dataset& dataset, const RunHeader& header) {
   for (const int m : dataset.Select(Split::kTrain))
     models.push_back(dataset.models()[static_cast<std::size_t>(m)]);
   const std::size_t shapes = CountShapes(models);
-  out.data = fmt::format("It learned from {} models{} in {} class{} {}.", header.training_models,
-                         shapes < models.size() ? fmt::format(" of {} shapes", shapes) : "",
-                         classes, classes == 1 ? "" : "es", SourceName(header.dataset_source));
+  out.data = fmt::format("It learned from {}{} in {} {}.", Count(header.training_models, "model"),
+                         shapes < models.size() ? " of " + Count(shapes, "shape") : "",
+                         Count(classes, "class"), SourceName(header.dataset_source));
   out.credits = info.credits;
   out.fov_y = info.camera.lens.fov_y;
   out.azimuth = info.camera.azimuth_step * ShownViews(info.views)[0];

@@ -11,6 +11,7 @@
 #include "base/folder_lock.h"
 #include "base/hash.h"
 #include "base/temporary_file.h"
+#include "base/text.h"
 #include "train/data/build/choose.h"
 #include "train/data/build/contact_sheet.h"
 #include "train/data/build/make_model.h"
@@ -128,9 +129,10 @@ class Builder {
     if (!there.ok()) return there.status();
     if (there->recipe != info_.recipe) {
       return InvalidArgument(
-          "{}: holds a dataset of other settings (source {}, {} pixels, {} views); choose another "
-          "folder, or --force to make it anew",
-          folder_.string(), there->source, there->image_size, there->views);
+          "{}: holds a dataset of other settings (source {}, {} pixels, {}); choose another "
+          "folder, "
+          "or --force to make it anew",
+          folder_.string(), there->source, there->image_size, Count(there->views, "view"));
     }
     // The index that may be there belongs to the classes of then, and stays until the new one.
     return {};
@@ -247,7 +249,7 @@ class Builder {
     Collect();
     TILEGRAD_TRY(WriteRejected(folder_, summary_.rejected));
     if (summary_.models.empty()) {
-      return DataLoss("none of {} models can be used; {} says why", chosen_.size(),
+      return DataLoss("none of {} can be used; {} says why", Count(chosen_.size(), "model"),
                       RejectedPath(folder_).string());
     }
     Split();

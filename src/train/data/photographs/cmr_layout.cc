@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/text.h"
 #include "io/mat/mat_file.h"
 #include "scene/weak_perspective_ref.h"
 #include "train/data/photographs/photographs.h"
@@ -206,8 +207,9 @@ class CmrReader {
     TILEGRAD_ASSIGN(const MatPlace cameras, MatPlace::Variable(sfm, "sfm_anno"));
     TILEGRAD_TRY(images.ExpectStruct());
     if (images.places() != cameras.places())
-      return InvalidArgument("{} has {} pictures, but {} has {} cameras", anno_file.string(),
-                             images.places(), sfm_file.string(), cameras.places());
+      return InvalidArgument("{} has {}, but {} has {}", anno_file.string(),
+                             Count(images.places(), "picture"), sfm_file.string(),
+                             Count(cameras.places(), "camera"));
     for (std::size_t i = 0; i < images.places(); ++i)
       TILEGRAD_TRY(ReadOne(images, cameras, i, split));
     if (split == Split::kTrain) TILEGRAD_TRY(ReadMeanShape(sfm));

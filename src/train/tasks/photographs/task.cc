@@ -2,6 +2,7 @@
 #include "train/tasks/photographs/task.h"
 
 #include "base/error.h"
+#include "base/text.h"
 #include "nn/nn.h"
 #include "train/data/batches.h"
 #include "train/data/fingerprint.h"
@@ -169,9 +170,9 @@ Result<Showcase> PhotographsTask::Show(const ShowcaseRequest& request, const Wor
   auto& model = dynamic_cast<PhotographModel&>(request.predictor.model());
   Showcase out;
   out.purpose = "to predict shape, texture and camera of an object from one photograph";
-  out.data = fmt::format(
-      "It learned from {} photographs, one of each object, with masks{}. It saw no 3D data.",
-      request.header.training_models, set.keypoint_names.empty() ? "" : " and keypoints");
+  out.data = fmt::format("It learned from {}, one of each object, with masks{}. It saw no 3D data.",
+                         Count(request.header.training_models, "photograph"),
+                         set.keypoint_names.empty() ? "" : " and keypoints");
   out.note =
       "The network saw none of these in training. Dots are annotated keypoints, rings predicted "
       "ones. Photographs are spread evenly over the held-out ones, not picked by hand.";

@@ -2,6 +2,7 @@
 #include "train/tasks/single_image/task.h"
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/image_file.h"
 #include "nn/kernels/sample_colors_ref.h"
 #include "nn/nn.h"
@@ -115,8 +116,8 @@ Status SingleImageTask::CheckDataset() const {
   if (dataset_->Select(Split::kTrain).empty())
     return InvalidArgument("{}: no training models in it", folder);
   if (config_.views > info.views) {
-    return InvalidArgument("schedule.views is {}, but the dataset has {} views a model",
-                           config_.views, info.views);
+    return InvalidArgument("schedule.views is {}, but the dataset has {} of each model",
+                           config_.views, Count(info.views, "view"));
   }
   if (info.image_size % 8 != 0) {
     return InvalidArgument("{}: images are {} pixels a side; the network needs a multiple of 8",

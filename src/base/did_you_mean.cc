@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cli/did_you_mean.h"
+#include "base/did_you_mean.h"
 
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <numeric>
 
-namespace tilegrad::cli {
+namespace tilegrad {
 namespace {
 
 // Letters to insert, remove or replace.
-std::size_t EditDistance(const std::string& a, const std::string& b) {
+std::size_t EditDistance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -26,16 +26,18 @@ std::size_t EditDistance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-std::string DidYouMean(const std::string& word, const std::vector<std::string>& known) {
+bool IsNear(std::string_view word, std::string_view name) {
   constexpr std::size_t kBegun = 4;  // letters, "--" among them, that are enough to tell
-  constexpr std::size_t kMost = 3;   // that are named
-  const std::size_t near = word.size() < kBegun ? 1 : 2;
-  std::vector<std::pair<std::size_t, std::string>> found;  // nearest first
+  const std::size_t both = std::min(word.size(), name.size());
+  if (both >= kBegun && word.substr(0, both) == name.substr(0, both)) return true;
+  return EditDistance(word, name) <= (word.size() < kBegun ? 1 : 2);
+}
+
+std::string DidYouMean(std::string_view word, const std::vector<std::string>& known) {
+  constexpr std::size_t kMost = 3;  // that are named
+  std::vector<std::pair<std::size_t, std::string>> found;
   for (const std::string& name : known) {
-    const std::size_t both = std::min(word.size(), name.size()),
-                      distance = EditDistance(word, name);
-    const bool begins = both >= kBegun && word.compare(0, both, name, 0, both) == 0;
-    if (begins || distance <= near) found.emplace_back(distance, name);
+    if (IsNear(word, name)) found.emplace_back(EditDistance(word, name), name);
   }
   std::sort(found.begin(), found.end());
   std::string list;
@@ -44,4 +46,4 @@ std::string DidYouMean(const std::string& word, const std::vector<std::string>& 
   return list.empty() ? "" : fmt::format(" (did you mean {}?)", list);
 }
 
-}  // namespace tilegrad::cli
+}  // namespace tilegrad
