@@ -109,7 +109,7 @@ void PrintRejected(const train::BuildSummary& summary, const Path& folder) {
 void PrintModelWarnings(const train::BuildSummary& summary) {
   constexpr std::size_t kShown = 10;
   if (summary.warnings.empty()) return;
-  Print("{} of reading models:\n", Count(summary.warnings.size(), "warning"));
+  Print("{} while reading models:\n", Count(summary.warnings.size(), "warning"));
   for (std::size_t i = 0; i < std::min(kShown, summary.warnings.size()); ++i)
     Print("  {}: {}\n", summary.warnings[i].file, summary.warnings[i].text);
   if (summary.warnings.size() > kShown) Print("  ...\n");

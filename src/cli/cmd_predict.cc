@@ -86,8 +86,8 @@ struct Prediction {
   Watch watch;
 };
 
-Status Refine(const Prediction& p, const ImageU8& cutout, const Path& file, Mesh* mesh,
-              nlohmann::ordered_json* json) {
+Status Refine(const Prediction& p, const std::string& image, const ImageU8& cutout,
+              const Path& file, Mesh* mesh, nlohmann::ordered_json* json) {
   TILEGRAD_ASSIGN(const auto planar,
                   train::PrepareCutout(cutout, train::kRefineSize, FramingOf(p.options)));
   TILEGRAD_ASSIGN(train::RefinedMesh refined,
@@ -98,6 +98,13 @@ Status Refine(const Prediction& p, const ImageU8& cutout, const Path& file, Mesh
   const train::PictureMatch &before = refined.before, &after = refined.after;
   Print("{}: silhouette {:.0f} -> {:.0f} %, colour off by {:.3f} -> {:.3f}\n", file.string(),
         100 * before.silhouette_iou, 100 * after.silhouette_iou, before.color_l1, after.color_l1);
+  if (refined.rival < train::kDoubtfulRival) {
+    PrintNote(
+        "tilegrad: warning: {}: the camera is doubtful: the object fits almost as well from "
+        "another "
+        "side; look at {}\n",
+        image, file.string());
+  }
   json->update(ScoresOf(refined));
   *mesh = std::move(refined.mesh);
   return {};
@@ -109,10 +116,11 @@ Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutou
   TILEGRAD_ASSIGN(const auto match, trained.Nearest(cutout));
   if (!match || !trained.IsUnlike(*match)) return {};
   PrintNote(
-      "tilegrad: warning: {} is unlike the {} training pictures: nearest is {} ({}) at {:.2f}, "
-      "where {:.0f} % of them have another shape within {:.2f}; expect little\n",
+      "tilegrad: warning: {}: unlike the {} training images; expect a poor mesh (nearest: {} ({}), "
+      "at "
+      "{:.2f}; usual: {:.2f})\n",
       file, fmt::group_digits(trained.count()), match->name, match->class_name, match->distance,
-      100 * train::kUsualShare, *trained.usual());
+      *trained.usual());
   return {};
 }
 
@@ -131,7 +139,7 @@ Status Relight(const train::Predictor& predictor, std::span<const std::uint8_t> 
   TILEGRAD_ASSIGN(const auto lit, PredictLit(predictor, picture));
   if (!lit) {
     return InvalidArgument(
-        "--relight: this run predicts no light and camera; train configs/texture_quick.toml");
+        "--relight: this network predicts no light; train one with --config texture_quick");
   }
   const auto& model = dynamic_cast<train::TexturedModel&>(predictor.model());
   return AnimateRelighting(mesh, {*lit, model.config().light, predictor.image_size()}, file);
@@ -178,7 +186,7 @@ Status PredictOne(const Prediction& p, const std::pair<std::string, std::string>
                                  {"animation", files.animation.string()}};
   if (p.options.refine > 0) {
     TILEGRAD_TRY(predictor.model().CheckRefinable());
-    TILEGRAD_TRY(Refine(p, cutout, files.match, &meshes[0], &json).Within(file));
+    TILEGRAD_TRY(Refine(p, file, cutout, files.match, &meshes[0], &json).Within(file));
   }
   TILEGRAD_TRY(SaveResult(predictor, *input, files.glb, &meshes[0]));
   if (p.options.relight) {

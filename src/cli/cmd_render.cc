@@ -206,8 +206,11 @@ Status RenderRun::Finish() {
   for (const Path& file : rendered_) files.push_back(file.string());
   PrintResult({{"files", files}});
   if (rendered_.size() == 1) Print("wrote {}\n", rendered_.back().string());
-  if (rendered_.size() > 1)
-    Print("{}, the last is {}\n", Count(rendered_.size(), "file"), rendered_.back().string());
+  if (rendered_.size() > 1) {
+    const Path folder = rendered_.back().parent_path();
+    Print("wrote {} to {}\n", Count(rendered_.size(), "file"),
+          folder.empty() ? "this folder" : folder.string());
+  }
   return settings_.write_cameras.empty() || views_.empty() ? Status() : WriteCameras();
 }
 

@@ -50,10 +50,7 @@ struct SampleFiles {
 Result<train::GeneratorModel*> GeneratorOf(const train::Predictor& predictor, const Path& run) {
   auto* const model = dynamic_cast<train::GeneratorModel*>(&predictor.model());
   if (model != nullptr) return model;
-  return InvalidArgument(
-      "{}: this run makes nothing from noise; name one that was trained to, such as of "
-      "configs/gan_quick.toml",
-      run.string());
+  return InvalidArgument("{}: not a generator; train one with --config gan_quick", run.string());
 }
 
 Result<std::vector<Mesh>> GenerateAll(train::GeneratorModel& model,
@@ -77,8 +74,8 @@ Status Interpolate(const SampleOptions& options, const SampleFiles& files,
                   DrawInterpolation({codes, options.interpolate, files.strip, files.animation},
                                     model, workers));
   Print(
-      "interpolation: {}, {}; the largest step of a row is {:.1f} times its mean one, {:.1f} at "
-      "most\n",
+      "interpolation: {}, {}; largest step of a row by its mean step: {:.1f} in the mean, {:.1f} "
+      "at most\n",
       files.strip.string(), files.animation.string(), steps.mean, steps.largest);
   (*json)["interpolation"] = {{"strip", files.strip.string()},
                               {"animation", files.animation.string()},
@@ -108,9 +105,9 @@ Status Score(const SampleOptions& options, const SampleFiles& files, const Path&
 
 Status RunSampling(const SampleOptions& options) {
   if (options.interpolate > 0 && options.count < 2)
-    return InvalidArgument("--interpolate goes from one sample to the next: --count 2 or more");
+    return InvalidArgument("--interpolate needs two samples or more: --count 2");
   if (!options.score && !(options.data.empty() && options.judge.empty()))
-    return InvalidArgument("--data and --judge are of --score");
+    return InvalidArgument("--data and --judge belong to --score");
   TILEGRAD_ASSIGN(const Path run, ChooseRun(options.run));
   const SampleFiles files(options);
   const OutputGuard guard(options.force);

@@ -49,7 +49,7 @@ Status WriteStudy(const Path& folder, const std::vector<StudyResult>& results,
                {"files", {"tradeoff.md", "tradeoff.csv", "tradeoff.svg"}},
                {"trained", !training.empty()}});
   if (training.empty() && PathExists(folder / "training.csv")) {
-    Print("training.csv there is of an earlier call\n");
+    Print("training.csv is from an earlier call\n");
   }
   return {};
 }

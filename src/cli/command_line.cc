@@ -85,7 +85,7 @@ void AddOptions(const std::vector<Option>& options, CLI::App* app) {
 // Of the words that nobody takes, the first: what follows an unknown option is its value.
 std::string ExplainExtra(const CLI::App& command) {
   const std::string word = command.remaining().front();
-  if (!word.starts_with('-')) return fmt::format("\"{}\" is one word too many", word);
+  if (!word.starts_with('-')) return fmt::format("unexpected argument \"{}\"", word);
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);

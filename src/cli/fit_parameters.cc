@@ -19,7 +19,7 @@ Result<Parameter> ParameterNamed(const std::string& name) {
     if (name == train::NameOf(p)) return p;
     known += fmt::format("{}{}", known.empty() ? "" : ", ", train::NameOf(p));
   }
-  return InvalidArgument("\"{}\" cannot be fitted; what can: {}", name, known);
+  return InvalidArgument("cannot fit \"{}\"; choose from {}", name, known);
 }
 
 // Whether a fit of these, which are the mesh and its colours if none is named, may move `p`.

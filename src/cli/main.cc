@@ -69,7 +69,7 @@ Status CheckFirstWord(const CommandList& commands, std::string* word) {
 Status CheckValues(const Command& command) {
   for (const Option& option : command.options) {
     for (const std::string& word : option.words) {
-      if (word.empty()) return InvalidArgument("{}: its value is empty", option.FirstName());
+      if (word.empty()) return InvalidArgument("{}: the value is empty", option.FirstName());
     }
   }
   return {};

@@ -21,7 +21,8 @@ nlohmann::ordered_json CameraRecord(const Camera& camera) {
 nlohmann::ordered_json ScoresOf(const train::RefinedMesh& refined) {
   const train::PictureMatch &before = refined.before, &after = refined.after;
   return {{"silhouette_iou", {before.silhouette_iou, after.silhouette_iou}},
-          {"color_l1", {before.color_l1, after.color_l1}}};
+          {"color_l1", {before.color_l1, after.color_l1}},
+          {"camera_doubtful", refined.rival < train::kDoubtfulRival}};
 }
 
 Status WriteMatch(const train::RefinedMesh& refined, const Path& file) {

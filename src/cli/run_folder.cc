@@ -57,8 +57,8 @@ void AddReadLimitOption(Command* command) {
     return status.message();
   };
   command->Add("--read-limit", WordCheck{take, ""},
-               fmt::format("what one file may become in memory with all that it names: bytes, or "
-                           "500M, 16G [{} in the environment, else 4G]",
+               fmt::format("memory limit per file, referenced files included: bytes, or 500M, 16G "
+                           "[{} in the environment, else 4G]",
                            kReadLimitVariable),
                {TypeName{"BYTES"}});
 }
@@ -148,10 +148,8 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
   }
   const Path dataset = json["dataset"].get<std::string>();
   if (const auto found = FindFromRun(dataset, run)) return *found;
-  return NotFound(
-      "{}: its dataset {} is not there, seen from this folder or those above the run; name it with "
-      "--data",
-      file.string(), dataset.string());
+  return NotFound("{}: its dataset {} is neither here nor above the run; name it with --data",
+                  file.string(), dataset.string());
 }
 
 }  // namespace tilegrad::cli

@@ -122,8 +122,8 @@ std::string FarSentence(const Sight& s, const FitStep& step) {
   const double delta = step.job.options.delta, reach = ReachInPixels(delta, side);
   const double needed = s.nearest < HUGE_VAL ? s.nearest : side;
   return fmt::format(
-      "{:.0f} % of what the masks have and the mesh lacks lies farther from it than delta {:.1e} "
-      "reaches ({:.1f} pixels): start with a delta of {:.1e} or more",
+      "{:.0f} % of the masks beyond the mesh is out of reach of delta {:.1e} ({:.1f} pixels): "
+      "start with a delta of {:.1e} or more",
       100 * s.lost_far / s.lost, delta, reach,
       std::max(2 * delta, delta * (needed / reach) * (needed / reach) * 2));
 }

@@ -71,7 +71,7 @@ void Multiply(std::span<float> colors, const glm::dvec3& by) {
 
 Status CheckMaterial(const FitConfig& config) {
   if (config.material == MaterialKind::kUnlit || config.lighting == Lighting::kNone) return {};
-  return InvalidArgument("a material other than unlit brings its light: leave the lighting out");
+  return InvalidArgument("a lit material learns its own light: leave out the lighting");
 }
 
 void SetMaterial(bool from_hull, FitConfig* config) {

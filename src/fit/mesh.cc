@@ -96,7 +96,7 @@ Result<FitScene> SceneOfMesh(const Mesh& mesh) {
   TILEGRAD_TRY(Validate(mesh));
   if (mesh.faces.empty()) return InvalidArgument("the mesh has no faces");
   if (mesh.materials.size() > 1) {
-    return InvalidArgument("the mesh has {} materials; fitting handles one: join them first",
+    return InvalidArgument("the mesh has {} materials, a fit takes one: merge them first",
                            mesh.materials.size());
   }
   FitScene scene;

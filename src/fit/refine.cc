@@ -183,17 +183,20 @@ std::vector<FoundCamera> Candidates(const std::vector<FoundCamera>& found, int f
 // can be bent onto any outline, also onto that of a car that faces the other way.
 Result<Descent> BestStart(const FitScene& scene, const std::vector<FoundCamera>& cameras,
                           const TargetImages& picture, const RefineOptions& options,
-                          const Workers& workers) {
+                          const Workers& workers, double* rival) {
   std::optional<Descent> best;
-  double best_cost = 0;
+  double best_cost = HUGE_VAL, next_cost = HUGE_VAL;
   const int pilot = static_cast<int>(kPilotShare * options.steps);
   for (const FoundCamera& start : cameras) {
     TILEGRAD_ASSIGN(Descent descent, Descent::Make(scene, start.camera, picture, workers));
     TILEGRAD_TRY(descent.Run(0, pilot, options));
     const double cost = descent.loss() + kSilhouetteWeight * start.cost();
+    next_cost = std::min(next_cost, std::max(cost, best_cost));
     if (best && cost >= best_cost) continue;
-    best.emplace(std::move(descent)), best_cost = cost;
+    best.emplace(std::move(descent));
+    best_cost = cost;
   }
+  *rival = next_cost / best_cost;
   TILEGRAD_TRY(best->Run(pilot, options.steps, options));
   return std::move(*best);
 }
@@ -226,7 +229,8 @@ Result<RefinedMesh> RefineMesh(const Mesh& prediction, const TargetImages& pictu
   out.camera_before = cameras[0].camera;
   TILEGRAD_ASSIGN(out.before, Match(scene, picture, workers));
   if (options.steps > 0) {
-    TILEGRAD_ASSIGN(const Descent best, BestStart(scene, cameras, picture, options, workers));
+    TILEGRAD_ASSIGN(const Descent best,
+                    BestStart(scene, cameras, picture, options, workers, &out.rival));
     scene = best.scene();
   }
   TILEGRAD_ASSIGN(out.after, Match(scene, picture, workers));

@@ -5,6 +5,8 @@
 // things have.
 #pragma once
 
+#include <cmath>
+
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "fit/image_loss.h"
@@ -15,8 +17,10 @@
 namespace tilegrad::train {
 
 inline constexpr int kRefineSteps = 800;  // a few seconds on two cores
-inline constexpr int kRefineSize = 128;   // pixels a side of the picture that predict refines on:
-                                          // an edge of the divided template is about three
+// Of RefinedMesh::rival: below, the picture may well be taken from another side.
+inline constexpr double kDoubtfulRival = 1.1;
+inline constexpr int kRefineSize = 128;  // pixels a side of the picture that predict refines on:
+                                         // an edge of the divided template is about three
 
 struct RefineOptions {
   int steps = kRefineSteps;  // of gradient descent; 0: only the camera is found
@@ -35,6 +39,9 @@ struct RefinedMesh {
   Camera camera;         // sees it as the picture shows it; of pixels of the picture
   Camera camera_before;  // the best that was found for the prediction
   PictureMatch before, after;
+  // What the best start from another side cost by that of this one, after a tenth of the steps: 1
+  // where the two are as good; infinity where there was no other.
+  double rival = HUGE_VAL;
 };
 
 // `picture`: one square image. `prediction`: a mesh with vertex colours or one texture map,

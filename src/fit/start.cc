@@ -43,9 +43,8 @@ Status CheckConfig(const FitConfig& config) {
 Status CheckMasks(const FitJob& job) {
   if (job.input.masked || job.config.loss.silhouette_weight == 0) return {};
   return InvalidArgument(
-      "no image has an alpha channel, a mask or a plain background, so it is not known where the "
-      "object is: add masks "
-      "(\"mask_path\" in transforms.json), or fit colours only with a silhouette weight of 0");
+      "no image has alpha, a mask or a plain background: add masks (\"mask_path\" in "
+      "transforms.json), or fit colours alone with a silhouette weight of 0");
 }
 
 void SetBlankTexture(int width, int height, FitScene* scene) {

@@ -322,7 +322,7 @@ TEST_F(BrokenInputs, EmptyValues) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = RunProgram(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments;
-    EXPECT_EQ(outcome.output, "tilegrad: " + message + ": its value is empty\n");
+    EXPECT_EQ(outcome.output, "tilegrad: " + message + ": the value is empty\n");
   };
   expect("train --config " + Config() + " --data '' --out " + (folder_ / "new").string() + kTiny,
          "--data");

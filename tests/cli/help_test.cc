@@ -52,6 +52,15 @@ TEST_F(Help, IsTheSameEitherWayRound) {
   EXPECT_NE(outcome.output.find("did you mean train?"), std::string::npos) << outcome.output;
 }
 
+// As of `help fit | head`.
+TEST_F(Help, AReaderThatHasSeenEnoughIsNoError) {
+  for (const char* asked : {"help fit", "man fit"}) {
+    const Outcome outcome =
+        RunProgram(std::string(asked) + " 2>" + In("said") + ") | true;", "(sleep 0.2; ");
+    EXPECT_EQ(ReadText(folder_ / "said").value(), "") << outcome.output;
+  }
+}
+
 TEST_F(Help, PagesAndCompletionsHaveEveryCommand) {
   const std::vector<std::string> commands = Commands();
   ASSERT_GT(commands.size(), 12u);

@@ -85,7 +85,7 @@ TEST_F(OptionWords, MistypedNamesAreAnswered) {
            {render + "--output x.png",
             "unknown option --output (did you mean --outputs or --out?)"},
            {render + "--colour red", "tilegrad: render: unknown option --colour; see"},
-           {"dataset procedural", "\"procedural\" is one word too many"},
+           {"dataset procedural", "unexpected argument \"procedural\""},
            {"figure2 --steps 0", "0 must be a number above 0"},
            {"dataset-view --data d --view -1", "-1 must be a number, 0 or above"},
            {"report --out page.pdf", "page.pdf: it is written as .html"},

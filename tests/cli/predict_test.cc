@@ -48,14 +48,40 @@ class Predict : public TempFolderTest {
 TEST_F(Predict, SaysWhatIsUnlikeTheTrainingPictures) {
   EXPECT_EQ(Said("known.png").find("unlike"), std::string::npos);
   const std::string said = Said("text.png");
-  for (const char* part : {"text.png is unlike the ", " training pictures: nearest is ", " at 0.",
-                           "90 % of them have another shape within 0.", "; expect little"})
+  for (const char* part :
+       {"text.png: unlike the ", " training images; expect a poor mesh (nearest: ", ", at 0.",
+        "; usual: 0."})
     EXPECT_NE(said.find(part), std::string::npos) << said;
   EXPECT_NE(Said("text.png", "r/checkpoints/step_00000001.safetensors").find("unlike"),
             std::string::npos);
   // It needs no dataset.
   std::filesystem::rename(folder_ / "d", folder_ / "gone");
   EXPECT_EQ(Said("text.png"), said);
+}
+
+// The picture that was cut out, before a wall.
+TEST_F(Predict, TakesPlainBackgroundsAway) {
+  ImageU8 cutout = io::LoadImage(folder_ / "known.png").value();
+  ImageU8 wall(4 * cutout.width, 4 * cutout.height, 3), noise = wall;
+  for (int y = 0; y < wall.height; ++y) {
+    for (int x = 0; x < wall.width; ++x) {
+      const std::uint8_t* from = cutout.at(x / 4, y / 4);
+      for (int c = 0; c < 3; ++c) {
+        wall.at(x, y)[c] = from[3] >= 128 ? from[c] / 2 : 235;
+        noise.at(x, y)[c] = static_cast<std::uint8_t>(x * y * (7 + c) % 251);
+      }
+    }
+  }
+  ASSERT_TRUE(io::SavePng(folder_ / "wall.png", wall).ok());
+  ASSERT_TRUE(io::SavePng(folder_ / "noise.png", noise).ok());
+  const auto result = nlohmann::json::parse(Said("wall.png --json"));
+  EXPECT_EQ(result[0]["mesh"], In("out/wall_predicted.glb"));
+  const Outcome refused =
+      RunProgram("predict --run " + In("r") + " --out " + In("out") + " " + In("noise.png"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.output.find("the object is not cut out, and the background is not plain"),
+            std::string::npos)
+      << refused.output;
 }
 
 TEST_F(Predict, DoesItsWorkWithoutTheTrainingPictures) {
@@ -79,13 +105,15 @@ TEST_F(Predict, TheAnimationIsTheSameAgain) {
 
 TEST_F(Predict, RecordsHowWellTheMeshMatchesItsPicture) {
   const std::string in = In("known.png"), to = " --run " + In("r") + " --out " + In("out") + " ";
-  ExpectDone("predict --refine 40" + to + in);
+  const auto said = nlohmann::json::parse(ExpectDone("predict --refine 40 --json" + to + in));
   const Bytes text = ReadFile(folder_ / "out/known_match.json").value();
   const auto record = nlohmann::json::parse(text.begin(), text.end());
   EXPECT_LT(record["silhouette_iou"][0], record["silhouette_iou"][1]);
   EXPECT_GT(record["silhouette_iou"][0], 0);
   EXPECT_LE(record["silhouette_iou"][1], 1);
   EXPECT_GT(record["color_l1"][0], record["color_l1"][1]);
+  for (const char* score : {"silhouette_iou", "color_l1"})
+    EXPECT_EQ(said[0][score], record[score]) << score;
   EXPECT_EQ(record["camera"]["size"], train::kRefineSize);
   // A rotation: its rows have length 1.
   const auto rows = record["camera"]["rotation"].get<std::vector<double>>();
@@ -127,7 +155,9 @@ TEST_F(Predict, WritesTheLightAndMovesIt) {
   const Outcome plain = RunProgram("predict --refine 0 --relight --force --run " + In("r") +
                                    " --out " + In("out") + " " + In("known.png"));
   EXPECT_NE(plain.exit_code, 0);
-  EXPECT_NE(plain.output.find("predicts no light and camera"), std::string::npos) << plain.output;
+  EXPECT_NE(plain.output.find("predicts no light; train one with --config texture_quick"),
+            std::string::npos)
+      << plain.output;
 }
 
 }  // namespace tilegrad::predict_test

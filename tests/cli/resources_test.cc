@@ -49,7 +49,7 @@ class Resources : public TempFolderTest {
       EXPECT_NE(outcome.output.find("4 models"), std::string::npos) << limit << outcome.output;
       EXPECT_EQ(outcome.output.find("could not be used"), std::string::npos)
           << limit << outcome.output;
-      EXPECT_EQ(outcome.output.find("of reading models"), std::string::npos)
+      EXPECT_EQ(outcome.output.find("while reading models"), std::string::npos)
           << limit << outcome.output;
     } else {
       EXPECT_GT(outcome.exit_code, 0) << "a signal: " << limit << outcome.output;

@@ -104,6 +104,57 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
 
+TEST_F(Runs, OfFitsGoOnWithoutAnyOption) {
+  ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
+  Done("views " + In("a.glb") + " --views 5 --size 32 --out " + In("views"));
+  const std::string in_folder = "cd " + folder_.string() + " && ";
+  const Outcome begun = RunProgram(
+      "fit views --steps 4 --smoothing 3 --light-direction 1 0 0 --lighting lambert --rate "
+      "positions=0.01,texture=0.02 --start sphere --hold-out 3 --out fit",
+      in_folder);
+  ASSERT_EQ(begun.exit_code, 0) << begun.output;
+  const std::string go_on = "fit --resume --out " + In("fit");
+  const Json more = Done(go_on + " --steps 6");  // and from another folder
+  EXPECT_EQ(more["steps"], 6);
+  EXPECT_EQ(more["training"]["views"], 4);
+  EXPECT_EQ(Done(go_on)["steps"], 6);  // it is a fit of six steps now
+  // What was given or not given then, by name and with both values.
+  ExpectRefused(go_on + " --smoothing 4", 2, "--smoothing: was 3, is 4; leave it out");
+  ExpectRefused(go_on + " --laplacian 2", 2, "--laplacian: was 0, is 2");
+  ExpectRefused(go_on + " --background none", 2, "--background: was auto, is none");
+  ExpectRefused(go_on + " --find-cameras", 2, "--find-cameras: was ");
+  ExpectRefused("fit " + In("a.glb") + " --resume --out " + In("fit"), 2, "input: was ");
+  Done(go_on + " --smoothing 3.0 --timelapse 2 --threads 1");
+  Done("fit " + In("views/../views") + " --resume --out " + In("fit"));
+  std::filesystem::remove(folder_ / "fit/fit.txt");  // of earlier versions, and of Python's
+  ExpectRefused(go_on, 2, "fit: input is required");
+}
+
+TEST_F(Runs, OfOneKindAreNotTakenForAnother) {
+  MakeData();
+  Done(Start("train"));
+  ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
+  Done("views " + In("a.glb") + " --views 3 --size 32 --out " + In("views"));
+  Done("fit " + In("views") + " --steps 1 --out " + In("fit"));
+  const std::string fit = In("fit"), picture = " " + In("views/images/000.png");
+  ExpectRefused("predict --run " + fit + picture, 2, "fit: is a fit, which predicts nothing");
+  ExpectRefused("sample --run " + fit + " --out " + In("s"), 2, "is a fit, which predicts nothing");
+  ExpectRefused("predict --run " + In("views") + picture, 3, "views: not the folder of a run");
+  ExpectRefused("fit " + In("views") + " --resume --out " + In("train"), 2,
+                "train: is a run of tilegrad train, not a fit");
+  ExpectRefused("train --resume " + fit, 3, "fit: not a run of tilegrad train");
+}
+
+// The log may end some steps before the network that was saved.
+TEST_F(Runs, ReportsCountTheStepsOfTheNetwork) {
+  MakeData();
+  Done(Start("run") + " --set schedule.log_every=2 --steps 3");
+  const std::string log = ReadText(folder_ / "run/metrics.jsonl").value();
+  Write("run/metrics.jsonl", log.substr(0, log.rfind("{\"step\":3")));
+  Done("report --run " + In("run") + " --models 0");
+  EXPECT_NE(ReadText(folder_ / "run/report.html")->find("learned for 3 steps"), std::string::npos);
+}
+
 TEST_F(Runs, OfFitsAreAnimated) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
   Done("views " + In("a.glb") + " --views 3 --size 32 --out " + In("views"));

@@ -126,7 +126,8 @@ TEST_F(Sample, ScoresAgainstTrueObjects) {
 }
 
 TEST_F(Sample, RefusesWhatItCannotDo) {
-  ExpectRefused("sample --run " + Run("t") + " --out " + In("x"), "makes nothing from noise");
+  ExpectRefused("sample --run " + Run("t") + " --out " + In("x"),
+                "not a generator; train one with --config gan_quick");
   ExpectRefused("sample --run " + Run("g") + " --count 1 --interpolate 4 --out " + In("x"),
                 "--count 2 or more");
   ExpectRefused("sample --run " + Run("g") + " --judge " + Run("t") + " --out " + In("x"),

@@ -87,7 +87,7 @@ TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
   const Outcome again = Run((folder_ / "tent.obj").string() +
                             " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1");
   ASSERT_EQ(again.exit_code, 0) << again.output;
-  EXPECT_NE(again.output.find("training.csv there is of an earlier call"), std::string::npos);
+  EXPECT_NE(again.output.find("training.csv is from an earlier call"), std::string::npos);
 }
 
 // They pass over a broken checkpoint aloud, as `tilegrad train` does, and go on from the one

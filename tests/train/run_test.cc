@@ -135,6 +135,28 @@ TEST_F(RunTest, FieldsOfEveryType) {
   ExpectMessage(CheckFields(fields), "u.number is 10");
 }
 
+// In words of what is expected, not of a parser.
+TEST_F(RunTest, WhatIsWrongWithAnAssignmentIsSaid) {
+  TrainConfig config = ParseConfig("", "default").value();
+  const auto error = [&](const std::string& assignment) {
+    return ApplyOverrides({assignment}, &config);
+  };
+  for (const std::string value : {"ten", "1.5", "", "[1]", "3\nseed = 4", "\"3\""}) {
+    ExpectMessage(error("schedule.steps=" + value), "schedule.steps=" + value,
+                  "schedule.steps must be a whole number");
+  }
+  ExpectMessage(error("schedule.steps=-1"), "schedule.steps is -1");
+  ExpectMessage(error("loss.color=yes"), "loss.color must be a number");
+  ExpectMessage(error("schedule.stepz=3"), "did you mean schedule.steps?");
+  ExpectMessage(error("steps=3"), "did you mean schedule.steps?");
+  ExpectMessage(error("network.steps=3"), "did you mean schedule.steps?");
+  const Status far_off = error("optimizer.lr=3");
+  ExpectMessage(far_off, "unknown key \"optimizer.lr\"; [optimizer] has ");
+  EXPECT_EQ(far_off.message().find("did you mean"), std::string::npos) << far_off.message();
+  ExpectMessage(ParseConfig("[schedule]\nsteps = ten\n", "c.toml").status(), "c.toml", "line 2",
+                "texts have quotes");
+}
+
 std::vector<nn::NamedTensor> SomeTensors(nn::Context& context, double value) {
   return {{"w", context.Full({3, 2}, value)}};
 }

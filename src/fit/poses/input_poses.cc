@@ -150,8 +150,8 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
                       const ProgressSink& progress, const StopFlag& stop) {
   if (!input->masked) {
     return InvalidArgument(
-        "no image says where the object is, without which cameras cannot be found: give images "
-        "with alpha, masks, or a plain background");
+        "cameras cannot be found without masks: give images with alpha, masks, or a plain "
+        "background");
   }
   std::vector<int> views = input->training;
   if (!input->posed) views.resize(input->names.size()), std::iota(views.begin(), views.end(), 0);
@@ -177,10 +177,10 @@ Status FindInputPoses(const InputPosesJob& job, FitInput* input, const Workers& 
   }
   input->found = true;
   if (found.agreement > kDoubt) {
-    input->warnings.push_back(fmt::format(
-        "the cameras that were found are in doubt: the two best of the searches differ by {:.0f} "
-        "degrees. Objects that look alike from several sides need cameras from another program",
-        found.agreement));
+    input->warnings.push_back(
+        fmt::format("the cameras are doubtful: the two best searches differ by {:.0f} degrees; "
+                    "objects that look alike from several sides need cameras from another program",
+                    found.agreement));
   }
   return {};
 }

@@ -183,8 +183,7 @@ Result<FoundCheckpoint> LoadNewestCheckpoint(nn::Context& context, const Path& r
     found.warnings.push_back(status.message());
     found.broken.push_back(*file);
   }
-  return DataLoss("{}; no checkpoint of this run is whole: begin anew in another folder",
-                  found.warnings[0]);
+  return DataLoss("{}; every checkpoint of this run is damaged: start anew", found.warnings[0]);
 }
 
 Result<FoundCheckpoint> FindCheckpoint(nn::Context& context, const Path& path) {

@@ -45,8 +45,8 @@ Status CheckSettings(const RunPlan& plan, const RunWork& work, const std::string
   then = WithoutKey(then, may_differ), now = WithoutKey(now, may_differ);
   if (then == now) return {};
   return InvalidArgument(
-      "{}: this run was started with another configuration: {}; continue with the same, or give "
-      "another --out",
+      "{}: was started with another configuration: {}; go on with that, or start anew with --force "
+      "or another --out",
       place.string(), FirstDifference(then, now));
 }
 

@@ -21,9 +21,7 @@ Result<std::vector<nn::NamedTensor>> Task::Statistics() {
 }
 
 Status Model::Predict(std::span<const std::uint8_t> /*images*/, std::vector<Mesh>* /*meshes*/) {
-  return InvalidArgument(
-      "this run predicts no meshes; name one that was trained to, such as of task.kind = "
-      "\"single_image\"");
+  return InvalidArgument("this network predicts no meshes; train one with --config quick");
 }
 
 }  // namespace tilegrad::train

@@ -126,6 +126,53 @@ TEST_F(Poses, SameBitsForAnyWorkersAndFromTheFile) {
       << refused.message();
 }
 
+// The searches that a stopped call came through are not done again.
+TEST_F(Poses, AStoppedSearchGoesOnToTheSameBits) {
+  const FitInput input = Input(8);
+  InputPosesJob job = Job();
+  job.options.starts = 2, job.options.sweeps = 1;
+  FitInput whole = input, parts = input;
+  ASSERT_TRUE(Find(job, &whole).ok());
+  job.file = folder_ / "other" / "cameras_start.json";
+  std::vector<std::uint64_t> searches;
+  const auto tell = [&](const Progress& p) {
+    if (p.stage != "looking for cameras") return;
+    searches.push_back(p.done);
+    stop_ = p.done == 1;
+  };
+  const Workers workers(2);
+  FitInput stopped = input;
+  EXPECT_EQ(FindInputPoses(job, &stopped, workers, tell, stop_).code(), StatusCode::kCancelled);
+  EXPECT_EQ(searches, (std::vector<std::uint64_t>{0, 1}));
+  searches.clear(), stop_ = false, job.reuse = true;
+  const auto listen = [&](const Progress& p) {
+    if (p.stage == "looking for cameras") searches.push_back(p.done);
+  };
+  ASSERT_TRUE(FindInputPoses(job, &parts, workers, listen, stop_).ok());
+  EXPECT_EQ(searches, std::vector<std::uint64_t>{1});
+  for (std::size_t i = 0; i < input.cameras.size(); ++i)
+    EXPECT_EQ(std::memcmp(&whole.cameras[i], &parts.cameras[i], sizeof(Camera)), 0) << i;
+}
+
+// Of other images it says nothing.
+TEST_F(Poses, AStoppedSearchOfOtherImagesBeginsAnew) {
+  FitInput input = Input(8);
+  InputPosesJob job = Job();
+  job.options.starts = 2, job.options.sweeps = 1;
+  const Workers workers(2);
+  int begun = 0;
+  const auto tell = [&](const Progress& p) {
+    if (p.stage != "looking for cameras") return;
+    begun += p.done == 0;
+    stop_ = p.done == 1;
+  };
+  FitInput other = input;
+  EXPECT_EQ(FindInputPoses(job, &other, workers, tell, stop_).code(), StatusCode::kCancelled);
+  input.images.color[3] += 0.25f, stop_ = false, job.reuse = true;
+  EXPECT_EQ(FindInputPoses(job, &input, workers, tell, stop_).code(), StatusCode::kCancelled);
+  EXPECT_EQ(begun, 2);
+}
+
 TEST_F(Poses, SaysWhatIsMissing) {
   FitInput few = Input(5);
   EXPECT_NE(Find(Job(), &few).message().find("it takes 6 or more"), std::string::npos);

@@ -35,7 +35,7 @@ Result<std::vector<const InstalledSource*>> SourcesNamed(const std::string& name
     sources.push_back(FindInstalledSource(one));
     if (sources.back() == nullptr || std::count(sources.begin(), sources.end(), sources.back()) > 1)
       return InvalidArgument(
-          "the source {}: of several, each is sweethome3d, planes, ships or cars, and there once",
+          "--source {}: several must be different ones of sweethome3d, planes, ships and cars",
           name);
   }
   return sources;

@@ -160,8 +160,7 @@ Result<ImageU8> GanTask::SamplePicture(std::int64_t steps) {
 Result<Evaluation> GanTask::Evaluate(const TaskEvaluation& /*job*/, const Workers& /*workers*/,
                                      const ProgressSink& /*progress*/, const StopFlag& /*stop*/) {
   return InvalidArgument(
-      "a generator predicts nothing that could be compared object by object: "
-      "tilegrad sample --score compares what it makes with held-out objects as sets");
+      "a generator is scored by tilegrad sample --score, which compares sets of objects");
 }
 
 Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& workers,

@@ -81,7 +81,7 @@ class Extraction {
 Result<TexturedModel*> TexturedModelOf(const Predictor& predictor, const Dataset& dataset) {
   auto* const model = dynamic_cast<TexturedModel*>(&predictor.model());
   if (model == nullptr)
-    return InvalidArgument("it extracts no textures: train one of configs/texture_quick.toml");
+    return InvalidArgument("it extracts no textures: train one with --config texture_quick");
   TILEGRAD_TRY(predictor.CheckImageSize(dataset));
   return model;
 }
