@@ -118,6 +118,10 @@ Status CheckFolder(const FitOptions& options, const OutputGuard& guard) {
   return CheckRunFolder(options.out, ExistingOf(options.resume, options.force), guard);
 }
 
+Status KeepGiven(const FitOptions& options) {
+  return WriteGiven(Path(options.out) / train::kFitSettings, options.given);
+}
+
 // Nobody else works in the folder from now on. --force takes away what an earlier fit left there;
 // --resume finds there what this one was given.
 Result<FolderLock> ClaimFolder(const FitOptions& options, const OutputGuard& guard) {
@@ -125,7 +129,7 @@ Result<FolderLock> ClaimFolder(const FitOptions& options, const OutputGuard& gua
   TILEGRAD_TRY(CheckFolder(options, guard));
   TILEGRAD_TRY(guard.CheckNotRead(train::RunFiles(options.out)));
   if (options.force) TILEGRAD_TRY(train::RemoveRun(options.out));
-  TILEGRAD_TRY(WriteGiven(Path(options.out) / train::kFitSettings, options.given));
+  if (!options.resume) TILEGRAD_TRY(KeepGiven(options));
   return lock;
 }
 
@@ -150,6 +154,7 @@ Status RunClaimed(const FitOptions& options, train::FitJob* job, const Workers& 
                                    line->Sink(), StopOnSignals()));
   PrintWarnings(job->input, warnings);
   job->warn = line->Warnings();
+  job->begun = [&options] { return KeepGiven(options); };  // of more steps, if so
   TILEGRAD_ASSIGN(const auto outcome, train::RunFit(*job, workers, line->Sink(), StopOnSignals()));
   PrintFit(outcome, options.out, options.config.steps);
   return {};

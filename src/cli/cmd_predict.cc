@@ -100,9 +100,8 @@ Status Refine(const Prediction& p, const std::string& image, const ImageU8& cuto
         100 * before.silhouette_iou, 100 * after.silhouette_iou, before.color_l1, after.color_l1);
   if (refined.rival < train::kDoubtfulRival) {
     PrintNote(
-        "tilegrad: warning: {}: the camera is doubtful: the object fits almost as well from "
-        "another "
-        "side; look at {}\n",
+        "tilegrad: warning: {}: the camera is doubtful, another side fits almost as well; look at "
+        "{}\n",
         image, file.string());
   }
   json->update(ScoresOf(refined));
@@ -116,9 +115,8 @@ Status WarnOfUnlike(const train::TrainingPictures& trained, const ImageU8& cutou
   TILEGRAD_ASSIGN(const auto match, trained.Nearest(cutout));
   if (!match || !trained.IsUnlike(*match)) return {};
   PrintNote(
-      "tilegrad: warning: {}: unlike the {} training images; expect a poor mesh (nearest: {} ({}), "
-      "at "
-      "{:.2f}; usual: {:.2f})\n",
+      "tilegrad: warning: {}: unlike the {} training images; expect a poor mesh (nearest: {} "
+      "({}), at {:.2f}; usual: {:.2f})\n",
       file, fmt::group_digits(trained.count()), match->name, match->class_name, match->distance,
       *trained.usual());
   return {};

@@ -10,8 +10,8 @@
 
 namespace tilegrad::cli {
 
-// {"silhouette_iou": [before, after], "color_l1": [before, after]}: PictureMatch of the prediction
-// and of the refined mesh.
+// {"silhouette_iou": [before, after], "color_l1": [before, after], "camera_doubtful": false}:
+// PictureMatch of the prediction and of the refined mesh, and whether RefinedMesh::rival is near.
 nlohmann::ordered_json ScoresOf(const train::RefinedMesh& refined);
 
 // The same and "camera", which sees the refined mesh, in pixels of a picture of "size" pixels a

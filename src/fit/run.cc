@@ -82,7 +82,9 @@ class FitWork : public RunWork {
     }
     return fmt::format("{}\n", fmt::join(lines, "\n"));
   }
-  Status Begin(std::int64_t /*first_step*/) override { return {}; }
+  Status Begin(std::int64_t /*first_step*/) override {
+    return job_.begun ? job_.begun() : Status();
+  }
   Status Step(std::int64_t step, StepValues* values) override;
   std::vector<nn::NamedTensor> State() override {
     std::vector<nn::NamedTensor> state = fitter_.State(context_);

@@ -8,6 +8,7 @@
 //   <out>/metrics.jsonl, tensorboard/, checkpoints/
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,7 +33,8 @@ struct FitJob {
   Path out;
   bool locked = false;  // RunPlan::locked
   ExistingRun existing = ExistingRun::kRefuse;
-  WarningSink warn = nullptr;  // broken checkpoints that were passed over
+  WarningSink warn = nullptr;               // broken checkpoints that were passed over
+  std::function<Status()> begun = nullptr;  // RunWork::Begin
 };
 
 struct FitOutcome : RunOutcome {

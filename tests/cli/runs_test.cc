@@ -118,6 +118,8 @@ TEST_F(Runs, OfFitsGoOnWithoutAnyOption) {
   EXPECT_EQ(more["steps"], 6);
   EXPECT_EQ(more["training"]["views"], 4);
   EXPECT_EQ(Done(go_on)["steps"], 6);  // it is a fit of six steps now
+  ExpectRefused(go_on + " --steps 3", 2, "it has 6 steps already, more than 3");
+  EXPECT_EQ(Done(go_on)["steps"], 6);
   // What was given or not given then, by name and with both values.
   ExpectRefused(go_on + " --smoothing 4", 2, "--smoothing: was 3, is 4; leave it out");
   ExpectRefused(go_on + " --laplacian 2", 2, "--laplacian: was 0, is 2");
