@@ -11,23 +11,23 @@
 namespace tilegrad::train {
 namespace {
 
-constexpr std::array kNames = {kTrainSettings,
-                               kFitSettings,
-                               "run.json",
-                               "metrics.jsonl",
-                               "stream.png",
-                               "thumbnails.npz",
-                               "eval.json",
-                               "eval.md",
-                               "training_models.txt",
-                               "training_photographs.txt",
-                               "report.html",
-                               "summary.png",
-                               "cameras_start.json",
-                               "transforms_fitted.json",
-                               "mesh.glb",
-                               "timelapse.png",
-                               "timelapse.webp"};
+constexpr std::array kRunNames = {kTrainSettings,
+                                  kFitSettings,
+                                  "run.json",
+                                  "metrics.jsonl",
+                                  "stream.png",
+                                  "thumbnails.npz",
+                                  "eval.json",
+                                  "eval.md",
+                                  "training_models.txt",
+                                  "training_photographs.txt",
+                                  "report.html",
+                                  "summary.png",
+                                  "cameras_start.json",
+                                  "transforms_fitted.json",
+                                  "mesh.glb",
+                                  "timelapse.png",
+                                  "timelapse.webp"};
 
 // Folders of a run, and how its files in them begin.
 struct Series {
@@ -64,7 +64,7 @@ bool IsOfFit(const std::string& settings) {
 
 std::vector<Path> RunFiles(const Path& folder) {
   std::vector<Path> out;
-  for (const char* name : kNames) {
+  for (const char* name : kRunNames) {
     if (PathExists(folder / name)) out.push_back(folder / name);
   }
   for (const Series& series : kSeries) AddSeries(folder, series, &out);
