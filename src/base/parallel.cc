@@ -18,6 +18,7 @@
 
 #include "base/sanitizers.h"
 #include "base/tbb_threads.h"
+#include "base/thread_data.h"
 
 namespace tilegrad {
 namespace {
@@ -104,6 +105,7 @@ void ForOnOwnThreads(const Workers* workers, std::mutex* one_loop, std::size_t n
   std::once_flag failed;
   std::exception_ptr error;  // the first (out of memory): rethrown to the caller, as oneTBB does
   const auto work = [&](std::size_t worker) {
+    ReserveThreadData();
     const OwnLoop outer = std::exchange(own_loop, {workers, worker});
     try {
       for (std::size_t i = next++; i < n; i = next++) task(i, worker);

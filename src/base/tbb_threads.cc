@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/thread_data.h"
 
 namespace tilegrad {
 namespace {
@@ -87,6 +88,7 @@ class TbbThreads {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(1);
     arena->execute([&] {
       const auto wait = [&](int) {
+        ReserveThreadData();
         for (--waiting; waiting > 0 && std::chrono::steady_clock::now() < end;) {
           std::this_thread::yield();
         }

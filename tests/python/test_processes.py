@@ -235,6 +235,33 @@ print((rast[..., 3] > 0).sum().item() > 0)
 """, "True\n")
 
 
+class LittleMemory(unittest.TestCase):
+    def test_a_thread_that_runs_out_says_so(self):
+        """A limit of addresses that a render meets half-way: MemoryError, whichever thread it is
+        that meets it, and a renderer that still works."""
+        code = """
+import resource, sys, tilegrad
+size = {"width": 512, "height": 512}
+scene = tilegrad.Scene(*tilegrad.icosphere(3), tilegrad.Camera.orbit(30, 20, 3, **size))
+pages = int(open("/proc/self/statm").read().split()[0])
+most = pages * resource.getpagesize() + (int(sys.argv[1]) << 20)
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+renderer = tilegrad.Renderer(threads=4)
+try:
+    renderer.render([scene] * 100, **size)
+    print("rendered")
+except MemoryError as error:
+    print("MemoryError", renderer.render(scene, width=8, height=8).alpha.shape)
+"""
+        outcomes = []
+        for megabytes in range(160, 400, 16):
+            done = subprocess.run([sys.executable, "-c", code, str(megabytes)], capture_output=True,
+                                  text=True, timeout=60)
+            self.assertEqual(done.returncode, 0, (megabytes, done.stderr))
+            outcomes.append(done.stdout.strip())
+        self.assertGreater(outcomes.count("MemoryError (1, 8, 8)"), 5, outcomes)
+
+
 class Environment(unittest.TestCase):
     def test_number_of_threads(self):
         code = """
