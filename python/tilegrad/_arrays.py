@@ -189,6 +189,18 @@ def as_limit(function: str, max_bytes: Any) -> int:
     return number
 
 
+def as_text(function: str, argument: str, value: Any) -> str:
+    """`value`, a str; TypeError if it is anything else, ValueError if UTF-8 cannot hold it."""
+    if not isinstance(value, str):
+        raise TypeError(f"{function}: {argument} {value!r} is not a string")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{function}: {argument} {value!r} has half of a pair of surrogates, which "
+                         f"is no character: no file can hold it") from None
+    return value
+
+
 def as_flag(function: str, argument: str, value: Any) -> bool:
     """`value`, which is True or False (or 1 or 0), as a bool; TypeError if it is anything else:
     "no" is true to Python."""

@@ -5,14 +5,13 @@ Kaolin and PyTorch3D, become a `tilegrad.Camera` by its own from_... and to_..."
 from __future__ import annotations
 
 import dataclasses
-import os
 from typing import Any, Iterable, Optional
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
-from tilegrad._paths import Path
+from tilegrad._paths import Path, ending_of, name_of
 
 _CENTRES = ("integer", "half")
 _FORMATS = ("opencv", "nerf", "colmap")
@@ -38,7 +37,7 @@ def load_cameras(path: Path, *, width: int = 0, height: int = 0,
     OSError, ValueError: name the file, and the line or frame. Lens distortion is refused.
     """
     half = _arrays.check_choice("load_cameras", "opencv_centre", opencv_centre, _CENTRES) == 1
-    views = _tools.load_cameras(os.fspath(path), (width, height), half)
+    views = _tools.load_cameras(name_of(path), (width, height), half)
     return [View(name, Camera.of_numbers(numbers), *size) for name, numbers, size in views]
 
 
@@ -49,11 +48,11 @@ def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = N
     for a path that ends in .json, else "colmap".
     """
     if format is None:
-        format = "opencv" if os.fspath(path).endswith(".json") else "colmap"
+        format = "opencv" if ending_of(path) == ".json" else "colmap"
     _arrays.check_choice("save_cameras", "format", format, _FORMATS)
-    _tools.save_cameras(os.fspath(path), format,
-                        [(view.name, _numbers(view.camera), (view.width, view.height))
-                         for view in views])
+    _tools.save_cameras(name_of(path), format,
+                        [(_arrays.as_text("save_cameras", "view name", view.name),
+                          _numbers(view.camera), (view.width, view.height)) for view in views])
 
 
 def rotation_from_vector(rvec: Any) -> np.ndarray:

@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import os
 from typing import Any, Iterator, Optional
 
 import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
-from tilegrad._paths import Path
+from tilegrad._paths import Path, name_of
 from tilegrad._threads import thread_count
 from tilegrad.meshes import Mesh, mesh_of_dict
 
@@ -80,9 +79,9 @@ class Dataset:
                  seed: int = 0, *, in_memory: bool = False, threads: int = 0) -> None:
         if split is not None:
             _arrays.check_choice("Dataset", "split", split, _SPLITS)
-        self._arguments = {"folder": os.fspath(folder), "split": split, "views": views,
+        self._arguments = {"folder": name_of(folder), "split": split, "views": views,
                            "seed": seed, "in_memory": in_memory, "threads": threads}
-        self._files = _tools.DatasetFiles(os.fspath(folder))
+        self._files = _tools.DatasetFiles(name_of(folder))
         self.info: dict[str, Any] = self._files.info
         self.models: list[ModelInfo] = [ModelInfo(**model) for model in self._files.models]
         self._indices = [i for i, model in enumerate(self.models) if split in (None, model.split)]

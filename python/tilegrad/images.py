@@ -9,7 +9,7 @@ from typing import Any, Optional
 import numpy as np
 
 from tilegrad import _arrays, _numbers, _tools
-from tilegrad._paths import Path, ending_of
+from tilegrad._paths import Path, ending_of, name_of
 
 _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}  # of EXR
 
@@ -25,22 +25,22 @@ def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
     ending = ending_of(path)
     limit = _arrays.as_limit("load_image", max_bytes)
     if ending == ".npy":
-        return _tools.load_npy(os.fspath(path), limit)
+        return _tools.load_npy(name_of(path), limit)
     if ending != ".exr":
-        return _tools.load_image(os.fspath(path), limit)
+        return _tools.load_image(name_of(path), limit)
     layers = load_layers(path, max_bytes=max_bytes)
     if len(layers) == 1:
         return np.stack(list(layers.values()), axis=-1)
     for names in reversed(_CHANNELS.values()):
         if set(names) <= set(layers):
             return np.stack([layers[name] for name in names], axis=-1)
-    raise ValueError(f"{os.fspath(path)}: channels {', '.join(layers)} do not make a picture; "
+    raise ValueError(f"{os.fsdecode(path)}: channels {', '.join(layers)} do not make a picture; "
                      f"load_layers reads them")
 
 
 def load_layers(path: Path, *, max_bytes: Optional[int] = None) -> dict[str, np.ndarray]:
     """Every channel of an EXR image by its name, (H, W) float32. max_bytes: as of `load_mesh`."""
-    names, planes = _tools.load_exr(os.fspath(path), _arrays.as_limit("load_layers", max_bytes))
+    names, planes = _tools.load_exr(name_of(path), _arrays.as_limit("load_layers", max_bytes))
     return dict(zip(names, planes))
 
 
@@ -55,24 +55,25 @@ def save_image(path: Path, image: Any, *, planar: bool = False) -> None:
     ending = ending_of(path)
     if ending == ".npy":
         array = _arrays.plain("save_image", "image", image)
-        return _tools.save_npy(os.fspath(path), np.ascontiguousarray(array).reshape(array.shape))
+        return _tools.save_npy(name_of(path), np.ascontiguousarray(array).reshape(array.shape))
     if ending not in (".png", ".exr"):
-        raise ValueError(f"save_image: {os.fspath(path)!r} must end in .png, .exr or .npy")
+        raise ValueError(f"save_image: {os.fsdecode(path)!r} must end in .png, .exr or .npy")
     if ending == ".png":
-        return _tools.save_png(os.fspath(path), as_bytes("save_image", "image", image, planar))
+        return _tools.save_png(name_of(path), as_bytes("save_image", "image", image, planar))
     pixels = _pixels("save_image", "image", image, planar)
     planes = np.ascontiguousarray(np.moveaxis(pixels, -1, 0), np.float32)
-    return _tools.save_exr(os.fspath(path), _CHANNELS[pixels.shape[-1]], planes)
+    return _tools.save_exr(name_of(path), _CHANNELS[pixels.shape[-1]], planes)
 
 
 def save_layers(path: Path, layers: dict[str, Any]) -> None:
     """Writes an EXR image of channels by name, (H, W) each: R, G, B, A, Z and others."""
     if not layers:
-        raise ValueError("save_layers: no layer")
+        raise ValueError(f"save_layers: no layer for {os.fsdecode(path)!r}")
     sizes: dict[str, int] = {}
-    planes = [_arrays.as_array("save_layers", name, plane, np.float32, ("H", "W"), sizes)
-              for name, plane in layers.items()]
-    _tools.save_exr(os.fspath(path), list(layers), np.stack(planes))
+    names = [_arrays.as_text("save_layers", "layer name", name) for name in layers]
+    planes = [_arrays.as_array("save_layers", name, layers[name], np.float32, ("H", "W"), sizes)
+              for name in names]
+    _tools.save_exr(name_of(path), names, np.stack(planes))
 
 
 def _pixels(function: str, argument: str, image: Any, planar: bool = False) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tilegrad import _arrays, _core, _numbers, _tools
 from tilegrad._camera import Camera
-from tilegrad._paths import Path
+from tilegrad._paths import Path, ending_of, name_of
 from tilegrad._scene import Scene, Surface, Texture, changed
 
 _COLOR_SPACES = ("srgb", "linear")
@@ -50,7 +50,8 @@ class Material:
         _arrays.check_choice(function, place + "wrap", self.wrap, _core.WRAPS)
         _arrays.check_choice(function, place + "alpha_mode", self.alpha_mode, _ALPHA_MODES)
         color = _arrays.as_array(function, place + "base_color", self.base_color, np.float32, (4,))
-        return {"name": str(self.name), "base_color": color.tolist(),
+        name = _arrays.as_text(function, "material name", str(self.name))
+        return {"name": name, "base_color": color.tolist(),
                 "texture": _arrays.as_number(function, place + "texture", self.texture, int),
                 "wrap": self.wrap, "nearest": bool(self.nearest), "alpha_mode": self.alpha_mode,
                 "alpha_cutoff": _arrays.as_number(function, place + "alpha_cutoff",
@@ -215,7 +216,9 @@ class Mesh:
                 "face_materials": array("face_materials", np.int32, "F"),
                 "origin": array("origin", np.float64, 3).tolist(),
                 "materials": [material.checked(function) for material in self.materials],
-                "textures": [{"name": str(texture.name), "image": self._texels(function, texture)}
+                "textures": [{"name": _arrays.as_text(function, "texture name",
+                                                      str(texture.name)),
+                              "image": self._texels(function, texture)}
                              for texture in self.textures]}
 
     @staticmethod
@@ -246,15 +249,15 @@ def load_mesh(path: Path, *, max_bytes: Optional[int] = None) -> Mesh:
     OSError, ValueError: name the file, the place in it and what to do. A missing texture is a
     warning of the mesh.
     """
-    return mesh_of_dict(_tools.load_mesh(os.fspath(path), _arrays.as_limit("load_mesh", max_bytes)))
+    return mesh_of_dict(_tools.load_mesh(name_of(path), _arrays.as_limit("load_mesh", max_bytes)))
 
 
 def save_mesh(path: Path, mesh: Mesh) -> None:
     """Writes a binary glTF 2.0 file (.glb), which every viewer opens; whole or not at all."""
-    if not os.fspath(path).lower().endswith(".glb"):
-        raise ValueError(f"save_mesh: {os.fspath(path)!r} must end in .glb, the format that is "
+    if ending_of(path) != ".glb":
+        raise ValueError(f"save_mesh: {os.fsdecode(path)!r} must end in .glb, the format that is "
                          f"written")
-    _tools.save_mesh(os.fspath(path), mesh._checked("save_mesh"))
+    _tools.save_mesh(name_of(path), mesh._checked("save_mesh"))
 
 
 def mesh_endings() -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tilegrad import _arrays, _tools
-from tilegrad._paths import Path
+from tilegrad._paths import Path, name_of
 from tilegrad._threads import thread_count
 from tilegrad.images import as_bytes
 from tilegrad.meshes import Mesh, mesh_of_dict
@@ -32,7 +32,7 @@ class Predictor:
     """
 
     def __init__(self, path: Path, threads: int = 0) -> None:
-        self._path = os.fspath(path)
+        self._path = name_of(path)
         self._threads = thread_count("Predictor", threads)
         self._load(self._threads)
 

@@ -10,7 +10,7 @@ from typing import Any, Mapping, Optional
 import numpy as np
 
 from tilegrad import _arrays, _tools
-from tilegrad._paths import Path, ending_of
+from tilegrad._paths import Path, ending_of, name_of
 
 
 class Weights(dict[str, np.ndarray]):
@@ -28,8 +28,8 @@ def load_weights(path: Path, *, max_bytes: Optional[int] = None) -> Weights:
     ending = _ending("load_weights", path)
     limit = _arrays.as_limit("load_weights", max_bytes)
     if ending == ".npz":
-        return Weights(_tools.load_npz(os.fspath(path), limit))
-    return Weights(*_tools.load_safetensors(os.fspath(path), limit))
+        return Weights(_tools.load_npz(name_of(path), limit))
+    return Weights(*_tools.load_safetensors(name_of(path), limit))
 
 
 def save_weights(path: Path, weights: Mapping[str, Any],
@@ -39,17 +39,18 @@ def save_weights(path: Path, weights: Mapping[str, Any],
     weights: arrays by name; safetensors: at most five axes of float32, float64, uint8, int32 or
     int64. metadata: texts, safetensors only; by default those of `Weights`.
     """
-    for name in weights:
-        if not isinstance(name, str):
-            raise TypeError(f"save_weights: name {name!r} is not a string")
-    arrays = {name: _plain(name, value) for name, value in weights.items()}
+    arrays = {_arrays.as_text("save_weights", "name", name): _plain(name, value)
+              for name, value in weights.items()}
     if metadata is None:
         metadata = getattr(weights, "metadata", {})
     if _ending("save_weights", path) == ".npz":
         if metadata:
             raise ValueError("save_weights: an .npz file holds no metadata; save .safetensors")
-        return _tools.save_npz(os.fspath(path), arrays)
-    return _tools.save_safetensors(os.fspath(path), arrays, dict(metadata))
+        return _tools.save_npz(name_of(path), arrays)
+    texts = {_arrays.as_text("save_weights", "metadata key", key):
+             _arrays.as_text("save_weights", "metadata", value)
+             for key, value in metadata.items()}
+    return _tools.save_safetensors(name_of(path), arrays, texts)
 
 
 @dataclasses.dataclass
@@ -70,7 +71,7 @@ class Checkpoint:
 def load_checkpoint(path: Path) -> Checkpoint:
     """Reads a checkpoint of `tilegrad train`: one file, or the newest whole one of a run folder.
     OSError, ValueError: name the file and what is wrong."""
-    found = _tools.load_checkpoint(os.fspath(path))
+    found = _tools.load_checkpoint(name_of(path))
     found["weights"] = Weights(found.pop("tensors"))
     found["file"] = os.fspath(found["file"])
     return Checkpoint(**found)
@@ -79,7 +80,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
 def _ending(function: str, path: Path) -> str:
     ending = ending_of(path)
     if ending not in (".safetensors", ".npz"):
-        raise ValueError(f"{function}: {os.fspath(path)!r} must end in .safetensors or .npz")
+        raise ValueError(f"{function}: {os.fsdecode(path)!r} must end in .safetensors or .npz")
     return ending
 
 

@@ -275,8 +275,9 @@ Result<std::string> ZipFingerprint(const Path& path) {
 }
 
 Status WriteZip(const Path& path, const std::vector<std::pair<std::string, Bytes>>& entries) {
-  TILEGRAD_ASSIGN(const Bytes bytes, EncodeZip(entries));
-  return WriteFileAtomic(path, bytes);
+  auto bytes = EncodeZip(entries);
+  if (!bytes.ok()) return bytes.status().Within(path.string());
+  return WriteFileAtomic(path, *bytes);
 }
 
 }  // namespace tilegrad::io

@@ -215,9 +215,17 @@ Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name) {
 
 namespace {
 
+constexpr std::size_t kMostNameBytes = 65535;  // of a zip entry: its length has 16 bits
+
 // A zip entry's name ends at a NUL, and readers look for "a/b" where a name is "a/./b": such an
-// array would be lost.
+// array would be lost, as one of a name that is cut.
 Status CheckArrayName(const std::string& name, const Path& path) {
+  const std::size_t bytes = EntryName(name).size();
+  if (bytes > kMostNameBytes) {
+    return InvalidArgument(
+        "{}: an array's name in an .npz has {} bytes at most; that of {} bytes begins with \"{}\"",
+        path.string(), kMostNameBytes - EntryName("").size(), name.size(), name.substr(0, 40));
+  }
   const bool ends = name.find('\0') != std::string::npos;
   if (!ends && NormalizeName(EntryName(name)) == EntryName(name)) return {};
   return InvalidArgument(
@@ -229,6 +237,7 @@ Status CheckArrayName(const std::string& name, const Path& path) {
 }  // namespace
 
 Status SaveNpz(const Path& path, const NpzArrays& arrays) {
+  if (arrays.empty()) return InvalidArgument("{}: no array to write into it", path.string());
   std::vector<std::pair<std::string, Bytes>> entries;
   for (const auto& [name, array] : arrays) {
     TILEGRAD_TRY(CheckArrayName(name, path));

@@ -80,7 +80,7 @@ using NpzArrays = std::map<std::string, NpyArray>;
 Result<NpzArrays> LoadNpz(const Path& path);
 // One array; an error that lists what is there if `name` is not.
 Result<NpyArray> LoadNpzArray(const Path& path, const std::string& name);
-// Compressed, whole or not at all; the same arrays give the same bytes.
+// Compressed, whole or not at all; the same arrays give the same bytes. One array at least.
 Status SaveNpz(const Path& path, const NpzArrays& arrays);
 
 }  // namespace tilegrad::io

@@ -261,6 +261,10 @@ Result<Bytes> EncodeSafetensors(const TensorFile& file) {
   }
   text += '}';
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the format allows spaces: data stays aligned
+  if (text.size() > kMaxHeader) {
+    return InvalidArgument("safetensors: names and metadata make a header of {} bytes, {} at most",
+                           text.size(), kMaxHeader);
+  }
   Bytes bytes(kLengthBytes + text.size() + end);
   const std::uint64_t length = text.size();
   std::memcpy(bytes.data(), &length, kLengthBytes);

@@ -64,8 +64,9 @@ TEST_F(Refusals, NpzNamesComeBackOrAreRefused) {
        {std::string("a\0b", 3), std::string("\0", 1), std::string("a\\b"), std::string("../a"),
         std::string("/a"), std::string("a/./b"), std::string("a//b"), std::string("a/../b"),
         std::string("layer/weight"), std::string("a b"), std::string("..a"), std::string("A"),
-        std::string(".")}) {
-    SCOPED_TRACE(name);
+        std::string("."), std::string(65531, 'n'), std::string(65532, 'n'),
+        std::string(70000, 'n')}) {
+    SCOPED_TRACE(name.substr(0, 20));
     NpzArrays arrays;
     arrays[name] = MakeNpy<float>({1}, std::span(&value, 1));
     arrays["a"] = MakeNpy<float>({0}, {});
@@ -83,6 +84,14 @@ TEST_F(Refusals, NpzNamesComeBackOrAreRefused) {
     EXPECT_EQ(back->at(name).data, arrays[name].data);
   }
   ExpectMessage(SaveNpz(file, {{std::string("a\0b", 3), {}}}), "a.npz", "\"a\"", "NUL");
+  ExpectMessage(SaveNpz(file, {{std::string(65532, 'n'), {}}}), "a.npz", "nnnn", "65531 bytes");
+  ExpectMessage(SaveNpz(file, {{"\xff", MakeNpy<float>({0}, {})}}), "a.npz");
+}
+
+TEST_F(Refusals, NpzWithoutArrays) {
+  const Path file = folder_ / "a.npz";
+  ExpectMessage(SaveNpz(file, {}), "a.npz", "no array");
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 }  // namespace tilegrad::io::refusals_test

@@ -216,6 +216,13 @@ TEST_F(Safetensors, NamesAndMetadataMustBeUtf8) {
   EXPECT_TRUE(EncodeSafetensors({{{"g\xc3\xb6\"\\", t}}, {{"k", "\xc3\xb6"}}}).ok());
 }
 
+TEST_F(Safetensors, HeadersThatNoReaderTakesAreNotWritten) {
+  TensorFile file{{}, {{"note", std::string(std::size_t{100} << 20, 'n')}}};
+  const auto bytes = EncodeSafetensors(file);
+  ASSERT_FALSE(bytes.ok());
+  EXPECT_NE(bytes.status().message().find("at most"), std::string::npos);
+}
+
 TEST_F(Safetensors, TensorsWithoutElements) {
   const Bytes bytes = EncodeSafetensors({{{"a", context_.Zeros({0, 300})}}, {}}).value();
   const auto back = DecodeSafetensors(context_, bytes);

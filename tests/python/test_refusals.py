@@ -59,11 +59,55 @@ class Names(FolderTest):
         for name in ("a\0b", "\0", "../a", "a\\b"):
             with self.assertRaisesRegex(ValueError, "cannot be the name"):
                 files.save_weights(self.folder / "a.npz", {name: one, "a": one})
+        for name in ("n" * 65532, "\u00e4" * 33000):  # 16 bits hold the bytes of a name and ".npy"
+            with self.assertRaisesRegex(ValueError, "a.npz: .*65531 bytes at most"):
+                files.save_weights(self.folder / "a.npz", {name: one})
+        with self.assertRaisesRegex(ValueError, "a.npz: no array"):
+            files.save_weights(self.folder / "a.npz", {})
         plane = np.ones((2, 2), np.float32)
         for names in (("R\0a", "R\0b"), ("n" * 256, "n" * 257)):
             with self.assertRaisesRegex(ValueError, "EXR channel name"):
                 files.save_layers(self.folder / "a.exr", dict.fromkeys(names, plane))
         self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_the_longest_that_a_file_can_hold(self) -> None:
+        name = "n" * 65531
+        files.save_weights(self.folder / "a.npz", {name: np.ones(2, np.float32)})
+        self.assertEqual(list(files.load_weights(self.folder / "a.npz")), [name])
+
+    def test_half_of_a_character(self) -> None:
+        """A lone surrogate, which UTF-8 cannot hold."""
+        one, plane, bad = np.ones(2, np.float32), np.ones((2, 2), np.float32), "a\ud800"
+        mesh = textured_mesh()
+        mesh.textures[0].name = bad
+        view = files.View(bad, TRIANGLE["camera"], 5, 5)
+        for call in (lambda: files.save_weights(self.folder / "a.npz", {bad: one}),
+                     lambda: files.save_weights(self.folder / "a.safetensors", {bad: one}),
+                     lambda: files.save_weights(self.folder / "a.safetensors", {"a": one},
+                                                {"b": bad}),
+                     lambda: files.save_layers(self.folder / "a.exr", {bad: plane}),
+                     lambda: files.save_mesh(self.folder / "a.glb", mesh),
+                     lambda: files.save_cameras(self.folder / "a.json", [view])):
+            with self.assertRaisesRegex(ValueError, r"^save_\w+: .*'a\\ud800' has half of a pair"):
+                call()
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_names_that_no_file_has(self) -> None:
+        one = np.ones((2, 2), np.float32)
+        for stem in ("a\ud800", "a\0"):
+            for call in (lambda: files.load_mesh(stem + ".glb"),
+                         lambda: files.load_image(stem + ".png"),
+                         lambda: files.load_weights(stem + ".npz"),
+                         lambda: files.load_cameras(stem), lambda: files.load_checkpoint(stem),
+                         lambda: files.Dataset(stem), lambda: files.Predictor(stem),
+                         lambda: files.save_mesh(stem + ".glb", textured_mesh()),
+                         lambda: files.save_image(stem + ".npy", one),
+                         lambda: files.save_weights(stem + ".npz", {"a": one}),
+                         lambda: files.save_cameras(stem, [])):
+                with self.assertRaisesRegex(ValueError, "cannot be the name of a file"):
+                    call()
+        files.save_image(os.fsencode(self.folder / "a.npy"), one)
+        np.testing.assert_array_equal(files.load_image(self.folder / "a.npy"), one)
 
     def test_cameras_that_could_not_be_read(self) -> None:
         camera = TRIANGLE["camera"]
