@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable
+from typing import Any, Optional
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tilegrad._packed import Packed, Part
 
 _D = _core.CAMERA
 Parts = dict[str, np.ndarray]
+Size = tuple[int, int]  # width, height of an image, pixels
 
 
 class _Rows:
@@ -41,16 +42,35 @@ class _Rows:
         rows = np.broadcast_to(array, self.lead + shape)
         return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
 
-    def camera(self, make: Callable[..., np.ndarray], *arguments: Any) -> "Camera":
-        return Camera.of_numbers(make(*arguments).reshape(self.lead + (Camera._SIZE,)))
+    def camera(self, numbers: np.ndarray, size: Optional[Size]) -> "Camera":
+        return Camera.of_numbers(numbers.reshape(self.lead + (Camera._SIZE,)), size)
 
-    def converted(self, convention: str, **extra: Any) -> "Camera":
-        return self.camera(lambda: _core.camera_from(convention, np.hstack(self.arrays), **extra))
+    def converted(self, convention: str, size: Optional[Size] = None, **extra: Any) -> "Camera":
+        if size is not None:
+            extra["size"] = size
+        numbers = _core.camera_from(convention, np.hstack(self.arrays), **extra)
+        return self.camera(numbers, size)
 
 
-def _size(function: str, width: int, height: int) -> tuple[int, int]:
+def _size(function: str, width: int, height: int) -> Size:
     return (_arrays.as_number(function, "width", width, int),
             _arrays.as_number(function, "height", height, int))
+
+
+def _known_size(function: str, size: Any) -> Optional[Size]:
+    """`size` as a pair of numbers of pixels; None, which is not known, stays that."""
+    if size is None:
+        return None
+    if not isinstance(size, (tuple, list)) or len(size) != 2:
+        raise TypeError(f"{function}: size is {size!r}, expected (width, height) or None")
+    width, height = size
+    return (_arrays.as_pixels(function, "width", width),
+            _arrays.as_pixels(function, "height", height))
+
+
+def filled_size(width: Any, height: Any, own: tuple[Any, Any]) -> tuple[Any, Any]:
+    """Width and height of an image, those of `own` where one is None."""
+    return own[0] if width is None else width, own[1] if height is None else height
 
 
 def _half(function: str, pixel_centre: str) -> bool:
@@ -73,6 +93,10 @@ class Camera(Packed):
     translation: (3,) or (N, 3), world units.
     fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, not 0, and principal point.
     near_plane: number or (N,), > 0, world units; what is nearer is cut away.
+    size: (width, height) of the images that fx, fy, cx, cy are for, pixels; None: not known.
+        Constructors that are told width and height note them, and so do cameras of files. An image
+        of another size is an error wherever such a camera is used, since it would show a corner or
+        have a margin; `resize` makes the camera of another size, replace(size=None) forgets it.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
     for what is not an array of these shapes; render refuses numbers that are not finite, focal
@@ -84,7 +108,7 @@ class Camera(Packed):
     Camera.from_... and files.save_cameras refuse such matrices.
     """
 
-    __slots__ = ()
+    __slots__ = ("size",)
     _SIZE = len(_D)
 
     rotation = Part(0, (3, 3), "(..., 3, 3) world to camera.")
@@ -96,9 +120,38 @@ class Camera(Packed):
     near_plane = Part(16, (), "(...) world units.")
 
     def __init__(self, rotation=np.reshape(_D[:9], (3, 3)).tolist(), translation=_D[9:12],
-                 fx=_D[12], fy=_D[13], cx=_D[14], cy=_D[15], near_plane=_D[16]) -> None:
+                 fx=_D[12], fy=_D[13], cx=_D[14], cy=_D[15], near_plane=_D[16],
+                 size: Optional[Size] = None) -> None:
         self._pack(rotation=rotation, translation=translation, fx=fx, fy=fy, cx=cx, cy=cy,
                    near_plane=near_plane)
+        self.size = _known_size("Camera", size)
+
+    @classmethod
+    def of_numbers(cls, numbers: np.ndarray, size: Optional[Size] = None) -> "Camera":
+        """Of an array (..., 17), which is not copied."""
+        camera = super().of_numbers(numbers)
+        camera.size = size
+        return camera
+
+    def __getitem__(self, index: Any) -> "Camera":
+        camera = super().__getitem__(index)
+        camera.size = self.size
+        return camera
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [*super()._names(), "size"]
+
+    def check_size(self, function: str, width: int, height: int) -> Size:
+        """The two numbers; ValueError, in the name of `function`, if the camera is known to be for
+        images of another size."""
+        size = (width, height)
+        if self.size is None or self.size == size:
+            return size
+        own = "{} x {}".format(*self.size)
+        raise ValueError(f"{function}: the camera is for images of {own} pixels, not {width} x "
+                         f"{height}: give camera.resize({self.size[0]}, {self.size[1]}, {width}, "
+                         f"{height})")
 
     # Constructors. Each argument may have a leading axis N, for N cameras.
 
@@ -114,7 +167,7 @@ class Camera(Packed):
         rows = _Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
         size = _size("Camera.look_at", width, height)
         fov_y = _arrays.as_number("Camera.look_at", "fov_y", fov_y, float)
-        return rows.camera(_core.camera_look_at, fov_y, size, *rows.arrays)
+        return rows.camera(_core.camera_look_at(fov_y, size, *rows.arrays), size)
 
     @classmethod
     def orbit(cls, azimuth, elevation, distance, *, fov_y: float = _core.FOV_Y, width: int,
@@ -129,7 +182,7 @@ class Camera(Packed):
                      distance=(distance, ()))
         size = _size(function, width, height)
         fov_y = _arrays.as_number(function, "fov_y", fov_y, float)
-        return rows.camera(_core.camera_orbit, fov_y, size, np.hstack(rows.arrays))
+        return rows.camera(_core.camera_orbit(fov_y, size, np.hstack(rows.arrays)), size)
 
     @classmethod
     def framing(cls, mesh: Any, *, azimuth=60, elevation=20, fov_y: float = _core.FOV_Y,
@@ -151,30 +204,33 @@ class Camera(Packed):
                              _size(function, width, height))
 
     @classmethod
-    def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer") -> "Camera":
+    def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer",
+                    size: Optional[Size] = None) -> "Camera":
         """OpenCV's: x right, y down, z forward.
 
         k: (3, 3) or (N, 3, 3) intrinsic matrix, pixels, without skew.
         rotation, translation: (3, 3), (3,) or with N, world to camera.
         pixel_centre: "integer": the centre of the first pixel is (0, 0), as OpenCV calibrates;
             "half": it is (0.5, 0.5), of matrices whose principal point is just width / 2.
+        size: as of Camera.
         """
         function = "Camera.from_opencv"
         rows = _Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
                      translation=(translation, (3,)))
-        return rows.converted("opencv", half=_half(function, pixel_centre))
+        return rows.converted("opencv", half=_half(function, pixel_centre)).replace(size=size)
 
     @classmethod
-    def from_colmap(cls, quaternion, translation, fx, fy, cx, cy) -> "Camera":
+    def from_colmap(cls, quaternion, translation, fx, fy, cx, cy, *,
+                    size: Optional[Size] = None) -> "Camera":
         """COLMAP's PINHOLE model, and a line of images.txt.
 
         quaternion: (4,) or (N, 4): w, x, y, z, world to camera, of any length > 0.
-        translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,).
+        translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,). size: as of Camera.
         """
         rows = _Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
                      translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
                      cy=(cy, ()))
-        return rows.converted("colmap")
+        return rows.converted("colmap").replace(size=size)
 
     @classmethod
     def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
@@ -213,14 +269,16 @@ class Camera(Packed):
         return rows.converted("pytorch3d", size=_size(function, width, height))
 
     @classmethod
-    def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy) -> "Camera":
+    def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy, *,
+                  size: Optional[Size] = None) -> "Camera":
         """A frame of NeRF's transforms.json.
 
         camera_to_world: (4, 4) or (N, 4, 4), transform_matrix. fl_x, fl_y, cx, cy: pixels.
+        size: as of Camera.
         """
         rows = _Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
                      fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
-        return rows.converted("nerf")
+        return rows.converted("nerf").replace(size=size)
 
     # And back: dictionaries of the arguments of the constructors above.
 
@@ -238,7 +296,7 @@ class Camera(Packed):
     def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
         """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
         near_plane; rendering here has none."""
-        size = _size("Camera.to_opengl", width, height)
+        size = self.check_size("Camera.to_opengl", *_size("Camera.to_opengl", width, height))
         far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
         rows = _core.camera_to("opengl", self._rows(), size, far_plane=far_plane)
         return self._parts(rows, projection=(4, 4), model_view=(4, 4))
@@ -246,13 +304,13 @@ class Camera(Packed):
     def to_kaolin(self, *, width: int, height: int) -> Parts:
         """rotation, position, projection, as from_kaolin takes them. ValueError if the principal
         point is not the middle of the image."""
-        size = _size("Camera.to_kaolin", width, height)
+        size = self.check_size("Camera.to_kaolin", *_size("Camera.to_kaolin", width, height))
         return self._parts(_core.camera_to("kaolin", self._rows(), size), rotation=(3, 3),
                            position=(3,), projection=(3,))
 
     def to_pytorch3d(self, *, width: int, height: int) -> Parts:
         """r, t, focal_length, principal_point, as from_pytorch3d takes them."""
-        size = _size("Camera.to_pytorch3d", width, height)
+        size = self.check_size("Camera.to_pytorch3d", *_size("Camera.to_pytorch3d", width, height))
         return self._parts(_core.camera_to("pytorch3d", self._rows(), size), r=(3, 3), t=(3,),
                            focal_length=(2,), principal_point=(2,))
 
@@ -262,10 +320,13 @@ class Camera(Packed):
                            fl_y=(), cx=(), cy=())
 
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
-        """The same view on an image of another size, pixels: everything scales."""
-        numbers = _core.camera_resize(self._rows(), _size("Camera.resize", width, height),
-                                      _size("Camera.resize", to_width, to_height))
-        return Camera.of_numbers(numbers.reshape(self.numbers.shape))
+        """The same view, of an image of width x height pixels, on one of to_width x to_height:
+        everything scales."""
+        size = _size("Camera.resize", to_width, to_height)
+        numbers = _core.camera_resize(
+            self._rows(), self.check_size("Camera.resize", *_size("Camera.resize", width, height)),
+            size)
+        return Camera.of_numbers(numbers.reshape(self.numbers.shape), size)
 
     def _rows(self) -> np.ndarray:
         return np.ascontiguousarray(self.numbers, np.float64).reshape(-1, self._SIZE)

@@ -95,7 +95,9 @@ class Packed:
         return type(self).of_numbers(self.numbers[index])
 
     def __repr__(self) -> str:
-        parts = ", ".join(f"{name}={getattr(self, name).tolist()}" for name in self._names())
+        values = {name: getattr(self, name) for name in self._names()}
+        parts = ", ".join(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value}"
+                          for name, value in values.items())
         return f"{type(self).__name__}({parts})"
 
 

@@ -8,10 +8,10 @@ from typing import Any, Callable, Iterator, Optional, Sequence, Union
 import numpy as np
 
 from tilegrad import _arrays, _core, _numbers
-from tilegrad._camera import Camera
+from tilegrad._camera import Camera, filled_size
 from tilegrad._packed import Packed
 from tilegrad._picture import Pictured
-from tilegrad._scene import Light, Scene, Surface
+from tilegrad._scene import Light, Scene, Surface, check_size, known_size
 from tilegrad._threads import thread_count
 
 _Reader = Callable[[str, str, Any], Any]
@@ -196,15 +196,16 @@ class Renderer:
         """How many threads were asked for; 0: one for each core."""
         return self._renderer.threads
 
-    def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: int = _D["width"],
-               height: int = _D["height"], outputs: Sequence[str] = _OUTPUTS,
+    def render(self, scenes: Union[Scene, Sequence[Scene]], *, width: Optional[int] = None,
+               height: Optional[int] = None, outputs: Sequence[str] = _OUTPUTS,
                delta: float = _D["delta"], max_alpha_error: float = _D["max_alpha_error"],
                interpolation: str = _D["interpolation"], culling: str = _D["culling"],
                alpha_rule: str = _D["alpha_rule"], paper_box: float = _D["paper_box"],
                paper_faces: int = _D["paper_faces"]) -> Frame:
         """The images of a scene, or of a list of scenes one behind the other.
 
-        width, height: pixels, 1 to 16384, of all images.
+        width, height: pixels, 1 to 16384, of all images; None: what the cameras are for
+            (`Camera.size`), or 64 where they do not say.
         outputs: which images are wanted, of "color", "alpha", "attributes", "depth", "normals",
             "uv", "barycentrics"; what is not wanted is not computed. face_ids are always there.
         delta: > 0, how soft silhouettes are: alpha = 1 - prod over faces (1 - exp(-d^2 / delta))
@@ -220,8 +221,10 @@ class Renderer:
         """
         single = isinstance(scenes, Scene)
         checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
-        options = _options(width, height, delta, max_alpha_error, interpolation, culling,
-                           alpha_rule, paper_box, paper_faces)
+        size = filled_size(width, height, known_size(checked) or (_D["width"], _D["height"]))
+        options = _options(*size, delta, max_alpha_error, interpolation, culling, alpha_rule,
+                           paper_box, paper_faces)
+        check_size("render", checked, options.width, options.height)
         outputs = _arrays.as_names("render", "outputs", outputs, _core.IMAGES)
         if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")

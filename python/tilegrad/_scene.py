@@ -263,7 +263,12 @@ class Scene:
     @property
     def camera(self) -> Camera:
         """Of one view, or of N; in the scene's dtype."""
-        return Camera.of_numbers(self._fields["camera"])
+        return Camera.of_numbers(self._fields["camera"], self.camera_size)
+
+    @property
+    def camera_size(self) -> Optional[tuple[int, int]]:
+        """`Camera.size` of its camera."""
+        return self._arguments["camera"].size
 
     @property
     def dtype(self) -> np.dtype:
@@ -294,6 +299,20 @@ class Scene:
     def __repr__(self) -> str:
         v, f = self.positions.shape[-2], len(self.faces)
         return f"<tilegrad.Scene: {len(self)} images, {v} vertices, {f} faces, {self.dtype}>"
+
+
+def known_size(scenes: Sequence[Scene]) -> Optional[tuple[int, int]]:
+    """Width and height of the images that the scenes' cameras are for; None where they do not say
+    or differ."""
+    sizes = {scene.camera_size for scene in scenes} - {None}
+    return sizes.pop() if len(sizes) == 1 else None
+
+
+def check_size(function: str, scenes: Sequence[Scene], width: int, height: int) -> None:
+    """ValueError if a scene's camera is for images of another size."""
+    for scene in scenes:
+        if scene.camera_size not in (None, (width, height)):
+            scene.camera.check_size(function, width, height)
 
 
 def changed(arguments: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -8,11 +8,12 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from tilegrad._camera import Camera
+from tilegrad._camera import Camera, filled_size
 from tilegrad._renderer import Frame, Renderer
 from tilegrad._scene import Light
 from tilegrad.meshes import as_mesh
 
+_SIDE = 512  # pixels
 _SOFT_PIXELS = 0.6  # how far outlines fade, so that they do not look like stairs
 # Towards lights, in the camera's axes: from above on the left, from the right, and from behind it.
 _LIGHTS = ((-0.4, 0.6, 1.0), (1.0, -0.1, 0.4), (0.0, 0.0, 1.0))
@@ -20,8 +21,9 @@ _INTENSITIES = (0.65, 0.2, 0.2)
 _renderers: dict[tuple[int, int], Renderer] = {}  # of this process, by threads
 
 
-def render(mesh: Any, camera: Optional[Camera] = None, *, width: int = 512, height: int = 512,
-           azimuth: float = 60, elevation: float = 20, background: Optional[Sequence[float]] = None,
+def render(mesh: Any, camera: Optional[Camera] = None, *, width: Optional[int] = None,
+           height: Optional[int] = None, azimuth: float = 60, elevation: float = 20,
+           background: Optional[Sequence[float]] = None,
            outputs: Sequence[str] = ("color", "alpha"), threads: int = 0,
            **arguments: Any) -> Frame:
     """A picture of a mesh, framed and lit: `tilegrad.render("chair.glb").save("chair.png")`.
@@ -30,17 +32,22 @@ def render(mesh: Any, camera: Optional[Camera] = None, *, width: int = 512, heig
         `tilegrad.meshes.as_mesh` takes.
     camera: None: `Camera.framing` of the mesh, from azimuth and elevation (degrees; numbers, or
         (N,) for N pictures).
+    width, height: pixels; None: what the camera is for (`Camera.size`), or 512.
     background: r, g, b of what `save` draws the object over; None: transparent.
     arguments: those of `Scene` (lighting, lights, colors, ...) and of `Renderer.render` (delta,
         max_alpha_error, ...); without them Lambert light from behind the camera.
     Returns a Frame, which notebooks show, `save` writes, and `Renderer.backward` takes.
     """
     mesh = as_mesh(mesh)
+    own = camera.size if isinstance(camera, Camera) else None
+    width, height = filled_size(width, height, own or (_SIDE, _SIDE))
     if camera is None:
         camera = Camera.framing(mesh, azimuth=azimuth, elevation=elevation, width=width,
                                 height=height)
     options = {name: arguments.pop(name) for name in list(arguments) if name in _OPTIONS}
     options.setdefault("delta", (_SOFT_PIXELS * 2 / max(width, height)) ** 2)
+    if not isinstance(camera, Camera):
+        raise TypeError(f"render: camera must be a Camera, got {type(camera).__name__}")
     scene = mesh.scene(camera, **{**_look(camera), **arguments})
     frame = _renderer(threads).render(scene, width=width, height=height, outputs=outputs, **options)
     frame.background = background
@@ -85,4 +92,4 @@ def framing(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, marg
                             height=height)
     numbers = np.array(camera.numbers)
     numbers[..., -1] = np.minimum(numbers[..., -1], 5e-4 * size + 1e-12)  # the near plane
-    return Camera.of_numbers(numbers)
+    return Camera.of_numbers(numbers, (width, height))

@@ -38,7 +38,8 @@ def load_cameras(path: Path, *, width: int = 0, height: int = 0,
     """
     half = _arrays.check_choice("load_cameras", "opencv_centre", opencv_centre, _CENTRES) == 1
     views = _tools.load_cameras(name_of(path), (width, height), half)
-    return [View(name, Camera.of_numbers(numbers), *size) for name, numbers, size in views]
+    return [View(name, Camera.of_numbers(numbers, size if all(size) else None), *size)
+            for name, numbers, size in views]
 
 
 def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = None) -> None:
@@ -52,7 +53,9 @@ def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = N
     _arrays.check_choice("save_cameras", "format", format, _FORMATS)
     _tools.save_cameras(name_of(path), format,
                         [(_arrays.as_text("save_cameras", "view name", view.name),
-                          _numbers(view.camera), (view.width, view.height)) for view in views])
+                          _numbers(view.camera),
+                          view.camera.check_size("save_cameras", view.width, view.height))
+                         for view in views])
 
 
 def rotation_from_vector(rvec: Any) -> np.ndarray:

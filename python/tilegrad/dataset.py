@@ -105,7 +105,7 @@ class Dataset:
     @property
     def cameras(self) -> Camera:
         """Of all views; the same for every model."""
-        return Camera.of_numbers(self._cameras)
+        return Camera.of_numbers(self._cameras, (self.image_size, self.image_size))
 
     def set_epoch(self, epoch: int) -> None:
         """Items show other views from now on; epoch: >= 0. Workers of a DataLoader see what was

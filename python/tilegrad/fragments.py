@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 import numpy as np
 
 from tilegrad import _arrays, _core
-from tilegrad._camera import Camera
+from tilegrad._camera import Camera, filled_size
 from tilegrad._renderer import Frame
-from tilegrad._scene import Scene
+from tilegrad._scene import Scene, check_size, known_size
 from tilegrad._threads import thread_count
 
 
@@ -43,7 +43,7 @@ def to_fragments(source: Union[Frame, Scene, Sequence[Scene]], faces_per_pixel: 
     """The faces_per_pixel nearest faces of every pixel of a frame, or of scenes.
 
     source: a Frame, whose scenes and size are taken; or a Scene or a list of them, with width and
-        height in pixels.
+        height in pixels, or cameras that know these (`Camera.size`).
     faces_per_pixel: K, 1..1024.
     blur_radius: NDC^2, >= 0: a pixel lists faces whose boundary is nearer than its root, too.
     perspective_correct: whether barycentrics are linear on the face or on the screen.
@@ -93,8 +93,10 @@ def _scenes_of(source: Any, width: Optional[int],
                         f"{type(source).__name__}")
     if not scenes:
         raise ValueError("to_fragments: source has no scene")
+    width, height = filled_size(width, height, known_size(scenes) or (None, None))
     if width is None or height is None:
         raise ValueError("to_fragments: scenes need width and height")
+    check_size("to_fragments", scenes, width, height)
     return scenes, width, height
 
 

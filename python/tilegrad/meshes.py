@@ -86,7 +86,7 @@ class MeshCamera:
         """For an image of that size in pixels."""
         return Camera.of_numbers(_tools.from_gltf(
             np.ravel(self.node_to_world), (self.yfov, self.aspect_ratio, self.znear),
-            (width, height)))
+            (width, height)), (width, height))
 
 
 @dataclasses.dataclass(eq=False)

@@ -200,19 +200,21 @@ def _views(images: Any, cameras: Any, masks: Any) -> dict[str, Any]:
     else:
         alpha = np.ones(pixels.shape[:3], np.float32)
     _arrays.check_shape("fit", "masks", alpha.shape, pixels.shape[:3])
-    return {"names": [str(i) for i in range(len(pixels))], "cameras": _rows(cameras, len(pixels)),
+    return {"names": [str(i) for i in range(len(pixels))], "cameras": _rows(cameras, pixels.shape),
             "color": np.ascontiguousarray(np.moveaxis(pixels[..., :3], -1, 1)),
             "alpha": np.ascontiguousarray(alpha)}
 
 
-def _rows(cameras: Any, views: int) -> Optional[list[list[float]]]:
+def _rows(cameras: Any, shape: tuple[int, ...]) -> Optional[list[list[float]]]:
     if cameras is None:
         return None
+    views, height, width = shape[:3]
     if not isinstance(cameras, Camera):
         raise TypeError(f"fit: cameras is {type(cameras).__name__}, expected a Camera of {views} "
                         "views")
     numbers = np.asarray(cameras.numbers, np.float64)
     _arrays.check_shape("fit", "cameras", numbers.shape, (views, 17))
+    cameras.check_size("fit", width, height)
     return numbers.tolist()
 
 

@@ -96,14 +96,15 @@ def _color(dtype: type) -> str:
     return _difference(frame.color[0][:, inside].T, color[inside], tolerance)
 
 
-def _sphere(dtype: type, lighting: str) -> Scene:
+def _sphere(dtype: type, lighting: str, size: tuple[int, int] = (32, 32)) -> Scene:
     positions, faces = tilegrad.icosphere(2, 0.8)
     numbers = np.random.default_rng(1)
     noise = numbers.uniform(-0.01, 0.01, positions.shape)
     positions = (positions + noise).astype(dtype)
     light: dict[str, Any] = {"sh": numbers.uniform(0.1, 0.3, 9).astype(dtype)} \
         if lighting == "spherical_harmonics" else {"lights": Light((0.3, 0.5, 1))}
-    return Scene(positions, faces, Camera.orbit(20, 30, 3, width=32, height=32), lighting=lighting,
+    return Scene(positions, faces, Camera.orbit(20, 30, 3, width=size[0], height=size[1]),
+                 lighting=lighting,
                  colors=numbers.uniform(0.2, 0.9, positions.shape).astype(dtype),
                  uvs=numbers.uniform(0, 1, (len(positions), 2)).astype(dtype),
                  textures=Texture(numbers.uniform(0.2, 0.9, (8, 8, 3)).astype(dtype)), **light)
@@ -160,7 +161,7 @@ def _determinism() -> str:
     results = []
     for threads in (1, 2, 7):
         renderer = Renderer(threads)
-        frame = renderer.render([_sphere(np.float32, "phong")] * 7, width=100, height=70)
+        frame = renderer.render([_sphere(np.float32, "phong", (100, 70))] * 7)
         got = renderer.backward(frame, color=np.ones_like(frame.color),
                                 alpha=np.ones_like(frame.alpha), wrt=("positions", "textures"))
         results.append((frame.color.tobytes(), frame.alpha.tobytes(),

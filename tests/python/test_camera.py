@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cameras: where a world point lands (docs/cameras.md), there and back, batches, errors."""
 
+import pickle
 import unittest
 
 import numpy as np
 
+import tilegrad
 from tilegrad import Camera
 
 # The camera and the point of docs/cameras.md.
@@ -130,6 +132,74 @@ class Batches(unittest.TestCase):
         cameras.translation[1] += 1
         cameras.fx[2] = 9
         self.assertEqual(cameras.numbers[2, 12], 9)
+
+
+class Sizes(unittest.TestCase):
+    """A camera knows the size of the image that it is for; an image of another size is an error."""
+
+    def test_who_knows_it(self):
+        own = (64, 48)
+        wide = {"width": 64, "height": 48}
+        orbit = Camera.orbit([0, 90], 20, 3, **wide)
+        sphere = tilegrad.icosphere(1)
+        for camera in (orbit, orbit[1], orbit[:1], orbit.replace(near_plane=0.1),
+                       pickle.loads(pickle.dumps(orbit)), Camera(size=own),
+                       Camera.look_at((0, 0, 3), **wide), Camera.framing(sphere, **wide),
+                       Camera.from_opengl(**orbit.to_opengl(**wide, far_plane=9), **wide),
+                       Camera.from_kaolin(**orbit.to_kaolin(**wide), **wide),
+                       Camera.from_pytorch3d(**orbit.to_pytorch3d(**wide), **wide),
+                       Camera.from_opencv(**orbit.to_opencv(), size=own),
+                       Camera.from_colmap(**orbit.to_colmap(), size=own),
+                       Camera.from_nerf(**orbit.to_nerf(), size=own),
+                       orbit.resize(64, 48, 9, 7).resize(9, 7, 64, 48),
+                       tilegrad.Scene(*sphere, orbit).camera):
+            self.assertEqual(camera.size, own)
+            self.assertIn("size=(64, 48)", repr(camera))
+        for camera in (Camera(), orbit.replace(size=None), Camera.of_numbers(orbit.numbers),
+                       Camera.from_nerf(**orbit.to_nerf())):
+            self.assertIsNone(camera.size)
+
+    def test_images_have_it_unless_told_otherwise(self):
+        camera = Camera.orbit([0, 90], 20, 3, width=24, height=16)
+        scene = tilegrad.Scene(*tilegrad.icosphere(1), camera)
+        self.assertEqual(tilegrad.Renderer(1).render(scene).alpha.shape, (2, 16, 24))
+        self.assertEqual(tilegrad.fragments.to_fragments(scene).zbuf.shape, (2, 16, 24, 1))
+        frame = tilegrad.render(tilegrad.icosphere(1), camera)
+        self.assertEqual(frame.alpha.shape, (2, 16, 24))
+
+    def test_another_size_is_an_error_everywhere(self):
+        camera = Camera.orbit(30, 20, 3, width=64, height=64)
+        mesh = tilegrad.icosphere(1)
+        scene = tilegrad.Scene(*mesh, camera)
+        plain = scene.replace(camera=camera.replace(size=None))
+        double = {"width": 128, "height": 128}
+        view = tilegrad.files.View("a", camera, 128, 128)
+        for call in (lambda: tilegrad.Renderer(1).render(scene, **double),
+                     lambda: tilegrad.Renderer(1).render([plain, scene], **double),
+                     lambda: tilegrad.Renderer(1).render(scene, height=128, width=64),
+                     lambda: tilegrad.render(mesh, camera, **double),
+                     lambda: tilegrad.fragments.to_fragments(scene, **double),
+                     lambda: tilegrad.fit(np.zeros((2, 128, 128, 4), np.uint8),
+                                          Camera.orbit([0, 90], 20, 3, width=64, height=64)),
+                     lambda: tilegrad.files.save_cameras("unwritten.json", [view]),
+                     lambda: camera.to_opengl(**double, far_plane=9),
+                     lambda: camera.to_kaolin(**double), lambda: camera.to_pytorch3d(**double),
+                     lambda: camera.resize(128, 128, 64, 64)):
+            with self.assertRaisesRegex(ValueError, "the camera is for images of 64 x 64 pixels"):
+                call()
+
+    def test_the_same_view_of_another_size(self):
+        """What the error says to do: every other pixel's corner is a pixel's corner of before."""
+        camera = Camera.orbit(30, 20, 3, width=64, height=64)
+        point = np.array([0.2, 0.1, -0.3])
+        np.testing.assert_allclose(pixel(camera.resize(64, 64, 128, 128), point),
+                                   2 * pixel(camera, point), rtol=1e-12)
+
+    def test_no_size(self):
+        for size, error in ((3, TypeError), ((1, 2, 3), TypeError), ((1.5, 2), TypeError),
+                            ((0, 2), ValueError), ((2, 99999), ValueError)):
+            with self.assertRaises(error):
+                Camera(size=size)
 
 
 class Errors(unittest.TestCase):

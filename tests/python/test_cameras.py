@@ -31,6 +31,7 @@ class CameraFiles(FolderTest):
             got = cameras.load_cameras(self.folder / name)
             for view, expected in zip(got, views, strict=True):
                 self.assertEqual((view.width, view.height), (WIDTH, HEIGHT))
+                self.assertEqual(view.camera.size, (WIDTH, HEIGHT))
                 np.testing.assert_allclose(view.camera.numbers, expected.camera.numbers, atol=1e-9)
         cameras.save_cameras(self.folder / "c.json", views)
         self.assertIn("K", json.loads((self.folder / "c.json").read_text())["frames"][0])

@@ -251,7 +251,7 @@ try:
     renderer.render([scene] * 100, **size)
     print("rendered")
 except MemoryError as error:
-    print("MemoryError", renderer.render(scene, width=8, height=8).alpha.shape)
+    print("MemoryError", renderer.render(scene).alpha.shape)
 """
         outcomes = []
         for megabytes in range(160, 400, 16):
@@ -259,7 +259,7 @@ except MemoryError as error:
                                   text=True, timeout=60)
             self.assertEqual(done.returncode, 0, (megabytes, done.stderr))
             outcomes.append(done.stdout.strip())
-        self.assertGreater(outcomes.count("MemoryError (1, 8, 8)"), 5, outcomes)
+        self.assertGreater(outcomes.count("MemoryError (1, 512, 512)"), 5, outcomes)
 
 
 class Environment(unittest.TestCase):

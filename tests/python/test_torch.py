@@ -376,6 +376,13 @@ class Errors(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "render: textures is on meta"):
             rendered({**given, "textures": texels})
 
+    def test_a_camera_of_another_size(self):
+        given = tensors(np.float32)
+        given["camera"] = Camera(fx=9, fy=9.5, cx=4.4, cy=4.1, size=(9, 8))
+        self.assertEqual(rendered(given).alpha.shape, (1, 8, 9))
+        with self.assertRaisesRegex(ValueError, "for images of 9 x 8 pixels, not 18 x 16"):
+            rendered(given, width=18, height=16)
+
     def test_shapes_and_names(self):
         given = tensors(np.float32)
         with self.assertRaisesRegex(TypeError, r"colors has dtype torch.bfloat16.*colors.float"):
