@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import operator
 import threading
+import weakref
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
@@ -24,6 +25,7 @@ _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
 MOST_PIXELS = 16384  # of an image in each axis: kMaxImageSize of src/raster/conventions.h
 _counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
 _lock = threading.Lock()
+_index_copies: dict[int, tuple[Any, Any]] = {}  # of arrays by id: who it is, and its copy
 
 
 def stats() -> dict[str, int]:
@@ -66,6 +68,39 @@ def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarr
     if not isinstance(value, _NUMBERS):
         _count_copy(copy)
     return copy
+
+
+def as_indices(function: str, argument: str, value: Any, shape: Sequence[Axis],
+               sizes: Optional[Sizes] = None) -> np.ndarray:
+    """As `as_array` of int32. An array that has to be copied is copied once: where it comes again,
+    with the numbers that it had, the copy of before serves."""
+    if isinstance(value, _NUMBERS):
+        return as_array(function, argument, value, np.int32, shape, sizes)
+    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
+    owner, copy = _index_copies.get(id(value), (None, None))
+    if owner is not None and owner() is value and np.array_equal(copy, array):
+        _counts["arrays"] += 1
+    else:
+        copy = contiguous(function, argument, array, np.int32)
+        if copy is not array:
+            _keep_copy(value, copy)
+    check_shape(function, argument, copy.shape, shape, sizes)
+    return copy
+
+
+def _keep_copy(value: Any, copy: np.ndarray) -> None:
+    """As long as `value` lives."""
+    key = id(value)
+
+    def forget(reference: Any) -> None:
+        if _index_copies.get(key, (None, None))[0] is reference:
+            del _index_copies[key]
+
+    copy.flags.writeable = False  # others may have it, too
+    try:
+        _index_copies[key] = (weakref.ref(value, forget), copy)
+    except TypeError:  # nobody is told when it goes
+        pass
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import torch
 
-from tilegrad._dense import check_dense
+from tilegrad._dense import check_dense, full_precision
 
 
+@full_precision
 def rotation_6d(numbers: torch.Tensor) -> torch.Tensor:
     """Rotations (..., 3, 3) of six free numbers (..., 6): their first two rows, made orthonormal
     (Y. Zhou et al.: On the continuity of rotation representations in neural networks, 2019).

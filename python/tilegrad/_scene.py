@@ -118,7 +118,7 @@ class Scene:
 
     Arrays that are C-contiguous and of the scene's dtype are used where they are, not copied: they
     must stay as they are from a render to its last backward. Everything else is copied once, here
-    (`tilegrad.stats` counts that).
+    (`tilegrad.stats` counts that); faces of another whole type once for all scenes of that array.
 
     positions: (V, 3), world. Their dtype is the scene's: an array of float64 makes a scene for the
         scalar reference in double precision, which is for checks and slow; everything else is
@@ -161,7 +161,7 @@ class Scene:
         sizes: dict[str, int] = {}
         corners = self._corners(per_corner)
         fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
-                  "faces": _arrays.as_array("Scene", "faces", faces, np.int32, ("F", 3), sizes),
+                  "faces": _arrays.as_indices("Scene", "faces", faces, ("F", 3), sizes),
                   "camera": self._camera(camera, sizes)}
         for name in _SHAPES:
             value = self._arguments[name]
@@ -173,8 +173,8 @@ class Scene:
                 shape = _CORNER_SHAPES[name] if name in corners else _SHAPES[name]
                 fields[name] = self._take(name, value, shape, sizes)
         if face_surfaces is not None:
-            fields["face_surfaces"] = _arrays.as_array("Scene", "face_surfaces", face_surfaces,
-                                                       np.int32, ("F",), sizes)
+            fields["face_surfaces"] = _arrays.as_indices("Scene", "face_surfaces", face_surfaces,
+                                                         ("F",), sizes)
         if lights is not None:
             fields["lights"] = self._lights(lights, sizes)
         self._fields = fields

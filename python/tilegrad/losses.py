@@ -102,10 +102,9 @@ def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
 
 
 def _of_mesh(name: str, positions: Any, faces: Any) -> Any:
-    triangles = np.ascontiguousarray(_numpy(faces))
-    if triangles.dtype.kind not in "iu":
-        raise TypeError(f"{name}: faces has dtype {triangles.dtype}, expected whole numbers")
-    triangles = triangles.astype(np.int32)
+    if _numpy(faces).dtype.kind not in "iu":
+        raise TypeError(f"{name}: faces has dtype {_numpy(faces).dtype}, expected whole numbers")
+    triangles = _arrays.as_indices(name, "faces", faces, ("F", 3))
     compute = getattr(_tools, name)
     if _torch_of(positions):
         return _on_tape(lambda p: compute(p, triangles), positions)
@@ -136,12 +135,15 @@ def _like(tensor: Any, value: Any) -> Any:
 
 def _on_tape(compute: Callable[..., tuple], *inputs: Any) -> Any:
     """The value as a scalar tensor whose backward gives the gradients. First derivatives only."""
+    from tilegrad._autograd import first_derivative_only
+    from tilegrad._dense import widened
     torch = _torch_of(*inputs)
-    tensors = [torch.as_tensor(value) for value in inputs]
+    tensors = [widened(torch.as_tensor(value)) for value in inputs]
 
     class Node(torch.autograd.Function):
         @staticmethod
         def forward(context, *values):
+            context.save_for_backward(*values)
             if any(value.device.type != "cpu" for value in values):
                 raise TypeError("tilegrad.losses: tensors must be of the CPU")
             value, *gradients = compute(*(np.ascontiguousarray(v.detach().numpy())
@@ -150,7 +152,7 @@ def _on_tape(compute: Callable[..., tuple], *inputs: Any) -> Any:
             return values[0].new_tensor(value)
 
         @staticmethod
-        @torch.autograd.function.once_differentiable
+        @first_derivative_only
         def backward(context, scale):
             return tuple(scale * gradient for gradient in context.gradients)
 

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _arrays, _core, _rotation
+from tilegrad._autograd import first_derivative_only
 from tilegrad._camera import Camera
-from tilegrad._dense import check_dense
+from tilegrad._dense import check_dense, full_precision
 from tilegrad._packed import Packed
 from tilegrad._renderer import Frame, Gradients
 from tilegrad._renderer import Renderer as _Engine
@@ -34,6 +34,7 @@ Value = Any  # a tensor, a number, or a nested sequence of numbers
 
 # Of several numbers each.
 _RECORDS: dict[str, type[Packed]] = {"camera": Camera, "lights": Light, "surfaces": Surface}
+_INDICES = ("faces", "face_surfaces")  # a Scene takes their tensors as they are
 _CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
 
 
@@ -51,14 +52,16 @@ class Images(NamedTuple):
     face_ids: Optional[torch.Tensor] = None
 
 
-def render(positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Tensor], *,
+@full_precision
+def render(positions: Union[torch.Tensor, Sequence[torch.Tensor]], faces: Array, camera: Any, *,
            width: int, height: int, outputs: Sequence[str] = ("color", "alpha"),
            threads: int = 0, surface_textures: Sequence[int] = (), **arguments: Any) -> Images:
-    """Images (N, ...) of a scene or of a batch of N.
+    """Images (N, ...) of a scene, of a batch of N, or of a list of meshes behind each other.
 
     positions: (V, 3) or (N, V, 3); its dtype is that of the images, to which other tensors are
         converted. faces: (F, 3) whole numbers.
-    camera: a Camera, or a tensor ([N,] 17) of `camera`.
+    camera: a Camera, or a tensor ([N,] 17) of `camera`. Images of another size than a Camera is
+        for are an error; the numbers in a tensor are for an image of width and height.
     width, height, outputs: as of `tilegrad.Renderer.render`; face_ids are always there.
     threads: as of `tilegrad.Renderer`; 0: what TILEGRAD_THREADS says, or as many as torch uses:
         one in a worker of a DataLoader.
@@ -68,14 +71,21 @@ def render(positions: torch.Tensor, faces: Array, camera: Union[Camera, torch.Te
         tensor ([N,] L, 4) of `lights`, surfaces a tensor (S, 13) of `surfaces`; and options of
         `tilegrad.Renderer.render` (delta, max_alpha_error, culling, ...).
 
+    Different meshes in one call: positions are a list of (V, 3) or (N, V, 3). Every other argument
+    that is a list (faces, camera, colors, ...) has one for each of them, too; what is no list, but
+    a tensor, a tuple, a number, is for all. They must be alike: what one has, all have.
+
+    In torch.autocast tensors of bfloat16 are rendered in float32; elsewhere they are an error.
+
     Errors: TypeError for tensors that are not on the CPU; what Scene and Renderer raise.
     """
     outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    scene = {"positions": positions, "faces": faces, "camera": camera}
+    scene = {"positions": positions, "faces": faces, "camera": camera,
+             "surface_textures": surface_textures}
     options = {"width": width, "height": height, "outputs": outputs}
     for name, value in arguments.items():
         (options if name in _OPTIONS else scene)[name] = value
-    call = _Call(scene, options, threads, surface_textures)
+    call = _Call(_each(scene), options, threads)
     images = _Render.apply(call, *call.tensors)
     return Images(**dict(zip((*outputs, "face_ids"), images)))
 
@@ -99,6 +109,7 @@ class Renderer(torch.nn.Module):
         return ", ".join(f"{name}={value!r}" for name, value in self.arguments.items())
 
 
+@full_precision
 def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
            translation: Value = (0.0, 0.0, 0.0), fx: Value = _core.CAMERA[12],
            fy: Value = _core.CAMERA[13], cx: Value = _core.CAMERA[14],
@@ -112,12 +123,14 @@ def camera(rotation: Value = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
                    fy=(fy, ()), cx=(cx, ()), cy=(cy, ()), near_plane=(near_plane, ()))
 
 
+@full_precision
 def lights(direction: Value, intensity: Value = 1.0) -> torch.Tensor:
     """Directional lights of tensors, ([N,] L, 4): direction ([N,] L, 3), from the surface to the
     light, world, not 0; intensity ([N,] L) or a number."""
     return _packed(direction=(direction, (3,)), intensity=(intensity, ()))
 
 
+@full_precision
 def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.0),
              diffuse: Value = (1.0, 1.0, 1.0), specular: Value = (0.4, 0.4, 0.4),
              shininess: Value = 10.0) -> torch.Tensor:
@@ -135,95 +148,137 @@ _OPTIONS = frozenset(("delta", "max_alpha_error", "interpolation", "culling", "a
                       "paper_box", "paper_faces"))
 
 
+class _Place(NamedTuple):
+    """Where a tensor stands: in which scene, in which argument, and of textures in which."""
+
+    scene: int
+    name: str
+    texture: int = 0
+
+
 class _Call:
-    """A render: its tensors, and all the rest with places for them.
+    """A render: its tensors, and all the rest with places for them."""
 
-    A place is the name of an argument of Scene, or "textures" with an index.
-    """
-
-    def __init__(self, arguments: dict[str, Any], options: dict[str, Any], threads: int,
-                 surface_textures: Sequence[int]) -> None:
+    def __init__(self, scenes: Sequence[dict[str, Any]], options: dict[str, Any],
+                 threads: int) -> None:
         for name, value in options.items():
             if isinstance(value, torch.Tensor) and value.requires_grad:
                 raise ValueError(f"render: {name} has no gradient; give {name}.item()")
         self.options, self.threads = options, thread_count("render", threads)
-        self.arguments = dict(arguments)
-        self.surface_textures = self._surface_textures(surface_textures)
-        self.places: list[tuple[str, int]] = []
+        self.scenes = [_with_textures(scene) for scene in scenes]
+        self.surface_textures = [_surface_textures(scene) for scene in self.scenes]
+        self.places: list[_Place] = []
         self.tensors: list[torch.Tensor] = []
-        textures = self.arguments.get("textures")
-        if textures is not None:
-            each = textures if isinstance(textures, (list, tuple)) else [textures]
-            self.arguments["textures"] = [t if isinstance(t, Texture) else Texture(t)
-                                          for t in each]
-            for i, texture in enumerate(self.arguments["textures"]):
-                self._note("textures", i, texture.texels)
-        for name, value in self.arguments.items():
-            self._note(name, 0, value)
+        for i, scene in enumerate(self.scenes):
+            for k, texture in enumerate(scene.get("textures") or ()):
+                self._note(_Place(i, "textures", k), texture.texels)
+            for name, value in scene.items():
+                self._note(_Place(i, name), value)
 
-    def _surface_textures(self, given: Sequence[int]) -> np.ndarray:
-        """As Surface has them; one -1 for all surfaces if there are none."""
-        indices = _arrays.contiguous("render", "surface_textures", given, np.int32)
-        if not indices.size:
-            return np.array(-1, np.int32)
-        if not isinstance(self.arguments.get("surfaces"), torch.Tensor):
-            raise ValueError("render: surface_textures belong to surfaces in a tensor; a Surface "
-                             "has its own texture")
-        return indices
-
-    def _note(self, name: str, index: int, value: Any) -> None:
+    def _note(self, place: _Place, value: Any) -> None:
         if not isinstance(value, torch.Tensor):
             return
+        name = place.name
         check_dense("render", name, value)
         if value.is_floating_point() and value.dtype not in (torch.float32, torch.float64):
             raise TypeError(f"render: {name} has dtype {value.dtype}, expected torch.float32 or "
                             f"torch.float64 ({name}.float() makes it one)")
-        self.places.append((name, index))
+        self.places.append(place)
         self.tensors.append(value)
 
     def frame(self, tensors: Sequence[torch.Tensor]) -> Frame:
         """Renders, with the memory of the tensors where the renderer can take it as it is."""
-        arguments = dict(self.arguments)
-        if arguments.get("textures") is not None:
-            arguments["textures"] = list(arguments["textures"])
-        for (name, index), tensor in zip(self.places, tensors):
-            array = tensor.detach().resolve_neg().numpy()
-            if name == "textures":
-                old = arguments["textures"][index]
-                arguments["textures"][index] = Texture(array, old.wrap, old.filter)
-            else:
-                arguments[name] = self._record(name, array) if name in _RECORDS else array
-        return self._engine().render(Scene(**arguments), **self.options)
+        scenes = [dict(scene) for scene in self.scenes]
+        for scene in scenes:
+            if scene.get("textures") is not None:
+                scene["textures"] = list(scene["textures"])
+        for place, tensor in zip(self.places, tensors):
+            if place.name not in _INDICES:
+                self._put(scenes[place.scene], place, tensor.detach().resolve_neg().numpy())
+        return self._engine().render([Scene(**scene) for scene in scenes], **self.options)
 
-    def _record(self, name: str, array: np.ndarray) -> Packed:
+    def _put(self, scene: dict[str, Any], place: _Place, array: np.ndarray) -> None:
+        name = place.name
+        if name == "textures":
+            old = scene[name][place.texture]
+            scene[name][place.texture] = Texture(array, old.wrap, old.filter)
+        elif name in _RECORDS:
+            scene[name] = self._record(place, array)
+        else:
+            scene[name] = array
+
+    def _record(self, place: _Place, array: np.ndarray) -> Packed:
         """The numbers of a camera, of lights or of surfaces as those."""
-        kind = _RECORDS[name]
+        kind = _RECORDS[place.name]
         if array.ndim < 1 or array.shape[-1] != kind._SIZE:
-            raise ValueError(f"render: {name} has shape {array.shape}, expected "
+            raise ValueError(f"render: {place.name} has shape {array.shape}, expected "
                              f"{_arrays.shape_text(('...', kind._SIZE))}")
         record = kind.of_numbers(array)
         if isinstance(record, Surface):
-            record.texture = self.surface_textures
+            record.texture = self.surface_textures[place.scene]
         return record
 
     def gradients(self, frame: Frame, wanted: Sequence[bool],
                   cotangents: dict[str, Any]) -> list[Optional[torch.Tensor]]:
         """dL/d(tensor) in the order of the tensors; None for those that are not wanted."""
-        names = tuple(dict.fromkeys(name for (name, _), want in zip(self.places, wanted) if want))
+        names = tuple(dict.fromkeys(place.name for place, want in zip(self.places, wanted) if want))
         found = self._engine().backward(frame, wrt=names, **cotangents)
-        assert isinstance(found, Gradients)  # of one scene
-        return [self._gradient(found, *place) if want else None
+        return [self._gradient(found[place.scene], place) if want else None
                 for place, want in zip(self.places, wanted)]
 
     @staticmethod
-    def _gradient(found: Gradients, name: str, index: int) -> torch.Tensor:
-        value = getattr(found, name)
-        if name == "textures":
-            value = value[index]
-        return torch.from_numpy(value.numbers if name in _RECORDS else value)
+    def _gradient(found: Gradients, place: _Place) -> torch.Tensor:
+        value = getattr(found, place.name)
+        if place.name == "textures":
+            value = value[place.texture]
+        return torch.from_numpy(value.numbers if place.name in _RECORDS else value)
 
     def _engine(self) -> _Engine:
         return _engine(self.threads or torch.get_num_threads())
+
+
+def _each(arguments: dict[str, Any]) -> list[dict[str, Any]]:
+    """The arguments of each mesh, where positions are a list of them."""
+    positions = arguments["positions"]
+    several = isinstance(positions, (list, tuple)) and len(positions) > 0
+    if not several or not all(getattr(mesh, "ndim", 0) >= 2 for mesh in positions):
+        return [arguments]  # nested lists of numbers are one mesh, too
+    own = {name: value for name, value in arguments.items() if _is_of_each(value)}
+    own["positions"] = positions
+    for name, value in own.items():
+        if len(value) != len(positions):
+            raise ValueError(f"render: {name} is a list of {len(value)}, expected {len(positions)}, "
+                             f"one for each of positions; what all share may be a tuple")
+    return [{**arguments, **{name: value[i] for name, value in own.items()}}
+            for i in range(len(positions))]
+
+
+def _is_of_each(value: Any) -> bool:
+    """Whether it is a list, of something else than numbers and names."""
+    return isinstance(value, list) and not all(isinstance(v, (int, float, str)) for v in value)
+
+
+def _with_textures(arguments: dict[str, Any]) -> dict[str, Any]:
+    """The same with a list of Texture, if there are textures."""
+    textures = arguments.get("textures")
+    if textures is None:
+        return arguments
+    each = textures if isinstance(textures, (list, tuple)) else [textures]
+    made = [texture if isinstance(texture, Texture) else Texture(texture) for texture in each]
+    return {**arguments, "textures": made}
+
+
+def _surface_textures(arguments: dict[str, Any]) -> np.ndarray:
+    """Takes them out of the arguments, as Surface has them: one -1 for all surfaces if there are
+    none."""
+    given = arguments.pop("surface_textures")
+    indices = _arrays.contiguous("render", "surface_textures", given, np.int32)
+    if not indices.size:
+        return np.array(-1, np.int32)
+    if not isinstance(arguments.get("surfaces"), torch.Tensor):
+        raise ValueError("render: surface_textures belong to surfaces in a tensor; a Surface "
+                         "has its own texture")
+    return indices
 
 
 class _Render(torch.autograd.Function):
@@ -244,7 +299,7 @@ class _Render(torch.autograd.Function):
         return (*images, face_ids)
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx: Any, *d_images: Optional[torch.Tensor]) -> tuple[Any, ...]:
         tensors = ctx.saved_tensors
         wanted = ctx.needs_input_grad[1:]

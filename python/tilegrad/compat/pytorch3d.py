@@ -18,10 +18,11 @@ import warnings
 from typing import Any, Optional, Sequence, Union
 
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core, fragments
 from tilegrad._arrays import check_indices
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import widened
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Fragments = fragments.Fragments
@@ -47,7 +48,7 @@ class _Rasterize(torch.autograd.Function):
         return out
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx: Any, _: Any,
                  *gradients: torch.Tensor) -> tuple[Optional[torch.Tensor], ...]:
         face_vertices, pix_to_face = ctx.saved_tensors
@@ -75,7 +76,7 @@ def rasterize_meshes(meshes: Any, image_size: Union[int, Sequence[int]] = 256,
     -1 behind the last face of a pixel. TypeError, ValueError: as of tilegrad.compat.kaolin.
     """
     name = "rasterize_meshes"
-    vertices, faces = meshes.verts_packed(), meshes.faces_packed()
+    vertices, faces = widened(meshes.verts_packed()), meshes.faces_packed()
     check_floats(name, "meshes.verts_packed()", vertices, ("V", 3))
     check_tensor(name, "meshes.faces_packed()", faces, ("F", 3))
     if faces.dtype not in (torch.int32, torch.int64):

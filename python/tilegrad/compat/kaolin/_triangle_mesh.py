@@ -8,6 +8,7 @@ from typing import Optional, Union
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin import ops
 from tilegrad.compat.kaolin.ops._subdivide import adjacency
 
@@ -75,10 +76,12 @@ class TriangleMesh:
         """The same, sparse."""
         return self.compute_adjacency_matrix_full().to_sparse()
 
+    @full_precision
     def compute_laplacian(self) -> torch.Tensor:
         """[V,3], each vertex minus the mean of its neighbours."""
         return -ops.mesh.uniform_laplacian(len(self.vertices), self.faces) @ self.vertices
 
+    @full_precision
     def laplacian_smoothing(self, iterations: int = 1) -> None:
         """Moves each vertex to the mean of its neighbours and itself."""
         adjacency = self.compute_adjacency_matrix_full()

@@ -7,10 +7,11 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
 from tilegrad._arrays import Sizes
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 
@@ -38,7 +39,7 @@ class _Antialias(torch.autograd.Function):
             call.rings, _tensors.threads()))
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx, d_out):
         color, rast, pos = ctx.saved_tensors
         wanted = [ctx.needs_input_grad[0], ctx.needs_input_grad[2]]
@@ -50,6 +51,7 @@ class _Antialias(torch.autograd.Function):
         return d_color, None, d_pos, None
 
 
+@full_precision
 def antialias(color: torch.Tensor, rast: torch.Tensor, pos: torch.Tensor, tri: torch.Tensor,
               topology_hash: Optional[TopologyHash] = None,
               pos_gradient_boost: float = 1.0) -> torch.Tensor:

@@ -8,14 +8,14 @@ from typing import Any, Optional
 import numpy as np
 import torch
 
-from tilegrad._arrays import Sizes, as_array
+from tilegrad._arrays import Sizes, as_indices
 from tilegrad.compat import _tensors
 
 
 def triangles(function: str, tri: Any) -> np.ndarray:
     """`tri` as an array [F, 3] of int32; ValueError if it is another shape or out of range."""
     _tensors.check_tensor(function, "tri", tri, ("F", 3))
-    return as_array(function, "tri", tri.detach().contiguous().numpy(), np.int32, ("F", 3))
+    return as_indices(function, "tri", tri, ("F", 3))
 
 
 def vertex_rows(function: str, argument: str, value: Any, channels: Any, sizes: Sizes,

@@ -7,10 +7,11 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
 from tilegrad._arrays import Sizes
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 
@@ -35,7 +36,7 @@ class _Interpolate(torch.autograd.Function):
         return out, out_da
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx, d_out, d_out_da):
         attr, rast, rast_db = ctx.saved_tensors
         gradients = _core.nvdiffrast_interpolate_backward(
@@ -44,6 +45,7 @@ class _Interpolate(torch.autograd.Function):
         return (*map(_inputs.optional_tensor, gradients), None)
 
 
+@full_precision
 def interpolate(attr: torch.Tensor, rast: torch.Tensor, tri: torch.Tensor,
                 rast_db: Optional[torch.Tensor] = None,
                 diff_attrs: Union[None, str, Sequence[int]] = None) -> tuple:

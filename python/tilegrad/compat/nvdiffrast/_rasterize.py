@@ -8,10 +8,11 @@ from typing import Any, NamedTuple, Optional, Sequence
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
 from tilegrad._arrays import MOST_PIXELS, Sizes, as_array
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 from tilegrad.compat.nvdiffrast._context import RasterizeCpuContext
@@ -40,7 +41,7 @@ class _Rasterize(torch.autograd.Function):
         return rast, rast_db
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx, d_rast, d_rast_db):
         pos, rast = ctx.saved_tensors
         if not ctx.call.grad_db:
@@ -53,6 +54,7 @@ class _Rasterize(torch.autograd.Function):
         return torch.from_numpy(d_pos), None, None
 
 
+@full_precision
 def rasterize(glctx: RasterizeCpuContext, pos: torch.Tensor, tri: torch.Tensor,
               resolution: Sequence[int], ranges: Optional[torch.Tensor] = None,
               grad_db: bool = True) -> Images:

@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
 from tilegrad._arrays import Sizes, check_choice
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat import _tensors
 from tilegrad.compat.nvdiffrast import _inputs
 
@@ -49,7 +50,7 @@ class _Texture(torch.autograd.Function):
             [_tensors.to_numpy(level) for level in levels], call.record(uv, uv_da, bias)))
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx, d_out):
         uv, uv_da, bias, *levels = ctx.saved_tensors
         wants_levels = any(ctx.needs_input_grad[4:])
@@ -65,6 +66,7 @@ class _Texture(torch.autograd.Function):
                 *map(_inputs.optional_tensor, d_levels))
 
 
+@full_precision
 def texture(tex: torch.Tensor, uv: torch.Tensor, uv_da: Optional[torch.Tensor] = None,
             mip_level_bias: Optional[torch.Tensor] = None,
             mip: Union[None, TextureMip, Sequence[torch.Tensor]] = None, filter_mode: str = "auto",
@@ -101,6 +103,7 @@ def texture(tex: torch.Tensor, uv: torch.Tensor, uv_da: Optional[torch.Tensor] =
                           mip_level_bias if mipmapped else None, tex, *levels)
 
 
+@full_precision
 def texture_construct_mip(tex: torch.Tensor, max_mip_level: Optional[int] = None,
                           cube_mode: bool = False) -> TextureMip:
     """The levels below `tex` for `texture`, of a tex that stays the same: each the mean of 2 x 2 of

@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats, surface_tools, threads, to_numpy
 from tilegrad.compat.kaolin._missing import missing_from
 
 __getattr__ = missing_from(__name__)
 
 
+@full_precision
 def sided_distance(p1: torch.Tensor, p2: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """For each point of p1 [B,N,3] the squared distance to the nearest one of p2 [B,M,3], [B,N],
     and the index of that one, [B,N] int64; of equally near ones the first."""
@@ -25,6 +27,7 @@ def sided_distance(p1: torch.Tensor, p2: torch.Tensor) -> tuple[torch.Tensor, to
     return ((p1 - nearest)**2).sum(dim=-1), index
 
 
+@full_precision
 def chamfer_distance(p1: torch.Tensor, p2: torch.Tensor, w1: float = 1., w2: float = 1.,
                      squared: bool = True) -> torch.Tensor:
     """w1 times the mean of p1's sided distances to p2 plus w2 times the mean of p2's to p1: [B].
@@ -35,6 +38,7 @@ def chamfer_distance(p1: torch.Tensor, p2: torch.Tensor, w1: float = 1., w2: flo
     return w1 * ways[0].mean(dim=-1) + w2 * ways[1].mean(dim=-1)
 
 
+@full_precision
 def f_score(gt_points: torch.Tensor, pred_points: torch.Tensor, radius: float = 0.01,
             eps: float = 1e-8) -> torch.Tensor:
     """2 P R / (P + R + eps): P and R are the shares of predicted points within `radius` of the

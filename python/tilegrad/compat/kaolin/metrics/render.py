@@ -3,6 +3,7 @@
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_tensor
 from tilegrad.compat.kaolin._missing import missing_from
 
@@ -11,6 +12,7 @@ __getattr__ = missing_from(__name__)
 _EPS = 1e-10
 
 
+@full_precision
 def mask_iou(lhs_mask: torch.Tensor, rhs_mask: torch.Tensor) -> torch.Tensor:
     """1 - the mean over images of sum(ab) / sum(a + b - ab): the paper's silhouette loss. Masks:
     [B,H,W], in [0, 1]; bool, integers, and a dtype each are fine. Returns a scalar of the wider

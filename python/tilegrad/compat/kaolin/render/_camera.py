@@ -8,6 +8,7 @@ from typing import Any, Callable, Optional, Sequence
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin.render._pinhole import CameraExtrinsics, PinholeIntrinsics
 
 Rays = tuple[torch.Tensor, torch.Tensor]
@@ -51,6 +52,7 @@ class Camera:
         ndc = self.intrinsics.transform(self.extrinsics.transform(vectors))
         return ndc.reshape(vectors.shape) if len(self) == 1 else ndc
 
+    @full_precision
     def view_projection_matrix(self) -> torch.Tensor:
         """[C,4,4], world to clip coordinates."""
         return self.intrinsics.projection_matrix() @ self.extrinsics.view_matrix()

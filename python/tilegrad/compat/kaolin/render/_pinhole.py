@@ -13,6 +13,7 @@ from typing import Any, Optional, Sequence, Union
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats
 
 _Values = Union[torch.Tensor, Sequence[float], Any]  # or an array of NumPy
@@ -69,6 +70,7 @@ class CameraExtrinsics:
         """[C,4,4], world to camera."""
         return self._view
 
+    @full_precision
     def inv_view_matrix(self) -> torch.Tensor:
         """[C,4,4], camera to world."""
         rotation = self.R.transpose(1, 2)
@@ -94,16 +96,19 @@ class CameraExtrinsics:
         """Of the view matrix."""
         return self._view.dtype
 
+    @full_precision
     def transform(self, vectors: torch.Tensor) -> torch.Tensor:
         """Points [V,3] or [C,V,3] from the world into cameras [C,V,3]."""
         check_floats("transform", "vectors", vectors, (*vectors.shape[:-1], 3), like=self._view)
         return vectors @ self.R.transpose(1, 2) + self.t.transpose(1, 2)
 
+    @full_precision
     def inv_transform_rays(self, ray_orig: torch.Tensor,
                            ray_dir: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Rays [V,3] or [C,V,3] from cameras into the world [C,V,3]."""
         return (ray_orig - self.t.transpose(1, 2)) @ self.R, ray_dir @ self.R
 
+    @full_precision
     def cam_pos(self) -> torch.Tensor:
         """[C,3,1], in the world."""
         return -self.R.transpose(1, 2) @ self.t
@@ -120,6 +125,7 @@ class CameraExtrinsics:
         """[C,3,1], the camera's z axis in the world, away from what it sees."""
         return self.R[:, 2, :, None]
 
+    @full_precision
     def translate(self, t: torch.Tensor) -> None:
         """Moves cameras by t [3], [C,3] or [C,3,1], in the world."""
         self._move(self.R @ t.reshape(-1, 3, 1))
@@ -136,6 +142,7 @@ class CameraExtrinsics:
         """Along cam_forward: backwards, if amount > 0."""
         self._move_along(2, amount)
 
+    @full_precision
     def rotate(self, yaw: Optional[_Amount] = None, pitch: Optional[_Amount] = None,
                roll: Optional[_Amount] = None) -> None:
         """Turns cameras about their own y, then x, then z; radians, numbers or [C]."""
@@ -255,6 +262,7 @@ class PinholeIntrinsics:
                 [zero, zero, -one, zero]]
         return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=1)
 
+    @full_precision
     def project(self, vectors: torch.Tensor) -> torch.Tensor:
         """Points [V,3] or [C,V,3] in cameras to clip coordinates [C,V,4]."""
         homogeneous = torch.nn.functional.pad(vectors, (0, 1), value=1.)
@@ -269,6 +277,7 @@ class PinholeIntrinsics:
         return len(self.params)
 
 
+@full_precision
 def _view_matrix(rotation: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
     """[C,4,4] of R and of where the camera is."""
     return _rows(rotation, -rotation @ position.unsqueeze(-1))

@@ -13,6 +13,7 @@ from typing import Any, Optional, Sequence, Union
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats
 
 _Gaussians = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
@@ -91,6 +92,7 @@ def approximate_sg_integral(amplitude: torch.Tensor, sharpness: torch.Tensor) ->
     return 2 * math.pi * amplitude / sharpness.unsqueeze(-1)
 
 
+@full_precision
 def sg_irradiance_inner_product(amplitude: torch.Tensor, direction: torch.Tensor,
                                 sharpness: torch.Tensor, normal: torch.Tensor) -> torch.Tensor:
     """Irradiance [P,3] at normal [P,3], by the cosine lobe's inner product with all lights."""
@@ -98,6 +100,7 @@ def sg_irradiance_inner_product(amplitude: torch.Tensor, direction: torch.Tensor
     return _sum_of_products(cosine_lobe_sg(normal), lights).clamp(min=0)
 
 
+@full_precision
 def sg_diffuse_inner_product(amplitude: torch.Tensor, direction: torch.Tensor,
                              sharpness: torch.Tensor, normal: torch.Tensor,
                              albedo: torch.Tensor) -> torch.Tensor:
@@ -106,6 +109,7 @@ def sg_diffuse_inner_product(amplitude: torch.Tensor, direction: torch.Tensor,
                                        normal) * albedo / math.pi
 
 
+@full_precision
 def sg_irradiance_fitted(amplitude: torch.Tensor, direction: torch.Tensor,
                          sharpness: torch.Tensor, normal: torch.Tensor) -> torch.Tensor:
     """Irradiance of each light at normal [P,3], [P,N,3], by Stephen Hill's fit."""
@@ -122,6 +126,7 @@ def sg_irradiance_fitted(amplitude: torch.Tensor, direction: torch.Tensor,
                                                                                     sharpness)
 
 
+@full_precision
 def sg_diffuse_fitted(amplitude: torch.Tensor, direction: torch.Tensor, sharpness: torch.Tensor,
                       normal: torch.Tensor, albedo: torch.Tensor) -> torch.Tensor:
     """As sg_diffuse_inner_product, by sg_irradiance_fitted."""
@@ -148,6 +153,7 @@ def fresnel(ldh: torch.Tensor, spec_albedo: torch.Tensor) -> torch.Tensor:
     return spec_albedo + (1 - spec_albedo) * (1 - ldh)**5
 
 
+@full_precision
 def sg_warp_specular_term(amplitude: torch.Tensor, direction: torch.Tensor,
                           sharpness: torch.Tensor, normal: torch.Tensor, roughness: torch.Tensor,
                           view: torch.Tensor, spec_albedo: torch.Tensor) -> torch.Tensor:

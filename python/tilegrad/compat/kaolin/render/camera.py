@@ -8,6 +8,7 @@ import math
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.render._camera import (
     Camera, generate_centered_pixel_coords, generate_pinhole_rays)
@@ -22,6 +23,7 @@ __all__ = ["Camera", "CameraExtrinsics", "CameraFOV", "PinholeIntrinsics",
 _EPS = 1e-10  # Kaolin's, added to lengths
 
 
+@full_precision
 def rotate_translate_points(points: torch.Tensor, camera_rot: torch.Tensor,
                             camera_trans: torch.Tensor) -> torch.Tensor:
     """R (p - t). points: [B,N,3]. camera_rot: [B,3,3], rows are the camera's axes.
@@ -29,6 +31,7 @@ def rotate_translate_points(points: torch.Tensor, camera_rot: torch.Tensor,
     return (points - camera_trans.reshape(-1, 1, 3)) @ camera_rot.transpose(1, 2)
 
 
+@full_precision
 def perspective_camera(points: torch.Tensor, camera_proj: torch.Tensor) -> torch.Tensor:
     """(f_x x, f_y y) / (-z), the image in [-1, 1]. points: [B,N,3] in the camera. camera_proj:
     [3,1] or [B,3,1]. Returns [B,N,2]."""
@@ -44,6 +47,7 @@ def generate_perspective_projection(fovyangle: float, ratio: float = 1.0,
     return torch.tensor([[1 / (ratio * tangent)], [1 / tangent], [-1]], dtype=dtype)
 
 
+@full_precision
 def generate_rotate_translate_matrices(camera_position: torch.Tensor, look_at: torch.Tensor,
                                        camera_up_direction: torch.Tensor
                                        ) -> tuple[torch.Tensor, torch.Tensor]:
@@ -53,6 +57,7 @@ def generate_rotate_translate_matrices(camera_position: torch.Tensor, look_at: t
     return torch.stack(axes, dim=1), camera_position
 
 
+@full_precision
 def generate_transformation_matrix(camera_position: torch.Tensor, look_at: torch.Tensor,
                                    camera_up_direction: torch.Tensor) -> torch.Tensor:
     """camera_transform [B,4,3] of the same cameras: (p, 1) times it is p in the camera."""

@@ -10,6 +10,7 @@ from typing import Sequence, Union
 
 import torch
 
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.render._spherical_gaussians import (
@@ -44,6 +45,7 @@ def project_onto_sh9(directions: Union[torch.Tensor, Sequence[float]]) -> torch.
         0.5462742152960396 * (x * x - y * y)], dim=-1)
 
 
+@full_precision
 def sh9_irradiance(lights: torch.Tensor, normals: torch.Tensor) -> torch.Tensor:
     """Irradiance from radiance with the coefficients lights [9], at points with normals [N,3].
     Returns [N]."""
@@ -53,6 +55,7 @@ def sh9_irradiance(lights: torch.Tensor, normals: torch.Tensor) -> torch.Tensor:
     return project_onto_sh9(normals) @ (lights * lights.new_tensor(_COSINE))
 
 
+@full_precision
 def sh9_diffuse(directions: torch.Tensor, normals: torch.Tensor,
                 albedo: torch.Tensor) -> torch.Tensor:
     """Light from directions [3] that a diffuse surface with normals [N,3] and albedo [N,3]

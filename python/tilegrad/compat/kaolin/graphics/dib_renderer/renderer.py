@@ -14,6 +14,7 @@ from typing import Any, Optional, Sequence
 import torch
 
 from tilegrad._arrays import check_choice
+from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin import ops
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.graphics.dib_renderer.utils import (
@@ -85,6 +86,7 @@ class _SmoothRender(_Render):
         """pfmtx: [V,F] or [1,V,F], the weights of faces' normals in those of vertices."""
         self._pfmtx = torch.as_tensor(pfmtx).reshape(-1, *pfmtx.shape[-2:])
 
+    @full_precision
     def _normals(self, points: Sequence[torch.Tensor],
                  cameras: Sequence[torch.Tensor]) -> torch.Tensor:
         """In the camera, for the corners of faces [B,F,3,3]; not of length 1."""

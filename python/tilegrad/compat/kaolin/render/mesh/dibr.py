@@ -13,9 +13,10 @@ import warnings
 from typing import Any, Optional, Union
 
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 from tilegrad.compat.kaolin.render.mesh.rasterization import (
     DEFAULT_MULTIPLIER, Features, check_multiplier, rasterize)
@@ -47,7 +48,7 @@ class _SoftMask(torch.autograd.Function):
         return mask
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx: Any, gradient: torch.Tensor) -> tuple[Optional[torch.Tensor], ...]:
         face_vertices_image, face_idx, mask = ctx.saved_tensors
         return torch.from_numpy(_core.projected_soft_mask_backward(
@@ -55,6 +56,7 @@ class _SoftMask(torch.autograd.Function):
             ctx.options, threads())), None, None
 
 
+@full_precision
 def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.Tensor,
                    sigmainv: float = 7000, boxlen: float = 0.02, knum: int = 30,
                    multiplier: float = 1000., *, exact_kaolin: Optional[bool] = None,
@@ -76,6 +78,7 @@ def dibr_soft_mask(face_vertices_image: torch.Tensor, selected_face_idx: torch.T
                       max_alpha_error)
 
 
+@full_precision
 def dibr_rasterization(height: int, width: int, face_vertices_z: torch.Tensor,
                        face_vertices_image: torch.Tensor, face_features: Features,
                        face_normals_z: torch.Tensor, sigmainv: float = 7000,

@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import Any, Optional, Sequence, Union
 
 import torch
-from torch.autograd.function import once_differentiable
 
 from tilegrad import _core
 from tilegrad._arrays import as_pixels, check_choice
+from tilegrad._autograd import first_derivative_only
+from tilegrad._dense import full_precision
 from tilegrad.compat._tensors import check_floats, check_tensor, threads, to_numpy
 
 Features = Union[torch.Tensor, Sequence[torch.Tensor]]
@@ -37,7 +38,7 @@ class _Rasterize(torch.autograd.Function):
         return image, long_idx
 
     @staticmethod
-    @once_differentiable
+    @first_derivative_only
     def backward(ctx: Any, gradient: torch.Tensor, _: Any) -> tuple[Optional[torch.Tensor], ...]:
         face_vertices_image, face_features, face_idx = ctx.saved_tensors
         wanted = ctx.needs_input_grad[:2]
@@ -48,6 +49,7 @@ class _Rasterize(torch.autograd.Function):
                 None, None, None, None)
 
 
+@full_precision
 def rasterize(height: int, width: int, face_vertices_z: torch.Tensor,
               face_vertices_image: torch.Tensor, face_features: Features,
               valid_faces: Optional[torch.Tensor] = None, multiplier: Optional[float] = None,

@@ -8,6 +8,7 @@ from typing import Optional
 import torch
 
 from tilegrad._arrays import check_choice
+from tilegrad._dense import full_precision
 from tilegrad.compat.kaolin import ops
 from tilegrad.compat._tensors import check_floats
 from tilegrad.compat.kaolin.render import camera
@@ -15,6 +16,7 @@ from tilegrad.compat.kaolin.render import camera
 _MODES = ("nearest", "bilinear", "bicubic")
 
 
+@full_precision
 def prepare_vertices(vertices: torch.Tensor, faces: torch.Tensor, camera_proj: torch.Tensor,
                      camera_rot: Optional[torch.Tensor] = None,
                      camera_trans: Optional[torch.Tensor] = None,
@@ -47,6 +49,7 @@ def prepare_vertices(vertices: torch.Tensor, faces: torch.Tensor, camera_proj: t
     return corners, on_image, ops.mesh.face_normals(corners, unit=True)
 
 
+@full_precision
 def texture_mapping(texture_coordinates: torch.Tensor, texture_maps: torch.Tensor,
                     mode: str = "nearest") -> torch.Tensor:
     """Looks textures up: (0, 0) is the lower left corner of the texture, (1, 1) the upper right
@@ -75,6 +78,7 @@ def texture_mapping(texture_coordinates: torch.Tensor, texture_maps: torch.Tenso
     return texels.squeeze(1) if sparse else texels
 
 
+@full_precision
 def spherical_harmonic_lighting(imnormal: torch.Tensor, lights: torch.Tensor) -> torch.Tensor:
     """Light from 9 coefficients, as Kaolin's deprecated function has it: the order of its first
     band is (x, z, y), all signs are +, and its last two constants are too small by sqrt(2).
