@@ -3,7 +3,8 @@
 
 A wheel holds the package, the program, its manual pages and completions. In the environment:
 
-TILEGRAD_CMAKE_ARGS     more arguments for CMake, "-DTILEGRAD_PROGRAM=OFF" for the renderer alone
+TILEGRAD_CMAKE_ARGS     more arguments for CMake, "-DTILEGRAD_PROGRAM=OFF" for the renderer alone:
+                        without files, networks, program and the command `tilegrad`
 TILEGRAD_BUILD          an existing build tree to use instead of build/pip
 TILEGRAD_BUNDLE=1       puts the shared libraries into the wheel, too, with their licences: it then
                         runs where they are not installed. Wants patchelf.
@@ -47,10 +48,7 @@ Description-Content-Type: text/markdown
 
 # ---- What pip calls.
 
-def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
-    write_metadata(pathlib.Path(metadata_directory))
-    return f"{NAME}.dist-info"
-
+# No prepare_metadata_for_build_wheel: whether there is a command is known when the wheel is built.
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     with tempfile.TemporaryDirectory() as folder:
@@ -97,10 +95,14 @@ def build():
     return tree
 
 
+def program_in(stage):
+    return stage / "tilegrad/bin/tilegrad"
+
+
 def stage_package(tree, stage):
     """The package and the program, as the tree installs them, and what the program says of itself."""
     cmake(f"-DBUILD={tree}", f"-DTO={stage}", "-P", SOURCE / "python/install_into.cmake")
-    program = stage / "tilegrad/bin/tilegrad"
+    program = program_in(stage)
     if not program.exists():  # TILEGRAD_PROGRAM=OFF
         return
     share = stage / f"{NAME}.data/data/share"
@@ -161,15 +163,16 @@ def wheel_tag():
     return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
 
 
-def write_metadata(folder, tag=None):
+def write_metadata(folder, tag):
     info = folder / f"{NAME}.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(METADATA + (SOURCE / "README.md").read_text())
-    (info / "entry_points.txt").write_text("[console_scripts]\ntilegrad = tilegrad.__main__:main\n")
+    if program_in(folder).exists():
+        (info / "entry_points.txt").write_text("[console_scripts]\n"
+                                               "tilegrad = tilegrad.__main__:main\n")
     shutil.copy(SOURCE / "LICENSE", info)
-    if tag:
-        (info / "WHEEL").write_text("Wheel-Version: 1.0\nGenerator: tilegrad\n"
-                                    f"Root-Is-Purelib: false\nTag: {tag}\n")
+    (info / "WHEEL").write_text("Wheel-Version: 1.0\nGenerator: tilegrad\n"
+                                f"Root-Is-Purelib: false\nTag: {tag}\n")
 
 
 def pack_wheel(stage, wheel):

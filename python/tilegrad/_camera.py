@@ -10,6 +10,7 @@ import numpy as np
 
 from tilegrad import _arrays, _core
 from tilegrad._packed import Packed, Part
+from tilegrad._points import points_of
 
 _D = _core.CAMERA
 Parts = dict[str, np.ndarray]
@@ -193,15 +194,13 @@ class Camera(Packed):
             numbers or (N,); azimuth 90 sees the side towards +z.
         margin: share of the picture that stays free on each side, [0, 0.5).
         """
-        from tilegrad import _interchange, _show
         function = "Camera.framing"
         margin = _arrays.as_number(function, "margin", margin, float)
         if not 0 <= margin < 0.5:
             raise ValueError(f"{function}: margin is {margin}, must be in [0, 0.5)")
-        points = _interchange.points_of(function, mesh)
-        return _show.framing(points, azimuth, elevation,
-                             _arrays.as_number(function, "fov_y", fov_y, float), margin,
-                             _size(function, width, height))
+        return _framed(points_of(function, mesh), azimuth, elevation,
+                       _arrays.as_number(function, "fov_y", fov_y, float), margin,
+                       _size(function, width, height))
 
     @classmethod
     def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer",
@@ -338,3 +337,25 @@ class Camera(Packed):
             parts[name] = rows[:, first:end].reshape(lead + shape)
             first = end
         return parts
+
+
+def _framed(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, margin: float,
+            size: Size) -> Camera:
+    """The camera from that side which is as near as the points allow that all are in the picture."""
+    width, height = size
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = (low + high) / 2
+    camera = Camera.orbit(azimuth, elevation, 1, fov_y=fov_y, width=width, height=height)
+    rotation = camera.rotation
+    seen = (points - centre) @ np.swapaxes(rotation, -1, -2)  # ([N,] V, 3), from the centre
+    free = 1 - 2 * margin
+    slopes = free * np.array(size) / 2 / np.stack([camera.fx, camera.fy], axis=-1)
+    needed = seen[..., 2:] + np.abs(seen[..., :2]) / slopes[..., None, :]
+    extent = float(np.linalg.norm(high - low))
+    distance = needed.max(axis=(-1, -2)) + 1e-3 * extent + 1e-12
+    back = rotation[..., 2, :]  # the camera's z in the world
+    camera = Camera.look_at(centre + distance[..., None] * back,
+                            np.broadcast_to(centre, back.shape), fov_y=fov_y, width=width,
+                            height=height)
+    camera.near_plane[...] = np.minimum(camera.near_plane, 5e-4 * extent + 1e-12)
+    return camera

@@ -35,22 +35,6 @@ def as_mesh(mesh: Any) -> Mesh:
     return out
 
 
-def points_of(function: str, mesh: Any) -> np.ndarray:
-    """The vertices that faces use of what `as_mesh` takes, or points (V, 3) as they are, float64.
-    ValueError: there are none, or one is not finite."""
-    if not isinstance(mesh, (Mesh, str, os.PathLike, tuple, list)) and not hasattr(mesh, "vertices"):
-        points = _arrays.as_array(function, "mesh", mesh, np.float64, ("V", 3))
-    else:
-        mesh = as_mesh(mesh)
-        used = np.unique(np.asarray(mesh.faces))
-        points = np.asarray(mesh.positions, np.float64)[used]
-    if not len(points):
-        raise ValueError(f"{function}: mesh has no faces")
-    if not np.isfinite(points).all():
-        raise ValueError(f"{function}: mesh has positions that are not finite")
-    return points
-
-
 def _positions_faces(positions: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:
     indices = np.asarray(faces)
     if indices.ndim != 2 or indices.shape[-1] != 3 or indices.dtype.kind not in "iu":

@@ -69,27 +69,3 @@ def _renderer(threads: int) -> Renderer:
     if key not in _renderers:
         _renderers[key] = Renderer(threads)
     return _renderers[key]
-
-
-def framing(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, margin: float,
-            size: tuple[int, int]) -> Camera:
-    """The camera from that side which is as near as the points allow that all are in the picture."""
-    width, height = size
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre = (low + high) / 2
-    camera = Camera.orbit(azimuth, elevation, 1, fov_y=fov_y, width=width, height=height)
-    rotation = np.asarray(camera.rotation, np.float64)
-    seen = (points - centre) @ np.swapaxes(rotation, -1, -2)  # ([N,] V, 3), from the centre
-    free = 1 - 2 * margin
-    slopes = free * np.array([width, height]) / 2 / np.stack(
-        [np.asarray(camera.fx), np.asarray(camera.fy)], axis=-1)
-    needed = seen[..., 2:] + np.abs(seen[..., :2]) / slopes[..., None, :]
-    size = float(np.linalg.norm(high - low))
-    distance = needed.max(axis=(-1, -2)) + 1e-3 * size + 1e-12
-    back = rotation[..., 2, :]  # the camera's z in the world
-    camera = Camera.look_at(centre + distance[..., None] * back,
-                            np.broadcast_to(centre, back.shape), fov_y=fov_y, width=width,
-                            height=height)
-    numbers = np.array(camera.numbers)
-    numbers[..., -1] = np.minimum(numbers[..., -1], 5e-4 * size + 1e-12)  # the near plane
-    return Camera.of_numbers(numbers, (width, height))

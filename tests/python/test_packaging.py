@@ -101,6 +101,48 @@ class Pip(Workspace):
                                           "libstdc++.so.6"})
 
 
+class RendererAlone(Workspace):
+    """What TILEGRAD_PROGRAM=OFF makes: no function that fails where it is used, no command."""
+
+    def test_the_package(self):
+        package = self.work / "alone/tilegrad"
+        shutil.copytree(pathlib.Path(tilegrad.__file__).parent, package,
+                        ignore=shutil.ignore_patterns("_tools*.so", "bin", "lib", "__pycache__"))
+        self.check_alone(package.parent)
+
+    def check_alone(self, folder):
+        code = """
+import tilegrad
+ball = tilegrad.icosphere(1)
+for name in ("render", "fit", "train", "files", "losses", "predict", "runs"):
+    assert not hasattr(tilegrad, name) and name not in dir(tilegrad), name
+camera = tilegrad.Camera.framing(ball, width=16, height=16)
+assert tilegrad.Renderer(1).render(tilegrad.Scene(*ball, camera)).alpha.any()
+for line in ("import tilegrad.files", "from tilegrad import files", "import tilegrad.losses"):
+    try:
+        exec(line)
+    except ImportError as error:
+        print(error)
+"""
+        said = self.run_python("-c", code, PYTHONPATH=str(folder)).splitlines()
+        self.assertEqual(said, ["this build of tilegrad is the renderer alone "
+                                "(TILEGRAD_PROGRAM=OFF)"] * 3)
+
+    def test_the_command(self):
+        """A wheel has it where it has the program."""
+        backend = self.work / "stage.py"
+        backend.write_text("import pathlib, sys; sys.path.insert(0, 'source/python')\n"
+                           "import build_backend as backend\n"
+                           "stage = pathlib.Path(sys.argv[1])\n"
+                           "backend.write_metadata(stage, 'tag')\n"
+                           "print(list(stage.glob('*.dist-info/entry_points.txt')) != [])\n")
+        for name in ("alone", "whole"):
+            (self.work / name / "tilegrad/bin").mkdir(parents=True)
+        (self.work / "whole/tilegrad/bin/tilegrad").touch()
+        self.assertEqual(self.run_python(backend, "alone"), "False\n")
+        self.assertEqual(self.run_python(backend, "whole"), "True\n")
+
+
 @long_test
 @unittest.skipUnless(HAS_PIP, "python3-pip is not installed")
 class LongPip(Workspace):
@@ -116,6 +158,8 @@ class LongPip(Workspace):
                  TILEGRAD_CMAKE_ARGS="-DTILEGRAD_PROGRAM=OFF -DTILEGRAD_SIMD=scalar "
                                      "-DCMAKE_CXX_FLAGS_RELEASE=-O1")
         self.check()
+        RendererAlone.check_alone(self, self.target)
+        self.assertFalse((self.target / "bin/tilegrad").exists())
 
 
 class Modules(unittest.TestCase):
