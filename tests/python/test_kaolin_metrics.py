@@ -75,6 +75,50 @@ class PointClouds(unittest.TestCase):
                 pointcloud.sided_distance(*arguments)
 
 
+class Nothing(unittest.TestCase):
+    """Metrics of nothing are errors that say so, or what their page defines; never NaN."""
+
+    def test_errors(self):
+        none, some = torch.zeros(2, 0, 3), torch.rand(2, 4, 3)
+        ops = kaolin.ops
+        for call, message in (
+                (lambda: pointcloud.chamfer_distance(none, none), "chamfer_distance: p1 has no points"),
+                (lambda: pointcloud.chamfer_distance(none, some), "chamfer_distance: p1 has no points"),
+                (lambda: pointcloud.chamfer_distance(some, none), "chamfer_distance: p2 has no points"),
+                (lambda: pointcloud.f_score(none, none), "f_score: gt_points has no points"),
+                (lambda: pointcloud.f_score(some, none), "f_score: pred_points has no points"),
+                (lambda: kaolin.metrics.render.mask_iou(torch.zeros(0, 4, 4), torch.zeros(0, 4, 4)),
+                 "mask_iou: the masks have no images"),
+                (lambda: ops.pointcloud.center_points(none), "center_points: points has no points"),
+                (lambda: ops.conversions.pointclouds_to_voxelgrids(none, 4), "has no points"),
+                (lambda: ops.conversions.trianglemeshes_to_voxelgrids(
+                    none, torch.zeros(0, 3, dtype=torch.int64), 4), "has no points"),
+                (lambda: ops.mesh.sample_points(some, torch.zeros(0, 3, dtype=torch.int64), 5),
+                 "sample_points"),
+                (lambda: ops.mesh.average_face_vertex_features(
+                    torch.zeros(0, 3, dtype=torch.int64), torch.zeros(1, 0, 3, 2)),
+                 "give num_vertices")):
+            with self.assertRaisesRegex(ValueError, message):
+                call()
+
+    def test_values(self):
+        none, faces = torch.zeros(2, 0, 3), torch.zeros(0, 3, dtype=torch.int64)
+        some = torch.rand(2, 4, 3)
+        self.assertEqual(tuple(pointcloud.sided_distance(none, none)[0].shape), (2, 0))
+        self.assertEqual(tuple(pointcloud.sided_distance(none, some)[0].shape), (2, 0))
+        self.assertEqual(tuple(trianglemesh.point_to_mesh_distance(
+            none, torch.zeros(2, 0, 3, 3))[0].shape), (2, 0))
+        self.assertEqual(tuple(trianglemesh.average_edge_length(some, faces).shape), (2, 0))
+        self.assertTrue(torch.equal(trianglemesh.uniform_laplacian_smoothing(some, faces), some))
+        self.assertFalse(kaolin.ops.mesh.check_sign(some, faces, some).any())
+        empty = torch.zeros(2, 3, 3, 3)
+        self.assertEqual(kaolin.metrics.voxelgrid.iou(empty, empty).tolist(), [1, 1])
+        self.assertEqual(kaolin.metrics.render.mask_iou(empty[0], empty[0]).item(), 1)
+        origin, scale = torch.zeros(2, 3), torch.ones(2)
+        grid = kaolin.ops.conversions.pointclouds_to_voxelgrids(none, 4, origin, scale)
+        self.assertEqual(float(grid.sum()), 0)
+
+
 class Distances(unittest.TestCase):
     def setUp(self):
         torch.manual_seed(1)

@@ -68,6 +68,29 @@ class Torch(unittest.TestCase):
                 np.testing.assert_allclose(tensor.grad.numpy(), 3 * loss(at)[1], atol=1e-12)
 
 
+class Nothing(unittest.TestCase):
+    def test_meshes_without_edges_and_extent_lose_nothing(self):
+        none = np.zeros((0, 3), np.int32)
+        for positions, faces in ((POSITIONS[:0], none), (POSITIONS, none),
+                                 (np.zeros((42, 3)), FACES)):
+            for loss in (losses.edge_length, losses.normal_consistency, losses.laplacian):
+                value, gradient = loss(positions, faces)
+                self.assertEqual(value, 0)
+                self.assertEqual(gradient.shape, positions.shape)
+                self.assertFalse(gradient.any())
+
+    def test_images_without_pixels_and_clouds_without_points(self):
+        self.assertEqual(losses.iou(np.zeros((0, 4, 4)), np.zeros((0, 4, 4))).value, 0)
+        self.assertEqual(losses.iou(np.zeros((2, 4, 4)), np.zeros((2, 4, 4))).value, 1)
+        for a, b, name in ((POINTS[:0], POINTS[:0], "a"), (POINTS, POINTS[:0], "b")):
+            with self.assertRaisesRegex(ValueError, f"chamfer: {name} has no points"):
+                losses.chamfer(a, b)
+
+    def test_faces_out_of_int32(self):
+        with self.assertRaisesRegex(ValueError, "out of int32's range"):
+            losses.edge_length(POSITIONS, FACES.astype(np.int64) + 2**32)
+
+
 class Errors(unittest.TestCase):
     def test_name_what_is_wrong(self):
         for call, message in (

@@ -38,6 +38,13 @@ def check_floats(function: str, argument: str, value: Any, shape: Sequence[Axis]
                         f"{like.dtype}")
 
 
+def check_not_empty(function: str, argument: str, tensor: torch.Tensor, things: str) -> None:
+    """ValueError if the second axis of `tensor`, [B,N,...], has length 0: what would be a mean over
+    it, or a least one, is NaN."""
+    if not tensor.shape[1]:
+        raise ValueError(f"{function}: {argument} has no {things}")
+
+
 def to_numpy(tensor: torch.Tensor) -> np.ndarray:
     """The tensor's memory as an array; of a copy if it is not contiguous."""
     return tensor.detach().resolve_neg().contiguous().numpy()

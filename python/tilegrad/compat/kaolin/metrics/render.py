@@ -20,6 +20,8 @@ def mask_iou(lhs_mask: torch.Tensor, rhs_mask: torch.Tensor) -> torch.Tensor:
     sizes: dict = {}
     check_tensor("mask_iou", "lhs_mask", lhs_mask, ("B", "H", "W"), sizes)
     check_tensor("mask_iou", "rhs_mask", rhs_mask, ("B", "H", "W"), sizes)
+    if not len(lhs_mask):
+        raise ValueError("mask_iou: the masks have no images, which have no mean")
     dtype = torch.promote_types(torch.promote_types(lhs_mask.dtype, rhs_mask.dtype), torch.float32)
     lhs_mask, rhs_mask = lhs_mask.to(dtype), rhs_mask.to(dtype)
     both = lhs_mask * rhs_mask

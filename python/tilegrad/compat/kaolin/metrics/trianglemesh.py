@@ -9,7 +9,8 @@ import torch
 
 from tilegrad._autograd import first_derivative_only
 from tilegrad._dense import full_precision
-from tilegrad.compat._tensors import check_floats, check_tensor, surface_tools, threads, to_numpy
+from tilegrad.compat._tensors import (check_floats, check_not_empty, check_tensor, surface_tools,
+                                      threads, to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.ops.mesh import index_vertices_by_faces, uniform_laplacian
 
@@ -32,8 +33,8 @@ def point_to_mesh_distance(pointclouds: torch.Tensor, face_vertices: torch.Tenso
     name, sizes = "point_to_mesh_distance", {}
     check_floats(name, "pointclouds", pointclouds, ("B", "P", 3), sizes)
     check_floats(name, "face_vertices", face_vertices, ("B", "F", 3, 3), sizes, pointclouds)
-    if pointclouds.shape[1] and not face_vertices.shape[1]:
-        raise ValueError(f"{name}: face_vertices has no faces")
+    if pointclouds.shape[1]:
+        check_not_empty(name, "face_vertices", face_vertices, "faces")
     face, weights = map(torch.from_numpy, surface_tools().nearest_faces(
         to_numpy(pointclouds), to_numpy(face_vertices), threads()))
     corners = face_vertices.gather(1, face[..., None, None].expand(-1, -1, 3, 3))

@@ -8,7 +8,8 @@ from typing import Optional
 
 import torch
 
-from tilegrad.compat._tensors import check_floats, check_tensor, surface_tools, to_numpy
+from tilegrad.compat._tensors import (check_floats, check_not_empty, check_tensor, surface_tools,
+                                      to_numpy)
 from tilegrad.compat.kaolin._missing import missing_from
 from tilegrad.compat.kaolin.ops.mesh import index_vertices_by_faces
 
@@ -64,6 +65,8 @@ def _in_grid(name: str, points: torch.Tensor, resolution: int, origin: Optional[
     if not 1 <= resolution <= 512:
         raise ValueError(f"{name}: resolution is {resolution}, expected 1..512")
     batch = len(points)
+    if origin is None or scale is None:
+        check_not_empty(name, "the mesh or cloud", points, "points")
     origin = points.amin(dim=1) if origin is None else origin
     check_tensor(name, "origin", origin, (batch, 3))
     scale = (points.amax(dim=1) - origin).amax(dim=1) if scale is None else scale

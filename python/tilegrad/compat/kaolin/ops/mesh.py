@@ -61,6 +61,8 @@ def average_face_vertex_features(faces: torch.Tensor, face_features: torch.Tenso
     name, sizes = "average_face_vertex_features", {}
     check_tensor(name, "faces", faces, ("F", "corners"), sizes)
     check_floats(name, "face_features", face_features, ("B", "F", "corners", "C"), sizes)
+    if num_vertices is None and not len(faces):
+        raise ValueError(f"{name}: there are no faces to tell how many vertices; give num_vertices")
     count = int(faces.max()) + 1 if num_vertices is None else num_vertices
     corners = faces.reshape(-1)
     features = face_features.flatten(1, 2)
