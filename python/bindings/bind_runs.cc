@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "bindings/camera_numbers.h"
+#include "bindings/listener.h"
 #include "bindings/mesh_dict.h"
 #include "bindings/to_python.h"
 #include "fit/bare_frames.h"
@@ -33,47 +34,6 @@ Camera CameraOf(const CameraRow& row) {
 
 using Words = std::vector<std::string>;  // "key=value"
 
-// A Python function that is told of progress, and may stop the work: by returning True, by an
-// exception, by Ctrl-C. The work itself runs without the GIL.
-class Listener {
- public:
-  explicit Listener(py::object function) : function_(std::move(function)) {}
-
-  ProgressSink Sink() {
-    return [this](const Progress& progress) { Tell(progress); };
-  }
-  const StopFlag& stop() const { return stop_; }
-  // After the work: what `function` raised goes on; that it wanted to stop is no error.
-  void Settle(const Status& status) const {
-    if (error_) {
-      py::error_already_set error = *error_;
-      throw error;
-    }
-    if (!(asked_ && status.code() == StatusCode::kCancelled)) ThrowIfError(status);
-  }
-  bool asked() const { return asked_; }
-
- private:
-  void Tell(const Progress& progress) {
-    const py::gil_scoped_acquire held;
-    if (stop_) return;
-    try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      asked_ = !function_.is_none() &&
-               function_(Text(progress.stage), progress.done, progress.total).is(py::bool_(true));
-      if (asked_) stop_ = true;
-    } catch (const py::error_already_set& error) {
-      error_.emplace(error);
-      stop_ = true;
-    }
-  }
-
-  py::object function_;
-  StopFlag stop_ = false;
-  bool asked_ = false;
-  std::optional<py::error_already_set> error_;
-};
-
 // ---- Fits.
 
 // Of `count` images, which have none if `cameras` is None.
@@ -89,7 +49,8 @@ std::vector<Camera> CamerasOf(const py::object& cameras, std::size_t count, Imag
 }
 
 // views: color [N,3,H,W] straight and alpha [N,H,W], float32; names [N]; cameras [N][17] or None.
-train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& options) {
+train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& options,
+                              Listener* listening) {
   const auto names = views["names"].cast<Words>();
   const auto n = static_cast<py::ssize_t>(names.size());
   const auto image = views["color"].cast<py::array>();
@@ -109,7 +70,10 @@ train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& 
     const bool held = options.hold_out > 0 && (i + 1) % options.hold_out == 0;
     (held ? input.held_out : input.training).push_back(i);
   }
-  ThrowIfError(train::ApplyBackground(options.background, &input));
+  const Status masked = listening->Run(
+      [&] { return train::ApplyBackground(options.background, &input, options.watch); });
+  listening->Settle(masked);
+  ThrowIfError(masked);
   return input;
 }
 
@@ -124,15 +88,18 @@ train::InputOptions InputOptionsOf(const py::dict& views) {
 
 // views: those arrays, or "folder", a path, and "model", of a dataset; "hold_out", "background",
 // "fov".
-train::FitInput InputOf(const py::dict& views) {
-  const train::InputOptions options = InputOptionsOf(views);
-  if (!views.contains("folder")) return InputOfArrays(views, options);
+train::FitInput InputOf(const py::dict& views, Listener* listening) {
+  train::InputOptions options = InputOptionsOf(views);
+  options.watch = {listening->Sink(), &listening->stop()};
+  if (!views.contains("folder")) return InputOfArrays(views, options, listening);
   const auto folder = views["folder"].cast<Path>();
   const auto model = views["model"].cast<std::string>();
-  return ValueOrThrow(WithoutGil([&] {
+  auto input = listening->Run([&] {
     return model.empty() ? train::ReadFitFolder(folder, options)
                          : train::ReadFitDataset(folder, model, options.hold_out);
-  }));
+  });
+  listening->Settle(input.status());
+  return ValueOrThrow(std::move(input));
 }
 
 train::ParameterSet ParametersNamed(const Words& names) {
@@ -170,11 +137,12 @@ train::ExistingRun ExistingOf(const py::dict& request) {
                                         : train::ExistingRun::kRefuse;
 }
 
-// request: out, a path; options, of fit/config.h; optimize, names; lighting; start, truth: meshes
-// or None; resume; threads.
-train::FitJob JobOf(const py::dict& views, const py::dict& request) {
+// request: out, a path; quality, a word or empty; options, of fit/config.h; optimize, names;
+// lighting; start, truth: meshes or None; resume; threads. All but the input.
+train::FitJob JobOf(const py::dict& request) {
   train::FitJob job;
-  job.input = InputOf(views);
+  if (const auto quality = request["quality"].cast<std::string>(); !quality.empty())
+    job.config.steps = ValueOrThrow(train::StepsOfQuality(quality));
   job.config.parameters = ParametersNamed(request["optimize"].cast<Words>());
   job.config.vertex_colors = job.config.parameters[train::Parameter::kColors];
   job.config.material = MaterialNamed(request["material"].cast<std::string>());
@@ -203,12 +171,13 @@ void WarnOf(const train::FitInput& input) {
 }
 
 py::dict Fit(const py::dict& views, const py::dict& request, const py::object& listener) {
-  train::FitJob job = JobOf(views, request);
+  train::FitJob job = JobOf(request);
   Listener listening(listener);
+  job.input = InputOf(views, &listening);
   const Workers workers(request["threads"].cast<int>());
   const train::CameraSearch search = {views["find_cameras"].cast<bool>(),
                                       request["resume"].cast<bool>()};
-  auto outcome = WithoutGil([&]() -> Result<train::FitOutcome> {
+  auto outcome = listening.Run([&]() -> Result<train::FitOutcome> {
     TILEGRAD_TRY(train::StartCameras(search, &job, workers, listening.Sink(), listening.stop()));
     return train::RunFit(job, workers, listening.Sink(), listening.stop());
   });
@@ -237,7 +206,7 @@ py::dict Train(const py::dict& request, const py::object& listener) {
   Listener listening(listener);
   const Workers workers(request["threads"].cast<int>());
   auto outcome =
-      WithoutGil([&] { return train::Train(job, workers, listening.Sink(), listening.stop()); });
+      listening.Run([&] { return train::Train(job, workers, listening.Sink(), listening.stop()); });
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
   return py::dict(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,

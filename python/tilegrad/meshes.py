@@ -166,6 +166,10 @@ class Mesh:
         own = self.scene_arguments(color_space=color_space, normals=normals)
         return Scene(self.positions, self.faces, camera, **changed(own, arguments))
 
+    def save(self, path: Path) -> None:
+        """`save_mesh`: writes a .glb file."""
+        save_mesh(path, self)
+
     def to_trimesh(self, trimesh: Any) -> Any:
         """The module trimesh's Trimesh of it, with vertex colours; `trimesh`: the module."""
         return trimesh.Trimesh(vertices=self.positions, faces=self.faces,

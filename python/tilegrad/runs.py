@@ -15,19 +15,10 @@ import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
-from tilegrad._paths import Path
+from tilegrad._paths import Path, name_of
+from tilegrad._progress import Progress, watched_line
 from tilegrad._threads import thread_count
 from tilegrad.meshes import Mesh, as_mesh, load_mesh
-
-
-@dataclasses.dataclass(frozen=True)
-class Progress:
-    """Where a run is: steps that are done, of how many; `values` are those that were logged last,
-    by name ("loss", "silhouette", ...; "seconds")."""
-
-    step: int
-    steps: int
-    values: Mapping[str, float]
 
 
 Callback = Callable[[Progress], Optional[bool]]  # True stops; everything is saved
@@ -77,8 +68,9 @@ class TrainResult:
 def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, model: str = "",
         background: str = "auto", fov: float = 65, find_cameras: bool = False,
         hold_out: int = 0, start: Any = None, truth: Any = None, optimize: Sequence[str] = (),
-        material: str = "unlit", lighting: str = "none", out: Optional[Path] = None, resume: bool = False,
-        callback: Optional[Callback] = None, threads: int = 0, **options: Any) -> FitResult:
+        material: str = "unlit", lighting: str = "none", quality: str = "",
+        out: Optional[Path] = None, resume: bool = False, callback: Optional[Callback] = None,
+        threads: int = 0, **options: Any) -> FitResult:
     """A mesh and its texture from images: `tilegrad.fit("photos").mesh`.
 
     images: (N, H, W, 4), cut out by alpha, or (N, H, W, 3) with masks or before a plain background;
@@ -95,31 +87,36 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     optimize: any of positions, colors, texture, uv, camera, light, sh, material; empty: positions
         and texture, or the colours that `start` has. lighting: as of `Scene`.
     material: "unlit"; "lambert" and "phong" learn the light beside the colours.
+    quality: "fast", "normal" or "best": 300, 1000 or 3000 steps, unless `steps` says how many.
     out: the run's folder; None: one that goes away. resume: goes on in it; with more steps in a
         finished fit, too.
     callback: told of each logged step (see `Progress`); returns True to stop. What it raises ends
-        the fit and goes on.
+        the fit and goes on. One with an attribute `stages` that is true is told of everything that
+        takes time, reading and preparing included. None: on a terminal and in a notebook a line
+        says where the fit is.
     options: those of `tilegrad fit`, with underscores: steps, smoothing, texture_size, ...
     Warns of masks and cameras that are in doubt.
     ValueError, OSError: say what does not fit. KeyboardInterrupt: Ctrl-C; everything is saved.
     """
+    if quality and "steps" in options:
+        raise ValueError("fit: quality and steps both say how many steps; give one of them")
     views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
              "background": background, "find_cameras": bool(find_cameras),
              "fov": _arrays.as_number("fit", "fov", fov, float)}
     if not 5 <= views["fov"] <= 150:
         raise ValueError(f"fit: fov is {fov}, expected 5 to 150 degrees")
-    if isinstance(images, (str, os.PathLike)):
+    if isinstance(images, (str, bytes, os.PathLike)):
         if cameras is not None or masks is not None:
             raise ValueError("fit: a folder has its own cameras and masks")
-        views.update(folder=os.fspath(images), model=model)
+        views.update(folder=name_of(images), model=_arrays.as_text("fit", "model", model))
     else:
         views.update(_views(images, cameras, masks))
-    request = {"options": _words(options), "optimize": list(optimize), "lighting": lighting,
-               "material": material,
+    request = {"options": _words(options), "quality": quality, "optimize": list(optimize),
+               "lighting": lighting, "material": material,
                "start": _mesh_dict(start), "truth": _mesh_dict(truth), "resume": bool(resume),
                "threads": thread_count("fit", threads)}
     if out is not None:
-        return _fit(views, request, pathlib.Path(out), callback, keep=True)
+        return _fit(views, request, pathlib.Path(name_of(out)), callback, keep=True)
     with tempfile.TemporaryDirectory() as folder:
         return _fit(views, request, pathlib.Path(folder), callback, keep=False)
 
@@ -134,13 +131,13 @@ def train(config: Path = "quick", *, data: Path, out: Path,
     set: keys to override, {"schedule.steps": 100}. max_minutes: saves and stops then; 0: no limit.
     resume, callback, threads, errors: as of `fit`; more steps: set={"schedule.steps": ...}.
     """
-    request = {"config": os.fspath(config), "data": os.fspath(data), "out": os.fspath(out),
+    request = {"config": name_of(config), "data": name_of(data), "out": name_of(out),
                "overrides": _words(set or {}), "resume": bool(resume),
                "max_minutes": float(max_minutes), "threads": thread_count("train", threads)}
-    listener = _Listener(pathlib.Path(out), callback)
-    done = _tools.train(request, listener)
-    return TrainResult(pathlib.Path(out), done["finished"], done.get("steps", listener.done),
-                       done.get("seconds", 0.0))
+    with _Listener(pathlib.Path(request["out"]), callback) as listener:
+        done = _tools.train(request, listener)
+    return TrainResult(pathlib.Path(request["out"]), done["finished"],
+                       done.get("steps", listener.done), done.get("seconds", 0.0))
 
 
 def config_names() -> list[str]:
@@ -150,8 +147,9 @@ def config_names() -> list[str]:
 
 def _fit(views: dict, request: dict, folder: pathlib.Path, callback: Optional[Callback],
          keep: bool) -> FitResult:
-    listener = _Listener(folder, callback)
-    done = _tools.fit(views, {**request, "out": os.fspath(folder)}, listener)
+    with _Listener(folder, callback) as listener:
+        listener("preparing", 0, 0)
+        done = _tools.fit(views, {**request, "out": os.fspath(folder)}, listener)
     finished = done["finished"]
     return FitResult(load_mesh(folder / "mesh.glb") if finished else None, finished,
                      done.get("steps", listener.done), done.get("seconds", 0.0),
@@ -160,33 +158,46 @@ def _fit(views: dict, request: dict, folder: pathlib.Path, callback: Optional[Ca
 
 
 class _Listener:
-    """Calls back when there is a new line in the log."""
+    """Calls back when there is a new line in the log, or, if the callback wants stages, always."""
 
     def __init__(self, folder: pathlib.Path, callback: Optional[Callback]) -> None:
         if callback is not None and not callable(callback):
             raise TypeError(f"callback is {callback!r}, expected a function")
-        self._log, self._callback = folder / "metrics.jsonl", callback
-        self._size, self.done = -1, 0
+        self._line = watched_line() if callback is None else None
+        self._log, self._callback = folder / "metrics.jsonl", self._line or callback
+        self._stages = getattr(self._callback, "stages", False)
+        self._size, self._values, self.done = -1, {}, 0
+
+    def __enter__(self) -> _Listener:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        if self._line is not None:
+            self._line.finish()
 
     def __call__(self, stage: str, done: int, total: int) -> Optional[bool]:
-        if stage not in ("fitting", "training"):
+        stepping = stage in ("fitting", "training")
+        if stepping:
+            self.done = done
+        if self._callback is None or not (self._stages or (stepping and self._is_logged())):
             return None
-        self.done = done
-        if self._callback is None or not self._log.exists():
-            return None
-        size = self._log.stat().st_size
-        if size == self._size:
-            return None
-        self._size = size
-        return self._callback(Progress(done, total, self._last_line()))
+        values = self._logged() if stepping else {}
+        return self._callback(Progress(done, total, values, stage))
 
-    def _last_line(self) -> dict[str, float]:
-        with open(self._log, "rb") as file:
-            file.seek(max(0, self._size - 8192))
-            lines = file.read().splitlines()
-        values = json.loads(lines[-1]) if lines else {}
-        values.pop("step", None)
-        return values
+    def _is_logged(self) -> bool:
+        """Whether there is a new line."""
+        return self._log.exists() and self._log.stat().st_size != self._size
+
+    def _logged(self) -> dict[str, float]:
+        """The values of the last line."""
+        if self._is_logged():
+            self._size = self._log.stat().st_size
+            with open(self._log, "rb") as file:
+                file.seek(max(0, self._size - 8192))
+                lines = file.read().splitlines()
+            self._values = json.loads(lines[-1]) if lines else {}
+            self._values.pop("step", None)
+        return self._values
 
 
 def _views(images: Any, cameras: Any, masks: Any) -> dict[str, Any]:
@@ -235,7 +246,8 @@ def _words(options: Mapping[str, Any]) -> list[str]:
     def text(value: Any) -> str:
         return str(value).lower() if isinstance(value, (bool, np.bool_)) else str(value)
 
-    return [f"{key}={text(value)}" for key, value in options.items()]
+    return [_arrays.as_text("options", "value", f"{key}={text(value)}")
+            for key, value in options.items()]
 
 
 def _mesh_dict(mesh: Any) -> Optional[dict[str, Any]]:

@@ -239,10 +239,6 @@ void AddWhat(Command* command, FitOptions* o) {
                {NotNegative()});
 }
 
-// Steps of each.
-const std::map<std::string, std::int64_t> kQualities = {
-    {"fast", 300}, {"normal", FitConfig().steps}, {"best", 3000}};
-
 // --views-per-step for "views_per_step", and so on; and --quality, which sets --steps.
 void AddNumbers(Command* command, FitConfig* config) {
   for (const train::ConfigField& field : train::FieldsOf(config)) {
@@ -254,8 +250,8 @@ void AddNumbers(Command* command, FitConfig* config) {
     command->Add(name, target, field.help, traits);
   }
   const auto set_steps = [config](const std::string& quality) {
-    const auto found = kQualities.find(quality);
-    if (found != kQualities.end()) config->steps = found->second;
+    const auto steps = train::StepsOfQuality(quality);
+    if (steps.ok()) config->steps = *steps;
     return std::string();  // OneOf says what is wrong
   };
   command->Add("--quality", WordCheck{set_steps, ""},

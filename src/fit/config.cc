@@ -93,6 +93,13 @@ ConfigFields FieldsOf(FitConfig* c) {
   };
 }
 
+Result<std::int64_t> StepsOfQuality(std::string_view quality) {
+  if (quality == "fast") return std::int64_t{300};
+  if (quality == "normal") return FitConfig().steps;
+  if (quality == "best") return std::int64_t{3000};
+  return InvalidArgument("quality is \"{}\", expected fast, normal or best", quality);
+}
+
 std::string DescribeConfig(const FitConfig& config) {
   FitConfig c = config;
   std::string names;

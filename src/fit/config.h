@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "fit/fitter.h"
 #include "train/run/config_fields.h"
@@ -74,6 +75,9 @@ struct FitConfig {
 // The numbers that `tilegrad fit` has an option for, each with its range and help: "steps" is
 // --steps. Positions and directions have rules of their own.
 ConfigFields FieldsOf(FitConfig* config);
+
+// The steps of "fast", "normal" and "best".
+Result<std::int64_t> StepsOfQuality(std::string_view quality);
 
 // One line "key = value" for each that shapes the result; two runs with the same lines and input
 // do the same.

@@ -120,6 +120,11 @@ class Meshes(FolderTest):
         files.save_mesh(self.folder / "b.glb", mesh)
         back = files.load_mesh(self.folder / "b.glb")
         self.assertEqual((back.positions + back.origin).tolist(), world)
+        mesh.save(self.folder / "c.glb")
+        self.assertEqual((self.folder / "c.glb").read_bytes(),
+                         (self.folder / "b.glb").read_bytes())
+        with self.assertRaisesRegex(ValueError, "'c.obj' must end in .glb"):
+            mesh.save("c.obj")
         near = files.Mesh(mesh.positions, mesh.faces)
         self.assertEqual(near.origin.tolist(), [0, 0, 0])
 

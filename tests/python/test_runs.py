@@ -1,10 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """tilegrad.fit and tilegrad.train: from arrays, with callbacks, stopped and continued."""
 
+import contextlib
+import fcntl
+import io
+import os
 import pathlib
+import pty
+import signal
+import struct
+import subprocess
+import sys
 import tempfile
+import termios
+import threading
+import time
+import types
 import unittest
 import warnings
+from unittest import mock
 
 import numpy as np
 
@@ -107,6 +121,127 @@ class Fit(unittest.TestCase):
             tilegrad.fit("nowhere")
         with self.assertRaisesRegex(TypeError, "expected a function"):
             tilegrad.fit(IMAGES, CAMERAS, callback=3)
+
+
+    def test_quality_says_how_many_steps(self):
+        small = {name: value for name, value in SMALL.items() if name != "steps"}
+        told = []
+        tilegrad.fit(IMAGES, CAMERAS, quality="fast", callback=lambda at: told.append(at) or True,
+                     **small)
+        self.assertEqual((told[0].step, told[0].steps, told[0].stage), (1, 300, "fitting"))
+        with self.assertRaisesRegex(ValueError, "quality and steps both"):
+            tilegrad.fit(IMAGES, CAMERAS, quality="fast", **SMALL)
+        with self.assertRaisesRegex(ValueError, 'fit: quality is "good", expected fast, normal or'):
+            tilegrad.fit(IMAGES, CAMERAS, quality="good", **small)
+
+    def test_a_callback_that_wants_stages_is_told_of_all(self):
+        class All(list):
+            stages = True
+
+            def __call__(self, at):
+                self.append(at)
+
+        told = All()
+        tilegrad.fit(IMAGES, CAMERAS, callback=told, **SMALL)
+        self.assertEqual((told[0].stage, dict(told[0].values)), ("preparing", {}))
+        fitting = [at.step for at in told if at.stage == "fitting"]
+        self.assertEqual(fitting, list(range(1, 61)))
+        self.assertIn("loss", told[-1].values)
+
+    def test_the_work_has_a_thread_callbacks_have_the_callers(self):
+        """So a callback may draw, and use what belongs to its thread."""
+        threads = []
+        tilegrad.fit(IMAGES, CAMERAS, callback=lambda at: threads.append(threading.get_ident()),
+                     **SMALL)
+        self.assertEqual(set(threads), {threading.get_ident()})
+
+
+FIT = """
+import numpy as np, tilegrad
+from test_runs import CAMERAS, IMAGES, SMALL
+"""
+
+
+class Watched(unittest.TestCase):
+    """The line that a terminal and a notebook show, and Ctrl-C."""
+
+    def on_terminal(self, code, columns):
+        """What is written to a terminal of that width."""
+        ours, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        done = subprocess.Popen([sys.executable, "-c", FIT + code], stderr=theirs,
+                                stdout=subprocess.DEVNULL)
+        os.close(theirs)
+        text = b""
+        while True:
+            try:
+                part = os.read(ours, 4096)
+            except OSError:  # the other end is closed
+                break
+            if not part:
+                break
+            text += part
+        os.close(ours)
+        self.assertEqual(done.wait(60), 0, text)
+        return text.decode().replace("\r\n", "\n")
+
+    def test_a_terminal_shows_the_stages(self):
+        text = self.on_terminal("tilegrad.fit(IMAGES, CAMERAS, **SMALL)", 120)
+        self.assertTrue(text.startswith("\rpreparing"), text)
+        self.assertRegex(text, r"\rfitting  60/60  100%  loss \d")
+        self.assertTrue(text.endswith("\n"))
+
+    def test_a_line_never_reaches_the_edge(self):
+        text = self.on_terminal("tilegrad.fit(IMAGES, CAMERAS, **SMALL)", 20)
+        drawn = [part for line in text.split("\n") for part in line.split("\r")]
+        self.assertEqual(max(map(len, drawn)), 19)
+
+    def test_nobody_watches(self):
+        for code in ("tilegrad.fit(IMAGES, CAMERAS, **SMALL)",
+                     "import sys; sys.stderr = None; tilegrad.fit(IMAGES, CAMERAS, **SMALL)"):
+            done = subprocess.run([sys.executable, "-c", FIT + code], capture_output=True, text=True,
+                                  timeout=60)
+            self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+
+    def test_a_callback_of_ones_own_stands_alone(self):
+        text = self.on_terminal("tilegrad.fit(IMAGES, CAMERAS, callback=lambda at: None, **SMALL)",
+                                80)
+        self.assertEqual(text, "")
+
+    def test_a_notebook(self):
+        kernel = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=1))
+        out = io.StringIO()
+        with mock.patch.dict(sys.modules, IPython=kernel), contextlib.redirect_stdout(out):
+            tilegrad.fit(IMAGES, CAMERAS, **SMALL)
+        self.assertIn("\rfitting  60/60  100%", out.getvalue())
+
+    def test_ctrl_c_ends_it_within_a_second_and_it_goes_on(self):
+        code = FIT + """
+import sys, time
+class Begun:
+    stages = True
+    def __call__(self, at):
+        if at.stage == "fitting":
+            print("begun", flush=True)
+try:
+    tilegrad.fit(IMAGES, CAMERAS, out=sys.argv[1], callback=Begun(), **{**SMALL, "steps": 100000})
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "fit"
+            fit = subprocess.Popen([sys.executable, "-c", code, out], stdout=subprocess.PIPE,
+                                   text=True)
+            self.assertEqual(fit.stdout.readline(), "begun\n")
+            fit.send_signal(signal.SIGINT)
+            start = time.monotonic()
+            lines = fit.stdout.read().split()
+            self.assertEqual(fit.wait(60), 0)
+            self.assertLess(time.monotonic() - start, 2)  # one, and the end of a process
+            self.assertEqual(lines[-1], "interrupted")
+            done = tilegrad.fit(IMAGES, CAMERAS, out=out, resume=True,
+                                callback=lambda at: True, **{**SMALL, "steps": 100000})
+            self.assertGreater(done.steps, 1)
 
 
 class Train(unittest.TestCase):
