@@ -78,8 +78,7 @@ void Listener::Hear(const Progress* progress) {
   try {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (progress == nullptr || function_.is_none()) return;
-    asked_ =
-        function_(Text(progress->stage), progress->done, progress->total).is(py::bool_(true));
+    asked_ = function_(Text(progress->stage), progress->done, progress->total).is(py::bool_(true));
     if (asked_) stop_ = true;
   } catch (const py::error_already_set& error) {
     error_.emplace(error);

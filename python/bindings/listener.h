@@ -41,9 +41,9 @@ class Listener {
 
  private:
   void RunApart(const std::function<void()>& work);
-  void Pass(const Progress& progress);   // on the thread of the work
-  void HearUntilDone();                  // on the caller's, from here on
-  void Hear(const Progress* progress);   // with the GIL; null: nothing is new
+  void Pass(const Progress& progress);  // on the thread of the work
+  void HearUntilDone();                 // on the caller's, from here on
+  void Hear(const Progress* progress);  // with the GIL; null: nothing is new
 
   py::object function_;
   StopFlag stop_ = false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bindings/renderer_object.h"
 
+#include <cstdio>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -47,11 +48,38 @@ Status RendererObject::Run(const Call& call) {
 
 namespace {
 
-// "options.width" is the argument `width` in Python.
-Status InPython(const Status& status) {
+template <class T>
+using Records = std::vector<std::shared_ptr<SceneRecord<T>>>;
+
+// The record that has image `image` of a batch.
+template <class T>
+const SceneRecord<T>* RecordOf(const Records<T>& records, std::size_t image) {
+  for (const auto& record : records) {
+    if (image < record->count()) return record.get();
+    image -= record->count();
+  }
+  return nullptr;
+}
+
+// "options.width" is the argument `width` in Python, and in "scene 0: faces[7] is 9" faces have two
+// axes.
+template <class T>
+std::string InPython(const std::string& message, const Records<T>& records) {
   constexpr std::string_view prefix = "options.";
-  if (status.message().rfind(prefix, 0) != 0) return status;
-  return {status.code(), status.message().substr(prefix.size())};
+  if (message.starts_with(prefix)) return message.substr(prefix.size());
+  std::size_t image = 0, number = 0;
+  char name[24];
+  int end = 0;
+  std::sscanf(message.c_str(), "scene %zu: %23[a-z_][%zu]%n", &image, name, &number, &end);
+  const SceneRecord<T>* const record = end > 0 ? RecordOf(records, image) : nullptr;
+  if (record == nullptr) return message;
+  return fmt::format("scene {}: {}{}", image, record->PlaceOf(name, number), message.substr(end));
+}
+
+template <class T>
+void ThrowInPython(const char* function, const Status& status, const Records<T>& records) {
+  if (status.ok()) return ThrowIfError(status);
+  ThrowIfError(Status(status.code(), InPython(status.message(), records)).Within(function));
 }
 
 }  // namespace
@@ -67,7 +95,7 @@ std::unique_ptr<FrameObject<T>> RendererObject::Render(
   auto out = std::make_unique<FrameObject<T>>(std::move(scenes), pool<T>());
   const Status status = Run<T>(
       [&](RendererT<T>& engine) { return engine.Render(views, options, outputs, &out->frame()); });
-  ThrowIfError(InPython(status).Within("render"));
+  ThrowInPython("render", status, out->scenes());
   return out;
 }
 
@@ -85,9 +113,9 @@ void RendererObject::Backward(const FrameObject<T>& frame, const FrameGradientsT
     const auto& own = records.back().gradients();
     views.insert(views.end(), own.begin(), own.end());
   }
-  ThrowIfError(Run<T>([&](RendererT<T>& engine) {
-                 return engine.Backward(frame.frame(), d_frame, views, mode);
-               }).Within("backward"));
+  const Status status = Run<T>(
+      [&](RendererT<T>& engine) { return engine.Backward(frame.frame(), d_frame, views, mode); });
+  ThrowInPython("backward", status, frame.scenes());
   for (const GradientRecord<T>& record : records) record.Store();
 }
 

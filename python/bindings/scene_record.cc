@@ -133,6 +133,25 @@ void SceneRecord<T>::SetStreams() {
 }
 
 template <class T>
+std::string SceneRecord<T>::PlaceOf(std::string_view name, std::size_t number) const {
+  std::vector<std::size_t> rows;  // the lengths of all axes but the first
+  if (name == "faces") rows = {3};
+  const SceneT<T> names;
+  ForEachStream(names, {}, [&](const SceneStream<T>& s) {
+    if (name != s.name) return;
+    const auto width = static_cast<std::size_t>(s.what == Varying::kUser ? channels_ : s.width);
+    rows = {width};
+    if (arrays_.at_corners(name)) rows.insert(rows.begin(), 3);
+  });
+  std::string others;
+  for (auto length = rows.rbegin(); length != rows.rend(); ++length) {
+    others = fmt::format(",{}", number % *length) + others;
+    number /= *length;
+  }
+  return fmt::format("{}[{}{}]", name, number, others);
+}
+
+template <class T>
 void SceneRecord<T>::SetTextures() {
   const std::size_t each = arrays_.textures.size();
   if (arrays_.wraps.size() != each || arrays_.filters.size() != each) {

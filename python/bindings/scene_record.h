@@ -60,6 +60,10 @@ class SceneRecord {
   int channels() const { return channels_; }  // of attributes, where there is no image, too
   const SceneArrays& arrays() const { return arrays_; }
 
+  // The number of an array that the engine counts one by one, as Python has it: "faces[2,1]" of
+  // number 7 of "faces". Numbers of records keep theirs.
+  std::string PlaceOf(std::string_view name, std::size_t number) const;
+
  private:
   void SetStreams();
   void SetTextures();

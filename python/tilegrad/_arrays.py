@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import operator
 import threading
-import weakref
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
@@ -20,12 +19,11 @@ import numpy as np
 Axis = Union[int, str]  # a length, or the name of one: "V"
 Sizes = dict  # name of a length -> length, as the arrays so far have it
 
-_NUMBERS = (list, tuple, int, float)  # not yet arrays: making one is not a copy
+NUMBERS = (list, tuple, int, float)  # not yet arrays: making one is not a copy
 _CPU_DEVICES = (1, 3)  # of DLPack: kDLCPU, kDLCUDAHost
 MOST_PIXELS = 16384  # of an image in each axis: kMaxImageSize of src/raster/conventions.h
 _counts = {"arrays": 0, "copies": 0, "bytes_copied": 0}
 _lock = threading.Lock()
-_index_copies: dict[int, tuple[Any, Any]] = {}  # of arrays by id: who it is, and its copy
 
 
 def stats() -> dict[str, int]:
@@ -58,57 +56,24 @@ def as_array(function: str, argument: str, value: Any, dtype: Any, shape: Sequen
 def contiguous(function: str, argument: str, value: Any, dtype: Any) -> np.ndarray:
     """`value` as a C-contiguous array of `dtype`, of any shape; see `as_array`."""
     dtype = np.dtype(dtype)
-    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
-    _counts["arrays"] += 1
+    array = value if type(value) is np.ndarray else foreign(function, argument, value)
+    count_array()
     if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
-    if array.size or not isinstance(value, _NUMBERS):  # [] has no numbers that could be wrong
+    if array.size or not isinstance(value, NUMBERS):  # [] has no numbers that could be wrong
         _check_dtype(function, argument, array, dtype)
     copy = np.require(array, dtype, ("C", "ALIGNED"))
-    if not isinstance(value, _NUMBERS):
+    if not isinstance(value, NUMBERS):
         _count_copy(copy)
     return copy
-
-
-def as_indices(function: str, argument: str, value: Any, shape: Sequence[Axis],
-               sizes: Optional[Sizes] = None) -> np.ndarray:
-    """As `as_array` of int32. An array that has to be copied is copied once: where it comes again,
-    with the numbers that it had, the copy of before serves."""
-    if isinstance(value, _NUMBERS):
-        return as_array(function, argument, value, np.int32, shape, sizes)
-    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
-    owner, copy = _index_copies.get(id(value), (None, None))
-    if owner is not None and owner() is value and np.array_equal(copy, array):
-        _counts["arrays"] += 1
-    else:
-        copy = contiguous(function, argument, array, np.int32)
-        if copy is not array:
-            _keep_copy(value, copy)
-    check_shape(function, argument, copy.shape, shape, sizes)
-    return copy
-
-
-def _keep_copy(value: Any, copy: np.ndarray) -> None:
-    """As long as `value` lives."""
-    key = id(value)
-
-    def forget(reference: Any) -> None:
-        if _index_copies.get(key, (None, None))[0] is reference:
-            del _index_copies[key]
-
-    copy.flags.writeable = False  # others may have it, too
-    try:
-        _index_copies[key] = (weakref.ref(value, forget), copy)
-    except TypeError:  # nobody is told when it goes
-        pass
 
 
 def float_dtype(function: str, argument: str, value: Any) -> np.dtype:
     """The dtype that `value` asks to be computed in: float64 if it is an array of that, float32
     for everything else, lists of numbers included."""
-    if isinstance(value, _NUMBERS):
+    if isinstance(value, NUMBERS):
         return np.dtype(np.float32)
-    array = value if type(value) is np.ndarray else _foreign(function, argument, value)
+    array = value if type(value) is np.ndarray else foreign(function, argument, value)
     return array.dtype if array.dtype == np.float64 else np.dtype(np.float32)
 
 
@@ -290,7 +255,7 @@ def plain(function: str, argument: str, value: Any) -> np.ndarray:
                         f"{type(value).__name__}: {error}") from error
 
 
-def _foreign(function: str, argument: str, value: Any) -> np.ndarray:
+def foreign(function: str, argument: str, value: Any) -> np.ndarray:
     """Anything but a plain NumPy array as one that holds numbers."""
     array = plain(function, argument, value)
     if array.dtype.kind not in "biufc":
@@ -319,6 +284,11 @@ def _check_dtype(function: str, argument: str, array: np.ndarray, dtype: np.dtyp
         if int(array.min()) < limits.min or int(array.max()) > limits.max:
             raise ValueError(f"{function}: {argument} has values of {array.min()} to "
                              f"{array.max()}, out of {dtype}'s range")
+
+
+def count_array() -> None:
+    """For `stats`: an array came in."""
+    _counts["arrays"] += 1
 
 
 def _count_copy(copy: np.ndarray) -> None:

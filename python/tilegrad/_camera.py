@@ -9,73 +9,12 @@ from typing import Any, Optional
 import numpy as np
 
 from tilegrad import _arrays, _core
+from tilegrad._camera_arguments import Rows, Size, checked_size, is_half, known_size, size_of
 from tilegrad._packed import Packed, Part
 from tilegrad._points import points_of
 
 _D = _core.CAMERA
 Parts = dict[str, np.ndarray]
-Size = tuple[int, int]  # width, height of an image, pixels
-
-
-class _Rows:
-    """Arguments of a constructor as rows for C++: their leading axes are broadcast, and given back
-    to what comes out."""
-
-    def __init__(self, function: str, **arguments: tuple[Any, tuple[int, ...]]) -> None:
-        arrays = {}
-        self.lead: tuple[int, ...] = ()
-        for name, (value, shape) in arguments.items():
-            array = _arrays.contiguous(function, name, value, np.float64)
-            split = array.ndim - len(shape)
-            if split not in (0, 1) or array.shape[split:] != shape:
-                raise ValueError(f"{function}: {name} has shape {array.shape}, expected "
-                                 f"{_arrays.shape_text(shape)} or "
-                                 f"{_arrays.shape_text(('N', *shape))}")
-            try:
-                self.lead = np.broadcast_shapes(self.lead, array.shape[:split])
-            except ValueError:
-                raise ValueError(f"{function}: {name} has {array.shape[0]} cameras, expected "
-                                 f"{self.lead[0]}") from None
-            arrays[name] = (array, shape)
-        self.arrays: Any = [self._rows(array, shape) for array, shape in arrays.values()]
-
-    def _rows(self, array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        rows = np.broadcast_to(array, self.lead + shape)
-        return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
-
-    def camera(self, numbers: np.ndarray, size: Optional[Size]) -> "Camera":
-        return Camera.of_numbers(numbers.reshape(self.lead + (Camera._SIZE,)), size)
-
-    def converted(self, convention: str, size: Optional[Size] = None, **extra: Any) -> "Camera":
-        if size is not None:
-            extra["size"] = size
-        numbers = _core.camera_from(convention, np.hstack(self.arrays), **extra)
-        return self.camera(numbers, size)
-
-
-def _size(function: str, width: int, height: int) -> Size:
-    return (_arrays.as_number(function, "width", width, int),
-            _arrays.as_number(function, "height", height, int))
-
-
-def _known_size(function: str, size: Any) -> Optional[Size]:
-    """`size` as a pair of numbers of pixels; None, which is not known, stays that."""
-    if size is None:
-        return None
-    if not isinstance(size, (tuple, list)) or len(size) != 2:
-        raise TypeError(f"{function}: size is {size!r}, expected (width, height) or None")
-    width, height = size
-    return (_arrays.as_pixels(function, "width", width),
-            _arrays.as_pixels(function, "height", height))
-
-
-def filled_size(width: Any, height: Any, own: tuple[Any, Any]) -> tuple[Any, Any]:
-    """Width and height of an image, those of `own` where one is None."""
-    return own[0] if width is None else width, own[1] if height is None else height
-
-
-def _half(function: str, pixel_centre: str) -> bool:
-    return _arrays.check_choice(function, "pixel_centre", pixel_centre, ("integer", "half")) == 1
 
 
 class Camera(Packed):
@@ -95,9 +34,8 @@ class Camera(Packed):
     fx, fy, cx, cy: numbers or (N,), pixels: focal lengths, not 0, and principal point.
     near_plane: number or (N,), > 0, world units; what is nearer is cut away.
     size: (width, height) of the images that fx, fy, cx, cy are for, pixels; None: not known.
-        Constructors that are told width and height note them, and so do cameras of files. An image
-        of another size is an error wherever such a camera is used, since it would show a corner or
-        have a margin; `resize` makes the camera of another size, replace(size=None) forgets it.
+        Noted by constructors that are told width and height, and by readers of files. An image of
+        another size is an error wherever it is known; `resize` makes the camera of that size.
 
     Numbers are kept in float64 and rounded to the dtype of the scene. Errors: TypeError, ValueError
     for what is not an array of these shapes; render refuses numbers that are not finite, focal
@@ -125,7 +63,7 @@ class Camera(Packed):
                  size: Optional[Size] = None) -> None:
         self._pack(rotation=rotation, translation=translation, fx=fx, fy=fy, cx=cx, cy=cy,
                    near_plane=near_plane)
-        self.size = _known_size("Camera", size)
+        self.size = known_size("Camera", size)
 
     @classmethod
     def of_numbers(cls, numbers: np.ndarray, size: Optional[Size] = None) -> "Camera":
@@ -143,17 +81,6 @@ class Camera(Packed):
     def _names(cls) -> list[str]:
         return [*super()._names(), "size"]
 
-    def check_size(self, function: str, width: int, height: int) -> Size:
-        """The two numbers; ValueError, in the name of `function`, if the camera is known to be for
-        images of another size."""
-        size = (width, height)
-        if self.size is None or self.size == size:
-            return size
-        own = "{} x {}".format(*self.size)
-        raise ValueError(f"{function}: the camera is for images of {own} pixels, not {width} x "
-                         f"{height}: give camera.resize({self.size[0]}, {self.size[1]}, {width}, "
-                         f"{height})")
-
     # Constructors. Each argument may have a leading axis N, for N cameras.
 
     @classmethod
@@ -165,10 +92,11 @@ class Camera(Packed):
         fov_y: degrees, the whole vertical field of view, (0, 180). Pixels are square, the principal
             point is the middle of an image of width x height pixels.
         """
-        rows = _Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
-        size = _size("Camera.look_at", width, height)
+        rows = Rows("Camera.look_at", eye=(eye, (3,)), target=(target, (3,)), up=(up, (3,)))
+        size = size_of("Camera.look_at", width, height)
         fov_y = _arrays.as_number("Camera.look_at", "fov_y", fov_y, float)
-        return rows.camera(_core.camera_look_at(fov_y, size, *rows.arrays), size)
+        numbers = _core.camera_look_at(fov_y, size, *rows.arrays)
+        return cls.of_numbers(rows.shaped(numbers), size)
 
     @classmethod
     def orbit(cls, azimuth, elevation, distance, *, fov_y: float = _core.FOV_Y, width: int,
@@ -179,11 +107,12 @@ class Camera(Packed):
         look_at.
         """
         function = "Camera.orbit"
-        rows = _Rows(function, azimuth=(azimuth, ()), elevation=(elevation, ()),
+        rows = Rows(function, azimuth=(azimuth, ()), elevation=(elevation, ()),
                      distance=(distance, ()))
-        size = _size(function, width, height)
+        size = size_of(function, width, height)
         fov_y = _arrays.as_number(function, "fov_y", fov_y, float)
-        return rows.camera(_core.camera_orbit(fov_y, size, np.hstack(rows.arrays)), size)
+        numbers = _core.camera_orbit(fov_y, size, np.hstack(rows.arrays))
+        return cls.of_numbers(rows.shaped(numbers), size)
 
     @classmethod
     def framing(cls, mesh: Any, *, azimuth=60, elevation=20, fov_y: float = _core.FOV_Y,
@@ -200,7 +129,7 @@ class Camera(Packed):
             raise ValueError(f"{function}: margin is {margin}, must be in [0, 0.5)")
         return _framed(points_of(function, mesh), azimuth, elevation,
                        _arrays.as_number(function, "fov_y", fov_y, float), margin,
-                       _size(function, width, height))
+                       size_of(function, width, height))
 
     @classmethod
     def from_opencv(cls, k, rotation, translation, *, pixel_centre: str = "integer",
@@ -214,9 +143,9 @@ class Camera(Packed):
         size: as of Camera.
         """
         function = "Camera.from_opencv"
-        rows = _Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
+        rows = Rows(function, k=(k, (3, 3)), rotation=(rotation, (3, 3)),
                      translation=(translation, (3,)))
-        return rows.converted("opencv", half=_half(function, pixel_centre)).replace(size=size)
+        return _converted("opencv", rows, known_size(function, size), half=is_half(function, pixel_centre))
 
     @classmethod
     def from_colmap(cls, quaternion, translation, fx, fy, cx, cy, *,
@@ -226,10 +155,10 @@ class Camera(Packed):
         quaternion: (4,) or (N, 4): w, x, y, z, world to camera, of any length > 0.
         translation: (3,) or (N, 3). fx, fy, cx, cy: pixels, numbers or (N,). size: as of Camera.
         """
-        rows = _Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
+        rows = Rows("Camera.from_colmap", quaternion=(quaternion, (4,)),
                      translation=(translation, (3,)), fx=(fx, ()), fy=(fy, ()), cx=(cx, ()),
                      cy=(cy, ()))
-        return rows.converted("colmap").replace(size=size)
+        return _converted("colmap", rows, known_size("Camera.from_colmap", size))
 
     @classmethod
     def from_opengl(cls, projection, model_view, *, width: int, height: int) -> "Camera":
@@ -239,8 +168,8 @@ class Camera(Packed):
         the transpose. width, height: pixels of the image.
         """
         function = "Camera.from_opengl"
-        rows = _Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
-        return rows.converted("opengl", size=_size(function, width, height))
+        rows = Rows(function, projection=(projection, (4, 4)), model_view=(model_view, (4, 4)))
+        return _converted("opengl", rows, size_of(function, width, height))
 
     @classmethod
     def from_kaolin(cls, rotation, position, projection, *, width: int, height: int) -> "Camera":
@@ -250,9 +179,9 @@ class Camera(Packed):
         projection: (3,) or (N, 3), camera_proj, its last number -1. width, height: pixels.
         """
         function = "Camera.from_kaolin"
-        rows = _Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
+        rows = Rows(function, rotation=(rotation, (3, 3)), position=(position, (3,)),
                      projection=(projection, (3,)))
-        return rows.converted("kaolin", size=_size(function, width, height))
+        return _converted("kaolin", rows, size_of(function, width, height))
 
     @classmethod
     def from_pytorch3d(cls, r, t, focal_length, principal_point=(0, 0), *, width: int,
@@ -263,9 +192,9 @@ class Camera(Packed):
         focal_length, principal_point: (2,) or (N, 2), NDC. width, height: pixels of the image.
         """
         function = "Camera.from_pytorch3d"
-        rows = _Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
+        rows = Rows(function, r=(r, (3, 3)), t=(t, (3,)), focal_length=(focal_length, (2,)),
                      principal_point=(principal_point, (2,)))
-        return rows.converted("pytorch3d", size=_size(function, width, height))
+        return _converted("pytorch3d", rows, size_of(function, width, height))
 
     @classmethod
     def from_nerf(cls, camera_to_world, fl_x, fl_y, cx, cy, *,
@@ -275,15 +204,15 @@ class Camera(Packed):
         camera_to_world: (4, 4) or (N, 4, 4), transform_matrix. fl_x, fl_y, cx, cy: pixels.
         size: as of Camera.
         """
-        rows = _Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
+        rows = Rows("Camera.from_nerf", camera_to_world=(camera_to_world, (4, 4)),
                      fl_x=(fl_x, ()), fl_y=(fl_y, ()), cx=(cx, ()), cy=(cy, ()))
-        return rows.converted("nerf").replace(size=size)
+        return _converted("nerf", rows, known_size("Camera.from_nerf", size))
 
     # And back: dictionaries of the arguments of the constructors above.
 
     def to_opencv(self, *, pixel_centre: str = "integer") -> Parts:
         """k, rotation, translation, as from_opencv takes them."""
-        half = _half("Camera.to_opencv", pixel_centre)
+        half = is_half("Camera.to_opencv", pixel_centre)
         return self._parts(_core.camera_to("opencv", self._rows(), half=half), k=(3, 3),
                            rotation=(3, 3), translation=(3,))
 
@@ -295,7 +224,7 @@ class Camera(Packed):
     def to_opengl(self, *, width: int, height: int, far_plane: float) -> Parts:
         """projection, model_view, as from_opengl takes them. far_plane: world units, beyond
         near_plane; rendering here has none."""
-        size = self.check_size("Camera.to_opengl", *_size("Camera.to_opengl", width, height))
+        size = self._sized("Camera.to_opengl", width, height)
         far_plane = _arrays.as_number("Camera.to_opengl", "far_plane", far_plane, float)
         rows = _core.camera_to("opengl", self._rows(), size, far_plane=far_plane)
         return self._parts(rows, projection=(4, 4), model_view=(4, 4))
@@ -303,13 +232,13 @@ class Camera(Packed):
     def to_kaolin(self, *, width: int, height: int) -> Parts:
         """rotation, position, projection, as from_kaolin takes them. ValueError if the principal
         point is not the middle of the image."""
-        size = self.check_size("Camera.to_kaolin", *_size("Camera.to_kaolin", width, height))
+        size = self._sized("Camera.to_kaolin", width, height)
         return self._parts(_core.camera_to("kaolin", self._rows(), size), rotation=(3, 3),
                            position=(3,), projection=(3,))
 
     def to_pytorch3d(self, *, width: int, height: int) -> Parts:
         """r, t, focal_length, principal_point, as from_pytorch3d takes them."""
-        size = self.check_size("Camera.to_pytorch3d", *_size("Camera.to_pytorch3d", width, height))
+        size = self._sized("Camera.to_pytorch3d", width, height)
         return self._parts(_core.camera_to("pytorch3d", self._rows(), size), r=(3, 3), t=(3,),
                            focal_length=(2,), principal_point=(2,))
 
@@ -321,11 +250,13 @@ class Camera(Packed):
     def resize(self, width: int, height: int, to_width: int, to_height: int) -> "Camera":
         """The same view, of an image of width x height pixels, on one of to_width x to_height:
         everything scales."""
-        size = _size("Camera.resize", to_width, to_height)
-        numbers = _core.camera_resize(
-            self._rows(), self.check_size("Camera.resize", *_size("Camera.resize", width, height)),
-            size)
+        size = size_of("Camera.resize", to_width, to_height)
+        numbers = _core.camera_resize(self._rows(), self._sized("Camera.resize", width, height),
+                                      size)
         return Camera.of_numbers(numbers.reshape(self.numbers.shape), size)
+
+    def _sized(self, function: str, width: int, height: int) -> Size:
+        return checked_size(function, self.size, size_of(function, width, height))
 
     def _rows(self) -> np.ndarray:
         return np.ascontiguousarray(self.numbers, np.float64).reshape(-1, self._SIZE)
@@ -337,6 +268,14 @@ class Camera(Packed):
             parts[name] = rows[:, first:end].reshape(lead + shape)
             first = end
         return parts
+
+
+def _converted(convention: str, rows: Rows, size: Optional[Size], **extra: Any) -> Camera:
+    """Of another program's numbers."""
+    if size is not None:
+        extra["size"] = size
+    return Camera.of_numbers(
+        rows.shaped(_core.camera_from(convention, np.hstack(rows.arrays), **extra)), size)
 
 
 def _framed(points: np.ndarray, azimuth: Any, elevation: Any, fov_y: float, margin: float,

@@ -3,21 +3,18 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any, Optional
 
 import numpy as np
 
 from tilegrad import _arrays
-from tilegrad.meshes import Material, Mesh, MeshTexture, load_mesh
+from tilegrad._mesh import Material, Mesh, MeshTexture
 
 
 def as_mesh(mesh: Any) -> Mesh:
-    """`tilegrad.meshes.as_mesh`."""
+    """`tilegrad.meshes.as_mesh`, of what is no file."""
     if isinstance(mesh, Mesh):
         return mesh
-    if isinstance(mesh, (str, os.PathLike)):
-        return load_mesh(mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*_positions_faces(*mesh))
     if not hasattr(mesh, "vertices"):

@@ -1,24 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of numbers in arrays: colours that are bytes, and where a wrong number stands."""
+"""Colours that are bytes, where numbers from 0 to 1 are meant."""
 
 from __future__ import annotations
 
-import contextlib
-import re
 import warnings
-from typing import Any, Iterator, Sequence
+from typing import Any, Sequence
 
 import numpy as np
 
 from tilegrad import _arrays
 
-_OF_NUMBERS = ("positions", "faces", "colors", "uvs", "normals", "attributes")  # not of records
-
 
 def refuse_bytes(function: str, argument: str, value: Any, dtype: Any) -> None:
     """TypeError if `value` is of bytes, 0 to 255, where numbers from 0 to 1 are meant: they would
     be 255 times too bright, and nothing would say so."""
-    array = value if type(value) is np.ndarray else _arrays._foreign(function, argument, value)
+    array = value if type(value) is np.ndarray else _arrays.foreign(function, argument, value)
     if array.dtype == np.uint8:
         raise TypeError(f"{function}: {argument} has dtype uint8, expected {dtype} from 0 to 1: "
                         f"divide by 255")
@@ -42,27 +38,3 @@ def as_colors(function: str, argument: str, value: Any, dtype: Any, shape: Seque
     array = _arrays.as_batched(function, argument, value, dtype, shape, sizes)
     warn_of_bytes(function, argument, array)
     return array
-
-
-@contextlib.contextmanager
-def axes_of(scenes: Sequence[Any]) -> Iterator[None]:
-    """ValueErrors of the core, which counts numbers of an array one by one, get the index that the
-    array has in Python: "faces[6] is 9" becomes "faces[2,0] is 9".
-
-    scenes: alike, as a call of the renderer has them.
-    """
-    fields = scenes[0]._fields if scenes else {}
-    corners = scenes[0]._arguments["per_corner"] if scenes else ()
-
-    def spell(match: re.Match) -> str:
-        name, number = match[1], int(match[2])
-        # Before an array's own axes there may be one of images.
-        shape = np.shape(fields.get(name, ()))[-3 if name in corners else -2:]
-        if name not in _OF_NUMBERS or len(shape) < 2 or number >= np.prod(shape):
-            return match[0]
-        return f"{name}[{','.join(map(str, np.unravel_index(number, shape)))}]"
-
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(re.sub(r"\b(\w+)\[(\d+)\]", spell, str(error))) from None

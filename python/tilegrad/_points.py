@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tilegrad import _arrays
+from tilegrad import _arrays, _indices
 from tilegrad._paths import name_of
 
 
@@ -18,7 +18,7 @@ def points_of(function: str, mesh: Any) -> np.ndarray:
     points, faces = _parts(mesh)
     points = _arrays.as_array(function, "mesh", points, np.float64, ("V", 3))
     if faces is not None:
-        faces = _arrays.as_indices(function, "faces", faces, ("F", 3))
+        faces = _indices.as_indices(function, "faces", faces, ("F", 3))
         _arrays.check_indices(function, "faces", faces, len(points))
         points = points[np.unique(faces)]
     if not len(points):

@@ -3,45 +3,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Iterator, Optional, Sequence, Union
+from typing import Any, Iterator, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _numbers
-from tilegrad._camera import Camera, filled_size
+from tilegrad import _arrays, _core
+from tilegrad._camera import Camera
+from tilegrad._camera_arguments import checked_size, common_size, filled_size
+from tilegrad._options import DEFAULTS as _D, options_of
 from tilegrad._packed import Packed
 from tilegrad._picture import Pictured
-from tilegrad._scene import Light, Scene, Surface, check_size, known_size
+from tilegrad._scene import Light, Scene, Surface
 from tilegrad._threads import thread_count
 
-_Reader = Callable[[str, str, Any], Any]
-
-
-def _number(kind: type) -> _Reader:
-    return lambda function, name, value: _arrays.as_number(function, name, value, kind)
-
-
-def _choice(choices: Sequence[str]) -> _Reader:
-    return lambda function, name, value: _arrays.check_choice(function, name, value, choices)
-
-
-def _option(name: str, choices: Optional[Sequence[str]] = None) -> tuple[Any, _Reader]:
-    """C++'s default of an option, and what checks another value."""
-    value = getattr(_core.RenderOptions(), name)
-    return (choices[value], _choice(choices)) if choices else (value, _number(type(value)))
-
-
-# In the order in which render has them.
-_OPTIONS = {"width": _option("width"), "height": _option("height"), "delta": _option("delta"),
-            "max_alpha_error": _option("max_alpha_error"),
-            "interpolation": _option("interpolation", _core.INTERPOLATIONS),
-            "culling": _option("culling", _core.CULLINGS),
-            "alpha_rule": _option("alpha_rule", _core.ALPHA_RULES),
-            "paper_box": _option("paper_box"), "paper_faces": _option("paper_faces")}
-_D = {name: default for name, (default, _) in _OPTIONS.items()}
 _OUTPUTS = ("color", "alpha")
 # Names whose values are not plain arrays.
-_RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
+RECORDS: dict[str, type[Packed]] = {"camera": Camera, "surfaces": Surface, "lights": Light}
 _NAMES = ("positions", "camera", "colors", "uvs", "normals", "textures", "surfaces", "lights",
           "light_directions", "sh", "attributes")
 
@@ -162,7 +139,7 @@ class Gradients:
         if name not in self._arrays:
             raise AttributeError(f"{name} was not asked for: wrt={tuple(self._arrays)!r}")
         value = self._arrays[name]
-        return _RECORDS[name].of_numbers(value) if name in _RECORDS else value
+        return RECORDS[name].of_numbers(value) if name in RECORDS else value
 
     def __iter__(self) -> Iterator[str]:
         """The names that were asked for."""
@@ -221,16 +198,17 @@ class Renderer:
         """
         single = isinstance(scenes, Scene)
         checked = (scenes,) if isinstance(scenes, Scene) else self._checked(scenes)
-        size = filled_size(width, height, known_size(checked) or (_D["width"], _D["height"]))
-        options = _options(*size, delta, max_alpha_error, interpolation, culling, alpha_rule,
+        sizes = [scene._arguments["camera"].size for scene in checked]
+        size = filled_size(width, height, common_size(sizes) or (_D["width"], _D["height"]))
+        options = options_of(*size, delta, max_alpha_error, interpolation, culling, alpha_rule,
                            paper_box, paper_faces)
-        check_size("render", checked, options.width, options.height)
+        for own in sizes:
+            checked_size("render", own, (options.width, options.height))
         outputs = _arrays.as_names("render", "outputs", outputs, _core.IMAGES)
         if "attributes" in outputs and any(scene["attributes"] is None for scene in checked):
             raise ValueError("render: outputs has 'attributes', but a scene has none")
         wanted = [name in outputs for name in _core.IMAGES]
-        with _numbers.axes_of(checked):
-            frame = self._renderer.render([s._record for s in checked], options, wanted)
+        frame = self._renderer.render([s._record for s in checked], options, wanted)
         return Frame(frame, checked, single, outputs)
 
     def backward(self, frame: Frame, *, color: Any = None, alpha: Any = None,
@@ -303,15 +281,6 @@ class Renderer:
             if wrt is not None and set(names) != set(gradient):
                 raise ValueError(f"backward: out[{i}] has {tuple(gradient)!r}, wrt is {names!r}")
         return gradients
-
-
-def _options(*values: Any) -> _core.RenderOptions:
-    """Of the values of _OPTIONS, which are checked if they are not the defaults themselves."""
-    options = _core.RenderOptions()
-    for (name, (default, read)), value in zip(_OPTIONS.items(), values):
-        if value is not default:
-            setattr(options, name, read("render", name, value))
-    return options
 
 
 def _empty_like(scene: Scene, name: str) -> Any:

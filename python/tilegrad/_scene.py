@@ -7,7 +7,7 @@ from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 
-from tilegrad import _arrays, _core, _numbers
+from tilegrad import _arrays, _core, _indices, _numbers
 from tilegrad._camera import Camera
 from tilegrad._packed import Packed, Part, stacked
 
@@ -161,7 +161,7 @@ class Scene:
         sizes: dict[str, int] = {}
         corners = self._corners(per_corner)
         fields = {"positions": self._take("positions", positions, ("V", 3), sizes),
-                  "faces": _arrays.as_indices("Scene", "faces", faces, ("F", 3), sizes),
+                  "faces": _indices.as_indices("Scene", "faces", faces, ("F", 3), sizes),
                   "camera": self._camera(camera, sizes)}
         for name in _SHAPES:
             value = self._arguments[name]
@@ -173,8 +173,8 @@ class Scene:
                 shape = _CORNER_SHAPES[name] if name in corners else _SHAPES[name]
                 fields[name] = self._take(name, value, shape, sizes)
         if face_surfaces is not None:
-            fields["face_surfaces"] = _arrays.as_indices("Scene", "face_surfaces", face_surfaces,
-                                                         ("F",), sizes)
+            fields["face_surfaces"] = _indices.as_indices("Scene", "face_surfaces", face_surfaces,
+                                                          ("F",), sizes)
         if lights is not None:
             fields["lights"] = self._lights(lights, sizes)
         self._fields = fields
@@ -263,12 +263,7 @@ class Scene:
     @property
     def camera(self) -> Camera:
         """Of one view, or of N; in the scene's dtype."""
-        return Camera.of_numbers(self._fields["camera"], self.camera_size)
-
-    @property
-    def camera_size(self) -> Optional[tuple[int, int]]:
-        """`Camera.size` of its camera."""
-        return self._arguments["camera"].size
+        return Camera.of_numbers(self._fields["camera"], self._arguments["camera"].size)
 
     @property
     def dtype(self) -> np.dtype:
@@ -299,20 +294,6 @@ class Scene:
     def __repr__(self) -> str:
         v, f = self.positions.shape[-2], len(self.faces)
         return f"<tilegrad.Scene: {len(self)} images, {v} vertices, {f} faces, {self.dtype}>"
-
-
-def known_size(scenes: Sequence[Scene]) -> Optional[tuple[int, int]]:
-    """Width and height of the images that the scenes' cameras are for; None where they do not say
-    or differ."""
-    sizes = {scene.camera_size for scene in scenes} - {None}
-    return sizes.pop() if len(sizes) == 1 else None
-
-
-def check_size(function: str, scenes: Sequence[Scene], width: int, height: int) -> None:
-    """ValueError if a scene's camera is for images of another size."""
-    for scene in scenes:
-        if scene.camera_size not in (None, (width, height)):
-            scene.camera.check_size(function, width, height)
 
 
 def changed(arguments: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

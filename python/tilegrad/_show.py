@@ -1,24 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of a mesh in one call: what it is framed by, lit by, and drawn over."""
+"""A picture of a mesh in one call."""
 
 from __future__ import annotations
 
-import os
 from typing import Any, Optional, Sequence
 
-import numpy as np
-
-from tilegrad._camera import Camera, filled_size
-from tilegrad._renderer import Frame, Renderer
-from tilegrad._scene import Light
+from tilegrad._camera import Camera
+from tilegrad._camera_arguments import filled_size
+from tilegrad._lit import lit
+from tilegrad._renderer import Frame
 from tilegrad.meshes import as_mesh
 
 _SIDE = 512  # pixels
-_SOFT_PIXELS = 0.6  # how far outlines fade, so that they do not look like stairs
-# Towards lights, in the camera's axes: from above on the left, from the right, and from behind it.
-_LIGHTS = ((-0.4, 0.6, 1.0), (1.0, -0.1, 0.4), (0.0, 0.0, 1.0))
-_INTENSITIES = (0.65, 0.2, 0.2)
-_renderers: dict[tuple[int, int], Renderer] = {}  # of this process, by threads
 
 
 def render(mesh: Any, camera: Optional[Camera] = None, *, width: Optional[int] = None,
@@ -44,28 +37,7 @@ def render(mesh: Any, camera: Optional[Camera] = None, *, width: Optional[int] =
     if camera is None:
         camera = Camera.framing(mesh, azimuth=azimuth, elevation=elevation, width=width,
                                 height=height)
-    options = {name: arguments.pop(name) for name in list(arguments) if name in _OPTIONS}
-    options.setdefault("delta", (_SOFT_PIXELS * 2 / max(width, height)) ** 2)
     if not isinstance(camera, Camera):
         raise TypeError(f"render: camera must be a Camera, got {type(camera).__name__}")
-    scene = mesh.scene(camera, **{**_look(camera), **arguments})
-    frame = _renderer(threads).render(scene, width=width, height=height, outputs=outputs, **options)
-    frame.background = background
-    return frame
-
-
-_OPTIONS = ("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule", "paper_box",
-            "paper_faces")
-
-
-def _look(camera: Camera) -> dict[str, Any]:
-    towards = np.asarray(_LIGHTS, np.float32) @ np.asarray(camera.rotation, np.float32)
-    return {"lighting": "lambert",
-            "lights": Light(towards, np.broadcast_to(_INTENSITIES, towards.shape[:-1]))}
-
-
-def _renderer(threads: int) -> Renderer:
-    key = (os.getpid(), threads)
-    if key not in _renderers:
-        _renderers[key] = Renderer(threads)
-    return _renderers[key]
+    return lit(mesh, camera, (width, height), background=background, outputs=outputs,
+               threads=threads, **arguments)

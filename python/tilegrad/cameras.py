@@ -11,6 +11,7 @@ import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
+from tilegrad._camera_arguments import checked_size
 from tilegrad._paths import Path, ending_of, name_of
 
 _CENTRES = ("integer", "half")
@@ -54,7 +55,7 @@ def save_cameras(path: Path, views: Iterable[View], *, format: Optional[str] = N
     _tools.save_cameras(name_of(path), format,
                         [(_arrays.as_text("save_cameras", "view name", view.name),
                           _numbers(view.camera),
-                          view.camera.check_size("save_cameras", view.width, view.height))
+                          checked_size("save_cameras", view.camera.size, (view.width, view.height)))
                          for view in views])
 
 

@@ -12,9 +12,10 @@ from typing import Any, NamedTuple, Optional, Sequence, Union
 import numpy as np
 
 from tilegrad import _arrays, _core
-from tilegrad._camera import Camera, filled_size
+from tilegrad._camera import Camera
+from tilegrad._camera_arguments import checked_size, common_size, filled_size
 from tilegrad._renderer import Frame
-from tilegrad._scene import Scene, check_size, known_size
+from tilegrad._scene import Scene
 from tilegrad._threads import thread_count
 
 
@@ -93,10 +94,12 @@ def _scenes_of(source: Any, width: Optional[int],
                         f"{type(source).__name__}")
     if not scenes:
         raise ValueError("to_fragments: source has no scene")
-    width, height = filled_size(width, height, known_size(scenes) or (None, None))
+    sizes = [scene.camera.size for scene in scenes]
+    width, height = filled_size(width, height, common_size(sizes) or (None, None))
     if width is None or height is None:
         raise ValueError("to_fragments: scenes need width and height")
-    check_size("to_fragments", scenes, width, height)
+    for own in sizes:
+        checked_size("to_fragments", own, (width, height))
     return scenes, width, height
 
 

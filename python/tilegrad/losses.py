@@ -15,7 +15,7 @@ from typing import Any, Callable, NamedTuple, Optional
 
 import numpy as np
 
-from tilegrad import _arrays, _tools
+from tilegrad import _arrays, _indices, _tools
 from tilegrad._threads import thread_count
 
 
@@ -104,7 +104,7 @@ def _chamfer(a: np.ndarray, b: np.ndarray, threads: int
 def _of_mesh(name: str, positions: Any, faces: Any) -> Any:
     if _numpy(faces).dtype.kind not in "iu":
         raise TypeError(f"{name}: faces has dtype {_numpy(faces).dtype}, expected whole numbers")
-    triangles = _arrays.as_indices(name, "faces", faces, ("F", 3))
+    triangles = _indices.as_indices(name, "faces", faces, ("F", 3))
     compute = getattr(_tools, name)
     if _torch_of(positions):
         return _on_tape(lambda p: compute(p, triangles), positions)

@@ -17,7 +17,7 @@ from tilegrad import _arrays, _tools
 from tilegrad._paths import Path, name_of
 from tilegrad._threads import thread_count
 from tilegrad.images import as_bytes
-from tilegrad.meshes import Mesh, mesh_of_dict
+from tilegrad._mesh import Mesh, mesh_of_dict
 
 
 class Predictor:

@@ -15,6 +15,7 @@ import numpy as np
 
 from tilegrad import _arrays, _tools
 from tilegrad._camera import Camera
+from tilegrad._camera_arguments import checked_size
 from tilegrad._paths import Path, name_of
 from tilegrad._progress import Progress, watched_line
 from tilegrad._threads import thread_count
@@ -98,23 +99,15 @@ def fit(images: Any, cameras: Optional[Camera] = None, *, masks: Any = None, mod
     Warns of masks and cameras that are in doubt.
     ValueError, OSError: say what does not fit. KeyboardInterrupt: Ctrl-C; everything is saved.
     """
+    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
+             "find_cameras": bool(find_cameras), "fov": _degrees("fov", fov),
+             **_texts(background=background), **_pictures(images, cameras, masks, model)}
     if quality and "steps" in options:
         raise ValueError("fit: quality and steps both say how many steps; give one of them")
-    views = {"hold_out": _arrays.as_number("fit", "hold_out", hold_out, int),
-             "background": background, "find_cameras": bool(find_cameras),
-             "fov": _arrays.as_number("fit", "fov", fov, float)}
-    if not 5 <= views["fov"] <= 150:
-        raise ValueError(f"fit: fov is {fov}, expected 5 to 150 degrees")
-    if isinstance(images, (str, bytes, os.PathLike)):
-        if cameras is not None or masks is not None:
-            raise ValueError("fit: a folder has its own cameras and masks")
-        views.update(folder=name_of(images), model=_arrays.as_text("fit", "model", model))
-    else:
-        views.update(_views(images, cameras, masks))
-    request = {"options": _words(options), "quality": quality, "optimize": list(optimize),
-               "lighting": lighting, "material": material,
-               "start": _mesh_dict(start), "truth": _mesh_dict(truth), "resume": bool(resume),
-               "threads": thread_count("fit", threads)}
+    request = {"options": _words(options), "start": _mesh_dict(start), "truth": _mesh_dict(truth),
+               "optimize": [_arrays.as_text("fit", "optimize", name) for name in optimize],
+               **_texts(lighting=lighting, material=material, quality=quality),
+               "resume": bool(resume), "threads": thread_count("fit", threads)}
     if out is not None:
         return _fit(views, request, pathlib.Path(name_of(out)), callback, keep=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -200,6 +193,27 @@ class _Listener:
         return self._values
 
 
+def _pictures(images: Any, cameras: Any, masks: Any, model: str) -> dict[str, Any]:
+    """A folder, or arrays."""
+    if not isinstance(images, (str, bytes, os.PathLike)):
+        return _views(images, cameras, masks)
+    if cameras is not None or masks is not None:
+        raise ValueError("fit: a folder has its own cameras and masks")
+    return {"folder": name_of(images), "model": _arrays.as_text("fit", "model", model)}
+
+
+def _texts(**words: Any) -> dict[str, str]:
+    return {name: _arrays.as_text("fit", name, word) for name, word in words.items()}
+
+
+def _degrees(argument: str, value: Any) -> float:
+    """Of a field of view."""
+    degrees = _arrays.as_number("fit", argument, value, float)
+    if 5 <= degrees <= 150:
+        return degrees
+    raise ValueError(f"fit: {argument} is {value}, expected 5 to 150 degrees")
+
+
 def _views(images: Any, cameras: Any, masks: Any) -> dict[str, Any]:
     pixels = _unit("images", images)
     if pixels.ndim != 4 or pixels.shape[-1] not in (3, 4):
@@ -225,7 +239,7 @@ def _rows(cameras: Any, shape: tuple[int, ...]) -> Optional[list[list[float]]]:
                         "views")
     numbers = np.asarray(cameras.numbers, np.float64)
     _arrays.check_shape("fit", "cameras", numbers.shape, (views, 17))
-    cameras.check_size("fit", width, height)
+    checked_size("fit", cameras.size, (width, height))
     return numbers.tolist()
 
 

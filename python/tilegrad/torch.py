@@ -16,25 +16,18 @@ import functools
 import math
 from typing import Any, NamedTuple, Optional, Sequence, Union
 
-import numpy as np
 import torch
 
 from tilegrad import _arrays, _core, _rotation
 from tilegrad._autograd import first_derivative_only
 from tilegrad._camera import Camera
 from tilegrad._dense import check_dense, full_precision
-from tilegrad._packed import Packed
-from tilegrad._renderer import Frame, Gradients
-from tilegrad._renderer import Renderer as _Engine
-from tilegrad._scene import Light, Scene, Surface, Texture
-from tilegrad._threads import thread_count
+from tilegrad._options import PASSED_ON
+from tilegrad._torch_call import Call, scenes_of
 
 Array = Any  # whatever tilegrad takes as an array
 Value = Any  # a tensor, a number, or a nested sequence of numbers
 
-# Of several numbers each.
-_RECORDS: dict[str, type[Packed]] = {"camera": Camera, "lights": Light, "surfaces": Surface}
-_INDICES = ("faces", "face_surfaces")  # a Scene takes their tensors as they are
 _CONSTANT = ("barycentrics", "face_ids")  # images without a gradient
 
 
@@ -84,8 +77,8 @@ def render(positions: Union[torch.Tensor, Sequence[torch.Tensor]], faces: Array,
              "surface_textures": surface_textures}
     options = {"width": width, "height": height, "outputs": outputs}
     for name, value in arguments.items():
-        (options if name in _OPTIONS else scene)[name] = value
-    call = _Call(_each(scene), options, threads)
+        (options if name in PASSED_ON else scene)[name] = value
+    call = Call(scenes_of(scene), options, threads)
     images = _Render.apply(call, *call.tensors)
     return Images(**dict(zip((*outputs, "face_ids"), images)))
 
@@ -144,148 +137,11 @@ def surfaces(base_color: Value = (1.0, 1.0, 1.0), ambient: Value = (0.0, 0.0, 0.
 
 rotation_6d = _rotation.rotation_6d
 
-_OPTIONS = frozenset(("delta", "max_alpha_error", "interpolation", "culling", "alpha_rule",
-                      "paper_box", "paper_faces"))
-
-
-class _Place(NamedTuple):
-    """Where a tensor stands: in which scene, in which argument, and of textures in which."""
-
-    scene: int
-    name: str
-    texture: int = 0
-
-
-class _Call:
-    """A render: its tensors, and all the rest with places for them."""
-
-    def __init__(self, scenes: Sequence[dict[str, Any]], options: dict[str, Any],
-                 threads: int) -> None:
-        for name, value in options.items():
-            if isinstance(value, torch.Tensor) and value.requires_grad:
-                raise ValueError(f"render: {name} has no gradient; give {name}.item()")
-        self.options, self.threads = options, thread_count("render", threads)
-        self.scenes = [_with_textures(scene) for scene in scenes]
-        self.surface_textures = [_surface_textures(scene) for scene in self.scenes]
-        self.places: list[_Place] = []
-        self.tensors: list[torch.Tensor] = []
-        for i, scene in enumerate(self.scenes):
-            for k, texture in enumerate(scene.get("textures") or ()):
-                self._note(_Place(i, "textures", k), texture.texels)
-            for name, value in scene.items():
-                self._note(_Place(i, name), value)
-
-    def _note(self, place: _Place, value: Any) -> None:
-        if not isinstance(value, torch.Tensor):
-            return
-        name = place.name
-        check_dense("render", name, value)
-        if value.is_floating_point() and value.dtype not in (torch.float32, torch.float64):
-            raise TypeError(f"render: {name} has dtype {value.dtype}, expected torch.float32 or "
-                            f"torch.float64 ({name}.float() makes it one)")
-        self.places.append(place)
-        self.tensors.append(value)
-
-    def frame(self, tensors: Sequence[torch.Tensor]) -> Frame:
-        """Renders, with the memory of the tensors where the renderer can take it as it is."""
-        scenes = [dict(scene) for scene in self.scenes]
-        for scene in scenes:
-            if scene.get("textures") is not None:
-                scene["textures"] = list(scene["textures"])
-        for place, tensor in zip(self.places, tensors):
-            if place.name not in _INDICES:
-                self._put(scenes[place.scene], place, tensor.detach().resolve_neg().numpy())
-        return self._engine().render([Scene(**scene) for scene in scenes], **self.options)
-
-    def _put(self, scene: dict[str, Any], place: _Place, array: np.ndarray) -> None:
-        name = place.name
-        if name == "textures":
-            old = scene[name][place.texture]
-            scene[name][place.texture] = Texture(array, old.wrap, old.filter)
-        elif name in _RECORDS:
-            scene[name] = self._record(place, array)
-        else:
-            scene[name] = array
-
-    def _record(self, place: _Place, array: np.ndarray) -> Packed:
-        """The numbers of a camera, of lights or of surfaces as those."""
-        kind = _RECORDS[place.name]
-        if array.ndim < 1 or array.shape[-1] != kind._SIZE:
-            raise ValueError(f"render: {place.name} has shape {array.shape}, expected "
-                             f"{_arrays.shape_text(('...', kind._SIZE))}")
-        record = kind.of_numbers(array)
-        if isinstance(record, Surface):
-            record.texture = self.surface_textures[place.scene]
-        return record
-
-    def gradients(self, frame: Frame, wanted: Sequence[bool],
-                  cotangents: dict[str, Any]) -> list[Optional[torch.Tensor]]:
-        """dL/d(tensor) in the order of the tensors; None for those that are not wanted."""
-        names = tuple(dict.fromkeys(place.name for place, want in zip(self.places, wanted) if want))
-        found = self._engine().backward(frame, wrt=names, **cotangents)
-        return [self._gradient(found[place.scene], place) if want else None
-                for place, want in zip(self.places, wanted)]
-
-    @staticmethod
-    def _gradient(found: Gradients, place: _Place) -> torch.Tensor:
-        value = getattr(found, place.name)
-        if place.name == "textures":
-            value = value[place.texture]
-        return torch.from_numpy(value.numbers if place.name in _RECORDS else value)
-
-    def _engine(self) -> _Engine:
-        return _engine(self.threads or torch.get_num_threads())
-
-
-def _each(arguments: dict[str, Any]) -> list[dict[str, Any]]:
-    """The arguments of each mesh, where positions are a list of them."""
-    positions = arguments["positions"]
-    several = isinstance(positions, (list, tuple)) and len(positions) > 0
-    if not several or not all(getattr(mesh, "ndim", 0) >= 2 for mesh in positions):
-        return [arguments]  # nested lists of numbers are one mesh, too
-    own = {name: value for name, value in arguments.items() if _is_of_each(value)}
-    own["positions"] = positions
-    for name, value in own.items():
-        if len(value) != len(positions):
-            raise ValueError(f"render: {name} is a list of {len(value)}, expected {len(positions)}, "
-                             f"one for each of positions; what all share may be a tuple")
-    return [{**arguments, **{name: value[i] for name, value in own.items()}}
-            for i in range(len(positions))]
-
-
-def _is_of_each(value: Any) -> bool:
-    """Whether it is a list, of something else than numbers and names."""
-    return isinstance(value, list) and not all(isinstance(v, (int, float, str)) for v in value)
-
-
-def _with_textures(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The same with a list of Texture, if there are textures."""
-    textures = arguments.get("textures")
-    if textures is None:
-        return arguments
-    each = textures if isinstance(textures, (list, tuple)) else [textures]
-    made = [texture if isinstance(texture, Texture) else Texture(texture) for texture in each]
-    return {**arguments, "textures": made}
-
-
-def _surface_textures(arguments: dict[str, Any]) -> np.ndarray:
-    """Takes them out of the arguments, as Surface has them: one -1 for all surfaces if there are
-    none."""
-    given = arguments.pop("surface_textures")
-    indices = _arrays.contiguous("render", "surface_textures", given, np.int32)
-    if not indices.size:
-        return np.array(-1, np.int32)
-    if not isinstance(arguments.get("surfaces"), torch.Tensor):
-        raise ValueError("render: surface_textures belong to surfaces in a tensor; a Surface "
-                         "has its own texture")
-    return indices
-
-
 class _Render(torch.autograd.Function):
     """Each call has its own frame, so that renders may follow each other before backward."""
 
     @staticmethod
-    def forward(ctx: Any, call: _Call,  # type: ignore[override]
+    def forward(ctx: Any, call: Call,  # type: ignore[override]
                 *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
         frame = call.frame(tensors)
         images = tuple(torch.from_numpy(frame.shared(name)) for name in frame.outputs)
@@ -311,12 +167,6 @@ class _Render(torch.autograd.Function):
         gradients = ctx.call.gradients(ctx.frame, wanted, cotangents)
         return (None, *(None if gradient is None else gradient.reshape_as(tensor).to(tensor.dtype)
                         for gradient, tensor in zip(gradients, tensors)))
-
-
-@functools.lru_cache(maxsize=None)
-def _engine(threads: int) -> _Engine:
-    """One for each number of threads; a renderer serves any thread and any process."""
-    return _Engine(threads)
 
 
 def _packed(**parts: tuple[Value, tuple[int, ...]]) -> torch.Tensor:

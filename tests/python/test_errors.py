@@ -220,6 +220,19 @@ class Errors(unittest.TestCase):
                               r"positions\[4,1\] is nan")):
             with self.assertRaisesRegex(ValueError, "render: .*" + text):
                 renderer.render(scene.replace(**change), **IMAGE)
+        plain = scene.replace(uvs=None, textures=None, surfaces=None, face_surfaces=None,
+                              per_corner=())
+        more = plain.replace(positions=np.zeros((20, 3), np.float32), colors=np.ones((20, 3)),
+                             attributes=np.ones((20, 2)))
+        more["attributes"][19, 1] = np.nan
+        with self.assertRaisesRegex(ValueError, r"^render: scene 1: attributes\[19,1\] is nan"):
+            renderer.render([plain, more], **IMAGE, outputs=("attributes",))
+        frame = renderer.render(scene, **IMAGE)
+        positions = scene.positions.copy()
+        scene.positions[3, 2] = np.inf
+        with self.assertRaisesRegex(ValueError, r"^backward: scene 0: positions\[3,2\] is inf"):
+            renderer.backward(frame, color=np.ones_like(frame.color))
+        scene.positions[...] = positions
         uvs = np.array(scene["uvs"])
         index = (3, 2, 1)[:uvs.ndim]
         uvs[index] = np.inf

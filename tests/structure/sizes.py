@@ -31,7 +31,6 @@ VECTOR_BODY = "one vector body: its helpers share register types and are inlined
 KEYWORDS = "documents each keyword argument of a public class"
 LONG_FILES = {
     "python/bindings/compat/bind_nvdiffrast.cc": (342, "one binding a function of nvdiffrast's"),
-    "python/tilegrad/_renderer.py": (327, KEYWORDS),
     "python/tilegrad/_scene.py": (311, KEYWORDS),
     "src/nn/kernels/conv2d/winograd_tiles-inl.h": (394, VECTOR_BODY),
     "src/raster/drawn_faces-inl.h": (399, VECTOR_BODY),

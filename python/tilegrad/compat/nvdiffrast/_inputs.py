@@ -8,7 +8,8 @@ from typing import Any, Optional
 import numpy as np
 import torch
 
-from tilegrad._arrays import Sizes, as_indices
+from tilegrad._arrays import Sizes
+from tilegrad._indices import as_indices
 from tilegrad.compat import _tensors
 
 

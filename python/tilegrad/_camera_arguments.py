@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What constructors of cameras are given: arrays with or without a leading axis, sizes of images."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Iterable, Optional
+
+import numpy as np
+
+from tilegrad import _arrays
+
+Size = tuple[int, int]  # width, height of an image, pixels
+
+
+class Rows:
+    """Arguments of a constructor as rows for C++: their leading axes are broadcast, and given back
+    to what comes out."""
+
+    def __init__(self, function: str, **arguments: tuple[Any, tuple[int, ...]]) -> None:
+        arrays = {}
+        self.lead: tuple[int, ...] = ()
+        for name, (value, shape) in arguments.items():
+            array = _arrays.contiguous(function, name, value, np.float64)
+            split = array.ndim - len(shape)
+            if split not in (0, 1) or array.shape[split:] != shape:
+                raise ValueError(f"{function}: {name} has shape {array.shape}, expected "
+                                 f"{_arrays.shape_text(shape)} or "
+                                 f"{_arrays.shape_text(('N', *shape))}")
+            try:
+                self.lead = np.broadcast_shapes(self.lead, array.shape[:split])
+            except ValueError:
+                raise ValueError(f"{function}: {name} has {array.shape[0]} cameras, expected "
+                                 f"{self.lead[0]}") from None
+            arrays[name] = (array, shape)
+        self.arrays: Any = [self._rows(array, shape) for array, shape in arrays.values()]
+
+    def _rows(self, array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        rows = np.broadcast_to(array, self.lead + shape)
+        return np.ascontiguousarray(rows).reshape(-1, max(1, math.prod(shape)))
+
+    def shaped(self, numbers: np.ndarray) -> np.ndarray:
+        """(..., 17), of the leading axes that the arguments have."""
+        return numbers.reshape(self.lead + numbers.shape[-1:])
+
+
+def size_of(function: str, width: int, height: int) -> Size:
+    return (_arrays.as_number(function, "width", width, int),
+            _arrays.as_number(function, "height", height, int))
+
+
+def known_size(function: str, size: Any) -> Optional[Size]:
+    """`size` as a pair of numbers of pixels; None, which is not known, stays that."""
+    if size is None:
+        return None
+    if not isinstance(size, (tuple, list)) or len(size) != 2:
+        raise TypeError(f"{function}: size is {size!r}, expected (width, height) or None")
+    width, height = size
+    return (_arrays.as_pixels(function, "width", width),
+            _arrays.as_pixels(function, "height", height))
+
+
+def common_size(sizes: Iterable[Optional[Size]]) -> Optional[Size]:
+    """The one size that is known; None where none is, or several are."""
+    known = set(sizes) - {None}
+    return known.pop() if len(known) == 1 else None
+
+
+def checked_size(function: str, own: Optional[Size], size: Size) -> Size:
+    """`size`; ValueError, in the name of `function`, if `own`, a camera's, is known and another."""
+    if own in (None, size):
+        return size
+    here, there = ("{} x {}".format(*numbers) for numbers in (own, size))
+    call = ", ".join(map(str, (*own, *size)))
+    raise ValueError(f"{function}: the camera is for images of {here} pixels, not {there}: give "
+                     f"camera.resize({call})")
+
+
+def filled_size(width: Any, height: Any, own: tuple[Any, Any]) -> tuple[Any, Any]:
+    """Width and height of an image, those of `own` where one is None."""
+    return own[0] if width is None else width, own[1] if height is None else height
+
+
+def is_half(function: str, pixel_centre: str) -> bool:
+    return _arrays.check_choice(function, "pixel_centre", pixel_centre, ("integer", "half")) == 1
