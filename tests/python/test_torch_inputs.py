@@ -30,7 +30,7 @@ class Lists(unittest.TestCase):
     def check(self, options, own, shared):
         """One call of all meshes and a call each: the same images, and the same gradients."""
         leaves = [value for values in own.values() for value in values
-                  if isinstance(value, torch.Tensor)]
+                  if isinstance(value, torch.Tensor) and value.is_floating_point()]
         common = [value for value in shared.values() if isinstance(value, torch.Tensor)]
         for leaf in (*leaves, *common):
             leaf.requires_grad_()
@@ -115,6 +115,8 @@ class Types(unittest.TestCase):
             texture = self.given["textures"]
             halves["textures"] = Texture(texture.texels.bfloat16(), texture.wrap, texture.filter)
             linear = torch.nn.Linear(3, 3)
+            torch.nn.init.eye_(linear.weight)
+            torch.nn.init.zeros_(linear.bias)
             moved = linear(self.positions)  # as a network's output: bfloat16
             self.assertEqual(moved.dtype, torch.bfloat16)
             half = rendered({**self.given, **halves, "positions": moved})

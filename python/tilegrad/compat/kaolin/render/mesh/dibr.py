@@ -163,4 +163,4 @@ def _say_once_what_is_ignored() -> None:
         warnings.warn("tilegrad.compat.kaolin: boxlen and knum are ignored: the soft mask takes in "
                       "all faces, within max_alpha_error. exact_kaolin=True, or "
                       "use_exact_kaolin() for the whole program, gives Kaolin's truncated mask.",
-                      UserWarning, stacklevel=4)
+                      UserWarning, stacklevel=5)
