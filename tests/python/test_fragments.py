@@ -139,6 +139,7 @@ class ToFragments(unittest.TestCase):
 
     def test_errors(self):
         scene = blob()
+        scene = scene.replace(camera=scene.camera.replace(size=None))
 
         def fails(error, message, *arguments, **options):
             with self.assertRaisesRegex(error, message):
@@ -225,7 +226,7 @@ class RasterizeMeshes(unittest.TestCase):
         self.assertFalse(near[cut[cut >= 0]].any())
 
     def test_to_fragments(self):
-        scene = blob()
+        scene = blob(size=(16, 16))
         got = pytorch3d.to_fragments(scene, 2, width=16, height=16)
         self.assertIsInstance(got.zbuf, torch.Tensor)
         np.testing.assert_array_equal(
