@@ -24,13 +24,14 @@ class Training : public RunWork {
   }
 
   Status Begin(std::int64_t first_step) override {
+    // First: a run that is killed from here on is one to resume.
+    TILEGRAD_TRY(WriteTextAtomic(job_.run / kTrainSettings, WriteConfig(config_)));
     TILEGRAD_TRY(task_.Begin(job_.run, first_step));
     RunHeader header = task_.Header();
     header.name = config_.name;
     header.dataset = job_.data.string();
     header.machine = DescribeMachine();
     TILEGRAD_TRY(WriteHeader(job_.run, header));
-    TILEGRAD_TRY(WriteTextAtomic(job_.run / kTrainSettings, WriteConfig(config_)));
     if (job_.crew) ShareState(first_step);
     return {};
   }
