@@ -91,8 +91,8 @@ TEST_F(RunTest, Overrides) {
     EXPECT_EQ(again->name, config.name);
   }
   ExpectMessage(ApplyOverrides({"schedule.step=5"}, &config), "schedule.steps");
-  ExpectMessage(ApplyOverrides({"steps=5"}, &config), "\"schedule.steps\"");
-  ExpectMessage(ApplyOverrides({"training.batches=5"}, &config), "\"schedule.batch\"");
+  ExpectMessage(ApplyOverrides({"steps=5"}, &config), "did you mean schedule.steps?");
+  ExpectMessage(ApplyOverrides({"training.batches=5"}, &config), "did you mean schedule.batch?");
   ExpectMessage(ApplyOverrides({"loss.color=red"}, &config), "loss.color");
   ExpectMessage(ApplyOverrides({"loss.color"}, &config), "key=value");
   ExpectMessage(ApplyOverrides({"name=caf\xe9"}, &config), "name", "UTF-8");

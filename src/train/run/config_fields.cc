@@ -23,12 +23,18 @@ std::string_view TablePart(std::string_view key) {
 
 // " (did you mean schedule.steps?)"; a table may be missing, or another.
 std::string NearKeys(const ConfigFields& fields, const std::string& key) {
-  std::vector<std::string> keys, elsewhere;
+  std::vector<std::string> keys, same, similar;
   for (const ConfigField& field : fields) {
     keys.push_back(field.key);
-    if (IsNear(LastPart(key), LastPart(field.key))) elsewhere.push_back(field.key);
+    const std::string_view name = LastPart(field.key);
+    if (name == LastPart(key)) {
+      same.push_back(field.key);
+    } else if (IsNear(LastPart(key), name)) {
+      similar.push_back(field.key);
+    }
   }
   const std::string near = DidYouMean(key, keys);
+  const std::vector<std::string>& elsewhere = same.empty() ? similar : same;
   if (!near.empty() || elsewhere.empty()) return near;
   return fmt::format(" (did you mean {}?)", fmt::join(elsewhere, " or "));
 }
