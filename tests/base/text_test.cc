@@ -20,7 +20,7 @@ TEST(Words, AreSuggestedWhereTheyAreNear) {
   EXPECT_TRUE(IsNear("schedule.step", "schedule.steps"));
   EXPECT_FALSE(IsNear("optimizer.lr", "softras.far"));
   EXPECT_FALSE(IsNear("lr", "far"));
-  EXPECT_EQ(DidYouMean("--outt", {"--outputs", "--out", "--view"}),
+  EXPECT_EQ(DidYouMean("--outp", {"--outputs", "--out", "--view"}),
             " (did you mean --out or --outputs?)");
   EXPECT_EQ(DidYouMean("--color", {"--view"}), "");
 }

@@ -102,7 +102,7 @@ TEST_F(BrokenInputs, Images) {
   ASSERT_TRUE(io::SavePng(folder_ / "opaque.png", image).ok());
   ExpectRefused(Predict(folder_ / "opaque.png"), "opaque.png", "mask");
   ASSERT_TRUE(io::SavePng(folder_ / "rgb.png", ImageU8(8, 8, 3, 9)).ok());
-  ExpectRefused(Predict(folder_ / "rgb.png"), "rgb.png", "alpha");
+  ExpectRefused(Predict(folder_ / "rgb.png"), "rgb.png", "transparent background");
   ExpectRefused(Predict(folder_ / "rgb.png", " --mask " + (folder_ / "opaque.png").string()),
                 "not cut out");
   ASSERT_TRUE(io::SavePng(folder_ / "small.png", ImageU8(4, 4, 1, 255)).ok());

@@ -87,9 +87,10 @@ void ExpectRefused(const std::string& options, const std::string& says) {
 TEST_F(DatasetTest, SourcesThatDoNotGoTogether) {
   const std::string folder = folder_.string(), out = " --out " + folder + "/out";
   ExpectRefused("--source planes,folder --input " + folder + out, "reads several folders");
-  ExpectRefused("--source cars,folder" + out, "each is sweethome3d, planes, ships or cars");
-  ExpectRefused("--source cars,cars" + out, "and there once");
-  ExpectRefused("--source thirteen,cars" + out, "each is sweethome3d");
+  ExpectRefused("--source cars,folder" + out,
+                "different ones of sweethome3d, planes, ships and cars");
+  ExpectRefused("--source cars,cars" + out, "several must be different");
+  ExpectRefused("--source thirteen,cars" + out, "different ones of sweethome3d");
   ExpectRefused("--source thirteen --input " + folder + out, "--input");
   ExpectRefused("--source boats" + out, "boats");
 }

@@ -133,7 +133,7 @@ TEST_F(HostileNames, TemporariesOfKilledCallsGo) {
                              " --size 8 --outputs color,depth --out " + Quoted("out/drawn.png") +
                              " --write-cameras ";
   EXPECT_EQ(RunProgram(render + Quoted("out/cameras.json")).exit_code, 0);
-  EXPECT_EQ(RunProgram(render + Quoted("out/colmap")).exit_code, 0);
+  EXPECT_EQ(RunProgram(render + Quoted("out/colmap") + " --force").exit_code, 0);
   for (const Path& file : left) EXPECT_FALSE(std::filesystem::exists(file)) << file;
   for (const Path& file : kept) EXPECT_TRUE(std::filesystem::exists(file)) << file;
 }

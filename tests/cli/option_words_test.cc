@@ -66,7 +66,8 @@ TEST_F(OptionWords, ThatAreTooFewAreSaidOfTheirOption) {
   ExpectRefused("render " + mesh + " --eye 0 0", 2, "--eye");
   ExpectRefused("render --eye 0 0 " + mesh, 2, "--eye");
   ExpectRefused("render " + mesh + " --eye 0 0 --size 8", 2, "--eye");
-  ExpectRefused("render " + mesh + " --eye 0 0 4 5", 3, "5: no such file");  // another mesh
+  ExpectRefused("render --out " + In("out") + " " + mesh + " --eye 0 0 4 5", 3,
+                "5: no such file");  // another mesh
   ExpectRefused("render " + mesh + " --eye 0 0 4 --eye 0 0 5", 2, "--eye");
   ExpectRefused("render " + mesh + " --light 1 0 0", 2, "--light");
   ExpectRefused("render " + mesh + " --sh 1 2 3", 2, "--sh");
@@ -126,7 +127,7 @@ TEST_F(OptionWords, TheLimitOfMemoryIsAnOptionOfEveryReader) {
   Write("t.mtl", std::string("newmtl m\nmap_Kd t.png\n"));
   Write("t.obj", std::string("mtllib t.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
                              "f 1/1 2/1 3/1\n"));
-  const std::string render = "render " + In("t.obj") + " --size 8 --out " + In("p.png");
+  const std::string render = "render " + In("t.obj") + " --size 8 --force --out " + In("p.png");
   ExpectRefused(render + " --read-limit 500K", 1, "--read-limit");
   ExpectDone(render + " --read-limit 20M");
   const Outcome stronger = RunProgram(render + " --read-limit 20M", "TILEGRAD_READ_LIMIT=1K ");

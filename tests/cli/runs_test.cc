@@ -106,7 +106,7 @@ TEST_F(Runs, SayWhatIsMissing) {
 
 TEST_F(Runs, OfFitsGoOnWithoutAnyOption) {
   ASSERT_TRUE(io::SaveGlb(folder_ / "a.glb", Icosphere(1, 1)).ok());
-  Done("views " + In("a.glb") + " --views 5 --size 32 --out " + In("views"));
+  Done("views " + In("a.glb") + " --views 5 --held-out 0 --size 32 --out " + In("views"));
   const std::string in_folder = "cd " + folder_.string() + " && ";
   const Outcome begun = RunProgram(
       "fit views --steps 4 --smoothing 3 --light-direction 1 0 0 --lighting lambert --rate "

@@ -129,9 +129,9 @@ TEST_F(Sample, RefusesWhatItCannotDo) {
   ExpectRefused("sample --run " + Run("t") + " --out " + In("x"),
                 "not a generator; train one with --config gan_quick");
   ExpectRefused("sample --run " + Run("g") + " --count 1 --interpolate 4 --out " + In("x"),
-                "--count 2 or more");
+                "--interpolate needs two samples or more");
   ExpectRefused("sample --run " + Run("g") + " --judge " + Run("t") + " --out " + In("x"),
-                "of --score");
+                "belong to --score");
   ExpectRefused("sample --run " + Run("g") + " --score --judge " + Run("t") + " --out " + In("x"),
                 "task.kind = \"classify\"");
   Write("y/sheet.png", std::string("mine"));

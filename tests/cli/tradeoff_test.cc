@@ -85,7 +85,7 @@ TEST_F(TradeoffCommand, TrainsWithEachErrorAndScores) {
   EXPECT_NE(Out("tradeoff.md").find("### Training"), std::string::npos);
   // Without trainings, the table of these is told from what is new.
   const Outcome again = Run((folder_ / "tent.obj").string() +
-                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1");
+                            " --size 8 --errors 1e-2 --deltas 1e-2 --repetitions 1 --force");
   ASSERT_EQ(again.exit_code, 0) << again.output;
   EXPECT_NE(again.output.find("training.csv is from an earlier call"), std::string::npos);
 }
@@ -112,7 +112,7 @@ TEST_F(TradeoffCommand, TrainingsWarnOfBrokenCheckpoints) {
   const std::string scores = Out("training.csv");
   std::filesystem::resize_file(folder_ / "out/training_0.01/checkpoints/step_00000002.safetensors",
                                1000);
-  const Outcome again = Run(study);
+  const Outcome again = Run(study + " --force");
   ASSERT_EQ(again.exit_code, 0) << again.output;
   EXPECT_NE(again.output.find("step_00000002.safetensors"), std::string::npos) << again.output;
   // But for the seconds, the same.

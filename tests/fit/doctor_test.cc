@@ -97,8 +97,7 @@ TEST(Doctor, AllLossFartherThanDeltaReaches) {
   patient.MoveMesh(0.85f, 0);  // beside where the image shows it
   patient.render.delta = 1e-6;
   const Finding finding = patient.Ask(Parameter::kPositions);
-  EXPECT_NE(finding.sentence.find("farther from it than delta"), std::string::npos)
-      << finding.sentence;
+  EXPECT_NE(finding.sentence.find("out of reach of delta"), std::string::npos) << finding.sentence;
 }
 
 TEST(Doctor, OnlyTheSilhouetteCounts) {

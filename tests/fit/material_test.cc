@@ -163,7 +163,7 @@ TEST_F(LitFit, TheMeanOfTheLightStays) {
 TEST_F(LitFit, AMaterialBringsItsLight) {
   FitJob job = Job(MaterialKind::kPhong, "both");
   job.config.lighting = Lighting::kLambert;
-  ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "material", "leave the lighting out");
+  ExpectMessage(RunFit(job, Workers(1), {}, stop_).status(), "material", "leave out the lighting");
 }
 
 // Directions of harmonics, where the light is known.

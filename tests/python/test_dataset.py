@@ -60,7 +60,7 @@ class Items(FolderTest):
         data = files.Dataset(dataset(), "test")
         for item in data:
             name = data.classes[item["class"]]
-            run_program("dataset-view", "--data", dataset(), "--class", name, "--out",
+            run_program("dataset-view", "--data", dataset(), "--class", name, "--force", "--out",
                         self.folder / "view.png")
             shown = files.load_image(self.folder / "view.png")[..., 3] / 255
             np.testing.assert_allclose(item["masks"][0], shown, atol=1e-6)

@@ -21,7 +21,8 @@ class Predict(FolderTest):
         run_program("dataset-view", "--data", dataset(), "--out", self.image)
 
     def _program(self, *arguments: object) -> bytes:
-        run_program("predict", self.image, "--run", run(), "--out", self.folder, *arguments)
+        run_program("predict", self.image, "--run", run(), "--out", self.folder, "--force",
+                    *arguments)
         return (self.folder / "view_predicted.glb").read_bytes()
 
     def _python(self, mesh: files.Mesh) -> bytes:

@@ -85,7 +85,7 @@ class Fit(unittest.TestCase):
         self.assertGreater(result.held_out["silhouette_iou"], 0.7)
 
     def test_finds_cameras_of_arrays_and_of_pictures_in_a_folder(self):
-        with self.assertRaisesRegex(ValueError, "needs 6 or more"):
+        with self.assertRaisesRegex(ValueError, "it takes 6 or more"):
             tilegrad.fit(IMAGES[:3], fov=40, **SMALL)
         folder = self.out.parent / "pictures"
         folder.mkdir()
@@ -109,7 +109,7 @@ class Fit(unittest.TestCase):
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, stepz=3), "did you mean steps"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, background="sky"), "mask, plain or none"),
                 (lambda: tilegrad.fit(IMAGES, fov=200), "5 to 150 degrees"),
-                (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "no image says where"),
+                (lambda: tilegrad.fit(IMAGES[..., :3], background="none"), "cannot be found without masks"),
                 (lambda: tilegrad.fit(IMAGES[:3], CAMERAS), "cameras has shape"),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, optimize=["shape"]), '"shape" cannot'),
                 (lambda: tilegrad.fit(IMAGES, CAMERAS, lighting="neon"), "expected one of"),
@@ -131,7 +131,7 @@ class Fit(unittest.TestCase):
         self.assertEqual((told[0].step, told[0].steps, told[0].stage), (1, 300, "fitting"))
         with self.assertRaisesRegex(ValueError, "quality and steps both"):
             tilegrad.fit(IMAGES, CAMERAS, quality="fast", **SMALL)
-        with self.assertRaisesRegex(ValueError, 'fit: quality is "good", expected fast, normal or'):
+        with self.assertRaisesRegex(ValueError, 'quality is "good", expected fast, normal or best'):
             tilegrad.fit(IMAGES, CAMERAS, quality="good", **small)
 
     def test_a_callback_that_wants_stages_is_told_of_all(self):
@@ -144,9 +144,9 @@ class Fit(unittest.TestCase):
         told = All()
         tilegrad.fit(IMAGES, CAMERAS, callback=told, **SMALL)
         self.assertEqual((told[0].stage, dict(told[0].values)), ("preparing", {}))
-        fitting = [at.step for at in told if at.stage == "fitting"]
-        self.assertEqual(fitting, list(range(1, 61)))
-        self.assertIn("loss", told[-1].values)
+        fitting = [at for at in told if at.stage == "fitting"]
+        self.assertEqual([at.step for at in fitting], list(range(1, 61)))
+        self.assertIn("loss", fitting[-1].values)
 
     def test_the_work_has_a_thread_callbacks_have_the_callers(self):
         """So a callback may draw, and use what belongs to its thread."""

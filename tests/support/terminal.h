@@ -32,11 +32,11 @@ class TerminalProgram {
   TerminalProgram(const TerminalProgram&) = delete;
   TerminalProgram& operator=(const TerminalProgram&) = delete;
 
-  // Whether the program says so before it ends.
-  bool AwaitText(const std::string& text) {
-    while (said_.find(text) == std::string::npos && Read()) {
+  // Whether the program says so before it ends, after the first `from` bytes of what it says.
+  bool AwaitText(const std::string& text, std::size_t from = 0) {
+    while (said_.find(text, from) == std::string::npos && Read()) {
     }
-    return said_.find(text) != std::string::npos;
+    return said_.find(text, from) != std::string::npos;
   }
   void Resize(int columns) {
     const winsize size = SizeOf(columns);

@@ -62,7 +62,7 @@ class TrainerTest : public TempFolderTest {
     });
     stop_ = false;
     ASSERT_EQ(outcome.status().code(), StatusCode::kCancelled) << outcome.status().message();
-    ExpectMessage(outcome.status(), "--resume");
+    ExpectMessage(outcome.status(), "everything is saved");
   }
   // Starts anew in `name`, undisturbed.
   void RunWhole(const std::string& name, int workers) {

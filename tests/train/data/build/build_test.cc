@@ -88,7 +88,7 @@ TEST_F(BuildTest, WorkersDoNotChangeAByte) {
   ASSERT_TRUE(Build(*source, root_ / "two", 2).ok());
   ASSERT_TRUE(Build(*source, root_ / "seven", 7).ok());
   const auto one = Contents(root_ / "one");
-  EXPECT_EQ(one.size(), 10u + 5u);  // models; dataset.json, two lists, the sheet, the lock
+  EXPECT_EQ(one.size(), 10u + 4u);  // models; dataset.json, two lists, the sheet
   EXPECT_EQ(one, Contents(root_ / "two"));
   EXPECT_EQ(one, Contents(root_ / "seven"));
 }
