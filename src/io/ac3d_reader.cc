@@ -266,7 +266,7 @@ class Ac3dReader {
 
 Result<LoadedMesh> ReadAc3d(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
-  Ac3dReader reader(source, name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  Ac3dReader reader(source, name, TextOf(bytes));
   TILEGRAD_TRY(reader.Read());
   return std::move(reader.out);
 }

@@ -194,8 +194,7 @@ Result<LoadedMesh> ReadOff(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
   const std::string place = source.Describe(name);
   LoadedMesh out;
-  OffReader reader({Lines({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), place},
-                   out);
+  OffReader reader({Lines(TextOf(bytes)), place}, out);
   TILEGRAD_TRY(reader.Read());
   return out;
 }

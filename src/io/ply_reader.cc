@@ -7,6 +7,7 @@
 #include "io/mesh_readers.h"
 #include "io/ply_body.h"
 #include "io/ply_header.h"
+#include "io/text_scan.h"
 
 namespace tilegrad::io {
 namespace {
@@ -63,9 +64,7 @@ class PlyTextures {
 Result<LoadedMesh> ReadPly(const FileSource& source, const std::string& name) {
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
   const std::string place = source.Describe(name);
-  TILEGRAD_ASSIGN(
-      const PlyHeader header,
-      ParsePlyHeader({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, place));
+  TILEGRAD_ASSIGN(const PlyHeader header, ParsePlyHeader(TextOf(bytes), place));
   LoadedMesh out;
   TILEGRAD_ASSIGN(const std::vector<double> images, ReadPlyBody(header, place, out));
   PlyTextures(header, source, name, out).Add(images);

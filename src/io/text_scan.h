@@ -5,10 +5,20 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
+#include "base/error.h"
+
 namespace tilegrad::io {
+
+inline std::string_view TextOf(std::span<const std::uint8_t> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 // The text without UTF-8's byte order mark, if it begins with one.
 inline std::string_view WithoutByteOrderMark(std::string_view text) {
@@ -40,24 +50,48 @@ class Lines {
   std::size_t number_ = 0;
 };
 
+// OK, or an error that says how to save the file: UTF-16 is no text to these readers.
+inline Status CheckTextEncoding(std::string_view text, const std::string& place) {
+  if (!text.starts_with("\xff\xfe") && !text.starts_with("\xfe\xff")) return {};
+  return DataLoss("{}: text in UTF-16; save it as UTF-8", place);
+}
+
+inline constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
+
+inline std::string_view Trimmed(std::string_view text) {
+  const auto begin = text.find_first_not_of(kWhiteSpace);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kWhiteSpace) + 1 - begin);
+}
+
 // Takes the next run of characters other than white space off `rest`; empty at the end.
 inline std::string_view NextToken(std::string_view& rest) {
-  constexpr std::string_view kSpace = " \t\r\n\v\f";
-  const auto begin = rest.find_first_not_of(kSpace);
+  const auto begin = rest.find_first_not_of(kWhiteSpace);
   if (begin == std::string_view::npos) return rest = {};
-  auto end = rest.find_first_of(kSpace, begin);
+  auto end = rest.find_first_of(kWhiteSpace, begin);
   if (end == std::string_view::npos) end = rest.size();
   const auto token = rest.substr(begin, end - begin);
   rest.remove_prefix(end);
   return token;
 }
 
-// The whole token as a number of type T, a finite one; a leading '+' is fine.
+// The whole token as a number of type T, "nan" and "inf" included, also as old programs of Windows
+// write them ("1.#QNAN"): as NaN. A leading '+' is fine.
 template <class T>
-bool ParseNumber(std::string_view token, T& value) {
+bool ParseAnyNumber(std::string_view token, T& value) {
+  if constexpr (std::is_floating_point_v<T>) {
+    value = std::numeric_limits<T>::quiet_NaN();
+    if (token.find(".#") != std::string_view::npos) return true;
+  }
   if (token.starts_with('+')) token.remove_prefix(1);
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  if (error != std::errc() || end != token.data() + token.size()) return false;
+  return error == std::errc() && end == token.data() + token.size();
+}
+
+// The same of a finite one.
+template <class T>
+bool ParseNumber(std::string_view token, T& value) {
+  if (!ParseAnyNumber(token, value)) return false;
   if constexpr (std::is_floating_point_v<T>) return std::isfinite(value);
   return true;
 }

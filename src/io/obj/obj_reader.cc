@@ -16,10 +16,6 @@
 namespace tilegrad::io {
 namespace {
 
-std::string_view TextOf(const Bytes& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 // The materials of all libraries of a file, by name.
 class ObjLibraries {
  public:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/obj/obj_text.h"
 
-#include "base/error.h"
 #include "io/text_scan.h"
 
 namespace tilegrad::io {
@@ -39,18 +38,6 @@ bool ObjLines::Next(std::string_view& keyword, std::string_view& rest) {
     joined_.clear();
   }
   return false;
-}
-
-Status CheckTextEncoding(std::string_view text, const std::string& place) {
-  if (!text.starts_with("\xff\xfe") && !text.starts_with("\xfe\xff")) return {};
-  return DataLoss("{}: text in UTF-16; save it as UTF-8", place);
-}
-
-std::string_view Trimmed(std::string_view text) {
-  constexpr std::string_view kSpace = " \t\r\n\v\f";
-  const auto begin = text.find_first_not_of(kSpace);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kSpace) + 1 - begin);
 }
 
 std::string_view WholeName(std::string_view rest) {

@@ -5,8 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "tilegrad/status.h"
-
 namespace tilegrad::io {
 
 // Walks over statements: comments and empty lines are left out, lines that end with a backslash are
@@ -26,11 +24,6 @@ class ObjLines {
   std::string joined_;
   std::size_t number_ = 0;
 };
-
-// OK, or an error that says how to save the file: UTF-16 is no text to these readers.
-Status CheckTextEncoding(std::string_view text, const std::string& place);
-
-std::string_view Trimmed(std::string_view text);
 
 // The rest of a line as one name, which may contain spaces, without quotes around it.
 std::string_view WholeName(std::string_view rest);
