@@ -10,6 +10,7 @@
 #include "io/assimp_import.h"
 #include "io/fbx_wrapping.h"
 #include "io/image_file.h"
+#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
 
@@ -75,6 +76,7 @@ class Assembly {
     const ImportedPart& part = scene_.parts[instance.part];
     if (part.triangles.empty()) return {};
     Mesh mesh = ConvertPart(part);
+    FinishColors(ColorNumbers::kShown, &mesh.colors, &out_.warnings);
     const glm::dmat4x3& m = instance.to_scene;
     std::vector<glm::dvec3> exact;
     for (const glm::vec3& p : mesh.positions) exact.push_back(m * glm::dvec4(p, 1));

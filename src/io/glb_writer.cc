@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "io/glb_builder.h"
 #include "io/image_file.h"
+#include "io/mesh_colors.h"
 #include "scene/srgb.h"
 
 namespace tilegrad::io {
@@ -184,10 +185,6 @@ void AddMaterials(GlbBuilder& glb, const Mesh& mesh) {
   }
   if (unlit) glb.json["extensionsUsed"] = {"KHR_materials_unlit"};
   AddTextures(glb, uses);
-}
-
-bool IsFinite(const glm::vec4& c) {
-  return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b) && std::isfinite(c.a);
 }
 
 // Large numbers have no linear counterpart; JSON would say null, and readers take white.

@@ -4,48 +4,82 @@
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
+#include <span>
 
 #include "base/error.h"
+#include "scene/srgb.h"
 
 namespace tilegrad::io {
 namespace {
 
-bool IsByte(glm::vec4 color) {
-  return glm::all(glm::equal(glm::vec3(color), glm::round(glm::vec3(color)))) &&
-         glm::all(glm::lessThanEqual(glm::vec3(color), glm::vec3(255)));
+constexpr float kBrightest = 16;  // no light explains more
+
+float Most(glm::vec4 color) { return std::max({color.r, color.g, color.b}); }
+
+bool IsWhole(glm::vec4 color) {
+  const glm::vec3 rgb(color);
+  return glm::all(glm::equal(rgb, glm::round(rgb)));
 }
 
-// Colours are 0 to 1. Some programs write bytes as floating point, 0 to 255: whole numbers, and
-// not only 0 and 1, or numbers that no light explains.
-void ClampColors(std::vector<glm::vec4>* colors, std::vector<std::string>* warnings) {
-  constexpr float kBrightest = 16;
-  float most = 0;
-  for (const glm::vec4& c : *colors) most = std::max({most, c.r, c.g, c.b});
-  const bool bytes =
-      most > kBrightest || (most > 1 && std::all_of(colors->begin(), colors->end(), IsByte));
-  if (bytes) {
-    warnings->push_back(
-        fmt::format("vertex colours are numbers up to {}; taken for bytes, 0 to 255", most));
-    for (glm::vec4& c : *colors) c = {glm::vec3(c) / 255.0f, c.a > 1 ? c.a / 255 : c.a};
-  } else if (most > 1 + 1e-3f) {
-    warnings->push_back(fmt::format("vertex colours reach {}; cut to 1", most));
+// What stands for 1. Some programs write bytes, or 16 bits, as floating point: whole numbers, and
+// not only 0 and 1, or numbers beyond all light.
+float FullOf(std::span<const glm::vec4> colors, float most) {
+  const bool whole = std::all_of(colors.begin(), colors.end(), IsWhole);
+  if (whole && most > 255) return 65535;
+  return most > kBrightest || (most > 1 && whole) ? 255 : 1;
+}
+
+glm::vec4 Finished(glm::vec4 c, float full, ColorNumbers numbers) {
+  if (full > 1) c = {glm::vec3(c) / full, c.a > 1 ? c.a / full : c.a};
+  c = glm::clamp(c, 0.0f, 1.0f);
+  return full == 1 && numbers == ColorNumbers::kLinear ? LinearToSrgb(c) : c;
+}
+
+// Files of many parts say it once.
+void WarnOnce(std::string_view text, std::vector<std::string>* warnings) {
+  if (std::find(warnings->begin(), warnings->end(), text) == warnings->end())
+    warnings->emplace_back(text);
+}
+
+// Of a material, whose file counts colours to `full`.
+void FinishMaterial(ColorNumbers numbers, float full, Material& material,
+                    std::vector<std::string>* warnings) {
+  const glm::vec4 c = material.base_color;
+  if (Most(c) <= 1) full = 1;  // 1 is no shade of black
+  if (Most(c) > 1 + 1e-3f) {
+    warnings->push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is {}", material.name,
+                                    c.r, c.g, c.b,
+                                    full > 1 ? "taken as counted from 0 to 255" : "cut to 1"));
   }
-  for (glm::vec4& c : *colors) c = glm::clamp(c, 0.0f, 1.0f);
+  material.base_color = Finished(c, full, numbers);
 }
 
 }  // namespace
 
-void ClampColors(LoadedMesh& loaded) {
-  ClampColors(&loaded.mesh.colors, &loaded.warnings);
-  ClampColors(&loaded.mesh.corner_colors, &loaded.warnings);
-  for (Material& material : loaded.mesh.materials) {
-    const glm::vec4& c = material.base_color;
-    if (std::max({c.r, c.g, c.b}) > 1 + 1e-3f) {
-      loaded.warnings.push_back(fmt::format("material \"{}\": its colour ({}, {}, {}) is cut to 1",
-                                            material.name, c.r, c.g, c.b));
-    }
-    material.base_color = glm::clamp(material.base_color, 0.0f, 1.0f);
+bool IsFinite(const glm::vec4& color) {
+  return !glm::any(glm::isnan(color)) && !glm::any(glm::isinf(color));
+}
+
+void FinishColors(ColorNumbers numbers, std::vector<glm::vec4>* colors,
+                  std::vector<std::string>* warnings) {
+  if (!std::all_of(colors->begin(), colors->end(), IsFinite)) return;  // Validate says so
+  float most = 0;
+  for (const glm::vec4& c : *colors) most = std::max(most, Most(c));
+  const float full = FullOf(*colors, most);
+  if (full > 1) {
+    WarnOnce(fmt::format("vertex colours are taken as counted from 0 to {}", full), warnings);
+  } else if (most > 1 + 1e-3f) {
+    WarnOnce("vertex colours beyond 1 are cut to 1", warnings);
   }
+  for (glm::vec4& c : *colors) c = c == kNoColor ? glm::vec4(1) : Finished(c, full, numbers);
+}
+
+void FinishMaterials(ColorNumbers numbers, LoadedMesh& loaded) {
+  float most = 0;
+  for (const Material& material : loaded.mesh.materials)
+    most = std::max(most, Most(material.base_color));
+  for (Material& material : loaded.mesh.materials)
+    FinishMaterial(numbers, most > kBrightest ? 255 : 1, material, &loaded.warnings);
 }
 
 void WarnOfTransparentColors(LoadedMesh& loaded) {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "base/error.h"
@@ -82,6 +82,21 @@ glm::vec3 UnitOr(glm::vec3 normal, glm::vec3 fallback) {
   const glm::dvec3 n(normal);  // its square must not overflow
   const double length = glm::length(n);
   return length > 0 ? glm::vec3(n / length) : fallback;
+}
+
+// Normals follow from the surface: one that is no number costs nobody the mesh.
+void DropNonFiniteNormals(LoadedMesh& loaded) {
+  bool dropped = false;
+  for (auto* normals :
+       {&loaded.mesh.normals, &loaded.mesh.corner_normals, &loaded.tables.normals}) {
+    for (glm::vec3& normal : *normals) {
+      if (std::isfinite(normal.x) && std::isfinite(normal.y) && std::isfinite(normal.z)) continue;
+      normal = glm::vec3(0);  // MakeNormalsUnit puts the surface's own there
+      dropped = true;
+    }
+  }
+  if (dropped)
+    loaded.warnings.emplace_back("normals that are not finite numbers: the surface's own instead");
 }
 
 // Files hold normals of any length, zero included.
@@ -229,10 +244,14 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
   PlaceNearOrigin(*loaded);
+  DropNonFiniteNormals(*loaded);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())
     return DataLoss("{}: {}", place, valid.message());
-  ClampColors(*loaded);
-  if (format->read != ReadGltf) WarnOfTransparentColors(*loaded);  // glTF says when alpha counts
+  for (auto* colors : {&loaded->mesh.colors, &loaded->mesh.corner_colors})
+    FinishColors(ColorNumbers::kShown, colors, &loaded->warnings);
+  const bool gltf = format->read == ReadGltf;
+  FinishMaterials(gltf ? ColorNumbers::kLinear : ColorNumbers::kShown, *loaded);
+  if (!gltf) WarnOfTransparentColors(*loaded);  // glTF says when alpha counts
   MakeNormalsUnit(loaded->mesh);
   return loaded;
 }

@@ -196,6 +196,15 @@ TEST_F(ObjTest, WhiteWhereNoMaterialIsNamed) {
   EXPECT_EQ(mesh.materials[3].base_color, glm::vec4(0.25f, 0.25f, 0.25f, 1));
 }
 
+TEST_F(ObjTest, NormalsThatAreNoneAreTheSurfaces) {
+  for (const std::string none : {"nan", "inf", "-1.#IND", "1e300"}) {
+    const auto loaded = Load(kSquare + "vn 0 0 2\nvn " + none + " 0 1\nf 1//1 2//2 3//1\n", 1);
+    ExpectNames(loaded.warnings[0], "normals that are not finite");
+    EXPECT_EQ(loaded.mesh.corner_normals, std::vector<glm::vec3>(3, {0, 0, 1}));
+    EXPECT_EQ(loaded.tables.normals, (std::vector<glm::vec3>{{0, 0, 2}, {0, 0, 0}}));
+  }
+}
+
 // --- material libraries ---
 
 TEST_F(ObjTest, LibrariesByEveryName) {

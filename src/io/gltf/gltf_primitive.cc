@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "io/gltf/gltf_extensions.h"
 #include "io/gltf/gltf_material.h"
-#include "scene/srgb.h"
 
 namespace tilegrad::io {
 namespace {
@@ -127,8 +126,8 @@ bool IsCompressed(const tinygltf::Model& model, const tinygltf::Primitive& p) {
 // The attributes of a primitive, morphed.
 struct Attributes {
   std::vector<glm::vec3> positions, normals;
-  std::vector<glm::vec4> colors;  // linear
-  std::vector<glm::vec2> uvs;     // as in the file
+  std::vector<glm::vec4> colors;  // as in the file, as uvs
+  std::vector<glm::vec2> uvs;
 };
 
 Result<Attributes> ReadAttributes(const tinygltf::Model& model, const tinygltf::Primitive& p,
@@ -164,8 +163,9 @@ Result<Mesh> ConvertGltfPrimitive(const tinygltf::Model& model, const tinygltf::
   Mesh mesh;
   TILEGRAD_ASSIGN(const auto indices, ReadIndices(model, p, read.positions.size(), what));
   mesh.faces = Triangles(p.mode, indices);
-  mesh.positions = std::move(read.positions), mesh.normals = std::move(read.normals);
-  for (const glm::vec4& color : read.colors) mesh.colors.push_back(LinearToSrgb(color));
+  mesh.positions = std::move(read.positions);
+  mesh.normals = std::move(read.normals);
+  mesh.colors = std::move(read.colors);
   if (read.uvs.empty()) return mesh;
   for (const Face& face : mesh.faces) {  // glTF's v points down
     for (const std::int32_t v : face) {

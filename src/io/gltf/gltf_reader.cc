@@ -16,9 +16,9 @@
 #include "io/gltf/gltf_primitive.h"
 #include "io/gltf/gltf_skin.h"
 #include "io/image_file.h"
+#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "scene/shapes.h"
-#include "scene/srgb.h"
 
 namespace tilegrad::io {
 namespace {
@@ -130,7 +130,7 @@ Material GltfWalk::ConvertMaterial(int index) {
   const tinygltf::Material& from = model.materials[index];
   material.name = from.name;
   const GltfBaseColor color = GltfBaseColorOf(model, index);
-  material.base_color = LinearToSrgb(glm::vec4(color.factor));
+  material.base_color = glm::vec4(color.factor);  // linear, until FinishMaterials
   material.alpha_mode = from.alphaMode == "MASK"    ? AlphaMode::kMask
                         : from.alphaMode == "BLEND" ? AlphaMode::kBlend
                                                     : AlphaMode::kOpaque;
@@ -188,6 +188,8 @@ Status GltfWalk::AddPrimitive(const tinygltf::Primitive& p, PrimitivePlace& at,
   }
   TILEGRAD_ASSIGN(Mesh mesh, ConvertGltfPrimitive(model, p, at.weights, what));
   if (mesh.faces.empty()) return {};
+  FinishColors(ColorNumbers::kLinear, &mesh.colors, &out.warnings);
+  if (p.attributes.count("COLOR_1") > 0) Warn("sets of vertex colours but COLOR_0 are left out");
   const Material material = ConvertMaterial(p.material);
   if (material.base_color_texture >= 0 && mesh.corner_uvs.empty()) {
     Warn(fmt::format("material \"{}\": its texture is not drawn where a mesh has no {}",

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "base/error.h"
+#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/obj/obj_text.h"
 #include "io/text_scan.h"
@@ -65,11 +66,13 @@ class ObjParser {
   }
 
   // Up to `most` numbers, up to the end or a comment. Returns how many; -1: `bad_` is none.
-  int Numbers(std::string_view rest, double* values, int most) {
+  int Numbers(std::string_view rest, double* values, int most, bool finite = true) {
     int count = 0;
     for (bad_ = NextToken(rest); !bad_.empty() && bad_[0] != '#' && count < most;
          bad_ = NextToken(rest)) {
-      if (!ParseNumber(bad_, values[count++])) return -1;
+      if (!ParseAnyNumber(bad_, values[count])) return -1;
+      if (finite && !std::isfinite(values[count])) return -1;
+      ++count;
     }
     return count;
   }
@@ -94,7 +97,7 @@ class ObjParser {
       return NeedsNumbers("a vertex needs three finite numbers in float's range");
     if (count == 5 || count == 8) ++odd_vertices_;
     if (count >= 6) {
-      out.colors.resize(out.positions.size(), glm::vec4(1));
+      out.colors.resize(out.positions.size(), kNoColor);
       out.colors.emplace_back(n[3], n[4], n[5], count >= 7 ? n[6] : 1);
     }
     out.positions.push_back(p);
@@ -111,7 +114,8 @@ class ObjParser {
 
   Status Normal(std::string_view rest) {
     std::array<double, 3> n;
-    if (Numbers(rest, n.data(), 3) < 3) return NeedsNumbers("a normal needs three finite numbers");
+    if (Numbers(rest, n.data(), 3, /*finite=*/false) < 3)
+      return NeedsNumbers("a normal needs three numbers");
     out.normals.emplace_back(n[0], n[1], n[2]);
     return CheckCount(out.normals.size());
   }
@@ -201,7 +205,7 @@ class ObjParser {
 
   void AddWarnings() {
     const auto warn = [&](std::string text) { out.warnings.push_back(std::move(text)); };
-    if (!out.colors.empty()) out.colors.resize(out.positions.size(), glm::vec4(1));
+    if (!out.colors.empty()) out.colors.resize(out.positions.size(), kNoColor);
     if (lines_or_points_) warn("points or lines left out");
     if (small_faces_ > 0)
       warn(fmt::format("{} faces with fewer than three corners left out", small_faces_));

@@ -25,7 +25,7 @@ struct ObjPolygon {
 
 struct ObjStatements {
   std::vector<glm::dvec3> positions;
-  std::vector<glm::vec4> colors;  // empty, or one a vertex: white where the file has none
+  std::vector<glm::vec4> colors;  // empty, or one a vertex: kNoColor where the file has none
   std::vector<glm::vec2> uvs;
   std::vector<glm::vec3> normals;
   std::vector<ObjCorner> corners;  // of all polygons, one after the other; all in range
