@@ -8,57 +8,14 @@
 #include <span>
 
 #include "base/error.h"
+#include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
+#include "io/ply_columns.h"
 #include "io/ply_header.h"
 #include "io/ply_values.h"
 
 namespace tilegrad::io {
 namespace {
-
-// What is read of a vertex or face; names as exporters write them.
-enum Slot { kX, kY, kZ, kNx, kNy, kNz, kRed, kGreen, kBlue, kAlpha, kU, kV, kTexNumber, kSlots };
-constexpr std::array<std::pair<std::string_view, Slot>, 27> kSlotNames = {
-    {{"x", kX},          {"y", kY},          {"z", kZ},
-     {"nx", kNx},        {"ny", kNy},        {"nz", kNz},
-     {"red", kRed},      {"green", kGreen},  {"blue", kBlue},
-     {"r", kRed},        {"g", kGreen},      {"b", kBlue},
-     {"alpha", kAlpha},  {"a", kAlpha},      {"diffuse_red", kRed},
-     {"u", kU},          {"v", kV},          {"diffuse_green", kGreen},
-     {"s", kU},          {"t", kV},          {"diffuse_blue", kBlue},
-     {"texture_u", kU},  {"texture_v", kV},  {"diffuse_alpha", kAlpha},
-     {"texcoord_u", kU}, {"texcoord_v", kV}, {"texnumber", kTexNumber}}};
-
-// Integer colours count from 0 to the type's largest value.
-double ColorScale(const PlyProperty& property) {
-  return property.type == PlyType::kU8 ? 255 : property.type == PlyType::kU16 ? 65535 : 1;
-}
-
-bool IsIndices(const PlyProperty& property) {
-  return property.name == "vertex_indices" || property.name == "vertex_index";
-}
-
-struct Column {
-  Slot slot;  // kSlots: read and forgotten
-  double scale = 1;
-};
-
-// What is forgotten of rows that are there goes to `not_read`.
-std::vector<Column> ColumnsOf(const PlyElement& element, std::array<bool, kSlots>& has,
-                              std::set<std::string, std::less<>>* not_read) {
-  std::vector<Column> columns;
-  for (const PlyProperty& p : element.properties) {
-    const auto* row = std::find_if(kSlotNames.begin(), kSlotNames.end(),
-                                   [&](const auto& known) { return known.first == p.name; });
-    const bool known = row != kSlotNames.end() && !p.count_type;
-    columns.push_back({known ? row->second : kSlots});
-    if (!known && element.count > 0 && !IsIndices(p) && p.name != "texcoord")
-      not_read->insert(p.name);
-    if (!known) continue;
-    has[row->second] = true;
-    if (row->second >= kRed && row->second <= kAlpha) columns.back().scale = ColorScale(p);
-  }
-  return columns;
-}
 
 struct PlyFace {
   std::size_t first = 0, count = 0;  // among the corners of all faces
@@ -91,70 +48,83 @@ class PlyBody {
   std::vector<double>& images() { return images_; }
 
  private:
+  using enum PlyColumns::Slot;
+
   Status Error(const PlyElement& element, std::size_t row, const PlyProperty& property) const {
     return DataLoss("{}: {} {}: \"{}\" is cut off or not a finite number", place_, element.name,
                     row, property.name);
   }
 
-  // The next row: numbers into `row` by column, each list to `take` with its property.
+  // What is left out of rows that are there is said.
+  PlyColumns ColumnsOf(const PlyElement& element, PlyColumns::Slot first, PlyColumns::Slot end) {
+    PlyColumns columns(element, first, end);
+    for (std::size_t k = 0; k < columns.of.size() && element.count > 0; ++k) {
+      if (columns.of[k].slot == kSlots && !columns.of[k].list)
+        properties_not_read_.insert(element.properties[k].name);
+    }
+    return columns;
+  }
+
+  // Normals may be anything: DropNonFiniteNormals comes later.
+  bool ReadNumber(const PlyProperty& property, const PlyColumns::Column& column, double& to) {
+    if (!values_.Next(property.type, to)) return false;
+    to /= column.scale;
+    return std::isfinite(to) || (column.slot >= kNx && column.slot <= kNz);
+  }
+
+  // The next row: numbers into `row` by slot, each list that is read to `take` with its property.
   template <class Take>
-  Status ReadRow(const PlyElement& element, std::size_t i, const std::vector<Column>& columns,
-                 std::array<double, kSlots + 1>& row, Take take) {
-    for (std::size_t k = 0; k < columns.size(); ++k) {
+  Status ReadRow(const PlyElement& element, std::size_t i, const PlyColumns& columns,
+                 std::array<double, kSlots>& row, Take take) {
+    for (std::size_t k = 0; k < columns.of.size(); ++k) {
       const PlyProperty& property = element.properties[k];
-      double& to = row[columns[k].slot];
-      if (!property.count_type) {
-        if (!values_.Next(property.type, to)) return Error(element, i, property);
-        to /= columns[k].scale;
-      } else {
-        if (!values_.NextList(property, list_)) return Error(element, i, property);
-        TILEGRAD_TRY(take(property));
-      }
+      const PlyColumns::Column& column = columns.of[k];
+      const bool good = column.list ? values_.NextList(property, list_)
+                        : column.slot == PlyColumns::kSlots
+                            ? values_.Skip(property)
+                            : ReadNumber(property, column, row[column.slot]);
+      if (!good) return Error(element, i, property);
+      if (column.list) TILEGRAD_TRY(take(property));
     }
     return {};
   }
 
   Status Vertices(const PlyElement& element) {
     Mesh& mesh = out_.mesh;
-    std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
-    if (!has[kX] || !has[kY] || !has[kZ])
-      return DataLoss("{}: the vertices have no x, y and z", place_);
-    std::array<double, kSlots + 1> row{};
+    const PlyColumns columns = ColumnsOf(element, kRed, kSlots);
+    const auto& has = columns.has;
+    if (!has[kX]) return DataLoss("{}: the vertices have no x, y and z", place_);
+    std::array<double, kSlots> row{};
     row[kAlpha] = 1;
     for (std::size_t i = 0; i < element.count; ++i) {
       TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
       out_.exact.emplace_back(row[kX], row[kY], row[kZ]);
-      if (has[kNx] && has[kNy] && has[kNz]) mesh.normals.emplace_back(row[kNx], row[kNy], row[kNz]);
-      if (HasColor(has)) mesh.colors.emplace_back(row[kRed], row[kGreen], row[kBlue], row[kAlpha]);
-      if (has[kU] && has[kV]) vertex_uvs_.emplace_back(row[kU], row[kV]);
+      if (has[kNx]) mesh.normals.emplace_back(row[kNx], row[kNy], row[kNz]);
+      if (has[kRed]) mesh.colors.emplace_back(row[kRed], row[kGreen], row[kBlue], row[kAlpha]);
+      if (has[kU]) vertex_uvs_.emplace_back(row[kU], row[kV]);
     }
     return {};
   }
 
-  static bool HasColor(const std::array<bool, kSlots>& has) {
-    return has[kRed] && has[kGreen] && has[kBlue];
-  }
-
   // Kept until all vertices are there: elements may come in any order.
   Status Faces(const PlyElement& element) {
-    std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
+    const PlyColumns columns = ColumnsOf(element, kTexNumber, kX);
+    const auto& has = columns.has;
     has_images_ = has_images_ || has[kTexNumber];
-    has_face_colors_ = has_face_colors_ || HasColor(has);
-    std::array<double, kSlots + 1> row{};
+    has_face_colors_ = has_face_colors_ || has[kRed];
+    std::array<double, kSlots> row{};
     row[kAlpha] = 1;
     std::vector<double> uvs;
     for (std::size_t i = 0; i < element.count; ++i) {
-      PlyFace face{corners_.size(), 0, glm::vec4(1), -1};
+      PlyFace face{corners_.size(), 0, kNoColor, -1};
       uvs.clear();
       TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
         if (property.name == "texcoord") uvs = list_;
-        if (IsIndices(property)) return AddCorners(element, i);
+        if (IsPlyIndices(property)) return AddCorners(element, i);
         return Status();
       }));
       face.count = corners_.size() - face.first;
-      if (HasColor(has)) face.color = {row[kRed], row[kGreen], row[kBlue], row[kAlpha]};
+      if (has[kRed]) face.color = {row[kRed], row[kGreen], row[kBlue], row[kAlpha]};
       if (has[kTexNumber]) face.image = row[kTexNumber];
       AddCornerUvs(uvs, face);
       faces_.push_back(face);
@@ -181,19 +151,22 @@ class PlyBody {
 
   // "texcoord": u and v of every corner of the polygon, in its order; 0 for a face without them.
   void AddCornerUvs(const std::vector<double>& uvs, const PlyFace& face) {
-    if (uvs.empty() || uvs.size() != 2 * face.count) return;
+    if (uvs.empty()) return;
+    if (uvs.size() != 2 * face.count) {
+      odd_uvs_ = true;
+      return;
+    }
     uvs_.resize(face.first, glm::vec2(0));
     for (std::size_t k = 0; k < face.count; ++k) uvs_.emplace_back(uvs[2 * k], uvs[2 * k + 1]);
   }
 
   // Strips of triangles, one after the other, with -1 between them.
   Status Strips(const PlyElement& element) {
-    std::array<bool, kSlots> has{};
-    const std::vector<Column> columns = ColumnsOf(element, has, &properties_not_read_);
-    std::array<double, kSlots + 1> row{};
+    const PlyColumns columns = ColumnsOf(element, kSlots, kSlots);
+    std::array<double, kSlots> row{};
     for (std::size_t i = 0; i < element.count; ++i) {
       TILEGRAD_TRY(ReadRow(element, i, columns, row, [&](const PlyProperty& property) {
-        return IsIndices(property) ? AddStrips(element, i) : Status();
+        return IsPlyIndices(property) ? AddStrips(element, i) : Status();
       }));
     }
     return {};
@@ -238,7 +211,7 @@ class PlyBody {
     mesh.faces.insert(mesh.faces.end(), strip_faces_.begin(), strip_faces_.end());
     const std::size_t corners = 3 * mesh.faces.size();
     if (!mesh.corner_uvs.empty()) mesh.corner_uvs.resize(corners, glm::vec2(0));
-    if (!mesh.corner_colors.empty()) mesh.corner_colors.resize(corners, glm::vec4(1));
+    if (!mesh.corner_colors.empty()) mesh.corner_colors.resize(corners, kNoColor);
     if (!images_.empty()) images_.resize(mesh.faces.size(), -1);
     if (!mesh.corner_uvs.empty() || vertex_uvs_.empty()) return;
     for (const Face& face : mesh.faces) {
@@ -251,6 +224,12 @@ class PlyBody {
       out_.mesh.corner_colors.clear();
       out_.warnings.push_back("colours of faces left out: the vertices have their own");
     }
+    if (!uvs_.empty() && !vertex_uvs_.empty())
+      out_.warnings.push_back("texture coordinates of vertices left out: the faces have their own");
+    if (odd_uvs_) {
+      out_.warnings.push_back(
+          "texture coordinates of faces left out where there are not two for each corner");
+    }
     for (const auto& [what, names] :
          {std::pair("elements", &not_read_), std::pair("properties", &properties_not_read_)}) {
       if (!names->empty())
@@ -260,10 +239,11 @@ class PlyBody {
 
   Status Skip(const PlyElement& element) {
     if (element.count > 0) not_read_.insert(element.name);
-    const std::vector<Column> columns(element.properties.size(), Column{kSlots});
-    std::array<double, kSlots + 1> row{};
-    for (std::size_t i = 0; i < element.count; ++i)
-      TILEGRAD_TRY(ReadRow(element, i, columns, row, [](const PlyProperty&) { return Status(); }));
+    for (std::size_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& property : element.properties) {
+        if (!values_.Skip(property)) return Error(element, i, property);
+      }
+    }
     return {};
   }
 
@@ -276,7 +256,7 @@ class PlyBody {
   std::vector<PlyFace> faces_;
   std::vector<Face> strip_faces_;
   std::vector<double> images_;
-  bool has_images_ = false, has_face_colors_ = false;
+  bool has_images_ = false, has_face_colors_ = false, odd_uvs_ = false;
   std::set<std::string, std::less<>> not_read_, properties_not_read_;
   std::vector<double> list_;  // scratch: the last list
   Polygon polygon_;           // scratch: the last polygon

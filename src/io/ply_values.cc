@@ -46,23 +46,43 @@ double DecodeAs(PlyType type, const char* bytes, bool swap) {
 }  // namespace
 
 bool PlyValues::Next(PlyType type, double& value) {
-  if (text_) return ParseNumber(NextToken(rest_), value);
+  if (text_) return ParseAnyNumber(NextToken(rest_), value);
   const std::size_t size = PlyTypeSize(type);
   if (rest_.size() < size) return false;
   value = DecodeAs(type, rest_.data(), swap_);
   rest_.remove_prefix(size);
-  return std::isfinite(value);
+  return true;
+}
+
+bool PlyValues::NextLength(const PlyProperty& property, std::size_t& length) {
+  double value = 0;
+  if (!Next(*property.count_type, value)) return false;
+  const std::size_t least = text_ ? 1 : PlyTypeSize(property.type);
+  if (!(value >= 0 && value <= static_cast<double>(rest_.size() / least))) return false;
+  length = static_cast<std::size_t>(value);
+  return true;
 }
 
 bool PlyValues::NextList(const PlyProperty& property, std::vector<double>& list) {
-  double length = 0;
-  if (!Next(*property.count_type, length)) return false;
-  const std::size_t least = text_ ? 1 : PlyTypeSize(property.type);
-  if (length < 0 || length > static_cast<double>(rest_.size() / least)) return false;
-  list.resize(static_cast<std::size_t>(length));
+  std::size_t length = 0;
+  if (!NextLength(property, length)) return false;
+  list.resize(length);
   for (double& value : list) {
-    if (!Next(property.type, value)) return false;
+    if (!Next(property.type, value) || !std::isfinite(value)) return false;
   }
+  return true;
+}
+
+bool PlyValues::Skip(const PlyProperty& property) {
+  std::size_t count = 1;
+  if (property.count_type && !NextLength(property, count)) return false;
+  if (text_) {
+    while (count > 0 && !NextToken(rest_).empty()) --count;
+    return count == 0;
+  }
+  const std::size_t bytes = count * PlyTypeSize(property.type);
+  if (rest_.size() < bytes) return false;
+  rest_.remove_prefix(bytes);
   return true;
 }
 

@@ -17,12 +17,17 @@ class PlyValues {
         text_(encoding == PlyHeader::Encoding::kText),
         swap_(encoding == PlyHeader::Encoding::kBigEndian) {}
 
-  // False if the data ends or is not a finite number.
+  // False if the data ends or is no number; it need not be a finite one.
   bool Next(PlyType type, double& value);
-  // A list. Its length is held against what is left before memory is taken.
+  // A list of finite numbers. Its length is held against what is left before memory is taken.
   bool NextList(const PlyProperty& property, std::vector<double>& list);
+  // Passes over a number or a list, whatever it holds. False if the data ends.
+  bool Skip(const PlyProperty& property);
 
  private:
+  // The length of a list, which the data that is left can hold.
+  bool NextLength(const PlyProperty& property, std::size_t& length);
+
   std::string_view rest_;
   bool text_, swap_;
 };

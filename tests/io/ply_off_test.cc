@@ -277,6 +277,105 @@ TEST_F(PlyOffTest, PlyPropertiesThatAreNotReadAreSaid) {
             "properties left out: \"f_dc_0\", \"flags\", \"quality\", \"ring\"");
 }
 
+// --- numbers that are none ---
+
+// Wherever nobody reads them.
+TEST_F(PlyOffTest, PlyNumbersThatNobodyReadsMayBeAnything) {
+  const std::string vertices =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\n";
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  for (const std::string none : {"nan", "-nan", "NaN", "inf", "-inf", "Infinity", "-nan(ind)",
+                                 "1.#QNAN", "-1.#IND00", "1.#INF", "1e999", "n/a"}) {
+    for (const std::string& text :
+         {vertices + "property float quality\n" + faces + "end_header\n0 0 0 " + none +
+              "\n1 0 0 0.5\n0 1 0 " + none + "\n3 0 1 2\n",
+          vertices + faces + "property double quality\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 " +
+              none + "\n",
+          vertices + "property list uchar float ring\n" + faces + "end_header\n0 0 0 0\n1 0 0 2 " +
+              none + " 1\n0 1 0 0\n3 0 1 2\n",
+          "ply\nformat ascii 1.0\nelement sensor 2\nproperty float gain\n" +
+              vertices.substr(vertices.find("element")) + faces + "end_header\n" + none + "\n" +
+              none + "\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+          // A normal, a colour and a uv without all of their numbers are none.
+          vertices + "property float nx\nproperty float red\nproperty float s\nproperty float a\n" +
+              faces + "end_header\n0 0 0 " + none + " " + none + " " + none + " " + none +
+              "\n1 0 0 0 0 0 0\n0 1 0 0 0 0 0\n3 0 1 2\n"}) {
+      const auto loaded = LoadMesh(Write("a.ply", text));
+      ASSERT_TRUE(loaded.ok()) << none << ": " << loaded.status().message();
+      EXPECT_EQ(loaded->mesh.positions, (std::vector<glm::vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+      EXPECT_EQ(loaded->warnings.size(), 1u);
+      EXPECT_TRUE(loaded->mesh.colors.empty() && loaded->mesh.normals.empty());
+    }
+  }
+}
+
+TEST_F(PlyOffTest, PlyBinaryNumbersThatNobodyReadsMayBeAnything) {
+  for (const bool big_endian : {false, true}) {
+    std::string header = Header(big_endian ? "binary_big_endian" : "binary_little_endian"), body;
+    header.replace(header.find("property list"), 37, "property float quality\n");
+    const std::string one = BinaryBody(big_endian);
+    for (std::size_t v = 0, at = 0; v < 4; ++v) {
+      body += one.substr(at, 19) + std::string("\x7f\xff\xff\x7f", 4);  // NaN in both orders
+      at += v == 1 ? 24 : 20;
+    }
+    body += one.substr(one.size() - 17);
+    const auto loaded = LoadMesh(Write("a.ply", header + body));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.positions[2], glm::vec3(1, 1, 0.5f));
+    EXPECT_EQ(loaded->mesh.colors[1], kGreen);
+    ASSERT_EQ(loaded->warnings.size(), 1u);
+    EXPECT_EQ(loaded->warnings[0], "properties left out: \"quality\"");
+  }
+}
+
+// Normals follow from the surface; what does not is an error that names the place.
+TEST_F(PlyOffTest, PlyNumbersThatAreRead) {
+  const auto text = [](const std::string& vertex) {
+    return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+           "float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float "
+           "red\nproperty float green\nproperty float blue\nproperty float s\nproperty float "
+           "t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+           vertex + "\n1 0 0 0 0 2 1 0 0 1 0\n0 1 0 0 1 0 0 0 1 0 1\n3 0 1 2\n";
+  };
+  for (const std::string none : {"nan", "inf", "1.#QNAN"}) {
+    const auto loaded = LoadMesh(Write("a.ply", text("0 0 0 0 " + none + " 0 0 0 0 0 0")));
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->mesh.normals, (std::vector<glm::vec3>{{0, 0, 1}, {0, 0, 1}, {0, 1, 0}}));
+    ASSERT_EQ(loaded->warnings.size(), 1u);
+    EXPECT_NE(loaded->warnings[0].find("normals that are not finite"), std::string::npos);
+    for (const auto& [at, name] : std::vector<std::pair<int, const char*>>{
+             {0, "x"}, {1, "y"}, {2, "z"}, {6, "red"}, {8, "blue"}, {9, "s"}, {10, "t"}}) {
+      std::string vertex;
+      for (int i = 0; i < 11; ++i) vertex += (i == at ? none : "0") + std::string(" ");
+      ExpectMessage(LoadPly(text(vertex)), "bad.ply", "vertex 0", "\"" + std::string(name) + "\"",
+                    "not a finite number");
+    }
+  }
+}
+
+TEST_F(PlyOffTest, PlyTextureCoordinatesThatAreLeftOutAreSaid) {
+  const std::string faces =
+      "property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_indices\n"
+      "property list uchar float texcoord\n";
+  const auto load = [&](const std::string& second) {
+    return LoadMesh(
+        Write("a.ply",
+              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
+              "y\nproperty float z\n" +
+                  faces + "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n" +
+                  "3 0 1 2 6 0 0 1 0 1 1\n" + second));
+  };
+  const auto both = load("3 0 2 3 6 0 0 1 1 0 1\n");
+  ASSERT_TRUE(both.ok()) << both.status().message();
+  ASSERT_EQ(both->warnings.size(), 1u);
+  EXPECT_NE(both->warnings[0].find("coordinates of vertices left out"), std::string::npos);
+  const auto odd = load("4 0 1 2 3 6 0 0 1 1 0 1\n");
+  ASSERT_TRUE(odd.ok()) << odd.status().message();
+  ASSERT_EQ(odd->warnings.size(), 2u);
+  EXPECT_NE(odd->warnings[1].find("not two for each corner"), std::string::npos);
+}
+
 // Of vertices and of faces; not where a material is transparent itself, or all alpha is 1.
 TEST_F(PlyOffTest, AlphaOfColorsThatIsNotDrawnIsSaid) {
   const auto warnings = [&](const std::string& name, const std::string& text) {
