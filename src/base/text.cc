@@ -2,6 +2,7 @@
 #include "base/text.h"
 
 #include <algorithm>
+#include <charconv>
 
 namespace tilegrad {
 
@@ -15,6 +16,20 @@ std::string LowerCase(std::string_view text) {
 
 std::string Plural(std::string_view thing, bool one) {
   return std::string(thing) + (one ? "" : thing.ends_with('s') ? "es" : "s");
+}
+
+std::string DecodePercent(std::string_view uri) {
+  constexpr std::size_t kDigits = 2;
+  std::string out;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const std::string_view digits = uri.substr(i + 1, kDigits);
+    unsigned code = 0;
+    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), code, 16).ptr;
+    const bool coded = uri[i] == '%' && end == digits.data() + kDigits;
+    out += coded ? static_cast<char>(code) : uri[i];
+    if (coded) i += kDigits;
+  }
+  return out;
 }
 
 void AppendUtf8(std::uint32_t character, std::string* out) {

@@ -20,6 +20,10 @@ std::string Count(Number number, std::string_view thing) {
   return std::to_string(number) + " " + Plural(thing, number == 1);
 }
 
+// "my%20wood.png" -> "my wood.png" (RFC 3986). A "+" is no space; a "%" that two hexadecimal digits
+// do not follow stands for itself.
+std::string DecodePercent(std::string_view uri);
+
 // Appends a character of Unicode as UTF-8; U+FFFD for what is none (surrogates, above U+10FFFF).
 void AppendUtf8(std::uint32_t character, std::string* out);
 

@@ -233,6 +233,7 @@ Result<Bytes> EncodeZip(const std::vector<std::pair<std::string, Bytes>>& entrie
 }  // namespace
 
 std::optional<std::string> NormalizeName(const std::string& name) {
+  if (name.find('\0') != std::string::npos) return std::nullopt;  // the system would cut it there
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const Path normal = Path(slashes).lexically_normal();

@@ -41,7 +41,8 @@ Result<std::string> ZipFingerprint(const Path& path);
 // Writes a zip with these entries, deflated, whole or not at all.
 Status WriteZip(const Path& path, const std::vector<std::pair<std::string, Bytes>>& entries);
 
-// Resolves '\\', ".", ".." and doubled slashes; nothing if the name is absolute or leads out.
+// Resolves '\\', ".", ".." and doubled slashes; nothing if the name is absolute, leads out or has a
+// NUL in it.
 std::optional<std::string> NormalizeName(const std::string& name);
 
 }  // namespace tilegrad::io

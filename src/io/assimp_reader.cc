@@ -144,7 +144,6 @@ class Assembly {
 
 std::optional<Bytes> Answer(const FileSource& source, std::string_view question) {
   const std::string name(question.substr(1));
-  if (name.find('\0') != std::string::npos) return std::nullopt;
   if (question[0] == kAskExists) return source.Exists(name) ? std::optional(Bytes()) : std::nullopt;
   auto content = source.Read(name);
   return content.ok() ? std::optional(std::move(content).value()) : std::nullopt;

@@ -127,11 +127,19 @@ std::optional<std::string> FindBeside(const FileSource& source, const std::strin
                                       std::string_view mentioned) {
   std::string slashes(mentioned);
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const std::string base = slashes.substr(slashes.find_last_of('/') + 1);
-  for (const std::string& candidate : {Folder(mesh_name) + slashes, Folder(mesh_name) + base}) {
-    if (source.Exists(candidate)) return candidate;
+  for (const std::string& name : {slashes, DecodePercent(slashes)}) {
+    const std::string base = name.substr(name.find_last_of('/') + 1);
+    for (const std::string& candidate : {Folder(mesh_name) + name, Folder(mesh_name) + base}) {
+      if (source.Exists(candidate)) return candidate;
+    }
   }
   return std::nullopt;
+}
+
+std::optional<std::string> FindByUri(const FileSource& source, const std::string& mesh_name,
+                                     std::string_view uri) {
+  auto found = FindBeside(source, mesh_name, DecodePercent(uri));
+  return found ? found : FindBeside(source, mesh_name, uri);
 }
 
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out) {
@@ -143,19 +151,26 @@ int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh&
   return static_cast<int>(out.mesh.textures.size()) - 1;
 }
 
+int AddTextureFile(const FileSource& source, const std::optional<std::string>& file,
+                   const std::string& image_name, LoadedMesh& out) {
+  if (!file) {
+    out.warnings.push_back(
+        fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
+    return -1;
+  }
+  // Not by name: an image inside the mesh may have the same one.
+  const std::string key = NormalizeName(*file).value_or(*file);
+  const auto [known, added] = out.texture_of_file.try_emplace(key, -1);
+  if (!added) return known->second;
+  const auto bytes = source.Read(*file);
+  known->second = AddTexture(
+      bytes.ok() ? DecodeImage(*bytes, source.Describe(*file)) : bytes.status(), image_name, out);
+  return known->second;
+}
+
 int AddTexture(const FileSource& source, const std::string& mesh_name,
                const std::string& image_name, LoadedMesh& out) {
-  for (std::size_t t = 0; t < out.mesh.textures.size(); ++t) {
-    if (out.mesh.textures[t].name == image_name) return static_cast<int>(t);
-  }
-  if (const auto found = FindBeside(source, mesh_name, image_name)) {
-    const auto bytes = source.Read(*found);
-    if (!bytes.ok()) return AddTexture(bytes.status(), image_name, out);
-    return AddTexture(DecodeImage(*bytes, source.Describe(*found)), image_name, out);
-  }
-  out.warnings.push_back(
-      fmt::format("texture \"{}\" not found; the material's colour stands in", image_name));
-  return -1;
+  return AddTextureFile(source, FindBeside(source, mesh_name, image_name), image_name, out);
 }
 
 Status AppendWithMaterial(Mesh part, const Material& material, LoadedMesh& out,
@@ -243,6 +258,7 @@ Result<LoadedMesh> LoadMesh(const FileSource& source, const std::string& name) {
   TILEGRAD_TRY(budget.status().Within(place));  // also where a texture was left out
   if (!loaded.ok()) return loaded.status();
   if (loaded->mesh.faces.empty()) return DataLoss("{}: no triangles in it", place);
+  loaded->texture_of_file.clear();
   PlaceNearOrigin(*loaded);
   DropNonFiniteNormals(*loaded);
   if (const Status valid = Validate(loaded->mesh); !valid.ok())

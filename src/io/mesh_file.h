@@ -6,6 +6,7 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -45,8 +46,10 @@ struct LoadedMesh {
   // What was subtracted from the file's coordinates, from cameras too: positions + origin is the
   // place in the world. 0, unless the mesh is farther from the origin than 256 times its size.
   glm::dvec3 origin{0};
-  std::vector<glm::dvec3> exact;  // of readers: positions before they are rounded; empty afterwards
-  std::vector<Path> files;        // that were read: the mesh, its MTL, buffers and images
+  // Of readers, empty afterwards: positions before they are rounded, textures by their files.
+  std::vector<glm::dvec3> exact;
+  std::map<std::string, int> texture_of_file;
+  std::vector<Path> files;  // that were read: the mesh, its MTL, buffers and images
 };
 
 // Vertices are those of the file, in its order, once each, whether a face uses them or not: OBJ,

@@ -50,14 +50,24 @@ struct Polygon {
 std::string ShortList(const std::set<std::string, std::less<>>& names);
 
 // A file that a mesh file mentions: as written beside the mesh, then by its base name there, which
-// helps absolute paths of another computer. Its name in the source, or nothing.
+// helps absolute paths of another computer; then the same with "%20" and the like decoded, as some
+// exporters write names. Its name in the source, or nothing.
 std::optional<std::string> FindBeside(const FileSource& source, const std::string& mesh_name,
                                       std::string_view mentioned);
+
+// The same where the format says that it is a URI: decoded first, then as written.
+std::optional<std::string> FindByUri(const FileSource& source, const std::string& mesh_name,
+                                     std::string_view uri);
 
 // Finds an image that a mesh file mentions. Adds it to out.mesh.textures and returns its index, or
 // adds a warning and returns -1.
 int AddTexture(const FileSource& source, const std::string& mesh_name,
                const std::string& image_name, LoadedMesh& out);
+
+// The same of a file of the source, each of which becomes one texture; nothing: it was not found.
+// `image_name` is the texture's, and stands in warnings.
+int AddTextureFile(const FileSource& source, const std::optional<std::string>& file,
+                   const std::string& image_name, LoadedMesh& out);
 
 // The same for an image that is already in memory.
 int AddTexture(Result<ImageU8> image, const std::string& image_name, LoadedMesh& out);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words for people.
 #include "base/text.h"
 
 #include <gtest/gtest.h>
@@ -23,6 +22,19 @@ TEST(Words, AreSuggestedWhereTheyAreNear) {
   EXPECT_EQ(DidYouMean("--outp", {"--outputs", "--out", "--view"}),
             " (did you mean --out or --outputs?)");
   EXPECT_EQ(DidYouMean("--color", {"--view"}), "");
+}
+
+TEST(Text, PercentIsDecodedAndPlusIsNoSpace) {
+  EXPECT_EQ(DecodePercent("my%20wood+red%2Bblue.png"), "my wood+red+blue.png");
+  EXPECT_EQ(DecodePercent("50%25.png"), "50%.png");
+  EXPECT_EQ(DecodePercent("%c3%A9"), "\xc3\xa9");
+  EXPECT_EQ(DecodePercent("%2525"), "%25");  // once
+  EXPECT_EQ(DecodePercent(std::string_view("a%00b")), std::string("a\0b", 3));
+}
+
+TEST(Text, PercentWithoutTwoDigitsStaysAsItIs) {
+  for (const char* text : {"", "%", "100%", "%4", "%zz", "%-1", "%+1", "% 1", "%0x41"})
+    EXPECT_EQ(DecodePercent(text), text);
 }
 
 }  // namespace tilegrad::text_test

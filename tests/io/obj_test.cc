@@ -196,6 +196,31 @@ TEST_F(ObjTest, WhiteWhereNoMaterialIsNamed) {
   EXPECT_EQ(mesh.materials[3].base_color, glm::vec4(0.25f, 0.25f, 0.25f, 1));
 }
 
+// Files of one name in several folders, and names that differ in upper and lower case.
+TEST_F(ObjTest, ImagesAreToldApartByTheirFiles) {
+  for (const auto& [name, grey] : std::vector<std::pair<std::string, int>>{
+           {"q.png", 10}, {"Q.png", 20}, {"sub/q.png", 30}, {"sub/only.png", 40}}) {
+    ASSERT_TRUE(SavePng(folder_ / name, ImageU8(1, 1, 3, static_cast<std::uint8_t>(grey))).ok());
+  }
+  const std::vector<std::pair<std::string, int>> images = {
+      {"q.png", 10},      {"Q.png", 20},        {"sub/q.png", 30},        {"./q.png", 10},
+      {"sub\\q.png", 30}, {"C:\\x\\q.png", 10}, {"-s 2 2 sub/q.png", 30}, {"sub/ONLY.png", 40}};
+  std::string mtl, obj = "mtllib m.mtl\n" + kSquare + kUvs;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    mtl += fmt::format("newmtl {}\nmap_Kd {}\n", i, images[i].first);
+    obj += fmt::format("usemtl {}\nf 1/1 2/2 3/3\n", i);
+  }
+  Write("m.mtl", mtl);
+  const Mesh mesh = Load(obj).mesh;
+  ASSERT_EQ(mesh.materials.size(), images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const int texture = mesh.materials[i].base_color_texture;
+    ASSERT_GE(texture, 0);
+    EXPECT_EQ(mesh.textures[texture].image.pixels[0], images[i].second) << images[i].first;
+  }
+  EXPECT_EQ(mesh.textures.size(), 4u);
+}
+
 TEST_F(ObjTest, NormalsThatAreNoneAreTheSurfaces) {
   for (const std::string none : {"nan", "inf", "-1.#IND", "1e300"}) {
     const auto loaded = Load(kSquare + "vn 0 0 2\nvn " + none + " 0 1\nf 1//1 2//2 3//1\n", 1);

@@ -8,36 +8,83 @@
 
 #include "base/error.h"
 #include "base/json_nesting.h"
+#include "base/text.h"
 #include "io/gltf/gltf_extensions.h"
+#include "io/mesh_readers.h"
 
 namespace tilegrad::io {
 namespace {
 
 constexpr int kMaxJsonNesting = 64;  // tinygltf's reading of "extras" is recursive
 
-// Side files of a glTF are names relative to it.
-struct SideFiles {
-  const FileSource& source;
-  std::string folder;  // with a trailing slash, or empty
-};
+using ParsedJson = nlohmann::json;
 
-bool SideExists(const std::string& name, void* user) {
-  return static_cast<SideFiles*>(user)->source.Exists(name);
+std::uint64_t CountOf(const ParsedJson& object, const char* key) {
+  const auto count = object.find(key);
+  return count != object.end() && count->is_number_unsigned() ? count->get<std::uint64_t>() : 0;
 }
-std::string SideExpand(const std::string& name, void*) { return name; }
-bool SideRead(std::vector<unsigned char>* out, std::string* error, const std::string& name,
-              void* user) {
-  auto bytes = static_cast<SideFiles*>(user)->source.Read(name);
-  if (!bytes.ok()) {
-    *error += bytes.status().message();
+
+// The buffers of a glTF that are files of their own. tinygltf decodes names by rules of its own
+// ("+" is a space to it) and refuses a file that is longer than its buffer; so it is given the
+// files in the order in which it asks for them, which is that of the buffers.
+class BufferFiles {
+ public:
+  BufferFiles(const FileSource& source, const std::string& gltf_name, const ParsedJson& document)
+      : source_(source), gltf_name_(gltf_name) {
+    const auto buffers = document.find("buffers");
+    if (buffers == document.end() || !buffers->is_array()) return;
+    for (const ParsedJson& buffer : *buffers) {
+      const auto uri = buffer.find("uri");
+      if (uri == buffer.end() || !uri->is_string()) continue;
+      const auto& text = uri->get_ref<const std::string&>();
+      if (text.empty() || tinygltf::IsDataURI(text)) continue;  // it reads those itself
+      files_.push_back({text, CountOf(buffer, "byteLength")});
+    }
+  }
+
+  tinygltf::FsCallbacks Callbacks() { return {Exists, Expand, Read, Write, this}; }
+  // Why the last file could not be read.
+  const Status& status() const { return status_; }
+
+ private:
+  struct File {
+    std::string uri;
+    std::uint64_t length;  // of the buffer
+  };
+
+  Result<Bytes> Next() {
+    if (next_ == files_.size()) return InternalError("tinygltf asks for a file that nobody named");
+    const File& file = files_[next_++];
+    const auto name = FindByUri(source_, gltf_name_, file.uri);
+    if (!name) return NotFound("there is no file \"{}\"", DecodePercent(file.uri.substr(0, 200)));
+    TILEGRAD_ASSIGN(Bytes bytes, source_.Read(*name));
+    if (bytes.size() < file.length) {
+      return DataLoss("{} has {} bytes, its buffer {}", source_.Describe(*name), bytes.size(),
+                      file.length);
+    }
+    bytes.resize(file.length);
+    return bytes;
+  }
+
+  static bool Exists(const std::string&, void*) { return true; }
+  static std::string Expand(const std::string& name, void*) { return name; }
+  static bool Read(std::vector<unsigned char>* out, std::string*, const std::string&, void* user) {
+    auto& files = *static_cast<BufferFiles*>(user);
+    auto bytes = files.Next();
+    files.status_ = bytes.status();
+    if (bytes.ok()) *out = std::move(bytes).value();
+    return bytes.ok();
+  }
+  static bool Write(std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
     return false;
   }
-  *out = std::move(bytes).value();
-  return true;
-}
-bool SideWrite(std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
-  return false;
-}
+
+  const FileSource& source_;
+  const std::string& gltf_name_;
+  std::vector<File> files_;
+  std::size_t next_ = 0;
+  Status status_;
+};
 
 // Keeps the encoded bytes of data URIs; images are decoded when a material asks for one. An image
 // in a buffer view comes with a place that tinygltf has not checked: it is left alone until then.
@@ -57,20 +104,20 @@ std::string_view JsonPart(const Bytes& bytes) {
   return text.substr(kGlbHeader, length);
 }
 
-Status Parse(const Bytes& bytes, SideFiles& side, const std::string& place,
+Status Parse(const Bytes& bytes, BufferFiles& files, const std::string& place,
              tinygltf::Model* model) {
   tinygltf::TinyGLTF loader;
-  loader.SetFsCallbacks({SideExists, SideExpand, SideRead, SideWrite, &side});
+  loader.SetFsCallbacks(files.Callbacks());
   loader.SetImageLoader(KeepEncoded, nullptr);
   std::string error, warning;
   const bool binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
   const auto size = static_cast<unsigned>(bytes.size());
   const bool ok =
-      binary ? loader.LoadBinaryFromMemory(model, &error, &warning, bytes.data(), size, side.folder)
+      binary ? loader.LoadBinaryFromMemory(model, &error, &warning, bytes.data(), size)
              : loader.LoadASCIIFromString(model, &error, &warning,
-                                          reinterpret_cast<const char*>(bytes.data()), size,
-                                          side.folder);
+                                          reinterpret_cast<const char*>(bytes.data()), size, "");
   if (ok) return {};
+  TILEGRAD_TRY(files.status().Within(place + ": a buffer"));
   // Accessors of compressed geometry have no buffer view, about which tinygltf complains.
   const std::string_view compression = GltfCompression(JsonPart(bytes));
   if (!compression.empty()) return RefuseGltfCompression(compression, place);
@@ -86,8 +133,6 @@ Status CheckNesting(std::string_view json, const std::string& place) {
   return DataLoss("{}: byte {} of its JSON: nested more than {} deep", place, at, kMaxJsonNesting);
 }
 
-using ParsedJson = nlohmann::json;
-
 // The members of `list` in the document that an index of `object` names; null if there is none.
 const ParsedJson* Referred(const ParsedJson& document, const char* list, const ParsedJson& object,
                            const char* key) {
@@ -101,17 +146,10 @@ const ParsedJson* Referred(const ParsedJson& document, const char* list, const P
   return i >= 0 && static_cast<std::size_t>(i) < entries->size() ? &(*entries)[i] : nullptr;
 }
 
-std::uint64_t CountOf(const ParsedJson& object, const char* key) {
-  const auto count = object.find(key);
-  return count != object.end() && count->is_number_unsigned() ? count->get<std::uint64_t>() : 0;
-}
-
 // tinygltf takes the address of an image's first byte in its buffer before it asks KeepEncoded,
 // also where the buffer ends before: a standard library that checks indices ends the program there.
 // Whatever else is wrong is left to tinygltf, which finds it before.
-Status CheckImages(std::string_view text, const std::string& place) {
-  if (text.find("images") == std::string_view::npos) return {};
-  const ParsedJson document = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
+Status CheckImages(const ParsedJson& document, const std::string& place) {
   const auto images = document.find("images");
   if (images == document.end() || !images->is_array()) return {};
   for (std::size_t i = 0; i < images->size(); ++i) {
@@ -144,13 +182,14 @@ Result<GltfDocument> ReadGltfDocument(const FileSource& source, const std::strin
   TILEGRAD_ASSIGN(const Bytes bytes, source.Read(name));
   const std::string place = source.Describe(name);
   if (bytes.size() > 0xFFFFFFFFu) return ResourceExhausted("{}: a glTF file above 4 GiB", place);
-  const auto slash = name.find_last_of('/');
-  SideFiles side{source, slash == std::string::npos ? "" : name.substr(0, slash)};
-  TILEGRAD_TRY(CheckNesting(JsonPart(bytes), place));
-  TILEGRAD_TRY(CheckImages(JsonPart(bytes), place));
+  const std::string_view text = JsonPart(bytes);
+  TILEGRAD_TRY(CheckNesting(text, place));
   GltfDocument document;
   try {
-    TILEGRAD_TRY(Parse(bytes, side, place, &document.model));
+    const ParsedJson json = ParsedJson::parse(text, nullptr, /*allow_exceptions=*/false);
+    TILEGRAD_TRY(CheckImages(json, place));
+    BufferFiles files(source, name, json);
+    TILEGRAD_TRY(Parse(bytes, files, place, &document.model));
   } catch (const std::bad_alloc&) {
     throw;                                 // no fault of the file
   } catch (const std::exception& error) {  // the JSON library throws on some type errors

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <charconv>
 #include <glm/mat4x4.hpp>
 #include <map>
 #include <optional>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "io/gltf/gltf_document.h"
 #include "io/gltf/gltf_extensions.h"
 #include "io/gltf/gltf_material.h"
@@ -24,6 +24,7 @@ namespace tilegrad::io {
 namespace {
 
 constexpr int kMaxNodeDepth = 256;  // the walk is recursive
+constexpr std::size_t kMostTypeShown = 80;
 
 // Where a node puts the primitives of its mesh.
 using SharedVertices = std::map<std::string, std::int32_t>;  // first vertex by VertexKey
@@ -50,6 +51,7 @@ struct GltfWalk {
   Status AppendPrimitive(Mesh mesh, const tinygltf::Primitive& p, const Material& material,
                          PrimitivePlace& at, const std::string& what);
   void Warn(std::string warning);  // once
+  void WarnOfOtherScenes();
   Material ConvertMaterial(int index);
   void AddCamera(const tinygltf::Node& node, const glm::dmat4& m);
   void SetSampler(int texture, Material* material);
@@ -60,23 +62,6 @@ struct GltfWalk {
 
 void GltfWalk::Warn(std::string warning) {
   if (warned.insert(warning).second) out.warnings.push_back(std::move(warning));
-}
-
-// "my%20wood.png" -> "my wood.png"
-std::string DecodePercent(const std::string& uri) {
-  std::string out;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    int code = 0;
-    const char* begin = uri.data() + i + 1;
-    if (uri[i] == '%' && i + 2 < uri.size() &&
-        std::from_chars(begin, begin + 2, code, 16).ptr == begin + 2) {
-      out += static_cast<char>(code);
-      i += 2;
-    } else {
-      out += uri[i];
-    }
-  }
-  return out;
 }
 
 int GltfWalk::ImageTexture(int texture) {
@@ -103,7 +88,12 @@ int GltfWalk::AddImage(const tinygltf::Image& image, int index) {
     return AddTexture(bytes.ok() ? DecodeImage(*bytes, label) : bytes.status(), label, out);
   }
   if (!image.image.empty()) return AddTexture(DecodeImage(image.image, label), label, out);
-  return AddTexture(source, name, DecodePercent(image.uri), out);
+  if (image.uri.starts_with("data:")) {  // what tinygltf takes for a file's name
+    const std::string type = image.uri.substr(0, std::min(image.uri.find(','), kMostTypeShown));
+    return AddTexture(DataLoss("{}: \"{}\" is not read; save it as PNG or JPEG", label, type),
+                      label, out);
+  }
+  return AddTextureFile(source, FindByUri(source, name, image.uri), DecodePercent(image.uri), out);
 }
 
 TextureWrap WrapOf(int number) {
@@ -249,6 +239,13 @@ Status GltfWalk::Visit(int index, const glm::dmat4& parent, int depth) {
   return {};
 }
 
+void GltfWalk::WarnOfOtherScenes() {
+  for (std::size_t i = 0; i < visited.size(); ++i) {
+    if (!visited[i] && model.nodes[i].mesh >= 0)
+      return Warn("meshes that are not in the scene are left out");
+  }
+}
+
 // The nodes of the default scene, or of the first one, or all root nodes.
 std::vector<int> SceneNodes(const tinygltf::Model& model) {
   if (model.scenes.empty()) return GltfRootNodes(model);
@@ -272,6 +269,7 @@ Result<LoadedMesh> ReadGltf(const FileSource& source, const std::string& name) {
                 model.skins.empty() ? std::vector<glm::dmat4>() : GltfWorldMatrices(model)};
   walk.out.warnings = std::move(document.warnings);
   for (const int root : SceneNodes(model)) TILEGRAD_TRY(walk.Visit(root, glm::dmat4(1), 0));
+  walk.WarnOfOtherScenes();
   return std::move(walk.out);
 }
 
