@@ -37,6 +37,9 @@ Status CheckPng(ByteSpan bytes, const std::string& name) {
     if (crc != BigEndian32(&bytes[at + 8 + length]))
       return DataLoss("{}: corrupt PNG: the checksum of the chunk at byte {} is wrong", name, at);
     if (type == "IEND") return {};
+    if (type == "CgBI") {  // blue before red, colours multiplied by alpha: stb_image leaves both so
+      return DataLoss("{}: a PNG of Xcode (CgBI), which is not read; save it as a plain PNG", name);
+    }
     at += kFrame + length;
   }
   return DataLoss("{}: truncated PNG: it ends without an end chunk", name);

@@ -251,6 +251,25 @@ TEST(Png, OfEveryKind) {
   }
 }
 
+// PNG's own words on what its numbers mean are not followed: glTF says so, and others do the same.
+TEST(Png, ProfilesAndGammaDoNotChangeNumbers) {
+  using namespace std::string_literals;
+  const std::string rows = "\0\x40\x80\0\xc0\xff"s;
+  const auto plain = DecodeImage(SmallPng(8, 0, rows), "a.png");
+  const auto tagged = DecodeImage(
+      SmallPng(8, 0, rows, PngChunk("gAMA", Big(100000, 4)) + PngChunk("sRGB", "\0"s)), "a.png");
+  ASSERT_TRUE(tagged.ok()) << tagged.status().message();
+  EXPECT_EQ(tagged->pixels, plain.value().pixels);
+  EXPECT_EQ(tagged->pixels, (std::vector<std::uint8_t>{64, 128, 192, 255}));
+}
+
+TEST(Png, OfXcodeIsRefused) {
+  Bytes png = SmallPng(8, 0, std::string(6, '\0'));
+  const std::string mark = PngChunk("CgBI", "\x50\x20\x20\x02");
+  png.insert(png.begin() + 8, mark.begin(), mark.end());
+  ExpectMessage(DecodeImage(png, "a.png").status(), "a.png", "Xcode");
+}
+
 TEST(Image, GreyBecomesColor) {
   ImageU8 grey(1, 1, 2);
   grey.pixels = {70, 90};
