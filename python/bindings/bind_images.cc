@@ -31,14 +31,16 @@ void SavePng(const Path& path, const py::object& pixels) {
   ThrowIfError(WithoutGil([&] { return io::SavePng(path, image).Within(path.string()); }));
 }
 
-// Names of channels and [channels,height,width] float32.
+// Names of channels, [channels,height,width] float32, and warnings.
 py::tuple LoadExr(const Path& path, std::size_t max_bytes) {
   io::LoadedExr image = LoadWithin(max_bytes, [&] { return io::LoadExr(path); });
   const auto channels = static_cast<py::ssize_t>(image.names.size());
-  py::list names;
+  py::list names, warnings;
   for (const std::string& name : image.names) names.append(Text(name));
+  for (const std::string& warning : image.warnings) warnings.append(Text(warning));
   return py::make_tuple(
-      names, OwnedArray<float>(std::move(image.values), {channels, image.height, image.width}));
+      names, OwnedArray<float>(std::move(image.values), {channels, image.height, image.width}),
+      warnings);
 }
 
 void SaveExr(const Path& path, const std::vector<std::string>& names, const py::object& planes) {
@@ -67,7 +69,7 @@ void BindImages(py::module_& m) {
   m.def("load_image", &LoadImage, py::arg("path"), py::arg("max_bytes") = 0, "(H, W, C) uint8.");
   m.def("save_png", &SavePng, py::arg("path"), py::arg("pixels"), "Writes (H, W, C) uint8.");
   m.def("load_exr", &LoadExr, py::arg("path"), py::arg("max_bytes") = 0,
-        "Names of channels and (C, H, W) float32.");
+        "Names of channels, (C, H, W) float32, and what of the file is left out.");
   m.def("save_exr", &SaveExr, py::arg("path"), py::arg("names"), py::arg("planes"),
         "Writes (C, H, W) float32 with names of channels.");
   m.def("load_npy", &LoadNpy, py::arg("path"), py::arg("max_bytes") = 0,

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Any, Optional
 
 import numpy as np
@@ -39,8 +40,12 @@ def load_image(path: Path, *, max_bytes: Optional[int] = None) -> np.ndarray:
 
 
 def load_layers(path: Path, *, max_bytes: Optional[int] = None) -> dict[str, np.ndarray]:
-    """Every channel of an EXR image by its name, (H, W) float32. max_bytes: as of `load_mesh`."""
-    names, planes = _tools.load_exr(name_of(path), _arrays.as_limit("load_layers", max_bytes))
+    """Every channel of an EXR image by its name, (H, W) float32: its display window, 0 where the file
+    has no data. What it has outside is left out with a warning. max_bytes: as of `load_mesh`."""
+    limit = _arrays.as_limit("load_layers", max_bytes)
+    names, planes, left_out = _tools.load_exr(name_of(path), limit)
+    for text in left_out:
+        warnings.warn(f"{os.fsdecode(path)}: {text}", stacklevel=2)
     return dict(zip(names, planes))
 
 

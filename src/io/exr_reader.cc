@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads EXR. The reading process sends bytes to this one: 'E' and a message, or 'I', width, height,
-// the number of channels, their names, each terminated by 0, and the values.
+// the numbers of channels and of warnings, the names of channels and the warnings, each terminated
+// by 0, and the values.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -19,13 +20,14 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
-#include <ImfInputFile.h>
+#include <ImfInputPart.h>
+#include <ImfMultiPartInputFile.h>
 #pragma GCC diagnostic pop
 
 namespace tilegrad::io {
 namespace {
 
-constexpr int kMaxChannels = 1024;
+constexpr int kMaxChannels = 1024, kMaxWarnings = 2;
 constexpr std::uint8_t kImage = 'I', kError = 'E';
 
 class MemoryInput : public Imf::IStream {
@@ -53,13 +55,31 @@ std::vector<std::string> NamesOf(const Imf::ChannelList& channels) {
   return names;
 }
 
+using ExrWindow = Imath::Box2i;
+
+struct WindowSize {
+  std::int64_t width, height;
+};
+
+WindowSize SizeOfWindow(const ExrWindow& window) {
+  return {std::int64_t{window.max.x} - window.min.x + 1,
+          std::int64_t{window.max.y} - window.min.y + 1};
+}
+
+std::string TextOfWindow(const ExrWindow& window) {
+  return fmt::format("({}, {}) to ({}, {})", window.min.x, window.min.y, window.max.x,
+                     window.max.y);
+}
+
 Status CheckExrHeader(const Imf::Header& header, const GuardLimits& limits) {
-  const auto& window = header.dataWindow();
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
-                     height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide) {
-    return DataLoss("the header says {} x {} pixels; at most {} a side are read", width, height,
-                    kMaxImageSide);
+  std::int64_t pixels = 0;  // the picture's and those of the data
+  for (const ExrWindow& window : {header.displayWindow(), header.dataWindow()}) {
+    const auto [width, height] = SizeOfWindow(window);
+    if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide) {
+      return DataLoss("the header says {} x {} pixels; at most {} a side are read", width, height,
+                      kMaxImageSide);
+    }
+    pixels += width * height;
   }
   const auto channels = static_cast<std::int64_t>(NamesOf(header.channels()).size());
   for (auto c = header.channels().begin(); c != header.channels().end(); ++c) {
@@ -68,10 +88,10 @@ Status CheckExrHeader(const Imf::Header& header, const GuardLimits& limits) {
   }
   if (channels < 1 || channels > kMaxChannels)
     return DataLoss("{} channels; 1 to {} are read", channels, kMaxChannels);
-  const auto bytes = static_cast<std::size_t>(4 * width * height * channels);
-  if (bytes > limits.memory_bytes / 4)  // the library and the transfer need room too
-    return ResourceExhausted("{} x {} x {} numbers are too many", width, height, channels);
-  return ReadBudget::Take(bytes, fmt::format("{} x {} x {} numbers", width, height, channels));
+  const auto bytes = static_cast<std::size_t>(4 * pixels * channels);
+  if (bytes > limits.memory_bytes / 2)  // the library needs room too
+    return ResourceExhausted("{} pixels of {} channels are too many", pixels, channels);
+  return ReadBudget::Take(bytes, fmt::format("{} pixels of {} channels", pixels, channels));
 }
 
 void Append(Bytes& out, const void* data, std::size_t size) {
@@ -86,26 +106,65 @@ Bytes ErrorBytes(std::string_view message) {
   return out;
 }
 
-Bytes ReadPixels(Imf::InputFile& in) {
-  const auto& window = in.header().dataWindow();
-  const std::vector<std::string> names = NamesOf(in.header().channels());
-  const std::array<std::int32_t, 3> sizes = {window.max.x - window.min.x + 1,
-                                             window.max.y - window.min.y + 1,
-                                             static_cast<std::int32_t>(names.size())};
-  Bytes out = {kImage};
-  Append(out, sizes.data(), sizeof(sizes));
-  for (const std::string& name : names) Append(out, name.c_str(), name.size() + 1);
-  const std::size_t row = sizeof(float) * static_cast<std::size_t>(sizes[0]),
-                    plane = row * static_cast<std::size_t>(sizes[1]);
-  std::size_t at = out.size();
-  out.resize(at + plane * static_cast<std::size_t>(sizes[2]));
+// All channels of the data window, one after the other.
+std::vector<float> ReadData(Imf::InputPart& in, const std::vector<std::string>& names) {
+  const ExrWindow& window = in.header().dataWindow();
+  const auto [width, height] = SizeOfWindow(window);
+  const auto pixels = static_cast<std::size_t>(width * height);
+  std::vector<float> data(pixels * names.size());
   Imf::FrameBuffer frame;
-  for (const std::string& name : names) {
-    frame.insert(name, Imf::Slice::Make(Imf::FLOAT, out.data() + at, window, sizeof(float), row));
-    at += plane;
+  for (std::size_t c = 0; c < names.size(); ++c) {
+    frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, &data[c * pixels], window, sizeof(float),
+                                            sizeof(float) * static_cast<std::size_t>(width)));
   }
   in.setFrameBuffer(frame);
   in.readPixels(window.min.y, window.max.y);
+  return data;
+}
+
+// One channel of the data window into the display window, whose floats begin anywhere.
+void PlaceInPicture(const float* data, const ExrWindow& from, const ExrWindow& to,
+                    std::uint8_t* picture) {
+  const auto at = [](const ExrWindow& window, std::int64_t x, std::int64_t y) {
+    return (y - window.min.y) * SizeOfWindow(window).width + (x - window.min.x);
+  };
+  const int left = std::max(from.min.x, to.min.x), right = std::min(from.max.x, to.max.x);
+  if (left > right) return;
+  const auto bytes = sizeof(float) * (static_cast<std::size_t>(right - left) + 1);
+  for (std::int64_t y = std::max(from.min.y, to.min.y); y <= std::min(from.max.y, to.max.y); ++y)
+    std::memcpy(picture + sizeof(float) * at(to, left, y), data + at(from, left, y), bytes);
+}
+
+std::vector<std::string> ExrWarnings(const Imf::Header& header, int parts) {
+  std::vector<std::string> warnings;
+  const ExrWindow &data = header.dataWindow(), &display = header.displayWindow();
+  if (!display.intersects(data.min) || !display.intersects(data.max)) {
+    warnings.push_back(fmt::format("data outside the display window left out: {}, outside {}",
+                                   TextOfWindow(data), TextOfWindow(display)));
+  }
+  if (parts > 1) warnings.push_back(fmt::format("{} parts; the first is read", parts));
+  return warnings;
+}
+
+Bytes ReadPicture(Imf::InputPart& in, int parts) {
+  const ExrWindow &data_window = in.header().dataWindow(), &display = in.header().displayWindow();
+  const std::vector<std::string> names = NamesOf(in.header().channels()),
+                                 warnings = ExrWarnings(in.header(), parts);
+  const auto [width, height] = SizeOfWindow(display);
+  const std::array<std::int32_t, 4> sizes = {
+      static_cast<std::int32_t>(width), static_cast<std::int32_t>(height),
+      static_cast<std::int32_t>(names.size()), static_cast<std::int32_t>(warnings.size())};
+  Bytes out = {kImage};
+  Append(out, sizes.data(), sizeof(sizes));
+  for (const auto* texts : {&names, &warnings}) {
+    for (const std::string& text : *texts) Append(out, text.c_str(), text.size() + 1);
+  }
+  const std::vector<float> data = ReadData(in, names);
+  const std::size_t head = out.size(), data_pixels = data.size() / names.size(),
+                    plane = sizeof(float) * static_cast<std::size_t>(width * height);
+  out.resize(head + names.size() * plane);
+  for (std::size_t c = 0; c < names.size(); ++c)
+    PlaceInPicture(&data[c * data_pixels], data_window, display, &out[head + c * plane]);
   return out;
 }
 
@@ -113,9 +172,11 @@ Bytes ReadPixels(Imf::InputFile& in) {
 Bytes ReadInChild(std::span<const std::uint8_t> bytes, const GuardLimits& limits) {
   try {  // the library throws
     MemoryInput stream(bytes);
-    Imf::InputFile in(stream, /*numThreads=*/0);
-    const Status status = CheckExrHeader(in.header(), limits);
-    return status.ok() ? ReadPixels(in) : ErrorBytes(status.message());
+    Imf::MultiPartInputFile file(stream, /*numThreads=*/0);
+    const Status status = CheckExrHeader(file.header(0), limits);
+    if (!status.ok()) return ErrorBytes(status.message());
+    Imf::InputPart first(file, 0);
+    return ReadPicture(first, file.parts());
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
@@ -130,19 +191,20 @@ Result<LoadedExr> ExrFromReader(std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (text.size() > 1 && text[0] == static_cast<char>(kError))
     return DataLoss("{}", text.substr(1));
-  std::array<std::int32_t, 3> sizes = {};
+  std::array<std::int32_t, 4> sizes = {};
   std::size_t at = 1 + sizeof(sizes);
   if (bytes.size() < at || bytes[0] != kImage) return damaged;
   std::memcpy(sizes.data(), bytes.data() + 1, sizeof(sizes));
   LoadedExr out;
-  out.width = sizes[0], out.height = sizes[1];
+  out.width = sizes[0];
+  out.height = sizes[1];
   if (out.width < 1 || out.height < 1 || std::max(out.width, out.height) > kMaxImageSide ||
-      sizes[2] < 1 || sizes[2] > kMaxChannels)
+      sizes[2] < 1 || sizes[2] > kMaxChannels || sizes[3] < 0 || sizes[3] > kMaxWarnings)
     return damaged;
-  for (int c = 0; c < sizes[2]; ++c) {
+  for (int i = 0; i < sizes[2] + sizes[3]; ++i) {
     const std::size_t end = text.find('\0', at);
     if (end == std::string_view::npos) return damaged;
-    out.names.emplace_back(text.substr(at, end - at));
+    (i < sizes[2] ? out.names : out.warnings).emplace_back(text.substr(at, end - at));
     at = end + 1;
   }
   const std::size_t count =

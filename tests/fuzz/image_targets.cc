@@ -176,7 +176,8 @@ void ExrFromReader(Input input) {
 }
 
 std::vector<Bytes> ExrFromReaderSeeds() {
-  Bytes image = {'I', 2, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 'A', 0, 'n', '.', 'X', 0};
+  Bytes image = {'I', 2, 0, 0, 0,   1, 0,   0,   0,   2, 0,   0, 0,
+                 1,   0, 0, 0, 'A', 0, 'n', '.', 'X', 0, 'w', 0};
   image.resize(image.size() + 2 * 1 * 2 * sizeof(float));
   return {image, ToBytes("Ethe file is cut short")};
 }

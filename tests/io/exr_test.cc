@@ -3,6 +3,10 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,6 +85,124 @@ TEST_F(Exr, DamagedFilesAreErrors) {
       ExpectMessage(image.status(), "a.exr");
     }
   }
+}
+
+// --- windows: the picture is the display window, wherever the data lies ---
+
+using ExrWindow = Imath::Box2i;
+
+ExrWindow WindowFrom(int left, int top, int right, int bottom) {
+  return {Imath::V2i(left, top), Imath::V2i(right, bottom)};
+}
+
+// What a channel has at a place of the plane that windows lie in; never 0.
+float Truth(int x, int y, char channel) {
+  return static_cast<float>(1000 * x + 10 * y + (channel == 'R' ? 1 : 2));
+}
+
+// The data window's numbers of a channel.
+std::vector<float> DataOf(const ExrWindow& window, char channel) {
+  std::vector<float> values;
+  for (int y = window.min.y; y <= window.max.y; ++y) {
+    for (int x = window.min.x; x <= window.max.x; ++x) values.push_back(Truth(x, y, channel));
+  }
+  return values;
+}
+
+// As another program writes it.
+void WriteWindows(const Path& file, const ExrWindow& display, const ExrWindow& data) {
+  Imf::Header header(display, data);
+  const std::vector<float> r = DataOf(data, 'R'), g = DataOf(data, 'G');
+  const std::size_t row = sizeof(float) * (static_cast<std::size_t>(data.max.x - data.min.x) + 1);
+  Imf::FrameBuffer frame;
+  for (const auto& [name, values] : {std::pair("R", &r), std::pair("G", &g)}) {
+    header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+    frame.insert(name, Imf::Slice::Make(Imf::FLOAT, values->data(), data, sizeof(float), row));
+  }
+  Imf::OutputFile out(file.c_str(), header);
+  out.setFrameBuffer(frame);
+  out.writePixels(data.max.y - data.min.y + 1);
+}
+
+void ExpectWindow(const io::LoadedExr& image, const ExrWindow& display, const ExrWindow& data) {
+  ASSERT_EQ(image.width, display.max.x - display.min.x + 1);
+  ASSERT_EQ(image.height, display.max.y - display.min.y + 1);
+  ASSERT_EQ(image.names, (std::vector<std::string>{"G", "R"}));
+  std::size_t at = 0;
+  for (const char channel : {'G', 'R'}) {
+    for (int y = display.min.y; y <= display.max.y; ++y) {
+      for (int x = display.min.x; x <= display.max.x; ++x) {
+        const float want = data.intersects(Imath::V2i(x, y)) ? Truth(x, y, channel) : 0;
+        ASSERT_EQ(image.values[at++], want) << channel << " at " << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST_F(Exr, TheDisplayWindowIsThePicture) {
+  struct Case {
+    ExrWindow display, data;
+    bool outside = false;
+  };
+  const Path file = folder_ / "w.exr";
+  for (const Case& c : std::vector<Case>{
+           {WindowFrom(0, 0, 7, 5), WindowFrom(0, 0, 7, 5)},            // the same
+           {WindowFrom(0, 0, 7, 5), WindowFrom(4, 1, 6, 2)},            // within
+           {WindowFrom(10, 20, 17, 25), WindowFrom(10, 20, 17, 25)},    // the same, elsewhere
+           {WindowFrom(-8, -6, -1, -1), WindowFrom(-5, -6, -3, -2)},    // negative
+           {WindowFrom(-2, -2, 3, 3), WindowFrom(0, 0, 3, 1)},          // to its corner
+           {WindowFrom(0, 0, 3, 2), WindowFrom(-2, -1, 5, 4), true},    // beyond it on all sides
+           {WindowFrom(0, 0, 3, 2), WindowFrom(2, 1, 8, 1), true},      // beyond one
+           {WindowFrom(0, 0, 3, 2), WindowFrom(1, -3, 1, 9), true},     // a column through it
+           {WindowFrom(0, 0, 3, 2), WindowFrom(20, 20, 22, 21), true},  // apart
+           {WindowFrom(0, 0, 0, 0), WindowFrom(-1000000, -9, -999999, -8), true}}) {
+    SCOPED_TRACE(c.data.min.x);
+    WriteWindows(file, c.display, c.data);
+    const auto image = io::LoadExr(file);
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    ExpectWindow(*image, c.display, c.data);
+    EXPECT_EQ(image->warnings.size(), c.outside ? 1u : 0u);
+  }
+  WriteWindows(file, WindowFrom(0, 0, 3, 2), WindowFrom(-2, -1, 5, 4));
+  EXPECT_EQ(
+      io::LoadExr(file)->warnings.at(0),
+      "data outside the display window left out: (-2, -1) to (5, 4), outside (0, 0) to (3, 2)");
+}
+
+TEST_F(Exr, WindowsHaveLimits) {
+  const Path file = folder_ / "w.exr";
+  WriteWindows(file, WindowFrom(0, 0, 100'000'000, 1), WindowFrom(0, 0, 1, 1));
+  ExpectMessage(io::LoadExr(file).status(), "w.exr", "100000001 x 2 pixels");
+  WriteWindows(file, WindowFrom(0, 0, 16383, 16383), WindowFrom(0, 0, 1, 1));  // 2 GiB of zeros
+  ExpectMessage(io::LoadExr(file).status(), "w.exr");
+}
+
+TEST_F(Exr, OtherPartsAreSaid) {
+  const Path file = folder_ / "p.exr";
+  std::vector<Imf::Header> headers(2, Imf::Header(3, 2));
+  const ExrWindow window = WindowFrom(0, 0, 2, 1);
+  const std::vector<float> left = DataOf(window, 'R'), right(6, 9.0f);
+  for (std::size_t p = 0; p < 2; ++p) {
+    headers[p].setName(p == 0 ? "left" : "right");
+    headers[p].setType(Imf::SCANLINEIMAGE);
+    headers[p].channels().insert("R", Imf::Channel(Imf::FLOAT));
+  }
+  {
+    Imf::MultiPartOutputFile out(file.c_str(), headers.data(), 2);
+    for (int p = 0; p < 2; ++p) {
+      Imf::FrameBuffer frame;
+      frame.insert("R", Imf::Slice::Make(Imf::FLOAT, (p == 0 ? left : right).data(), window,
+                                         sizeof(float), 3 * sizeof(float)));
+      Imf::OutputPart part(out, p);
+      part.setFrameBuffer(frame);
+      part.writePixels(2);
+    }
+  }
+  const auto image = io::LoadExr(file);
+  ASSERT_TRUE(image.ok()) << image.status().message();
+  EXPECT_EQ(image->values, left);
+  ASSERT_EQ(image->warnings.size(), 1u);
+  EXPECT_EQ(image->warnings[0], "2 parts; the first is read");
 }
 
 }  // namespace tilegrad::exr_test

@@ -2,6 +2,7 @@
 """Meshes, images and weights: in, out, and what is wrong with them."""
 
 import pathlib
+import struct
 import unittest
 
 import numpy as np
@@ -254,6 +255,27 @@ class Images(FolderTest):
             files.load_image(self.folder / "a.exr")
         with self.assertRaisesRegex(ValueError, r"Z has shape \(3, 2\)"):
             files.save_layers(self.folder / "a.exr", {"R": np.zeros((2, 3)), "Z": np.zeros((3, 2))})
+
+    def test_the_display_window_of_an_exr_is_the_picture(self) -> None:
+        path = self.folder / "a.exr"
+        plane = np.arange(1, 7, dtype=np.float32).reshape(2, 3)
+        files.save_layers(path, {"R": plane, "G": 10 * plane})
+        head = b"displayWindow\0box2i\0" + struct.pack("<i", 16)
+        whole = path.read_bytes()
+        at = whole.index(head) + len(head)
+
+        def with_window(*numbers: int) -> dict[str, np.ndarray]:
+            path.write_bytes(whole[:at] + struct.pack("<4i", *numbers) + whole[at + 16:])
+            return files.load_layers(path)
+
+        around = np.zeros((5, 6), np.float32)
+        around[1:3, 2:5] = plane
+        layers = with_window(-2, -1, 3, 3)
+        np.testing.assert_array_equal(layers["R"], around)
+        np.testing.assert_array_equal(layers["G"], 10 * around)
+        with self.assertWarnsRegex(UserWarning, r"a\.exr: data outside .*\(0, 0\) to \(2, 1\)"):
+            layers = with_window(1, 0, 1, 1)
+        np.testing.assert_array_equal(layers["R"], plane[:, 1:2])
 
     def test_a_render_goes_into_a_file(self) -> None:
         frame = tilegrad.Renderer().render(textured_mesh().scene(CAMERA), width=32, height=32)
