@@ -186,14 +186,37 @@ TEST_F(ObjTest, VertexColors) {
 
 TEST_F(ObjTest, WhiteWhereNoMaterialIsNamed) {
   Write("m.mtl", "newmtl m\nKs 1 1 1\nnewmtl d\nd 0.5\nnewmtl grey\nKd 0.25\n");
-  const auto mesh = Load("mtllib m.mtl\n" + kSquare +
-                         "f 1 2 3\nusemtl m\nf 1 3 4\nusemtl d\nf 1 2 4\nusemtl grey\nf 2 3 4\n")
-                        .mesh;
+  const auto loaded =
+      Load("mtllib m.mtl\n" + kSquare +
+               "f 1 2 3\nusemtl m\nf 1 3 4\nusemtl d\nf 1 2 4\nusemtl grey\nf 2 3 4\n",
+           1);
+  EXPECT_EQ(loaded.warnings[0],
+            "faces before the first usemtl are white; the library has \"d\", \"grey\", \"m\"");
+  const Mesh& mesh = loaded.mesh;
   ASSERT_EQ(mesh.materials.size(), 4u);
   EXPECT_EQ(mesh.materials[0].base_color, glm::vec4(1));
   EXPECT_EQ(mesh.materials[1].base_color, glm::vec4(1));
   EXPECT_EQ(mesh.materials[2].base_color, glm::vec4(1, 1, 1, 0.5f));
   EXPECT_EQ(mesh.materials[3].base_color, glm::vec4(0.25f, 0.25f, 0.25f, 1));
+}
+
+TEST_F(ObjTest, LibrariesThatNobodyUses) {
+  ASSERT_TRUE(SavePng(folder_ / "q.png", ImageU8(2, 2, 3, 77)).ok());
+  const std::string square = "mtllib m.mtl\n" + kSquare + kUvs + "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+  Write("m.mtl", "newmtl skin\nmap_Kd q.png\n");
+  const auto one = Load(square, 1);  // there is no choice
+  ExpectNames(one.warnings[0], "no usemtl in the file: drawn with \"skin\"");
+  EXPECT_EQ(Names(one.mesh), (std::vector<std::string>{"skin", "skin"}));
+  EXPECT_EQ(one.mesh.materials.at(0).base_color_texture, 0);
+  Write("m.mtl", "newmtl skin\nmap_Kd q.png\nnewmtl eye\nKd 0 0 1\n");
+  const auto two = Load(square, 1);
+  ExpectNames(two.warnings[0], "white; the library has \"eye\", \"skin\"");
+  EXPECT_EQ(two.mesh.materials.at(0).base_color, glm::vec4(1));
+  EXPECT_TRUE(two.mesh.textures.empty());
+  const auto some = Load(square + "usemtl eye\nf 1/1 2/2 4/4\n", 1);
+  EXPECT_EQ(Names(some.mesh), (std::vector<std::string>{"", "", "eye"}));
+  Write("m.mtl", "# nothing\n");
+  Load(square);
 }
 
 // Files of one name in several folders, and names that differ in upper and lower case.

@@ -49,6 +49,16 @@ class ObjLibraries {
     return nullptr;
   }
 
+  // The only material of all libraries, or nothing.
+  const MtlMaterial* Only() const {
+    return materials_.size() == 1 ? &materials_.begin()->second : nullptr;
+  }
+  std::set<std::string, std::less<>> Names() const {
+    std::set<std::string, std::less<>> names;
+    for (const auto& [name, material] : materials_) names.insert(name);
+    return names;
+  }
+
  private:
   std::optional<std::string> Find(std::string_view name) const {
     return FindBeside(source_, obj_name_, name);
@@ -160,13 +170,27 @@ class ObjAssembly {
     const auto [found, added] = used_.try_emplace(index);
     if (!added) return found->second;
     const std::string name = index < 0 ? "" : from_.materials[static_cast<std::size_t>(index)];
-    const MtlMaterial* known = index < 0 ? nullptr : libraries.Get(name);
+    const MtlMaterial* known = index < 0 ? Unnamed(libraries) : libraries.Get(name);
     if (known == nullptr && index >= 0) unknown_.insert(name);
     const MtlMaterial from = known == nullptr ? MtlMaterial{.name = name} : *known;
     const auto place = static_cast<std::int32_t>(out_.mesh.materials.size());
     out_.mesh.materials.push_back(Convert(from));
     const bool textured = out_.mesh.materials.back().base_color_texture >= 0;
     return found->second = {place, from.image.scale, from.image.offset, textured};
+  }
+
+  // Of faces before any usemtl: nothing, unless there is no choice.
+  const MtlMaterial* Unnamed(const ObjLibraries& libraries) {
+    const MtlMaterial* const only = from_.materials.empty() ? libraries.Only() : nullptr;
+    if (const auto names = libraries.Names(); !names.empty()) {
+      out_.warnings.push_back(
+          only ? fmt::format("no usemtl in the file: drawn with \"{}\", the only material of its "
+                             "library",
+                             only->name)
+               : fmt::format("faces before the first usemtl are white; the library has {}",
+                             ShortList(names)));
+    }
+    return only;
   }
 
   Material Convert(const MtlMaterial& from) {
