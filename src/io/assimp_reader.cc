@@ -12,6 +12,7 @@
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
+#include "io/text_scan.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::io {
@@ -170,6 +171,31 @@ Status Explain(const Status& failure, const std::string& place, const std::strin
                             place, MeshEnding(name), failure.message()));
 }
 
+// Bit 15 of a facet's attribute says that the facet has a colour of its own; of Magics, which
+// writes COLOR= into the header, that it has the header's. Assimp 5.2 reads the one as the other,
+// so Magics' bits are inverted; not where all attributes are 0, which programs without colours
+// leave there. Facets without a colour beside others become white: Assimp makes them grey glass.
+void MendStlColors(Bytes& stl) {
+  constexpr std::size_t kHeader = 80, kFirstFacet = 84, kFacet = 50, kAttribute = 48;
+  constexpr std::uint8_t kMark = 0x80;  // in the second byte
+  if (stl.size() < kFirstFacet) return;
+  std::uint32_t count = 0;
+  std::memcpy(&count, &stl[kHeader], sizeof(count));
+  if (stl.size() != kFirstFacet + kFacet * std::uint64_t{count}) return;  // text
+  const bool magics = TextOf(stl).substr(0, kHeader).find("COLOR=") != std::string::npos;
+  bool colored = false;
+  for (std::size_t at = kFirstFacet + kAttribute; at < stl.size(); at += kFacet)
+    colored = colored || (stl[at + 1] & kMark) != 0 || (magics && (stl[at] | stl[at + 1]) != 0);
+  for (std::size_t at = kFirstFacet + kAttribute; colored && at < stl.size(); at += kFacet) {
+    if (magics) {
+      stl[at + 1] ^= kMark;
+    } else if ((stl[at + 1] & kMark) == 0) {
+      stl[at] = 0xff;
+      stl[at + 1] = 0xff;
+    }
+  }
+}
+
 }  // namespace
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
@@ -194,6 +220,7 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
   TILEGRAD_ASSIGN(Bytes file, source.Read(name));
   // Assimp 5.2 takes frames that end with the file for frames beyond it.
   if (MeshEnding(name) == ".md2") file.push_back(0);
+  if (MeshEnding(name) == ".stl") MendStlColors(file);
   return ReadByAssimp(source, name, file, LimitsFor(file.size()));
 }
 
