@@ -250,6 +250,17 @@ Result<std::shared_ptr<FileSource>> OpenZip(const Path& path) {
   return std::shared_ptr<FileSource>(std::make_shared<Zip>(path, std::move(zip)));
 }
 
+Result<Bytes> ReadFromZip(const Bytes& zip, const std::string& place, const std::string& name) {
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* source = zip_source_buffer_create(zip.data(), zip.size(), /*freep=*/0, &error);
+  ZipHandle handle(source == nullptr ? nullptr : zip_open_from_source(source, ZIP_RDONLY, &error));
+  if (!handle) zip_source_free(source);
+  zip_error_fini(&error);
+  if (!handle) return DataLoss("{}: not a zip archive that can be read", place);
+  return Zip(place, std::move(handle)).Read(name);
+}
+
 Result<std::vector<std::string>> ListZip(const Path& path) {
   TILEGRAD_ASSIGN(ZipHandle zip, OpenZipHandle(path));
   std::vector<std::string> names;

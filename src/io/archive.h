@@ -31,6 +31,9 @@ std::shared_ptr<FileSource> OpenFolder(const Path& folder, std::vector<Path>* re
 // Reading is thread-safe (a lock); one entry may be at most 1 GiB unpacked.
 Result<std::shared_ptr<FileSource>> OpenZip(const Path& path);
 
+// One entry of a zip in memory; `place` stands for the zip in messages.
+Result<Bytes> ReadFromZip(const Bytes& zip, const std::string& place, const std::string& name);
+
 // The names of all entries of a zip, folders left out.
 Result<std::vector<std::string>> ListZip(const Path& path);
 

@@ -7,12 +7,14 @@
 #include <unordered_map>
 
 #include "base/error.h"
+#include "io/archive.h"
 #include "io/assimp_import.h"
 #include "io/fbx_wrapping.h"
 #include "io/image_file.h"
 #include "io/mesh_colors.h"
 #include "io/mesh_readers.h"
 #include "io/text_scan.h"
+#include "io/threemf_paint.h"
 #include "scene/shapes.h"
 
 namespace tilegrad::io {
@@ -196,6 +198,13 @@ void MendStlColors(Bytes& stl) {
   }
 }
 
+void WarnOfPaint(const Bytes& threemf, const std::string& place,
+                 std::vector<std::string>* warnings) {
+  const auto model = ReadFromZip(threemf, place, "3D/3dmodel.model");
+  if (!model.ok() || !HasPaintedTriangles(TextOf(*model))) return;
+  warnings->emplace_back("colours of single triangles and colour groups left out");
+}
+
 }  // namespace
 
 Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& name,
@@ -213,6 +222,7 @@ Result<LoadedMesh> ReadByAssimp(const FileSource& source, const std::string& nam
     loaded->warnings.emplace_back(
         "the wrapping of a texture (clamped) is not read; all textures repeat");
   }
+  if (MeshEnding(name) == ".3mf") WarnOfPaint(file, place, &loaded->warnings);
   return loaded;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "base/error.h"
+#include "io/archive.h"
 #include "io/fbx_wrapping.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
@@ -205,6 +206,40 @@ TEST_F(AssimpWarningsTest, FbxSaysWhatIsNotRead) {
     ASSERT_EQ(wrapped.size(), 1u);
     EXPECT_NE(wrapped[0].find("wrapping"), std::string::npos) << wrapped[0];
   }
+}
+
+TEST_F(AssimpWarningsTest, ThreeMfSaysThatTrianglesArePainted) {
+  const auto load = [&](const std::string& resources, const std::string& first,
+                        const std::string& second) {
+    const std::string model =
+        "<model><resources>" + resources +
+        "<object id=\"1\" pid=\"5\" pindex=\"0\"><mesh><vertices><vertex x=\"0\" y=\"0\" z=\"0\"/>"
+        "<vertex x=\"1\" y=\"0\" z=\"0\"/><vertex x=\"0\" y=\"1\" z=\"0\"/></vertices><triangles>"
+        "<triangle v1=\"0\" v2=\"1\" v3=\"2\"" +
+        first + "/><triangle v1=\"2\" v2=\"1\" v3=\"0\"" + second +
+        "/></triangles></mesh></object></resources><build><item objectid=\"1\"/></build></model>";
+    const std::string relations =
+        "<Relationships><Relationship Id=\"r\" Target=\"/3D/3dmodel.model\" "
+        "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>";
+    EXPECT_TRUE(WriteZip(folder_ / "a.3mf", {{"_rels/.rels", {relations.begin(), relations.end()}},
+                                             {"3D/3dmodel.model", {model.begin(), model.end()}}})
+                    .ok());
+    const auto loaded = LoadMesh(folder_ / "a.3mf");
+    EXPECT_TRUE(loaded.ok()) << loaded.status().message();
+    return loaded.ok() ? loaded->warnings : std::vector<std::string>();
+  };
+  const std::string materials =
+      "<basematerials id=\"5\"><base name=\"a\" displaycolor=\"#FF0000\"/>"
+      "<base name=\"b\" displaycolor=\"#00FF00\"/></basematerials>";
+  const std::string red = " pid=\"5\" p1=\"0\"", green = " pid=\"5\" p1=\"1\"";
+  const std::vector<std::string> said = {"colours of single triangles and colour groups left out"};
+  EXPECT_TRUE(load(materials, "", "").empty());
+  EXPECT_TRUE(load(materials, green, green).empty());
+  EXPECT_EQ(load(materials, red, green), said);
+  EXPECT_EQ(load(materials, "", green), said);
+  EXPECT_EQ(load(materials, "", " paint_color=\"4\""), said);
+  EXPECT_EQ(load("<m:colorgroup id=\"5\"><m:color color=\"#FF0000\"/></m:colorgroup>", "", ""),
+            said);
 }
 
 // The same property as binary files have it, whole, cut, and with a length beyond the end.
