@@ -52,6 +52,7 @@ class Ac3dReader {
                       keyword == "MAT" ? text_.ReadMaterialBlock(line) : text_.ReadMaterial(line));
       palette_.push_back(std::move(material));
     }
+    if (text_.emits()) out.warnings.emplace_back("the emission of materials is not drawn");
     return {};
   }
 

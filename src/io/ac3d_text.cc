@@ -16,7 +16,7 @@ Status Ac3dText::Error(std::string_view what) const {
   return DataLoss("{}: line {}: {}", place_, lines_.Number(), what);
 }
 
-Result<Material> Ac3dText::ReadMaterial(std::string_view rest) const {
+Result<Material> Ac3dText::ReadMaterial(std::string_view rest) {
   Material material{.name = std::string(NextAc3dString(rest)), .base_color = glm::vec4(1)};
   TILEGRAD_TRY(MaterialValues(rest, material));
   return material;
@@ -32,9 +32,14 @@ Result<Material> Ac3dText::ReadMaterialBlock(std::string_view rest) {
 }
 
 // "rgb 1 1 1  amb ...  trans 0", or a part of it.
-Status Ac3dText::MaterialValues(std::string_view rest, Material& material) const {
+Status Ac3dText::MaterialValues(std::string_view rest, Material& material) {
   for (auto key = NextToken(rest); !key.empty(); key = NextToken(rest)) {
     if (key == "rgb") TILEGRAD_TRY(Numbers(rest, &material.base_color[0], 3, "rgb"));
+    if (key == "emis") {
+      glm::vec3 light(0);
+      TILEGRAD_TRY(Numbers(rest, &light[0], 3, "emis"));
+      emits_ = emits_ || light != glm::vec3(0);
+    }
     if (key != "trans") continue;
     float transparency = 0;
     TILEGRAD_TRY(Numbers(rest, &transparency, 1, "trans"));

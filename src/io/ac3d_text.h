@@ -34,15 +34,18 @@ class Ac3dText {
   }
 
   // What follows MATERIAL on its line.
-  Result<Material> ReadMaterial(std::string_view rest) const;
+  Result<Material> ReadMaterial(std::string_view rest);
   // What follows MAT, in version 12 of the format: one line a property, up to ENDMAT.
   Result<Material> ReadMaterialBlock(std::string_view rest);
+  // Whether any of these shines by itself.
+  bool emits() const { return emits_; }
 
  private:
-  Status MaterialValues(std::string_view rest, Material& material) const;
+  Status MaterialValues(std::string_view rest, Material& material);
 
   const std::string place_;
   Lines lines_;
+  bool emits_ = false;
 };
 
 // The next token, or a quoted string, which may contain spaces.

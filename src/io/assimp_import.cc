@@ -12,6 +12,7 @@
 #include <glm/mat4x4.hpp>
 #include <iterator>
 #include <memory>
+#include <set>
 
 #include "base/error.h"
 
@@ -96,31 +97,54 @@ ImportedPart ConvertPart(const aiMesh& from) {
   return part;
 }
 
-template <class T>
-T MaterialValue(const aiMaterial& from, const char* key, T value) {
-  from.Get(key, aiTextureType_DIFFUSE, 0, value);
-  return value;
-}
+// Things with commas between.
+class CommaList {
+ public:
+  void Add(bool is, std::string_view what) {
+    if (is) text.append(text.empty() ? "" : ", ").append(what);
+  }
+  std::string text;
+};
 
 // What a material says about its image that is not read: uv are those of the first set, as they
 // are, and repeat.
-std::string NotReadOfImage(const aiMaterial& from) {
-  std::string list;
-  const auto add = [&](bool is, std::string_view what) {
-    if (is) list.append(list.empty() ? "" : ", ").append(what);
+std::string NotReadOfImage(const aiMaterial& from, aiTextureType type) {
+  const auto value = [&](const char* key, auto fallback) {
+    from.Get(key, type, 0, fallback);
+    return fallback;
   };
-  add(MaterialValue<int>(from, _AI_MATKEY_MAPPING_BASE, aiTextureMapping_UV) != aiTextureMapping_UV,
-      "its projection (a sphere's, a box's, ...)");
-  const int set = MaterialValue<int>(from, _AI_MATKEY_UVWSRC_BASE, 0);
-  add(set != 0, fmt::format("uv set {}; set 0 stands in", set));
+  CommaList list;
+  list.Add(value(_AI_MATKEY_MAPPING_BASE, int{aiTextureMapping_UV}) != aiTextureMapping_UV,
+           "its projection (a sphere's, a box's, ...)");
+  const int set = value(_AI_MATKEY_UVWSRC_BASE, 0);
+  list.Add(set != 0, fmt::format("uv set {}; set 0 stands in", set));
   constexpr int kWrap = aiTextureMapMode_Wrap;
-  add(MaterialValue(from, _AI_MATKEY_MAPPINGMODE_U_BASE, kWrap) != kWrap ||
-          MaterialValue(from, _AI_MATKEY_MAPPINGMODE_V_BASE, kWrap) != kWrap,
-      "its wrapping (clamped, mirrored or once); it repeats");
-  const auto t = MaterialValue(from, _AI_MATKEY_UVTRANSFORM_BASE, aiUVTransform());
-  add(t.mTranslation != aiVector2D(0, 0) || t.mScaling != aiVector2D(1, 1) || t.mRotation != 0,
-      "its uv transform");
-  return list;
+  list.Add(value(_AI_MATKEY_MAPPINGMODE_U_BASE, kWrap) != kWrap ||
+               value(_AI_MATKEY_MAPPINGMODE_V_BASE, kWrap) != kWrap,
+           "its wrapping (clamped, mirrored or once); it repeats");
+  const auto t = value(_AI_MATKEY_UVTRANSFORM_BASE, aiUVTransform());
+  list.Add(t.mTranslation != aiVector2D(0, 0) || t.mScaling != aiVector2D(1, 1) || t.mRotation != 0,
+           "its uv transform");
+  return list.text;
+}
+
+// Materials for physically based lighting have the one instead of the other.
+aiTextureType TypeOfImage(const aiMaterial& from) {
+  return from.GetTextureCount(aiTextureType_DIFFUSE) > 0 ? aiTextureType_DIFFUSE
+                                                         : aiTextureType_BASE_COLOR;
+}
+
+// What else of a material would be seen.
+std::string LeftOutOf(const aiMaterial& from) {
+  CommaList list;
+  list.Add(from.GetTextureCount(TypeOfImage(from)) > 1, "layers of its image but the first");
+  list.Add(from.GetTextureCount(aiTextureType_OPACITY) > 0, "its image of opacity");
+  list.Add(from.GetTextureCount(aiTextureType_LIGHTMAP) > 0, "its light map");
+  list.Add(from.GetTextureCount(aiTextureType_DISPLACEMENT) > 0, "its displacement");
+  aiColor3D emission(0, 0, 0);
+  from.Get(AI_MATKEY_COLOR_EMISSIVE, emission);
+  list.Add(!emission.IsBlack() || from.GetTextureCount(aiTextureType_EMISSIVE) > 0, "its emission");
+  return list.text;
 }
 
 ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
@@ -132,10 +156,11 @@ ImportedMaterial ConvertMaterial(const aiMaterial& from, const aiScene& scene) {
   from.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse);
   from.Get(AI_MATKEY_OPACITY, opacity);
   material.color = {diffuse.r, diffuse.g, diffuse.b, opacity};
-  if (from.GetTexture(aiTextureType_DIFFUSE, 0, &text) != AI_SUCCESS) return material;
+  const aiTextureType type = TypeOfImage(from);
+  if (from.GetTexture(type, 0, &text) != AI_SUCCESS) return material;
   if (text == aiString("$texture_dummy.bmp")) return material;  // of an MD2 without a skin
   material.image = text.C_Str();
-  material.not_read = NotReadOfImage(from);
+  material.not_read = NotReadOfImage(from, type);
   const aiTexture* embedded = scene.GetEmbeddedTexture(text.C_Str());
   for (unsigned i = 0; embedded != nullptr && i < scene.mNumTextures; ++i) {
     if (scene.mTextures[i] == embedded) material.embedded = static_cast<std::int32_t>(i);
@@ -159,23 +184,38 @@ void PlaceParts(const aiNode& node, const glm::dmat4& parent, ImportedScene& sce
   for (unsigned i = 0; i < node.mNumChildren; ++i) PlaceParts(*node.mChildren[i], to_scene, scene);
 }
 
+void WarnOfPart(const aiMesh& mesh, std::vector<std::string>* warnings) {
+  const auto warn = [&](bool is, std::string_view what) {
+    if (is) warnings->push_back(fmt::format("part \"{}\": {}", mesh.mName.C_Str(), what));
+  };
+  warn(mesh.mNumBones > 0 || mesh.mNumAnimMeshes > 0,
+       "bones and morph targets are not read; it is drawn as it was modelled");
+  warn(mesh.HasVertexColors(1), "sets of colours but the first left out");
+  warn((mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0, "points or lines left out");
+}
+
+// Of the materials that parts have.
+void WarnOfMaterials(const aiScene& from, std::vector<std::string>* warnings) {
+  std::set<unsigned> used;
+  for (unsigned i = 0; i < from.mNumMeshes; ++i) used.insert(from.mMeshes[i]->mMaterialIndex);
+  for (const unsigned i : used) {
+    if (i >= from.mNumMaterials) continue;
+    const std::string left_out = LeftOutOf(*from.mMaterials[i]);
+    if (left_out.empty()) continue;
+    warnings->push_back(fmt::format("material \"{}\": left out: {}",
+                                    from.mMaterials[i]->GetName().C_Str(), left_out));
+  }
+}
+
 ImportedScene ConvertScene(const aiScene& from) {
   ImportedScene scene;
   for (unsigned i = 0; i < from.mNumMeshes; ++i) {
-    const aiMesh& mesh = *from.mMeshes[i];
-    scene.parts.push_back(ConvertPart(mesh));
-    if (mesh.mNumBones > 0 || mesh.mNumAnimMeshes > 0) {
-      scene.warnings.push_back(fmt::format(
-          "part \"{}\": bones and morph targets are not read; it is drawn as it was modelled",
-          mesh.mName.C_Str()));
-    }
-    if ((mesh.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
-      scene.warnings.push_back(
-          fmt::format("part \"{}\": points or lines left out", mesh.mName.C_Str()));
-    }
+    scene.parts.push_back(ConvertPart(*from.mMeshes[i]));
+    WarnOfPart(*from.mMeshes[i], &scene.warnings);
   }
   for (unsigned i = 0; i < from.mNumMaterials; ++i)
     scene.materials.push_back(ConvertMaterial(*from.mMaterials[i], from));
+  WarnOfMaterials(from, &scene.warnings);
   for (unsigned i = 0; i < from.mNumTextures; ++i)
     scene.images.push_back(ConvertImage(*from.mTextures[i]));
   PlaceParts(*from.mRootNode, glm::dmat4(1), scene);

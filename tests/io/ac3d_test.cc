@@ -91,6 +91,14 @@ TEST_F(Ac3dTest, StripsAndLayersOfTorcs) {
   EXPECT_EQ(loaded->parts[0].name, "body");
 }
 
+TEST_F(Ac3dTest, EmissionIsSaid) {
+  std::string lamp = World(kTriangle);
+  lamp.replace(lamp.find("emis 0 0 0"), 10, "emis 0 0.5 0");
+  const auto loaded = LoadMesh(Write("a.ac", lamp));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ(loaded->warnings, (std::vector<std::string>{"the emission of materials is not drawn"}));
+}
+
 TEST_F(Ac3dTest, PartsSayWhichFacesAnObjectHas) {
   const auto loaded = LoadMesh(
       Write("a.ac", kHead + "OBJECT world\nkids 2\nOBJECT poly\nname \"hull\"\n" + kTriangle +

@@ -242,6 +242,40 @@ TEST_F(AssimpWarningsTest, ThreeMfSaysThatTrianglesArePainted) {
             said);
 }
 
+// Materials of Stingray, Arnold and Maya have the image of their colour under another name.
+TEST_F(AssimpWarningsTest, FbxImagesOfBaseColourAreRead) {
+  for (const char* name : {"DiffuseColor", "Maya|baseColor", "Maya|TEX_color_map",
+                           "3dsMax|Parameters|base_color_map", "3dsMax|main|base_color_map"}) {
+    std::string file = Fbx("");
+    file.replace(file.find("DiffuseColor"), 12, name);
+    EXPECT_TRUE(WarningsOf(Write("a.fbx", file)).empty()) << name;  // and there is one texture
+  }
+}
+
+TEST_F(AssimpWarningsTest, WhatElseOfAMaterialIsSeenIsSaid) {
+  const auto linked = [&](const char* property) {
+    return Fbx("", "", fmt::format("C: \"OP\",4,3, \"{}\"\n", property));
+  };
+  ExpectOne(WarningsOf(Write("a.fbx", linked("TransparentColor"))),
+            "left out: its image of opacity");
+  ExpectOne(WarningsOf(Write("b.fbx", linked("EmissiveColor"))), "left out: its emission");
+  ExpectOne(WarningsOf(Write("c.fbx", linked("DisplacementColor"))), "left out: its displacement");
+  std::string dae = Collada("", "", 0);
+  dae.replace(dae.find("<lambert>"), 9, "<lambert><emission><color>0.5 0 0 1</color></emission>");
+  ExpectOne(WarningsOf(Write("d.dae", dae)), "left out: its emission");
+}
+
+// A name in a URI, as Collada and X3D have it.
+TEST_F(AssimpWarningsTest, NamesOfImagesAreDecoded) {
+  for (const auto& [file, uri] : std::vector<std::pair<std::string, std::string>>{
+           {"my q.png", "my%20q.png"}, {"a+b.png", "a+b.png"}, {"a+b.png", "a%2Bb.png"}}) {
+    ASSERT_TRUE(SavePng(folder_ / file, ImageU8(2, 2, 3, 77)).ok());
+    std::string dae = Collada("", "", 0);
+    dae.replace(dae.find("q.png"), 5, uri);
+    EXPECT_TRUE(WarningsOf(Write("a.dae", dae)).empty()) << uri;
+  }
+}
+
 // The same property as binary files have it, whole, cut, and with a length beyond the end.
 TEST_F(AssimpWarningsTest, FbxWrappingOfBinaryFiles) {
   const auto text = [](const std::string& t) {
