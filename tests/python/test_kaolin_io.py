@@ -85,6 +85,24 @@ class ImportMesh(FileTest):
         self.assertEqual([start for _, start in order], [0, 1])
         self.assertEqual([m for m, _ in order], mesh.material_assignments.tolist())
 
+    def test_materials_are_sorted_by_name(self):
+        names = ["b", "C", "a", "\u00e9", "a10", "a2"]
+        (self.root / "many.mtl").write_text("".join(
+            f"newmtl {name}\nKd 0.{i + 1} 0 0\n" for i, name in enumerate(names)), encoding="utf-8")
+        corners = OBJ[OBJ.index("v 0"):OBJ.index("usemtl")]
+        path = self.root / "many.obj"
+        path.write_text("mtllib many.mtl\n" + corners + "f 1 2 3\n" + "".join(
+            f"usemtl {name}\nf 1 2 3\n" for name in [*names, "b"]), encoding="utf-8")
+        mesh = kaolin.io.obj.import_mesh(path, with_materials=True)
+        self.assertEqual([material["material_name"] for material in mesh.materials], sorted(names))
+        self.assertEqual(mesh.material_assignments.dtype, torch.int16)
+        self.assertEqual(mesh.material_assignments.tolist(),
+                         [-1, *(sorted(names).index(name) for name in [*names, "b"])])
+        self.assertEqual(mesh.materials_order[0].tolist(), [sorted(names).index("b"), 1])
+        for material in mesh.materials:
+            red = (names.index(material["material_name"]) + 1) / 10
+            self.assertAlmostEqual(float(material["Kd"][0]), red, places=6)
+
     def test_only_what_was_asked_for(self):
         mesh = kaolin.io.obj.import_mesh(self.path)
         for name in ("materials", "material_assignments", "materials_order", "normals",

@@ -198,7 +198,8 @@ def _materials_order(mesh: SurfaceMesh) -> Optional[torch.Tensor]:
     if of_faces is None:
         return None
     materials, counts = of_faces.long().unique_consecutive(return_counts=True)
-    return torch.stack([materials, counts.cumsum(0) - counts], dim=1)
+    order = torch.stack([materials, counts.cumsum(0) - counts], dim=1)
+    return order[materials >= 0]  # -1: faces without one
 
 
 _COMPUTED: dict[str, Callable[[SurfaceMesh], Optional[torch.Tensor]]] = {

@@ -25,8 +25,9 @@ def load_surface(path: Path, with_materials: bool = True, with_normals: bool = T
         if loaded.normals is None and mesh.normals is not None:
             loaded.normals, loaded.face_normals_idx = torch.from_numpy(mesh.normals), loaded.faces
     if with_materials:
-        loaded.materials = _materials(mesh)
-        loaded.material_assignments = _assignments(mesh)
+        order = _order(mesh, os.fspath(path))
+        loaded.materials = _materials(mesh, order)
+        loaded.material_assignments = _assignments(mesh, order)
     if mesh.colors is not None:
         loaded.vertex_colors = torch.from_numpy(mesh.colors[:, :3])
     if mesh.corner_colors is not None:
@@ -48,10 +49,18 @@ def _table(mesh: Mesh, name: str, corners: Optional[np.ndarray]
             torch.arange(3 * len(corners)).reshape(-1, 3))
 
 
-def _materials(mesh: Mesh) -> list[dict[str, Any]]:
+def _order(mesh: Mesh, path: str) -> list[int]:
+    """The materials as Kaolin lists them: of OBJ by name, without that of faces that name none."""
+    order = list(range(len(mesh.materials)))
+    if not path.lower().endswith(".obj"):
+        return order
+    return sorted((i for i in order if mesh.materials[i].name), key=lambda i: mesh.materials[i].name)
+
+
+def _materials(mesh: Mesh, order: list[int]) -> list[dict[str, Any]]:
     """material_name, Kd [3], and map_Kd [H,W,3] uint8 where there is a texture."""
     materials = []
-    for material in mesh.materials:
+    for material in (mesh.materials[i] for i in order):
         one = {"material_name": material.name, "Kd": torch.tensor(material.base_color[:3])}
         if material.texture >= 0:
             image = mesh.textures[material.texture].image[..., :3]
@@ -60,8 +69,9 @@ def _materials(mesh: Mesh) -> list[dict[str, Any]]:
     return materials
 
 
-def _assignments(mesh: Mesh) -> torch.Tensor:
-    """[F] int16, as Kaolin has it."""
-    if mesh.face_materials is not None:
-        return torch.from_numpy(mesh.face_materials).to(torch.int16)
-    return torch.full((len(mesh.faces),), 0 if mesh.materials else -1, dtype=torch.int16)
+def _assignments(mesh: Mesh, order: list[int]) -> torch.Tensor:
+    """[F] int16, as Kaolin has it: -1 for faces without a material."""
+    places = np.full(len(mesh.materials) + 1, -1, np.int16)  # the last one: of a mesh without any
+    places[order] = np.arange(len(order))
+    faces = mesh.face_materials
+    return torch.from_numpy(places[np.zeros(len(mesh.faces), int) if faces is None else faces])

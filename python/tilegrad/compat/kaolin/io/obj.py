@@ -17,8 +17,9 @@ def import_mesh(path: Path, with_materials: bool = False, with_normals: bool = F
                 triangulate: bool = True, raw_materials: bool = True) -> SurfaceMesh:
     """Loads a mesh, of any format that tilegrad.meshes reads; faces are cut into triangles.
 
-    with_materials: materials, dictionaries of material_name, Kd [3] and map_Kd [H,W,3] uint8 where
-        there is a texture, with material_assignments [F]. with_normals: normals with
+    with_materials: materials sorted by name, dictionaries of material_name, Kd [3] and map_Kd
+        [H,W,3] uint8 where there is a texture, with material_assignments [F], -1 for faces without
+        one. Those that no face uses are left out. with_normals: normals with
         face_normals_idx. uvs: (0, 0) is the lower left corner of the texture.
     The rest are Kaolin's, and accepted: there is nothing to handle in a file that loads, and
     materials are always as above.
