@@ -134,6 +134,25 @@ for name in ("30_utm_sphere.obj", "30_utm_sphere.ply", "30_local_sphere.obj"):
     RIGHT[name] = ("round, or warned with extent", round_or_said)
 for name in ("30_huge.obj", "30_huge18.obj", "30_tiny.obj", "30_tiny20.obj", "30_utm.obj"):
     RIGHT[name] = ("drawn, warned or refused", either(drawn, lambda shot: shot.text != ""))
+# The two squares of samename.glb, seen from three times as far: points are a third of what they were.
+ASIDE = ("--shading", "none", "--eye", 1.5, 0, 12, "--target", 1.5, 0, 0, "--supersample", 1)
+
+# File of second/: (what is right, check, arguments of the view).
+SECOND = {
+    "gltf_plus/plus.gltf": ("red", colored({(0, 0): RED}), straight()),
+    "gltf_plus/encoded.gltf": ("red", colored({(0, 0): RED}), straight()),
+    "gltf/same.obj": ("orange", colored({(0.5, -0.5): (255, 128, 0)}), straight()),
+    "gltf/u8_not_normalized.glb": ("as same.obj, or refused",
+                                   either(colored({(0.5, -0.5): (255, 128, 0)}), refused("COLOR")),
+                                   straight()),
+    "gltf/samename.glb": ("left blue, right red", colored({(-0.5, 0): BLUE, (0.5, 0): RED}), ASIDE),
+    "stl/magics_all_default.stl": ("red", colored({(0.3, 0.3): RED, (0.8, 0.8): RED}), straight()),
+    "threemf/colors.3mf": ("both colours, or warned",
+                           either(colored({(0.7, 0.3): RED, (0.3, 0.7): GREEN}),
+                                  said("colours of single triangles")), straight()),
+    "ply/quality_nan.ply": ("read", drawn, straight()),
+    "obj_no_usemtl/mesh.obj": ("warned", said("usemtl"), straight()),
+}
 CAMERAS = {"tf_fisheye.json": refused("OPENCV_FISHEYE"), "tf_isfisheye.json": refused("is_fisheye"),
            "tf_ortho.json": refused("EQUIRECTANGULAR"), "tf_k1.json": refused("k1"),
            "tf_blenderscale.json": refused("rotation"), "tf_mirror.json": refused("rotation"),
@@ -173,6 +192,29 @@ def count_views(program, folder, cameras):
         return done, len(list(pathlib.Path(out).glob("*.png")))
 
 
+def reads_display_window(file):
+    """Whether Python reads six rows of eight pixels, zeros but for columns 4 to 6 of rows 1 and 2."""
+    from tilegrad.images import load_layers  # not in every build
+    data = [[y, x] for y in (1, 2) for x in (4, 5, 6)]
+    return all(plane.shape == (6, 8) and np.argwhere(plane).tolist() == data
+               for plane in load_layers(file).values())
+
+
+def second_rows(program, folder):
+    """As `rows`, of the files after further reports."""
+    for name, (right, check, view) in SECOND.items():
+        shot = Shot(program, folder, (name, *view))
+        yield f"second/{name}", right, check(shot), shot
+    shot = Shot(program, folder, ("../34_missing.obj", *straight("--texture", "png/red.png")))
+    yield ("second/png/red.png", "red, or refused",
+           colored({(0, 0): RED})(shot) or refused("red.png")(shot), shot)
+    try:
+        yield ("second/exr/crop.exr", "6 x 8 pixels, zeros around",
+               reads_display_window(folder / "exr/crop.exr"), None)
+    except ImportError:
+        print("skipped: second/exr/crop.exr; Python has no module tilegrad")
+
+
 def rows(program, folder):
     """(file, what is right, whether it is, the shot)."""
     for file in sorted(folder.glob("*.*")):
@@ -205,6 +247,10 @@ def rows(program, folder):
     for name, count in COUNTS.items():
         done, views = count_views(program, folder, name)
         yield name, f"{count} cameras", done.returncode == 0 and views == count, done
+    if (folder / "second").is_dir():
+        yield from second_rows(program, folder / "second")
+    else:
+        print(f"skipped: there is no folder {folder}/second")
 
 
 def find_folder():
