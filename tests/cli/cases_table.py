@@ -21,7 +21,10 @@ import numpy as np
 SIZE, HALF = 128, 4 * np.tan(np.radians(20))  # pixels; what they show at z = 0, seen from 4 away
 
 # Not right yet, and what they need; the table says which of these have become right.
-NOT_DONE: dict = {}
+NOT_DONE: dict = {
+    f"second/fit_{name}": "src/fit"
+    for name in ("cx0", "parallel", "two_models", "some_mask_paths", "one_without_alpha",
+                 "empty_mask", "narrow", "webp", "mixed_kinds")}
 
 
 class Shot:
@@ -200,8 +203,63 @@ def reads_display_window(file):
                for plane in load_layers(file).values())
 
 
+class Fit:
+    """What `tilegrad fit` made of a folder, or what it had said after `patience` seconds."""
+
+    def __init__(self, program, folder, patience=60):
+        with tempfile.TemporaryDirectory() as place:
+            out = pathlib.Path(place) / "fit"
+            command = [program, "fit", folder, "--out", out, "--steps", "100", "--hold-out", "5",
+                       "--json"]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                  text=True) as fit:
+                try:
+                    result, self.text = fit.communicate(timeout=patience)
+                except subprocess.TimeoutExpired:
+                    fit.kill()
+                    result, self.text = fit.communicate()
+                self.code = fit.returncode
+            scores = json.loads(result).get("held_out") if self.code == 0 else None
+            self.iou = scores["silhouette_iou"] if scores else 0.0
+            self.extent = extent_of(out / "mesh.glb") if self.code == 0 else np.inf
+        self.text, self.refused = self.text.strip(), self.code in (2, 3)
+
+
+def extent_of(glb):
+    """The largest coordinate of a GLB, whose accessors say what theirs are."""
+    data = glb.read_bytes()
+    accessors = json.loads(data[20:20 + int.from_bytes(data[12:16], "little")])["accessors"]
+    return max(np.abs([a["min"], a["max"]]).max() for a in accessors
+               if a["type"] == "VEC3" and "min" in a)
+
+
+def fitted(*words, iou=0.95):
+    return lambda fit: fit.iou > iou and all(word in fit.text for word in words)
+
+
+# Folder of second/: (what is right, check, seconds that it may take).
+FITS = {
+    "fit_base": ("IoU above 0.95", fitted(), 60),
+    "fit_cx0": ("IoU above 0.95: 0 is a number", fitted(), 60),
+    "fit_parallel": ("the sphere, or the cause", either(fitted(iou=0.9), refused("parallel")), 60),
+    "fit_two_models": ("the larger one, and a word", fitted("sparse"), 60),
+    "fit_some_mask_paths": ("refused", refused("004.png"), 60),
+    "fit_one_without_alpha": ("refused", refused("003.png"), 60),
+    "fit_empty_mask": ("named; the others fitted", fitted("003.png", iou=0.9), 60),
+    "fit_narrow": ("warned, no lens", lambda fit: "degrees" in fit.text and fit.extent < 4, 60),
+    # Their cameras are searched for: what is said before counts.
+    "fit_webp": ("read", lambda fit: not fit.refused and "not read" not in fit.text, 15),
+    "fit_mixed_kinds": ("what is skipped is named",
+                        lambda fit: all(kind in fit.text.lower() for kind in ("heic", "tif", "bmp")),
+                        15),
+}
+
+
 def second_rows(program, folder):
     """As `rows`, of the files after further reports."""
+    for name, (right, check, patience) in FITS.items():
+        fit = Fit(program, folder / name, patience)
+        yield f"second/{name}", right, check(fit), fit
     for name, (right, check, view) in SECOND.items():
         shot = Shot(program, folder, (name, *view))
         yield f"second/{name}", right, check(shot), shot
