@@ -315,7 +315,34 @@ TEST(ReportData, MeshKeepsSixteenBits) {
   EXPECT_EQ(json["positions"], Base64(steps));
   EXPECT_EQ(json["colors"], Base64(Bytes(9, 255)));
   EXPECT_EQ(json["faces"], Base64(Bytes{0, 0, 1, 0, 2, 0}));
+  EXPECT_TRUE(json["texture"].is_null());
   EXPECT_TRUE(MeshJson(Mesh()).is_null());
+}
+
+TEST(ReportData, MeshHasTheTextureThatAllFacesShare) {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  mesh.faces = {{0, 1, 2}, {2, 1, 3}};
+  mesh.corner_uvs = {{0, 0}, {2, 0}, {0, 1}, {0, 1}, {2, 0}, {2, 1}};
+  mesh.textures = {{"t", ImageU8(2, 2, 3, 7)}};
+  mesh.materials = {{.name = "m",
+                     .base_color = {1, 0.2f, 0, 1},
+                     .base_color_texture = 0,
+                     .wrap = {TextureWrap::kMirror, TextureWrap::kClamp}}};
+  const auto json = MeshJson(mesh);
+  EXPECT_EQ(json["texture"]["image"], PngAddress(ImageU8(2, 2, 3, 7)).value());
+  EXPECT_EQ(json["texture"]["wrap"], (nlohmann::ordered_json{"MIRRORED_REPEAT", "CLAMP_TO_EDGE"}));
+  EXPECT_EQ(json["texture"]["low"], (nlohmann::ordered_json{0.0, 0.0}));
+  EXPECT_EQ(json["texture"]["high"], (nlohmann::ordered_json{2.0, 1.0}));
+  const Bytes steps = {0, 0, 0,   0,   255, 255, 0, 0, 0,   0,   255, 255,
+                       0, 0, 255, 255, 255, 255, 0, 0, 255, 255, 255, 255};
+  EXPECT_EQ(json["texture"]["uvs"], Base64(steps));
+  const Bytes factor = {255, 51, 0, 255, 51, 0, 255, 51, 0, 255, 51, 0};
+  EXPECT_EQ(json["colors"], Base64(factor));
+  // Two textures are two pictures; the page draws one.
+  mesh.materials.push_back({.name = "plain", .base_color_texture = -1});
+  mesh.face_materials = {0, 1};
+  EXPECT_TRUE(MeshJson(mesh)["texture"].is_null());
 }
 
 TEST(ReportData, ThinKeepsMeansAndTheLastStep) {

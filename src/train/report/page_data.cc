@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "train/data/stream/textured_meshes.h"
 #include "train/report/html.h"
 
 namespace tilegrad::train {
@@ -15,6 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kCurvePoints = 1000;
+constexpr int kMostTexels = 2048;  // a side; some browsers take no more than twice that
 
 void AppendLittleEndian(std::uint32_t value, std::size_t bytes, Bytes* out) {
   for (std::size_t i = 0; i < bytes; ++i) out->push_back(static_cast<std::uint8_t>(value >> 8 * i));
@@ -24,22 +27,24 @@ std::uint32_t Quantise(float unit, float levels) {
   return static_cast<std::uint32_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * levels));
 }
 
-std::string Positions(const Mesh& mesh, const Bounds& bounds) {
+// 16 bits for each number of `points`, over [low, high] of its axis.
+template <class Point>
+std::string Steps(const std::vector<Point>& points, const Point& low, const Point& high) {
   Bytes bytes;
-  for (const glm::vec3& p : mesh.positions) {
-    for (int k = 0; k < 3; ++k) {
-      const float extent = bounds.high[k] - bounds.low[k];
-      AppendLittleEndian(Quantise(extent > 0 ? (p[k] - bounds.low[k]) / extent : 0, 65535), 2,
-                         &bytes);
+  for (const Point& p : points) {
+    for (int k = 0; k < Point::length(); ++k) {
+      const float extent = high[k] - low[k];
+      AppendLittleEndian(Quantise(extent > 0 ? (p[k] - low[k]) / extent : 0, 65535), 2, &bytes);
     }
   }
   return Base64(bytes);
 }
 
-std::string Colors(const Mesh& mesh) {
-  if (mesh.colors.empty()) return Base64(Bytes(3 * mesh.positions.size(), 255));
+// Of vertices, times the factor of their material.
+std::string Colors(const Mesh& mesh, const glm::vec4& factor) {
   Bytes bytes;
-  for (const glm::vec4& color : mesh.colors) {
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const glm::vec4 color = mesh.colors.empty() ? factor : mesh.colors[v] * factor;
     for (int k = 0; k < 3; ++k) AppendLittleEndian(Quantise(color[k], 255), 1, &bytes);
   }
   return Base64(bytes);
@@ -54,7 +59,46 @@ std::string Faces(const Mesh& mesh, std::size_t index_bytes) {
   return Base64(bytes);
 }
 
-Json Triple(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+template <class Point>
+Json ListOf(const Point& point) {
+  Json out = Json::array();
+  for (int k = 0; k < Point::length(); ++k) out.push_back(point[k]);
+  return out;
+}
+
+// The material of the one texture that all faces have; null where there is none or several.
+const Material* TexturedMaterial(const Mesh& mesh) {
+  if (mesh.corner_uvs.empty() || mesh.materials.empty()) return nullptr;
+  const Material& first = mesh.materials[0];
+  const auto alike = [&](const Material& m) {
+    return m.base_color_texture == first.base_color_texture;
+  };
+  const bool one = first.base_color_texture >= 0 && std::ranges::all_of(mesh.materials, alike);
+  return one ? &first : nullptr;
+}
+
+const char* WrapName(TextureWrap wrap) {
+  return wrap == TextureWrap::kRepeat   ? "REPEAT"
+         : wrap == TextureWrap::kMirror ? "MIRRORED_REPEAT"
+                                        : "CLAMP_TO_EDGE";
+}
+
+Json TextureJson(const Mesh& mesh, const Material& material) {
+  const MeshTexture& texture = mesh.textures[static_cast<std::size_t>(material.base_color_texture)];
+  const auto address = PngAddress(ShrunkImage(texture.image, kMostTexels));
+  if (!address.ok()) return nullptr;  // of no pixels
+  glm::vec2 low = mesh.corner_uvs[0];
+  glm::vec2 high = low;
+  for (const glm::vec2& uv : mesh.corner_uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return {{"image", *address},
+          {"wrap", {WrapName(material.wrap[0]), WrapName(material.wrap[1])}},
+          {"low", ListOf(low)},
+          {"high", ListOf(high)},
+          {"uvs", Steps(mesh.corner_uvs, low, high)}};
+}
 
 // More than a pen can draw. std::stod would throw for numbers next to 0.
 double SixDigits(double value) {
@@ -113,12 +157,20 @@ Json MeshJson(const Mesh& mesh) {
   if (mesh.faces.empty()) return nullptr;
   const Bounds bounds = MeshBounds(mesh);
   const std::size_t index_bytes = mesh.positions.size() > 65536 ? 4 : 2;
-  return {{"low", Triple(bounds.low)},
-          {"high", Triple(bounds.high)},
-          {"positions", Positions(mesh, bounds)},
-          {"colors", Colors(mesh)},
+  const Material* textured = TexturedMaterial(mesh);
+  return {{"low", ListOf(bounds.low)},
+          {"high", ListOf(bounds.high)},
+          {"positions", Steps(mesh.positions, bounds.low, bounds.high)},
+          {"colors", Colors(mesh, textured == nullptr ? glm::vec4(1) : textured->base_color)},
           {"faces", Faces(mesh, index_bytes)},
-          {"index_bytes", index_bytes}};
+          {"index_bytes", index_bytes},
+          {"texture", textured == nullptr ? Json() : TextureJson(mesh, *textured)}};
+}
+
+Result<Json> CentredMeshJson(Mesh mesh) {
+  if (mesh.faces.empty()) return Json();
+  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule().half_extent)));
+  return MeshJson(mesh);
 }
 
 Json CurveData(const std::vector<LogEntry>& log, const std::vector<TermLabel>& labels) {

@@ -9,10 +9,14 @@
 
 namespace tilegrad::train {
 
-// {"low": [3], "high": [3], "positions", "colors", "faces": base64}: positions as 16 bits an axis
-// over the bounding box, colours as 8 bits a channel (white where the mesh has none), indices of
-// `index_bytes` bytes; all little-endian. An error never grows from a mesh that is valid.
+// {"low": [3], "high": [3], "positions", "colors", "faces": base64, "texture"}: positions as 16
+// bits an axis over the bounding box, colours as 8 bits a channel (white where the mesh has none),
+// indices of `index_bytes` bytes; all little-endian. `texture`, where all faces share one:
+// {"image": address, "wrap": [2], "low": [2], "high": [2], "uvs": base64}, 16 bits a coordinate of
+// a corner; else null. Null for a mesh without faces.
 nlohmann::ordered_json MeshJson(const Mesh& mesh);
+// The same in the middle of a cube of side 0.9. An error for a mesh without extent.
+Result<nlohmann::ordered_json> CentredMeshJson(Mesh mesh);
 
 // {"curves": {"step": [], "loss": [], ...}, "charts": [{"key", "title"}]}: a chart for each value
 // of the log but the clock's.

@@ -27,14 +27,24 @@ function bytesOf(base64) {
   return bytes.buffer;
 }
 
-function decodeMesh(packed) {
-  const steps = new Uint16Array(bytesOf(packed.positions)), positions = new Float32Array(steps.length);
-  for (let i = 0; i < steps.length; ++i) {
-    const k = i % 3;
-    positions[i] = packed.low[k] + steps[i] / 65535 * (packed.high[k] - packed.low[k]);
-  }
-  const Index = packed.index_bytes === 4 ? Uint32Array : Uint16Array;
-  return {positions, colors: new Uint8Array(bytesOf(packed.colors)), faces: new Uint32Array(new Index(bytesOf(packed.faces)))};
+function unpack(base64, low, high) {
+  const steps = new Uint16Array(bytesOf(base64)), axes = low.length;
+  return Float32Array.from(steps, (step, i) => low[i % axes] + step / 65535 * (high[i % axes] - low[i % axes]));
+}
+
+function decodeMesh({positions, colors, faces, index_bytes, low, high, texture}) {
+  const Index = index_bytes === 4 ? Uint32Array : Uint16Array;
+  return {
+    positions: unpack(positions, low, high), colors: new Uint8Array(bytesOf(colors)), faces: new Index(bytesOf(faces)),
+    uvs: texture ? unpack(texture.uvs, texture.low, texture.high) : null,
+  };
+}
+
+// Of each corner, what its vertex has: corners of one vertex may lie apart in the texture.
+function ofCorners(values, faces) {
+  const out = new values.constructor(3 * faces.length);
+  faces.forEach((v, corner) => { for (let k = 0; k < 3; ++k) out[3 * corner + k] = values[3 * v + k]; });
+  return out;
 }
 
 // Means over the faces of a vertex, weighted by area.
@@ -53,16 +63,20 @@ function vertexNormals({positions, faces}) {
 
 const vertexShader = `#version 300 es
 in vec3 position, normal, color;
+in vec2 uv;
 uniform mat4 camera;
 out vec3 point, vertexNormal, tint;
+out vec2 place;
 void main() {
-  point = position; vertexNormal = normal; tint = color;
+  point = position; vertexNormal = normal; tint = color; place = vec2(uv.x, 1.0 - uv.y);
   gl_Position = camera * vec4(position, 1.0);
 }`;
 // Predicted surfaces are smooth, real ones are soups of flat faces; both are lit on the side that is seen.
 const fragmentShader = `#version 300 es
 precision highp float;
 in vec3 point, vertexNormal, tint;
+in vec2 place;
+uniform sampler2D picture;
 uniform vec3 eye, strength;
 uniform bool smoothSurface;
 out vec4 result;
@@ -72,7 +86,7 @@ void main() {
   n *= dot(n, eye - point) < 0.0 ? -1.0 : 1.0;
   float key = max(dot(n, normalize(vec3(0.35, 0.8, 0.5))), 0.0);
   float fill = max(dot(n, normalize(vec3(-0.6, 0.3, -0.75))), 0.0);
-  result = vec4(tint * dot(strength, vec3(1.0, key, fill)), 1.0);
+  result = vec4(texture(picture, place).rgb * tint * dot(strength, vec3(1.0, key, fill)), 1.0);
 }`;
 // Ambient, key and fill: the dataset's light for true colours, a hint of it for predicted ones, which hold the light already.
 const lights = {truth: [0.45, 0.45, 0.2], prediction: [0.84, 0.22, 0.12]};
@@ -89,6 +103,12 @@ function makeProgram(gl) {
   return gl.getProgramParameter(program, gl.LINK_STATUS) ? program : null;
 }
 
+async function decodedImage(address) {
+  const image = new Image();
+  image.src = address;
+  return image.decode().then(() => image, () => null);
+}
+
 class MeshView {
   // null where the browser cannot.
   static on(canvas, kind) {
@@ -97,28 +117,46 @@ class MeshView {
     return program ? new MeshView(canvas, kind, gl, program) : null;
   }
   constructor(canvas, kind, gl, program) {
-    Object.assign(this, {canvas, kind, gl, program, count: 0});
+    Object.assign(this, {canvas, kind, gl, program, count: 0, changed: () => {}});
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0.88, 0.88, 0.88, 1);
-    this.buffers = {position: gl.createBuffer(), normal: gl.createBuffer(), color: gl.createBuffer(), faces: gl.createBuffer()};
+    this.buffers = {position: gl.createBuffer(), normal: gl.createBuffer(), color: gl.createBuffer(), uv: gl.createBuffer()};
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
   }
-  attribute(name, values, type) {
+  attribute(name, values, type, width) {
     const gl = this.gl, location = gl.getAttribLocation(this.program, name);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[name]);
     gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(location);
-    gl.vertexAttribPointer(location, 3, type, type === gl.UNSIGNED_BYTE, 0, 0);
+    gl.vertexAttribPointer(location, width, type, type === gl.UNSIGNED_BYTE, 0, 0);
   }
-  show(packed) {
+  texels(image, wrap) {
+    const gl = this.gl, set = (name, value) => gl.texParameteri(gl.TEXTURE_2D, gl[name], gl[value]);
+    if (image) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4).fill(255));
+    set('TEXTURE_WRAP_S', wrap[0]);
+    set('TEXTURE_WRAP_T', wrap[1]);
+    set('TEXTURE_MIN_FILTER', 'LINEAR_MIPMAP_LINEAR');
+    gl.generateMipmap(gl.TEXTURE_2D);
+  }
+  // Once its texture is decoded; what was shown stays until then. Of several calls the last one counts.
+  async show(packed) {
+    this.wanted = packed;
+    const image = packed?.texture ? await decodedImage(packed.texture.image) : null;
+    if (this.wanted !== packed) return;
     this.count = 0;
-    if (!packed) return;
-    const gl = this.gl, mesh = decodeMesh(packed);
-    this.attribute('position', mesh.positions, gl.FLOAT);
-    this.attribute('normal', vertexNormals(mesh), gl.FLOAT);
-    this.attribute('color', mesh.colors, gl.UNSIGNED_BYTE);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers.faces);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.faces, gl.STATIC_DRAW);
-    this.count = mesh.faces.length;
+    if (packed) this.upload(decodeMesh(packed), image, packed.texture?.wrap ?? ['REPEAT', 'REPEAT']);
+    this.changed();
+  }
+  upload(mesh, image, wrap) {
+    const gl = this.gl, {faces} = mesh;
+    this.attribute('position', ofCorners(mesh.positions, faces), gl.FLOAT, 3);
+    this.attribute('normal', ofCorners(vertexNormals(mesh), faces), gl.FLOAT, 3);
+    this.attribute('color', ofCorners(mesh.colors, faces), gl.UNSIGNED_BYTE, 3);
+    this.attribute('uv', mesh.uvs ?? new Float32Array(2 * faces.length), gl.FLOAT, 2);
+    this.texels(image, wrap);
+    this.count = faces.length;
   }
   draw(eye, fov) {
     const gl = this.gl, side = Math.round(this.canvas.clientWidth * Math.min(devicePixelRatio || 1, 2));
@@ -131,7 +169,7 @@ class MeshView {
     gl.uniform3fv(at('eye'), eye);
     gl.uniform3fv(at('strength'), lights[this.kind]);
     gl.uniform1i(at('smoothSurface'), this.kind === 'prediction' ? 1 : 0);
-    if (this.count) gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
+    if (this.count) gl.drawArrays(gl.TRIANGLES, 0, this.count);
   }
 }
 
@@ -142,7 +180,10 @@ class Viewer {
     Object.assign(this, {views, camera});
     this.pointers = new Map();
     this.reset();
-    views.forEach((view) => this.listen(view.canvas));
+    for (const view of views) {
+      this.listen(view.canvas);
+      view.changed = () => this.redraw();
+    }
     new ResizeObserver(() => this.redraw()).observe(stage);
   }
   reset() {

@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
-#include "train/data/build/truth_mesh.h"
 #include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
@@ -184,7 +183,7 @@ Result<Showcase> GanTask::Show(const ShowcaseRequest& request, const Workers& wo
       const char* const where = azimuth == 0 ? "from the front" : "from behind";
       example.pictures.push_back({std::move(pictures[0]), where, example.name + " " + where});
     }
-    example.prediction = MakeTruthMesh(meshes[0], meshes[0].faces.size());
+    example.prediction = std::move(meshes[0]);
     if (progress)
       progress({"generating", static_cast<std::size_t>(i) + 1,
                 static_cast<std::size_t>(request.examples), ""});

@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "io/image_file.h"
 #include "nn/nn.h"
-#include "train/data/build/truth_mesh.h"
 #include "train/data/fingerprint.h"
 #include "train/data/trained_models.h"
 #include "train/predictor.h"
@@ -181,7 +180,7 @@ Result<Showcase> TexturedImageTask::Show(const ShowcaseRequest& request, const W
     TILEGRAD_ASSIGN(auto objects, model.PredictObjects(ToBytes(truth.Of(truth.lit, 0))));
     TILEGRAD_ASSIGN(example.pictures,
                     PicturesOf({example.name, objects[0], truth}, pictures, size));
-    example.prediction = MakeTruthMesh(objects[0].mesh, objects[0].mesh.faces.size());
+    example.prediction = std::move(objects[0].mesh);
     TILEGRAD_ASSIGN(ModelData data, dataset.Load(held_out.models()[i]));
     example.truth = std::move(data.mesh);
     out.examples.push_back(std::move(example));
