@@ -11,11 +11,11 @@
 #include "base/error.h"
 #include "fit/clock.h"
 #include "fit/result.h"
-#include "fit/shown_mesh.h"
 #include "fit/soft_targets.h"
 #include "fit/texture_fill.h"
 #include "nn/context.h"
 #include "render/picture/composite.h"
+#include "train/data/stream/textured_meshes.h"
 
 namespace tilegrad::train {
 namespace {
@@ -23,6 +23,7 @@ namespace {
 constexpr std::int64_t kLogEvery = 10;
 constexpr const char* kInput = "input = ";
 constexpr std::int64_t kKeptCheckpoints = 2;
+constexpr int kPictureTexels = 512;  // a side: there is a texture for each picture
 
 ImageSize SizeOf(const FitInput& input) { return {input.images.width, input.images.height}; }
 
@@ -100,7 +101,7 @@ class FitWork : public RunWork {
     return ShowsAt(job_.config, steps) || (config_.timelapse > 0 && steps == clock_.End());
   }
   Result<ImageU8> Picture(std::int64_t steps) override;
-  Mesh PictureMesh() const override { return ShownMesh(fitter_.scene()); }
+  Mesh PictureMesh() const override;
 
   const FitScene& scene() const { return fitter_.scene(); }
   const FitClock& clock() const { return clock_; }
@@ -160,6 +161,13 @@ Result<ImageU8> FitWork::Picture(std::int64_t /*steps*/) {
   job.options.width = job_.input.images.width, job.options.height = job_.input.images.height;
   TILEGRAD_TRY(renderer.Render(fitter_.scene(), job));
   return OverGrey(renderer.images(), 0, kWhite);
+}
+
+Mesh FitWork::PictureMesh() const {
+  Mesh mesh = MeshOfScene(fitter_.scene());
+  for (MeshTexture& texture : mesh.textures)
+    texture.image = ShrunkImage(texture.image, kPictureTexels);
+  return mesh;
 }
 
 // A texture that began blank has no colour where no view looked. One of the user's keeps his there.

@@ -71,6 +71,9 @@ TEST_F(Fit, FindsShapeAndTextureAndWritesThem) {
     EXPECT_TRUE(std::filesystem::exists(job.out / name)) << name;
   }
   EXPECT_NE(ReadText(job.out / "report.html")->find("lighting = none\n"), std::string::npos);
+  const auto first = io::LoadMesh(job.out / "timelapse/00000000.glb");
+  ASSERT_TRUE(first.ok()) << first.status().message();
+  EXPECT_EQ(first->mesh.textures.size(), 1u);
 }
 
 // In the words of the options, not as numbers.

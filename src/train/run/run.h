@@ -77,8 +77,7 @@ class RunWork {
   // one is not written.
   virtual bool HasPicture(std::int64_t steps) const = 0;
   virtual Result<ImageU8> Picture(std::int64_t steps) = 0;
-  // The mesh as it is then, with vertex colours, for pages that show it forming; without faces:
-  // none is written.
+  // The mesh as it is then, for pages that show it forming; without faces: none is written.
   virtual Mesh PictureMesh() const { return {}; }
 };
 
