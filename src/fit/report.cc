@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page about a fit: one file that needs nothing else.
 #include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "base/error.h"
-#include "base/log_plot.h"
+#include "base/text.h"
 #include "fit/run.h"
+#include "train/report/assets.h"
 #include "train/report/html.h"
+#include "train/report/page_data.h"
 #include "train/run/log.h"
 
 namespace tilegrad::train {
@@ -13,103 +18,160 @@ namespace {
 
 constexpr std::size_t kShownViews = 6;
 
-constexpr const char* kPageHead =
-    "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-    "<title>tilegrad fit</title>\n<style>body{font:16px/1.5 sans-serif;max-width:60rem;margin:2rem "
-    "auto;padding:0 1rem;color:#222;background:#fff}table{border-collapse:collapse}td,th{padding:"
-    ".2rem .8rem .2rem 0;text-align:left}figure{display:inline-block;margin:0 1rem 1rem 0}img{max-"
-    "width:100%;border:1px solid #ddd}svg{max-width:100%}pre{background:#f4f4f4;padding:1rem;"
-    "overflow:auto}</style></head><body>\n<h1>tilegrad fit</h1>\n";
-
 std::string Row(const std::string& name, const std::string& value) {
-  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", EscapeHtml(name), EscapeHtml(value));
+  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", EscapeHtml(name),
+                     EscapeHtml(value));
+}
+
+std::string SentenceOf(const char* of, std::span<const ViewScore> views) {
+  if (views.empty()) return "";
+  return fmt::format(
+      " {} have a mean PSNR of <b>{:.2f}\u00a0dB</b> and a silhouette IoU of <b>{:.1f}\u00a0%</b>.",
+      of, MeanPsnr(views), 100 * MeanIou(views));
 }
 
 std::string Summary(const FitJob& job, const FitOutcome& o) {
-  std::string out = "<table>\n";
-  out += Row("images", fmt::format("{} fitted, {} held out, {} x {} pixels",
-                                   job.input.training.size(), job.input.held_out.size(),
-                                   job.input.images.width, job.input.images.height));
-  out += Row("steps", fmt::format("{} in {:.1f} s", o.last_step, o.seconds));
-  const auto scores = [&](const char* name, std::span<const ViewScore> views) {
-    if (views.empty()) return;
-    out += Row(name, fmt::format("PSNR {:.2f} dB, silhouette IoU {:.1f} %", MeanPsnr(views),
-                                 100 * MeanIou(views)));
-  };
-  scores("fitted views", o.training), scores("held-out views", o.held_out);
+  return fmt::format("Fitted to {} of {} × {} pixels in {} {} and {:.1f} seconds.{}{}",
+                     Count(job.input.training.size(), "image"), job.input.images.width,
+                     job.input.images.height, WithCommas(o.last_step),
+                     Plural("step", o.last_step == 1), o.seconds,
+                     SentenceOf("Renders of the fitted views", o.training),
+                     SentenceOf("Renders of held-out views", o.held_out));
+}
+
+std::string Facts(const FitJob& job, const FitOutcome& o, const Mesh& mesh) {
+  std::string out = Row("vertices", WithCommas(std::ssize(mesh.positions)));
+  out += Row("faces", WithCommas(std::ssize(mesh.faces)));
+  for (const MeshTexture& texture : mesh.textures)
+    out += Row("texture", fmt::format("{} × {} texels", texture.image.width, texture.image.height));
+  if (mesh.textures.empty() && !mesh.colors.empty()) out += Row("colours", "one per vertex");
+  out += Row("images fitted", WithCommas(std::ssize(job.input.training)));
+  out += Row("images held out", WithCommas(std::ssize(job.input.held_out)));
   if (o.voxel_iou)
-    out += Row("3D IoU at 32 voxels a side", fmt::format("{:.1f} %", 100 * *o.voxel_iou));
+    out += Row("3D IoU, 32 voxels a side", fmt::format("{:.1f} %", 100 * *o.voxel_iou));
   if (o.camera_error_before && o.camera_error_after) {
-    out += Row("cameras turned by", fmt::format("{:.2f} degrees at the start, {:.2f} at the end",
-                                                *o.camera_error_before, *o.camera_error_after));
-  }
-  return out + "</table>\n";
-}
-
-std::string Doctor(const FitOutcome& o) {
-  std::string out = "<h2>Gradients at the start</h2>\n<table>\n";
-  for (const Finding& f : o.findings) out += Row(NameOf(f.parameter), f.sentence);
-  return out + "</table>\n";
-}
-
-Result<std::string> Figure(const ImageU8& image, const std::string& caption) {
-  TILEGRAD_ASSIGN(const std::string address, PngAddress(image));
-  return fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n",
-                     EscapeHtml(caption), address);
-}
-
-Result<std::string> Views(const FitJob& job, const FitOutcome& o) {
-  const bool held = !o.held_out.empty();
-  std::span<const ViewScore> scores = held ? o.held_out : o.training;
-  const std::size_t shown = std::min(kShownViews, scores.size());
-  const std::string some =
-      shown < scores.size() ? fmt::format(" (the first {} of {})", shown, scores.size()) : "";
-  std::string out =
-      fmt::format("<h2>{} views{}: image | fit</h2>\n", held ? "Held-out" : "Fitted", some);
-  for (const ViewScore& s : scores.first(shown)) {
-    const std::string& name = job.input.names[static_cast<std::size_t>(s.view)];
-    TILEGRAD_ASSIGN(const std::string truth, Figure(s.truth, name));
-    TILEGRAD_ASSIGN(const std::string rendered,
-                    Figure(s.rendered, fmt::format("{:.2f} dB", s.psnr)));
-    out += "<div>" + truth + rendered + "</div>\n";
+    out += Row("camera error", fmt::format("{:.2f}° at the start, {:.2f}° at the end",
+                                           *o.camera_error_before, *o.camera_error_after));
   }
   return out;
 }
 
-// What is 0 has no place on a logarithmic axis.
-Result<std::string> Curves(const FitJob& job) {
-  TILEGRAD_ASSIGN(const std::vector<LogEntry> log, ReadLog(job.out));
-  LogPlot plot{"step", "loss", {}};
-  for (const char* name : {"loss", "color", "silhouette"}) {
-    LogSeries series{{name}, {}};
-    for (const LogEntry& entry : log) {
-      for (const auto& [key, value] : entry.values) {
-        if (key != name || !(value > 0)) continue;
-        series.points.push_back({static_cast<double>(entry.step), value,
-                                 fmt::format("step {}: {:.5f}", entry.step, value)});
-      }
-    }
-    if (!series.points.empty()) plot.series.push_back(std::move(series));
+std::string Gradients(const FitOutcome& o) {
+  std::string out;
+  for (const Finding& f : o.findings) out += Row(NameOf(f.parameter), f.sentence);
+  return out;
+}
+
+Result<std::string> Figure(const ImageU8& image, const std::string& caption) {
+  TILEGRAD_ASSIGN(const std::string address, PngAddress(image));
+  return fmt::format(
+      "<figure><img alt=\"{0}\" src=\"{1}\" width=\"{2}\" height=\"{3}\">"
+      "<figcaption>{0}</figcaption></figure>\n",
+      EscapeHtml(caption), address, image.width, image.height);
+}
+
+// The views that judge the fit.
+std::span<const ViewScore> JudgedViews(const FitOutcome& o) {
+  return o.held_out.empty() ? o.training : o.held_out;
+}
+
+std::string ViewsTitle(const FitOutcome& o) {
+  const std::size_t all = JudgedViews(o).size();
+  return fmt::format(
+      "{} views{}", o.held_out.empty() ? "Fitted" : "Held-out",
+      all > kShownViews ? fmt::format(", the first {} of {}", kShownViews, all) : "");
+}
+
+Result<std::string> Views(const FitJob& job, const FitOutcome& o) {
+  const std::span<const ViewScore> scores = JudgedViews(o);
+  std::string out;
+  for (const ViewScore& s : scores.first(std::min(kShownViews, scores.size()))) {
+    const std::string& name = job.input.names[static_cast<std::size_t>(s.view)];
+    TILEGRAD_ASSIGN(const std::string truth, Figure(s.truth, name));
+    const std::string score =
+        fmt::format("PSNR {:.2f}\u00a0dB, IoU {:.1f}\u00a0%", s.psnr, 100 * s.iou);
+    TILEGRAD_ASSIGN(const std::string rendered, Figure(s.rendered, score));
+    out += "<div class=\"pair\">" + truth + rendered + "</div>\n";
   }
-  if (plot.series.empty()) return std::string();
-  return "<h2>Losses</h2>\n" + LogPlotSvg(plot);
+  return out;
+}
+
+Result<std::string> Timelapse(const ImageU8& sheet) {
+  if (sheet.empty()) return std::string();
+  TILEGRAD_ASSIGN(const std::string figure, Figure(sheet, "the first view over the run"));
+  return "<section aria-labelledby=\"timelapse-heading\" class=\"sheet\">\n<h2 "
+         "id=\"timelapse-heading\">Timelapse</h2>\n" +
+         figure + "</section>\n";
+}
+
+std::string Setting(const std::string& name, const std::string& value, const char* meaning) {
+  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n", EscapeHtml(name),
+                     EscapeHtml(value), EscapeHtml(meaning));
+}
+
+// What each setting means beside its value: choices first, then the numbers.
+std::string Settings(const FitJob& job) {
+  static const std::map<std::string, const char*> kMeanings = {
+      {"parameters", "what was fitted"},
+      {"material", "what the surface does with light"},
+      {"lighting", "how light reaches the surface"},
+      {"light_direction", "towards the light, in the world"},
+      {"start", "the shape that the fit started from, unless a mesh was given"},
+      {"mesh", "the mesh that was given to start from"},
+      {"filter", "how the texture is looked up"},
+      {"vertex_colors", "colours at vertices instead of a texture"},
+      {"max_alpha_error", "the most by which soft outlines may be off"},
+      {"rates", "learning rates of positions, colors, texture, uv, camera, light, sh, material"},
+      {"rate_exposure", "learning rate of exposures"},
+      {"rate_focal", "learning rate of focal lengths"},
+      {"final_rate", "the share of these rates that is left at the end"}};
+  std::string choices, numbers;
+  FitConfig config = job.config;
+  const ConfigFields fields = FieldsOf(&config);
+  std::istringstream lines(DescribeJob(job));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t equals = line.find(" = ");
+    const std::string key = line.substr(0, equals);
+    const std::string value = line.substr(equals + 3);
+    if (value.empty()) continue;  // parameters, where the input decides
+    const auto choice = kMeanings.find(key);
+    const auto field = std::ranges::find(fields, key, &ConfigField::key);
+    if (choice != kMeanings.end()) choices += Setting(key, value, choice->second);
+    if (field != fields.end()) numbers += Setting(key, value, field->help);
+  }
+  return choices + numbers;
 }
 
 }  // namespace
 
-Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const ImageU8& sheet) {
-  std::string out = kPageHead + Summary(job, outcome);
+std::vector<TermLabel> FitLabels() {
+  return {{"color", "Colour loss (mean difference)"}, {"silhouette", "Silhouette loss"},
+          {"laplacian", "Laplacian of the movement"}, {"flatness", "Angles between faces"},
+          {"edge_length", "Unequal edges"},           {"area", "Surface area"},
+          {"delta", "Softness of outlines (NDC²)"},   {"factor", "Downsampling of the images"},
+          {"images_per_second", "Images per second"}};
+}
+
+Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,
+                              const ImageU8& sheet) {
+  TILEGRAD_ASSIGN(const std::vector<LogEntry> log, ReadLog(job.out));
   TILEGRAD_ASSIGN(const std::string views, Views(job, outcome));
-  TILEGRAD_ASSIGN(const std::string curves, Curves(job));
-  out += views + curves;
-  if (!sheet.empty()) {
-    TILEGRAD_ASSIGN(const std::string lapse, Figure(sheet, "the first view, over the run"));
-    out += "<h2>Timelapse</h2>\n" + lapse;
-  }
-  out += Doctor(outcome);
-  return out + "<h2>Settings</h2>\n<pre>" + EscapeHtml(DescribeJob(job)) +
-         "</pre>\n</body></html>\n";
+  TILEGRAD_ASSIGN(const std::string timelapse, Timelapse(sheet));
+  nlohmann::ordered_json data = CurveData(log, FitLabels());
+  const auto shown = CentredMeshJson(mesh);
+  data["mesh"] = shown.ok() ? *shown : nullptr;  // of no extent
+  const Path page = std::filesystem::absolute(job.out / "report.html").lexically_normal();
+  return FillTemplate(kFitHtml, {{"name", EscapeHtml(page.parent_path().filename().string())},
+                                 {"summary", Summary(job, outcome)},
+                                 {"facts", Facts(job, outcome, mesh)},
+                                 {"views_title", ViewsTitle(outcome)},
+                                 {"views", views},
+                                 {"timelapse", timelapse},
+                                 {"gradients", Gradients(outcome)},
+                                 {"settings", Settings(job)},
+                                 {"data", ScriptJson(data)},
+                                 {"style", std::string(kReportCss)},
+                                 {"script", std::string(kPartsJs)}});
 }
 
 }  // namespace tilegrad::train

@@ -76,7 +76,7 @@ Status FitResult::Finish(const RunPlan& plan, FitOutcome* outcome) const {
   TILEGRAD_TRY(Score(outcome));
   TILEGRAD_ASSIGN(const ImageU8 sheet, Sheet(plan));
   if (!sheet.empty()) TILEGRAD_TRY(io::SavePng(job_.out / "timelapse.png", sheet));
-  TILEGRAD_ASSIGN(const std::string page, FitReport(job_, *outcome, sheet));
+  TILEGRAD_ASSIGN(const std::string page, FitReport(job_, *outcome, MeshOfScene(scene_), sheet));
   return WriteTextAtomic(job_.out / "report.html", page);
 }
 

@@ -20,6 +20,7 @@
 #include "fit/input.h"
 #include "fit/score.h"
 #include "train/run/run.h"
+#include "train/tasks/task.h"
 
 namespace tilegrad::train {
 
@@ -71,7 +72,10 @@ std::vector<Camera> TurnedCameras(const FitJob& job, const std::array<float, 3>&
 // What shapes the result, as DescribeConfig says it, and the input's size.
 std::string DescribeJob(const FitJob& job);
 
+// What people read for the names in its log.
+std::vector<TermLabel> FitLabels();
 // The page. `sheet` is the timelapse in one picture, or empty.
-Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const ImageU8& sheet);
+Result<std::string> FitReport(const FitJob& job, const FitOutcome& outcome, const Mesh& mesh,
+                              const ImageU8& sheet);
 
 }  // namespace tilegrad::train

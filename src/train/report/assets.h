@@ -7,7 +7,7 @@
 namespace tilegrad::train {
 
 extern const std::string_view kReportHtml, kReportCss, kReportJs;
-// What both pages draw with, and the live page.
-extern const std::string_view kPartsJs, kLiveHtml, kLiveJs;
+// What all pages draw with, the live page, and that of a fit.
+extern const std::string_view kPartsJs, kLiveHtml, kLiveJs, kFitHtml;
 
 }  // namespace tilegrad::train

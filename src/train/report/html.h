@@ -15,6 +15,9 @@
 
 namespace tilegrad::train {
 
+// 3214902 as "3,214,902".
+std::string WithCommas(std::int64_t number);
+
 std::string Base64(std::span<const std::uint8_t> bytes);
 
 // JSON for a <script> element: every '<' is written as \u003c, so nothing in it can end the

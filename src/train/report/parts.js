@@ -355,3 +355,13 @@ class Chart {
     if (this.values[index] !== null) svg('circle', {cx: x, cy: this.y(this.values[index]), r: 4.5}, this.cursor);
   }
 }
+
+// The charts of a log in `host`, in place of those that stand there. Values that never change make none.
+function showCharts(host, {curves, charts}) {
+  const told = charts.filter(({key}) => key === 'loss' || curves[key].some((value) => value !== curves[key][0]));
+  const drawn = told.map(({key, title}) => new Chart({title, values: curves[key]}, curves.step, (index) => drawn.forEach((chart) => chart.point(index))));
+  host.replaceChildren(...drawn.map((chart) => chart.element));
+  host.sizes?.disconnect();
+  host.sizes = new ResizeObserver(() => requestAnimationFrame(() => drawn.forEach((chart) => chart.draw())));
+  host.sizes.observe(host);
+}

@@ -54,16 +54,8 @@ function showModel([prediction, truth], index) {
 }
 
 function startCurves() {
-  const host = byId('curves'), steps = data.curves.step;
-  if (steps.length === 0) {
-    host.textContent = 'Nothing is logged yet.';
-    return;
-  }
-  const drawn = [];
-  const moved = (index) => drawn.forEach((chart) => chart.point(index));
-  for (const {key, title} of data.charts) drawn.push(new Chart({title, values: data.curves[key]}, steps, moved));
-  host.append(...drawn.map((chart) => chart.element));
-  new ResizeObserver(() => requestAnimationFrame(() => drawn.forEach((chart) => chart.draw()))).observe(host);
+  if (data.curves.step.length > 0) showCharts(byId('curves'), data);
+  else byId('curves').textContent = 'Nothing has been logged yet.';
 }
 
 addEventListener('beforeprint', () => document.querySelectorAll('details').forEach((details) => { details.open = true; }));

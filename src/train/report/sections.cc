@@ -10,14 +10,6 @@
 namespace tilegrad::train {
 namespace {
 
-// 3214902 as "3,214,902".
-std::string WithCommas(std::int64_t number) {
-  std::string digits = std::to_string(number);
-  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3)
-    digits.insert(static_cast<std::size_t>(at), ",");
-  return digits;
-}
-
 std::string Comparison(const Evaluation& evaluation) {
   const auto& rows = evaluation.rows;
   const double own = rows.back().mean.main();
