@@ -154,7 +154,8 @@ TEST_F(Runs, ReportsCountTheStepsOfTheNetwork) {
   const std::string log = ReadText(folder_ / "run/metrics.jsonl").value();
   Write("run/metrics.jsonl", log.substr(0, log.rfind("{\"step\":3")));
   Done("report --run " + In("run") + " --models 0");
-  EXPECT_NE(ReadText(folder_ / "run/report.html")->find("learned for 3 steps"), std::string::npos);
+  EXPECT_NE(ReadText(folder_ / "run/report.html")->find("was trained for 3 steps"),
+            std::string::npos);
 }
 
 TEST_F(Runs, OfFitsAreAnimated) {

@@ -161,7 +161,8 @@ TEST_F(ReportTest, DrawsTheModelsInOnePicture) {
 
 TEST_F(ReportTest, SaysThatThereIsNoEvaluationYet) {
   const std::string page = Page();
-  EXPECT_EQ(Count(page, "There is no evaluation"), 2);  // in the summary and in place of the table
+  EXPECT_EQ(Count(page, "It has not been evaluated"),
+            2);  // in the summary and in place of the table
   EXPECT_EQ(Count(page, "<table class=\"scores\">"), 0);
   EXPECT_FALSE(Make()->evaluated);
 }

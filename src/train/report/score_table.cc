@@ -116,9 +116,8 @@ std::string PhotographsHtml(const Evaluation& evaluation) {
       "<th scope=\"col\" class=\"number\">texture L1</th>"
       "<th scope=\"col\" class=\"number\">2D IoU loss</th>"
       "<th scope=\"col\" class=\"number\">PCK@0.1</th></tr></thead>\n"
-      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">Of the first two less is better, of "
-      "the "
-      "share of keypoints within a tenth of the box's longer side more.</p>\n",
+      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">Lower is better for the first two, "
+      "higher for PCK: the share of keypoints within a tenth of the box's longer side.</p>\n",
       lines);
 }
 
@@ -142,9 +141,10 @@ std::string LightHtml(const Evaluation& evaluation) {
       "<th scope=\"col\" class=\"number\">texture L1</th>"
       "<th scope=\"col\" class=\"number\">light, °</th>"
       "<th scope=\"col\" class=\"number\">texture + light L1</th></tr></thead>\n"
-      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">L1: mean difference of colour over all "
-      "pixels of the input's view, without light and with it, of 1. Light: angle between its "
-      "direction and the true one. Less is better.</p>\n",
+      "<tbody>\n{}</tbody></table></div>\n<p class=\"note\">L1: mean colour difference over all "
+      "pixels "
+      "of the input view, on a scale of 0 to 1. Light: angle between the predicted and the true "
+      "direction. Lower is better.</p>\n",
       lines);
 }
 
@@ -152,14 +152,14 @@ std::string LightHtml(const Evaluation& evaluation) {
 
 std::string ScoresHtml(const ReportFacts& facts) {
   if (facts.showcase.generated) {
-    return fmt::format("<p>As a set, beside true objects: <code>tilegrad {} --run {}</code>.</p>",
-                       facts.run.config.task->ScoreCommand(),
-                       EscapeHtml(facts.run.folder.string()));
+    return fmt::format(
+        "<p>To compare them with true objects as a set: <code>tilegrad {} --run {}</code>.</p>",
+        facts.run.config.task->ScoreCommand(), EscapeHtml(facts.run.folder.string()));
   }
   if (!facts.evaluation) {
     return fmt::format(
-        "<p>There is no evaluation yet: <code>tilegrad eval --run {}</code>, then make this report "
-        "again.</p>",
+        "<p>It has not been evaluated yet: run <code>tilegrad eval --run {}</code>, then make this "
+        "report again.</p>",
         EscapeHtml(facts.run.folder.string()));
   }
   const Evaluation& evaluation = *facts.evaluation;

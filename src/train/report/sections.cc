@@ -47,7 +47,7 @@ std::string ComparisonOfLight(const Evaluation& evaluation) {
 
 std::string EvaluationSentence(const ReportFacts& facts) {
   if (facts.showcase.generated) return "";
-  if (!facts.evaluation) return "There is no evaluation of it yet.";
+  if (!facts.evaluation) return "It has not been evaluated yet.";
   const Evaluation& evaluation = *facts.evaluation;
   std::int64_t models = 0;
   for (const int n : evaluation.class_models) models += n;
@@ -76,7 +76,7 @@ std::string SummaryHtml(const ReportFacts& facts) {
   const std::string progress = step >= steps
                                    ? WithCommas(step)
                                    : fmt::format("{} of {}", WithCommas(step), WithCommas(steps));
-  return fmt::format("A network of {} parameters learned for {} {} {}. {} {}",
+  return fmt::format("A network of {} parameters was trained for {} {} {}. {} {}",
                      WithCommas(run.header.parameters), progress,
                      Plural("step", std::max(step, steps) == 1), EscapeHtml(facts.showcase.purpose),
                      EscapeHtml(facts.showcase.data), EvaluationSentence(facts));
@@ -101,9 +101,10 @@ std::string ComparisonHtml(const ReportFacts& facts) {
         &row == &rows.back() ? " class=\"own\"" : "", EscapeHtml(row.method), 80 * share, value);
   }
   const bool voxels = !Classifies(*facts.evaluation) && !IsOfPhotographs(*facts.evaluation);
-  const char* note = light ? ", mean difference of colour in the input's view, of 1; less is better"
-                     : voxels ? ", 32³ voxels"
-                              : "";
+  const char* note =
+      light    ? ", mean colour difference in the input view, on a scale of 0 to 1; lower is better"
+      : voxels ? ", 32³ voxels"
+               : "";
   return out + fmt::format("</dl>\n<p class=\"note\">Mean {} over classes, held-out models{}.</p>",
                            measure, note);
 }

@@ -184,7 +184,7 @@ TEST_F(GanTaskTest, MakesMeshesAndAReport) {
        {"to make textured objects from noise", "Wasserstein estimate", "sample 1 from behind",
         "Generated meshes to turn", "tilegrad sample --score --run"})
     EXPECT_NE(text.find(part), std::string::npos) << part;
-  for (const char* part : {"Held-out models", "There is no evaluation", "unnamed creator"})
+  for (const char* part : {"Held-out models", "has not been evaluated", "unnamed creator"})
     EXPECT_EQ(text.find(part), std::string::npos) << part;
 }
 
