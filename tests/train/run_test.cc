@@ -15,6 +15,7 @@
 #include "train/data/batches.h"
 #include "train/run/checkpoint.h"
 #include "train/run/log.h"
+#include "train/run/step_values.h"
 #include "train/run/tensorboard.h"
 
 namespace tilegrad::train::run_test {
@@ -25,6 +26,14 @@ class RunTest : public TempFolderTest {
   Workers workers_;
   nn::Context context_;
 };
+
+// The same numbers as in the log and on pages.
+TEST(StepValuesText, HasTermsWithoutTheirWeights) {
+  StepValues values;
+  values.loss = 2.569;
+  values.terms = {{"iou", 10, 0.2458}, {"color", 1, 0.111}, {"watched", 0, 5}};
+  EXPECT_EQ(values.ForConsole(), "loss 2.5690  iou 0.246  color 0.111");
+}
 
 TEST_F(RunTest, ConfigRoundTrip) {
   TrainConfig config = ParseConfig("", "defaults").value();

@@ -8,7 +8,7 @@ namespace tilegrad::train {
 std::string StepValues::ForConsole() const {
   std::string out = fmt::format("loss {:.4f}", loss);
   for (const LossTerm& term : terms) {
-    if (term.weight != 0) out += fmt::format("  {} {:.3f}", term.name, term.weight * term.value);
+    if (term.weight != 0) out += fmt::format("  {} {:.3g}", term.name, term.value);
   }
   return out;
 }

@@ -27,7 +27,7 @@ struct StepValues {
   double wait_seconds = 0;    // for gradients of other ranks, after its own were there
   double summed_numbers = 0;  // with other ranks, in all updates of the step
 
-  // The loss and each term's share of it: "loss 0.6320  iou 0.521  color 0.111".
+  // The loss, and its terms without their weights: "loss 2.5690  iou 0.246  color 0.111".
   std::string ForConsole() const;
   // "iou 0.5 x 1, color nan x 1".
   std::string DescribeTerms() const;
