@@ -29,7 +29,7 @@ Path DatasetOf(const LiveOptions& options) {
 }
 
 Status RunLive(const LiveOptions& options) {
-  if (!IsFolder(options.run)) return NotFound("{}: no such folder of a run", options.run);
+  TILEGRAD_TRY(CheckIsRun(options.run));
   const StopFlag& stop = StopOnSignals();
   TILEGRAD_ASSIGN(const LiveServer server,
                   LiveServer::Start({options.run, DatasetOf(options)}, options.port));

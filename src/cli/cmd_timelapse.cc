@@ -28,6 +28,7 @@ struct TimelapseOptions {
 
 // The meshes beside the pictures of a fit, by step; at the end the result, with its texture.
 Result<std::vector<Path>> MeshFiles(const Path& run) {
+  TILEGRAD_TRY(CheckIsRun(run));
   std::vector<Path> files;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(run / "timelapse", error)) {
@@ -37,7 +38,7 @@ Result<std::vector<Path>> MeshFiles(const Path& run) {
   const Path result = run / "mesh.glb";
   if (!files.empty() && PathExists(result)) files.push_back(result);
   if (!files.empty()) return files;
-  return NotFound("{}: no meshes in it; fits keep them beside each picture of --timelapse",
+  return NotFound("{}: no meshes to animate: fits keep them beside each picture of --timelapse",
                   (run / "timelapse").string());
 }
 

@@ -87,6 +87,14 @@ Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const Out
   return holds ? Status() : guard.CheckFolder(folder);
 }
 
+Status CheckIsRun(const Path& folder) {
+  if (!PathExists(folder)) return NotFound("{} does not exist", folder.string());
+  TILEGRAD_ASSIGN(const bool holds, train::HoldsRun(folder));
+  // One of tilegrad.fit has nothing else before its first checkpoint.
+  if (holds || IsFile(folder / "metrics.jsonl")) return {};
+  return NotFound("{}: not the folder of a training or a fit", folder.string());
+}
+
 Result<Path> ChooseRun(const std::string& given) {
   if (!given.empty()) return Path(given);
   // By when a checkpoint was written, and by name where that is the same moment: a look at an old

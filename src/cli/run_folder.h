@@ -33,6 +33,8 @@ train::ExistingRun ExistingOf(bool resume, bool force);
 // Whether a run may begin or go on in the folder: it holds one, and `existing` allows that, or it
 // holds nothing.
 Status CheckRunFolder(const Path& folder, train::ExistingRun existing, const OutputGuard& guard);
+// Whether the folder holds a training or a fit.
+Status CheckIsRun(const Path& folder);
 // `given`, or if that is empty the run below runs/ whose last checkpoint is the newest, which a
 // note on the terminal names; an error if there is none.
 Result<Path> ChooseRun(const std::string& given);

@@ -167,7 +167,15 @@ TEST_F(Runs, OfFitsAreAnimated) {
   const Bytes file = ReadFile(folder_ / "fit/timelapse.webp").value();
   EXPECT_EQ(std::string(file.begin() + 8, file.begin() + 12), "WEBP");
   Done("fit " + In("views") + " --steps 2 --timelapse 0 --out " + In("bare"));
-  ExpectRefused("timelapse " + In("bare"), 3, "no meshes in it");
+  ExpectRefused("timelapse " + In("bare"), 3, "no meshes to animate");
+}
+
+TEST_F(Runs, AreTheOnlyFoldersToLookAt) {
+  Write("photos/a.png", std::string("x"));
+  for (const char* command : {"live ", "timelapse "}) {
+    ExpectRefused(command + In("nope"), 3, "nope does not exist");
+    ExpectRefused(command + In("photos"), 3, "photos: not the folder of a training or a fit");
+  }
 }
 
 }  // namespace tilegrad::runs_test
