@@ -16,7 +16,6 @@ if(TILEGRAD_PROGRAM)
   pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)    # libopenexr-dev
   pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebpmux libwebp)    # libwebp-dev
   pkg_check_modules(WEBPDEMUX REQUIRED IMPORTED_TARGET libwebpdemux)    # likewise; for tests
-  pkg_check_modules(HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)    # libcpp-httplib-dev
   find_package(TinyGLTF REQUIRED)           # libtinygltf-dev
   # libopenmpi-dev or libmpich-dev; without it processes train alone.
   find_package(MPI COMPONENTS C)

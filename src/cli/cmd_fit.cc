@@ -13,7 +13,7 @@
 #include "cli/fit_parameters.h"
 #include "cli/fit_pictures.h"
 #include "cli/given_options.h"
-#include "cli/live_server.h"
+#include "cli/live_option.h"
 #include "cli/run_folder.h"
 #include "fit/poses/start_cameras.h"
 #include "fit/run.h"
@@ -32,10 +32,9 @@ struct FitOptions {
   std::vector<std::string> rates;
   std::vector<float> light_direction;
   int workers = 0, hold_out = 0;
-  bool resume = false, doctor = false, force = false;
+  bool resume = false, doctor = false, force = false, live = false;
   FitPictures pictures;
   FitConfig config;
-  LiveOption live;
   GivenOptions given;  // that the fit depends on
 };
 
@@ -146,18 +145,25 @@ Status RunDoctor(const FitOptions& options, train::FitJob job, const Workers& wo
 
 // A fit whose folder is claimed.
 Status RunClaimed(const FitOptions& options, train::FitJob* job, const Workers& workers,
-                  ProgressLine* line) {
-  TILEGRAD_ASSIGN(const auto live,
-                  StartLive(options.live, {options.out, {}, options.config.steps}));
+                  const ProgressSink& progress) {
   const std::size_t warnings = job->input.warnings.size();
   TILEGRAD_TRY(train::StartCameras({options.pictures.find_cameras, options.resume}, job, workers,
-                                   line->Sink(), StopOnSignals()));
+                                   progress, StopOnSignals()));
   PrintWarnings(job->input, warnings);
-  job->warn = line->Warnings();
   job->begun = [&options] { return KeepGiven(options); };  // of more steps, if so
-  TILEGRAD_ASSIGN(const auto outcome, train::RunFit(*job, workers, line->Sink(), StopOnSignals()));
+  TILEGRAD_ASSIGN(const auto outcome, train::RunFit(*job, workers, progress, StopOnSignals()));
   PrintFit(outcome, options.out, options.config.steps);
   return {};
+}
+
+Status RunShown(const FitOptions& options, train::FitJob* job, const Workers& workers,
+                const ProgressSink& progress) {
+  Live live;
+  if (options.live)
+    TILEGRAD_TRY(live.Start({options.out, {}, options.config.steps, train::FitLabels()}));
+  const Status status = RunClaimed(options, job, workers, live.Sink(progress));
+  live.Finish(status);
+  return status;
 }
 
 Status RunFitting(const FitOptions& options) {
@@ -170,7 +176,8 @@ Status RunFitting(const FitOptions& options) {
   if (options.doctor) return RunDoctor(options, std::move(job), workers, watch);
   TILEGRAD_ASSIGN(const FolderLock lock, ClaimFolder(options, guard));
   job.out = options.out, job.locked = true, job.existing = train::ExistingRun::kContinue;
-  return WithCommand(RunClaimed(options, &job, workers, &line),
+  job.warn = line.Warnings();
+  return WithCommand(RunShown(options, &job, workers, watch.progress),
                      "tilegrad fit --resume --out " + options.out);
 }
 

@@ -6,17 +6,18 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/folder_lock.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/live_server.h"
+#include "cli/live_option.h"
 #include "cli/run_folder.h"
+#include "fit/run.h"
 
 namespace tilegrad::cli {
 namespace {
 
 struct LiveOptions {
   std::string run, data;
-  int port = 0;
 };
 
 // Only runs of train have a dataset; without it the page has no meshes of them.
@@ -28,15 +29,28 @@ Path DatasetOf(const LiveOptions& options) {
   return {};
 }
 
-Status RunLive(const LiveOptions& options) {
-  TILEGRAD_TRY(CheckIsRun(options.run));
+// Until the run ends.
+void KeepPage(const Path& run, train::LivePage* page) {
   const StopFlag& stop = StopOnSignals();
-  TILEGRAD_ASSIGN(const LiveServer server,
-                  LiveServer::Start({options.run, DatasetOf(options)}, options.port));
-  PrintResult({{"address", server.address()}});
+  PrintRemark("updating it until the run ends; Ctrl-C stops the updates, not the run\n");
+  while (!stop && FolderLock::IsHeld(run)) {
+    page->Tell({});
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+Status RunLive(const LiveOptions& options) {
+  const Path run = options.run;
+  TILEGRAD_TRY(CheckIsRun(run));
+  train::LivePage page({run, DatasetOf(options), 0, train::FitLabels()});
+  const bool kept = train::LivePage::IsKept(run);
+  if (!kept) TILEGRAD_TRY(page.Start());
+  ShowPage(page);
+  PrintResult({{"page", page.file().string()}, {"address", train::FileAddress(page.file())}});
   std::fflush(stdout);
-  PrintRemark("Ctrl-C ends it\n");
-  while (!stop) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  if (kept) return {};
+  if (FolderLock::IsHeld(run)) KeepPage(run, &page);
+  if (!FolderLock::IsHeld(run)) EndPage({}, &page);
   return {};
 }
 
@@ -48,8 +62,6 @@ void AddLive(CommandList* list) {
       RunLive);
   command->Add("run", &options->run, "folder of a training or a fit", {Required{}});
   command->Add("--data", &options->data, "dataset folder [the one it was trained on]");
-  command->Add("--port", &options->port, "of 127.0.0.1; 0: 8642, or any that is free",
-               {Range{0, 65535}});
 }
 
 }  // namespace tilegrad::cli

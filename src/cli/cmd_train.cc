@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "cli/command.h"
 #include "cli/console.h"
-#include "cli/live_server.h"
+#include "cli/live_option.h"
 #include "cli/ranks.h"
 #include "cli/run_folder.h"
 #include "train/named_configs.h"
@@ -27,7 +27,7 @@ struct TrainOptions {
   bool force = false;
   double max_minutes = 0;
   int workers = 0;
-  LiveOption live;
+  bool live = false;
 };
 
 void PrintOutcome(const train::RunOutcome& outcome, const TrainOptions& options,
@@ -118,13 +118,15 @@ Status RunTraining(const TrainOptions& given) {
   const Workers workers(ranks.Workers(options.workers));
   if (ranks.follows())
     return ranks.Told(train::Train(job, workers, nullptr, StopOnSignals()).status());
-  TILEGRAD_ASSIGN(const auto live,
-                  StartLive(options.live, {options.out, options.data, job.config.schedule.steps}));
+  Live live;
+  if (options.live)
+    job.begun = [&] { return live.Start({options.out, options.data, job.config.schedule.steps}); };
   ProgressLine line;
   job.warn = line.Warnings();
   job.drawn = TellOfSheets(&line, job.config.schedule.sample_every);
-  auto outcome = train::Train(job, workers, line.Sink(), StopOnSignals());
+  auto outcome = train::Train(job, workers, live.Sink(line.Sink()), StopOnSignals());
   line.Finish();
+  live.Finish(outcome.status());
   ranks.EndIfBroken(outcome.status());
   if (!outcome.ok()) return WithCommand(outcome.status(), "tilegrad train --resume " + options.out);
   PrintOutcome(*outcome, options, job.config.task->ScoreCommand());

@@ -61,17 +61,12 @@ struct Excludes {
 using Trait = std::variant<Required, Hidden, NoDefault, SplitAtCommas, Numbers, Range, OneOf,
                            TypeName, ValueMayLack, Needs, Excludes, WordCheck>;
 
-// A flag that may have a word behind "=", never the next one.
-struct FlagWord {
-  std::string* word;
-  std::string lone;  // the word if there is none
-};
 // Where the values of an option go. A bool makes it a flag, a vector one that may be repeated; a
 // WordCheck keeps the word itself.
 using Target =
     std::variant<bool*, int*, std::int64_t*, std::uint64_t*, float*, double*, std::string*,
                  std::vector<float>*, std::vector<double>*, std::vector<std::string>*,
-                 std::vector<std::tuple<float, float, float, float>>*, FlagWord, WordCheck>;
+                 std::vector<std::tuple<float, float, float, float>>*, WordCheck>;
 
 // A value of an enumeration by its name, in upper or lower case.
 template <class T>

@@ -24,11 +24,8 @@ struct Declare {
     return app->add_option_function<std::string>(option.names, keep_nothing, option.help)
         ->check(keeper.fault, keeper.description);
   }
-  CLI::Option* operator()(const FlagWord& flag) const {
-    return app->add_flag(option.names + "{" + flag.lone + "}", *flag.word, option.help);
-  }
   CLI::Option* operator()(bool* flag) const {
-    return app->add_flag(option.names, *flag, option.help);
+    return app->add_flag(option.names, *flag, option.help)->disable_flag_override();
   }
   template <class T>
   CLI::Option* operator()(T* value) const {
@@ -94,6 +91,13 @@ std::string ExplainExtra(const CLI::App& command) {
   return fmt::format("unknown option {}{}", name, DidYouMean(name, known));
 }
 
+// CLI11's words for --flag=value, without the dashes, in ours.
+std::string ExplainFlag(std::string_view what) {
+  constexpr std::string_view kOverride = " was given a disallowed flag override";
+  if (!what.ends_with(kOverride)) return std::string(what);
+  return fmt::format("--{} takes no value", what.substr(0, what.size() - kOverride.size()));
+}
+
 // The command that was chosen, what is wrong, and where its options are listed.
 std::string Explain(const CLI::App* app, const CLI::Error& error) {
   const auto chosen = app->get_subcommands();
@@ -102,7 +106,8 @@ std::string Explain(const CLI::App* app, const CLI::Error& error) {
   const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
                      !command.remaining().empty();
   return fmt::format("tilegrad: {}{}; see tilegrad {}--help\n", name.empty() ? "" : name + ": ",
-                     extra ? ExplainExtra(command) : error.what(), name.empty() ? "" : name + " ");
+                     extra ? ExplainExtra(command) : ExplainFlag(error.what()),
+                     name.empty() ? "" : name + " ");
 }
 
 }  // namespace

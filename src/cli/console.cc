@@ -105,6 +105,8 @@ void OpenStandardStreams() {
   if (fd > STDERR_FILENO) ::close(fd);  // all are open
 }
 
+bool OutputIsTerminal() { return SpeechNow() == Speech::kFull && ::isatty(STDOUT_FILENO) == 1; }
+
 void PrintThreadNotice() {
   if (const char* notice = TakeThreadNotice()) PrintNote("tilegrad: warning: {}\n", notice);
 }

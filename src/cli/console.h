@@ -59,6 +59,9 @@ void PrintRemark(fmt::format_string<Args...> format, Args&&... args) {
   if (SpeechNow() != Speech::kQuiet) PrintNote(format, std::forward<Args>(args)...);
 }
 
+// Whether somebody reads stdout as it comes.
+bool OutputIsTerminal();
+
 // Says, once, that the system has refused threads.
 void PrintThreadNotice();
 

@@ -32,6 +32,7 @@ class Training : public RunWork {
     header.dataset = job_.data.string();
     header.machine = DescribeMachine();
     TILEGRAD_TRY(WriteHeader(job_.run, header));
+    if (job_.begun) TILEGRAD_TRY(job_.begun());
     if (job_.crew) ShareState(first_step);
     return {};
   }

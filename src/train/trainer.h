@@ -6,6 +6,8 @@
 //   <run>/metrics.jsonl, tensorboard/, samples/, checkpoints/, and what the task adds
 #pragma once
 
+#include <functional>
+
 #include "base/parallel.h"
 #include "train/config.h"
 #include "train/ranks/crew.h"
@@ -28,6 +30,7 @@ struct TrainJob {
   Crew* crew = nullptr;
   WarningSink warn = nullptr;  // broken checkpoints that were passed over, and the task's warnings
   PictureSink drawn = nullptr;
+  std::function<Status()> begun = nullptr;  // once the run has its folder
 };
 
 // As ExecuteRun. With a crew, every rank calls it and rank 0's result tells; after an error with

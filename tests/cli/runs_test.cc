@@ -97,9 +97,7 @@ TEST_F(Runs, SayWhatIsMissing) {
   ExpectRefused("train", 2, "tilegrad: train: --config is required; see tilegrad train --help");
   ExpectRefused("train --config quick --data x", 2, "train: --out is required");
   ExpectRefused("train --resume", 2, "--config is required");
-  // The server ends with the command, however soon that is.
-  ExpectRefused("train --config quick --data none --out " + In("c") + " --live", 3, "none");
-  ExpectRefused("train --config quick --data none --out " + In("c") + " --live=x", 2, "--live=x");
+  ExpectRefused("train --config quick --data none --out " + In("c") + " --live=9000", 2, "--live");
   Write("run/config.toml", std::string("name = \"a\"\n"));
   ExpectRefused("train --resume " + In("run") + " --out " + In("b"), 2, "leave out --out");
 }
@@ -170,12 +168,35 @@ TEST_F(Runs, OfFitsAreAnimated) {
   ExpectRefused("timelapse " + In("bare"), 3, "no meshes to animate");
 }
 
+// A page without a server. Commands that are refused leave none, and leave that of a run alone.
+TEST_F(Runs, HaveALivePage) {
+  const Path page = folder_ / "run/live.html", script = folder_ / "run/live/state.js";
+  ExpectRefused(Start("run") + " --live", 3, "data");
+  EXPECT_FALSE(PathExists(page));
+  MakeData();
+  const Outcome done = RunProgram(Start("run") + " --live");
+  EXPECT_EQ(done.exit_code, 0) << done.output;
+  EXPECT_NE(done.output.find("live page: file://" + page.string()), std::string::npos);
+  const std::string state = ReadText(script).value();
+  EXPECT_NE(state.find("\"finished\":true"), std::string::npos) << state;
+  EXPECT_TRUE(IsFile(folder_ / "run/live/mesh_00000003.js"));  // predicted
+  ExpectRefused(Start("run") + " --live", 2, "already holds a run");
+  EXPECT_EQ(ReadText(script).value(), state);
+  Done(Start("run") + " --force");
+  EXPECT_FALSE(PathExists(page) || PathExists(script));
+  const Json said = Done("live " + In("run"));
+  EXPECT_EQ(said["page"], page.string());
+  EXPECT_EQ(said["address"], "file://" + page.string());
+  EXPECT_NE(ReadText(script)->find("\"finished\":true"), std::string::npos);
+}
+
 TEST_F(Runs, AreTheOnlyFoldersToLookAt) {
   Write("photos/a.png", std::string("x"));
   for (const char* command : {"live ", "timelapse "}) {
     ExpectRefused(command + In("nope"), 3, "nope does not exist");
     ExpectRefused(command + In("photos"), 3, "photos: not the folder of a training or a fit");
   }
+  EXPECT_FALSE(PathExists(folder_ / "photos/live.html"));
 }
 
 }  // namespace tilegrad::runs_test

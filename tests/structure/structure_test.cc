@@ -199,7 +199,6 @@ TEST(Structure, EachForeignLibraryHasOneHome) {
       {std::regex("^Eigen/.*"), {"src/train/metrics/frechet.cc"}},
       {std::regex("^toml\\+\\+.*"), {"src/train/", "src/fit/"}},
       {std::regex("^CLI/.*"), {"src/cli/command_line.cc", "src/cli/command_tree.cc"}},
-      {std::regex("^httplib\\.h$"), {"src/cli/live_server.cc"}},
       {std::regex("^(pybind11/.*|Python\\.h)$"), {"python/bindings/"}},
       {std::regex("^(fmt|nlohmann)/.*"), {"src/", "python/bindings/"}},
       {std::regex("^(sys/.*|(fcntl|poll|pthread|sched|unistd|malloc)\\.h)$"),

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/report/live_page.h"
 
+#include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "base/file.h"
 #include "base/folder_lock.h"
+#include "base/temporary_file.h"
 #include "io/mesh_file.h"
 #include "train/config.h"
 #include "train/predictor.h"
@@ -14,12 +15,22 @@
 #include "train/report/html.h"
 #include "train/report/page_data.h"
 #include "train/run/checkpoint.h"
+#include "train/run/log.h"
+#include "train/run/run_files.h"
 
 namespace tilegrad::train {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Files = std::map<std::int64_t, Path>;  // by step
+using Files = std::map<std::int64_t, Path>;
+
+constexpr const char* kLiveFile = "live.html";
+constexpr const char* kLiveFolder = "live";
+constexpr const char* kLiveState = "state.js";
+constexpr std::chrono::seconds kLivePause{1}, kLongestPause{5};
+constexpr int kRest = 20;  // times what writing took
+constexpr std::chrono::seconds kStale{10};
+constexpr std::size_t kMostMeshes = 60, kMostPictures = 300;
 
 // Files "BEGINNING00001500.ENDING" of a folder.
 Files FilesOfSteps(const Path& folder, const std::string& beginning, const std::string& ending) {
@@ -36,121 +47,196 @@ Files FilesOfSteps(const Path& folder, const std::string& beginning, const std::
   return files;
 }
 
-Files Pictures(const Path& run) {
+// At most so many, the first and the last among them.
+Files Spread(const Files& files, std::size_t most) {
+  if (files.size() <= most) return files;
+  Files out;
+  std::size_t i = 0;
+  for (const auto& file : files) {
+    if (out.size() * (files.size() - 1) <= i * (most - 1)) out.insert(file);
+    ++i;
+  }
+  return out;
+}
+
+// When a file was last written; the beginning of time if there is none.
+std::filesystem::file_time_type WrittenAt(const Path& file) {
+  std::error_code error;
+  const auto time = std::filesystem::last_write_time(file, error);
+  return error ? std::filesystem::file_time_type::min() : time;
+}
+
+double Seconds(std::chrono::system_clock::duration since) {
+  return std::chrono::duration<double>(since).count();
+}
+
+Json PictureList(const Path& run) {
   Files files = FilesOfSteps(run / "samples", "step_", ".png");
   files.merge(FilesOfSteps(run / "timelapse", "", ".png"));
-  return files;
-}
-
-Files Meshes(const Path& run) { return FilesOfSteps(run / "timelapse", "", ".glb"); }
-
-// Of the newest checkpoint; -1: there is none.
-std::int64_t CheckpointStep(const Path& run) {
-  const Files files = FilesOfSteps(run / "checkpoints", "step_", ".safetensors");
-  return files.empty() ? -1 : files.rbegin()->first;
-}
-
-Json StepsOf(const Files& files) {
-  Json steps = Json::array();
-  for (const auto& [step, file] : files) steps.push_back(step);
-  return steps;
+  Json out = Json::array();
+  for (const auto& [step, file] : Spread(files, kMostPictures))
+    out.push_back({{"step", step}, {"file", file.lexically_relative(run).generic_string()}});
+  return out;
 }
 
 Result<Json> MeshOf(Mesh mesh) {
-  if (mesh.faces.empty()) return Json();
-  TILEGRAD_TRY(NormalizeToBox(mesh, static_cast<float>(CameraRule().half_extent)));
-  Json json = MeshJson(mesh);
-  json["face_count"] = mesh.faces.size();
+  const std::size_t faces = mesh.faces.size();
+  TILEGRAD_ASSIGN(Json json, CentredMeshJson(std::move(mesh)));
+  if (!json.is_null()) json["face_count"] = faces;
   return json;
 }
 
-std::string DumpForScript(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-// What its config.toml says of a run; a fit has none.
-struct Known {
-  std::string name;
-  std::int64_t steps = 0;
-  std::vector<TermLabel> labels;
-};
-
-Known ReadKnown(const LiveSource& source) {
-  Known known{std::filesystem::absolute(source.run).lexically_normal().filename().string(),
-              source.steps,
-              {}};
-  if (auto config = ReadConfig(source.run / "config.toml"); config.ok()) {
-    if (known.steps == 0) known.steps = config->schedule.steps;
-    known.labels = config->task->Labels();
-  }
-  return known;
+Json RunningJson(const Progress& progress) {
+  return {{"running", true},
+          {"error", ""},
+          {"stage", progress.stage},
+          {"done", progress.done},
+          {"total", progress.total}};
 }
 
 }  // namespace
 
-Result<std::string> LiveRun::State() {
-  const Known known = ReadKnown(source_);
+LivePage::LivePage(LiveSource source)
+    : source_(std::move(source)),
+      file_(std::filesystem::absolute(source_.run / kLiveFile).lexically_normal()),
+      folder_(source_.run / kLiveFolder) {}
+
+Status LivePage::Start() {
+  TILEGRAD_ASSIGN(
+      const std::string page,
+      FillTemplate(kLiveHtml, {{"style", std::string(kReportCss)},
+                               {"script", std::string(kPartsJs) + std::string(kLiveJs)}}));
+  TILEGRAD_TRY(WriteTextAtomic(file_, page));
+  RemoveTemporaries(folder_);
+  return Write(RunningJson({}));
+}
+
+void LivePage::Tell(const Progress& progress) {
+  const auto begin = Clock::now();
+  if (begin < next_ && progress.stage == stage_) return;
+  stage_ = progress.stage;
+  Note(Write(RunningJson(progress)));
+  const auto end = Clock::now();
+  next_ = end + std::clamp<Clock::duration>(kRest * (end - begin), kLivePause, kLongestPause);
+}
+
+Status LivePage::Finish(const Status& outcome) {
+  const bool failed = !outcome.ok() && outcome.code() != StatusCode::kCancelled;
+  Note(Write({{"running", false}, {"error", failed ? outcome.message() : ""}}));
+  return problem_;
+}
+
+void LivePage::Note(const Status& status) {
+  if (problem_.ok() && status.code() != StatusCode::kCancelled) problem_ = status;
+}
+
+Status LivePage::Write(const Json& now) {
+  TILEGRAD_ASSIGN(Json state, State());
+  state["meshes"] = WriteMeshes(Meshes(state["step"].get<std::int64_t>()));
+  state.update(now);
+  return WriteTextAtomic(folder_ / kLiveState, "tilegradState(" + ScriptJson(state) + ");\n");
+}
+
+Result<Json> LivePage::State() const {
+  std::int64_t steps = source_.steps;
+  std::vector<TermLabel> labels = source_.labels;
+  const auto config = ReadConfig(source_.run / kTrainSettings);
+  if (config.ok()) {
+    if (steps == 0) steps = config->schedule.steps;
+    labels = config->task->Labels();
+  }
   std::vector<LogEntry> log;
-  if (PathExists(source_.run / "metrics.jsonl")) {
+  const Path metrics = source_.run / "metrics.jsonl";
+  if (PathExists(metrics)) {
     TILEGRAD_ASSIGN(log, ReadLog(source_.run));
   }
-  const bool running = FolderLock::IsHeld(source_.run);
   const std::int64_t step = log.empty() ? 0 : log.back().step;
   // A fit writes its result at the end.
-  const bool fitted = !running && PathExists(source_.run / "mesh.glb");
-  Json json = {{"name", known.name},
-               {"running", running},
+  const bool fitted = WrittenAt(source_.run / "mesh.glb") > WrittenAt(metrics);
+  Json json = {{"name", file_.parent_path().filename().string()},
+               {"time", Seconds(std::chrono::system_clock::now().time_since_epoch())},
+               {"finished", step > 0 && (fitted || step == steps)},
                {"step", step},
-               {"steps", fitted ? step : known.steps},
-               {"pictures", StepsOf(Pictures(source_.run))},
-               {"meshes", StepsOf(Meshes(source_.run))}};
-  const std::int64_t saved = CheckpointStep(source_.run);
-  if (json["meshes"].empty() && !source_.data.empty() && saved >= 0) json["meshes"] = {saved};
-  json.update(CurveData(log, known.labels));
-  return DumpForScript(json);
+               {"steps", steps},
+               {"pictures", PictureList(source_.run)}};
+  json.update(CurveData(log, labels));
+  return json;
 }
 
-Result<std::string> LiveRun::Mesh(std::int64_t step) {
-  const Files files = Meshes(source_.run);
-  const auto found = files.find(step);
-  if (found == files.end()) return Predicted(step);
-  TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(found->second));
-  TILEGRAD_ASSIGN(Json mesh, MeshOf(std::move(loaded.mesh)));
-  return DumpForScript({{"mesh", std::move(mesh)}, {"truth", nullptr}});
+// `step`: the last one that was logged.
+Files LivePage::Meshes(std::int64_t step) const {
+  Files files = FilesOfSteps(source_.run / "timelapse", "", ".glb");
+  const Path result = source_.run / "mesh.glb";
+  const bool newest = files.empty() || WrittenAt(result) >= WrittenAt(files.rbegin()->second);
+  if (IsFile(result) && newest) files[step] = result;
+  if (!files.empty() || source_.data.empty()) return Spread(files, kMostMeshes);
+  files = FilesOfSteps(source_.run / "checkpoints", "step_", ".safetensors");
+  if (!files.empty()) files.erase(files.begin(), std::prev(files.end()));
+  return files;
 }
 
-Result<std::string> LiveRun::Predicted(std::int64_t step) {
-  const std::scoped_lock lock(mutex_);
-  if (step == predicted_step_) return predicted_;
-  if (source_.data.empty() || step != CheckpointStep(source_.run))
-    return NotFound("{}: no mesh of step {}", source_.run.string(), step);
-  const Workers workers(1);  // the others are at work
+// Those that are new; scripts of others go.
+Json LivePage::WriteMeshes(const Files& files) {
+  Json out = Json::array();
+  Files old = FilesOfSteps(folder_, "mesh_", ".js");
+  for (const auto& [step, source] : files) {
+    const Path script = folder_ / fmt::format("mesh_{:08}.js", step);
+    if (broken_.contains(source)) continue;
+    if (WrittenAt(script) < WrittenAt(source)) {
+      if (const Status status = WriteMesh(source, script, step); !status.ok()) {
+        broken_.insert(source);
+        Note(status);
+        continue;
+      }
+    }
+    old.erase(step);
+    const auto made = WrittenAt(script).time_since_epoch();
+    out.push_back({{"step", step},
+                   {"made", std::chrono::duration_cast<std::chrono::milliseconds>(made).count()}});
+  }
+  std::error_code error;
+  for (const auto& [step, script] : old) std::filesystem::remove(script, error);
+  return out;
+}
+
+Status LivePage::WriteMesh(const Path& source, const Path& script, std::int64_t step) const {
+  Json shown = {{"mesh", nullptr}, {"truth", nullptr}};
+  if (source.extension() == ".glb") {
+    TILEGRAD_ASSIGN(io::LoadedMesh loaded, io::LoadMesh(source));
+    TILEGRAD_ASSIGN(shown["mesh"], MeshOf(std::move(loaded.mesh)));
+  } else {
+    TILEGRAD_ASSIGN(shown, Predicted());
+  }
+  return WriteTextAtomic(script, fmt::format("tilegradMesh({}, {});\n", step, ScriptJson(shown)));
+}
+
+Result<Json> LivePage::Predicted() const {
+  const Workers workers(1);
   TILEGRAD_ASSIGN(const Predictor predictor, Predictor::Load(source_.run, workers));
   TILEGRAD_ASSIGN(const RunHeader header, ReadHeader(source_.run));
   const ShowcaseRequest request{source_.run, source_.data, header, predictor, /*examples=*/1};
   const StopFlag go_on = false;
   TILEGRAD_ASSIGN(Showcase show, predictor.task().Show(request, workers, nullptr, go_on));
   Json json = {{"mesh", nullptr}, {"truth", nullptr}};
-  if (!show.examples.empty()) {
-    TILEGRAD_ASSIGN(json["mesh"], MeshOf(std::move(show.examples[0].prediction)));
-    TILEGRAD_ASSIGN(json["truth"], MeshOf(std::move(show.examples[0].truth)));
+  if (show.examples.empty()) return json;
+  TILEGRAD_ASSIGN(json["mesh"], MeshOf(std::move(show.examples[0].prediction)));
+  TILEGRAD_ASSIGN(json["truth"], MeshOf(std::move(show.examples[0].truth)));
+  return json;
+}
+
+bool LivePage::IsKept(const Path& run) {
+  const auto now = std::filesystem::file_time_type::clock::now();
+  return WrittenAt(run / kLiveFolder / kLiveState) > now - kStale && FolderLock::IsHeld(run);
+}
+
+std::string FileAddress(const Path& file) {
+  std::string out = "file://";
+  for (const char c : file.string()) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       std::string_view("/-._~").find(c) != std::string_view::npos;
+    out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
-  predicted_ = DumpForScript(json);
-  predicted_step_ = step;
-  return predicted_;
-}
-
-Result<Bytes> LiveRun::Picture(std::int64_t step) const {
-  const Files files = Pictures(source_.run);
-  const auto found = files.find(step);
-  if (found == files.end())
-    return NotFound("{}: no picture of step {}", source_.run.string(), step);
-  return ReadFile(found->second);
-}
-
-Result<std::string> LivePage() {
-  return FillTemplate(kLiveHtml, {{"style", std::string(kReportCss)},
-                                  {"script", std::string(kPartsJs) + std::string(kLiveJs)}});
+  return out;
 }
 
 }  // namespace tilegrad::train

@@ -22,6 +22,7 @@ constexpr std::array kRunNames = {kTrainSettings,
                                   "training_models.txt",
                                   "training_photographs.txt",
                                   "report.html",
+                                  "live.html",
                                   "summary.png",
                                   "cameras_start.json",
                                   "transforms_fitted.json",
@@ -34,7 +35,8 @@ struct Series {
   const char *folder, *begin;
 };
 constexpr std::array kSeries = {Series{"checkpoints", "step_"}, Series{"samples", "step_"},
-                                Series{"timelapse", "0"}, Series{"tensorboard", "events."}};
+                                Series{"timelapse", "0"},       Series{"live", "mesh_"},
+                                Series{"live", "state.js"},     Series{"tensorboard", "events."}};
 
 void AddSeries(const Path& run, const Series& series, std::vector<Path>* out) {
   std::error_code error;

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// --live: the page of a run (train/report/live_page.h) while a command works.
+#pragma once
+
+#include <optional>
+
+#include "cli/command.h"
+#include "train/report/live_page.h"
+
+namespace tilegrad::cli {
+
+void AddLiveOption(Command* command, bool* live);
+
+// A page, once it is started.
+class Live {
+ public:
+  // In the folder of a run that this process holds.
+  Status Start(train::LiveSource source);
+  // What `line` is told, the page is told, too. Valid while this lives.
+  ProgressSink Sink(ProgressSink line);
+  // As EndPage.
+  void Finish(const Status& outcome);
+
+ private:
+  std::optional<train::LivePage> page_;
+};
+
+// LivePage::Finish; what is wrong with the page is a warning.
+void EndPage(const Status& outcome, train::LivePage* page);
+// Says where the page is, and opens it where somebody sits before a desktop.
+void ShowPage(const train::LivePage& page);
+
+}  // namespace tilegrad::cli
