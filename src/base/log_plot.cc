@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/escape_html.h"
+#include "base/whole_number.h"
 
 namespace tilegrad {
 namespace {
@@ -22,8 +23,8 @@ struct Axis {
   int low = 0, high = 1;  // powers of ten
 
   void Cover(double least, double largest) {
-    low = static_cast<int>(std::floor(std::log10(least)));
-    high = std::max(low + 1, static_cast<int>(std::ceil(std::log10(largest))));
+    low = WholeNumber<int>(std::floor(std::log10(least)));
+    high = std::max(low + 1, WholeNumber<int>(std::ceil(std::log10(largest))));
   }
   double At(double v) const { return from + (to - from) * (std::log10(v) - low) / (high - low); }
 };

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/output_guard.h"
+#include "base/whole_number.h"
 #include "cli/command.h"
 #include "cli/console.h"
 #include "cli/run_folder.h"
@@ -95,7 +96,7 @@ Status RunTimelapse(const TimelapseOptions& options) {
   const Workers workers(options.workers);
   TILEGRAD_ASSIGN(const auto frames, DrawFrames(options, meshes, workers));
   const int frame_ms =
-      std::clamp(static_cast<int>(1000 * options.seconds / options.frames), 1, 65535);
+      std::clamp(WholeNumber<int>(1000 * options.seconds / options.frames), 1, 65535);
   TILEGRAD_TRY(WriteGuarded(guard, out, [&] {
     return io::SaveWebpAnimation(out, frames, {.frame_ms = frame_ms, .quality = 80});
   }));

@@ -54,13 +54,6 @@ std::optional<double> RealNumber(const std::string& word) {
   return number;
 }
 
-std::optional<std::int64_t> WholeNumber(const std::string& word) {
-  char* end = nullptr;
-  const std::int64_t number = std::strtoll(word.c_str(), &end, /*base=*/0);
-  if (word.empty() || end != word.c_str() + word.size()) return std::nullopt;
-  return number;
-}
-
 std::vector<std::string> PartsBetweenCommas(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream rest(text);

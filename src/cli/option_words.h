@@ -2,7 +2,6 @@
 // What the words of a command line say, and lists of several words.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,7 +10,6 @@ namespace tilegrad::cli {
 
 // The number that all of the word is, as CLI11 reads options: also "+.5", "0x10", "inf" and "nan".
 std::optional<double> RealNumber(const std::string& word);
-std::optional<std::int64_t> WholeNumber(const std::string& word);
 
 // "a,b" is a and b.
 std::vector<std::string> PartsBetweenCommas(const std::string& text);

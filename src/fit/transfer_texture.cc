@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
+#include "base/whole_number.h"
 #include "fit/texels.h"
 #include "train/metrics/face_tree.h"
 
@@ -36,10 +37,10 @@ void AddSurfacePoints(const FitScene& scene, std::size_t face, std::vector<Surfa
   const double area = Cross(p[1] - p[0], p[2] - p[0]);
   if (!(std::abs(area) > 0)) return;
   const auto from = [](double a, double b, double c) {
-    return std::max(0, static_cast<int>(std::ceil(std::min({a, b, c}))));
+    return std::max(0, WholeNumber<int>(std::ceil(std::min({a, b, c}))));
   };
   const auto to = [](double a, double b, double c, int size) {
-    return std::min(size - 1, static_cast<int>(std::floor(std::max({a, b, c}))));
+    return std::min(size - 1, WholeNumber<int>(std::floor(std::max({a, b, c}))));
   };
   const int last_y = to(p[0].y, p[1].y, p[2].y, scene.texture.height),
             last_x = to(p[0].x, p[1].x, p[2].x, scene.texture.width);
@@ -67,12 +68,15 @@ Lookup LookupAt(const FitScene& scene, const FaceTree::Nearest& nearest) {
   for (std::size_t k = 0; k < 3; ++k)
     at += nearest.weights[k] * TexelAt(scene, scene.uv_indices[3 * Index(nearest.face) + k]);
   const int width = scene.texture.width, height = scene.texture.height;
-  at.x = std::clamp(at.x, 0.0, width - 1.0), at.y = std::clamp(at.y, 0.0, height - 1.0);
-  const int x = std::min(static_cast<int>(at.x), width - 2),
-            y = std::min(static_cast<int>(at.y), height - 2);
+  at.x = std::clamp(at.x, 0.0, width - 1.0);
+  at.y = std::clamp(at.y, 0.0, height - 1.0);
+  const int x = std::min(WholeNumber<int>(at.x), std::max(0, width - 2)),
+            y = std::min(WholeNumber<int>(at.y), std::max(0, height - 2));
   const auto fx = static_cast<float>(at.x - x), fy = static_cast<float>(at.y - y);
-  const auto first = static_cast<std::size_t>(y * width + x), w = static_cast<std::size_t>(width);
-  return {{first, first + 1, first + w, first + w + 1},
+  const auto first = static_cast<std::size_t>(y * width + x);
+  const std::size_t right = width > 1 ? 1 : 0,
+                    down = height > 1 ? static_cast<std::size_t>(width) : 0;
+  return {{first, first + right, first + down, first + down + right},
           {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy}};
 }
 

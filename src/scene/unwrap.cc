@@ -8,10 +8,10 @@
 #include <deque>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <optional>
 #include <unordered_map>
 
 #include "base/error.h"
+#include "base/whole_number.h"
 #include "scene/topology.h"
 
 namespace tilegrad {
@@ -22,8 +22,7 @@ constexpr double kFirstFill = 0.85;  // of the texture, that is tried first
 constexpr double kShrink = 0.94;     // of the scale, until charts fit
 constexpr int kMostTries = 60;
 
-// The two directions of a chart's plane: right, up, and towards its axis make a right-handed
-// system.
+// The two directions of a chart's plane; with its axis they make a right-handed system.
 struct Plane {
   glm::dvec3 right, up, axis;
 };
@@ -65,6 +64,8 @@ class Unwrapping {
     for (const Face& f : mesh.faces) {
       const glm::dvec3 n = glm::cross(At(f[1]) - At(f[0]), At(f[2]) - At(f[0]));
       const double length = glm::length(n);
+      for (std::size_t k = 0; k < 3; ++k)
+        longest_ = std::max(longest_, glm::distance(At(f[k]), At(f[(k + 1) % 3])));
       areas_.push_back(length / 2);
       normals_.push_back(length > 0 ? n / length : glm::dvec3(0, 1, 0));
     }
@@ -75,7 +76,8 @@ class Unwrapping {
     double area = 0;
     for (std::size_t f = 0; f < areas_.size(); ++f) area += areas_[f] * Cosine(f, labels_[f]);
     if (!(area > 0)) return InvalidArgument("the mesh has no area to unwrap");
-    scale_ = std::sqrt(kFirstFill * options_.width * options_.height / area);
+    scale_ = std::min(std::sqrt(kFirstFill * options_.width * options_.height / area),
+                      2 * std::max(options_.width, options_.height) / longest_);
     for (int i = 0; i < kMostTries; ++i, scale_ *= kShrink) {
       // How faces lie over each other depends on the scale little, so charts are made but twice.
       if (i % 10 == 0) MakeCharts();
@@ -176,8 +178,7 @@ class Unwrapping {
   bool Claim(const std::array<glm::dvec2, 3>& corners, std::int32_t face,
              std::unordered_map<std::uint64_t, std::int32_t>* texels) {
     claimed_.clear();
-    std::array<glm::dvec2, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) p[k] = corners[k] * scale_;
+    const std::array p = {corners[0] * scale_, corners[1] * scale_, corners[2] * scale_};
     const glm::dvec2 low = glm::min(glm::min(p[0], p[1]), p[2]),
                      high = glm::max(glm::max(p[0], p[1]), p[2]);
     const auto side = [&](std::size_t k, const glm::dvec2& c) {
@@ -208,13 +209,11 @@ class Unwrapping {
     for (std::size_t i = 0; i < charts_.size(); ++i) {
       Chart& c = charts_[i];
       const glm::dvec2 size = (c.high - c.low) * scale_;
-      c.width = static_cast<int>(std::ceil(size.x)) + 2 * options_.gutter;
-      c.height = static_cast<int>(std::ceil(size.y)) + 2 * options_.gutter;
+      c.width = WholeNumber<int>(std::ceil(size.x)) + 2 * options_.gutter;
+      c.height = WholeNumber<int>(std::ceil(size.y)) + 2 * options_.gutter;
       order.push_back(i);
     }
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return charts_[a].height > charts_[b].height;
-    });
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return -charts_[i].height; });
     std::vector<Shelf> shelves;
     int top = 0;
     for (const std::size_t i : order) {
@@ -280,6 +279,7 @@ class Unwrapping {
   std::vector<Chart> charts_;
   std::vector<std::int32_t> chart_of_;
   std::vector<std::uint64_t> claimed_;
+  double longest_ = 0;  // edge: slivers have no area, and Claim looks at all texels around a face
   double scale_ = 1;
 };
 

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+// Words for people, and numbers from outside.
 #include "base/text.h"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "base/did_you_mean.h"
+#include "base/whole_number.h"
 
 namespace tilegrad::text_test {
 
@@ -35,6 +40,26 @@ TEST(Text, PercentIsDecodedAndPlusIsNoSpace) {
 TEST(Text, PercentWithoutTwoDigitsStaysAsItIs) {
   for (const char* text : {"", "%", "100%", "%4", "%zz", "%-1", "%+1", "% 1", "%0x41"})
     EXPECT_EQ(DecodePercent(text), text);
+}
+
+TEST(WholeNumber, IsDefinedForEveryNumber) {
+  constexpr int kMost = std::numeric_limits<int>::max(), kLeast = std::numeric_limits<int>::min();
+  EXPECT_EQ(WholeNumber<int>(2.9f), 2);
+  EXPECT_EQ(WholeNumber<int>(-2.9), -2);
+  EXPECT_EQ(WholeNumber<int>(NAN), 0);
+  EXPECT_EQ(WholeNumber<int>(HUGE_VALF), kMost);
+  EXPECT_EQ(WholeNumber<int>(-HUGE_VAL), kLeast);
+  EXPECT_EQ(WholeNumber<int>(2147483647.5), kMost);
+  EXPECT_EQ(WholeNumber<int>(2147483646.5), kMost - 1);
+  EXPECT_EQ(WholeNumber<int>(2147483648.0f), kMost);
+  EXPECT_EQ(WholeNumber<int>(2147483520.0f), 2147483520);  // the float before
+  EXPECT_EQ(WholeNumber<int>(-2147483648.0f), kLeast);
+  EXPECT_EQ(WholeNumber<std::size_t>(-1.0f), 0u);
+  EXPECT_EQ(WholeNumber<std::size_t>(1e30), std::numeric_limits<std::size_t>::max());
+  EXPECT_EQ(WholeNumber<std::uint8_t>(255.9f), 255);
+  EXPECT_EQ(WholeNumber<std::int64_t>(9223372036854775807.0),
+            std::numeric_limits<std::int64_t>::max());
+  static_assert(WholeNumber<int>(3.5) == 3);
 }
 
 }  // namespace tilegrad::text_test

@@ -39,6 +39,15 @@ TEST(MaskDistance, WithoutAnOutlineIsFarEverywhere) {
   EXPECT_GE(DistanceOf(full, 4, 3).At(-3, 2), 1e5f);  // cut by the border: may go on
 }
 
+TEST(MaskDistance, OfNoPlaceIsFarOutside) {
+  const std::vector<float> alpha(12, 1.0f);
+  for (const float wild : {NAN, HUGE_VALF, -HUGE_VALF}) {
+    EXPECT_EQ(DistanceOf(alpha, 4, 3).At(wild, 1), -HUGE_VALF);
+    EXPECT_EQ(DistanceOf(alpha, 4, 3).At(1, wild), -HUGE_VALF);
+  }
+  EXPECT_TRUE(std::isfinite(DistanceOf(std::vector<float>{1, 0}, 2, 1).At(3e38f, -3e38f)));
+}
+
 class Hull : public TempFolderTest {
  protected:
   FitInput Views(const Mesh& mesh, int size = 96) {

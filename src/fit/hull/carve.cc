@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/whole_number.h"
 #include "fit/hull/mask_distance.h"
 
 namespace tilegrad::train {
@@ -224,10 +225,14 @@ Result<ScalarGrid> Carve(const FitInput& input, const CarveOptions& options, con
   const float longest = std::max({extent.x, extent.y, extent.z});
   const float cell = std::max(static_cast<float>(options.cell_pixels) * carver.PixelAt(middle),
                               longest / static_cast<float>(options.most_cells));
+  if (!(cell > 0 && std::isfinite(cell))) {
+    return InvalidArgument(
+        "the visual hull is {:.3g} across, in cells of {:.3g}: check the cameras", longest, cell);
+  }
   std::array<int, 3> size;
   for (int a = 0; a < 3; ++a)
     size[static_cast<std::size_t>(a)] =
-        static_cast<int>(std::ceil(extent[a] / cell + 2 * kBorderCells)) + 1;
+        WholeNumber<int>(std::ceil(extent[a] / cell + 2 * kBorderCells)) + 1;
   const glm::vec3 points(size[0] - 1, size[1] - 1, size[2] - 1);
   TILEGRAD_TRY(watch.At(carving));
   ScalarGrid grid = carver.Fill(middle - 0.5f * cell * points, cell, size);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "base/whole_number.h"
+
 namespace tilegrad::train {
 namespace {
 
@@ -90,11 +92,13 @@ class Propagation {
 }  // namespace
 
 float MaskDistance::At(float x, float y) const {
-  x -= 0.5f, y -= 0.5f;
+  if (!std::isfinite(x) || !std::isfinite(y)) return -HUGE_VALF;
+  x -= 0.5f;
+  y -= 0.5f;
   const float in_x = std::clamp(x, 0.0f, static_cast<float>(width - 1)),
               in_y = std::clamp(y, 0.0f, static_cast<float>(height - 1));
-  const int x0 = std::min(static_cast<int>(in_x), std::max(0, width - 2)),
-            y0 = std::min(static_cast<int>(in_y), std::max(0, height - 2));
+  const int x0 = std::min(WholeNumber<int>(in_x), std::max(0, width - 2)),
+            y0 = std::min(WholeNumber<int>(in_y), std::max(0, height - 2));
   const int x1 = std::min(x0 + 1, width - 1), y1 = std::min(y0 + 1, height - 1);
   const float fx = in_x - static_cast<float>(x0), fy = in_y - static_cast<float>(y0);
   const auto value = [&](int column, int row) {

@@ -14,7 +14,8 @@ struct MaskDistance {
 
   // Bilinear, at a place in pixels from the image's upper left corner. Beyond the border it is what
   // stands at the border, less the distance from there if that is outside of the mask: whether an
-  // object that the border cuts goes on is not known.
+  // object that the border cuts goes on is not known. A place that is not finite is infinitely far
+  // outside.
   float At(float x, float y) const;
 };
 
