@@ -65,7 +65,9 @@ void SetColors(PosePictures* out) {
 Result<PosePictures> PreparePictures(const TargetImages& images, std::span<const Camera> lenses,
                                      int side) {
   PosePictures out;
-  const int factor = std::max(1, std::max(images.width, images.height) / side);
+  // No side of the result may vanish.
+  const auto [shorter, longer] = std::minmax(images.width, images.height);
+  const int factor = std::clamp(longer / side, 1, shorter);
   out.images = Reduce(CutToMultiple(images, factor), factor);
   const std::size_t plane = images.pixels();
   for (std::size_t n = 0; n < lenses.size(); ++n) {

@@ -11,6 +11,7 @@
 #include "fit/make_views.h"
 #include "fit/poses/crop.h"
 #include "fit/poses/input_poses.h"
+#include "fit/poses/pictures.h"
 #include "fit/score.h"
 #include "scene/shapes.h"
 #include "support/temp_folder.h"
@@ -30,6 +31,21 @@ Mesh Thing() {
   add({-0.2f, 0.0f, 0.35f}, {0.3f, 0.3f, 0.25f}, {0.9f, 0.85f, 0.2f, 1});
   add({-0.35f, -0.1f, -0.3f}, {0.1f, 0.2f, 0.3f}, {0.2f, 0.7f, 0.3f, 1});
   return mesh;
+}
+
+// Strips of pictures were divided by more than their height.
+TEST(PosePictures, KeepTheShorterSide) {
+  for (const auto& [width, height] : {std::pair(200, 2), {128, 1}, {1, 300}}) {
+    TargetImages strip;
+    strip.width = width;
+    strip.height = height;
+    strip.alpha.assign(strip.pixels(), 1.0f);
+    strip.color.assign(3 * strip.pixels(), 0.5f);
+    const Camera lens = OrbitCamera({50, width, height}, 0, 0, 2);
+    const auto pictures = PreparePictures(strip, std::span(&lens, 1), 16);
+    ASSERT_TRUE(pictures.ok()) << pictures.status().message();
+    EXPECT_EQ(std::min(pictures->images.width, pictures->images.height), 1);
+  }
 }
 
 class Poses : public TempFolderTest {
