@@ -7,34 +7,10 @@
 #include <cstdint>
 
 #include "base/escape_html.h"
+#include "base/text.h"
 
 namespace tilegrad {
 namespace {
-
-// The character at the beginning of a text: how many bytes it has, 1 and `valid` false where they
-// are not UTF-8.
-struct Utf8 {
-  std::uint32_t code = 0;
-  std::size_t bytes = 1;
-  bool valid = false;
-};
-
-Utf8 FirstOf(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint8_t lead = byte(0);
-  if (lead < 0x80) return {lead, 1, true};
-  const std::size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter would do below
-  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) return {lead};
-  std::uint32_t code = lead & (0x7fu >> bytes);
-  for (std::size_t i = 1; i < bytes; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return {lead};
-    code = code << 6 | (byte(i) & 0x3fu);
-  }
-  const bool surrogate = code >= 0xd800 && code <= 0xdfff;
-  if (code < kLeast[bytes] || code > 0x10ffff || surrogate) return {lead};
-  return {code, bytes, true};
-}
 
 bool IsControl(std::uint32_t code) {
   const bool layout = code == '\n' || code == '\t';
@@ -50,7 +26,7 @@ bool IsControl(std::uint32_t code) {
 std::string EscapeControls(std::string_view text) {
   std::string out;
   while (!text.empty()) {
-    const Utf8 first = FirstOf(text);
+    const Utf8Character first = FirstCharacter(text);
     if (first.valid && !IsControl(first.code)) {
       out += text.substr(0, first.bytes);
     } else {

@@ -5,6 +5,15 @@
 #include <charconv>
 
 namespace tilegrad {
+namespace {
+
+constexpr std::uint32_t kByte = 0xEF00;  // and the byte: a character that stands for it
+
+bool StandsForByte(const Utf8Character& c) {
+  return c.valid && c.code >= kByte + 0x80 && c.code <= kByte + 0xFF;
+}
+
+}  // namespace
 
 std::string LowerCase(std::string_view text) {
   std::string lower(text);
@@ -39,6 +48,61 @@ void AppendUtf8(std::uint32_t character, std::string* out) {
   out->push_back(static_cast<char>(kFirst[more] | character >> 6 * more));
   for (int left = more - 1; left >= 0; --left)
     out->push_back(static_cast<char>(0x80 | (character >> 6 * left & 0x3F)));
+}
+
+Utf8Character FirstCharacter(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
+  const std::uint8_t lead = byte(0);
+  if (lead < 0x80) return {lead, 1, true};
+  const std::size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
+  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // shorter would do below
+  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) return {lead};
+  std::uint32_t code = lead & (0x7fu >> bytes);
+  for (std::size_t i = 1; i < bytes; ++i) {
+    if ((byte(i) & 0xc0) != 0x80) return {lead};
+    code = code << 6 | (byte(i) & 0x3fu);
+  }
+  const bool surrogate = code >= 0xd800 && code <= 0xdfff;
+  if (code < kLeast[bytes] || code > 0x10ffff || surrogate) return {lead};
+  return {code, bytes, true};
+}
+
+bool IsUtf8(std::string_view text) {
+  while (!text.empty()) {
+    const Utf8Character first = FirstCharacter(text);
+    if (!first.valid) return false;
+    text.remove_prefix(first.bytes);
+  }
+  return true;
+}
+
+std::string JsonName(std::string_view name) {
+  std::string out;
+  while (!name.empty()) {
+    const Utf8Character first = FirstCharacter(name);
+    const std::string_view bytes = name.substr(0, first.bytes);
+    if (first.valid && !StandsForByte(first)) {
+      out += bytes;
+    } else {
+      for (const char c : bytes) AppendUtf8(kByte + static_cast<std::uint8_t>(c), &out);
+    }
+    name.remove_prefix(first.bytes);
+  }
+  return out;
+}
+
+std::string NameFromJson(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const Utf8Character first = FirstCharacter(text);
+    if (StandsForByte(first)) {
+      out += static_cast<char>(first.code - kByte);
+    } else {
+      out += text.substr(0, first.bytes);
+    }
+    text.remove_prefix(first.bytes);
+  }
+  return out;
 }
 
 }  // namespace tilegrad

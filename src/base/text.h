@@ -3,6 +3,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -26,5 +27,22 @@ std::string DecodePercent(std::string_view uri);
 
 // Appends a character of Unicode as UTF-8; U+FFFD for what is none (surrogates, above U+10FFFF).
 void AppendUtf8(std::uint32_t character, std::string* out);
+
+// The character at the beginning of a text that is not empty: how many bytes it has; 1, and `valid`
+// false, where they are not UTF-8.
+struct Utf8Character {
+  std::uint32_t code = 0;
+  std::size_t bytes = 1;
+  bool valid = false;
+};
+Utf8Character FirstCharacter(std::string_view text);
+
+bool IsUtf8(std::string_view text);
+
+// Names of files are any bytes, JSON is UTF-8. A byte that is not, b, is written as the character
+// U+EF00 + b, which nothing else is used for (as MirBSD's OPTU does); what is one of these already,
+// byte by byte. NameFromJson(JsonName(x)) is x, whatever x is.
+std::string JsonName(std::string_view name);
+std::string NameFromJson(std::string_view text);
 
 }  // namespace tilegrad

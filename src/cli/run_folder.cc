@@ -5,12 +5,12 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/json_text.h"
 #include "base/read_budget.h"
 #include "cli/console.h"
 #include "train/run/checkpoint.h"
@@ -150,7 +150,7 @@ Result<Path> ChooseDataset(const std::string& given, const Path& run) {
                     run.string());
   }
   TILEGRAD_ASSIGN(const std::string text, ReadText(file));
-  const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  TILEGRAD_ASSIGN(const nlohmann::json json, ParseJson(text, file.string()));
   if (!json.is_object() || !json.contains("dataset") || !json["dataset"].is_string()) {
     return DataLoss("{}: no \"dataset\" in it; name the dataset with --data", file.string());
   }

@@ -136,8 +136,8 @@ std::string WriteTransforms(const std::vector<TransformsView>& views, ImageSize 
     if (view.gain != 1) frame["exposure_gain"] = view.gain;
     frames.push_back(std::move(frame));
   }
-  const nlohmann::ordered_json file = {{"w", size.width}, {"h", size.height}, {"frames", frames}};
-  return file.dump(1) + "\n";
+  nlohmann::ordered_json file = {{"w", size.width}, {"h", size.height}, {"frames", frames}};
+  return JsonText(std::move(file), 1) + "\n";
 }
 
 }  // namespace tilegrad::train

@@ -2,9 +2,8 @@
 // Cameras to JSON: NeRF's transforms.json, and OpenCV's numbers.
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
-#include "base/error.h"
+#include "base/json_text.h"
 #include "io/camera_file.h"
 #include "io/json_cameras.h"
 
@@ -26,12 +25,7 @@ json Rows(const std::array<double, N>& m, std::size_t columns) {
 
 // What the reader refuses is not written: no frames, sizes, numbers that JSON has no word for.
 Status SaveJson(const Path& file, const json& top) {
-  std::string text;
-  try {
-    text = top.dump(1) + "\n";
-  } catch (const json::exception&) {
-    return InvalidArgument("{}: the name of a view is not UTF-8", file.string());
-  }
+  const std::string text = JsonText(top, 1) + "\n";
   const auto back = ReadJsonCameras(text, file, {});
   if (!back.ok()) {
     return InvalidArgument("{}; nothing was written, as it could not be read",

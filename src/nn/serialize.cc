@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/text.h"
 
 static_assert(std::endian::native == std::endian::little, "safetensors data is little endian");
 
@@ -217,12 +218,6 @@ Result<TensorFile> ReadSafetensors(Context& context, const Path& path) {
 }
 
 namespace {
-
-// A name that is not would be written as another one.
-bool IsUtf8(const std::string& text) {
-  const std::string dumped = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return Json::parse(dumped).get<std::string>() == text;
-}
 
 // Appends a member to a JSON object that begins with `text`. An ordered object of the JSON library
 // would look through all members for each new one.

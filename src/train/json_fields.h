@@ -8,30 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/json_nesting.h"
+#include "base/json_text.h"
 
 namespace tilegrad::train {
-
-// An error names the line. `place` is the file's name; `first_line` the number of the text's first
-// line in it.
-inline Result<nlohmann::json> ParseJson(std::string_view text, const std::string& place,
-                                        int first_line = 1) {
-  constexpr int kMostDepth = 100;  // what this program writes is below 10
-  if (FirstNestedDeeper(text, kMostDepth) != std::string_view::npos) {
-    return DataLoss("{}: from line {} on: nested deeper than {} levels", place, first_line,
-                    kMostDepth);
-  }
-  try {
-    return nlohmann::json::parse(text);
-  } catch (const nlohmann::json::parse_error& error) {
-    const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
-    const auto line = first_line + std::count(text.begin(), end, '\n');
-    return DataLoss("{}: line {}: not valid JSON", place, line);
-  } catch (const nlohmann::json::exception& error) {  // a number beyond double; has no place
-    return DataLoss("{}: from line {} on: not valid JSON: {}", place, first_line, error.what());
-  }
-}
 
 class JsonFields {
  public:

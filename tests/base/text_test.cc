@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words for people, and numbers from outside.
+// Words for people, numbers and names from outside.
 #include "base/text.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,8 @@
 #include <limits>
 
 #include "base/did_you_mean.h"
+#include "base/json_text.h"
+#include "base/rng.h"
 #include "base/whole_number.h"
 
 namespace tilegrad::text_test {
@@ -60,6 +62,42 @@ TEST(WholeNumber, IsDefinedForEveryNumber) {
   EXPECT_EQ(WholeNumber<std::int64_t>(9223372036854775807.0),
             std::numeric_limits<std::int64_t>::max());
   static_assert(WholeNumber<int>(3.5) == 3);
+}
+
+TEST(Text, TellsUtf8) {
+  for (const std::string good : {"", "a", "\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\x98\x80"})
+    EXPECT_TRUE(IsUtf8(good)) << good;
+  for (const std::string bad :
+       {"\xe9", "a\xff", "\xc3", "\xc0\x80", "\xed\xa0\x80", "\xf5\x80\x80\x80"})
+    EXPECT_FALSE(IsUtf8(bad)) << bad;
+}
+
+// Of any bytes, the characters that stand for bytes among them.
+TEST(JsonNames, ComeBackAsTheyWere) {
+  EXPECT_EQ(JsonName("caf\xc3\xa9.png"), "caf\xc3\xa9.png");
+  EXPECT_EQ(JsonName("caf\xe9.png"), "caf\xee\xbf\xa9.png");
+  std::vector<std::string> names = {"", "\xee\xbf\xa9", "\xee\xbe\x80\xff", "a\0b"};
+  Rng rng(7);
+  for (int i = 0; i < 500; ++i) {
+    std::string name;
+    for (std::uint64_t n = rng.Below(12); n-- > 0;) {
+      const bool mark = rng.Below(4) == 0;
+      name += mark ? std::string("\xee\xbf\xa9") : std::string(1, static_cast<char>(rng.Next()));
+    }
+    names.push_back(name);
+  }
+  for (const std::string& name : names) {
+    const std::string text = JsonName(name);
+    EXPECT_TRUE(IsUtf8(text));
+    EXPECT_EQ(NameFromJson(text), name);
+  }
+}
+
+TEST(JsonNames, GoThroughFiles) {
+  const nlohmann::json json = {{"folder", "d\xe9j\xe0"}, {"list", {"\xff", "plain"}}, {"n", 3}};
+  const std::string text = JsonText(json);
+  EXPECT_TRUE(IsUtf8(text));
+  EXPECT_EQ(ParseJson(text, "a.json").value(), json);
 }
 
 }  // namespace tilegrad::text_test

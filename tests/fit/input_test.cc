@@ -4,7 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fit/colmap_frames.h"
+#include "base/text.h"
+#include "fit/transforms.h"
 #include "io/image_file.h"
 #include "support/temp_folder.h"
 
@@ -121,6 +122,27 @@ TEST_F(Input, TransformsOfOtherLenses) {
           R"({"fl_x":10,"frames":[{)" + image + "},{" + lens + "," + image + "}]}");
     ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 1", "pinhole");
   }
+}
+
+// A disk from before UTF-8, in all that names files.
+TEST_F(Input, NamesNeedNotBeUtf8) {
+  const std::string name = "caf\xe9.png";
+  Image("n/images/" + name, 51);
+  const auto bare = ReadFitFolder(folder_ / "n", 0);
+  ASSERT_TRUE(bare.ok()) << bare.status().message();
+  EXPECT_EQ(bare->names[0], name);
+  Write("n/sparse/0/cameras.txt", std::string("1 PINHOLE 16 12 20 22 9 5\n"));
+  Write("n/sparse/0/images.txt", "1 0 1 0 0 0 0 4 1 " + name + "\n\n");
+  const auto colmap = ReadFitFolder(folder_ / "n", 0);
+  ASSERT_TRUE(colmap.ok()) << colmap.status().message();
+  // What a fit writes is JSON, and names the same file.
+  const std::string text = WriteTransforms({{"images/" + name, colmap->cameras[0]}}, {8, 6});
+  EXPECT_TRUE(IsUtf8(text));
+  Write("n/transforms.json", text);
+  const auto frames = ReadTransforms(folder_ / "n/transforms.json");
+  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  EXPECT_EQ(frames->at(0).image, folder_ / "n/images" / name);
+  EXPECT_TRUE(ReadFitFolder(folder_ / "n", 0).ok());
 }
 
 }  // namespace tilegrad::train::input_test

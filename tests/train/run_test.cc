@@ -14,6 +14,7 @@
 #include "train/config.h"
 #include "train/data/batches.h"
 #include "train/run/checkpoint.h"
+#include "train/run/header.h"
 #include "train/run/log.h"
 #include "train/run/step_values.h"
 #include "train/run/tensorboard.h"
@@ -363,6 +364,15 @@ TEST(BatchOrder, MirrorsTheShareThatIsAskedForAndNothingElseChanges) {
   }
   // 400 throws of 0.25: five standard deviations are 43.
   EXPECT_NEAR(mirrored, 100, 43);
+}
+
+TEST_F(RunTest, HeadersKeepPathsOfAnyBytes) {
+  RunHeader header;
+  header.dataset = "d\xe9j\xe0/vu";
+  ASSERT_TRUE(WriteHeader(folder_, header).ok());
+  const auto back = ReadHeader(folder_);
+  ASSERT_TRUE(back.ok()) << back.status().message();
+  EXPECT_EQ(back->dataset, header.dataset);
 }
 
 TEST(MirroredCamera, SeesTheMirroredWorldFlipped) {

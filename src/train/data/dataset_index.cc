@@ -18,11 +18,6 @@ constexpr const char *kModelFolder = "models", *kModelEnding = ".npz";
 constexpr double kMostUnits = 1e6;  // far beyond any dataset, and float still has digits
 constexpr Split kSplits[] = {Split::kTrain, Split::kValidation, Split::kTest};
 
-std::string Dump(const Json& json, int indent) {
-  // Names from foreign files may be no UTF-8: then a replacement character, not an exception.
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
-}
-
 std::string Hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
 void ReadHex(JsonFields& fields, const char* key, std::uint64_t* out) {
@@ -173,7 +168,7 @@ Status WriteDatasetInfo(const Path& folder, const DatasetInfo& info) {
                      {"classes", info.classes},
                      {"credits", info.credits},
                      {"recipe", info.recipe}};
-  return WriteTextAtomic(DatasetInfoPath(folder), Dump(json, 2) + "\n");
+  return WriteTextAtomic(DatasetInfoPath(folder), JsonText(json, 2) + "\n");
 }
 
 Result<DatasetInfo> ReadDatasetInfo(const Path& folder) {
@@ -203,7 +198,7 @@ Result<DatasetInfo> ReadDatasetInfo(const Path& folder) {
 Status WriteModels(const Path& folder, const DatasetInfo& info,
                    const std::vector<ModelInfo>& models) {
   std::string text;
-  for (const ModelInfo& model : models) text += Dump(ModelJson(info, model), -1) + "\n";
+  for (const ModelInfo& model : models) text += JsonText(ModelJson(info, model)) + "\n";
   return WriteTextAtomic(ModelsPath(folder), text);
 }
 
@@ -235,7 +230,7 @@ Status WriteRejected(const Path& folder, const std::vector<RejectedModel>& rejec
                        {"class", model.class_name},
                        {"file", model.file},
                        {"reason", model.reason}};
-    text += Dump(json, -1) + "\n";
+    text += JsonText(json) + "\n";
   }
   return WriteTextAtomic(RejectedPath(folder), text);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/escape_text.h"
+#include "base/json_text.h"
 #include "base/temporary_file.h"
 #include "base/text.h"
 #include "train/eval/evaluation.h"
@@ -238,10 +238,7 @@ nlohmann::ordered_json EvaluationJson(const Evaluation& evaluation) {
 
 Status WriteEvaluation(const Path& run, const Evaluation& evaluation) {
   for (const char* name : {"eval.json", "eval.md"}) RemoveTemporariesOf(run / name);
-  // A class may be no UTF-8: then a replacement character, not an exception.
-  const std::string json =
-      EvaluationJson(evaluation).dump(1, ' ', false, Json::error_handler_t::replace);
-  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", json + "\n"));
+  TILEGRAD_TRY(WriteTextAtomic(run / "eval.json", JsonText(EvaluationJson(evaluation), 1) + "\n"));
   return WriteTextAtomic(run / "eval.md", FormatMarkdown(evaluation));
 }
 

@@ -14,10 +14,7 @@ Status WriteHeader(const Path& run, const RunHeader& header) {
                                  {"training_models", header.training_models},
                                  {"parameters", header.parameters}};
   for (const auto& [key, value] : header.machine) json["machine"][key] = value;
-  // Paths need be no UTF-8: then a replacement character, not an exception.
-  const std::string text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  return WriteTextAtomic(run / "run.json", text + "\n");
+  return WriteTextAtomic(run / "run.json", JsonText(std::move(json), 2) + "\n");
 }
 
 Result<RunHeader> ReadHeader(const Path& run) {
