@@ -35,7 +35,7 @@ std::vector<Path> PicturesIn(const Path& folder) {
 
 TransformsFrame BareFrame(double fov) {
   TransformsFrame frame;
-  frame.pose.fl_x = frame.pose.fl_y = 0;
+  frame.camera.camera_to_world = NerfCamera().camera_to_world;
   frame.angle_long = fov * std::numbers::pi / 180;
   return frame;
 }
@@ -49,6 +49,7 @@ Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double f
     TransformsFrame frame = BareFrame(fov);
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
+    frame.camera.place = name.string();
     frames.push_back(std::move(frame));
   }
   TILEGRAD_TRY(CheckAllMasked(frames));

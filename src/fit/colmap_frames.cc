@@ -4,7 +4,6 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "io/camera_file.h"
-#include "io/transforms_lens.h"
 
 namespace tilegrad::train {
 namespace {
@@ -23,6 +22,19 @@ Result<Path> FindImages(const Path& model, const std::string& first) {
       "{}: its image {} is neither in a folder \"images\" beside the model or above it, nor there "
       "itself",
       model.string(), first);
+}
+
+io::NerfFrame FrameOf(const io::CameraView& view) {
+  const NerfCamera camera = ToNerf(view.camera);
+  io::NerfFrame frame;
+  frame.place = view.name;
+  frame.camera_to_world = camera.camera_to_world;
+  frame.fl_x = camera.fl_x;
+  frame.fl_y = camera.fl_y;
+  frame.cx = camera.cx;
+  frame.cy = camera.cy;
+  frame.size = view.size;
+  return frame;
 }
 
 }  // namespace
@@ -57,8 +69,7 @@ Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
     frame.stored_order = true;  // COLMAP ignores the tag of orientation
-    frame.pose = ToNerf(view.camera);
-    frame.size = view.size;
+    frame.camera = FrameOf(view);
     frames.push_back(std::move(frame));
   }
   TILEGRAD_TRY(CheckAllMasked(frames));

@@ -37,11 +37,11 @@ Result<ImageU8> LoadTarget(const TransformsFrame& frame) {
   TILEGRAD_ASSIGN(ImageU8 stored,
                   io::DecodeImage(bytes, frame.image.string(), io::PixelOrder::kStored));
   if (frame.stored_order) return stored;
+  const ImageSize meant = frame.camera.size.value_or(ImageSize());
   const auto fits = [&](const ImageU8& image) {
-    return std::int64_t{image.width} * frame.size.height ==
-           std::int64_t{image.height} * frame.size.width;
+    return std::int64_t{image.width} * meant.height == std::int64_t{image.height} * meant.width;
   };
-  const bool fits_stored = frame.size.width > 0 && fits(stored);
+  const bool fits_stored = meant.width > 0 && fits(stored);
   ImageU8 upright = io::Upright(stored, io::OrientationOf(bytes));
   return fits_stored && !fits(upright) ? std::move(stored) : std::move(upright);
 }

@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a NeRF program's transforms.json says about the lens. The camera here is a pinhole, so
-// everything that bends rays is refused, as it is in COLMAP's models (colmap_cameras.cc).
+// Internal to io: what a NeRF program's transforms.json says about the lens.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
-#include <string>
-
-#include "tilegrad/status.h"
+#include "io/json_frame.h"
+#include "scene/lens_distortion.h"
 
 namespace tilegrad::io {
 
-// An error that names the key, unless the frame is seen by a pinhole: camera_model of nerfstudio
-// and COLMAP, the flags of instant-ngp, and the coefficients of distortion, which must be 0. What
-// the frame omits is taken from `top`. Both are objects.
-Status CheckPinhole(const nlohmann::json& top, const nlohmann::json& frame);
+// By camera_model of nerfstudio and COLMAP, the flags of instant-ngp, and the coefficients of
+// distortion. An error names the key of what is no lens of lens_distortion.h.
+Result<LensDistortion> LensOf(const JsonFrame& frame);
 
-// Windows programs write "images\\0001.png": with slashes, as every system reads it.
-std::string PortablePath(std::string path);
+// An error, unless it is straight, that says what to do.
+Status CheckStraight(const LensDistortion& lens);
 
 }  // namespace tilegrad::io

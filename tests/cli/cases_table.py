@@ -156,10 +156,10 @@ SECOND = {
     "ply/quality_nan.ply": ("read", drawn, straight()),
     "obj_no_usemtl/mesh.obj": ("warned", said("usemtl"), straight()),
 }
-CAMERAS = {"tf_fisheye.json": refused("OPENCV_FISHEYE"), "tf_isfisheye.json": refused("is_fisheye"),
+CAMERAS = {"tf_fisheye.json": refused("the lens bends rays"), "tf_isfisheye.json": refused("the lens bends rays"),
            "tf_ortho.json": refused("EQUIRECTANGULAR"), "tf_k1.json": refused("k1"),
            "tf_blenderscale.json": refused("rotation"), "tf_mirror.json": refused("rotation"),
-           "colmapf": refused("cameras.txt: line 2")}
+           "colmapf": refused("a.png: the lens bends rays")}
 COUNTS = {"tf_anglexy.json": 1, "tf_perframe.json": 2, "colmap1": 3, "colmap2": 2}
 
 

@@ -114,14 +114,47 @@ TEST_F(Input, TransformsOfOtherLenses) {
   Image("f/0.png", 51);
   const std::string image = R"("file_path":"0.png",)" + std::string(kPose);
   for (const std::string lens :
-       {R"("camera_model":"OPENCV_FISHEYE")", R"("camera_model":"EQUIRECTANGULAR")",
-        R"("is_fisheye":true)", R"("k4":0.1)"}) {
+       {R"("camera_model":"EQUIRECTANGULAR")", R"("orthographic":true)", R"("k4":0.1)",
+        R"("camera_model":"OPENCV_FISHEYE","p1":0.1)", R"("k1":"wide")"}) {
     Write("f/transforms.json", R"({"fl_x":10,)" + lens + R"(,"frames":[{)" + image + "}]}");
-    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 0", "pinhole");
+    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 0",
+                  "undistort");
     Write("f/transforms.json",
           R"({"fl_x":10,"frames":[{)" + image + "},{" + lens + "," + image + "}]}");
-    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 1", "pinhole");
+    ExpectMessage(ReadFitFolder(folder_ / "f", 0).status(), "transforms.json: frame 1",
+                  "undistort");
   }
+}
+
+// What a frame says goes before what the file says, 0 is a number, null is nothing.
+TEST_F(Input, TransformsSayWhatTheySay) {
+  Image("t/0.png", 51);
+  const auto camera = [&](const std::string& file, const std::string& frame) {
+    Write("t/transforms.json",
+          "{" + file + R"("frames":[{"file_path":"0.png",)" + frame + kPose + "}]}");
+    const auto input = ReadFitFolder(folder_ / "t", 0);
+    EXPECT_TRUE(input.ok()) << input.status().message();
+    return input.ok() ? input->cameras[0] : Camera();
+  };
+  Camera c = camera(R"("fl_x":10,"cx":0,"cy":0.0,)", "");
+  EXPECT_EQ(c.cx, 0);
+  EXPECT_EQ(c.cy, 0);
+  c = camera(R"("fl_x":10,"cx":null,"cy":null,"w":null,"h":null,"fl_y":null,"k1":null,)",
+             R"("mask_path":null,)");
+  EXPECT_EQ(c.cx, 4);
+  EXPECT_EQ(c.cy, 3);
+  EXPECT_EQ(c.fy, 10);
+  c = camera(R"("fl_x":10,"fl_y":12,"cx":1,)", R"("camera_angle_x":1.5707963267948966,"cx":2,)");
+  EXPECT_NEAR(c.fx, 4, 1e-6);  // half of 8 pixels at 45 degrees
+  EXPECT_NEAR(c.fy, 4, 1e-6);
+  EXPECT_EQ(c.cx, 2);
+  c = camera(R"("camera_angle_x":0.7,)", R"("fl_x":null,"fl_y":20,)");
+  EXPECT_EQ(c.fx, 20);
+  c = camera(R"("fl_x":10,"fl_y":12,)", R"("camera_angle_x":null,)");
+  EXPECT_EQ(c.fy, 12);
+  Write("t/transforms.json",
+        std::string(R"({"fl_x":0,"frames":[{"file_path":"0.png",)") + kPose + "}]}");
+  ExpectMessage(ReadFitFolder(folder_ / "t", 0).status(), "0.png", "focal lengths are 0");
 }
 
 // A disk from before UTF-8, in all that names files.

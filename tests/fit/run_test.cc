@@ -367,7 +367,7 @@ TEST_F(Fit, WildTransforms) {
   };
   const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
   EXPECT_TRUE(error(matrix("4")).ok());
-  EXPECT_TRUE(error(R"("w": "x", "w": 8, )" + matrix("4")).ok());  // the last counts
+  EXPECT_TRUE(error(R"("w": "x", "w": 8, "h": 8, )" + matrix("4")).ok());  // the last counts
   ExpectMessage(error(matrix("1e999")), "transforms.json", "1e999");
   ExpectMessage(error(matrix("null")), "transforms.json", "frame 0", "transform_matrix");
   ExpectMessage(error(R"("transform_matrix": )" + deep), "transforms.json", "nested");

@@ -239,7 +239,8 @@ TEST_F(CameraFiles, BrokenJson) {
   ExpectRefused("a.json", "{\"frames\": [3]}", "frame 0");
   ExpectRefused("a.json", "{\"w\": 4, \"h\": 0.5, \"frames\": [{}]}", "pixels");
   ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"frames\": [{}]}", "transform_matrix");
-  ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"k1\": 0.1, \"frames\": [{}]}", "undistort");
+  ExpectRefused("a.json", "{\"w\": 4, \"h\": 4, \"k1\": 0.1, \"frames\": [{}]}",
+                "transform_matrix");
   for (const char* angle : {"0", "-0.7", "40", "3.15"}) {
     ExpectRefused("a.json",
                   fmt::format("{{\"w\": 4, \"h\": 4, \"camera_angle_x\": {}, {}}}", angle, kPose),
