@@ -26,9 +26,11 @@ py::array RowOf(const Camera64& camera) {
 }
 
 py::list LoadCameras(const Path& path, const Size& size, bool half) {
-  const io::CameraFileOptions options = {SizeOf(size),
-                                         half ? PixelCentre::kHalf : PixelCentre::kInteger};
+  std::string note;
+  io::CameraFileOptions options = {SizeOf(size), half ? PixelCentre::kHalf : PixelCentre::kInteger};
+  options.warn = [&note](const std::string& warning) { note = warning; };
   const auto views = ValueOrThrow(WithoutGil([&] { return io::LoadCameras(path, options); }));
+  if (!note.empty()) WarnUser("load_cameras: " + note);
   py::list out;
   for (const io::CameraView& view : views) {
     out.append(py::make_tuple(Text(view.name), RowOf(view.camera),

@@ -162,14 +162,6 @@ py::object ScoresToDict(const std::vector<train::ViewScore>& scores) {
                   py::arg("silhouette_iou") = train::MeanIou(scores));
 }
 
-// As Python's warnings.
-void WarnOf(const train::FitInput& input) {
-  for (const std::string& warning : input.warnings) {
-    if (PyErr_WarnEx(PyExc_UserWarning, ("fit: " + warning).c_str(), 1) != 0)
-      throw py::error_already_set();
-  }
-}
-
 py::dict Fit(const py::dict& views, const py::dict& request, const py::object& listener) {
   train::FitJob job = JobOf(request);
   Listener listening(listener);
@@ -181,7 +173,7 @@ py::dict Fit(const py::dict& views, const py::dict& request, const py::object& l
     TILEGRAD_TRY(train::StartCameras(search, &job, workers, listening.Sink(), listening.stop()));
     return train::RunFit(job, workers, listening.Sink(), listening.stop());
   });
-  WarnOf(job.input);
+  for (const std::string& warning : job.input.warnings) WarnUser("fit: " + warning);
   listening.Settle(outcome.status());
   if (!outcome.ok()) return py::dict(py::arg("finished") = false);
   py::dict out(py::arg("finished") = outcome->finished, py::arg("steps") = outcome->last_step,

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "base/escape_text.h"
 #include "bindings/arrays.h"
 
 namespace tilegrad::python {
@@ -27,6 +29,12 @@ template <class Work>
 auto WithoutGil(const Work& work) {
   const py::gil_scoped_release release;
   return work();
+}
+
+// As Python's warning; bytes that are no text are shown escaped.
+inline void WarnUser(const std::string& text) {
+  if (PyErr_WarnEx(PyExc_UserWarning, EscapeControls(text).c_str(), 1) != 0)
+    throw py::error_already_set();
 }
 
 }  // namespace tilegrad::python

@@ -82,7 +82,10 @@ class RenderRun {
         renderer_(workers_),
         guard_(settings.file.force) {
     const std::string& cameras = settings.view.camera_file;
-    if (!cameras.empty()) guard_.AddInput(io::FindColmapModel(cameras).value_or(cameras));
+    if (!cameras.empty()) {
+      const auto model = io::FindColmapModel(cameras);
+      guard_.AddInput(model ? model->folder : Path(cameras));
+    }
     for (const std::string& mesh : settings.meshes) guard_.AddInput(mesh);
   }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "cli/console.h"
 #include "cli/option_words.h"
 #include "cli/render_job.h"
 #include "cli/unique_names.h"
@@ -57,7 +58,9 @@ void NameFiles(std::vector<CameraView>* views) {
 
 Result<std::vector<CameraView>> FileViews(const ViewSettings& settings, ImageSize size) {
   const auto centre = settings.opencv_centre == "half" ? PixelCentre::kHalf : PixelCentre::kInteger;
-  TILEGRAD_ASSIGN(auto views, io::LoadCameras(settings.camera_file, {size, centre}));
+  const auto warn = [](const std::string& note) { PrintNote("tilegrad: warning: {}\n", note); };
+  const io::CameraFileOptions options = {size, centre, false, warn};
+  TILEGRAD_ASSIGN(auto views, io::LoadCameras(settings.camera_file, options));
   for (CameraView& view : views) {
     if (size.width == 0) continue;
     view.camera = ResizeCamera(view.camera, view.size, size);

@@ -34,6 +34,7 @@ io::NerfFrame FrameOf(const io::CameraView& view) {
   frame.cx = camera.cx;
   frame.cy = camera.cy;
   frame.size = view.size;
+  frame.lens = view.lens;
   return frame;
 }
 

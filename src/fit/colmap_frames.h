@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A COLMAP project as frames: its cameras, the images that they belong to, and masks beside these.
 //
-//   <project>/sparse/0/cameras.txt, images.txt   or .bin; also <project>/sparse, <project>, and
-//                                                colmap/ before them, as nerfstudio has it
+//   <project>/sparse/0/cameras.txt, images.txt   or .bin; the largest of several models; also
+//                                                <project>/sparse, <project>, and colmap/ before
+//                                                them, as nerfstudio has it
 //   <project>/images/a/1.jpg
 //   <project>/masks/a/1.jpg.png                  as COLMAP names masks, or masks/a/1.png
 #pragma once

@@ -122,12 +122,15 @@ Status Finish(FitInput* input) {
 }
 
 // Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
-Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, bool* posed) {
-  *posed = true;
+// Says in `input` whether they have cameras, and warns.
+Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, FitInput* input) {
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     if (PathExists(folder / name)) return ReadTransforms(folder / name);
   }
-  if (const auto model = io::FindColmapModel(folder)) return ReadColmapFrames(*model);
+  if (const auto model = io::FindColmapModel(folder)) {
+    if (!model->note.empty()) input->warnings.push_back(model->note);
+    return ReadColmapFrames(model->folder);
+  }
   TILEGRAD_ASSIGN(auto bare, ReadBareFrames(folder, fov));
   if (PathExists(DatasetInfoPath(folder))) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
@@ -140,7 +143,7 @@ Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, 
   }
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
   if (!bare.empty()) {
-    *posed = false;
+    input->posed = false;
     return bare;
   }
   return NotFound(
@@ -183,7 +186,7 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
 
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {
   FitInput input;
-  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input.posed));
+  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input));
   TILEGRAD_TRY(AddViews(frames, options.watch, &input));
   const Path test = folder / "transforms_test.json";
   const bool has_test = PathExists(test);

@@ -10,7 +10,8 @@
 //               {"name": "0003", "rvec": [...], "tvec": [...], "K": ..., "width": ...}]}
 //
 // What a frame omits is taken from the top level; a file without "frames" is one camera. Lens
-// distortion is an error that explains how to remove it: the renderer's rays are straight.
+// distortion is an error that explains how to remove it: the renderer's rays are straight. Cameras
+// that no image uses may be of any kind.
 #pragma once
 
 #include <optional>
@@ -19,32 +20,40 @@
 #include <vector>
 
 #include "base/file.h"
-#include "scene/camera_conventions.h"
+#include "base/progress.h"
+#include "scene/lens_distortion.h"
 
 namespace tilegrad::io {
 
 struct CameraView {
   std::string name;  // as the file says, or its number
   Camera64 camera;
-  ImageSize size;  // of the image
+  ImageSize size;            // of the image
+  LensDistortion lens = {};  // straight unless the options ask for others
 };
 
 struct CameraFileOptions {
   ImageSize size = {};  // where the file does not say; 0 x 0: then it must
   PixelCentre opencv_centre = PixelCentre::kInteger;  // of K in OpenCV's JSON
+  bool bent = false;           // lenses of COLMAP that bend rays are given back, not refused
+  WarningSink warn = nullptr;  // of COLMAP's models that are not read
 };
 
 // By what is there: a folder is COLMAP's, a JSON file with K is OpenCV's, else NeRF's. Errors name
 // the file and the line or frame. At least one camera.
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options);
 
+struct ColmapModel {
+  Path folder;
+  std::string note;  // which others were passed over, for people; or empty
+};
 // The COLMAP model in `folder`, which is the model's own or its project's (sparse/0,
-// colmap/sparse/0,
-// ...); or nothing.
-std::optional<Path> FindColmapModel(const Path& folder);
+// colmap/sparse/0, ...), or nothing. Of several in sparse/ the one with the most images.
+std::optional<ColmapModel> FindColmapModel(const Path& folder);
 
 // Of what FindColmapModel finds; sizes and pixel centres need no options.
-Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder);
+Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
+                                                  const CameraFileOptions& options = {});
 
 // Writers for what LoadCameras reads; numbers come back as they were.
 Status SaveColmapCameras(const Path& folder, std::span<const CameraView> views);  // text

@@ -2,6 +2,7 @@
 // COLMAP's sparse models: cameras.txt and images.txt, or the same as .bin (little-endian).
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <map>
 
@@ -9,32 +10,43 @@
 #include "base/file.h"
 #include "io/camera_file.h"
 #include "io/text_scan.h"
+#include "io/transforms_lens.h"
 
 namespace tilegrad::io {
 namespace {
 
-// COLMAP's models of up to eight numbers that begin with one or two focal lengths, then the
-// principal point; what follows is distortion.
+using Bend = LensDistortion::Model;
+
+// COLMAP's models begin with one or two focal lengths, then the principal point; what follows are
+// the first coefficients of a LensDistortion, or without `bend` something that is not read.
 struct Model {
   std::string_view name;
   int id;
   std::size_t focals, params;
+  std::optional<Bend> bend;
 };
-constexpr std::array<Model, 7> kModels = {{{"SIMPLE_PINHOLE", 0, 1, 3},
-                                           {"PINHOLE", 1, 2, 4},
-                                           {"SIMPLE_RADIAL", 2, 1, 4},
-                                           {"RADIAL", 3, 1, 5},
-                                           {"OPENCV", 4, 2, 8},
-                                           {"OPENCV_FISHEYE", 5, 2, 8},
-                                           {"FULL_OPENCV", 6, 2, 12}}};
-constexpr std::string_view kFisheye = "OPENCV_FISHEYE";  // bent even without distortion
-constexpr std::size_t kMaxParams = 12;
+constexpr std::array<Model, 12> kModels = {
+    {{"SIMPLE_PINHOLE", 0, 1, 3, Bend::kBrown},
+     {"PINHOLE", 1, 2, 4, Bend::kBrown},
+     {"SIMPLE_RADIAL", 2, 1, 4, Bend::kBrown},
+     {"RADIAL", 3, 1, 5, Bend::kBrown},
+     {"OPENCV", 4, 2, 8, Bend::kBrown},
+     {"OPENCV_FISHEYE", 5, 2, 8, Bend::kFisheye},
+     {"FULL_OPENCV", 6, 2, 12, Bend::kBrown},
+     {"FOV", 7, 2, 5, std::nullopt},
+     {"SIMPLE_RADIAL_FISHEYE", 8, 1, 4, Bend::kFisheye},
+     {"RADIAL_FISHEYE", 9, 1, 5, Bend::kFisheye},
+     {"THIN_PRISM_FISHEYE", 10, 2, 12, std::nullopt},
+     {"RAD_TAN_THIN_PRISM_FISHEYE", 11, 2, 16, std::nullopt}}};
+constexpr std::size_t kMaxParams = 16;
 
 struct Intrinsics {
   ColmapCamera camera;
   ImageSize size;
+  LensDistortion lens;
 };
-using Cameras = std::map<std::uint32_t, Intrinsics>;
+// Why one is not to be had matters only if an image uses it.
+using Cameras = std::map<std::uint32_t, Result<Intrinsics>>;
 
 struct RawCamera {
   std::uint32_t id = 0;
@@ -49,9 +61,7 @@ bool IsSize(std::uint64_t width, std::uint64_t height) {
 
 Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
                                   const std::string& place) {
-  const auto distortion = std::span(raw.params).first(model.params).subspan(model.focals + 2);
-  if (model.name == kFisheye ||
-      std::any_of(distortion.begin(), distortion.end(), [](double x) { return x != 0; })) {
+  if (!model.bend) {
     return InvalidArgument(
         "{}: camera {} ({}) has lens distortion; undistort the images first (colmap "
         "image_undistorter) and take the model that this writes",
@@ -61,17 +71,21 @@ Result<Intrinsics> MakeIntrinsics(const RawCamera& raw, const Model& model,
     return DataLoss("{}: camera {} has an image of {} x {} pixels", place, raw.id, raw.width,
                     raw.height);
   }
-  const auto& p = raw.params;
-  Intrinsics out;
-  out.camera.fx = p[0], out.camera.fy = p[model.focals - 1];
-  out.camera.cx = p[model.focals], out.camera.cy = p[model.focals + 1];
-  out.size = {static_cast<int>(raw.width), static_cast<int>(raw.height)};
-  return out;
+  const double* middle = &raw.params[model.focals];
+  std::array<double, 8> k = {};
+  std::copy_n(middle + 2, model.params - model.focals - 2, k.begin());
+  if (!std::ranges::all_of(k, [](double x) { return std::isfinite(x); }))
+    return DataLoss("{}: camera {} has a number that is not finite", place, raw.id);
+  return Intrinsics{
+      {.fx = raw.params[0], .fy = middle[-1], .cx = middle[0], .cy = middle[1]},
+      {static_cast<int>(raw.width), static_cast<int>(raw.height)},
+      *model.bend == Bend::kFisheye ? FisheyeLens({k[0], k[1], k[2], k[3]}) : BrownLens(k)};
 }
 
 std::string KnownModels() {
   std::string list;
-  for (const Model& m : kModels) list += (list.empty() ? "" : ", ") + std::string(m.name);
+  for (const Model& m : kModels)
+    if (m.bend) list += (list.empty() ? "" : ", ") + std::string(m.name);
   return list;
 }
 
@@ -81,12 +95,13 @@ Status AddView(const std::string& place, const Cameras& cameras, std::uint32_t c
   const auto found = cameras.find(camera_id);
   if (found == cameras.end())
     return DataLoss("{}: image \"{}\" names camera {}, which is not there", place, name, camera_id);
-  const ColmapCamera& k = found->second.camera;
+  if (!found->second.ok()) return found->second.status();
+  const ColmapCamera& k = found->second->camera;
   camera.fx = k.fx, camera.fy = k.fy, camera.cx = k.cx, camera.cy = k.cy;
   const auto converted = FromColmap(camera);
   if (!converted.ok())
     return DataLoss("{}: image \"{}\": {}", place, name, converted.status().message());
-  views->push_back({name, *converted, found->second.size});
+  views->push_back({name, *converted, found->second->size, found->second->lens});
   return {};
 }
 
@@ -109,10 +124,11 @@ Result<Cameras> ReadCamerasText(const Path& file) {
     RawCamera raw;
     if (!ParseTokens(line, raw.id)) return DataLoss("{}: no camera number", place);
     const std::string_view name = NextToken(line);
-    const auto model = std::find_if(kModels.begin(), kModels.end(),
-                                    [&](const Model& m) { return m.name == name; });
+    const auto model = std::ranges::find(kModels, name, &Model::name);
     if (model == kModels.end()) {
-      return DataLoss("{}: camera model \"{}\" is not one of {}", place, name, KnownModels());
+      cameras.insert_or_assign(
+          raw.id, DataLoss("{}: camera model \"{}\" is not one of {}", place, name, KnownModels()));
+      continue;
     }
     bool good = ParseTokens(line, raw.width, raw.height);
     for (std::size_t i = 0; i < model->params; ++i) good = good && ParseTokens(line, raw.params[i]);
@@ -120,7 +136,7 @@ Result<Cameras> ReadCamerasText(const Path& file) {
       return DataLoss("{}: expected CAMERA_ID {} WIDTH HEIGHT and {} numbers", place, name,
                       model->params);
     }
-    TILEGRAD_ASSIGN(cameras[raw.id], MakeIntrinsics(raw, *model, place));
+    cameras.insert_or_assign(raw.id, MakeIntrinsics(raw, *model, place));
   }
   return cameras;
 }
@@ -219,8 +235,7 @@ Result<Cameras> ReadCamerasBinary(const Path& file) {
     RawCamera raw;
     std::int32_t id = 0;
     if (!in.Read(raw.id, id, raw.width, raw.height)) return CutShort(file);
-    const auto model =
-        std::find_if(kModels.begin(), kModels.end(), [&](const Model& m) { return m.id == id; });
+    const auto model = std::ranges::find(kModels, id, &Model::id);
     if (model == kModels.end()) {
       return DataLoss("{}: camera {} has model number {}; read are {}", file.string(), raw.id, id,
                       KnownModels());
@@ -228,7 +243,7 @@ Result<Cameras> ReadCamerasBinary(const Path& file) {
     for (std::size_t i = 0; i < model->params; ++i) {
       if (!in.Read(raw.params[i])) return CutShort(file);
     }
-    TILEGRAD_ASSIGN(cameras[raw.id], MakeIntrinsics(raw, *model, file.string()));
+    cameras.insert_or_assign(raw.id, MakeIntrinsics(raw, *model, file.string()));
   }
   return cameras;
 }
@@ -255,30 +270,26 @@ Result<std::vector<CameraView>> ReadImagesBinary(const Path& file, const Cameras
 
 }  // namespace
 
-std::optional<Path> FindColmapModel(const Path& folder) {
-  for (const Path& root : {folder, folder / "colmap"}) {
-    for (const Path& model : {root, root / "sparse/0", root / "sparse"}) {
-      for (const char* file : {"cameras.txt", "cameras.bin"}) {
-        if (IsFile(model / file)) return model;
-      }
-    }
-  }
-  return std::nullopt;
-}
-
-Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder) {
+Result<std::vector<CameraView>> LoadColmapCameras(const Path& folder,
+                                                  const CameraFileOptions& options) {
   const auto model = FindColmapModel(folder);
   if (!model) {
     return NotFound(
         "{}: not a COLMAP model: neither cameras.txt nor cameras.bin is in it or its sparse/0",
         folder.string());
   }
-  const bool text = IsFile(*model / "cameras.txt");
-  TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(*model / "cameras.txt")
-                                              : ReadCamerasBinary(*model / "cameras.bin"));
-  TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(*model / "images.txt", cameras)
-                                   : ReadImagesBinary(*model / "images.bin", cameras));
-  if (views.empty()) return DataLoss("{}: no images in it", model->string());
+  if (!model->note.empty() && options.warn) options.warn(model->note);
+  const Path& at = model->folder;
+  const bool text = IsFile(at / "cameras.txt");
+  TILEGRAD_ASSIGN(const Cameras cameras, text ? ReadCamerasText(at / "cameras.txt")
+                                              : ReadCamerasBinary(at / "cameras.bin"));
+  TILEGRAD_ASSIGN(auto views, text ? ReadImagesText(at / "images.txt", cameras)
+                                   : ReadImagesBinary(at / "images.bin", cameras));
+  if (views.empty()) return DataLoss("{}: no images in it", at.string());
+  for (const CameraView& view : views) {
+    if (options.bent) break;
+    TILEGRAD_TRY(CheckStraight(view.lens).Within(at.string() + ": " + view.name));
+  }
   return views;
 }
 

@@ -116,7 +116,7 @@ Result<std::vector<CameraView>> ReadJsonCameras(const std::string& text, const P
 }
 
 Result<std::vector<CameraView>> LoadCameras(const Path& path, const CameraFileOptions& options) {
-  if (IsFolder(path)) return LoadColmapCameras(path);
+  if (IsFolder(path)) return LoadColmapCameras(path, options);
   TILEGRAD_ASSIGN(const std::string text, ReadText(path));
   return ReadJsonCameras(text, path, options);
 }

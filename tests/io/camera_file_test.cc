@@ -122,8 +122,8 @@ TEST_F(CameraFiles, BrokenColmapText) {
   const std::string good = "1 PINHOLE 640 480 500 500 320 240\n", pose = "1 1 0 0 0 0 0 1 ";
   refused("1 PINHOLE 640 480 500\n", "", "cameras.txt: line 1");
   refused("# head\n1 THIN_PRISM_FISHEYE 4 4\n", "", "line 2");
-  refused("1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n", "", "undistort");
-  refused("1 PINHOLE 0 480 500 500 320 240\n", "", "0 x 480");
+  refused("1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n", pose + "1 a.png\n\n", "undistort");
+  refused("1 PINHOLE 0 480 500 500 320 240\n", pose + "1 a.png\n\n", "0 x 480");
   refused(good, "", "no images");
   refused(good, pose + "2 a.png\n\n", "camera 2");
   refused(good, "1 0 0 0 0 0 0 1 1 a.png\n\n", "quaternion");
@@ -199,6 +199,54 @@ TEST_F(CameraFiles, LensesThatBendRays) {
                                                   R"("is_fisheye":false,)" + kPose + "}]}"),
                               {})
                   .ok());
+}
+
+// Kept for who undistorts the images (tilegrad fit), in OpenCV's order.
+TEST_F(CameraFiles, ColmapLensesAreGivenToWhoAsks) {
+  using Model = LensDistortion::Model;
+  const auto lens = [&](const std::string& camera) {
+    Write("cameras.txt", "1 " + camera + "\n");
+    Write("images.txt", std::string("1 1 0 0 0 0 0 1 1 a.png\n\n"));
+    const auto got = io::LoadColmapCameras(folder_, {.bent = true});
+    EXPECT_TRUE(got.ok()) << got.status().message();
+    return got.ok() ? got->at(0).lens : LensDistortion();
+  };
+  using K = std::array<double, 8>;
+  EXPECT_TRUE(lens("SIMPLE_RADIAL 640 480 500 320 240 0").straight());
+  EXPECT_EQ(lens("SIMPLE_RADIAL 640 480 500 320 240 0.1").k, (K{0.1}));
+  EXPECT_EQ(lens("RADIAL 640 480 500 320 240 0.1 0.2").k, (K{0.1, 0.2}));
+  const LensDistortion brown = lens("FULL_OPENCV 640 480 500 510 320 240 1 2 3 4 5 6 7 8");
+  EXPECT_EQ(brown.model, Model::kBrown);
+  EXPECT_EQ(brown.k, (K{1, 2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(lens("OPENCV 640 480 500 510 320 240 1 2 3 4").k, (K{1, 2, 3, 4}));
+  const LensDistortion fisheye = lens("OPENCV_FISHEYE 640 480 500 510 320 240 0 0 0 0");
+  EXPECT_EQ(fisheye.model, Model::kFisheye);
+  EXPECT_EQ(lens("RADIAL_FISHEYE 640 480 500 320 240 1 2").k, (K{1, 2}));
+  EXPECT_EQ(lens("RADIAL_FISHEYE 640 480 500 320 240 1 2").model, Model::kFisheye);
+  Write("cameras.txt", std::string("1 OPENCV 640 480 500 510 320 240 1 2 3 4\n"));
+  ExpectMessage(io::LoadColmapCameras(folder_).status(), "a.png", "undistort");
+}
+
+TEST_F(CameraFiles, OfSeveralColmapModelsTheLargestIsRead) {
+  const std::string image = "1 1 0 0 0 0 0 0 1 a.png\n\n", more = "2 1 0 0 0 0 0 0 1 b.png\n\n";
+  for (const auto& [name, images] : {std::pair("0", image), {"1", image + more}, {"10", image}}) {
+    Write(std::string("sparse/") + name + "/cameras.txt",
+          std::string("1 SIMPLE_PINHOLE 640 480 500 320 240\n"));
+    Write(std::string("sparse/") + name + "/images.txt", images);
+  }
+  std::string told;
+  const auto got =
+      io::LoadCameras(folder_, {.warn = [&](const std::string& note) { told = note; }});
+  ASSERT_TRUE(got.ok()) << got.status().message();
+  EXPECT_EQ(got->size(), 2u);
+  EXPECT_NE(told.find("sparse/1: taken for its 2 images"), std::string::npos) << told;
+  EXPECT_NE(told.find("0 (1), 10 (1)"), std::string::npos) << told;
+  // What a broken file claims to have, but has no room for, does not count.
+  std::string broken = BinaryImages();
+  broken[0] = broken[3] = 100;
+  Write("sparse/2/cameras.bin", BinaryCameras());
+  Write("sparse/2/images.bin", broken);
+  EXPECT_EQ(io::LoadCameras(folder_, {}).value().size(), 2u);
 }
 
 TEST_F(CameraFiles, BackslashesOfWindows) {

@@ -36,6 +36,14 @@ class CameraFiles(FolderTest):
         cameras.save_cameras(self.folder / "c.json", views)
         self.assertIn("K", json.loads((self.folder / "c.json").read_text())["frames"][0])
 
+    def test_models_of_colmap_that_are_left_out_are_named(self) -> None:
+        views = [cameras.View(f"{i}.png", camera, WIDTH, HEIGHT)
+                 for i, camera in enumerate(some_cameras(3))]
+        for name, count in (("0", 2), ("1", 3)):
+            cameras.save_cameras(self.folder / "p/sparse" / name, views[:count], format="colmap")
+        with self.assertWarnsRegex(UserWarning, r"sparse/1: taken for its 3 images.*: 0 \(2\)"):
+            self.assertEqual(len(cameras.load_cameras(self.folder / "p")), 3)
+
     def test_rotation_vector(self) -> None:
         np.testing.assert_allclose(cameras.rotation_from_vector((0, 0, np.pi / 2)),
                                    [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)

@@ -130,8 +130,9 @@ class FolderReader {
       if (found == by_stem.end())
         return InvalidArgument("{}: no camera for it among the {} of {}", photo.image.string(),
                                cameras->size(), folder_.string());
-      const auto& [name, camera, size] = *found->second;
-      const Camera64 resized = ResizeCamera(camera, size, {photo.mask.width, photo.mask.height});
+      const io::CameraView& view = *found->second;
+      const Camera64 resized =
+          ResizeCamera(view.camera, view.size, {photo.mask.width, photo.mask.height});
       auto weak = WeakPerspectiveOf(resized, {0, 0, 0});
       if (!weak.ok()) return weak.status().Within(photo.image.string());
       photo.camera = *weak;
