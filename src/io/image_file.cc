@@ -17,6 +17,7 @@
 #include "io/orientation.h"
 #include "io/pnm_reader.h"
 #include "io/sgi_reader.h"
+#include "io/webp_reader.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -60,8 +61,8 @@ Result<ImageU8> Decode(std::span<const std::uint8_t> bytes, const std::string& n
       return DataLoss("{}: an image in {}, which is not read; save it as PNG or JPEG", name,
                       format);
     }
-    return DataLoss("{}: not an image that can be read (PNG, JPEG, BMP, TGA, PNM, SGI): {}", name,
-                    stbi_failure_reason());
+    return DataLoss("{}: not an image that can be read (PNG, JPEG, WebP, BMP, TGA, PNM, SGI): {}",
+                    name, stbi_failure_reason());
   }
   if (height < 0 && height >= -kMaxImageSide) height = -height;  // a BMP with its first row on top
   TILEGRAD_TRY(CheckImageSize(width, height, name));
@@ -109,10 +110,19 @@ Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::stri
   return DecodeBytes(bytes, name, order);
 }
 
-Result<ImageU8> LoadImage(const Path& path, PixelOrder order) {
+Result<StoredImage> LoadStoredImage(const Path& path) {
   const ReadBudget budget;
   TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(path));
-  return DecodeBytes(bytes, path.string(), order);
+  TILEGRAD_ASSIGN(ImageU8 image, IsWebp(bytes)
+                                     ? DecodeWebp(bytes, path.string())
+                                     : DecodeBytes(bytes, path.string(), PixelOrder::kStored));
+  return StoredImage{std::move(image), OrientationOf(bytes)};
+}
+
+Result<ImageU8> LoadImage(const Path& path, PixelOrder order) {
+  TILEGRAD_ASSIGN(StoredImage stored, LoadStoredImage(path));
+  return order == PixelOrder::kStored ? std::move(stored.image)
+                                      : Upright(std::move(stored.image), stored.orientation);
 }
 
 ImageU8 ToColor(ImageU8 image) {

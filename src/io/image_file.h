@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files: PNG, JPEG, BMP, TGA by stb_image, binary PGM and PPM and SGI in; PNG out.
+// Image files: PNG, JPEG, BMP, TGA by stb_image, WebP by libwebp, binary PGM and PPM and SGI in;
+// PNG out.
 #pragma once
 
 #include <span>
@@ -17,11 +18,18 @@ inline constexpr int kMaxImageSide = 16384;
 enum class PixelOrder { kUpright, kStored };
 
 // 1 to 4 channels as in the file (16-bit files are reduced to 8; CMYK becomes RGB). `name` stands
-// in error messages. DecodeImage, of what other files hold, is kCancelled where they are not to be
-// read on (StopGuardedBy).
+// in error messages. DecodeImage, of what other files hold, reads no WebP, and is kCancelled where
+// they are not to be read on (StopGuardedBy).
 Result<ImageU8> DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name,
                             PixelOrder order = PixelOrder::kUpright);
 Result<ImageU8> LoadImage(const Path& path, PixelOrder order = PixelOrder::kUpright);
+
+// As its file stores it, and how that is to be turned (orientation.h).
+struct StoredImage {
+  ImageU8 image;
+  int orientation = 1;
+};
+Result<StoredImage> LoadStoredImage(const Path& path);
 
 // 3 or 4 channels: grey becomes RGB, grey with alpha RGBA.
 ImageU8 ToColor(ImageU8 image);

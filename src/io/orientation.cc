@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "io/image_check.h"
+#include "io/webp_reader.h"
 
 namespace tilegrad::io {
 namespace {
@@ -83,10 +84,28 @@ int OrientationOfPng(ByteSpan bytes) {
   return 1;
 }
 
+// A header of 12 bytes, then chunks of an even number of bytes each: name, length, content. Some
+// programs begin the content as a JPEG's segment does.
+int OrientationOfWebp(ByteSpan bytes) {
+  constexpr std::size_t kHeader = 12, kFrame = 8;
+  constexpr std::string_view kExif("Exif\0\0", 6);
+  for (std::size_t at = kHeader; at + kFrame <= bytes.size();) {
+    const std::size_t length = Number(bytes.subspan(at + 4, 4), false);
+    ByteSpan content = Part(bytes, at + kFrame, length);
+    if (Is(bytes.subspan(at, 4), "EXIF")) {
+      if (Is(Part(content, 0, kExif.size()), kExif)) content = content.subspan(kExif.size());
+      return OrientationOfTiff(content);
+    }
+    at += kFrame + length + length % 2;
+  }
+  return 1;
+}
+
 }  // namespace
 
 int OrientationOf(ByteSpan bytes) {
   if (IsPng(bytes)) return OrientationOfPng(bytes);
+  if (IsWebp(bytes)) return OrientationOfWebp(bytes);
   return IsJpeg(bytes) ? OrientationOfJpeg(bytes) : 1;
 }
 

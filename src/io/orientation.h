@@ -10,8 +10,8 @@
 
 namespace tilegrad::io {
 
-// 1 to 8, of a JPEG's Exif segment or a PNG's eXIf chunk; 1, upright, where there is none or it
-// makes no sense. `bytes` may be anything.
+// 1 to 8, of a JPEG's Exif segment, a PNG's eXIf or a WebP's EXIF chunk; 1, upright, where there is
+// none or it makes no sense. `bytes` may be anything.
 int OrientationOf(std::span<const std::uint8_t> bytes);
 
 // The image turned and mirrored so that it is upright. `orientation` is 1 to 8.

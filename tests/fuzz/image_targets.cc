@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers of images. One decoder takes them all; the targets differ in where they begin, and in
 // what is mended: a PNG with a wrong checksum is refused before anything else is looked at.
+#include <webp/encode.h>
 #include <zlib.h>
 
 #include <cmath>
@@ -189,9 +190,31 @@ std::vector<Bytes> ExrSeeds() {
           *io::EncodeExr({1, 6, {{"Z", values}}})};
 }
 
+// Read from files alone.
+void Webp(Input input) {
+  const ReadBudget budget(kBudget);
+  const MemoryFile file(input);
+  Check(io::LoadImage(file.path()));
+}
+
+std::vector<Bytes> WebpSeeds() {
+  std::vector<Bytes> out;
+  for (const float quality : {-1.0f, 80.0f}) {  // -1: lossless
+    const ImageU8 image = Picture(20, 11, 4);
+    std::uint8_t* bytes = nullptr;
+    const std::size_t size = quality < 0
+                                 ? WebPEncodeLosslessRGBA(image.pixels.data(), 20, 11, 80, &bytes)
+                                 : WebPEncodeRGBA(image.pixels.data(), 20, 11, 80, quality, &bytes);
+    out.emplace_back(bytes, bytes + size);
+    WebPFree(bytes);
+  }
+  return out;
+}
+
 const Registration kTargets[] = {
     Registration({"png", Decode, RepairedPngSeeds, RepairPng}),
     Registration({"jpeg", Decode, JpegSeeds}),
+    Registration({"webp", Webp, WebpSeeds}),
     Registration({"bmp_tga", Decode, RawSeeds}),
     Registration({"pnm", Decode, PnmSeeds}),
     Registration({"sgi", Decode, SgiSeeds}),

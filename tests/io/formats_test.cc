@@ -72,7 +72,6 @@ TEST_F(FormatsTest, TruncatedImagesAreErrors) {
 TEST_F(FormatsTest, ImagesOfOtherFormatsAreNamed) {
   using namespace std::string_literals;
   for (const auto& [bytes, format] : std::vector<std::pair<std::string, std::string>>{
-           {"RIFF\x24\0\0\0WEBPVP8 "s, "in WebP"},
            {"\0\0\0\x18"s + "ftypheic\0\0\0\0"s, "in HEIC"},
            {"\0\0\0\x1c"s + "ftypavif\0\0\0\0"s, "in AVIF"},
            {"GIF89a\2\0\2\0"s, "in GIF"},
