@@ -66,14 +66,10 @@ train::FitInput InputOfArrays(const py::dict& views, const train::InputOptions& 
   input.posed = !views["cameras"].is_none();
   input.cameras = CamerasOf(views["cameras"], names.size(),
                             {input.images.width, input.images.height}, options.fov);
-  for (int i = 0; i < n; ++i) {
-    const bool held = options.hold_out > 0 && (i + 1) % options.hold_out == 0;
-    (held ? input.held_out : input.training).push_back(i);
-  }
-  const Status masked = listening->Run(
-      [&] { return train::ApplyBackground(options.background, &input, options.watch); });
-  listening->Settle(masked);
-  ThrowIfError(masked);
+  const Status finished =
+      listening->Run([&] { return train::FinishInput(options, &input).Within("fit"); });
+  listening->Settle(finished);
+  ThrowIfError(finished);
   return input;
 }
 

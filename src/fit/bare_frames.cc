@@ -3,32 +3,47 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <numbers>
+#include <span>
 #include <string_view>
 
+#include "base/error.h"
 #include "base/text.h"
 #include "fit/colmap_frames.h"
 
 namespace tilegrad::train {
 namespace {
 
-bool IsPicture(const Path& file) {
-  static constexpr std::array<std::string_view, 4> kEndings = {".png", ".jpg", ".jpeg", ".webp"};
-  const std::string ending = LowerCase(file.extension().string());
-  return std::ranges::find(kEndings, ending) != kEndings.end();
-}
+constexpr std::array<std::string_view, 4> kRead = {".png", ".jpg", ".jpeg", ".webp"};
+constexpr std::array<std::string_view, 23> kOthers = {
+    ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".tga",
+    ".jp2",  ".jxl",  ".jfif", ".psd", ".exr",  ".hdr", ".ppm", ".pgm",
+    ".dng",  ".cr2",  ".cr3",  ".nef", ".arw",  ".raf", ".orf"};
 
-// Their names, sorted.
-std::vector<Path> PicturesIn(const Path& folder) {
+// Names of files with such an ending, sorted.
+std::vector<Path> FilesIn(const Path& folder, std::span<const std::string_view> endings) {
   std::vector<Path> out;
   std::error_code error;
   for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
        at.increment(error)) {
-    if (at->is_regular_file(error) && IsPicture(at->path())) out.push_back(at->path().filename());
+    const std::string ending = LowerCase(at->path().extension().string());
+    const bool wanted = std::ranges::find(endings, ending) != endings.end();
+    if (wanted && at->is_regular_file(error)) out.push_back(at->path().filename());
   }
   std::ranges::sort(out);
   return out;
+}
+
+void WarnOfOthers(const Path& folder, std::vector<std::string>* warnings) {
+  constexpr std::size_t kNamed = 5;
+  const std::vector<Path> others = FilesIn(folder, kOthers);
+  if (others.empty()) return;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(others.size(), kNamed); ++i)
+    names += (i == 0 ? "" : ", ") + others[i].string();
+  warnings->push_back(fmt::format("{}: left out {} (not PNG, JPEG or WebP): {}{}", folder.string(),
+                                  Count(others.size(), "picture"), names,
+                                  others.size() > kNamed ? ", ..." : ""));
 }
 
 }  // namespace
@@ -40,19 +55,19 @@ TransformsFrame BareFrame(double fov) {
   return frame;
 }
 
-Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double fov) {
+std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
+                                            std::vector<std::string>* warnings) {
   Path images = folder / "images";
-  std::vector<Path> names = PicturesIn(images);
-  if (names.empty()) images = folder, names = PicturesIn(images);
+  if (FilesIn(images, kRead).empty()) images = folder;
+  WarnOfOthers(images, warnings);
   std::vector<TransformsFrame> frames;
-  for (const Path& name : names) {
+  for (const Path& name : FilesIn(images, kRead)) {
     TransformsFrame frame = BareFrame(fov);
     frame.image = images / name;
     frame.mask = MaskFileOf(images, name);
     frame.camera.place = name.string();
     frames.push_back(std::move(frame));
   }
-  TILEGRAD_TRY(CheckAllMasked(frames));
   return frames;
 }
 

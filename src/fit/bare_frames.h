@@ -2,7 +2,7 @@
 // A folder of pictures without cameras.
 //
 //   <folder>/images/a.jpg or <folder>/a.jpg     PNG, JPEG or WebP, in the order of their names
-//   <folder>/masks/a.jpg.png or masks/a.png     beside images/ or in <folder>; all or none
+//   <folder>/masks/a.jpg.png or masks/a.png     beside images/ or in <folder>
 #pragma once
 
 #include <vector>
@@ -17,7 +17,8 @@ inline constexpr double kUsualFov = 65;  // degrees along the longer side: main 
 // nothing.
 TransformsFrame BareFrame(double fov);
 
-// Empty if there are no pictures. Errors: a mask is missing.
-Result<std::vector<TransformsFrame>> ReadBareFrames(const Path& folder, double fov);
+// Empty if there are no pictures. Warns of pictures in formats that are not read.
+std::vector<TransformsFrame> ReadBareFrames(const Path& folder, double fov,
+                                            std::vector<std::string>* warnings);
 
 }  // namespace tilegrad::train

@@ -51,15 +51,6 @@ Path MaskFileOf(const Path& images, const Path& name) {
   return {};
 }
 
-Status CheckAllMasked(const std::vector<TransformsFrame>& frames) {
-  const TransformsFrame* masked = nullptr;
-  const TransformsFrame* bare = nullptr;
-  for (const TransformsFrame& frame : frames) (frame.mask.empty() ? bare : masked) = &frame;
-  if (masked == nullptr || bare == nullptr) return {};
-  return DataLoss("{}: has no mask, though {} has {}", bare->image.string(), masked->image.string(),
-                  masked->mask.string());
-}
-
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
   TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model));
   TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
@@ -73,7 +64,6 @@ Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
     frame.camera = FrameOf(view);
     frames.push_back(std::move(frame));
   }
-  TILEGRAD_TRY(CheckAllMasked(frames));
   return frames;
 }
 

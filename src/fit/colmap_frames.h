@@ -15,13 +15,11 @@
 namespace tilegrad::train {
 
 // Images are looked for in folders `images`, and by their names alone, beside the model and up to
-// two folders above it. Either all images have a mask or none. Errors name the file.
+// two folders above it. Errors name the file.
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model);
 
 // The mask of `images`/`name`, in a folder "masks" or "mask" beside `images` or in it; empty where
 // there is none.
 Path MaskFileOf(const Path& images, const Path& name);
-// An error names an image without a mask where others have one.
-Status CheckAllMasked(const std::vector<TransformsFrame>& frames);
 
 }  // namespace tilegrad::train

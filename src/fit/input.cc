@@ -10,13 +10,10 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "base/read_budget.h"
 #include "fit/bare_frames.h"
 #include "fit/colmap_frames.h"
+#include "fit/view_pixels.h"
 #include "io/camera_file.h"
-#include "io/image_file.h"
-#include "io/orientation.h"
-#include "train/data/cutout.h"
 #include "train/data/dataset.h"
 #include "train/data/dataset_files.h"
 
@@ -25,113 +22,98 @@ namespace {
 
 constexpr std::size_t kMostPixels = std::size_t{1} << 30;  // of all views together
 
-ImageSize SizeOf(const ImageU8& image) { return {image.width, image.height}; }
+// Grows an input by one view after the other.
+class InputReader {
+ public:
+  explicit InputReader(FitInput* input) : input_(*input) {}
 
-std::string Describe(ImageSize size) { return fmt::format("{} x {}", size.width, size.height); }
-
-// NeRF programs differ: some turn images first, some ignore the tag as COLMAP does. Where the
-// camera's size is that of the stored image and not of the upright one, it counts stored pixels.
-Result<ImageU8> LoadTarget(const TransformsFrame& frame) {
-  const ReadBudget budget;
-  TILEGRAD_ASSIGN(const Bytes bytes, ReadFile(frame.image));
-  TILEGRAD_ASSIGN(ImageU8 stored,
-                  io::DecodeImage(bytes, frame.image.string(), io::PixelOrder::kStored));
-  if (frame.stored_order) return stored;
-  const ImageSize meant = frame.camera.size.value_or(ImageSize());
-  const auto fits = [&](const ImageU8& image) {
-    return std::int64_t{image.width} * meant.height == std::int64_t{image.height} * meant.width;
-  };
-  const bool fits_stored = meant.width > 0 && fits(stored);
-  ImageU8 upright = io::Upright(stored, io::OrientationOf(bytes));
-  return fits_stored && !fits(upright) ? std::move(stored) : std::move(upright);
-}
-
-Status TakeMask(const Path& path, ImageSize size, float* alpha) {
-  TILEGRAD_ASSIGN(const ImageU8 mask, io::LoadImage(path));
-  if (mask.width != size.width || mask.height != size.height) {
-    return DataLoss("{}: the mask has {} pixels, its image {}", path.string(),
-                    Describe(SizeOf(mask)), Describe(size));
-  }
-  const std::vector<std::uint8_t> values = MaskValues(mask);
-  std::transform(values.begin(), values.end(), alpha,
-                 [](std::uint8_t v) { return static_cast<float>(v) / 255; });
-  return {};
-}
-
-void TakeImage(const ImageU8& image, float* color, float* alpha) {
-  const auto channels = static_cast<std::size_t>(image.channels);
-  const std::size_t plane = image.pixels.size() / channels;
-  for (std::size_t p = 0; p < plane; ++p) {
-    const std::uint8_t* pixel = &image.pixels[channels * p];
-    for (std::size_t c = 0; c < 3; ++c) {
-      color[c * plane + p] = static_cast<float>(pixel[channels >= 3 ? c : 0]) / 255;
+  Status AddAll(std::span<const TransformsFrame> frames, const Watch& watch) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      TILEGRAD_TRY(watch.At({"reading images", i, frames.size(), ""}));
+      TILEGRAD_TRY(Add(frames[i]));
     }
-    const bool has_alpha = channels == 2 || channels == 4;
-    alpha[p] = has_alpha ? static_cast<float>(pixel[channels - 1]) / 255 : 1.0f;
+    return watch.At({"reading images", frames.size(), frames.size(), ""});
   }
-}
 
-// Grows the input by one view.
-Status AddView(const TransformsFrame& frame, FitInput* input) {
-  TILEGRAD_ASSIGN(const ImageU8 image, LoadTarget(frame));
-  TargetImages& all = input->images;
-  const ImageSize size = SizeOf(image);
-  if (input->names.empty()) all.width = size.width, all.height = size.height;
-  if (size.width != all.width || size.height != all.height) {
-    return DataLoss("{}: has {} pixels, the images before it {}", frame.image.string(),
-                    Describe(size), Describe({all.width, all.height}));
+  // Either all views have a mask or none.
+  Status CheckMasks(Background background) const {
+    const bool asked = background == Background::kAuto || background == Background::kMask;
+    if (!asked || masked_.empty() || bare_.empty()) return {};
+    return DataLoss(
+        "{}: has no mask, though {} has {}: give it one, or --background plain or none for all",
+        bare_[0].image, masked_[0].image, masked_[0].mask);
   }
-  const std::size_t plane = all.pixels(), n = input->names.size();
-  if ((n + 1) * plane > kMostPixels) {
+
+  // Where others have a border, a mask without one says most likely nothing.
+  void WarnOfFullMasks() {
+    if (!HasAlpha(input_)) return;
+    for (const std::string& name : full_)
+      input_.warnings.push_back(name + ": its mask is full: every pixel counts as the object");
+  }
+
+ private:
+  struct Source {
+    std::string image, mask;
+  };
+
+  Status Add(const TransformsFrame& frame) {
+    TILEGRAD_ASSIGN(const ViewPixels view, LoadViewPixels(frame));
+    TILEGRAD_TRY(CheckSize(frame, view));
+    const auto camera = CameraOfFrame(frame, view.size);
+    if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
+    input_.cameras.push_back(*camera);
+    input_.names.push_back(frame.image.filename().string());
+    input_.images.color.insert(input_.images.color.end(), view.color.begin(), view.color.end());
+    input_.images.alpha.insert(input_.images.alpha.end(), view.alpha.begin(), view.alpha.end());
+    (view.mask.empty() ? bare_ : masked_).push_back({frame.image.string(), view.mask});
+    NoteFull(view);
+    return {};
+  }
+
+  Status CheckSize(const TransformsFrame& frame, const ViewPixels& view) {
+    TargetImages& all = input_.images;
+    if (input_.names.empty()) {
+      all.width = view.size.width;
+      all.height = view.size.height;
+    }
+    if (view.size.width != all.width || view.size.height != all.height) {
+      return DataLoss("{}: has {} x {} pixels, the images before it {} x {}", frame.image.string(),
+                      view.size.width, view.size.height, all.width, all.height);
+    }
+    if ((input_.names.size() + 1) * all.pixels() <= kMostPixels) return {};
     return ResourceExhausted("{}: all images together have more than {} pixels",
                              frame.image.string(), kMostPixels);
   }
-  auto camera = CameraOfFrame(frame, size);
-  if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
-  all.color.resize(3 * plane * (n + 1)), all.alpha.resize(plane * (n + 1));
-  TakeImage(image, all.color.data() + 3 * plane * n, all.alpha.data() + plane * n);
-  if (!frame.mask.empty()) {
-    TILEGRAD_TRY(TakeMask(frame.mask, size, all.alpha.data() + plane * n));
-  }
-  input->cameras.push_back(*camera);
-  input->names.push_back(frame.image.filename().string());
-  return {};
-}
 
-Status AddViews(std::span<const TransformsFrame> frames, const Watch& watch, FitInput* input) {
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    TILEGRAD_TRY(watch.At({"reading images", i, frames.size(), ""}));
-    TILEGRAD_TRY(AddView(frames[i], input));
+  void NoteFull(const ViewPixels& view) {
+    const bool full = std::ranges::all_of(view.alpha, [](float a) { return a >= 1; });
+    if (full && !view.mask.empty()) full_.push_back(input_.names.back());
   }
-  return watch.At({"reading images", frames.size(), frames.size(), ""});
-}
 
-// Every n-th view, from the n-th on, is held out.
+  FitInput& input_;
+  std::vector<Source> masked_, bare_;
+  std::vector<std::string> full_;
+};
+
+// Every n-th view, from the n-th on, is held out, as are those that are already.
 void HoldOut(int every, FitInput* input) {
+  std::vector<int> more;
   for (int i = 0; i < static_cast<int>(input->cameras.size()); ++i) {
+    if (std::ranges::find(input->held_out, i) != input->held_out.end()) continue;
     const bool held = every > 0 && i % every == every - 1;
-    (held ? input->held_out : input->training).push_back(i);
+    (held ? more : input->training).push_back(i);
   }
+  input->held_out.insert(input->held_out.end(), more.begin(), more.end());
 }
 
-Status Finish(FitInput* input) {
-  if (input->training.empty())
-    return InvalidArgument("all views are held out: none is left to fit");
-  input->masked = HasAlpha(*input);
-  return {};
-}
+struct Frames {
+  std::vector<TransformsFrame> frames;
+  bool posed = true;
+  std::vector<std::string> warnings;
+};
 
-// Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
-// Says in `input` whether they have cameras, and warns.
-Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, FitInput* input) {
-  for (const char* name : {"transforms.json", "transforms_train.json"}) {
-    if (PathExists(folder / name)) return ReadTransforms(folder / name);
-  }
-  if (const auto model = io::FindColmapModel(folder)) {
-    if (!model->note.empty()) input->warnings.push_back(model->note);
-    return ReadColmapFrames(model->folder);
-  }
-  TILEGRAD_ASSIGN(auto bare, ReadBareFrames(folder, fov));
+// Why there is nothing to fit in a folder.
+Status NothingIn(const Path& folder, const Frames& bare) {
   if (PathExists(DatasetInfoPath(folder))) {
     return InvalidArgument("{}: a folder of tilegrad dataset: name a model of it, --model CLASS/ID",
                            folder.string());
@@ -142,15 +124,30 @@ Result<std::vector<TransformsFrame>> ReadFrames(const Path& folder, double fov, 
         folder.string());
   }
   if (!PathExists(folder)) return NotFound("{}: no such folder", folder.string());
-  if (!bare.empty()) {
-    input->posed = false;
-    return bare;
-  }
+  if (!bare.frames.empty()) return {};
   return NotFound(
       "{}: neither transforms.json nor transforms_train.json nor a COLMAP model nor pictures in it "
-      "(docs/fit.md "
-      "says what a fit reads)",
-      folder.string());
+      "(docs/fit.md says what a fit reads){}",
+      folder.string(), bare.warnings.empty() ? "" : "; " + bare.warnings[0]);
+}
+
+// Of transforms.json, or of a COLMAP model where there is none, or pictures without cameras.
+Result<Frames> ReadFrames(const Path& folder, double fov) {
+  Frames out;
+  for (const char* name : {"transforms.json", "transforms_train.json"}) {
+    if (!PathExists(folder / name)) continue;
+    TILEGRAD_ASSIGN(out.frames, ReadTransforms(folder / name));
+    return out;
+  }
+  if (const auto model = io::FindColmapModel(folder)) {
+    if (!model->note.empty()) out.warnings.push_back(model->note);
+    TILEGRAD_ASSIGN(out.frames, ReadColmapFrames(model->folder));
+    return out;
+  }
+  out.posed = false;
+  out.frames = ReadBareFrames(folder, fov, &out.warnings);
+  TILEGRAD_TRY(NothingIn(folder, out));
+  return out;
 }
 
 Result<int> FindModel(const Dataset& dataset, const std::string& name) {
@@ -184,26 +181,38 @@ TargetImages TargetsOfPlanar(std::span<const std::uint8_t> bytes, int size) {
   return out;
 }
 
+Status FinishInput(const InputOptions& options, FitInput* input) {
+  HoldOut(options.hold_out, input);
+  TILEGRAD_TRY(ApplyBackground(options.background, input, options.watch));
+  TILEGRAD_TRY(DropEmptyViews(input));
+  if (input->training.empty())
+    return InvalidArgument("all views are held out: none is left to fit");
+  return {};
+}
+
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options) {
   FitInput input;
-  TILEGRAD_ASSIGN(const auto frames, ReadFrames(folder, options.fov, &input));
-  TILEGRAD_TRY(AddViews(frames, options.watch, &input));
+  TILEGRAD_ASSIGN(Frames read, ReadFrames(folder, options.fov));
+  input.posed = read.posed;
+  input.warnings = std::move(read.warnings);
   const Path test = folder / "transforms_test.json";
-  const bool has_test = PathExists(test);
-  if (has_test && options.hold_out > 0) {
+  if (PathExists(test) && options.hold_out > 0) {
     return InvalidArgument(
         "{}: already says which views are held out: leave out --hold-out, or that file",
         test.string());
   }
-  HoldOut(options.hold_out, &input);
-  if (has_test && input.posed) {
-    TILEGRAD_ASSIGN(const auto more, ReadTransforms(test));
-    for (std::size_t i = 0; i < more.size(); ++i)
-      input.held_out.push_back(static_cast<int>(frames.size() + i));
-    TILEGRAD_TRY(AddViews(more, options.watch, &input));
+  if (PathExists(test) && input.posed) {
+    TILEGRAD_ASSIGN(auto more, ReadTransforms(test));
+    for (TransformsFrame& frame : more) {
+      input.held_out.push_back(static_cast<int>(read.frames.size()));
+      read.frames.push_back(std::move(frame));
+    }
   }
-  TILEGRAD_TRY(ApplyBackground(options.background, &input, options.watch));
-  TILEGRAD_TRY(Finish(&input));
+  InputReader reader(&input);
+  TILEGRAD_TRY(reader.AddAll(read.frames, options.watch));
+  TILEGRAD_TRY(reader.CheckMasks(options.background));
+  reader.WarnOfFullMasks();
+  TILEGRAD_TRY(FinishInput(options, &input));
   return input;
 }
 
@@ -219,8 +228,7 @@ Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, in
     input.names.push_back(fmt::format("view {}", i));
   }
   input.occupancy = std::move(data.occupancy);
-  HoldOut(hold_out, &input);
-  TILEGRAD_TRY(Finish(&input));
+  TILEGRAD_TRY(FinishInput({hold_out, Background::kMask}, &input));
   return input;
 }
 

@@ -50,26 +50,32 @@ struct InputOptions {
   int hold_out = 0;  // every n-th view; 0: none
   Background background = Background::kAuto;
   double fov = kUsualFov;  // of images without cameras, degrees along their longer side
-  Watch watch = {};        // of reading and masks
+  Watch watch = {};  // of reading and masks
 };
 
 // A folder with transforms.json, or transforms_train.json, or a COLMAP project. Views of
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
 // none). Or a folder of pictures alone, which come without cameras (bare_frames.h). An image's mask
-// is its alpha, or the mask_path of its frame (grey or alpha). All images must have one size.
-// Errors name the file.
+// is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
+// images must have one size. Errors name the file.
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
 inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});
 }
 
+// What is left to do once there are names, cameras and images: masks as `background` says, of
+// images with alpha or opaque ones; every `hold_out`-th of the views that are not held out is.
+// Views whose mask is empty go, with a warning. An error if no view is left to fit.
+Status FinishInput(const InputOptions& options, FitInput* input);
+
 // Whether some pixel is not opaque.
 bool HasAlpha(const FitInput& input);
-// Masks as `background` says, of images with alpha or opaque ones. Sets `masked`. An error only if
-// stopped.
+// Sets `masked`, too. An error only if stopped.
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch = {});
 // Masks of all images by their plain backgrounds, with a warning for each that is in doubt.
 Status TakePlainBackgrounds(FitInput* input, const Watch& watch = {});
+// Takes away views that show no object, with a warning for each. An error if all are such.
+Status DropEmptyViews(FitInput* input);
 
 // One model of a dataset (train/data/dataset.h), named "CLASS/ID".
 Result<FitInput> ReadFitDataset(const Path& folder, const std::string& model, int hold_out);

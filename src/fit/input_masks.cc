@@ -40,12 +40,57 @@ namespace {
 Status LookForPlainBackgrounds(bool asked, FitInput* input, const Watch& watch) {
   FitInput masked = *input;
   TILEGRAD_TRY(TakePlainBackgrounds(&masked, watch));
+  const std::size_t doubts = masked.warnings.size() - input->warnings.size();
   // Backgrounds that are not plain make no masks unless somebody says so.
-  if (asked || 2 * masked.warnings.size() <= masked.names.size()) *input = std::move(masked);
+  if (asked || 2 * doubts <= masked.names.size()) *input = std::move(masked);
   return {};
 }
 
+constexpr float kObjectAlpha = 0.5f;  // alpha of what the hull takes for the object
+
+template <class Values>
+void KeepPlanes(const std::vector<int>& kept, std::size_t size, Values* values) {
+  Values out;
+  for (const int i : kept) {
+    const auto from = values->begin() + static_cast<std::ptrdiff_t>(size) * i;
+    out.insert(out.end(), from, from + static_cast<std::ptrdiff_t>(size));
+  }
+  values->swap(out);
+}
+
+// Indices of views among those that are kept.
+void Renumber(const std::vector<int>& kept, std::vector<int>* views) {
+  std::vector<int> out;
+  for (const int view : *views) {
+    const auto at = std::ranges::lower_bound(kept, view);
+    if (at != kept.end() && *at == view) out.push_back(static_cast<int>(at - kept.begin()));
+  }
+  views->swap(out);
+}
+
 }  // namespace
+
+Status DropEmptyViews(FitInput* input) {
+  TargetImages& all = input->images;
+  std::vector<int> kept;
+  for (std::size_t n = 0; n < input->names.size(); ++n) {
+    const auto alpha = std::span(all.alpha).subspan(n * all.pixels(), all.pixels());
+    if (std::ranges::any_of(alpha, [](float a) { return a >= kObjectAlpha; })) {
+      kept.push_back(static_cast<int>(n));
+    } else {
+      input->warnings.push_back(input->names[n] + ": its mask is empty; the view is left out");
+    }
+  }
+  if (kept.empty()) return InvalidArgument("all masks are empty: there is nothing to fit");
+  if (kept.size() == input->names.size()) return {};
+  KeepPlanes(kept, 3 * all.pixels(), &all.color);
+  KeepPlanes(kept, all.pixels(), &all.alpha);
+  KeepPlanes(kept, 1, &input->names);
+  KeepPlanes(kept, 1, &input->cameras);
+  Renumber(kept, &input->training);
+  Renumber(kept, &input->held_out);
+  return {};
+}
 
 Status ApplyBackground(Background background, FitInput* input, const Watch& watch) {
   if (background == Background::kNone) std::ranges::fill(input->images.alpha, 1.0f);

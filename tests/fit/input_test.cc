@@ -183,6 +183,96 @@ TEST_F(Input, ColmapCamerasThatNoImageUsesMayBeOfAnyKind) {
   ExpectMessage(ReadFitFolder(folder_ / "p", 0).status(), "cameras.txt: line 1", "NEVER_HEARD_OF");
 }
 
+// A cut-out of 8 x 6 pixels; the object is its first `columns`.
+ImageU8 CutOut(int columns) {
+  ImageU8 image(8, 6, 4, 77);
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 8; ++x) image.at(x, y)[3] = x < columns ? 255 : 0;
+  return image;
+}
+
+// Ten frames of images/0.png to 9.png; `more` stands in the given one.
+std::string TenFrames(int which, const std::string& more) {
+  std::string frames;
+  for (int i = 0; i < 10; ++i) {
+    frames += std::string(i == 0 ? "" : ",") + R"({"file_path":"images/)" + std::to_string(i) +
+              R"(.png",)" + (i == which ? more : "") + kPose + "}";
+  }
+  return R"({"fl_x":10,"frames":[)" + frames + "]}";
+}
+
+TEST_F(Input, EitherAllViewsHaveAMaskOrNone) {
+  std::filesystem::create_directories(folder_ / "m/images");
+  for (int i = 0; i < 10; ++i) {
+    const ImageU8 image = i == 7 ? ImageU8(8, 6, 3, 77) : CutOut(4);
+    ASSERT_TRUE(io::SavePng(folder_ / "m/images" / (std::to_string(i) + ".png"), image).ok());
+  }
+  Write("m/transforms.json", TenFrames(-1, ""));
+  ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask",
+                "images/0.png has its alpha channel");
+  EXPECT_TRUE(ReadFitFolder(folder_ / "m", {.background = Background::kNone}).ok());
+  Mask("m/seven.png");
+  Write("m/transforms.json", TenFrames(7, R"("mask_path":"seven.png",)"));
+  const auto input = ReadFitFolder(folder_ / "m", 0);
+  ASSERT_TRUE(input.ok()) << input.status().message();
+  EXPECT_TRUE(input->warnings.empty());
+  // Bare pictures, and those of a test file, go the same way.
+  std::filesystem::remove(folder_ / "m/transforms.json");
+  ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask");
+  Write("m/transforms.json",
+        R"({"fl_x":10,"frames":[{"file_path":"images/0.png",)" + std::string(kPose) + "}]}");
+  Write("m/transforms_test.json",
+        R"({"fl_x":10,"frames":[{"file_path":"images/7.png",)" + std::string(kPose) + "}]}");
+  ExpectMessage(ReadFitFolder(folder_ / "m", 0).status(), "images/7.png: has no mask");
+  // An alpha that is 1 everywhere may be right.
+  ASSERT_TRUE(io::SavePng(folder_ / "m/images/7.png", CutOut(8)).ok());
+  const auto full = ReadFitFolder(folder_ / "m", 0);
+  ASSERT_EQ(full->warnings.size(), 1u);
+  EXPECT_NE(full->warnings[0].find("7.png: its mask is full"), std::string::npos);
+}
+
+TEST_F(Input, ViewsThatShowNothingAreNamedAndLeftOut) {
+  std::filesystem::create_directories(folder_ / "e/images");
+  for (int i = 0; i < 10; ++i) {
+    const ImageU8 image = CutOut(i == 2 || i == 3 ? 0 : i == 9 ? 5 : 4);
+    ASSERT_TRUE(io::SavePng(folder_ / "e/images" / (std::to_string(i) + ".png"), image).ok());
+  }
+  Write("e/transforms.json", TenFrames(-1, ""));
+  const auto input = ReadFitFolder(folder_ / "e", 4);  // views 3 and 7 are held out
+  ASSERT_TRUE(input.ok()) << input.status().message();
+  EXPECT_EQ(input->names, (std::vector<std::string>{"0.png", "1.png", "4.png", "5.png", "6.png",
+                                                    "7.png", "8.png", "9.png"}));
+  EXPECT_EQ(input->held_out, std::vector<int>{5});
+  EXPECT_EQ(input->training, (std::vector<int>{0, 1, 2, 3, 4, 6, 7}));
+  EXPECT_EQ(input->cameras.size(), 8u);
+  EXPECT_EQ(input->images.alpha.size(), 8u * 48);
+  EXPECT_EQ(input->images.alpha[7 * 48 + 4], 1);
+  EXPECT_EQ(input->images.color.size(), 3u * 8 * 48);
+  ASSERT_EQ(input->warnings.size(), 2u);
+  EXPECT_NE(input->warnings[0].find("2.png: its mask is empty"), std::string::npos);
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(io::SavePng(folder_ / "e/images" / (std::to_string(i) + ".png"), CutOut(0)).ok());
+  }
+  ExpectMessage(ReadFitFolder(folder_ / "e", 0).status(), "all masks are empty");
+}
+
+TEST_F(Input, BarePicturesThatAreNotReadAreNamed) {
+  Image("b/0.png", 51);
+  Image("b/1.PNG", 51);
+  Write("b/notes.txt", std::string("mine"));
+  EXPECT_TRUE(ReadFitFolder(folder_ / "b", 0)->warnings.empty());
+  for (const char* name : {"b/2.heic", "b/3.TIF", "b/4.bmp"}) Write(name, std::string("x"));
+  const auto input = ReadFitFolder(folder_ / "b", 0);
+  ASSERT_TRUE(input.ok()) << input.status().message();
+  EXPECT_EQ(input->names.size(), 2u);
+  ASSERT_EQ(input->warnings.size(), 1u);
+  EXPECT_NE(input->warnings[0].find("left out 3 pictures"), std::string::npos);
+  EXPECT_NE(input->warnings[0].find("2.heic, 3.TIF, 4.bmp"), std::string::npos);
+  std::filesystem::remove(folder_ / "b/0.png");
+  std::filesystem::remove(folder_ / "b/1.PNG");
+  ExpectMessage(ReadFitFolder(folder_ / "b", 0).status(), "nor pictures", "2.heic");
+}
+
 // A disk from before UTF-8, in all that names files.
 TEST_F(Input, NamesNeedNotBeUtf8) {
   const std::string name = "caf\xe9.png";
