@@ -52,7 +52,7 @@ Path MaskFileOf(const Path& images, const Path& name) {
 }
 
 Result<std::vector<TransformsFrame>> ReadColmapFrames(const Path& model) {
-  TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model));
+  TILEGRAD_ASSIGN(const auto views, io::LoadColmapCameras(model, {.bent = true}));
   TILEGRAD_ASSIGN(const Path images, FindImages(model, io::PortablePath(views[0].name)));
   std::vector<TransformsFrame> frames;
   for (const io::CameraView& view : views) {

@@ -12,7 +12,7 @@
 #include "base/file.h"
 #include "fit/bare_frames.h"
 #include "fit/colmap_frames.h"
-#include "fit/view_pixels.h"
+#include "fit/undistort.h"
 #include "io/camera_file.h"
 #include "train/data/dataset.h"
 #include "train/data/dataset_files.h"
@@ -57,11 +57,11 @@ class InputReader {
   };
 
   Status Add(const TransformsFrame& frame) {
-    TILEGRAD_ASSIGN(const ViewPixels view, LoadViewPixels(frame));
+    TILEGRAD_ASSIGN(ViewPixels view, LoadViewPixels(frame));
     TILEGRAD_TRY(CheckSize(frame, view));
     const auto camera = CameraOfFrame(frame, view.size);
     if (!camera.ok()) return camera.status().Within("camera of " + frame.image.string());
-    input_.cameras.push_back(*camera);
+    input_.cameras.push_back(Undistort(frame.camera.lens, *camera, &view));
     input_.names.push_back(frame.image.filename().string());
     input_.images.color.insert(input_.images.color.end(), view.color.begin(), view.color.end());
     input_.images.alpha.insert(input_.images.alpha.end(), view.alpha.begin(), view.alpha.end());

@@ -57,7 +57,8 @@ struct InputOptions {
 // transforms_test.json beside it, if it is there, are held out; otherwise every `hold_out`-th (0:
 // none). Or a folder of pictures alone, which come without cameras (bare_frames.h). An image's mask
 // is its alpha, or the mask_path of its frame (grey or alpha); either all have one or none. All
-// images must have one size. Errors name the file.
+// images must have one size. Lenses that bend rays are straightened (undistort.h). Errors name the
+// file.
 Result<FitInput> ReadFitFolder(const Path& folder, const InputOptions& options);
 inline Result<FitInput> ReadFitFolder(const Path& folder, int hold_out) {
   return ReadFitFolder(folder, InputOptions{.hold_out = hold_out});

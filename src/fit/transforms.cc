@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "base/json_text.h"
-#include "io/transforms_lens.h"
 
 namespace tilegrad::train {
 namespace {
@@ -27,7 +26,6 @@ Result<std::vector<TransformsFrame>> ReadTransforms(const Path& path) {
   std::vector<TransformsFrame> out;
   for (io::NerfFrame& frame : frames) {
     if (!frame.image) return DataLoss("{}: needs \"file_path\", a string", frame.place);
-    TILEGRAD_TRY(io::CheckStraight(frame.lens).Within(frame.place));
     TransformsFrame& one = out.emplace_back();
     one.image = FindFile(path.parent_path(), *frame.image);
     if (frame.mask) one.mask = FindFile(path.parent_path(), *frame.mask);

@@ -371,7 +371,7 @@ TEST_F(Fit, WildTransforms) {
   ExpectMessage(error(matrix("1e999")), "transforms.json", "1e999");
   ExpectMessage(error(matrix("null")), "transforms.json", "frame 0", "transform_matrix");
   ExpectMessage(error(R"("transform_matrix": )" + deep), "transforms.json", "nested");
-  for (const std::string field : {"\"w\": 1e300", "\"h\": -1", "\"fl_x\": []", "\"k1\": 1e-320",
+  for (const std::string field : {"\"w\": 1e300", "\"h\": -1", "\"fl_x\": []", "\"k5\": 1e-320",
                                   "\"mask_path\": 1", "\"file_path\": null"}) {
     ExpectMessage(error(field + ", " + matrix("4")), "transforms.json", "frame 0");
   }

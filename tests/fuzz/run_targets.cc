@@ -62,9 +62,10 @@ void Transforms(Input input) {
 std::vector<Bytes> TransformsSeeds() {
   return {
       ToBytes(train::WriteTransforms({{"a.png", Camera(), 1.5}}, {64, 48})),
-      ToBytes(R"({"camera_angle_x":0.7,"camera_model":"OPENCV","k1":0,"frames":[{"file_path":"a",)"
-              R"("mask_path":"m.png","w":64,"h":48,"fl_x":50,"fl_y":50,"cx":32,"cy":24,)"
-              R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]})")};
+      ToBytes(
+          R"({"camera_angle_x":0.7,"camera_model":"OPENCV","k1":0.1,"frames":[{"file_path":"a",)"
+          R"("mask_path":"m.png","w":64,"h":48,"fl_x":50,"fl_y":50,"cx":32,"cy":24,)"
+          R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]})")};
 }
 
 void Checkpoint(Input input) {
